@@ -1,0 +1,45 @@
+# Every target sets up its own .venv first; nothing outside this folder is changed.
+
+SUPPORTED := import sys; sys.exit(sys.version_info[:2] not in ((3, 11), (3, 12)))
+# The first candidate that runs and is 3.11 or 3.12; `make PYTHON=/path/to/python3.11 …` overrides.
+PYTHON ?= $(shell for candidate in python3.12 python3.11 python3; do \
+	"$$candidate" -c "$(SUPPORTED)" 2>/dev/null && { command -v "$$candidate"; break; }; done)
+BIN := .venv/bin
+EXPLORER := $(BIN)/explorer
+
+.DEFAULT_GOAL := help
+.PHONY: help venv serve calibrate calibrate-quick test slow clean
+
+help: ## show this list
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 18
+
+venv: .venv/.ready ## set up .venv from pyproject.toml and constraints.txt
+
+.venv/.ready: pyproject.toml constraints.txt
+	@"$(PYTHON)" -c "$(SUPPORTED)" 2>/dev/null || \
+		{ echo "error: Python 3.11 or 3.12 is needed; install one, or name it: make PYTHON=/path/to/python3.11" >&2; exit 1; }
+	"$(PYTHON)" -m venv .venv
+	$(BIN)/python -m pip install --disable-pip-version-check --quiet -c constraints.txt -e '.[test]'
+	@touch $@
+
+serve: .venv/.ready ## open the live page (address is printed; stop with Ctrl-C)
+	$(EXPLORER) serve
+
+calibrate: .venv/.ready ## calibrate the shipped material, profile standard, into results/standard (resumes)
+	$(EXPLORER) calibrate --headless --profile standard --out results/standard $(if $(wildcard results/standard),--resume)
+
+calibrate-quick: .venv/.ready ## the same chain with coarse shapes and less mass, into results/quick (resumes)
+	$(EXPLORER) calibrate --headless --profile quick --out results/quick $(if $(wildcard results/quick),--resume)
+
+test: .venv/.ready ## format check, lint, types, fast tests
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/pytest
+
+slow: .venv/.ready ## the tests marked slow
+	$(BIN)/pytest -m slow
+
+clean: ## remove .venv and the caches; results stay
+	rm -rf .venv .mypy_cache .pytest_cache .ruff_cache .hypothesis
+	find explorer solver doe tests -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,148 @@
+"""The whole chain: pilot → screening → assumptions → scan → ascent → surface → optimum → verification."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from doe.errors import StatisticsError, StudyStopped
+from doe.profile import Profile
+from doe.record import Record, plain
+from doe.runner import Run, Runner, Setting
+from doe.stages.ascent import AscentResult, ascent
+from doe.stages.lines import (
+    ascent_line,
+    optimum_line,
+    pilot_line,
+    scan_line,
+    screening_line,
+    surface_line,
+    verification_line,
+)
+from doe.stages.pilot import Bias, PilotResult, pilot
+from doe.stages.scan import ScanResult, scan
+from doe.stages.screening import ScreeningResult, assumptions, screening
+from doe.stages.sizing import ASSUMPTION_ROWS, SCREENING_ROWS
+from doe.stages.surface import OptimumResult, SurfaceResult, optimum, surface
+from doe.stages.verification import VerificationResult, verification
+from doe.study import Study
+
+SCHEMA = 1
+STAGES = ("pilot", "screening", "assumptions", "scan", "ascent", "surface", "optimum", "verification")
+
+
+@dataclass(frozen=True)
+class CampaignResult(Record):
+    """Everything that a study found; ``to_dict`` is the body of ``result.json``."""
+
+    pilot: PilotResult
+    screening: ScreeningResult
+    assumptions: ScreeningResult | None
+    scan: ScanResult | None
+    ascent: AscentResult
+    surface: SurfaceResult
+    optimum: OptimumResult
+    verification: VerificationResult
+    stage_seconds: dict[str, float]
+
+    def all_runs(self) -> list[tuple[str, Run]]:
+        """(stage, run) of every run, failed ones included."""
+        found: list[tuple[str, Run]] = []
+        for stage in ("pilot", "screening", "assumptions", "scan", "ascent", "surface"):
+            result = getattr(self, stage)
+            if result is not None:
+                found += [(stage, run) for runs in result.runs for run in runs]
+        return found + [("verification", run) for run in self.verification.runs]
+
+
+def run_campaign(
+    study: Study,
+    profile: Profile,
+    runner: Runner,
+    estimator_bias: Bias,
+    on_stage: Callable[[str, str], None] = lambda stage, line: None,
+) -> CampaignResult:
+    """Run every stage; ``on_stage`` is called with (stage, one line of what it found) as each ends.
+
+    Raises StudyStopped where what the runs of a stage gave cannot be analysed.
+    """
+    seconds: dict[str, float] = {}
+    counted = CountingRunner(runner)
+
+    def timed(stage: str, work: Callable[[], Any], line: Callable[[Any], str]) -> Any:
+        started = time.perf_counter()
+        try:
+            result = work()
+        except StatisticsError as error:
+            seen = ", ".join(f"{number} {outcome}" for outcome, number in counted.outcomes.items())
+            raise StudyStopped(stage, f"{error} (the last runs: {seen})", counted.runs) from error
+        seconds[stage] = time.perf_counter() - started
+        on_stage(stage, line(result) if result is not None else "not declared in this study")
+        return result
+
+    piloted: PilotResult = timed("pilot", lambda: pilot(study, profile, counted, estimator_bias), pilot_line)
+    sized = piloted.profile
+    response = piloted.estimator
+    screened = timed("screening", lambda: screening(study, sized, counted, response), screening_line)
+    assumed = timed("assumptions", lambda: assumptions(study, sized, counted, response), screening_line)
+    noise = piloted.noise[study.targets[0].observable]
+    scanned = timed("scan", lambda: scan(study, sized, counted, noise), scan_line)
+    walked = timed("ascent", lambda: ascent(study, sized, counted, screened, noise), ascent_line)
+    fitted = timed("surface", lambda: surface(study, sized, counted, walked.factors, walked.region), surface_line)
+    chosen = timed("optimum", lambda: optimum(study, fitted), optimum_line)
+    verified = timed("verification", lambda: verification(study, sized, counted, chosen.values), verification_line)
+    return CampaignResult(piloted, screened, assumed, scanned, walked, fitted, chosen, verified, stage_seconds=seconds)
+
+
+class CountingRunner:
+    """A runner that counts the runs that it was given, failed ones included."""
+
+    def __init__(self, runner: Runner) -> None:
+        self._runner, self.runs = runner, 0
+        self.outcomes: Counter[str] = Counter()
+        """Outcome → number of the stage that ran last."""
+
+    def run(self, stage: str, settings: Sequence[Setting]) -> list[list[Run]]:
+        """See :class:`doe.runner.Runner`."""
+        rows = self._runner.run(stage, settings)
+        self.runs += sum(len(runs) for runs in rows)
+        self.outcomes = Counter(run.outcome for runs in rows for run in runs)
+        return rows
+
+
+def planned_runs(study: Study, profile: Profile) -> dict[str, int]:
+    """Valid runs that each stage will make, replacements of failed runs not counted."""
+    return {
+        "pilot": profile.pilot_runs + profile.change_runs * len(study.changes),
+        "screening": SCREENING_ROWS * profile.screening_replicates,
+        "assumptions": ASSUMPTION_ROWS * profile.assumption_replicates if study.assumptions else 0,
+        "scan": len(study.scan_values) * profile.scan_replicates,
+        "ascent": profile.ascent_steps * profile.ascent_replicates,
+        "surface": 17 * profile.surface_replicates,
+        "verification": profile.verification_runs,
+    }
+
+
+def summary_of_runs(result: CampaignResult) -> dict[str, Any]:
+    """Counts of runs by stage and outcome, and the list of all runs, for ``result.json``."""
+    runs = result.all_runs()
+    outcomes: dict[str, int] = {}
+    stages: dict[str, int] = {}
+    for stage, run in runs:
+        outcomes[run.outcome] = outcomes.get(run.outcome, 0) + 1
+        stages[stage] = stages.get(stage, 0) + 1
+    valid = sum(run.valid for _, run in runs)
+    listed = [
+        {"stage": stage, "label": run.label, "seed": run.seed, "outcome": run.outcome, "key": run.key}
+        for stage, run in runs
+    ]
+    return {
+        "total": len(runs),
+        "valid": valid,
+        "by_outcome": outcomes,
+        "by_stage": stages,
+        "list": plain(listed),
+    }

@@ -1,0 +1,82 @@
+"""Plackett–Burman two-level screening designs with 12 and 28 runs.
+
+Source: Plackett and Burman 1946, Biometrika 33:305. The 28-run table is the one of that paper (nine generator
+rows in three blocks A | B | C); R's FrF2 package and the transcription github.com/paulo-raca/plackett-burman
+print the same. Every column is orthogonal to every other and sums to zero, so N runs estimate N - 1 main
+effects independently of each other. Main effects are not free of two-factor interactions: see
+`interaction_aliases`.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.errors import StatisticsError
+
+IntArray = npt.NDArray[np.int64]
+FloatArray = npt.NDArray[np.float64]
+
+GENERATOR_12 = "++-+++---+-"
+GENERATOR_ROWS_28 = (
+    "+-++++----+---+--+++-+-++-+",
+    "++-+++-----++--+---++++-++-",
+    "-+++++---+---+--+-+-+-++-++",
+    "---+-++++--+-+---++-+++-+-+",
+    "---++-++++----++--++--++++-",
+    "----+++++-+-+---+--+++-+-++",
+    "+++---+-+--+--+-+-+-++-+++-",
+    "+++---++-+--+----+++-++--++",
+    "+++----++-+--+-+---++-+++-+",
+)
+
+
+def plackett_burman(runs: int) -> IntArray:
+    """Return the Plackett–Burman design as levels -1 and +1, shape (runs, runs - 1), last row all -1.
+
+    Raises StatisticsError unless runs is 12 or 28.
+    """
+    if runs == 12:
+        return _cyclic(_levels(GENERATOR_12))
+    if runs == 28:
+        return _block_cyclic(np.array([_levels(row) for row in GENERATOR_ROWS_28]))
+    raise StatisticsError(f"runs = {runs} has no Plackett–Burman table here; allowed are 12 and 28")
+
+
+def fold_over(design: IntArray) -> IntArray:
+    """Return the design followed by its mirror image, shape (2 x runs, columns).
+
+    Frees every main effect from every two-factor interaction (Box and Wilson 1951).
+    """
+    return np.vstack([design, -design])
+
+
+def interaction_aliases(design: IntArray) -> tuple[FloatArray, tuple[tuple[int, int], ...]]:
+    """Return how much of each two-factor interaction leaks into each main effect.
+
+    The alias matrix is A = X'Z/runs with Z the products of column pairs: the estimate of effect j has the
+    expectation effect_j + sum over pairs of A[j, pair] x effect_pair. Returns A, shape (columns, pairs), and
+    the pairs of column indices.
+    """
+    pairs = tuple(combinations(range(design.shape[1]), 2))
+    products = np.stack([design[:, i] * design[:, j] for i, j in pairs], axis=1)
+    return (design.T @ products) / design.shape[0], pairs
+
+
+def _levels(signs: str) -> IntArray:
+    return np.array([1 if sign == "+" else -1 for sign in signs], dtype=np.int64)
+
+
+def _cyclic(generator: IntArray) -> IntArray:
+    """Return the generator, its successive right shifts and a row of -1."""
+    rows = [np.roll(generator, shift) for shift in range(generator.size)]
+    return np.vstack([*rows, -np.ones_like(generator)])
+
+
+def _block_cyclic(generators: IntArray) -> IntArray:
+    """Return the rows [A B C], [C A B], [B C A] and a row of -1."""
+    width = generators.shape[1] // 3
+    blocks = [np.roll(generators, shift * width, axis=1) for shift in range(3)]
+    return np.vstack([*blocks, -np.ones((1, generators.shape[1]), dtype=np.int64)])

@@ -1,0 +1,25 @@
+"""The exceptions of this package."""
+
+
+class StatisticsError(ValueError):
+    """Input that no statistic can be computed from; the message names the argument, its value and what is
+    allowed.
+    """
+
+
+class StudyFileError(ValueError):
+    """An entry of a study file that is not allowed; the message is one line naming key, value and what is allowed."""
+
+
+class StudyStopped(RuntimeError):
+    """A study that ended before its last stage, because what the runs gave cannot be analysed.
+
+    Not a ValueError: the input was right, the outcome is what it is.
+    """
+
+    def __init__(self, stage: str, reason: str, runs: int) -> None:
+        super().__init__(
+            f"stopped in the {stage} stage: {reason}; {runs} finished runs are in the store, --resume continues with "
+            "them once the study is changed"
+        )
+        self.stage, self.reason, self.runs = stage, reason, runs

@@ -1,0 +1,204 @@
+"""Optimum: of all settings that give the target, the one nearest to the measured parameters, and how sure it
+is.
+
+The settings with model = target form a surface in the cube, so one target cannot fix several factors. The
+chosen point minimises sum ((x_i - reference_i)/scale_i)^2 on that surface. Reported beside it: the bootstrap
+interval of the point (the target's own standard error included), the range that each factor can take on the
+surface (its width), and the share of the cube whose predicted mean is compatible with the target at 95 %.
+Source: Davison and Hinkley 1997 (bootstrap); Myers, Montgomery and Anderson-Cook 2016, ch. 6-7.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from doe.bootstrap import Resampling, bootstrap_coefficients
+from doe.errors import StatisticsError
+from doe.level_set import crossings, extremes, nearest_points
+from doe.record import Record
+from doe.surface import Surface
+from doe.surface_anova import analyse_surface
+
+FloatArray = npt.NDArray[np.float64]
+
+WIDTH_LINES = 81
+SHARE_LEVELS = 21
+
+
+@dataclass(frozen=True)
+class Optimum(Record):
+    """The chosen setting. Arrays of shape (factors,) in natural units unless named coded.
+
+    predicted with its 95 % confidence interval is in the unit of the response, as are the reachable values.
+    point_low, point_high: 95 % bootstrap interval of the chosen point; bootstrap_points: shape (refits,
+    factors). share_reached: share of refits in which the target is reachable. solution_low, solution_high:
+    range of each factor on the surface model = target; solution_share: that range as a share of the cube.
+    compatible_share: share of the cube whose mean differs from the target by no more than its 95 % margin.
+    """
+
+    names: tuple[str, ...]
+    target: float
+    target_standard_error: float
+    reached: bool
+    point_coded: FloatArray
+    point: FloatArray
+    predicted: float
+    predicted_low: float
+    predicted_high: float
+    reachable_low: float
+    reachable_low_at: FloatArray
+    reachable_high: float
+    reachable_high_at: FloatArray
+    reference: FloatArray
+    scale: FloatArray
+    distance: float
+    point_low: FloatArray
+    point_high: FloatArray
+    bootstrap_points: FloatArray
+    resampling: Resampling
+    share_reached: float
+    solution_low: FloatArray
+    solution_high: FloatArray
+    solution_share: FloatArray
+    unidentified: tuple[str, ...]
+    compatible_share: float
+    better_than_noise: bool
+    statement: str
+
+
+def find_optimum(
+    surface: Surface,
+    target: float,
+    reference: npt.ArrayLike,
+    scale: npt.ArrayLike | None = None,
+    refits: int = 1000,
+    seed: int = 0,
+    unidentified_share: float = 0.5,
+    target_standard_error: float = 0.0,
+) -> Optimum:
+    """Return the point of {model = target} nearest to the reference, with its uncertainty.
+
+    reference, scale: natural units, shape (factors,); by default the scale is the half-width of the region,
+    so that distance is measured in coded units. A factor counts as unidentified when it can take at least
+    `unidentified_share` of its range while the model stays at the target. When the target cannot be reached,
+    the point is where the model comes nearest to it. target_standard_error: of the measured mean, unit of the
+    response; every refit draws its own target from it.
+
+    Raises StatisticsError for wrong shapes, a scale that is not positive or refits < 500.
+    """
+    region, k = surface.region, len(surface.names)
+    natural_reference = _vector("reference", reference, k)
+    natural_scale = region.half_width.copy() if scale is None else _vector("scale", scale, k)
+    if not (natural_scale > 0).all():
+        raise StatisticsError(f"scale = {natural_scale.tolist()} must be positive")
+    if refits < 500:
+        raise StatisticsError(f"refits = {refits}; a 95 % interval needs at least 500")
+    coded_reference, coded_scale = region.coded(natural_reference), natural_scale / region.half_width
+
+    fitted = surface.coefficients[None, :]
+    points, reachable = nearest_points(fitted, target, coded_reference, coded_scale)
+    point, reached = points[0], bool(reachable[0])
+    resampled, resampling = bootstrap_coefficients(surface, refits, seed)
+    # A stream of its own: the refits stay the same whether or not the target is uncertain.
+    drawn = target + target_standard_error * np.random.default_rng([seed, 1]).standard_normal(refits)
+    cloud, cloud_reached = nearest_points(resampled, drawn, coded_reference, coded_scale)
+    low, high = np.percentile(cloud, [2.5, 97.5], axis=0)
+    bounds = extremes(fitted, k)
+    solution_low, solution_high = solution_range(surface, target)
+    share = np.nan_to_num((solution_high - solution_low) / 2)
+    unidentified = tuple(name for name, part in zip(surface.names, share, strict=True) if part >= unidentified_share)
+    interval_low, interval_high = surface.confidence_interval(point)
+    better = analyse_surface(surface).better_than_noise
+    predicted = float(surface.predict(point))
+    return Optimum(
+        names=surface.names,
+        target=target,
+        target_standard_error=target_standard_error,
+        reached=reached,
+        point_coded=point,
+        point=region.natural(point),
+        predicted=predicted,
+        predicted_low=float(interval_low),
+        predicted_high=float(interval_high),
+        reachable_low=float(bounds.low[0]),
+        reachable_low_at=region.natural(bounds.low_at[0]),
+        reachable_high=float(bounds.high[0]),
+        reachable_high_at=region.natural(bounds.high_at[0]),
+        reference=natural_reference,
+        scale=natural_scale,
+        distance=float(np.sqrt((((point - coded_reference) / coded_scale) ** 2).sum())),
+        point_low=region.natural(low),
+        point_high=region.natural(high),
+        bootstrap_points=region.natural(cloud),
+        resampling=resampling,
+        share_reached=float(cloud_reached.mean()),
+        solution_low=region.natural(solution_low),
+        solution_high=region.natural(solution_high),
+        solution_share=share,
+        unidentified=unidentified,
+        compatible_share=compatible_share(surface, target, target_standard_error),
+        better_than_noise=better,
+        statement=_statement(surface.names, target, reached, predicted, region.natural(point), unidentified, better),
+    )
+
+
+def solution_range(surface: Surface, target: float) -> tuple[FloatArray, FloatArray]:
+    """Return the least and greatest coded value of each factor on {model = target}, each of shape (factors,).
+
+    Sampled by axis-parallel lines 2/80 apart; NaN where the cube holds no such point.
+    """
+    k = len(surface.names)
+    points, valid = crossings(surface.coefficients[None, :], target, np.zeros((1, k)), 1.0, WIDTH_LINES)
+    found = points[0][valid[0]]
+    if not len(found):
+        return np.full(k, np.nan), np.full(k, np.nan)
+    return found.min(axis=0), found.max(axis=0)
+
+
+def compatible_share(surface: Surface, target: float, target_standard_error: float = 0.0, level: float = 0.95) -> float:
+    """Return the share of the cube where |model - target| <= t(level) standard errors, on a 21^k grid of cells.
+
+    The standard error is that of the difference: sqrt(se(model)^2 + target_standard_error^2), with the degrees of
+    freedom of the surface.
+    """
+    k = len(surface.names)
+    middles = (np.arange(SHARE_LEVELS) + 0.5) * 2 / SHARE_LEVELS - 1
+    grid = np.array(list(product(middles, repeat=k)))
+    error = np.hypot(surface.standard_error(grid), target_standard_error)
+    margin = stats.t.ppf((1 + level) / 2, surface.df_residual) * error
+    return float((np.abs(surface.predict(grid) - target) <= margin).mean())
+
+
+def _statement(
+    names: tuple[str, ...],
+    target: float,
+    reached: bool,
+    predicted: float,
+    point: FloatArray,
+    unidentified: tuple[str, ...],
+    better_than_noise: bool,
+) -> str:
+    """Return the result in one or two sentences."""
+    place = ", ".join(f"{name} = {value:.4g}" for name, value in zip(names, point, strict=True))
+    if reached:
+        text = f"The model gives {target:.4g} at {place}, the solution nearest to the reference."
+    else:
+        text = f"The model does not reach {target:.4g} in the region; "
+        text += f"its nearest value is {predicted:.4g} at {place}."
+    if reached and unidentified:
+        text += f" The target does not identify {', '.join(unidentified)}."
+    if not better_than_noise:
+        text += " The surface is not better than noise, so this point is not a calibration."
+    return text
+
+
+def _vector(name: str, values: npt.ArrayLike, k: int) -> FloatArray:
+    vector = np.asarray(values, dtype=np.float64)
+    if vector.shape != (k,) or not np.isfinite(vector).all():
+        raise StatisticsError(f"{name} = {vector.tolist()} must hold {k} finite numbers")
+    return vector

@@ -1,0 +1,157 @@
+"""What a t test can see: its power, the smallest effect it resolves and the replicates it needs.
+
+Notation: sigma = standard deviation of one run; SE = standard error of the effect under test; an effect delta
+is tested by t = estimate/SE against Student's t, and under delta that t is noncentral with shift delta/SE.
+Source: Cohen 1988, Statistical Power Analysis, ch. 2; the same numbers as statsmodels' TTestIndPower.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+from scipy import optimize, stats
+
+from doe.errors import StatisticsError
+from doe.surface import second_order_terms
+
+FloatArray = npt.NDArray[np.float64]
+
+MAX_REPLICATES = 100_000
+
+
+def t_test_power(effect: float, standard_error: float, df: float, alpha: float = 0.05) -> float:
+    """Return the chance that a two-sided t test at level `alpha` rejects when the true effect is `effect`.
+
+    `effect` and `standard_error` share one unit; `df` are the degrees of freedom of the error estimate.
+    """
+    limit = stats.t.ppf(1 - alpha / 2, df)
+    shift = abs(effect) / standard_error
+    beyond, opposite = stats.nct.sf(limit, df, shift), stats.nct.cdf(-limit, df, shift)
+    # scipy returns NaN for the far tail once it underflows; that tail is then zero to double precision.
+    return float(min(1.0, beyond + (opposite if np.isfinite(opposite) else 0.0)))
+
+
+def smallest_effect(standard_error: float, df: float, alpha: float = 0.05, power: float = 0.8) -> float:
+    """Return the effect that a two-sided t test detects with chance `power`, in the unit of `standard_error`.
+
+    NaN without degrees of freedom; zero when the standard error is zero.
+    """
+    if df < 1 or not math.isfinite(standard_error):
+        return math.nan
+    if standard_error == 0:
+        return 0.0
+
+    def shortfall(shift: float) -> float:
+        return t_test_power(shift, 1.0, df, alpha) - power
+
+    upper = 2.0
+    while shortfall(upper) < 0:
+        upper *= 2
+    return standard_error * float(optimize.brentq(shortfall, 0.0, upper))
+
+
+def smallest_difference(sigma: float, replicates: int, alpha: float = 0.05, power: float = 0.8) -> float:
+    """Return the difference of two means of `replicates` runs each that a pooled t test resolves. Unit of
+    `sigma`.
+    """
+    return smallest_effect(sigma * math.sqrt(2 / replicates), 2 * replicates - 2, alpha, power)
+
+
+def smallest_main_effect(
+    sigma: float,
+    replicates: int,
+    rows: int = 28,
+    alpha: float = 0.05,
+    power: float = 0.8,
+    comparisons: int = 1,
+) -> float:
+    """Return the main effect, mean(+) - mean(-), that a two-level design of `rows` x `replicates` runs
+    resolves.
+
+    SE = 2 sigma/sqrt(rows x replicates); the error has rows x (replicates - 1) degrees of freedom (pure
+    error), so the answer is NaN for one replicate. `comparisons` divides alpha (Bonferroni).
+    """
+    standard_error = 2 * sigma / math.sqrt(rows * replicates)
+    return smallest_effect(standard_error, rows * (replicates - 1), alpha / comparisons, power)
+
+
+def smallest_linear_effect(
+    sigma: float, replicates: int, design: FloatArray, alpha: float = 0.05, power: float = 0.8
+) -> float:
+    """Return the change from low to high of one factor, 2 b_i, that a second-order model of `design` resolves.
+
+    design: coded points, shape (points, factors), each run `replicates` times. SE = 2 sigma sqrt(v/replicates)
+    with v the entry of (X'X)^-1 that belongs to a linear term; the error is the residual of the model.
+    """
+    model = second_order_terms(design)
+    variance = float(np.linalg.inv(model.T @ model)[1, 1])
+    df = model.shape[0] * replicates - model.shape[1]
+    return smallest_effect(2 * sigma * math.sqrt(variance / replicates), df, alpha, power)
+
+
+def replicates_for_difference(effect: float, sigma: float, alpha: float = 0.05, power: float = 0.8) -> int:
+    """Return the least runs per group with which a two-sample comparison resolves `effect` (unit of `sigma`).
+
+    Raises StatisticsError unless effect > 0 and sigma > 0.
+    """
+    _require_positive(effect=effect, sigma=sigma)
+    return _least_replicates(
+        2, lambda n: t_test_power(effect, sigma * math.sqrt(2 / n), 2 * n - 2, alpha) >= power, effect, sigma
+    )
+
+
+def replicates_for_main_effect(
+    effect: float, sigma: float, rows: int = 28, alpha: float = 0.05, power: float = 0.8, comparisons: int = 1
+) -> int:
+    """Return the least replicates per row (at least 2) with which a two-level design resolves a main effect.
+
+    Arguments as in `smallest_main_effect`. Raises StatisticsError unless effect > 0 and sigma > 0.
+    """
+    _require_positive(effect=effect, sigma=sigma)
+
+    def enough(n: int) -> bool:
+        standard_error = 2 * sigma / math.sqrt(rows * n)
+        return t_test_power(effect, standard_error, rows * (n - 1), alpha / comparisons) >= power
+
+    return _least_replicates(2, enough, effect, sigma)
+
+
+def replicates_for_linear_effect(
+    effect: float, sigma: float, design: FloatArray, alpha: float = 0.05, power: float = 0.8
+) -> int:
+    """Return the least replicates per point with which a second-order model resolves a change from low to high.
+
+    Arguments as in `smallest_linear_effect`. Raises StatisticsError unless effect > 0 and sigma > 0.
+    """
+    _require_positive(effect=effect, sigma=sigma)
+
+    def enough(n: int) -> bool:
+        return smallest_linear_effect(sigma, n, design, alpha, power) <= effect
+
+    return _least_replicates(1, enough, effect, sigma)
+
+
+def _least_replicates(least: int, enough: Callable[[int], bool], effect: float, sigma: float) -> int:
+    """Return the smallest n >= `least` with enough(n), by doubling and bisection (power grows with n)."""
+    upper = least
+    while not enough(upper):
+        upper *= 2
+        if upper > MAX_REPLICATES:
+            raise StatisticsError(
+                f"effect = {effect:g} at sigma = {sigma:g} needs more than {MAX_REPLICATES} replicates; "
+                "allowed is a larger effect"
+            )
+    lower = max(least, upper // 2)
+    while lower < upper:
+        middle = (lower + upper) // 2
+        lower, upper = (lower, middle) if enough(middle) else (middle + 1, upper)
+    return lower
+
+
+def _require_positive(**values: float) -> None:
+    for name, value in values.items():
+        if not (math.isfinite(value) and value > 0):
+            raise StatisticsError(f"{name} = {value} must be a positive number")

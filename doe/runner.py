@@ -1,0 +1,198 @@
+"""From settings of parameters to finished runs: seeds, replicates, replacement of failed runs, and the store."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.record import Record
+from doe.store import Store, StoredRun, run_key
+from solver import Job, Outcome, Scene, code_version, observe, parameters, run_queue, value, with_values
+from solver import Record as PourRecord
+
+FloatArray = npt.NDArray[np.float64]
+
+TRIES = 3
+"""Seeds that are tried for one replicate; a run that jammed or broke is kept with its outcome and replaced."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One row of a design: what is changed against the study's scene, and how often it is run."""
+
+    label: str
+    values: dict[str, float | str]
+    replicates: int
+
+
+@dataclass(frozen=True)
+class Run(Record):
+    """One run of a setting. ``attempt`` counts the replacements of this replicate."""
+
+    label: str
+    replicate: int
+    attempt: int
+    seed: int
+    outcome: str
+    message: str
+    observables: dict[str, float | None]
+    wall_s: float
+    key: str
+    reused: bool = False
+    """True if it was found in the store."""
+
+    @property
+    def valid(self) -> bool:
+        """True if the pile came to rest."""
+        return self.outcome == Outcome.AT_REST
+
+
+class Runner(Protocol):
+    """Anything that can run settings: the pours, or a formula in a test."""
+
+    def run(self, stage: str, settings: Sequence[Setting]) -> list[list[Run]]:
+        """All runs of every setting, failed ones included, in the order of the settings."""
+        ...
+
+
+class PourObserver(Protocol):
+    """Someone who watches pours that are really run (not those found in the store), to record them."""
+
+    def sample(self, stage: str, seed: int, pour: Any) -> None:
+        """Called at every moment of decision of a running pour."""
+        ...
+
+    def finish(self, stage: str, seed: int, record: PourRecord) -> None:
+        """Called when a pour has ended."""
+        ...
+
+
+OnRun = Callable[[str, Run, int], None]
+"""Called with (stage, run, replicates of this stage that are still to come)."""
+
+
+def seed_of(study_seed: int, stage: str, row: int, replicate: int, attempt: int) -> int:
+    """A seed of its own for every run: independent streams from one root (NumPy's SeedSequence)."""
+    entropy = [study_seed, *stage.encode(), row, replicate, attempt]
+    return int(np.random.SeedSequence(entropy).generate_state(1)[0])
+
+
+def responses(rows: Sequence[Sequence[Run]], observable: str) -> FloatArray:
+    """Matrix (settings, replicates) of an observable; NaN where a replicate has no valid run."""
+    width = max((run.replicate + 1 for runs in rows for run in runs), default=0)
+    table = np.full((len(rows), width), math.nan)
+    for k, runs in enumerate(rows):
+        for run in runs:
+            found = run.observables.get(observable)
+            if run.valid and found is not None:
+                table[k, run.replicate] = found
+    return table
+
+
+def no_pile_shares(rows: Sequence[Sequence[Run]]) -> FloatArray:
+    """Share of the runs of each setting that did not give a pile, replacements included, shape (settings,)."""
+    return np.array([np.mean([not run.valid for run in runs]) if runs else math.nan for runs in rows])
+
+
+class PourRunner:
+    """Runs settings as pours in this process and keeps every run in the store."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        store: Store,
+        study: str,
+        study_seed: int,
+        threads: int | None = None,
+        on_run: OnRun | None = None,
+        observer: PourObserver | None = None,
+    ) -> None:
+        self._scene, self._store, self._study, self._seed = scene, store, study, study_seed
+        self._threads, self._on_run, self._observer = threads, on_run, observer
+
+    def run(self, stage: str, settings: Sequence[Setting]) -> list[list[Run]]:
+        """See :class:`Runner`. Runs found in the store are taken from there."""
+        scenes = [with_values(self._scene, setting.values) for setting in settings]
+        found: list[list[Run]] = [[] for _ in settings]
+        places: list[tuple[int, int, int]] = []
+        queue: deque[Job] = deque()
+        waiting = [sum(setting.replicates for setting in settings)]
+
+        def settle(run: Run, row: int) -> None:
+            found[row].append(run)
+            again = not run.valid and run.attempt + 1 < TRIES
+            waiting[0] -= 0 if again else 1
+            if self._on_run is not None:
+                self._on_run(stage, run, waiting[0])
+            if again:
+                request(row, run.replicate, run.attempt + 1)
+
+        def request(row: int, replicate: int, attempt: int) -> None:
+            seed = seed_of(self._seed, stage, row, replicate, attempt)
+            stored = self._store.find(run_key(scenes[row], seed, code_version()))
+            if stored is not None:
+                settle(_reused(stored, settings[row], replicate, attempt), row)
+            else:
+                places.append((row, replicate, attempt))
+                queue.append(Job(scenes[row], seed, tag=len(places) - 1))
+
+        for row, setting in enumerate(settings):
+            for replicate in range(setting.replicates):
+                request(row, replicate, 0)
+
+        def sample(job: Job, pour: Any) -> None:
+            if self._observer is not None:
+                self._observer.sample(stage, job.seed, pour)
+
+        if queue:
+            for job, record in run_queue(queue, scenes, self._threads, on_sample=sample):
+                row, replicate, attempt = places[job.tag]
+                if self._observer is not None:
+                    self._observer.finish(stage, job.seed, record)
+                settle(self._keep(stage, settings[row], replicate, attempt, job, record), row)
+        return [sorted(runs, key=lambda run: (run.replicate, run.attempt)) for runs in found]
+
+    def _keep(self, stage: str, setting: Setting, replicate: int, attempt: int, job: Job, record: PourRecord) -> Run:
+        seen = {name: found.value for name, found in observe(record).items()}
+        observables = {name: number if math.isfinite(number) else None for name, number in seen.items()}
+        key = run_key(job.scene, job.seed, code_version())
+        self._store.add(
+            StoredRun(
+                key=key,
+                study=self._study,
+                stage=stage,
+                label=setting.label,
+                seed=job.seed,
+                code_version=code_version(),
+                outcome=str(record.outcome),
+                message=record.message,
+                parameters={path: value(job.scene, path) for path in parameters(job.scene)},
+                observables=observables,
+                dt=record.dt,
+                steps=record.steps,
+                wall_s=record.wall_s,
+            )
+        )
+        outcome, message = str(record.outcome), record.message
+        return Run(setting.label, replicate, attempt, job.seed, outcome, message, observables, record.wall_s, key)
+
+
+def _reused(stored: StoredRun, setting: Setting, replicate: int, attempt: int) -> Run:
+    return Run(
+        label=setting.label,
+        replicate=replicate,
+        attempt=attempt,
+        seed=stored.seed,
+        outcome=stored.outcome,
+        message=stored.message,
+        observables=stored.observables,
+        wall_s=stored.wall_s,
+        key=stored.key,
+        reused=True,
+    )

@@ -1,0 +1,203 @@
+"""Screening: which factors of a two-level design move the response, judged by two error estimates side by
+side.
+
+Model: mean response of row r = intercept + sum_j effect_j/2 x_rj, fitted by least squares to the row means.
+effect = mean(+) - mean(-), in the unit of the response, when no row is missing. Sums of squares are partial
+(Type III) on the scale of row means: SS = runs/4 effect^2 for a complete design.
+
+Two errors: (a) what the factors leave unexplained, that is the dummy columns (Plackett and Burman 1946), with
+few degrees of freedom and inflated by aliased interactions; (b) the replicates of each row (pure error).
+Lenth's pseudo standard error (Lenth 1989, Technometrics 31:469) is given as a third view.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.errors import StatisticsError
+from doe.multiple_tests import lenth
+from doe.replicates import centred, require_matrix, row_moments
+from doe.screening_errors import (
+    effect_tests,
+    error_estimate,
+    error_of_dummies,
+    unexplained_by_factors,
+    with_intercept,
+)
+from doe.screening_result import (
+    FALLBACK,
+    SIGNIFICANT,
+    Adjustment,
+    Effect,
+    ErrorEstimate,
+    Screening,
+    Selected,
+)
+
+FloatArray = npt.NDArray[np.float64]
+
+__all__ = ["FALLBACK", "SIGNIFICANT", "Screening", "Selected", "analyse_screening", "select_factors"]
+
+
+def analyse_screening(
+    design: npt.NDArray[np.int64],
+    names: Sequence[str],
+    responses: FloatArray,
+    dummies: Sequence[str],
+    alpha: float = 0.05,
+) -> Screening:
+    """Estimate and test the effects of a two-level design.
+
+    design: levels -1/+1, shape (rows, columns). names: one per column. responses: shape (rows, replicates),
+    NaN where a run is missing. dummies: the names of columns that carry no factor. Rows without any valid run
+    are left out and named; the factors are then estimated by least squares on the rest, and the dummies are
+    no longer estimable.
+
+    Raises StatisticsError when shapes or names disagree, levels are not -1/+1 or the rows left cannot
+    separate the factors.
+    """
+    _require_consistent(design, names, dummies)
+    values = require_matrix("responses", responses, rows=design.shape[0])
+    means, counts, within = row_moments(values)
+    valid = counts > 0
+    is_dummy = np.array([name in set(dummies) for name in names])
+    levels, counts = design[valid].astype(np.float64), counts[valid]
+    mean, means = float(means[valid].mean()), centred(means[valid])
+    _require_estimable(levels[:, ~is_dummy], valid)
+
+    complete = bool(valid.all())
+    used = np.ones_like(is_dummy) if complete else ~is_dummy
+    estimator = 2 * np.linalg.pinv(with_intercept(levels[:, used]))[1:]
+    effects = np.full(len(names), np.nan)
+    effects[used] = estimator @ means
+    norms = np.full(len(names), np.nan)
+    norms[used] = (estimator**2).sum(axis=1)
+    sums = effects**2 / norms
+    total = float(means @ means)
+
+    dummy_error, dummy_scale = error_of_dummies(levels[:, ~is_dummy], means, norms[~is_dummy], alpha)
+    spread = np.full(len(names), np.nan)
+    spread[used] = np.sqrt((estimator**2 / counts).sum(axis=1))
+    df_pure = int((counts - 1).sum())
+    pure_sigma = math.sqrt(float(within.sum()) / df_pure) if df_pure else math.nan
+    pure_error = (
+        error_estimate("replicates", pure_sigma, df_pure, pure_sigma * spread[~is_dummy], alpha) if df_pure else None
+    )
+    by_dummies = effect_tests(effects, dummy_scale * np.sqrt(norms), dummy_error, is_dummy)
+    by_replicates = effect_tests(effects, pure_sigma * spread, pure_error, is_dummy)
+    unexplained_f, unexplained_p = unexplained_by_factors(levels[:, ~is_dummy], means, counts, pure_sigma, df_pure)
+
+    return Screening(
+        effects=tuple(
+            Effect(
+                name=name,
+                is_dummy=bool(is_dummy[j]),
+                effect=float(effects[j]),
+                sum_of_squares=float(sums[j]),
+                contribution_percent=100 * float(sums[j]) / total if total > 0 else math.nan,
+                by_dummies=None if is_dummy[j] else by_dummies[j],
+                by_replicates=by_replicates[j],
+            )
+            for j, name in enumerate(names)
+        ),
+        mean=mean,
+        rows=int(design.shape[0]),
+        missing_rows=tuple(int(row) for row in np.flatnonzero(~valid)),
+        runs=int(counts.sum()),
+        total_sum_of_squares=total,
+        dummy_error=dummy_error,
+        pure_error=pure_error,
+        lenth=lenth(effects[used], alpha),
+        unexplained_f=unexplained_f,
+        unexplained_p=unexplained_p,
+        notes=_notes(valid, dummy_error, pure_error, pure_sigma, total, unexplained_p),
+    )
+
+
+def select_factors(
+    screening: Screening,
+    n: int = 3,
+    fallback: Sequence[str] = (),
+    exclude: Sequence[str] = (),
+    alpha: float = 0.05,
+    adjust: Adjustment = "holm",
+) -> tuple[Selected, ...]:
+    """Return the `n` factors of the next stage, each with its reason.
+
+    Significant factors come first by falling |t|, then `fallback` in its order; `exclude` holds factors that
+    this set-up cannot test. Raises StatisticsError when both together give fewer than `n`, or a name is no
+    factor.
+    """
+    known = {effect.name for effect in screening.effects if not effect.is_dummy}
+    for name in (*fallback, *exclude):
+        if name not in known:
+            raise StatisticsError(f"'{name}' is no factor of the screening; allowed are {', '.join(sorted(known))}")
+    chosen = [Selected(name, SIGNIFICANT) for name in screening.significant(alpha, adjust) if name not in exclude]
+    for name in fallback:
+        if name not in exclude and name not in {selected.name for selected in chosen}:
+            chosen.append(Selected(name, FALLBACK))
+    if len(chosen) < n:
+        raise StatisticsError(
+            f"fallback = {list(fallback)} leaves {len(chosen)} of {n} factors after {len(exclude)} exclusions"
+            "; name more factors in the fallback list"
+        )
+    return tuple(chosen[:n])
+
+
+def _notes(
+    valid: npt.NDArray[np.bool_],
+    dummy_error: ErrorEstimate | None,
+    pure_error: ErrorEstimate | None,
+    pure_sigma: float,
+    total: float,
+    unexplained_p: float,
+) -> tuple[str, ...]:
+    """Return what a reader of the effects must know, as sentences."""
+    notes = []
+    if not valid.all():
+        rows = ", ".join(str(row + 1) for row in np.flatnonzero(~valid))
+        df = 0 if dummy_error is None else dummy_error.df
+        notes.append(
+            f"Rows {rows} (counted from 1) have no valid run; the factors are fitted by least squares to the "
+            f"other {int(valid.sum())} rows, which leaves {df} degrees of freedom between rows and no dummy "
+            "effects."
+        )
+    if pure_error is None:
+        notes.append("No row has two valid runs; significance rests on the dummy columns alone.")
+    elif pure_sigma == 0:
+        notes.append("All replicates of each row agree exactly (was the seed varied?); no effect can be tested.")
+    if total == 0:
+        notes.append("The response is the same in every row; no effect can be tested.")
+    if unexplained_p < 0.05:
+        notes.append(
+            f"The dummy columns hold more than replicate noise (p = {unexplained_p:.3g}): interactions leak "
+            "into the main effects."
+        )
+    return tuple(notes)
+
+
+def _require_consistent(design: npt.NDArray[np.int64], names: Sequence[str], dummies: Sequence[str]) -> None:
+    if design.ndim != 2 or not np.isin(design, (-1, 1)).all():
+        raise StatisticsError("design must be a matrix (rows, columns) of levels -1 and +1")
+    if len(names) != design.shape[1] or len(set(names)) != len(names):
+        raise StatisticsError(f"names has {len(names)} entries; allowed are {design.shape[1]} different names")
+    for name in dummies:
+        if name not in names:
+            raise StatisticsError(f"dummies names '{name}', which is no column of the design")
+    if len(set(dummies)) == len(names):
+        raise StatisticsError("dummies names every column; at least one column must carry a factor")
+
+
+def _require_estimable(levels: FloatArray, valid: npt.NDArray[np.bool_]) -> None:
+    """Refuse rows that cannot tell the factors apart; levels: the valid rows and factor columns."""
+    model = with_intercept(levels)
+    if np.linalg.matrix_rank(model) < model.shape[1]:
+        missing = ", ".join(str(row + 1) for row in np.flatnonzero(~valid)) or "none missing"
+        raise StatisticsError(
+            f"responses: without rows {missing} (counted from 1) the {model.shape[0]} others cannot separate "
+            f"{levels.shape[1]} factors and the mean; rerun one, or declare an untestable factor a dummy"
+        )

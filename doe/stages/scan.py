@@ -1,0 +1,53 @@
+"""The response over one assumption in steps, so that a reader sees what the calibration hangs on."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from doe.pilot import Noise, replicate_noise
+from doe.power import smallest_effect
+from doe.profile import Profile
+from doe.record import Record
+from doe.runner import FloatArray, Run, Runner, Setting, no_pile_shares, responses
+from doe.study import Study
+
+
+@dataclass(frozen=True)
+class ScanResult(Record):
+    """Mean and spread of the target's observable at each value of ``path`` (SI); ``noise`` is None below two runs."""
+
+    path: str
+    values: tuple[float, ...]
+    observable: str
+    means: FloatArray
+    noise: tuple[Noise | None, ...]
+    no_pile_share: FloatArray
+    runs: tuple[tuple[Run, ...], ...]
+    smallest_difference: float
+    """Difference between two values of ``path`` that would have been seen with power 0.8."""
+
+
+def scan(study: Study, profile: Profile, runner: Runner, noise: Noise) -> ScanResult | None:
+    """Run the scan of the study; None if it declares none. ``noise`` of the target's observable is the pilot's."""
+    if study.scan_path is None or not study.scan_values:
+        return None
+    path = study.scan_path
+    rows = runner.run(
+        "scan", [Setting(f"{path} = {v:g}", {path: v}, profile.scan_replicates) for v in study.scan_values]
+    )
+    observable = study.targets[0].observable
+    table = responses(rows, observable)
+    valid = [row[~np.isnan(row)] for row in table]
+    return ScanResult(
+        path=path,
+        values=study.scan_values,
+        observable=observable,
+        means=np.array([row.mean() if len(row) else math.nan for row in valid]),
+        noise=tuple(replicate_noise(row) if len(row) > 1 else None for row in valid),
+        no_pile_share=no_pile_shares(rows),
+        runs=tuple(tuple(runs) for runs in rows),
+        smallest_difference=smallest_effect(noise.sigma * math.sqrt(2.0 / profile.scan_replicates), noise.runs - 1),
+    )

@@ -1,0 +1,107 @@
+"""Response surface: Box–Behnken runs, a second-order model per target, and the optimum with its uncertainty."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from doe.ascent import Region
+from doe.canonical import Canonical, canonical_analysis
+from doe.compromise import Compromise, find_compromise
+from doe.designs import box_behnken
+from doe.optimum import Optimum, find_optimum
+from doe.power import smallest_effect
+from doe.profile import Profile
+from doe.record import Record
+from doe.runner import FloatArray, Run, Runner, Setting, no_pile_shares, responses
+from doe.stages.sizing import CENTRE_RUNS
+from doe.study import Factor, Study
+from doe.surface import Surface, fit_surface
+from doe.surface_anova import SurfaceAnova, analyse_surface
+
+
+@dataclass(frozen=True)
+class SurfaceResult(Record):
+    """Runs of the Box–Behnken design and, per target in the study's order, model, ANOVA and canonical analysis."""
+
+    factors: tuple[Factor, ...]
+    region: Region
+    design: FloatArray
+    natural: FloatArray
+    runs: tuple[tuple[Run, ...], ...]
+    no_pile_share: FloatArray
+    observables: tuple[str, ...]
+    models: tuple[Surface, ...]
+    anova: tuple[SurfaceAnova, ...]
+    canonical: tuple[Canonical, ...]
+    smallest_main_effect: tuple[float, ...]
+    """Per target: the change from low to high of one factor that would have been seen with power 0.8."""
+
+
+@dataclass(frozen=True)
+class OptimumResult(Record):
+    """The chosen setting: path → value [SI], and how it was found (one target: ``single``, several: ``compromise``)."""
+
+    values: dict[str, float]
+    factors: tuple[Factor, ...]
+    single: Optimum
+    compromise: Compromise | None
+
+
+def surface(
+    study: Study, profile: Profile, runner: Runner, factors: tuple[Factor, ...], region: Region
+) -> SurfaceResult:
+    """Run the 12 edge points and 5 centre points around the bracket and fit the model of each target."""
+    design = box_behnken(len(factors), centre=CENTRE_RUNS).astype(float)
+    natural = region.natural(design)
+    settings = [
+        Setting(
+            f"point {k + 1}",
+            {f.path: float(v) for f, v in zip(factors, point, strict=True)},
+            profile.surface_replicates,
+        )
+        for k, point in enumerate(natural)
+    ]
+    rows = runner.run("surface", settings)
+    observables = tuple(target.observable for target in study.targets)
+    models = tuple(fit_surface(design, responses(rows, name), region) for name in observables)
+    return SurfaceResult(
+        factors=factors,
+        region=region,
+        design=design,
+        natural=natural,
+        runs=tuple(tuple(runs) for runs in rows),
+        no_pile_share=no_pile_shares(rows),
+        observables=observables,
+        models=models,
+        anova=tuple(analyse_surface(model) for model in models),
+        canonical=tuple(canonical_analysis(model) for model in models),
+        smallest_main_effect=tuple(_smallest_main_effect(model) for model in models),
+    )
+
+
+def _smallest_main_effect(model: Surface) -> float:
+    linear = 1  # terms stand in the order 1, x₁, x₂, …; the design gives every linear term the same variance
+    error = 2.0 * math.sqrt(model.mse * model.information_inverse[linear, linear])
+    return smallest_effect(error, model.df_residual)
+
+
+def optimum(study: Study, fitted: SurfaceResult) -> OptimumResult:
+    """The setting on the solution surface nearest the measured values, or the best compromise of several targets."""
+    reference = np.array([float(factor.reference) for factor in fitted.factors])
+    target = study.targets[0]
+    error = target.standard_error
+    single = find_optimum(fitted.models[0], target.mean, reference, seed=study.seed, target_standard_error=error)
+    compromise = None
+    point = single.point
+    if len(study.targets) > 1:
+        compromise = find_compromise(fitted.models, study.targets, reference)
+        point = compromise.point
+    return OptimumResult(
+        values={f.path: float(v) for f, v in zip(fitted.factors, point, strict=True)},
+        factors=fitted.factors,
+        single=single,
+        compromise=compromise,
+    )

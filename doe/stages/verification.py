@@ -1,0 +1,51 @@
+"""Verification: fresh pours at the optimum against every target."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from doe.power import smallest_effect
+from doe.profile import Profile
+from doe.record import Record
+from doe.runner import Run, Runner, Setting, no_pile_shares, responses
+from doe.study import Study
+from doe.target import Target
+from doe.verification import Verification, verify
+
+
+@dataclass(frozen=True)
+class VerificationResult(Record):
+    """Fresh runs at ``values`` [SI] and, per target, the tests."""
+
+    values: dict[str, float]
+    runs: tuple[Run, ...]
+    no_pile_share: float
+    targets: tuple[Target, ...]
+    tests: tuple[Verification, ...]
+    smallest_difference: tuple[float, ...]
+    """Per target: the difference from the measured mean that would have been seen with power 0.8 (Welch)."""
+
+
+def verification(study: Study, profile: Profile, runner: Runner, values: dict[str, float]) -> VerificationResult:
+    """Run the optimum with seeds that no other stage used and compare with the measurement."""
+    rows = runner.run("verification", [Setting("optimum", dict(values), profile.verification_runs)])
+    tests = tuple(verify(responses(rows, t.observable)[0], t.mean, t.sd, t.n, margin=t.margin) for t in study.targets)
+    return VerificationResult(
+        values=values,
+        runs=tuple(rows[0]),
+        no_pile_share=float(no_pile_shares(rows)[0]),
+        targets=study.targets,
+        tests=tests,
+        smallest_difference=tuple(_smallest_difference(test) for test in tests),
+    )
+
+
+def _smallest_difference(test: Verification) -> float:
+    simulated, measured = test.simulated, test.target
+    parts = [(s.sd**2 / s.n, s.n) for s in (simulated, measured) if s.n > 1 and math.isfinite(s.sd)]
+    if not parts or simulated.n < 2:
+        return math.nan
+    variance = sum(part for part, _ in parts)
+    df = variance**2 / sum(part**2 / (n - 1) for part, n in parts) if variance > 0 else math.inf
+    return smallest_effect(math.sqrt(variance), df) if variance > 0 else 0.0

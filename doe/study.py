@@ -1,0 +1,253 @@
+"""A study: what is varied, against which measurement, with how many runs. Read from a TOML file.
+
+format = 1
+material = "name or file"      fallback = ["X4", …]
+dummies = 3                    columns of the screening that stay free of factors, at least
+estimators = [observables]     candidates for the screening's response; those of the targets always belong to them
+[rig] name and dimensions      [insertion] …
+[[target]]      observable, mean, n, sd, weight, margin
+[[factor]]      name, path, low, high, reference        screened, then calibrated; numbers
+[[assumption]]  the same keys, or named levels           screened beside them: what nobody published
+[[change]]      name, values = { path = value }          declared changes for the choice of the estimator
+[scan]          path, values                             one assumption in steps
+[profile.NAME]  spheres, mass and the numbers of runs
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from doe.errors import StudyFileError
+from doe.factors import MIN_BODIES, bodies_touched, checked_levels
+from doe.profile import Profile, profile_from
+from doe.record import Record
+from doe.study_table import Table, entries, names, one_of, only, required, section, whole
+from doe.target import Target, is_angle, target_from
+from solver import (
+    ParameterError,
+    Scene,
+    asset_path,
+    canonical,
+    load_material,
+    observable_names,
+    parameters,
+    parse_quantity,
+    read_toml,
+    with_values,
+)
+
+CALIBRATED = 3
+"""Factors that go on from the screening to the ascent and the response surface."""
+COLUMNS = 27
+"""Columns of the 28-run design; those without a factor are its dummies."""
+
+Values = dict[str, float | str]
+
+
+@dataclass(frozen=True)
+class Factor(Record):
+    """A parameter with its low and high level and its measured value, SI or a name."""
+
+    name: str
+    path: str
+    low: float | str
+    high: float | str
+    reference: float | str
+
+    def level(self, coded: float) -> float | str:
+        """Value at a coded level: −1 low, +1 high, linear between; a named level only at the ends."""
+        if isinstance(self.low, str) or isinstance(self.high, str):
+            return self.high if coded > 0 else self.low
+        return self.low + 0.5 * (coded + 1.0) * (self.high - self.low)
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study file, read and checked. ``scene`` holds the reference values of all parameters."""
+
+    name: str
+    file: Path
+    scene: Scene
+    targets: tuple[Target, ...]
+    factors: tuple[Factor, ...]
+    assumptions: tuple[Factor, ...]
+    changes: dict[str, Values]
+    scan_path: str | None
+    scan_values: tuple[float, ...]
+    fallback: tuple[str, ...]
+    profiles: dict[str, Profile]
+    estimators: tuple[str, ...]
+    seed: int = 1
+
+
+ESTIMATORS = (
+    "angle_of_repose_deg",
+    "angle_of_repose_above_one_body_deg",
+    "angle_of_repose_cone_deg",
+    "angle_of_repose_mass_cone_deg",
+    "angle_of_repose_volume_cone_deg",
+)
+KEYS = {
+    "format", "title", "material", "dummies", "fallback", "rig", "insertion", "target", "factor", "assumption",
+    "change", "scan", "profile", "estimators", "seed",
+}  # fmt: skip
+
+
+def load_study(name: str) -> Study:
+    """Study from a shipped name or a file; every mistake is one line that names file, key and what is allowed."""
+    path = asset_path("studies", name)
+    try:
+        return study_from(read_toml(path), path)
+    except (ParameterError, StudyFileError) as error:
+        text = str(error)
+        raise ParameterError(text if text.startswith(str(path)) else f"{path}: {text}") from None
+
+
+def with_profile(study: Study, name: str) -> tuple[Study, Profile]:
+    """The study with the shapes and the mass of profile ``name``, and the profile.
+
+    Raises ParameterError where there is no such profile, its mixture leaves too few factors of the fallback list
+    testable, or it asks for a resolution in degrees of a target that is no angle.
+    """
+    if name not in study.profiles:
+        raise ParameterError(f"profile: {name!r} is not one of {', '.join(study.profiles)}")
+    profile = study.profiles[name]
+    scene = with_values(study.scene, {"body.spheres": profile.spheres, "rig.mass": profile.mass})
+    observable = study.targets[0].observable
+    if profile.resolution_deg is not None and not is_angle(observable):
+        raise ParameterError(
+            f"{study.file}: profile.{name}.resolution_deg: the first target, {observable}, is not in degrees; "
+            "allowed with an observable that ends in _deg"
+        )
+    paths = {factor.name: factor.path for factor in study.factors}
+    bodies = {factor: bodies_touched(scene, paths[factor]) for factor in study.fallback}
+    rare = {factor: n for factor, n in bodies.items() if n < MIN_BODIES}
+    if len(bodies) - len(rare) < CALIBRATED:
+        listed = ", ".join(f"{factor} acts on {n:.0f}" for factor, n in rare.items())
+        raise ParameterError(
+            f"{study.file}: fallback: {listed} bodies in profile {name}; at least {CALIBRATED} factors that act on "
+            f"{MIN_BODIES} bodies or more are needed"
+        )
+    return replace(study, scene=scene), profile
+
+
+def study_from(table: Table, path: Path) -> Study:
+    """Study from a parsed file. Raises ParameterError or StudyFileError."""
+    only(table, KEYS, "")
+    if table.get("format") != 1:
+        raise StudyFileError(f"format: {table.get('format')!r} is not 1")
+    if "material" not in table:
+        raise ParameterError("material: a shipped material or the path of a material file is needed")
+    scene = _set_up(table, load_material(str(table["material"]), relative_to=path.parent))
+    factors = tuple(_factor(scene, entry) for entry in entries(table, "factor"))
+    scene = with_values(scene, {factor.path: factor.reference for factor in factors})
+    dummies = whole(table.get("dummies", 3), "dummies", least=1)
+    if not CALIBRATED <= len(factors) <= COLUMNS - dummies:
+        raise StudyFileError(
+            f"factor: {len(factors)} factors with {dummies} dummies; allowed: {CALIBRATED} to {COLUMNS - dummies} in a "
+            "28-run design"
+        )
+    assumptions = tuple(_levels(scene, entry, "assumption") for entry in entries(table, "assumption"))
+    _refuse_twins([*factors, *assumptions])
+    if len(assumptions) > 8:
+        raise StudyFileError(f"assumption: {len(assumptions)} assumptions; at most 8 fit the 12-run design")
+    fallback = names(table.get("fallback", []), "fallback", [factor.name for factor in factors])
+    if len(fallback) < CALIBRATED:
+        raise StudyFileError(f"fallback: {len(fallback)} factors; at least {CALIBRATED} are needed")
+    if not entries(table, "target"):
+        raise StudyFileError("target: at least one [[target]] is needed")
+    targets = tuple(target_from(entry, observable_names()) for entry in entries(table, "target"))
+    scan_path, scan_values = _scan(scene, section(table, "scan"))
+    wanted = section(table, "profile")
+    profiles = {name: _profile(scene, name, section(wanted, name)) for name in wanted}
+    estimators = names(table.get("estimators", list(ESTIMATORS)), "estimators", observable_names())
+    return Study(
+        name=path.stem,
+        file=path,
+        scene=scene,
+        targets=targets,
+        factors=factors,
+        assumptions=assumptions,
+        changes=_changes(scene, entries(table, "change")),
+        scan_path=scan_path,
+        scan_values=scan_values,
+        fallback=fallback,
+        profiles=profiles or {"standard": Profile("standard")},
+        estimators=tuple(dict.fromkeys([*(target.observable for target in targets), *estimators])),
+        seed=whole(table.get("seed", 1), "seed", least=0),
+    )
+
+
+def _set_up(table: Table, scene: Scene) -> Scene:
+    """The scene with the study's rig and insertion."""
+    rig = section(table, "rig")
+    one_of(rig.get("name", "funnel"), "rig.name", ("funnel",))
+    settings = {f"rig.{key}": value for key, value in rig.items() if key != "name"}
+    return with_values(scene, settings | {f"insertion.{k}": v for k, v in section(table, "insertion").items()})
+
+
+def _levels(scene: Scene, entry: Table, where: str) -> Factor:
+    only(entry, set(Factor.__dataclass_fields__), where)
+    required(entry, ("name", "path", "low", "high", "reference"), where)
+    return Factor(str(entry["name"]), *checked_levels(scene, entry))
+
+
+def _factor(scene: Scene, entry: Table) -> Factor:
+    """A factor; it may have to be varied continuously, which named levels cannot."""
+    factor = _levels(scene, entry, "factor")
+    if isinstance(factor.low, str):
+        raise StudyFileError(
+            f"factor.path: {factor.path} of {factor.name} has named levels, which only an [[assumption]] may have; "
+            "a [[factor]] needs numbers"
+        )
+    return factor
+
+
+def _refuse_twins(factors: list[Factor]) -> None:
+    for key in ("name", "path"):
+        seen: set[str] = set()
+        for factor in factors:
+            value = getattr(factor, key)
+            if value in seen:
+                raise StudyFileError(f"factor.{key}: {value!r} stands twice among the factors and assumptions")
+            seen.add(value)
+
+
+def _scan(scene: Scene, scan: Table) -> tuple[str | None, tuple[float, ...]]:
+    """(path, values [SI]) of the scan; (None, ()) without one."""
+    if not scan:
+        return None, ()
+    only(scan, {"path", "values"}, "scan")
+    for key in ("path", "values"):
+        if not scan.get(key):
+            raise StudyFileError(f"scan.{key}: missing; a scan needs a path and values")
+    path = canonical(scene, str(scan["path"]))
+    if parameters(scene)[path].choices or not isinstance(scan["values"], list):
+        raise StudyFileError(f"scan: {path} over {scan['values']!r}; a list of numbers is needed")
+    values = tuple(float(parameters(scene)[path].check(value)) for value in scan["values"])
+    for value in values:
+        with_values(scene, {path: value})
+    return path, values
+
+
+def _changes(scene: Scene, changes: list[Table]) -> dict[str, Values]:
+    found: dict[str, Values] = {}
+    for entry in changes:
+        only(entry, {"name", "values"}, "change")
+        required(entry, ("name", "values"), "change")
+        if str(entry["name"]) in found:
+            raise StudyFileError(f"change.name: {entry['name']!r} stands twice")
+        values = section(entry, "values")
+        if not values:
+            raise StudyFileError(f"change.values: {entry['name']!r} changes nothing; a path and its value are needed")
+        with_values(scene, values)
+        found[str(entry["name"])] = dict(values)
+    return found
+
+
+def _profile(scene: Scene, name: str, entry: Table) -> Profile:
+    resolutions = parameters(scene)["body.spheres"].choices
+    spheres = one_of(entry.get("spheres", "standard"), f"profile.{name}.spheres", resolutions)
+    mass = parse_quantity(entry.get("mass", 0.03), "kg", f"profile.{name}.mass")
+    return profile_from(name, entry, spheres, mass)

@@ -1,0 +1,1 @@
+"""The interface: command line, live page, recordings and reports."""

@@ -1,0 +1,101 @@
+"""The command line: one table of commands, and the one place where an error becomes a line and an exit code.
+
+Exit codes: 0 done, 1 failure, 2 bad input, 130 interrupted. Files in `explorer/commands` import nothing heavy
+at their top, so that ``explorer --help`` answers at once.
+"""
+
+from __future__ import annotations
+
+import errno
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+
+from explorer.commands import calibrate, new, parameters, replay, runs, serve, simulate
+
+BAD_INPUT, INTERRUPTED = 2, 130
+OWN_PACKAGES = ("explorer", "doe", "solver")
+
+
+class Commands(TyperGroup):
+    """The group of all commands; turns errors about the input into ``error: …`` on stderr and exit code 2."""
+
+    def invoke(self, ctx: typer.Context) -> Any:  # type: ignore[override]
+        """Run the command that ``ctx`` names."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            raise typer.Exit(INTERRUPTED) from None
+        except Exception as error:
+            line = _line_for_user(error)
+            if line is None:
+                raise
+            typer.echo(f"error: {line}", err=True)
+            raise typer.Exit(BAD_INPUT) from None
+
+
+def _line_for_user(error: Exception) -> str | None:
+    """One line about an error in the input; None for an error of the program, which needs its traceback."""
+    if isinstance(error, typer.Exit) or getattr(error, "errno", None) == errno.EPIPE:
+        return None
+    # What the parser of the command line raises: an unknown option, a missing argument.
+    if hasattr(error, "format_message"):
+        return _one_line(
+            f"{error.format_message()} (`explorer --help` lists commands, `explorer COMMAND --help` options)"
+        )
+    if isinstance(error, OSError) and error.strerror:
+        return _one_line(f"{error.filename}: {error.strerror}" if error.filename else error.strerror)
+    return _one_line(str(error)) if isinstance(error, OSError) or _is_about_the_input(error) else None
+
+
+def _is_about_the_input(error: Exception) -> bool:
+    """True for a ValueError that this program defines: by the house rule, its message is a line for the user."""
+    own = [kind for kind in type(error).__mro__ if kind.__module__.partition(".")[0] in OWN_PACKAGES]
+    return any(issubclass(kind, ValueError) for kind in own)
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
+
+
+app = typer.Typer(
+    name="explorer",
+    cls=Commands,
+    help="Pour, pile and calibrate granular material.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from explorer.run_result import package_version
+
+        typer.echo(f"explorer {package_version('repose-explorer') or 'from a source tree that is not installed'}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: bool = typer.Option(
+        False, "--version", callback=_print_version, is_eager=True, help="Print the version and exit."
+    ),
+) -> None:
+    """Pour, pile and calibrate granular material."""
+
+
+app.command()(serve.serve)
+app.command()(simulate.simulate)
+app.command()(calibrate.calibrate)
+app.command()(runs.runs)
+app.command()(parameters.parameters)
+app.command()(new.new)
+app.command()(replay.replay)
+
+
+def main() -> None:
+    """Entry point of the command ``explorer``."""
+    app(prog_name="explorer")

@@ -1,0 +1,43 @@
+"""`explorer calibrate`: the whole study in this process, with progress, into a folder."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+
+import typer
+
+FAILURE, ABOVE_LIMIT = 1, 3
+
+
+def calibrate(
+    headless: bool = typer.Option(
+        False, "--headless", help="Run here, without a page; the page runs it from its own panel."
+    ),
+    study: str = typer.Option("sunflower_extract", help="A shipped study or the path of a study file."),
+    profile: str = typer.Option("standard", help="Size of the study: a [profile.NAME] of the study file."),
+    out: Path = typer.Option(Path("results"), help="Folder for result.json, report.html and report.md."),
+    resume: bool = typer.Option(False, "--resume", help="Go on in a folder that is not empty."),
+    store: Path | None = typer.Option(None, help="SQLite file that keeps every run."),
+    record: Path | None = typer.Option(None, help="Folder for .rrd recordings of the verification pours."),
+    threads: int | None = typer.Option(None, min=1, help="CPU threads; all if not given."),
+    fail_above: float | None = typer.Option(None, min=0.0, help="Exit with 3 above this relative error in percent."),
+) -> None:
+    """Calibrate a material: pilot, screening, ascent, response surface, optimum, verification, report."""
+    from doe.errors import StudyStopped
+    from explorer.errors import CommandError
+    from explorer.study_run import StudyOrder, run_study
+
+    if not headless:
+        raise CommandError("calibrate: add --headless to run here, or start it from the panel of `explorer serve`")
+    # The page cancels with SIGTERM; that has to end like Ctrl-C, with the store closed and finished runs kept.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    order = StudyOrder(study, profile, out, resume, store, record, threads)
+    try:
+        error_percent = run_study(order, typer.echo)
+    except StudyStopped as stopped:
+        typer.echo(f"error: {' '.join(str(stopped).split())}", err=True)
+        raise typer.Exit(FAILURE) from None
+    if fail_above is not None and not error_percent <= fail_above:
+        typer.echo(f"relative error {error_percent:.2f} % is above the limit of {fail_above:g} %", err=True)
+        raise typer.Exit(ABOVE_LIMIT)

@@ -1,0 +1,39 @@
+"""``explorer new``: start a material or a study of one's own."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+
+import typer
+
+
+class Kind(StrEnum):
+    """What can be started."""
+
+    MATERIAL = "material"
+    STUDY = "study"
+
+
+def new(
+    kind: Kind = typer.Argument(help="What to start."),
+    name: str = typer.Argument(metavar="NAME", help="Its name: letters, digits, - and _."),
+    out: Path = typer.Option(Path(), help="Folder to write into."),
+    material: str | None = typer.Option(
+        None,
+        help="Material of the study: name or file. By default NAME.toml beside it, written if it is missing.",
+    ),
+) -> None:
+    """Write a commented file that runs as it is.
+
+    NAME.toml for a material, NAME_study.toml for a study (and NAME.toml beside it, where that is missing).
+    """
+    from explorer.errors import CommandError
+    from explorer.starter_files import write_material, write_study
+
+    if kind == Kind.MATERIAL and material is not None:
+        raise CommandError("--material: belongs to `new study`")
+    written = [write_material(out, name)] if kind == Kind.MATERIAL else write_study(out, name, material)
+    for path in written:
+        typer.echo(f"wrote {path}")
+    typer.echo(f"try it: explorer simulate {written[-1]}")

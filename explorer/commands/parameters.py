@@ -1,0 +1,44 @@
+"""``explorer parameters``: every parameter path with its value, unit, range and meaning."""
+
+from __future__ import annotations
+
+import typer
+
+
+def parameters(
+    source: str = typer.Argument(
+        "sunflower_extract",
+        metavar="[MATERIAL]",
+        help="Material or study, by file or shipped name; or a rig.",
+    ),
+) -> None:
+    """List every parameter.
+
+    What --set, a study or a slider may change.
+
+    "acts": "at once" on a running pile, "on restart" with the next pour.
+    """
+    from explorer.scene_file import load_scene
+    from explorer.text_table import text_table
+    from solver import Parameter, value
+    from solver import parameters as declared
+
+    def allowed(entry: Parameter) -> str:
+        return ", ".join(entry.choices) if entry.choices else f"{entry.low:g} … {entry.high:g}"
+
+    def shown(number: float | str) -> str:
+        return number if isinstance(number, str) else f"{number:.6g}"
+
+    scene = load_scene(source)
+    rows = [
+        (
+            path,
+            shown(value(scene, path)),
+            entry.unit,
+            allowed(entry),
+            "at once" if entry.live else "on restart",
+            entry.doc,
+        )
+        for path, entry in declared(scene).items()
+    ]
+    typer.echo(text_table(("path", "value", "unit", "allowed", "acts", "meaning"), rows))

@@ -1,0 +1,36 @@
+"""``explorer replay``: look at a recording again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+
+def replay(
+    recording: Path = typer.Argument(metavar="FILE.rrd", help="The recording."),
+    port: int = typer.Option(0, min=0, max=65535, help="Port of the page; 0 takes a free one."),
+    native: bool = typer.Option(False, "--native", help="Open the native viewer instead of a page."),
+    static: Path | None = typer.Option(None, metavar="DIR", help="Only write a folder that any web server can show."),
+    no_browser: bool = typer.Option(False, "--no-browser", help="Print the page's address, open nothing."),
+) -> None:
+    """Play a recording.
+
+    In the browser, served on 127.0.0.1 until Ctrl-C, or in rerun's native viewer; its statistics are off.
+    """
+    from explorer.errors import CommandError
+    from explorer.logs.replay import check_recording, open_native, serve_replay
+    from explorer.logs.static_replay import write_static_replay
+    from explorer.run_folder import appearing
+
+    if native and static:
+        raise CommandError("--native and --static exclude each other")
+    check_recording(recording)
+    if native:
+        open_native(recording)
+    elif static:
+        with appearing(static) as folder:
+            write_static_replay(recording, folder)
+        typer.echo(f"wrote {static}: serve it with any web server, such as `python -m http.server -d {static}`")
+    else:
+        serve_replay(recording, port=port, open_browser=not no_browser, announce=typer.echo)

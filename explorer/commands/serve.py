@@ -1,0 +1,31 @@
+"""``explorer serve``: the live page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+
+def serve(
+    port: int = typer.Option(8080, min=0, max=65535, help="Port of the page; 0 takes a free one."),
+    host: str = typer.Option("127.0.0.1", help="Address to listen on."),
+    study: str | None = typer.Option(None, help="Study for the page's calibration: file or shipped name."),
+    material: str | None = typer.Option(None, help="Material to pour, without a calibration: file or shipped name."),
+    set_: list[str] = typer.Option([], "--set", metavar="PATH=VALUE", help="Set a parameter; may be repeated."),
+    seed: int = typer.Option(1, min=0, help="Seed of the first pour."),
+    store: Path | None = typer.Option(None, help="SQLite file that keeps the runs of the page's calibration."),
+    record: Path | None = typer.Option(
+        None, metavar="FILE.rrd", help="Record the session: the first pour here, the k-th in FILE_k.rrd."
+    ),
+) -> None:
+    """Open the page: watch a pour, turn its parameters, calibrate."""
+    from explorer.errors import CommandError
+    from explorer.scene_file import DEFAULT_STUDY, load_scene, study_path, study_scene, with_settings
+    from explorer.viewer.app import serve as serve_page
+
+    if study and material:
+        raise CommandError(f"--material {material}: the study {study} has a material of its own; name one of the two")
+    file = None if material else study_path(study or DEFAULT_STUDY)
+    scene = with_settings(study_scene(file) if file else load_scene("funnel", material), set_)
+    serve_page(scene, host=host, port=port, seed=seed, study_file=file, store=store, record_path=record)

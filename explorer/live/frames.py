@@ -1,0 +1,125 @@
+"""Frames in shared memory: the solver process writes the newest state of all bodies, the page's process reads
+it.
+
+Two slots and a counter. The writer fills the slot that was not published last and then raises the counter; a
+reader copies the published slot and looks at the counter again: while it has not moved, the writer was at
+work on the other slot, so the copy is whole. No lock is involved that a dying process could keep.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from solver.record import Bodies
+
+MAX_BODIES = 8192
+"""Bodies for which there is room in a frame."""
+
+SLOT = np.dtype(
+    [
+        ("generation", np.int64),
+        ("time", np.float64),
+        ("bodies", np.int64),
+        ("position", np.float32, (MAX_BODIES, 3)),
+        ("quaternion", np.float32, (MAX_BODIES, 4)),
+        ("component", np.int32, (MAX_BODIES,)),
+        ("inside", np.bool_, (MAX_BODIES,)),
+    ],
+    align=True,
+)
+"""One frame in memory; the first ``bodies`` rows of the arrays are filled."""
+
+BUFFER = np.dtype([("counter", np.int64), ("slots", SLOT, (2,))], align=True)
+"""The shared block. ``counter`` is the number of frames published so far; frame k lies in slot k mod 2."""
+
+READ_ATTEMPTS = 5
+
+
+@dataclass(frozen=True)
+class Frame:
+    """State of the n bodies that have entered, in order of entry. A copy; later frames do not change it."""
+
+    number: int
+    """Count of frames since the session began, from 1."""
+    generation: int
+    """Which pour of the session this is."""
+    time: float
+    """Simulated time [s]."""
+    position: npt.NDArray[np.float32]
+    """Centres of mass [m], shape (n, 3)."""
+    quaternion: npt.NDArray[np.float32]
+    """Orientation of the principal frame, wxyz, shape (n, 4)."""
+    component: npt.NDArray[np.int32]
+    """Index into ``scene.bodies``, shape (n,)."""
+    inside: npt.NDArray[np.bool_]
+    """False for bodies that rolled out of the domain, shape (n,)."""
+
+
+def shared_block(context: Any) -> Any:
+    """Zeroed shared memory for ``BUFFER``, to be handed to a process that ``context`` (multiprocessing) starts."""
+    return context.RawArray(ctypes.c_byte, BUFFER.itemsize)
+
+
+class FrameWriter:
+    """The solver's end of the block."""
+
+    def __init__(self, block: Any) -> None:
+        self._buffer = np.frombuffer(block, dtype=BUFFER)[0:1]
+
+    def publish(self, bodies: Bodies, generation: int, time: float) -> None:
+        """Write a frame; ``bodies`` must not be more than ``MAX_BODIES``."""
+        n = len(bodies.mass)
+        following = int(self._buffer["counter"][0]) + 1
+        slot = self._buffer["slots"][0, following % 2 : following % 2 + 1]
+        slot["generation"], slot["time"], slot["bodies"] = generation, time, n
+        slot["position"][0, :n] = bodies.position
+        slot["quaternion"][0, :n] = bodies.quaternion
+        slot["component"][0, :n] = bodies.component
+        slot["inside"][0, :n] = bodies.inside
+        self._buffer["counter"] = following
+
+
+class FrameReader:
+    """The page's end of the block."""
+
+    def __init__(self, block: Any, between: Callable[[], None] = lambda: None) -> None:
+        """``between`` is called after each copy, before it is checked (tests put a writer there)."""
+        self._buffer = np.frombuffer(block, dtype=BUFFER)[0:1]
+        self._between = between
+        self._last: Frame | None = None
+
+    def newest(self) -> Frame | None:
+        """The newest frame, or None before the first one.
+
+        The same object as long as nothing new was published, and also where the writer overtook every attempt
+        to copy (it would have to publish two frames within a copy of some 10 µs, five times in a row).
+        """
+        for _ in range(READ_ATTEMPTS):
+            counter = int(self._buffer["counter"][0])
+            if counter == 0 or (self._last is not None and self._last.number == counter):
+                return self._last
+            frame = _copy(self._buffer["slots"][0, counter % 2], counter)
+            self._between()
+            if int(self._buffer["counter"][0]) == counter:
+                self._last = frame
+                break
+        return self._last
+
+
+def _copy(slot: Any, number: int) -> Frame:
+    n = int(slot["bodies"])
+    return Frame(
+        number=number,
+        generation=int(slot["generation"]),
+        time=float(slot["time"]),
+        position=slot["position"][:n].copy(),
+        quaternion=slot["quaternion"][:n].copy(),
+        component=slot["component"][:n].copy(),
+        inside=slot["inside"][:n].copy(),
+    )

@@ -1,0 +1,76 @@
+"""The solver process: takes commands until it is told to close or its parent is gone.
+
+The parent imports this file, so Taichi is imported inside :func:`run` only.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import queue
+import signal
+import traceback
+from typing import TYPE_CHECKING, Any
+
+from explorer.live.messages import Close, Command, Failure, Report, Start
+
+if TYPE_CHECKING:
+    from explorer.live.live_pour import LivePour
+
+IDLE_WAIT = 0.5
+"""Longest wait [s] for a command before the process looks whether its parent still lives."""
+
+
+def run(commands: Any, reports: Any, block: Any) -> None:
+    """Main function of the process: queue of commands in, queue of reports out, shared memory for frames."""
+    # Ctrl-C in a terminal reaches the whole group; the parent decides when this process ends.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        _work(commands, reports, block)
+    except Exception as error:  # whatever it is, the person at the screen has to hear of it
+        traceback.print_exc()
+        reports.put(Failure(f"{type(error).__name__}: {' '.join(str(error).split())[:300]}"))
+
+
+def _work(commands: Any, reports: Any, block: Any) -> None:
+    from explorer.live.frames import FrameWriter
+    from explorer.live.live_pour import LivePour
+    from solver import backend
+
+    backend.init(threads=1)
+    pour: LivePour | None = None
+    while True:
+        for command in _waiting(commands, pour):
+            if isinstance(command, Close):
+                return
+            if pour is not None:
+                pour.obey(command)
+            elif isinstance(command, Start):
+                pour = LivePour(command, FrameWriter(block), _sender(reports))
+        if not _parent_lives():
+            return
+        if pour is not None and pour.seconds_to_wait() == 0.0:
+            pour.advance()
+
+
+def _sender(reports: Any) -> Any:
+    def send(report: Report) -> None:
+        reports.put(report)
+
+    return send
+
+
+def _waiting(commands: Any, pour: LivePour | None) -> list[Command]:
+    """Commands that have come in; waits for one while there is nothing else to do."""
+    wait = None if pour is None else pour.seconds_to_wait()
+    found: list[Command] = []
+    try:
+        found.append(commands.get(timeout=IDLE_WAIT if wait is None else max(wait, 1e-4)))
+        while True:
+            found.append(commands.get_nowait())
+    except queue.Empty:
+        return found
+
+
+def _parent_lives() -> bool:
+    parent = multiprocessing.parent_process()
+    return parent is None or parent.is_alive()

@@ -1,0 +1,183 @@
+"""One recording: a pour as moving bodies, curves, events and parameters in a ``.rrd`` file.
+
+    world/bodies/<component>    the mesh once, then one pose per body that is in the domain, per frame
+    world/plate, world/cone     the rig; world/gate while the gate is shut
+    curves/<plot>/<name>        scalars, the unit in the name
+    log                         events
+    parameters, outcome         Markdown
+
+Timelines: ``sim_time`` [s] and ``step``. Poses are single precision: an f32 position of 0.1 m resolves 7 nm.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Protocol, Self
+
+import numpy as np
+import numpy.typing as npt
+import rerun as rr
+
+from explorer.logs.blueprint import CURVES, TIMELINE, blueprint, curve_entity
+from explorer.logs.documents import outcome_document, parameters_document
+from explorer.new_file import check_new_file
+from explorer.scene_meshes import GATE_NAME, Triangles, body_triangles, rig_triangles
+from explorer.viewer.palette import BODY_COLOURS, GLASS, PLATE
+from solver import Scene
+from solver.observables import Value
+
+APPLICATION = "repose-explorer"
+FLUSH_INTERVAL = 1.0
+"""Wall time [s] after which what was logged is written out: a killed program loses no more than this."""
+PLATE_COLOUR, CONE_COLOUR = (*PLATE, 255), (*GLASS, 70)
+"""RGBA, 0 … 255; the colours of the page, the cone as if of glass."""
+
+
+class Poses(Protocol):
+    """State of the n bodies that have entered; `solver.Bodies` and a live frame are such."""
+
+    @property
+    def component(self) -> npt.NDArray[np.int32]:
+        """Index into ``scene.bodies``, shape (n,)."""
+
+    @property
+    def position(self) -> npt.NDArray[np.floating]:
+        """Centres of mass [m], shape (n, 3)."""
+
+    @property
+    def quaternion(self) -> npt.NDArray[np.floating]:
+        """Orientation of the principal frame, wxyz, shape (n, 4)."""
+
+    @property
+    def inside(self) -> npt.NDArray[np.bool_]:
+        """False for bodies that were taken out of the domain, shape (n,)."""
+
+
+class PourLog:
+    """Writes one pour into a new file ``path``. Use as a context manager, or end with :meth:`close`.
+
+    Raises :class:`explorer.errors.CommandError` if the file exists, has another suffix or no folder to be in.
+    """
+
+    def __init__(self, path: Path, scene: Scene, seed: int) -> None:
+        check_new_file(path, suffix=".rrd")
+        # Otherwise rerun drops bad data with no more than a warning.
+        rr.set_strict_mode(True)
+        self._scene = scene
+        self._shown: set[int] = set()
+        self._gate_shown = False
+        self._stream = rr.RecordingStream(APPLICATION)
+        self._stream.set_sinks(rr.FileSink(str(path)))
+        self._stream.send_blueprint(blueprint(eye_distance=3.0 * scene.rig.inlet_height))
+        self._static(seed)
+        self.flush()
+
+    def frame(
+        self,
+        time: float,
+        poses: Poses,
+        curves: Mapping[str, float],
+        *,
+        step: int | None = None,
+        gate_shut: bool = False,
+    ) -> None:
+        """Log the state at ``time`` [s]; ``curves`` by the names of ``CURVES``, leaving out NaN."""
+        self._at(time, step)
+        for k in range(len(self._scene.bodies)):
+            self._component(k, poses)
+        self._gate(gate_shut)
+        for curve in CURVES:
+            number = curves.get(curve.name, np.nan)
+            if np.isfinite(number):
+                self._stream.log(curve_entity(curve), rr.Scalars(number))
+        if clock.perf_counter() - self._flushed >= FLUSH_INTERVAL:
+            self.flush()
+
+    def event(self, time: float, text: str, *, step: int | None = None, level: str = "INFO") -> None:
+        """Log something that happened at ``time`` [s]."""
+        self._at(time, step)
+        self._stream.log("log", rr.TextLog(text, level=level))
+
+    def outcome(self, time: float, text: str, observed: Mapping[str, Value], *, step: int | None = None) -> None:
+        """Log how the pour ended and what was read off its pile."""
+        self.event(time, text, step=step)
+        document = outcome_document(text, observed)
+        self._stream.log("outcome", rr.TextDocument(document, media_type="text/markdown"))
+
+    def flush(self) -> None:
+        """Write out what was logged so far: from here on it survives the end of the program."""
+        self._stream.flush()
+        self._flushed = clock.perf_counter()
+
+    def close(self) -> None:
+        """Write out the rest and end the file."""
+        self._stream.flush()
+        self._stream.disconnect()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _static(self, seed: int) -> None:
+        self._stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        document = parameters_document(self._scene, seed)
+        self._stream.log("parameters", rr.TextDocument(document, media_type="text/markdown"), static=True)
+        for curve in CURVES:
+            self._stream.log(curve_entity(curve), rr.SeriesLines(names=curve.name), static=True)
+        self._rig = rig_triangles(self._scene.rig)
+        for name, triangles in self._rig.items():
+            if name != GATE_NAME:
+                colour = PLATE_COLOUR if name == "plate" else CONE_COLOUR
+                self._stream.log(f"world/{name}", _mesh(triangles, colour), static=True)
+
+    def _at(self, time: float, step: int | None) -> None:
+        self._stream.set_time(TIMELINE, duration=time)
+        if step is not None:
+            self._stream.set_time("step", sequence=step)
+
+    def _component(self, k: int, poses: Poses) -> None:
+        """Poses of component ``k``.
+
+        Its mesh is there only while it has bodies: the viewer draws a mesh without poses where it is.
+        """
+        body = self._scene.bodies[k]
+        entity = f"world/bodies/{body.name}"
+        chosen = (poses.component == k) & poses.inside
+        if not chosen.any():
+            if k in self._shown:
+                self._stream.log(entity, rr.Clear(recursive=False))
+                self._shown.remove(k)
+            return
+        if k not in self._shown:
+            colour = BODY_COLOURS[k % len(BODY_COLOURS)]
+            self._stream.log(entity, _mesh(body_triangles(body), (*colour, 255)))
+            self._shown.add(k)
+        # wxyz here, xyzw in rerun
+        turned = poses.quaternion[chosen][:, [1, 2, 3, 0]].astype(np.float32)
+        self._stream.log(
+            entity,
+            rr.InstancePoses3D(translations=poses.position[chosen].astype(np.float32), quaternions=turned),
+        )
+
+    def _gate(self, shut: bool) -> None:
+        if shut and not self._gate_shown:
+            self._stream.log(f"world/{GATE_NAME}", _mesh(self._rig[GATE_NAME], PLATE_COLOUR))
+        elif self._gate_shown and not shut:
+            self._stream.log(f"world/{GATE_NAME}", rr.Clear(recursive=False))
+        self._gate_shown = shut
+
+
+def _mesh(triangles: Triangles, colour: tuple[int, int, int, int]) -> rr.Mesh3D:
+    return rr.Mesh3D(
+        vertex_positions=triangles.vertices,
+        vertex_normals=triangles.normals,
+        triangle_indices=triangles.faces,
+        albedo_factor=colour,
+    )

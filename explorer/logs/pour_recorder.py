@@ -1,0 +1,106 @@
+"""Recordings of pours that run in this process: one file per pour, fed from ``run_pours(on_sample=…)``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Self
+
+from explorer.logs.blueprint import motion_curves
+from explorer.logs.pour_log import PourLog
+from explorer.new_file import check_new_file
+from explorer.outcomes import outcome_text
+from solver import Outcome, Record
+from solver.observables import observe
+from solver.observables.pile import angle_of_repose
+from solver.observables.reading import PileReading
+from solver.record_builder import member_spheres, pile_of
+
+if TYPE_CHECKING:
+    from solver.pour import Pour
+
+FRAME_INTERVAL, ANGLE_INTERVAL = 0.02, 0.1
+"""Simulated time [s] between frames, and between readings of the angle."""
+
+
+def recorder_of(path: Path, seeds: Sequence[int]) -> PourRecorder:
+    """Recorder into ``path`` for one seed, ``<stem>_<seed>.rrd`` for several; refuses files that exist."""
+    several = len(seeds) > 1
+    paths = [path.with_name(f"{path.stem}_{seed}{path.suffix}") if several else path for seed in seeds]
+    for one in paths:
+        check_new_file(one, suffix=".rrd")
+    return PourRecorder(paths)
+
+
+class PourRecorder:
+    """Logs pour k into ``paths[k]``. A context manager: at its end, files of unfinished pours are closed."""
+
+    def __init__(self, paths: Sequence[Path]) -> None:
+        self._paths = paths
+        self._open: dict[int, _Recording] = {}
+
+    def sample(self, k: int, pour: Pour) -> None:
+        """Log the present state of pour ``k`` if a frame is due (always when it has ended)."""
+        if k not in self._open:
+            self._open[k] = _Recording(PourLog(self._paths[k], pour.scene, pour.seed))
+        self._open[k].sample(pour)
+
+    def finish(self, k: int, record: Record) -> None:
+        """Log the outcome of pour ``k`` and close its file."""
+        recording = self._open.pop(k)
+        text = outcome_text(record.outcome, record.message)
+        with recording.log as log:
+            log.outcome(recording.time, text, observe(record), step=record.steps)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        with ExitStack() as stack:
+            for recording in self._open.values():
+                stack.enter_context(recording.log)
+        self._open.clear()
+
+
+class _Recording:
+    """One file and what was logged last."""
+
+    def __init__(self, log: PourLog) -> None:
+        self.log = log
+        self.time = 0.0
+        self._frame_due = self._angle_due = -math.inf
+        self._phase = ""
+
+    def sample(self, pour: Pour) -> None:
+        self.time = pour.time
+        if pour.phase != self._phase:
+            self._phase = pour.phase
+            self.log.event(pour.time, f"phase: {pour.phase}", step=pour.steps)
+        ended = pour.outcome != Outcome.RUNNING
+        if not ended and pour.time < self._frame_due:
+            return
+        # Half a sample early is in time: samples do not fall on multiples of the interval exactly.
+        slack = 0.5 * pour.scene.numerics.sample_interval
+        self._frame_due = pour.time + FRAME_INTERVAL - slack
+        finite = pour.outcome != Outcome.NON_FINITE
+        curves = dict(_curves(pour.samples[-1]))
+        if finite and (ended or pour.time >= self._angle_due):
+            self._angle_due = pour.time + ANGLE_INTERVAL - slack
+            curves["angle_of_repose_deg"] = _angle_deg(pour)
+        # The last finite state stays on the screen when a run has diverged.
+        if finite:
+            self.log.frame(pour.time, pour.bodies(), curves, step=pour.steps, gate_shut=pour.gate_shut)
+
+
+def _curves(sample: Mapping[str, float]) -> Mapping[str, float]:
+    return motion_curves(sample["entered"], sample["discharged"], sample["kinetic"], sample["touching"])
+
+
+def _angle_deg(pour: Pour) -> float:
+    bodies = pour.bodies()
+    return angle_of_repose(PileReading(pile_of(pour.scene, bodies, member_spheres(pour.scene, bodies)))).value

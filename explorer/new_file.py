@@ -1,0 +1,17 @@
+"""Files that a command is about to make: refused before any work where they exist or cannot be made."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from explorer.errors import CommandError
+
+
+def check_new_file(path: Path, suffix: str) -> None:
+    """Raise :class:`CommandError` unless ``path`` ends in ``suffix``, is new and has a folder."""
+    if path.suffix != suffix:
+        raise CommandError(f"{path}: the name must end in {suffix}")
+    if path.exists():
+        raise CommandError(f"{path}: exists already; choose another name")
+    if not path.absolute().parent.is_dir():
+        raise CommandError(f"{path}: there is no folder {path.absolute().parent}")

@@ -1,0 +1,1 @@
+"""Charts of a report: pure functions from a result to a plotly specification in plain JSON types."""

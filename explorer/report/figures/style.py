@@ -1,0 +1,95 @@
+"""Colours and parts that the charts share. Every colour reads on a light and on a dark page."""
+
+from __future__ import annotations
+
+import html
+from typing import Any
+
+from explorer.report.content import Spec
+
+Json = dict[str, Any]
+
+FACTOR = "#3d7fb8"
+ASSUMPTION = "#d07a2c"
+DUMMY = "#8d949c"
+TARGET = "#2b9a81"
+CHOSEN = "#c2455a"
+INK = "#2b2f34"
+"""Lines on a filled ground that is light on every page."""
+MARGIN_BAND = "rgba(43, 154, 129, 0.08)"
+CLOUD = "rgba(61, 127, 184, 0.4)"
+BELOW_TO_ABOVE = [[0.0, "#3d7fb8"], [0.5, "#efece6"], [1.0, "#d07a2c"]]
+"""Colour scale of a surface: below, at and above the target."""
+
+
+def label(text: str) -> str:
+    """Text for a chart; plotly reads a little HTML, so names are escaped."""
+    return html.escape(text, quote=False)
+
+
+def chart(traces: list[Json], layout: Json, height: int = 380) -> Spec:
+    """A chart from its traces; margins and legend as in all others."""
+    common: Json = {
+        "height": height,
+        "margin": {"l": 60, "r": 24, "t": 28, "b": 52},
+        "legend": {"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom"},
+        "hovermode": "closest",
+    }
+    return {"data": traces, "layout": common | layout}
+
+
+def axis(title: str, **more: Any) -> Json:
+    """An axis with a title."""
+    return {"title": {"text": label(title)}, "automargin": True, **more}
+
+
+def side_by_side(panels: int, gap: float = 0.06) -> list[list[float]]:
+    """Domains of ``panels`` charts in a row."""
+    width = (1.0 - gap * (panels - 1)) / panels
+    return [[k * (width + gap), k * (width + gap) + width] for k in range(panels)]
+
+
+def suffix(panel: int) -> str:
+    """What plotly puts behind "x" and "y" for a panel: nothing for the first, then "2", "3", …"""
+    return "" if panel == 0 else str(panel + 1)
+
+
+def points(x: list[Any], y: list[Any], name: str, colour: str, **more: Any) -> Json:
+    """Markers with a name in the legend."""
+    marker = {"color": colour, "size": 8} | more.pop("marker", {})
+    return {"type": "scatter", "mode": "markers", "x": x, "y": y, "name": label(name), "marker": marker, **more}
+
+
+def error_bars(half_widths: list[float | None], colour: str) -> Json:
+    """Symmetric intervals; none where the half-width is None."""
+    widths = [0.0 if width is None else width for width in half_widths]
+    return {"type": "data", "array": widths, "color": colour, "thickness": 1.5, "width": 4}
+
+
+def horizontal_line(y: float, colour: str, panel: int = 0, dash: str = "solid") -> Json:
+    """A line across a panel at height ``y``."""
+    place = {"xref": f"x{suffix(panel)} domain", "yref": f"y{suffix(panel)}"}
+    return {"type": "line", **place, "x0": 0, "x1": 1, "y0": y, "y1": y, "line": line(colour, dash)}
+
+
+def vertical_line(x: float, colour: str, panel: int = 0, dash: str = "solid") -> Json:
+    """A line up a panel at ``x``."""
+    place = {"xref": f"x{suffix(panel)}", "yref": f"y{suffix(panel)} domain"}
+    return {"type": "line", **place, "x0": x, "x1": x, "y0": 0, "y1": 1, "line": line(colour, dash)}
+
+
+def horizontal_band(low: float, high: float, colour: str) -> Json:
+    """A band across the first panel."""
+    place = {"xref": "x domain", "yref": "y", "x0": 0, "x1": 1, "y0": low, "y1": high}
+    return {"type": "rect", **place, "fillcolor": colour, "line": {"width": 0}, "layer": "below"}
+
+
+def line(colour: str, dash: str = "solid", width: float = 1.5) -> Json:
+    """Stroke of a line."""
+    return {"color": colour, "dash": dash, "width": width}
+
+
+def note(text: str, x: float, y: float, panel: int = 0, **more: Any) -> Json:
+    """A short text at a place of a panel; y counts in shares of its height."""
+    place = {"xref": f"x{suffix(panel)}", "yref": f"y{suffix(panel)} domain", "x": x, "y": y}
+    return {"text": label(text), "showarrow": False, "font": {"size": 11}, **place, **more}

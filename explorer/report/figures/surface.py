@@ -1,0 +1,152 @@
+"""Charts of a response surface: contours through the optimum, predicted against observed, residuals."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+
+from doe.surface import second_order_terms
+from explorer.report.content import Spec
+from explorer.report.figures.style import (
+    BELOW_TO_ABOVE,
+    CHOSEN,
+    FACTOR,
+    INK,
+    TARGET,
+    Json,
+    axis,
+    chart,
+    line,
+    points,
+    side_by_side,
+    suffix,
+)
+from explorer.report.findings import Plain
+from explorer.report.units_for_people import axis_title, observable_title, unit_of_observable, unit_of_parameter
+
+GRID = 41
+
+
+def contours(result: Plain, index: int) -> Spec:
+    """The surface of target ``index`` over each pair of factors, the others at the optimum.
+
+    Runs of the design are projected on each panel; the thick line is where the model gives the target.
+    """
+    surface, target = result["surface"], result["study"]["targets"][index]
+    unit = unit_of_observable(target["observable"])
+    model, factors, region = surface["models"][index], surface["factors"], surface["region"]
+    centre, half_width = np.array(region["centre"]), np.array(region["half_width"])
+    optimum = np.array([result["optimum"]["values"][factor["path"]] for factor in factors])
+    fixed = (optimum - centre) / half_width
+    pairs = list(combinations(range(len(factors)), 2))
+    grids = [_slice(np.array(model["coefficients"]), fixed, i, j) / unit.size for i, j in pairs]
+    level = unit.of(target["mean"])
+    reach = max(float(np.abs(grid - level).max()) for grid in grids) or 1.0
+    domains = side_by_side(len(pairs), 0.1)
+    traces: list[Json] = []
+    layout: Json = {"coloraxis": _colours(level, reach, observable_title(target["observable"]))}
+    for panel, (i, j) in enumerate(pairs):
+        axes = {"xaxis": f"x{suffix(panel)}", "yaxis": f"y{suffix(panel)}"}
+        scale = [unit_of_parameter(factors[k]["path"]).size for k in (i, j)]
+        x, y = (
+            ((centre[k] + half_width[k] * np.linspace(-1, 1, GRID)) / size).tolist()
+            for k, size in zip((i, j), scale, strict=True)
+        )
+        shared: Json = {"type": "contour", "x": x, "y": y, "z": np.round(grids[panel], 6).tolist(), **axes}
+        traces.append(
+            shared
+            | {
+                "coloraxis": "coloraxis",
+                "name": "model",
+                "line": {"width": 0.6, "color": "rgba(43, 47, 52, 0.35)"},
+                "contours": {"coloring": "heatmap", "showlabels": True, "labelfont": {"size": 10, "color": INK}},
+                "hovertemplate": "%{x:.4g}, %{y:.4g}: %{z:.2f}<extra></extra>",
+            }
+        )
+        at_target = {"start": level, "end": level, "size": 1.0, "coloring": "none"}
+        traces.append(
+            shared
+            | {"contours": at_target, "line": {"color": TARGET, "width": 4}, "showscale": False, "hoverinfo": "skip"}
+            | {"name": "model = target", "showlegend": panel == 0}
+        )
+        traces += _marks(surface, optimum, factors, (i, j), scale, axes, panel == 0)
+        layout[f"xaxis{suffix(panel)}"] = axis(
+            axis_title(factors[i]["path"], factors[i]["name"]), domain=domains[panel], anchor=f"y{suffix(panel)}"
+        )
+        layout[f"yaxis{suffix(panel)}"] = axis(
+            axis_title(factors[j]["path"], factors[j]["name"]), anchor=f"x{suffix(panel)}"
+        )
+    return chart(traces, layout, 420)
+
+
+def fit(result: Plain, index: int) -> Spec:
+    """Left: predicted against observed per run; right: externally studentized residuals over the prediction."""
+    surface = result["surface"]
+    model, anova, observable = surface["models"][index], surface["anova"][index], surface["observables"][index]
+    unit = unit_of_observable(observable)
+    observed = [unit.of(value) for value in model["observed"]]
+    predicted = [unit.of(value) for value in model["predicted"]]
+    ends = [min(observed + predicted), max(observed + predicted)]
+    left, right = side_by_side(2, 0.12)
+    residuals = {"xaxis": "x2", "yaxis": "y2", "showlegend": False}
+    traces = [
+        {
+            "type": "scatter",
+            "mode": "lines",
+            "x": ends,
+            "y": ends,
+            "name": "predicted = observed",
+            "line": line("#8d949c", "dash"),
+        },
+        points(observed, predicted, "pours of the design", FACTOR, marker={"opacity": 0.75}),
+        points(predicted, anova["studentized_residuals"], "residual", FACTOR, marker={"opacity": 0.75}, **residuals),
+    ]
+    title = observable_title(observable)
+    layout = {
+        "xaxis": axis(f"observed: {title}", domain=left),
+        "yaxis": axis("predicted"),
+        "xaxis2": axis(f"predicted: {title}", domain=right, anchor="y2"),
+        "yaxis2": axis("studentized residual", anchor="x2", zeroline=True, zerolinewidth=1.5),
+    }
+    return chart(traces, layout, 380)
+
+
+def _slice(coefficients: np.ndarray, fixed: np.ndarray, i: int, j: int) -> np.ndarray:
+    """The model on a grid over factors i (columns) and j (rows), the others at ``fixed`` (coded)."""
+    across, up = np.meshgrid(np.linspace(-1, 1, GRID), np.linspace(-1, 1, GRID))
+    coded = np.broadcast_to(fixed, (GRID, GRID, fixed.size)).copy()
+    coded[..., i], coded[..., j] = across, up
+    return np.asarray(second_order_terms(coded) @ coefficients)
+
+
+def _marks(
+    surface: Plain,
+    optimum: np.ndarray,
+    factors: list[Plain],
+    pair: tuple[int, int],
+    scale: list[float],
+    axes: Json,
+    in_legend: bool,
+) -> list[Json]:
+    """Runs of the design, the measured parameters where they lie in the region, and the optimum."""
+    i, j = pair
+    natural = np.array(surface["natural"])[:, pair] / scale
+    at = np.array([optimum[i], optimum[j]]) / scale
+    reference = np.array([factors[i]["reference"], factors[j]["reference"]]) / scale
+    low = (np.array(surface["region"]["centre"]) - surface["region"]["half_width"])[list(pair)] / scale
+    high = (np.array(surface["region"]["centre"]) + surface["region"]["half_width"])[list(pair)] / scale
+    runs = {"size": 7, "color": "#ffffff", "line": {"color": INK, "width": 1.2}}
+    star = {"size": 13, "symbol": "star", "line": {"color": "#ffffff", "width": 1}}
+    diamond = {"size": 10, "symbol": "diamond", "color": "#ffffff", "line": {"color": INK, "width": 1.5}}
+    shown: Json = {"showlegend": in_legend, **axes}
+    marks = [points(natural[:, 0].tolist(), natural[:, 1].tolist(), "points of the design", INK, marker=runs, **shown)]
+    if ((low <= reference) & (reference <= high)).all():
+        x, y = (float(value) for value in reference)
+        marks.append(points([x], [y], "measured parameters", INK, marker=diamond, **shown))
+    return [*marks, points([float(at[0])], [float(at[1])], "optimum", CHOSEN, marker=star, **shown)]
+
+
+def _colours(level: float, reach: float, title: str) -> Json:
+    bar = {"title": {"text": title, "side": "right"}, "thickness": 12, "outlinewidth": 0}
+    return {"colorscale": BELOW_TO_ABOVE, "cmin": level - reach, "cmax": level + reach, "colorbar": bar}

@@ -1,0 +1,59 @@
+"""Sections as Markdown: the same facts and tables without the charts, fit for an issue."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from explorer.report.content import Block, Bullets, Caution, Code, Facts, Figure, Folded, Section, Table, Text
+
+SPECIAL = re.compile(r"([\\*_\[\]<>#|])")
+
+
+def document(title: str, subtitle: str, sections: Sequence[Section]) -> str:
+    """The whole report."""
+    parts = [f"# {escaped(title)}", escaped(subtitle)]
+    for section in sections:
+        parts.append(f"## {escaped(section.title)}")
+        parts += [text for block in section.blocks if (text := _block(block))]
+    return "\n\n".join(parts) + "\n"
+
+
+def escaped(text: str) -> str:
+    """Text in which Markdown and HTML see no markup; code spans stay, and line breaks become blanks."""
+    pieces = re.split(r"(`[^`]+`)", text.replace("\n", " "))
+    return "".join(
+        piece.replace("|", r"\|") if piece.startswith("`") and len(piece) > 1 else SPECIAL.sub(r"\\\1", piece)
+        for piece in pieces
+    )
+
+
+def _block(block: Block) -> str:
+    match block:
+        case Text(text):
+            return escaped(text)
+        case Caution(text):
+            return f"> **Note:** {escaped(text)}"
+        case Facts(pairs):
+            return "\n".join(f"- **{escaped(what)}:** {escaped(value)}" for what, value in pairs)
+        case Bullets(items):
+            return "\n".join(f"- {escaped(item)}" for item in items)
+        case Code(text):
+            return f"```sh\n{text}\n```"
+        case Table():
+            return _table(block)
+        case Figure():
+            return ""
+        case Folded(title, blocks):
+            return "\n\n".join([f"### {escaped(title)}", *(text for inner in blocks if (text := _block(inner)))])
+
+
+def _table(table: Table) -> str:
+    lines = [_row(table.header), "|" + "---|" * len(table.header), *map(_row, table.rows)]
+    if table.caption:
+        lines += ["", escaped(table.caption)]
+    return "\n".join(lines)
+
+
+def _row(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(map(escaped, cells))} |"

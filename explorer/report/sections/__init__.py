@@ -1,0 +1,42 @@
+"""Sections of a report, one file per topic: pure functions from a result to a heading and its blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from explorer.report.content import Section
+from explorer.report.sections.ascent import ascent
+from explorer.report.sections.assumptions import assumptions, scan
+from explorer.report.sections.effects import effects
+from explorer.report.sections.noise import noise
+from explorer.report.sections.optimum import optimum
+from explorer.report.sections.overview import overview
+from explorer.report.sections.paper import paper
+from explorer.report.sections.repeat import repeat, runs
+from explorer.report.sections.screening import screening
+from explorer.report.sections.surface import surface
+from explorer.report.sections.verification import verification
+
+SECTIONS: tuple[Callable[[dict[str, Any]], Section | None], ...] = (
+    overview,
+    verification,
+    effects,
+    noise,
+    screening,
+    assumptions,
+    scan,
+    ascent,
+    surface,
+    optimum,
+    paper,
+    runs,
+    repeat,
+)
+"""In the order of the page: what was found, then how."""
+
+
+def sections_of(result: dict[str, Any]) -> tuple[Section, ...]:
+    """Every section that ``result`` has something for."""
+    found = (make(result) for make in SECTIONS)
+    return tuple(section for section in found if section is not None)

@@ -1,0 +1,56 @@
+"""The steepest ascent: the walk along the fitted effects and where it passes the target."""
+
+from __future__ import annotations
+
+from explorer.report.content import Block, Bullets, Figure, Section, Table, Text
+from explorer.report.figures.walks import ascent_path
+from explorer.report.findings import Plain, values_of
+from explorer.report.units_for_people import (
+    fixed,
+    observable_label,
+    observed,
+    parameter_label,
+    parameter_value,
+)
+
+
+def ascent(result: Plain) -> Section:
+    """Steps, means, errors and the bracket."""
+    walk = result["ascent"]
+    observable, factors = walk["observable"], walk["factors"]
+    blocks: list[Block] = [
+        Text(
+            "Direction and steps follow the effects on the target's own observable; base factor "
+            f"{walk['path']['base']}. {walk['bracket']['statement']} Two steps have to differ by "
+            f"{observed(observable, walk['smallest_difference'])} to be told apart with chance 0.8."
+        ),
+        Figure("ascent", ascent_path(result), "Intervals use the pilot's σ and the number of valid pours of a step."),
+        _steps(walk, observable, factors),
+    ]
+    region = walk["region"]["notes"]
+    notes = (*walk["notes"], *(f"Region of the surface, SI units: {note}" for note in region))
+    if notes:
+        blocks.append(Bullets(notes))
+    return Section("Steepest ascent", tuple(blocks))
+
+
+def _steps(walk: Plain, observable: str, factors: list[Plain]) -> Table:
+    rows = []
+    for k, natural in enumerate(walk["path"]["natural"]):
+        rows.append(
+            (
+                str(k + 1),
+                *(parameter_value(f["path"], value) for f, value in zip(factors, natural, strict=True)),
+                str(len(values_of(walk["runs"][k], observable))),
+                observed(observable, walk["means"][k]),
+                observed(observable, walk["sd"][k]),
+                observed(observable, walk["standard_error"][k]),
+                fixed(walk["relative_error_percent"][k]),
+            )
+        )
+    header = (
+        "step",
+        *(f"{factor['name']} {parameter_label(factor['path'])}" for factor in factors),
+        *("valid pours", "mean", "sd", "standard error", "relative error [%]"),
+    )
+    return Table(header, tuple(rows), f"{observable_label(observable)}, given a pile.")

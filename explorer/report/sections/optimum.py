@@ -1,0 +1,115 @@
+"""The optimum: the solution nearest the measured parameters, how sure it is, and what one target leaves open."""
+
+from __future__ import annotations
+
+from explorer.report.content import Block, Figure, Section, Table, Text
+from explorer.report.figures.optimum import cloud, ranges
+from explorer.report.findings import Plain
+from explorer.report.units_for_people import (
+    enumeration,
+    fixed,
+    observable_label,
+    observed,
+    parameter_label,
+    parameter_range,
+    parameter_value,
+    percent,
+    signed,
+)
+
+
+def optimum(result: Plain) -> Section:
+    """Chosen setting with its 95 % set, the width of the solution surface and unidentified parameters."""
+    found = result["optimum"]
+    blocks: list[Block] = [Text(_statement(result)), _settings(result)]
+    if found["compromise"] is not None:
+        blocks += _compromise(result)
+    single = found["single"]
+    blocks += [
+        Figure("ranges", ranges(result), "Thin inside thick: the narrower the bar, the better a factor is known."),
+        Figure(
+            "cloud",
+            cloud(result),
+            f"{len(single['bootstrap_points'])} refits to resampled {single['resampling']}; each dot is the solution "
+            f"nearest the measured parameters. {percent(single['share_reached'])} of the refits reach the target.",
+        ),
+    ]
+    return Section("Optimum", tuple(blocks))
+
+
+def _statement(result: Plain) -> str:
+    single = result["optimum"]["single"]
+    name = result["study"]["targets"][0]["observable"]
+    between = f"{observed(name, single['predicted_low'])} … {observed(name, single['predicted_high'])}"
+    if single["reached"]:
+        text = (
+            f"Of all settings at which the model gives {observed(name, single['target'])}, this one is nearest the "
+            f"measured parameters (distance {fixed(single['distance'])} half-widths); the model's 95 % interval there "
+            f"is {between}."
+        )
+    else:
+        text = (
+            f"The model does not give {observed(name, single['target'])} in its region; it comes nearest with "
+            f"{observed(name, single['predicted'])} ({between})."
+        )
+    if single["unidentified"]:
+        text += f" The target does not identify {enumeration(single['unidentified'])}."
+    text += (
+        f" In {percent(single['compatible_share'])} of the region the predicted mean is compatible with the target "
+        "at 95 %."
+    )
+    error = single["target_standard_error"]
+    text += (
+        f" The 95 % set and this share include the target's own standard error, {observed(name, error)}."
+        if error
+        else " The target is taken as exact: the study states no standard deviation and number of measurements."
+    )
+    if not single["better_than_noise"]:
+        text += " The surface is not better than noise, so this point is not a calibration."
+    return text
+
+
+def _settings(result: Plain) -> Table:
+    found = result["optimum"]
+    single = found["single"]
+    rows = []
+    for k, factor in enumerate(found["factors"]):
+        path = factor["path"]
+        rows.append(
+            (
+                factor["name"],
+                parameter_label(path),
+                parameter_value(path, found["values"][path]),
+                parameter_range(path, single["point_low"][k], single["point_high"][k]),
+                parameter_range(path, single["solution_low"][k], single["solution_high"][k]),
+                percent(single["solution_share"][k]),
+                "no" if factor["name"] in single["unidentified"] else "yes",
+                parameter_value(path, factor["reference"]),
+                parameter_range(path, factor["low"], factor["high"]),
+            )
+        )
+    header = (
+        *("factor", "parameter", "optimum", "95 % set", "range on the solution surface", "of the region"),
+        *("identified", "measured", "screened"),
+    )
+    caption = "Intervals and ranges of the first target alone." if found["compromise"] is not None else ""
+    return Table(header, tuple(rows), caption)
+
+
+def _compromise(result: Plain) -> list[Block]:
+    compromise = result["optimum"]["compromise"]
+    rows = tuple(
+        (
+            observable_label(target["observable"]),
+            observed(target["observable"], target["mean"]),
+            observed(target["observable"], predicted),
+            signed(missed),
+            fixed(target["weight"]),
+        )
+        for target, predicted, missed in zip(
+            result["study"]["targets"], compromise["predicted"], compromise["standardised"], strict=True
+        )
+    )
+    header = ("target", "measured", "model at the optimum", "missed by [standard errors]", "weight")
+    text = f"Several targets: the setting of least weighted misfit J = {fixed(compromise['misfit'])}."
+    return [Text(f"{text} {compromise['statement']}"), Table(header, rows)]

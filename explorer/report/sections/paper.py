@@ -1,0 +1,123 @@
+"""Compared with the paper: its printed numbers beside ours, for the study of its material only.
+
+Source: Processes 2022, 10, 185. Its tables are assets; what stands only in its text (section 3) is below.
+"""
+
+from __future__ import annotations
+
+import csv
+
+from explorer.report.content import Section, Table, Text
+from explorer.report.findings import Plain, deciding_error, mean_and_sd, significant
+from explorer.report.units_for_people import (
+    MISSING,
+    enumeration,
+    fixed,
+    observed,
+    p_value,
+    parameter_label,
+    parameter_range,
+    parameter_value,
+)
+from solver import asset_path
+
+STUDY = "sunflower_extract"
+PRINTED_SIGNIFICANT = ("X4", "X7", "X16")
+PRINTED_OPTIMUM = {"X4": 58.34e6, "X7": 0.62, "X16": 0.608}
+"""[Pa], 1, 1."""
+PRINTED_MEAN_DEG = 24.91
+PRINTED_RELATIVE_ERROR_PERCENT = 0.923
+PRINTED_P = 0.827
+
+
+def paper(result: Plain) -> Section | None:
+    """Factors, optimum and verification side by side; None for any other study."""
+    if result["study"]["name"] != STUDY:
+        return None
+    analysis = result["screening"]["analysis"]
+    ours = significant(analysis, deciding_error(analysis), "p_holm")
+    text = (
+        f"The paper (Processes 2022, 10, 185) found {enumeration(list(PRINTED_SIGNIFICANT))} significant, judged "
+        f"against three dummy columns without correction. Here: {enumeration(significant(analysis, 'dummies', 'p'))} "
+        f"in that way, {enumeration(ours)} after Holm against the {deciding_error(analysis)}."
+    )
+    return Section("Compared with the paper", (Text(text), _optimum(result), _verification(result), _factors(result)))
+
+
+def _optimum(result: Plain) -> Table:
+    values = result["optimum"]["values"]
+    single, order = result["optimum"]["single"], [factor["name"] for factor in result["optimum"]["factors"]]
+    rows = []
+    for factor in result["study"]["factors"]:
+        if factor["name"] not in PRINTED_OPTIMUM and factor["name"] not in order:
+            continue
+        path, at = factor["path"], order.index(factor["name"]) if factor["name"] in order else None
+        rows.append(
+            (
+                factor["name"],
+                parameter_label(path),
+                parameter_value(path, PRINTED_OPTIMUM.get(factor["name"])),
+                parameter_value(path, values.get(path)),
+                MISSING if at is None else parameter_range(path, single["point_low"][at], single["point_high"][at]),
+            )
+        )
+    return Table(("factor", "parameter", "paper's optimum", "optimum here", "95 % set here"), tuple(rows))
+
+
+def _verification(result: Plain) -> Table:
+    name = result["study"]["targets"][0]["observable"]
+    test = result["verification"]["tests"][0]
+    pours = [float(row["simulated_angle_of_repose_deg"]) for row in _table("table10_verification")]
+    _, sd = mean_and_sd(pours)
+    p = None if test["pooled"] is None else test["pooled"]["p"]
+    ours = test["simulated"]
+    rows = (
+        ("simulated pours", f"{len(pours)}: {', '.join(f'{value:.2f}°' for value in pours)}", f"{ours['n']}"),
+        ("simulated mean", f"{PRINTED_MEAN_DEG:.2f}°", observed(name, ours["mean"])),
+        ("sd of one pour", f"{fixed(sd)}° (from the three pours)", observed(name, ours["sd"])),
+        ("measured mean", "24.68°", observed(name, test["target"]["mean"])),
+        (
+            "relative error",
+            f"{PRINTED_RELATIVE_ERROR_PERCENT} % as printed",
+            f"{fixed(test['relative_error_percent'])} %",
+        ),
+        ("p, two-sample t test", f"{PRINTED_P}", p_value(p)),
+    )
+    caption = (
+        "The paper's 0.923 % is 0.23° divided by its simulated mean, 24.91°; ours is divided by the measured mean. "
+        "p: Student's test with equal variances on both sides."
+    )
+    return Table(("", "paper", "here"), rows, caption)
+
+
+def _factors(result: Plain) -> Table:
+    printed = {row["factor"]: row for row in _table("table6_plackett_burman_anova")}
+    paths = {factor["name"]: factor["path"] for factor in result["study"]["factors"]}
+    rows = []
+    for effect in result["screening"]["analysis"]["effects"]:
+        if effect["is_dummy"] or effect["name"] not in printed:
+            continue
+        row, by_dummies, by_replicates = printed[effect["name"]], effect["by_dummies"], effect["by_replicates"]
+        deciding = by_replicates or by_dummies
+        rows.append(
+            (
+                effect["name"],
+                parameter_label(paths[effect["name"]]),
+                row["sum_of_squares"],
+                fixed(effect["sum_of_squares"]),
+                row["p_value"],
+                MISSING if by_dummies is None else p_value(by_dummies["p"]),
+                MISSING if by_replicates is None else p_value(by_replicates["p"]),
+                MISSING if deciding is None else p_value(deciding["p_holm"]),
+            )
+        )
+    header = (
+        *("factor", "parameter", "paper: sum of squares", "here: sum of squares", "paper: p"),
+        *("here: p dummies", "here: p replicates", "here: p Holm"),
+    )
+    return Table(header, tuple(rows), "The paper's columns as printed in its Table 6.")
+
+
+def _table(name: str) -> list[dict[str, str]]:
+    with asset_path("source_tables", name).open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))

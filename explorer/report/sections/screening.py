@@ -1,0 +1,162 @@
+"""The screening: which of the declared factors matter, by every way of judging."""
+
+from __future__ import annotations
+
+from explorer.report.content import Block, Bullets, Facts, Figure, Folded, Section, Table, Text
+from explorer.report.figures.effects import half_normal, pareto
+from explorer.report.findings import (
+    Plain,
+    factor_effects,
+    half_width,
+    mean_and_sd,
+    significant,
+    values_of,
+)
+from explorer.report.units_for_people import (
+    MISSING,
+    enumeration,
+    fixed,
+    observable_label,
+    observable_title,
+    observed,
+    p_value,
+    parameter_label,
+    parameter_range,
+    percent,
+    signed,
+)
+
+
+def screening(result: Plain) -> Section:
+    """Pareto, half-normal plot, the verdicts, effects and rows of the Plackett–Burman design."""
+    part = result["screening"]
+    analysis, response = part["analysis"], part["response"]
+    blocks: list[Block] = [
+        Text(
+            f"{analysis['rows']}-run Plackett–Burman design over {len(part['factors'])} factors, "
+            f"{analysis['runs']} valid pours, response: {observable_label(response)}, given a pile."
+        ),
+        Facts(tuple(_verdicts(part))),
+    ]
+    chart = pareto(part)
+    if chart is None:
+        blocks.append(Text("No error could be estimated, so no |t| is shown."))
+    else:
+        blocks.append(
+            Figure("pareto", chart, "Lines: the |t| at which p = 0.05 for one factor (dashed) and for all (solid).")
+        )
+    caption = "Noise alone would follow a straight line through the origin; what stands above it acts."
+    blocks += [Figure("half-normal", half_normal(part), caption), effect_table(part)]
+    notes = (*analysis["notes"], *(_no_pile_note(part)))
+    if notes:
+        blocks.append(Bullets(notes))
+    blocks += not_testable(part)
+    blocks.append(Folded("All rows of the screening", (row_table(part),)))
+    return Section("Screening", tuple(blocks))
+
+
+def not_testable(part: Plain) -> list[Block]:
+    """Which factors act on so few bodies that their effect says nothing; empty if none does."""
+    if not part["not_testable"]:
+        return []
+    names = tuple(
+        f"{entry['factor'].replace('_', ' ')} ({parameter_label(entry['path'])}): acts on {entry['bodies']:.0f} bodies"
+        for entry in part["not_testable"]
+    )
+    return [Text("Not testable, because they touch fewer than 5 bodies of the mixture:"), Bullets(names)]
+
+
+def effect_table(part: Plain) -> Table:
+    """Effects by falling size with their tests; the last column reads the same pours in the target's observable."""
+    analysis, response = part["analysis"], part["response"]
+    factors = {factor["name"]: factor for factor in part["factors"]}
+    in_target = {effect["name"]: effect for effect in part["target_analysis"]["effects"]}
+    untestable = {entry["factor"] for entry in part["not_testable"]}
+    rows = []
+    for effect in factor_effects(analysis):
+        factor = factors[effect["name"]]
+        by_replicates, by_dummies = effect["by_replicates"], effect["by_dummies"]
+        deciding = by_replicates if analysis["pure_error"] is not None else by_dummies
+        rows.append(
+            (
+                effect["name"].replace("_", " ") + (" †" if effect["name"] in untestable else ""),
+                parameter_label(factor["path"]),
+                parameter_range(factor["path"], factor["low"], factor["high"]),
+                signed(effect["effect"]),
+                f"± {fixed(half_width(analysis, effect))}",
+                MISSING if by_replicates is None else p_value(by_replicates["p"]),
+                MISSING if by_dummies is None else p_value(by_dummies["p"]),
+                MISSING if deciding is None else p_value(deciding["p_holm"]),
+                fixed(effect["sum_of_squares"]),
+                fixed(effect["contribution_percent"], 1),
+                signed(in_target[effect["name"]]["effect"]),
+            )
+        )
+    header = (
+        *("factor", "parameter", "low … high", "effect", "95 %", "p replicates", "p dummies", "p Holm"),
+        *("sum of squares", "share [%]", "effect in the target"),
+    )
+    caption = "† not testable. " if untestable else ""
+    caption += (
+        f"Effects on {observable_title(response)}; sums of squares of row means. p Holm is corrected for all factors, "
+        "against the error that decides (replicates where there are any); the last column reads the same pours in the "
+        "target's own observable."
+    )
+    return Table(header, tuple(rows), caption)
+
+
+def row_table(part: Plain) -> Table:
+    """One line per row of the design: levels, pours, mean, spread and failures."""
+    rows = []
+    for k, (levels, runs, lost) in enumerate(zip(part["design"], part["runs"], part["no_pile_share"], strict=True)):
+        values = values_of(runs, part["response"])
+        mean, sd = mean_and_sd(values)
+        signs = "".join("+" if level > 0 else "−" for level in levels)
+        rows.append(
+            (
+                str(k + 1),
+                f"`{signs}`",
+                str(len(values)),
+                observed(part["response"], mean),
+                observed(part["response"], sd),
+                percent(lost),
+            )
+        )
+    columns = ", ".join(part["columns"])
+    return Table(("row", "levels", "valid pours", "mean", "sd", "no pile"), tuple(rows), f"Levels of {columns}.")
+
+
+def _verdicts(part: Plain) -> list[tuple[str, str]]:
+    analysis, response = part["analysis"], part["response"]
+    found = []
+    for name, key, way in (
+        ("replicates", "pure_error", "By replicates"),
+        ("dummies", "dummy_error", "By dummies, the way of most published studies"),
+    ):
+        error = analysis[key]
+        if error is None:
+            found.append((way, "not available"))
+            continue
+        raw, corrected = (enumeration(significant(analysis, name, p)) for p in ("p", "p_holm"))  # type: ignore[arg-type]
+        found.append((way, f"p < 0.05: {raw}; after Holm: {corrected} ({error['df']} degrees of freedom)"))
+        found.append(
+            (
+                f"Limits against the {name}",
+                f"{observed(response, error['margin'])} for one factor, "
+                f"{observed(response, error['margin_bonferroni'])} for all (Bonferroni); smallest effect seen with "
+                f"chance 0.8: {observed(response, error['smallest_detectable_effect'])}, for all "
+                f"{observed(response, error['smallest_detectable_effect_bonferroni'])}",
+            )
+        )
+    chosen = [f"{entry['name']} ({entry['reason']})" for entry in part["selected"]]
+    return [*found, ("Going on", enumeration(chosen))] if chosen else found
+
+
+def _no_pile_note(part: Plain) -> list[str]:
+    if part["no_pile_analysis"] is None:
+        return ["Every pour gave a pile, so the share without one has no effects."]
+    found = significant(part["no_pile_analysis"], "dummies", "p_holm")
+    return [
+        f"Share of pours without a pile: mean {percent(part['no_pile_analysis']['mean'], 1)} per row; factors that "
+        f"change it (against the dummies, after Holm): {enumeration(found)}."
+    ]

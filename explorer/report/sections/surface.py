@@ -1,0 +1,147 @@
+"""The response surface: its design, equations, analysis of variance and fit."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+from explorer.report.content import Block, Bullets, Facts, Figure, Folded, Section, Table, Text
+from explorer.report.figures.surface import contours, fit
+from explorer.report.findings import Plain, mean_and_sd, resolved_by_surface, values_of
+from explorer.report.units_for_people import (
+    fixed,
+    number,
+    observable_label,
+    observed,
+    p_value,
+    parameter_label,
+    parameter_range,
+    parameter_value,
+    percent,
+    unit_of_observable,
+    unit_of_parameter,
+)
+
+
+def surface(result: Plain) -> Section:
+    """Model, ANOVA, equations and charts per target."""
+    part = result["surface"]
+    blocks: list[Block] = [
+        Text(
+            f"Box–Behnken design of {len(part['design'])} points over {len(part['factors'])} factors, and "
+            "the full second-order model by least squares on every valid pour. The first model sees a change of "
+            f"{observed(part['observables'][0], resolved_by_surface(result))} from the low to the high end of a factor "
+            "with chance 0.8."
+        ),
+        Bullets(tuple(_region(part))),
+    ]
+    for index, observable in enumerate(part["observables"]):
+        blocks += _of_target(result, index, observable)
+    blocks.append(Folded("All points of the design", (_points(part),)))
+    return Section("Response surface", tuple(blocks))
+
+
+def equation(part: Plain, index: int) -> tuple[str, str]:
+    """The model as text, coded (x from −1 to +1) and in the units that people read."""
+    model, names = part["models"][index], [factor["name"] for factor in part["factors"]]
+    sizes = [unit_of_parameter(factor["path"]).size for factor in part["factors"]]
+    unit = unit_of_observable(part["observables"][index])
+    terms, scales = _terms(names, sizes)
+    coded = [unit.of(value) for value in model["coefficients"]]
+    actual = [unit.of(value) * scale for value, scale in zip(model["coefficients_natural"], scales, strict=True)]
+    return _sum(coded, terms, 4), _sum(actual, terms, 5)
+
+
+def anova_table(anova: Plain) -> Table:
+    """Analysis of variance as published calibrations print it."""
+    rows = tuple(
+        (
+            row["source"].replace("_", " ").replace("*", " × ").replace("^2", "²"),
+            number(row["sum_of_squares"], 4),
+            str(row["df"]),
+            number(row["mean_square"], 4),
+            number(row["f"], 4),
+            p_value(row["p"]),
+        )
+        for row in anova["rows"]
+    )
+    return Table(("source", "sum of squares", "df", "mean square", "F", "p"), rows, "Partial sums of squares.")
+
+
+def _of_target(result: Plain, index: int, observable: str) -> list[Block]:
+    part = result["surface"]
+    anova, canonical = part["anova"][index], part["canonical"][index]
+    coded, actual = equation(part, index)
+    symbols = {factor["name"]: unit_of_parameter(factor["path"]).symbol for factor in part["factors"]}
+    units = [f"{name} in {symbol}" for name, symbol in symbols.items() if symbol]
+    name = observable_label(observable)
+    blocks: list[Block] = [
+        Facts(
+            (
+                ("Model of", f"{name}, given a pile"),
+                ("R²", f"{fixed(anova['r_squared'], 3)}; adjusted {fixed(anova['r_squared_adjusted'], 3)}; predicted "
+                       f"{fixed(anova['r_squared_predicted'], 3)}, by whole points "
+                       f"{fixed(anova['r_squared_predicted_by_row'], 3)}"),
+                ("Scatter", f"σ = {observed(observable, anova['sigma'])}, coefficient of variation "
+                            f"{fixed(anova['cv_percent'])} %"),
+                ("Adequate precision", fixed(anova["adequate_precision"])),
+                ("Shape", _shape(canonical)),
+                ("Equation, coded", f"{coded} (each factor from −1 to +1 over the region)"),
+                ("Equation, actual", actual + (f" ({', '.join(units)})" if units else "")),
+            )
+        )
+    ]  # fmt: skip
+    caption = "Through the optimum; the points of the design are projected on each panel."
+    blocks.append(Figure(f"contours-{index + 1}", contours(result, index), caption))
+    blocks.append(Figure(f"fit-{index + 1}", fit(result, index), ""))
+    blocks.append(anova_table(anova))
+    if anova["notes"]:
+        blocks.append(Bullets(tuple(anova["notes"])))
+    return blocks
+
+
+def _shape(canonical: Plain) -> str:
+    values = ", ".join(number(value) for value in canonical["eigenvalues"])
+    if canonical["kind"] == "ridge":
+        return f"ridge without a stationary point (eigenvalues {values} in coded units)"
+    place = "inside" if canonical["inside"] else "outside"
+    return f"{canonical['kind']}, its stationary point {place} the region (eigenvalues {values} in coded units)"
+
+
+def _region(part: Plain) -> list[str]:
+    centre, half = part["region"]["centre"], part["region"]["half_width"]
+    return [
+        f"{factor['name']} {parameter_label(factor['path'])}: "
+        f"{parameter_range(factor['path'], c - h, c + h)} of the screened "
+        f"{parameter_range(factor['path'], factor['low'], factor['high'])}"
+        for factor, c, h in zip(part["factors"], centre, half, strict=True)
+    ]
+
+
+def _points(part: Plain) -> Table:
+    rows = []
+    for k, (natural, runs, lost) in enumerate(zip(part["natural"], part["runs"], part["no_pile_share"], strict=True)):
+        means = []
+        for observable in part["observables"]:
+            values = values_of(runs, observable)
+            mean, sd = mean_and_sd(values)
+            means += [observed(observable, mean), observed(observable, sd)]
+        settings = (parameter_value(f["path"], v) for f, v in zip(part["factors"], natural, strict=True))
+        valid = sum(run["outcome"] == "at_rest" for run in runs)
+        rows.append((str(k + 1), *settings, str(valid), *means, percent(lost)))
+    measured = [word for name in part["observables"] for word in (f"mean {observable_label(name)}", "sd")]
+    header = ("point", *(factor["name"] for factor in part["factors"]), "valid pours", *measured, "no pile")
+    return Table(header, tuple(rows))
+
+
+def _terms(names: list[str], sizes: list[float]) -> tuple[list[str], list[float]]:
+    """Term names in the order of the model, and the size of each in SI."""
+    pairs = list(combinations(range(len(names)), 2))
+    terms = ["", *names, *(f"{names[i]}·{names[j]}" for i, j in pairs), *(f"{name}²" for name in names)]
+    return terms, [1.0, *sizes, *(sizes[i] * sizes[j] for i, j in pairs), *(size**2 for size in sizes)]
+
+
+def _sum(coefficients: list[float], terms: list[str], digits: int) -> str:
+    text = number(coefficients[0], digits)
+    for value, term in zip(coefficients[1:], terms[1:], strict=True):
+        text += f" {'−' if value < 0 else '+'} {number(abs(value), digits)} {term}"
+    return text

@@ -1,0 +1,176 @@
+"""Numbers, units and names as a person reads them: SI inside a result, MPa, mm, g/s and ° in a report."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+
+from explorer.screen_units import SCREEN_UNIT
+from solver import load_material, parameters
+from solver.observables import OBSERVABLES
+from solver.params import UNITS
+
+MISSING = "–"
+"""What stands for a number that could not be computed."""
+
+OBSERVABLE_LABELS = {
+    "angle_of_repose_deg": "angle of repose, silhouette",
+    "angle_of_repose_above_one_body_deg": "angle of repose, silhouette above one body",
+    "angle_of_repose_cone_deg": "angle of repose, mean cone",
+    "angle_of_repose_mass_cone_deg": "angle of repose, centre-of-mass cone",
+    "angle_of_repose_volume_cone_deg": "angle of repose, volume cone",
+}
+SYMBOLS = {"deg": "°", "kg/m3": "kg/m³", "m/s2": "m/s²", "1": ""}
+
+
+@dataclass(frozen=True)
+class ReadingUnit:
+    """A unit for people: its symbol and its size in SI."""
+
+    symbol: str
+    size: float
+
+    def of(self, value: float) -> float:
+        """SI → this unit."""
+        return value / self.size
+
+    def attach(self, text: str) -> str:
+        """``text`` with the symbol behind it; a degree sign takes no blank."""
+        if text == MISSING or not self.symbol:
+            return text
+        return f"{text}{self.symbol}" if self.symbol == "°" else f"{text} {self.symbol}"
+
+
+@cache
+def parameter_units() -> dict[str, str]:
+    """Last part of a parameter's path → its SI unit, as the solver declares it."""
+    declared = parameters(load_material("sunflower_extract"))
+    return {path.rsplit(".", 1)[-1]: parameter.unit for path, parameter in declared.items()}
+
+
+def unit_of_parameter(path: str) -> ReadingUnit:
+    """Unit in which the parameter ``path`` is read; without symbol for a plain number."""
+    return _reading_unit(parameter_units().get(path.rsplit(".", 1)[-1], "1"))
+
+
+def unit_of_observable(name: str) -> ReadingUnit:
+    """Unit in which the observable ``name`` is read."""
+    units = {observable.name: observable.unit for observable in OBSERVABLES}
+    return _reading_unit(units.get(name, "1"))
+
+
+def parameter_value(path: str, value: float | str | None) -> str:
+    """A parameter's value with its unit, e.g. 5.63e7 → "56.3 MPa"; a named choice stays as it is."""
+    if isinstance(value, str):
+        return value
+    unit = unit_of_parameter(path)
+    return unit.attach(number(None if value is None else unit.of(value), 4))
+
+
+def parameter_range(path: str, low: float | str | None, high: float | str | None) -> str:
+    """Two values with one unit, e.g. "40.1 … 70.5 MPa"."""
+    if low is None or high is None:
+        return MISSING
+    if isinstance(low, str) or isinstance(high, str):
+        return f"{low} … {high}"
+    unit = unit_of_parameter(path)
+    return unit.attach(f"{number(unit.of(low), 4)} … {number(unit.of(high), 4)}")
+
+
+def observed(name: str, value: float | None) -> str:
+    """A value of an observable with its unit, e.g. "24.68°"."""
+    unit = unit_of_observable(name)
+    return unit.attach(fixed(None if value is None else unit.of(value)))
+
+
+def parameter_label(path: str) -> str:
+    """Words for a path, e.g. "pair.seed.seed.static_friction" → "static friction seed–seed"."""
+    kind, *names, last = path.split(".")
+    words = last.replace("_", " ")
+    if kind == "pair":
+        return f"{words} {'–'.join(name.replace('_', ' ') for name in names)}"
+    if kind in {"material", "body"} and names:
+        return f"{words} {names[0].replace('_', ' ')}"
+    return f"insertion {words}" if kind == "insertion" else words
+
+
+def axis_title(path: str, name: str) -> str:
+    """Title of an axis over the parameter ``path`` of the factor ``name``."""
+    unit = unit_of_parameter(path).symbol
+    return f"{name}: {parameter_label(path)}" + (f" [{unit}]" if unit else "")
+
+
+def observable_label(name: str) -> str:
+    """Words for an observable."""
+    return OBSERVABLE_LABELS.get(name, name.replace("_", " "))
+
+
+def observable_title(name: str) -> str:
+    """Title of an axis over an observable."""
+    unit = unit_of_observable(name).symbol
+    return observable_label(name) + (f" [{unit}]" if unit else "")
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """``digits`` significant digits, without exponent between 1e-4 and 1e6."""
+    if value is None or not math.isfinite(value):
+        return MISSING
+    rounded = float(f"{value:.{digits}g}")
+    if rounded == 0 or 1e-4 <= abs(rounded) < 1e6:
+        decimals = 0 if rounded == 0 else max(0, digits - 1 - math.floor(math.log10(abs(rounded))))
+        text = f"{rounded:.{decimals}f}"
+        text = text.rstrip("0").rstrip(".") if "." in text else text
+    else:
+        text = f"{rounded:.{digits - 1}e}"
+    return text.replace("-", "−")
+
+
+def fixed(value: float | None, decimals: int = 2) -> str:
+    """A number with ``decimals`` places."""
+    if value is None or not math.isfinite(value):
+        return MISSING
+    return f"{value:.{decimals}f}".replace("-", "−")
+
+
+def signed(value: float | None, decimals: int = 2) -> str:
+    """A number with its sign and ``decimals`` places."""
+    if value is None or not math.isfinite(value):
+        return MISSING
+    return f"{value:+.{decimals}f}".replace("-", "−")
+
+
+def p_value(p: float | None) -> str:
+    """A probability with four places; smaller ones as "<0.0001"."""
+    if p is None or not math.isfinite(p):
+        return MISSING
+    return "<0.0001" if p < 1e-4 else f"{p:.4f}"
+
+
+def percent(share: float | None, decimals: int = 0) -> str:
+    """A share as a percentage."""
+    return MISSING if share is None else f"{fixed(100 * share, decimals)} %"
+
+
+def duration(seconds: float | None) -> str:
+    """A duration in s below two minutes, else in min."""
+    if seconds is None:
+        return MISSING
+    return f"{number(seconds)} s" if seconds < 120 else f"{fixed(seconds / 60, 1)} min"
+
+
+def code(text: str) -> str:
+    """A code span; backticks inside would end it and become apostrophes."""
+    return "`" + text.replace("`", "'") + "`"
+
+
+def enumeration(items: list[str]) -> str:
+    """ "a", "a and b", "a, b and c"; "none" for an empty list."""
+    if not items:
+        return "none"
+    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
+
+
+def _reading_unit(si: str) -> ReadingUnit:
+    name = SCREEN_UNIT.get(si, si)
+    return ReadingUnit(SYMBOLS.get(name, name), UNITS.get(si, {}).get(name, 1.0))

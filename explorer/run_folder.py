@@ -1,0 +1,104 @@
+"""The folder that a simulation leaves behind. It appears at once and complete, or not at all.
+
+result.json            as in `explorer.run_result`
+parameters.toml        every parameter, SI
+trace_<seed>.csv       curves over time
+pile_<seed>.npz        xyz (n, 3) [m], radius (n,) [m], body (n,): the spheres on the plate
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from explorer.errors import CommandError
+from solver import Record
+
+TRACE_COLUMNS = {
+    "time_s": "time",
+    "entered_mass_kg": "entered_mass",
+    "discharged_mass_kg": "discharged_mass",
+    "kinetic_energy_J": "kinetic_energy",
+    "contacts": "contacts",
+    "max_overlap": "max_overlap",
+}
+"""Columns of a trace file → curves of ``solver.Trace``; ``max_overlap`` is in radii of the sphere."""
+
+
+def check_vacant(folder: Path) -> None:
+    """Raise :class:`CommandError` unless ``folder`` is missing or empty."""
+    if folder.exists() and not folder.is_dir():
+        raise CommandError(f"--out {folder}: is a file; name a folder that is new or empty")
+    if folder.is_dir() and any(folder.iterdir()):
+        raise CommandError(f"--out {folder}: is not empty; name a folder that is new or empty")
+
+
+@contextmanager
+def appearing(folder: Path) -> Iterator[Path]:
+    """A temporary folder that becomes ``folder`` when the block ends, and is removed when the block fails.
+
+    Raises :class:`CommandError` where ``folder`` is not vacant, OSError where it cannot be made.
+    """
+    check_vacant(folder)
+    folder = folder.absolute()
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    temporary = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+    try:
+        yield temporary
+        # mkdtemp gives access to the owner only; a result folder has the rights of any new folder.
+        temporary.chmod(0o777 & ~_umask())
+        check_vacant(folder)
+        if folder.is_dir():
+            folder.rmdir()
+        temporary.rename(folder)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def write_run(folder: Path, result: dict[str, Any], records: Sequence[Record]) -> None:
+    """Write the files of a simulation into an existing ``folder``."""
+    (folder / "result.json").write_text(json_text(result) + "\n", encoding="utf-8")
+    (folder / "parameters.toml").write_text(parameters_text(result["parameters"]), encoding="utf-8")
+    for record in records:
+        _write_trace(folder / f"trace_{record.seed}.csv", record)
+        spheres = record.pile.spheres
+        np.savez_compressed(
+            folder / f"pile_{record.seed}.npz", xyz=spheres.centre, radius=spheres.radius, body=spheres.body
+        )
+
+
+def json_text(result: dict[str, Any]) -> str:
+    """JSON with numbers that every reader understands: NaN and infinity are refused."""
+    return json.dumps(result, indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def parameters_text(values: dict[str, dict[str, Any]]) -> str:
+    """TOML of parameters: path → value, its SI unit as a comment."""
+    lines = ["# Every parameter of the run; SI."]
+    for path, entry in values.items():
+        unit = "" if entry["unit"] == "1" else f"   # [{entry['unit']}]"
+        lines.append(f"{json.dumps(path)} = {json.dumps(entry['value'])}{unit}")
+    return "\n".join(lines) + "\n"
+
+
+def _write_trace(path: Path, record: Record) -> None:
+    columns = [getattr(record.trace, curve).tolist() for curve in TRACE_COLUMNS.values()]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(TRACE_COLUMNS)
+        writer.writerows(zip(*columns, strict=True))
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,108 @@
+"""The result of replicated pours as plain data: what ``simulate --json`` prints and ``result.json`` holds.
+
+    outcome, message, seed, dt, steps    of the first seed
+    observables     name → value and spread (within the pile) of the first seed, unit, and mean, sd, n over
+                    the replicates at rest in which it could be measured
+    outcomes        outcome → number of replicates
+    runs            per seed: outcome, message, dt, steps, wall_s, and name → value and spread
+    parameters      path → value in SI, unit
+    seeds, wall_s (of all), title, versions
+
+A number that could not be measured is null.
+"""
+
+from __future__ import annotations
+
+import math
+import platform
+from collections import Counter
+from collections.abc import Sequence
+from importlib import metadata
+from typing import Any
+
+import numpy as np
+
+from solver import Outcome, Record, Scene, parameters, value
+from solver.observables import Value, observe
+
+RUNTIME = ("taichi", "numpy")
+
+
+def result_of(scene: Scene, records: Sequence[Record], wall_s: float) -> dict[str, Any]:
+    """All about the ``records`` of one scene, in the order of their seeds; ``wall_s`` [s] for all of them."""
+    observed = [observe(record) for record in records]
+    first = records[0]
+    return {
+        "title": scene.title,
+        "outcome": str(first.outcome),
+        "message": first.message,
+        "outcomes": dict(Counter(str(record.outcome) for record in records)),
+        "observables": _observables(records, observed),
+        "parameters": parameter_values(scene),
+        "seed": first.seed,
+        "seeds": [record.seed for record in records],
+        "dt": first.dt,
+        "steps": first.steps,
+        "wall_s": wall_s,
+        "runs": [_run(record, values) for record, values in zip(records, observed, strict=True)],
+        "versions": versions(),
+    }
+
+
+def parameter_values(scene: Scene) -> dict[str, dict[str, Any]]:
+    """Every parameter of ``scene``: path → value in SI (or the name of a choice), unit."""
+    return {path: {"value": value(scene, path), "unit": entry.unit} for path, entry in parameters(scene).items()}
+
+
+def versions() -> dict[str, str | None]:
+    """Versions of this package, of what calculates, and of Python; None for one that is not installed."""
+    return {
+        "repose-explorer": package_version("repose-explorer"),
+        **{name: package_version(name) for name in RUNTIME},
+        "python": platform.python_version(),
+    }
+
+
+def package_version(distribution: str) -> str | None:
+    """Installed version of a distribution, or None."""
+    try:
+        return metadata.version(distribution)
+    except metadata.PackageNotFoundError:
+        return None
+
+
+def _observables(records: Sequence[Record], observed: Sequence[dict[str, Value]]) -> dict[str, dict[str, Any]]:
+    at_rest = [values for record, values in zip(records, observed, strict=True) if record.outcome == Outcome.AT_REST]
+    return {
+        name: _value(first) | {"unit": first.unit} | _over_replicates([values[name].value for values in at_rest])
+        for name, first in observed[0].items()
+    }
+
+
+def _over_replicates(numbers: Sequence[float]) -> dict[str, Any]:
+    finite = [number for number in numbers if math.isfinite(number)]
+    return {
+        "mean": float(np.mean(finite)) if finite else None,
+        "sd": float(np.std(finite, ddof=1)) if len(finite) > 1 else None,
+        "n": len(finite),
+    }
+
+
+def _run(record: Record, values: dict[str, Value]) -> dict[str, Any]:
+    return {
+        "seed": record.seed,
+        "outcome": str(record.outcome),
+        "message": record.message,
+        "dt": record.dt,
+        "steps": record.steps,
+        "wall_s": record.wall_s,
+        "observables": {name: _value(observed) for name, observed in values.items()},
+    }
+
+
+def _value(observed: Value) -> dict[str, float | None]:
+    return {"value": _finite(observed.value), "spread": _finite(observed.spread)}
+
+
+def _finite(number: float | None) -> float | None:
+    return None if number is None or not math.isfinite(number) else float(number)

@@ -1,0 +1,132 @@
+"""From what a person names on the command line to a scene: a rig, a material or a study, and settings on top.
+
+A file with ``material`` but neither targets nor factors is a set-up: its tables ``[rig]``, ``[insertion]`` and
+``[numerics]`` lie over the material; their keys are the last parts of parameter paths (``outlet_height`` in
+``[rig]`` is ``rig.outlet_height``). With targets or factors it is a study and is read as `explorer calibrate` does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from doe.study import load_study
+from solver import ParameterError, Scene, load_material, read_toml, with_values
+from solver.assets import AssetNotFoundError, asset_path, shipped_assets
+from solver.rigs import RIGS
+from solver.shape import ShapeError
+
+DEFAULT_MATERIAL = "sunflower_extract"
+DEFAULT_STUDY = "sunflower_extract"
+SCENE_TABLES = ("rig", "insertion", "numerics")
+SET_UP_KEYS = ("format", "title", "material", *SCENE_TABLES)
+
+
+def load_scene(source: str, material: str | None = None) -> Scene:
+    """The scene that ``source`` names.
+
+    Args:
+        source: a rig ("funnel"), or a material, set-up or study by the path of its file or its shipped name. Where
+            a material and a study share a shipped name, it means the material.
+        material: path or shipped name of the material in the rig; only a rig takes one.
+
+    Raises:
+        ParameterError, AssetNotFoundError: one line with file, key, value and what is allowed.
+    """
+    if source in RIGS:
+        return _material_scene(material or DEFAULT_MATERIAL)
+    path = _file_of(source)
+    if material is not None:
+        raise ParameterError(f"--material {material}: {path} has a material of its own; only a rig takes one")
+    table = read_toml(path)
+    if "materials" in table or "body" in table:
+        return _material_scene(str(path))
+    if "target" in table or "factor" in table:
+        return study_scene(path)
+    with _naming(path):
+        return _set_up_scene(table, path)
+
+
+def study_scene(path: Path) -> Scene:
+    """The scene of a study file: its material and set-up with every factor at its reference."""
+    with _naming(path):
+        return load_study(str(path)).scene
+
+
+def with_settings(scene: Scene, settings: Sequence[str]) -> Scene:
+    """``scene`` with settings ``path=value`` (``rig.mass=12g``); of two for one path the last counts."""
+    values: dict[str, Any] = {}
+    for setting in settings:
+        path, equals, value = setting.partition("=")
+        if not equals or not path.strip():
+            raise ParameterError(f"--set {setting}: write path=value, such as rig.outlet_height=65mm")
+        values.pop(path.strip(), None)
+        values[path.strip()] = value.strip()
+    try:
+        return with_values(scene, values)
+    except ParameterError as error:
+        raise ParameterError(f"--set: {error}") from None
+
+
+def study_path(study: str) -> Path:
+    """The file of a study, by its path or shipped name."""
+    return asset_path("studies", study)
+
+
+def _file_of(source: str) -> Path:
+    own = Path(source).expanduser()
+    if own.is_file():
+        return own
+    stem = source.removesuffix(".toml")
+    if stem in shipped_assets("materials"):
+        return asset_path("materials", stem)
+    if stem in shipped_assets("studies"):
+        return asset_path("studies", stem)
+    rigs, materials, studies = map(", ".join, (RIGS, shipped_assets("materials"), shipped_assets("studies")))
+    raise ParameterError(
+        f"{source}: no such file, and no rig ({rigs}), shipped material ({materials}) or study ({studies}) of that name"
+    )
+
+
+def _material_scene(name: str, relative_to: Path | None = None) -> Scene:
+    path = asset_path("materials", name, relative_to=relative_to)
+    with _naming(path):
+        return load_material(str(path))
+
+
+def _set_up_scene(table: dict[str, Any], path: Path) -> Scene:
+    for key in table:
+        if key not in SET_UP_KEYS:
+            raise ParameterError(f"{key}: unknown key; allowed: {', '.join(SET_UP_KEYS)}")
+    if table.get("format") != 1:
+        raise ParameterError(f"format: {table.get('format')!r} is not 1")
+    material = table.get("material")
+    if not isinstance(material, str):
+        raise ParameterError(f"material: a name or a path is needed, not {material!r}")
+    return with_values(_material_scene(material, path.parent), _table_values(table))
+
+
+def _table_values(table: dict[str, Any]) -> dict[str, Any]:
+    """Parameter path → value for the scene's tables of a set-up."""
+    values: dict[str, Any] = {}
+    for kind in SCENE_TABLES:
+        entries = table.get(kind, {})
+        if not isinstance(entries, dict):
+            raise ParameterError(f"{kind}: a table is needed, not {entries!r}")
+        values |= {f"{kind}.{key}": value for key, value in entries.items()}
+    rig = values.pop("rig.name", "funnel")
+    if rig not in RIGS:
+        raise ParameterError(f"rig.name: {rig!r} is not one of {', '.join(RIGS)}")
+    return values
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    """Put the name of the file in front of an error about its contents."""
+    try:
+        yield
+    except (ParameterError, AssetNotFoundError, ShapeError) as error:
+        text = str(error)
+        raise ParameterError(text if text.startswith(str(path)) else f"{path}: {text}") from None

@@ -1,0 +1,223 @@
+"""A live pour in its own process: commands in, frames and statuses out. No viser, no Taichi.
+
+A Taichi call holds the interpreter's lock until it returns, so the solver must not share a process with the
+page. Either end survives the other: a solver that dies becomes the state ``died`` with a message, and a
+restart brings a new one; a solver whose parent is gone ends by itself.
+"""
+
+from __future__ import annotations
+
+import math
+import multiprocessing
+import queue
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from explorer.errors import CommandError
+from explorer.live.frames import MAX_BODIES, Frame, FrameReader, shared_block
+from explorer.live.messages import (
+    Close,
+    Command,
+    Event,
+    Failure,
+    Pause,
+    Play,
+    SessionState,
+    SetParameters,
+    SetSpeed,
+    Start,
+    Status,
+    Step,
+)
+from explorer.live.process import run
+from solver.body import counts
+from solver.params import ParameterError
+from solver.scene import Scene, canonical, parameters, with_values
+
+SPEED_RANGE = (0.01, 10.0)
+"""Allowed ratio of simulated to wall time."""
+EVENTS_KEPT = 200
+CLOSE_WAIT = 3.0
+"""Seconds that a solver process has to end by itself."""
+
+
+class SessionError(CommandError):
+    """A command that cannot be carried out now; one line, fit for a user."""
+
+
+class Session:
+    """Owner of the solver process. Use it from one thread."""
+
+    def __init__(self) -> None:
+        self._context = multiprocessing.get_context("spawn")
+        self._process: Any = None
+        self._commands: Any = None
+        self._reports: Any = None
+        self._frames: FrameReader | None = None
+        self._status: Status | None = None
+        self._events: deque[Event] = deque(maxlen=EVENTS_KEPT)
+        self._generation = 0
+        self._speed = 1.0
+
+    def start(self, scene: Scene, seed: int) -> None:
+        """Pour ``scene`` with ``seed``, in a new process if there is none. Returns at once.
+
+        Raises ParameterError for a scene with more bodies than a frame holds.
+        """
+        bodies = sum(counts(scene.bodies, scene.rig.mass))
+        if bodies > MAX_BODIES:
+            raise ParameterError(
+                f"rig.mass: {scene.rig.mass:g} kg are {bodies} bodies; the live view holds at most {MAX_BODIES}"
+            )
+        self._generation += 1
+        # A process that has failed may live on for a moment, but takes no commands any more.
+        failed = self._status is not None and self._status.state == SessionState.FAILED
+        if failed or not self._alive():
+            self._spawn()
+        self._status = Status(
+            state=SessionState.STARTING,
+            message="starting the solver process",
+            scene=scene,
+            seed=seed,
+            generation=self._generation,
+            speed=self._speed,
+        )
+        self._commands.put(Start(scene, seed, self._generation))
+        self._commands.put(SetSpeed(self._speed))
+
+    def restart(self, scene: Scene | None = None, seed: int | None = None) -> None:
+        """Start again, by default with the scene as it is now and the same seed."""
+        present = self._present()
+        self.start(scene or present.scene, present.seed if seed is None else seed)
+
+    def play(self) -> None:
+        """Let time run."""
+        self._send(Play())
+
+    def pause(self) -> None:
+        """Stop time."""
+        self._send(Pause())
+
+    def step(self) -> None:
+        """Go on by one sample interval of the scene (``numerics.sample_interval``), then stand still."""
+        self._send(Step(self._present().scene.numerics.sample_interval))
+
+    def set_speed(self, factor: float) -> None:
+        """Aim at ``factor`` seconds of simulated time per second."""
+        low, high = SPEED_RANGE
+        if not (math.isfinite(factor) and low <= factor <= high):
+            raise SessionError(f"speed: {factor!r} is outside {low:g} … {high:g}")
+        self._send(SetSpeed(factor))
+        self._speed = factor
+
+    def set_parameters(self, values: Mapping[str, float | str]) -> None:
+        """Change live parameters of the running pour by path (SI, or text with a unit), all of them together.
+
+        Raises ParameterError for an unknown path, a value that is not finite or out of range, and a parameter
+        that acts on restart only. What the solver took over stands in ``status().scene``.
+        """
+        scene = self._present().scene
+        known = parameters(scene)
+        for path in values:
+            if not known[canonical(scene, path)].live:
+                raise ParameterError(f"{path}: acts on restart only, not on a running pour")
+        with_values(scene, dict(values))
+        self._send(SetParameters(dict(values)))
+
+    def frame(self) -> Frame | None:
+        """The newest frame of the present pour; None before its first one."""
+        frame = self._frames.newest() if self._frames is not None else None
+        return frame if frame is not None and frame.generation == self._generation else None
+
+    def status(self) -> Status:
+        """The newest status, after taking in all that the solver process has sent."""
+        self._listen()
+        return self._present()
+
+    def new_events(self) -> tuple[Event, ...]:
+        """Changes of parameters and outcomes since the last call, oldest first; at most ``EVENTS_KEPT``."""
+        self._listen()
+        events = tuple(self._events)
+        self._events.clear()
+        return events
+
+    def close(self) -> None:
+        """End the solver process; afterwards only ``start`` and ``restart`` make sense."""
+        if self._alive():
+            self._commands.put(Close())
+            self._process.join(CLOSE_WAIT)
+        self._forget_process()
+        if self._status is not None:
+            self._status = replace(self._status, state=SessionState.CLOSED, message="", real_time_factor=0.0)
+
+    @property
+    def process_id(self) -> int | None:
+        """Process id of the solver process, None where there is none."""
+        return self._process.pid if self._alive() else None
+
+    def _present(self) -> Status:
+        if self._status is None:
+            raise SessionError("no pour has been started")
+        return self._status
+
+    def _alive(self) -> bool:
+        return self._process is not None and self._process.is_alive()
+
+    def _spawn(self) -> None:
+        # New queues: a process that was killed may have left the old ones locked.
+        self._forget_process()
+        self._commands, self._reports = self._context.Queue(), self._context.Queue()
+        block = shared_block(self._context)
+        self._frames = FrameReader(block)
+        self._process = self._context.Process(
+            target=run, args=(self._commands, self._reports, block), name="explorer-solver", daemon=True
+        )
+        self._process.start()
+
+    def _forget_process(self) -> None:
+        if self._process is None:
+            return
+        if self._process.is_alive():
+            self._process.kill()
+        self._process.join()
+        self._commands.cancel_join_thread()
+        self._commands.close()
+        self._reports.close()
+        self._process = None
+
+    def _send(self, command: Command) -> None:
+        present = self.status()
+        if not self._alive():
+            raise SessionError(present.message or "the solver process does not run; restart the pour")
+        self._commands.put(command)
+
+    def _listen(self) -> None:
+        if self._process is None or self._status is None:
+            return
+        # Asked before the queue is emptied: a process that is dead now has said all it will say.
+        alive = self._process.is_alive()
+        while True:
+            try:
+                report = self._reports.get_nowait()
+            except queue.Empty:
+                break
+            self._take(report)
+        if not alive and self._status.state not in (SessionState.FAILED, SessionState.DIED):
+            self._stand_still(
+                SessionState.DIED,
+                f"the solver process ended (exit code {self._process.exitcode}); restart the pour for a new one",
+            )
+
+    def _take(self, report: Status | Event | Failure) -> None:
+        if isinstance(report, Failure):
+            self._stand_still(SessionState.FAILED, f"the solver stopped: {report.message}; restart the pour")
+        elif report.generation == self._generation:
+            if isinstance(report, Event):
+                self._events.append(report)
+            else:
+                self._status = report
+
+    def _stand_still(self, state: SessionState, message: str) -> None:
+        self._status = replace(self._present(), state=state, message=message, real_time_factor=0.0)

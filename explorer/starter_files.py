@@ -1,0 +1,113 @@
+"""Files that a material or a study of one's own starts from. They run as they are.
+
+The texts are templates beside this file; a study's factors are read off the material that it calibrates.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from explorer.errors import CommandError
+from explorer.scene_file import load_scene
+from solver import Parameter, Scene, parameters, value
+from solver.assets import shipped_assets
+
+TEMPLATES = Path(__file__).with_name("templates")
+NAME = re.compile(r"[A-Za-z0-9_-]+")
+SPAN = 0.2
+"""Half the width of a factor's range, as a fraction of its reference."""
+MOST_FACTORS = 8
+
+
+def write_material(folder: Path, name: str) -> Path:
+    """Write ``NAME.toml`` into ``folder``; :class:`CommandError` if it exists or the name is not allowed."""
+    path = folder / f"{_checked(name)}.toml"
+    return _write_new(path, material_text(path))
+
+
+def write_study(folder: Path, name: str, material: str | None) -> list[Path]:
+    """Write ``NAME_study.toml`` into ``folder``, and before it the material where that is missing.
+
+    ``material`` is the path or shipped name of what to calibrate; None means ``NAME.toml`` in ``folder``.
+    """
+    study = folder / f"{_checked(name)}_study.toml"
+    if study.exists():
+        raise CommandError(f"{study}: exists already; choose another name")
+    if material is not None:
+        named = material if _is_shipped(material) else str(Path(material).expanduser().absolute())
+        return [_write_new(study, study_text(study, named, load_scene("funnel", material)))]
+    own = folder / f"{name}.toml"
+    written = [] if own.exists() else [write_material(folder, name)]
+    return [*written, _write_new(study, study_text(study, own.name, load_scene("funnel", str(own))))]
+
+
+def material_text(path: Path) -> str:
+    """The commented material file."""
+    return _filled("material.toml", NAME=path.stem, FILE=path.name)
+
+
+def study_text(path: Path, material: str, scene: Scene) -> str:
+    """The commented study of ``scene``, whose file or shipped name is ``material``."""
+    paths = factor_paths(scene)
+    declared = parameters(scene)
+    factors = "".join(
+        _factor_text(f"X{k}", float(value(scene, entry)), declared[entry]) for k, entry in enumerate(paths, start=1)
+    )
+    return _filled(
+        "study.toml",
+        NAME=path.stem,
+        FILE=path.name,
+        MATERIAL=material,
+        FACTORS=factors,
+    )
+
+
+def factor_paths(scene: Scene) -> list[str]:
+    """At most eight parameters that a pile may hang on, friction first, heaviest components first."""
+    by_share = sorted(scene.bodies, key=lambda body: -body.mass_fraction)
+    names = list(dict.fromkeys(body.material for body in by_share))
+    pairs = [pair for pair in scene.pairs if {pair.a, pair.b} <= {*names, scene.rig.wall}]
+    pairs.sort(key=lambda pair: sum(names.index(end) if end in names else 0 for end in (pair.a, pair.b)))
+    of_pairs = [f"pair.{p.a}.{p.b}.{key}" for p in pairs for key in ("static_friction", "restitution")]
+    of_materials = [f"material.{name}.{key}" for name in names for key in ("shear_modulus", "poisson_ratio")]
+    room = MOST_FACTORS - min(len(of_materials), 2)
+    chosen = of_pairs[:room] + of_materials
+    return [path for path in chosen if float(value(scene, path)) > 0.0][:MOST_FACTORS]
+
+
+def _factor_text(name: str, reference: float, entry: Parameter) -> str:
+    low = max(entry.low, (1.0 - SPAN) * reference)
+    high = min(entry.high, (1.0 + SPAN) * reference)
+    unit = "" if entry.unit == "1" else f"   # [{entry.unit}]"
+    return (
+        f'\n[[factor]]\nname = "{name}"\npath = "{entry.path}"   # {entry.doc}\n'
+        f"low = {low:.6g}{unit}\nhigh = {high:.6g}\nreference = {reference:.6g}\n"
+    )
+
+
+def _is_shipped(material: str) -> bool:
+    return not Path(material).is_file() and material.removesuffix(".toml") in shipped_assets("materials")
+
+
+def _filled(template: str, **words: str) -> str:
+    text = (TEMPLATES / template).read_text(encoding="utf-8")
+    for key, word in words.items():
+        text = text.replace(f"@{key}@", word)
+    return text
+
+
+def _checked(name: str) -> str:
+    if not NAME.fullmatch(name):
+        raise CommandError(f"NAME {name!r}: letters, digits, - and _ are allowed")
+    return name
+
+
+def _write_new(path: Path, text: str) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise CommandError(f"{path}: exists already; choose another name") from None
+    return path

@@ -1,0 +1,112 @@
+"""A calibration from its order to its files: the study is read, run, and written as result.json and reports."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from doe.campaign import SCHEMA, CampaignResult, planned_runs, run_campaign, summary_of_runs
+from doe.profile import Profile
+from doe.record import plain
+from doe.runner import PourRunner
+from doe.store import Store, default_store
+from doe.study import Study, load_study, with_profile
+from explorer.errors import CommandError
+from explorer.progress import Progress
+from explorer.report import write_report
+from explorer.run_result import versions
+from explorer.whole_file import write_whole
+from solver import code_version
+from solver.observables.made_up import estimator_bias
+
+if TYPE_CHECKING:
+    from explorer.logs.study_recorder import StudyRecorder
+
+
+@dataclass(frozen=True)
+class StudyOrder:
+    """What a user asked for."""
+
+    study: str
+    profile: str
+    out: Path
+    resume: bool = False
+    store: Path | None = None
+    record: Path | None = None
+    threads: int | None = None
+
+
+def run_study(order: StudyOrder, say: Callable[[str], None]) -> float:
+    """Run the whole chain and write the files; returns the relative error of the verification in percent.
+
+    Finished runs are kept in the store, so a study that was interrupted goes on where it stopped.
+    """
+    study, profile = with_profile(load_study(order.study), order.profile)
+    if order.out.is_file() or (order.out.is_dir() and any(order.out.iterdir()) and not order.resume):
+        raise CommandError(f"--out {order.out}: is not empty; name a new folder, or add --resume to go on there")
+    path = order.store or default_store()
+    store = Store(path)
+    order.out.mkdir(parents=True, exist_ok=True)
+    planned = planned_runs(study, profile)
+    say(f"{study.name}, profile {profile.name}: {sum(planned.values())} runs of {1e3 * profile.mass:g} g; store {path}")
+    progress = Progress(order.out / "progress.jsonl", planned, say, terminal=sys.stdout.isatty())
+    progress.compiling()
+    with ExitStack() as stack:
+        stack.callback(store.close)
+        recorder = stack.enter_context(_recorder(order.record)) if order.record else None
+        runner = PourRunner(
+            study.scene, store, study.name, study.seed, order.threads, on_run=progress.run, observer=recorder
+        )
+        found = run_campaign(study, profile, runner, estimator_bias(study.estimators), on_stage=progress.stage)
+    result = result_of(study, profile, found, progress.elapsed)
+    write_whole(order.out / "result.json", json.dumps(result, ensure_ascii=False, allow_nan=False, indent=1) + "\n")
+    write_report(result, order.out)
+    say(f"{order.out}/report.html, report.md, result.json")
+    return found.verification.tests[0].relative_error_percent
+
+
+def result_of(study: Study, profile: Profile, found: CampaignResult, total_s: float) -> dict[str, Any]:
+    """The content of ``result.json``: study, one key per stage, runs, timing, versions, shapes."""
+    runs = summary_of_runs(found)
+    return plain(
+        {
+            "schema": SCHEMA,
+            "study": {
+                "name": study.name,
+                "title": study.scene.title,
+                "file": str(study.file),
+                "profile": profile.to_dict(),
+                "targets": study.targets,
+                "factors": study.factors,
+                "assumptions": study.assumptions,
+                "assumed": study.scene.assumed,
+                "changes": study.changes,
+                "seed": study.seed,
+            },
+            **found.to_dict(),
+            "runs": runs,
+            "timing": {
+                "total_s": total_s,
+                "stage_s": found.stage_seconds,
+                "runs_per_minute": 60.0 * runs["total"] / max(total_s, 1e-9),
+                "reused_runs": sum(run.reused for _, run in found.all_runs()),
+            },
+            "versions": {**versions(), "solver": code_version()},
+            "shapes": [
+                {"body": body.name, "mass": body.mass, "spheres": body.spheres, "fit": asdict(body.clump.fit)}
+                for body in study.scene.bodies
+            ],
+        }
+    )
+
+
+def _recorder(folder: Path) -> StudyRecorder:
+    # rerun takes a second to import; only those who record pay for it.
+    from explorer.logs.study_recorder import StudyRecorder
+
+    return StudyRecorder(folder)

@@ -1,0 +1,129 @@
+"""Angle of repose and discharged mass over simulated time, as they come in."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import viser
+import viser.uplot
+
+from explorer.live.messages import Status
+from explorer.viewer.palette import ANGLE_LINE, AXIS_TEXT, GRID_LINE, MASS_LINE
+from explorer.viewer.readout import angle_of_repose_deg
+from solver.observables.value import Value
+
+Array = npt.NDArray[np.float64]
+
+MOST_POINTS = 300
+"""Points kept of each curve; when there are more, every other one is dropped."""
+LEAST_TOP_DEG = 50.0
+"""The axis of the angle reaches at least to here [°]."""
+
+
+class Curve:
+    """Values over simulated time [s], thinned out when they become many."""
+
+    def __init__(self) -> None:
+        self._points: list[tuple[float, float]] = []
+
+    def add(self, time: float, value: float) -> bool:
+        """Add a point, unless it is not later than the last one; True if it was added."""
+        if self._points and time <= self._points[-1][0]:
+            return False
+        self._points.append((time, value))
+        if len(self._points) > MOST_POINTS:
+            self._points = self._points[::2]
+        return True
+
+    def columns(self) -> tuple[Array, Array]:
+        """Times and values, shape (n,) each."""
+        points = np.array(self._points, dtype=np.float64).reshape(-1, 2)
+        return points[:, 0], points[:, 1]
+
+
+class History:
+    """Angle of repose and mass below the outlet of one pour. The angle is read less often, and begins later."""
+
+    def __init__(self) -> None:
+        self._generation = 0
+        self._angle, self._mass = Curve(), Curve()
+        self._observed: Mapping[str, Value] = {}
+
+    def add(self, status: Status) -> bool:
+        """Take note of ``status``; True if there is something new to draw."""
+        fresh = status.generation != self._generation
+        if fresh:
+            self._generation, self._observed = status.generation, {}
+            self._angle, self._mass = Curve(), Curve()
+        angle_deg = angle_of_repose_deg(status)
+        # What was not read anew is no point: the chart would draw steps.
+        if status.observables != self._observed and math.isfinite(angle_deg):
+            self._observed = status.observables
+            self._angle.add(status.time, angle_deg)
+        return self._mass.add(status.time, 1e3 * status.discharged_mass) or fresh
+
+    def columns(self) -> tuple[Array, Array, Array]:
+        """Time [s], angle [°], mass [g]; shape (n,) each.
+
+        Between its points a curve is what a line through them is; before the first and after the last angle there is
+        NaN, which the chart leaves out.
+        """
+        (angle_time, angle), (mass_time, mass) = self._angle.columns(), self._mass.columns()
+        if not len(mass_time):
+            return np.zeros(1), np.full(1, math.nan), np.zeros(1)
+        time = np.union1d(angle_time, mass_time)
+        inside = np.interp(time, angle_time, angle, math.nan, math.nan) if len(angle_time) else time * math.nan
+        return time, inside, np.interp(time, mass_time, mass)
+
+
+class Chart:
+    """The chart on the page."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._history, self._top_deg = History(), LEAST_TOP_DEG
+        self._plot = server.gui.add_uplot(
+            self._history.columns(),
+            (
+                viser.uplot.Series(label="time [s]"),
+                viser.uplot.Series(
+                    label="angle [°]", stroke=ANGLE_LINE, width=2, points={"show": False}, scale="angle"
+                ),
+                viser.uplot.Series(
+                    label="mass below [g]", stroke=MASS_LINE, width=2, points={"show": False}, scale="mass"
+                ),
+            ),
+            scales=_scales(LEAST_TOP_DEG),
+            axes=(_axis("x", 2), _axis("angle", 3, "angle [°]"), _axis("mass", 1, "mass below [g]")),
+            aspect=2.5,
+            padding=(12, 8, 0, 0),
+        )
+
+    def show(self, status: Status) -> None:
+        """Draw what is new; call it inside ``server.atomic()``."""
+        if self._history.add(status):
+            columns = self._history.columns()
+            self._plot.data = columns
+            self._reach(columns[1])
+
+    def _reach(self, angle_deg: Array) -> None:
+        """Let the axis reach the greatest angle."""
+        top = max(LEAST_TOP_DEG, 10.0 * math.ceil(np.max(angle_deg, initial=0.0, where=np.isfinite(angle_deg)) / 10.0))
+        if top != self._top_deg:
+            self._top_deg = top
+            self._plot.scales = _scales(top)
+
+
+def _scales(top_deg: float) -> dict[str, viser.uplot.Scale]:
+    # The range of the angle is set, since uPlot finds none among numbers that include NaN.
+    return {"x": viser.uplot.Scale(time=False), "angle": viser.uplot.Scale(range=(0.0, top_deg))}
+
+
+def _axis(scale: str, side: Any, label: str = "") -> viser.uplot.Axis:
+    """An axis; ``side`` is uPlot's: 1 right, 2 bottom, 3 left."""
+    grid = {"show": side != 1, "stroke": GRID_LINE}
+    axis: Any = {"scale": scale, "side": side, "stroke": AXIS_TEXT, "grid": grid, "size": 38}
+    return axis if not label else axis | {"label": label, "labelSize": 18}

@@ -1,0 +1,110 @@
+"""Parameters that act on the running pour: choose materials or pairs, move sliders, read what the solver has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html import escape
+from typing import Any
+
+import viser
+
+from explorer.live.messages import Status
+from explorer.screen_units import quantity, title
+from explorer.session import Session
+from explorer.viewer.actions import Post
+from explorer.viewer.live_controls import LiveControl
+from solver.params import Parameter
+from solver.scene import Scene, parameters, value
+
+Targets = dict[str, tuple[str, ...]]
+"""Text of a choice → prefixes of the parameter paths that it stands for."""
+
+
+class LivePanel:
+    """One section per kind of thing that has live parameters (materials, pairs of materials)."""
+
+    def __init__(self, server: viser.ViserServer, session: Session, scene: Scene, post: Post) -> None:
+        self._sections = [
+            _Section(server, session, scene, post, "Pair", pair_targets(scene)),
+            _Section(server, session, scene, post, "Material", material_targets(scene)),
+        ]
+
+    def show(self, status: Status) -> None:
+        """Follow the solver's values; call it inside ``server.atomic()``."""
+        for section in self._sections:
+            section.show(status.scene)
+
+
+class _Section:
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        session: Session,
+        scene: Scene,
+        post: Post,
+        name: str,
+        targets: Targets,
+    ):
+        self._server, self._session, self._post, self._targets = server, session, post, targets
+        self._folder = server.gui.add_folder(f"{name} (acts now)")
+        with self._folder:
+            self._chooser = server.gui.add_dropdown(name, tuple(targets))
+            self._echo = server.gui.add_html("")
+        self._live: list[LiveControl] = []
+        self._build(scene, next(iter(targets)))
+
+        @self._chooser.on_update
+        def _(event: viser.GuiEvent[Any]) -> None:
+            chosen = event.target.value
+            if event.client_id is not None and chosen in targets:
+                post(lambda: self._build(session.status().scene, chosen))
+
+    def _build(self, scene: Scene, chosen: str) -> None:
+        """Controls for the live parameters of what was chosen, in place of those that there were."""
+        for control in self._live:
+            control.remove()
+        self._chosen = chosen
+        with self._folder:
+            self._live = [
+                LiveControl(self._server.gui, parameter, paths, scene, self._post, self._session.set_parameters)
+                for parameter, paths in live_parameters(scene, self._targets[chosen])
+            ]
+
+    def show(self, scene: Scene) -> None:
+        for control in self._live:
+            control.follow(scene)
+        echo = echo_html(scene, self._targets[self._chosen])
+        if self._echo.content != echo:
+            self._echo.content = echo
+
+
+def live_parameters(scene: Scene, prefixes: tuple[str, ...]) -> Iterator[tuple[Parameter, tuple[str, ...]]]:
+    """Declarations of the live parameters under the first prefix, each with its paths under all ``prefixes``."""
+    for path, parameter in parameters(scene).items():
+        prefix, _, name = path.rpartition(".")
+        if parameter.live and prefix == prefixes[0]:
+            yield parameter, tuple(f"{one}.{name}" for one in prefixes)
+
+
+def material_targets(scene: Scene) -> Targets:
+    """Choices of materials: those of all bodies together (not the wall), then each one."""
+    bodies = tuple(dict.fromkeys(f"material.{body.material}" for body in scene.bodies))
+    return {"all bodies": bodies} | {m.name: (f"material.{m.name}",) for m in scene.materials}
+
+
+def pair_targets(scene: Scene) -> Targets:
+    """Choices of pairs: all together, then each one."""
+    prefixes = {f"{pair.a} – {pair.b}": (f"pair.{pair.a}.{pair.b}",) for pair in scene.pairs}
+    return {"all pairs": tuple(one for (one,) in prefixes.values())} | prefixes
+
+
+def echo_html(scene: Scene, prefixes: tuple[str, ...]) -> str:
+    """What the solver has in force for a choice: one line per live parameter, a range where values differ."""
+    lines = []
+    for parameter, paths in live_parameters(scene, prefixes):
+        values = sorted({float(value(scene, path)) for path in paths})
+        texts = dict.fromkeys(quantity(number, parameter.unit) for number in (values[0], values[-1]))
+        name = escape(title(parameter).split(" [")[0])
+        lines.append(f"<span style='opacity:0.65'>{name}</span> {' … '.join(texts)}")
+    text = " &nbsp; ".join(lines)
+    return f"<div style='padding:0 0.75em; font-size:0.8em'>In the solver: {text}</div>"

@@ -1,0 +1,38 @@
+"""Colours of the page. Bodies: Okabe & Ito (2008), told apart with every common form of colour blindness."""
+
+from __future__ import annotations
+
+Colour = tuple[int, int, int]
+
+BODY_COLOURS: tuple[Colour, ...] = (
+    (230, 159, 0),  # orange
+    (86, 180, 233),  # sky blue
+    (0, 158, 115),  # bluish green
+    (240, 228, 66),  # yellow
+    (204, 121, 167),  # reddish purple
+    (213, 94, 0),  # vermilion
+    (0, 114, 178),  # blue
+)
+GLASS: Colour = (190, 210, 225)
+RIM: Colour = (150, 170, 185)
+PLATE: Colour = (44, 50, 58)
+RING: Colour = (110, 122, 135)
+BRAND: Colour = (86, 150, 200)
+
+SRGB_GAMMA = 2.2
+
+ANGLE_LINE = "rgb(230, 159, 0)"
+MASS_LINE = "rgb(86, 180, 233)"
+AXIS_TEXT = "#9aa4ae"
+GRID_LINE = "rgba(160, 170, 180, 0.15)"
+
+
+def linear(colour: Colour) -> Colour:
+    """The colour as viser 1.1.1 wants it for batched meshes: it takes those numbers as linear light, not as sRGB."""
+    red, green, blue = (round(255.0 * (channel / 255.0) ** SRGB_GAMMA) for channel in colour)
+    return red, green, blue
+
+
+def css(colour: Colour) -> str:
+    """The colour as CSS writes it."""
+    return f"rgb({colour[0]}, {colour[1]}, {colour[2]})"

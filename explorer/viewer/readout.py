@@ -1,0 +1,153 @@
+"""What the pour is doing, in words and numbers: Status → HTML. Every text that came from outside is escaped."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from html import escape
+from itertools import groupby
+
+from explorer.live.angle_reader import LEAST_SHARE_BELOW
+from explorer.live.messages import Event, SessionState, Status
+from explorer.viewer.palette import css
+from explorer.viewer.scene_nodes import component_colour
+from solver.record import Outcome, Phase
+from solver.scene import Scene
+
+EVENTS_SHOWN = 3
+
+PHASE_WORDS = {
+    Phase.FILL: "filling",
+    Phase.DISCHARGE: "discharging",
+    Phase.PILE: "settling",
+    Phase.AT_REST: "at rest",
+}
+OUTCOME_WORDS = {
+    Outcome.RUNNING: "still running",
+    Outcome.AT_REST: "at rest: a valid pile",
+    Outcome.JAMMED: "jammed: material stays in the funnel",
+    Outcome.TIME_LIMIT: "cut off: still moving at the time limit",
+    Outcome.LOST_BODY: "lost a body through the plate",
+    Outcome.NON_FINITE: "diverged: a number is not finite",
+    Outcome.OVERLAP_LIMIT: "stopped: bodies overlap too far",
+    Outcome.BUFFER_OVERFLOW: "stopped: the contact list is full",
+}
+STATE_WORDS = {
+    SessionState.STARTING: "starting",
+    SessionState.RUNNING: "running",
+    SessionState.PAUSED: "paused",
+    SessionState.ENDED: "ended",
+    SessionState.FAILED: "solver failed",
+    SessionState.DIED: "solver gone",
+    SessionState.CLOSED: "closed",
+}
+TROUBLE = (SessionState.FAILED, SessionState.DIED)
+
+STYLE = """<style>
+.pour {padding: 0.2em 1.1em 0.4em 0.75em; font-size: 0.82em; line-height: 1.45;}
+.pour .state {padding: 0.1em 0.7em; border-radius: 0.8em; background: rgba(128,150,170,0.22);}
+.pour .trouble {background: rgba(213,94,0,0.55);}
+.pour .big {font-size: 2.4em; font-weight: 600; line-height: 1.2; font-variant-numeric: tabular-nums;}
+.pour .dim {opacity: 0.65;}
+.pour .grid {display: grid; grid-template-columns: 1fr 1fr; column-gap: 1.6em; margin-top: 0.3em;}
+.pour .cell {display: flex; justify-content: space-between; font-variant-numeric: tabular-nums;}
+.pour .wide {grid-column: 1 / 3;}
+.pour .top {display: flex; justify-content: space-between; align-items: center;}
+.pour .dot {display: inline-block; width: 0.7em; height: 0.7em; border-radius: 50%;
+  margin: 0 0.3em 0 0.8em;}
+.pour .note {margin-top: 0.4em; padding: 0.25em 0.5em; border-radius: 0.3em;
+  background: rgba(128,150,170,0.14); overflow-wrap: anywhere;}
+</style>"""
+
+
+def readout_html(status: Status, events: Sequence[Event], notice: str) -> str:
+    """The whole readout; ``notice`` is the page's own last message (a refused input, for instance)."""
+    cells = "".join(_cell(name, text) for name, text in readings(status))
+    cells += "".join(_cell(name, text, "wide") for name, text in long_readings(status))
+    lines = "".join(f"<div class='note'>{escape(text)}</div>" for text in notes(status, events, notice))
+    top = f"<div class='top'>{_state(status)}<span>{legend(status.scene)}</span></div>"
+    return f"{STYLE}<div class='pour'>{top}{_angle(status)}<div class='grid'>{cells}</div>{lines}</div>"
+
+
+def readings(status: Status) -> list[tuple[str, str]]:
+    """Names and texts of the short readings, two to a line."""
+    names = ("Phase", "Simulated time", "Bodies", "Time step")
+    if status.state == SessionState.STARTING:
+        return [(name, "–") for name in names]
+    bodies = f"{status.bodies} of {status.bodies_planned}"
+    texts = (PHASE_WORDS[status.phase], f"{status.time:.3f} s", bodies, f"{1e6 * status.dt:.2f} µs")
+    return list(zip(names, texts, strict=True))
+
+
+def long_readings(status: Status) -> list[tuple[str, str]]:
+    """Names and texts of the readings that take a line each."""
+    starting, running = status.state == SessionState.STARTING, status.state == SessionState.RUNNING
+    pace = f"{status.real_time_factor:.2f} of {status.speed:.3g} wanted" if running else "–"
+    mass = f"{1e3 * status.discharged_mass:.1f} of {1e3 * status.poured_mass:.1f} g"
+    found = [
+        ("Real-time factor", pace),
+        ("Outcome", "–" if starting else OUTCOME_WORDS[status.outcome]),
+        ("Mass below the outlet", "–" if starting else mass),
+    ]
+    if status.energy_put_in is not None:
+        found.append(("Energy put in by the last change", f"{1e6 * status.energy_put_in:.3g} µJ"))
+    return found
+
+
+def notes(status: Status, events: Sequence[Event], notice: str) -> list[str]:
+    """Lines below the readings, each once: what was refused, what the solver says, what happened last."""
+    happened = recent(events, status.generation)
+    said = "" if any(status.message in line for line in happened) else status.message
+    return [text for text in dict.fromkeys((notice, said, *happened)) if text]
+
+
+def legend(scene: Scene) -> str:
+    """Coloured dots with the components' names, as HTML."""
+    dots = [
+        f"<span class='dot' style='background:{css(component_colour(k))}'></span>{escape(body.name)}"
+        for k, body in enumerate(scene.bodies)
+    ]
+    return "".join(dots)
+
+
+def recent(events: Sequence[Event], generation: int) -> list[str]:
+    """The last moments at which something happened, newest first, one line for each."""
+    mine = [event for event in events if event.generation == generation]
+    moments = [list(group) for _, group in groupby(mine, key=lambda event: event.time)]
+    lines = []
+    for moment in moments[: -EVENTS_SHOWN - 1 : -1]:
+        more = f" (and {len(moment) - 1} more)" if len(moment) > 1 else ""
+        lines.append(f"{moment[-1].time:.3f} s  {moment[-1].text}{more}")
+    return lines
+
+
+def angle_of_repose_deg(status: Status) -> float:
+    """Angle of the pile as it is now [°]; NaN where there is none."""
+    found = status.observables.get("angle_of_repose_deg")
+    return math.nan if found is None else found.value
+
+
+def _cell(name: str, text: str, kind: str = "") -> str:
+    return f"<div class='cell {kind}'><span class='dim'>{name}</span><span>{text}</span></div>"
+
+
+def _state(status: Status) -> str:
+    kind = "state trouble" if status.state in TROUBLE else "state"
+    return f"<span class='{kind}'>{STATE_WORDS[status.state]}</span>"
+
+
+def _angle(status: Status) -> str:
+    values = status.observables
+    found = values.get("angle_of_repose_deg")
+    if found is None:
+        words = f"angle of repose: from {LEAST_SHARE_BELOW:.0%} of the mass below the outlet on"
+    else:
+        flanks = [values.get(f"angle_of_repose_{side}_deg") for side in ("left", "right")]
+        left, right = (math.nan if flank is None else flank.value for flank in flanks)
+        spread = "" if found.spread is None else f" ± {found.spread:.1f}° over flanks"
+        words = f"angle of repose{spread} · one view: left {_degrees(left)}, right {_degrees(right)}"
+    return f"<div class='big'>{_degrees(angle_of_repose_deg(status))}</div><div class='dim'>{words}</div>"
+
+
+def _degrees(angle_deg: float) -> str:
+    return f"{angle_deg:.1f}°" if math.isfinite(angle_deg) else "–"

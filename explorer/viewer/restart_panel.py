@@ -1,0 +1,96 @@
+"""Settings of the set-up, which act on the next pour, and the seed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import viser
+
+from explorer.live.messages import Status
+from explorer.screen_units import checked, screen_unit, title
+from explorer.session import Session
+from explorer.viewer.actions import Post
+from solver.params import Parameter
+from solver.scene import Scene, parameters, value, with_values
+
+PATHS = (
+    "rig.mass",
+    "rig.outlet_height",
+    "insertion.rate",
+    "insertion.drop_speed",
+    "insertion.protocol",
+    "body.spheres",
+)
+"""Parameters in this panel, in order."""
+LARGEST_SEED = 2**31 - 1
+SIGNIFICANT_STEP = {"mm": 1.0, "g": 1.0, "g/s": 1.0, "m/s": 0.1}
+
+
+class RestartPanel:
+    """Number boxes and choices made from the declarations; a button pours anew with all of them."""
+
+    def __init__(self, server: viser.ViserServer, session: Session, scene: Scene, seed: int, post: Post) -> None:
+        self._session, self._generation = session, session.status().generation
+        known = parameters(scene)
+        self._shown = {path: known[path] for path in PATHS}
+        with server.gui.add_folder("Set-up (on restart)"):
+            self._inputs = {path: _input(server.gui, p, scene) for path, p in self._shown.items()}
+            self._seed = server.gui.add_number(
+                "Seed", seed, min=0, max=LARGEST_SEED, step=1, hint="Same seed, same pour."
+            )
+            button = server.gui.add_button("Restart with this set-up")
+        button.on_click(lambda _: post(self._restart))
+
+    def show(self, status: Status) -> None:
+        """Show what a new pour was started with, whoever started it: another browser, or a key."""
+        if status.generation == self._generation:
+            return
+        self._generation = status.generation
+        self._seed.value = status.seed  # type: ignore[misc]
+        for path, parameter in self._shown.items():
+            self._inputs[path].value = on_screen(parameter, status.scene)
+
+    def _restart(self) -> None:
+        """Read all inputs, check them as a whole, and pour; parameters changed live keep their values."""
+        values = {path: entered(p, self._inputs[path].value) for path, p in self._shown.items()}
+        seed = int(checked(self._seed.value, 0, LARGEST_SEED, "seed"))
+        present = self._session.status().scene
+        # What was not touched stays to the last digit: a number box shows six.
+        changed = {path: new for path, new in values.items() if not _same(value(present, path), new)}
+        self._session.restart(with_values(present, changed), seed)
+
+
+def entered(parameter: Parameter, number: object) -> float | str:
+    """What a browser sent for ``parameter``, in SI or as the name of a choice; raises InputError."""
+    if parameter.choices:
+        return str(number)
+    unit = screen_unit(parameter)
+    low, high = unit.to_screen(parameter.low), unit.to_screen(parameter.high)
+    return min(max(unit.to_si(checked(number, low, high, title(parameter))), parameter.low), parameter.high)
+
+
+def on_screen(parameter: Parameter, scene: Scene) -> Any:
+    """What the input of ``parameter`` shows: a number in the unit of the screen, or the name of a choice."""
+    present = value(scene, parameter.path)
+    return present if isinstance(present, str) else screen_unit(parameter).to_screen(present)
+
+
+def _input(gui: viser.GuiApi, parameter: Parameter, scene: Scene) -> Any:
+    present = on_screen(parameter, scene)
+    if parameter.choices:
+        return gui.add_dropdown(title(parameter), parameter.choices, initial_value=present, hint=parameter.doc)
+    unit = screen_unit(parameter)
+    return gui.add_number(
+        title(parameter),
+        present,
+        min=unit.to_screen(parameter.low),
+        max=unit.to_screen(parameter.high),
+        step=SIGNIFICANT_STEP.get(unit.name),
+        hint=parameter.doc,
+    )
+
+
+def _same(old: float | str, new: float | str) -> bool:
+    if isinstance(old, str) or isinstance(new, str):
+        return old == new
+    return abs(old - new) <= 1e-6 * abs(old)

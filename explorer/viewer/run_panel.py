@@ -1,0 +1,65 @@
+"""Play, pause, step, restart, speed; by mouse and by key."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import viser
+
+from explorer.live.messages import SessionState
+from explorer.screen_units import checked
+from explorer.session import Session
+from explorer.viewer.actions import Action, Post
+
+PLAY_PAUSE, STEP, RESTART = "Play / pause", "Step", "Restart"
+KEYS: dict[str, Any] = {PLAY_PAUSE: "space", STEP: "arrowright", RESTART: "R"}
+SLOWEST, FASTEST = 0.05, 2.0
+"""Range of the speed slider: simulated seconds per second."""
+
+
+class RunPanel:
+    """Buttons and keys that act on the pour as a whole."""
+
+    def __init__(self, server: viser.ViserServer, session: Session, post: Post) -> None:
+        self._session = session
+        acts = {PLAY_PAUSE: self._toggle, STEP: session.step, RESTART: session.restart}
+        buttons = server.gui.add_button_group(
+            "Pour",
+            tuple(acts),
+            hint="Keys: space plays and pauses, right arrow steps 10 ms, R restarts with the same seed.",
+        )
+
+        @buttons.on_click
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None and event.target.value in acts:
+                post(acts[event.target.value])
+
+        for label, key in KEYS.items():
+            server.gui.add_command(label, hotkey=key).on_trigger(partial(_trigger, post, acts[label]))
+
+        speed = server.gui.add_slider(
+            "Speed",
+            SLOWEST,
+            FASTEST,
+            SLOWEST,
+            1.0,
+            hint="Simulated seconds per second that the solver aims at; it goes as fast as it can up to that.",
+        )
+
+        @speed.on_update
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None:
+                value = event.target.value
+                post(lambda: session.set_speed(checked(value, SLOWEST, FASTEST, "speed")))
+
+    def _toggle(self) -> None:
+        if self._session.status().state == SessionState.PAUSED:
+            self._session.play()
+        else:
+            self._session.pause()
+
+
+def _trigger(post: Post, action: Action, event: object) -> None:
+    """A key was pressed."""
+    post(action)

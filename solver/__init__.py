@@ -1,0 +1,65 @@
+"""The physics: a discrete-element solver for rigid multi-sphere bodies, batched over independent worlds.
+
+Names that other packages may use stand in ``__all__``. Importing this package does not import Taichi (which takes a
+second and may not happen in the page's process): the names that need it are fetched when they are first used.
+"""
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from solver.assets import asset_path
+from solver.body import Body, counts
+from solver.material_file import load_material, read_toml
+from solver.observables import Value, observable_names, observe
+from solver.params import Parameter, ParameterError, parse_quantity
+from solver.record import Bodies, Outcome, Phase, Pile, Record, Spheres, Trace
+from solver.scene import Scene, canonical, parameters, value, with_values
+from solver.version import code_version
+
+if TYPE_CHECKING:
+    from solver.run import Job, run_pour, run_pours, run_queue
+
+_NEEDS_TAICHI = {
+    "Job": "solver.run",
+    "run_pour": "solver.run",
+    "run_pours": "solver.run",
+    "run_queue": "solver.run",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _NEEDS_TAICHI:
+        return getattr(importlib.import_module(_NEEDS_TAICHI[name]), name)
+    raise AttributeError(f"module 'solver' has no attribute {name!r}")
+
+
+__all__ = [
+    "Bodies",
+    "Body",
+    "Job",
+    "Outcome",
+    "Parameter",
+    "ParameterError",
+    "Phase",
+    "Pile",
+    "Record",
+    "Scene",
+    "Spheres",
+    "Trace",
+    "Value",
+    "asset_path",
+    "canonical",
+    "code_version",
+    "counts",
+    "load_material",
+    "observable_names",
+    "observe",
+    "parameters",
+    "parse_quantity",
+    "read_toml",
+    "run_pour",
+    "run_pours",
+    "run_queue",
+    "value",
+    "with_values",
+]

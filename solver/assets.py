@@ -1,0 +1,71 @@
+"""Where the shipped data files are, in a checkout and in an installed wheel alike."""
+
+from pathlib import Path
+from typing import Literal, get_args
+
+AssetKind = Literal["materials", "studies", "meshes", "source_tables"]
+
+_SUFFIX: dict[AssetKind, str] = {
+    "materials": ".toml",
+    "studies": ".toml",
+    "meshes": ".stl",
+    "source_tables": ".csv",
+}
+
+
+_SINGULAR: dict[AssetKind, str] = {
+    "materials": "material",
+    "studies": "study",
+    "meshes": "mesh",
+    "source_tables": "source table",
+}
+
+
+class AssetNotFoundError(ValueError):
+    """A name that is neither a shipped asset nor a file."""
+
+
+def asset_path(kind: AssetKind, name: str, *, relative_to: Path | None = None) -> Path:
+    """Path of a shipped asset or of a user's own file.
+
+    Args:
+        kind: folder of the asset, one of `AssetKind`.
+        name: a shipped name, with or without its suffix ("sunflower_extract"), or the path of a file. A file
+            that exists under exactly this path wins over a shipped asset.
+        relative_to: folder from which a relative path is looked up, such as the folder of the study file that
+            names a material; the working directory if None.
+
+    Raises:
+        AssetNotFoundError: neither exists; the message lists the shipped names.
+        ValueError: unknown kind.
+    """
+    if kind not in _SUFFIX:
+        raise ValueError(f"asset kind {kind!r} is unknown; allowed: {', '.join(get_args(AssetKind))}")
+    own = (relative_to or Path()) / Path(name).expanduser()
+    if own.is_file():
+        return own
+    shipped = shipped_assets(kind)
+    if stem := _shipped_stem(name, _SUFFIX[kind], shipped):
+        return _folder(kind) / f"{stem}{_SUFFIX[kind]}"
+    raise AssetNotFoundError(
+        f"{_SINGULAR[kind]} {name!r} is neither a file (looked for {own.absolute()}) nor shipped; "
+        f"shipped: {', '.join(shipped) or 'none'}"
+    )
+
+
+def shipped_assets(kind: AssetKind) -> tuple[str, ...]:
+    """Names of the shipped assets of one kind, without suffix, sorted."""
+    return tuple(sorted(path.stem for path in _folder(kind).glob(f"*{_SUFFIX[kind]}")))
+
+
+def _shipped_stem(name: str, suffix: str, shipped: tuple[str, ...]) -> str | None:
+    """The shipped name that `name` means, with or without its suffix."""
+    stem = name.removesuffix(suffix)
+    return stem if stem in shipped else None
+
+
+def _folder(kind: AssetKind) -> Path:
+    """Folder of one kind: inside this package in a wheel, in the repository's root in a checkout."""
+    packaged = Path(__file__).with_suffix("")
+    root = packaged if packaged.is_dir() else Path(__file__).parents[1] / "assets"
+    return root / kind

@@ -1,0 +1,238 @@
+"""Clumps: rigid bodies that touch by their member spheres and move with the inertia of the true solid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from solver.shape import ShapeError, Solid, file_stamp, mass_properties, surface_mesh
+from solver.solid_points import interior_points, surface_points
+from solver.sphere_fit import Orbits, Target, not_facing, refine, without_idle
+from solver.sphere_layout import start_layouts
+from solver.sphere_union import distance_to_union, outer_dimensions, squared_distances, union_volume
+
+Array = npt.NDArray[np.float64]
+Resolution = Literal["coarse", "standard", "fine"]
+
+
+@dataclass(frozen=True)
+class Demand:
+    """What a resolution asks of a clump.
+
+    Args:
+        rms: largest RMS surface deviation, relative to the diameter of the sphere of the same volume.
+        least_radius: smallest member sphere, relative to the largest inside the solid; it sets the time step.
+        most_spheres: where the search ends; the best clump so far is then taken, with its stated error.
+    """
+
+    rms: float
+    least_radius: float
+    most_spheres: int
+
+
+# standard is 0.39 mm RMS for a seed of 27.92 x 11.18 x 6.11 mm, 0.49 mm for a plate of 27.53 x 15.02 x 5 mm
+DEMANDS: dict[str, Demand] = {
+    "coarse": Demand(rms=0.075, least_radius=0.8, most_spheres=16),
+    "standard": Demand(rms=0.0312, least_radius=0.7, most_spheres=40),
+    "fine": Demand(rms=0.0145, least_radius=0.6, most_spheres=48),
+}
+EXTENT_LIMIT = 0.02
+# points of equal area: a symmetric solid folds them into one octant, eight times as dense
+FIT_POINTS, FIT_POINTS_SYMMETRIC, CHECK_POINTS = 1000, 800, 4000
+INTERIOR_POINTS, CHECK_INTERIOR_POINTS = 30_000, 200_000
+
+
+@dataclass(frozen=True)
+class ClumpFit:
+    """How well the member spheres stand for the solid.
+
+    Args:
+        n_spheres: number of member spheres.
+        volume_ratio: volume of the union of spheres / volume of the solid.
+        covered_ratio: volume of the union within the solid / volume of the solid.
+        surface_rms: RMS over the solid's surface (by area) of the distance to the union's surface [m].
+        surface_max: largest such distance [m].
+        extent_errors: (x, y, z) outer dimension of the union / that of the solid - 1.
+        smallest_radius: radius of the smallest member sphere [m].
+    """
+
+    n_spheres: int
+    volume_ratio: float
+    covered_ratio: float
+    surface_rms: float
+    surface_max: float
+    extent_errors: tuple[float, float, float]
+    smallest_radius: float
+
+
+@dataclass(frozen=True, eq=False)
+class Clump:
+    """A rigid body of member spheres. Arrays are read-only.
+
+    Args:
+        centres: (n, 3) in the principal frame, relative to the centre of mass [m].
+        radii: (n,) [m].
+        mass: [kg].
+        inertia: (3,) principal moments about x, y, z [kg m2].
+        bounding_radius: of the sphere about the centre of mass that holds every member sphere [m].
+        fit: how well the spheres stand for the solid.
+    """
+
+    centres: Array
+    radii: Array
+    mass: float
+    inertia: Array
+    bounding_radius: float
+    fit: ClumpFit
+
+
+def fit_clump(solid: Solid, density: float, resolution: Resolution) -> Clump:
+    """The clump of as few spheres as meet the resolution's demand; the same bits every time.
+
+    Starting layouts are tried by ascending number of spheres and refined by least squares
+    (`solver.sphere_fit`); the first number whose best layout meets the RMS deviation, and outer dimensions
+    within 2 %, is taken. If none does, the layout of least deviation is, and `fit` says by how much it
+    misses. A sphere is its own clump, exactly. Mass and inertia are the solid's, never the spheres'. Cached
+    by solid and resolution, a mesh also by the time of its file's last change.
+
+    Args:
+        solid: true shape.
+        density: [kg/m3].
+        resolution: coarse, standard or fine.
+
+    Raises:
+        ShapeError: unknown resolution, bad density or unusable mesh.
+    """
+    if resolution not in DEMANDS:
+        raise ShapeError(f"resolution = {resolution!r}: allowed are {', '.join(get_args(Resolution))}")
+    properties = mass_properties(solid, density)
+    centres, radii, fit = _fit_spheres(solid, resolution, file_stamp(solid))
+    return _clump(centres, radii, properties.mass, properties.inertia, fit)
+
+
+def explicit_clump(centres: npt.ArrayLike, radii: npt.ArrayLike, mass: float, inertia: npt.ArrayLike) -> Clump:
+    """A body that is declared by its spheres.
+
+    The union of spheres is the body itself, hence `fit` states no error. Nothing is recentred: the
+    declaration says where the centre of mass is.
+
+    Args:
+        centres: (n, 3) relative to the centre of mass, along the principal axes [m].
+        radii: (n,) [m].
+        mass: [kg].
+        inertia: (3,) principal moments [kg m2].
+
+    Raises:
+        ShapeError: wrong array shapes, values that are not finite, a radius, mass or moment that is not
+            positive, or moments that no body has (each must be at most the sum of the others).
+    """
+    centres, radii, inertia = (
+        _numbers("sphere_centres", centres),
+        _numbers("sphere_radii", radii),
+        _numbers("inertia", inertia),
+    )
+    if centres.ndim != 2 or centres.shape[1] != 3 or len(centres) == 0:
+        raise ShapeError(f"sphere_centres: an array (n, 3) with n >= 1 is expected, got {centres.shape}")
+    if radii.shape != (len(centres),):
+        raise ShapeError(f"sphere_radii: one radius for each of {len(centres)} centres is expected, got {radii.shape}")
+    if not (radii > 0.0).all():
+        raise ShapeError(f"sphere_radii: every radius must be positive [m], got {radii.min():g}")
+    if not (np.ndim(mass) == 0 and _numbers("mass", mass) > 0.0):
+        raise ShapeError(f"mass = {mass!r}: must be positive [kg]")
+    if inertia.shape != (3,) or not (inertia > 0.0).all():
+        raise ShapeError(f"inertia = {inertia.tolist()}: three positive principal moments are expected [kg m2]")
+    # 1e-6: moments are declared with few digits, and those of a thin plate meet the limit exactly
+    if inertia.max() > (1.0 + 1e-6) * (inertia.sum() - inertia.max()):
+        raise ShapeError(f"inertia = {inertia.tolist()}: no moment may exceed the sum of the other two")
+    fit = ClumpFit(len(radii), 1.0, 1.0, 0.0, 0.0, (0.0, 0.0, 0.0), float(radii.min()))
+    return _clump(centres, radii, float(mass), inertia, fit)
+
+
+def _numbers(name: str, values: npt.ArrayLike) -> Array:
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ShapeError(f"{name}: numbers in rows of equal length are expected, got {values!r}") from None
+    if not np.isfinite(array).all():
+        raise ShapeError(f"{name}: every number must be finite, got {values!r}")
+    return array
+
+
+def _clump(centres: Array, radii: Array, mass: float, inertia: Array, fit: ClumpFit) -> Clump:
+    for array in (centres, radii, inertia):
+        array.flags.writeable = False
+    bounding_radius = float((np.linalg.norm(centres, axis=1) + radii).max())
+    return Clump(centres, radii, mass, inertia, bounding_radius, fit)
+
+
+@lru_cache(maxsize=64)
+def _fit_spheres(solid: Solid, resolution: Resolution, stamp: int) -> tuple[Array, Array, ClumpFit]:
+    if solid.kind == "sphere":
+        radius = solid.dimensions[0] / 2.0
+        return np.zeros((1, 3)), np.array([radius]), ClumpFit(1, 1.0, 1.0, 0.0, 0.0, (0.0, 0.0, 0.0), radius)
+    symmetric = solid.kind != "mesh"
+    surface, normals = surface_points(solid, FIT_POINTS_SYMMETRIC if symmetric else FIT_POINTS)
+    target = Target(
+        np.abs(surface) if symmetric else surface,
+        np.abs(normals) if symmetric else normals,
+        interior_points(solid, INTERIOR_POINTS),
+        np.array(surface_mesh(solid).bounds),
+        symmetric,
+    )
+    volume = mass_properties(solid, 1.0).volume
+    centres, radii = _fewest_spheres(target, DEMANDS[resolution], np.cbrt(6.0 * volume / np.pi)).spheres()
+    return centres, radii, _measure(solid, target, volume, centres, radii)
+
+
+def _fewest_spheres(target: Target, demand: Demand, diameter: float) -> Orbits:
+    floor = demand.least_radius * target.inscribed_radius
+    limit = demand.rms * diameter
+    best_score, best, next_count = np.inf, None, 1
+    for count, layouts in sorted(start_layouts(target, demand.most_spheres, floor).items()):
+        if count < min(next_count, 0.9 * demand.most_spheres):
+            continue
+        trials = [without_idle(refine(layout, target, floor, 100), target) for layout in layouts]
+        trial = min(trials, key=lambda orbits: _score(orbits, target))
+        score = _score(trial, target)
+        if score < best_score or best is None:
+            best_score, best = score, trial
+        if score <= limit:
+            break
+        # deviation falls more slowly than count^(-4/3): far from the demand, a few more spheres do not help
+        next_count = int(count * min(best_score / limit, 1.5) ** 0.75)
+    assert best is not None, "one row of one sphere is always among the layouts"
+    return best
+
+
+def _score(orbits: Orbits, target: Target) -> float:
+    """RMS gap [m], raised by outer dimensions beyond their limit so that such clumps come last."""
+    centres, radii = orbits.spheres()
+    distance = np.sqrt(squared_distances(target.surface, centres))
+    gap = (distance - radii + not_facing(target.surface, target.normals, centres)).min(axis=1)
+    excess = np.abs(_extent_errors(target.bounds, centres, radii)).max() - EXTENT_LIMIT
+    return float(np.sqrt((gap**2).mean()) + max(excess, 0.0) * 100.0 * target.inscribed_radius)
+
+
+def _extent_errors(bounds: Array, centres: Array, radii: Array) -> Array:
+    return outer_dimensions(centres, radii) / (bounds[1] - bounds[0]) - 1.0
+
+
+def _measure(solid: Solid, target: Target, volume: float, centres: Array, radii: Array) -> ClumpFit:
+    """The fit's errors, on other and more points than it was made with."""
+    deviation = distance_to_union(surface_points(solid, CHECK_POINTS)[0], centres, radii)
+    inside = interior_points(solid, CHECK_INTERIOR_POINTS)
+    covered = np.any([((inside - c) ** 2).sum(axis=1) <= r**2 for c, r in zip(centres, radii, strict=True)], axis=0)
+    errors = _extent_errors(target.bounds, centres, radii)
+    return ClumpFit(
+        n_spheres=len(radii),
+        volume_ratio=float(union_volume(centres, radii) / volume),
+        covered_ratio=float(covered.mean()),
+        surface_rms=float(np.sqrt((deviation**2).mean())),
+        surface_max=float(deviation.max()),
+        extent_errors=(float(errors[0]), float(errors[1]), float(errors[2])),
+        smallest_radius=float(radii.min()),
+    )

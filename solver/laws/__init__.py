@@ -1,0 +1,1 @@
+"""Contact laws: the force between two bodies that overlap."""

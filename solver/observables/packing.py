@@ -1,0 +1,36 @@
+"""How densely the bodies of a pile lie."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from solver.observables.reading import PileReading
+from solver.observables.value import Value
+
+if TYPE_CHECKING:
+    from solver.record import Record
+
+
+def bulk_density(reading: PileReading) -> Value:
+    """Mass of the bodies with centres within r50 over the volume under the top surface there."""
+    return Value(_inner_density(reading, np.ones(len(reading.pile.component_names))), "kg/m3")
+
+
+def solid_fraction(record: Record) -> Value:
+    """Solid volume (mass over the body's density) over the volume under the top surface, within r50."""
+    density = {body.name: body.density for body in record.scene.bodies}
+    solid_volume_per_mass = np.array([1.0 / density[name] for name in record.pile.component_names])
+    return Value(_inner_density(PileReading(record.pile), solid_volume_per_mass), "1")
+
+
+def _inner_density(reading: PileReading, per_mass: npt.NDArray[np.float64]) -> float:
+    """Sum of mass × ``per_mass`` of its component within r50, over the volume under the surface there."""
+    if not reading.is_pile or reading.surface is None:
+        return float("nan")
+    pile = reading.pile
+    inner = reading.radii <= reading.r50
+    volume = reading.surface.volume(reading.r50)
+    return float(pile.mass[inner] @ per_mass[pile.component[inner]]) / volume if volume > 0.0 else float("nan")

@@ -1,0 +1,124 @@
+"""The observables of a pile at rest, each a function PileReading → Value."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from solver.observables.cone import fitted_cone_angle_deg, mass_cone_angle_deg, volume_cone_angle_deg
+from solver.observables.footprint import radius_holding
+from solver.observables.reading import PileReading
+from solver.observables.repose import AZIMUTHS_DEG
+from solver.observables.silhouette import PIXEL, column_tops
+from solver.observables.surface import height_map, radial_profile
+from solver.observables.value import Value, mean_value
+
+Array = npt.NDArray[np.float64]
+
+PROFILE_RING = 5.0e-3
+"""Width of the rings of :func:`height_profile` [m]."""
+PROFILE_RINGS = 30
+SURFACE_RINGS = 60
+"""Rings of the surface that the cone is fitted to, out to 3 r50."""
+
+
+def angle_of_repose(reading: PileReading) -> Value:
+    """Silhouette flank fit, mean of 12 views × 2 flanks; spread over the flanks."""
+    return mean_value(reading.flanks_deg.ravel().tolist(), "deg")
+
+
+def angle_of_repose_above_one_body(reading: PileReading) -> Value:
+    """Silhouette flank fit with the floor at max(20 % of the height, one body's thickness)."""
+    return mean_value(reading.flanks_above_one_body_deg.ravel().tolist(), "deg")
+
+
+def angle_of_repose_left(reading: PileReading) -> Value:
+    """Silhouette flank fit, left flank of the view along +y (the side of -x)."""
+    return Value(float(reading.flanks_deg[0, 0]), "deg")
+
+
+def angle_of_repose_right(reading: PileReading) -> Value:
+    """Silhouette flank fit, right flank of the view along +y (the side of +x)."""
+    return Value(float(reading.flanks_deg[0, 1]), "deg")
+
+
+def angle_of_repose_at(azimuth_deg: float) -> Callable[[PileReading], Value]:
+    """The observable "one view, mean of both flanks" for an azimuth among ``AZIMUTHS_DEG``."""
+    view = AZIMUTHS_DEG.index(azimuth_deg)
+    return lambda reading: mean_value(reading.flanks_deg[view].tolist(), "deg")
+
+
+def angle_of_repose_cone(reading: PileReading) -> Value:
+    """Angle of the cone nearest to the azimuth-averaged top surface."""
+    if not reading.is_pile or reading.surface is None:
+        return Value(float("nan"), "deg")
+    ring_width = 3.0 * reading.r50 / SURFACE_RINGS
+    return Value(fitted_cone_angle_deg(*radial_profile(reading.surface, ring_width, SURFACE_RINGS)), "deg")
+
+
+def angle_of_repose_mass_cone(reading: PileReading) -> Value:
+    """Angle of the cone with the pile's height of the centre of mass and its r50."""
+    if not reading.is_pile:
+        return Value(float("nan"), "deg")
+    return Value(mass_cone_angle_deg(float(reading.centre[2]), reading.r50), "deg")
+
+
+def angle_of_repose_volume_cone(reading: PileReading) -> Value:
+    """Angle of the cone with the volume under the pile's surface (within 2 r50, its base) and its r50."""
+    if not reading.is_pile or reading.surface is None:
+        return Value(float("nan"), "deg")
+    return Value(volume_cone_angle_deg(reading.surface.volume(2.0 * reading.r50), reading.r50), "deg")
+
+
+def apex_height(reading: PileReading) -> Value:
+    """Top of the silhouette above the plate, median over the views; spread over them.
+
+    The median, because a tall stray stands before or behind the pile in a few views.
+    """
+    heights = [float(column_tops(image).max()) * PIXEL for image in reading.silhouettes if image.size]
+    over_views = mean_value(heights, "m")
+    return Value(float(np.median(heights)), "m", over_views.spread) if heights else over_views
+
+
+def footprint_r50(reading: PileReading) -> Value:
+    """Radius about the pile's centre of mass that holds 50 % of the mass on the plate."""
+    return Value(reading.r50, "m")
+
+
+def footprint_r90(reading: PileReading) -> Value:
+    """Radius about the pile's centre of mass that holds 90 % of the mass on the plate."""
+    return Value(radius_holding(0.9, reading.radii, reading.pile.mass), "m")
+
+
+def centroid_x(reading: PileReading) -> Value:
+    """Centre of mass relative to the funnel's axis, along x."""
+    return Value(float(reading.centre[0]) - reading.pile.axis[0], "m")
+
+
+def centroid_y(reading: PileReading) -> Value:
+    """Centre of mass relative to the funnel's axis, along y."""
+    return Value(float(reading.centre[1]) - reading.pile.axis[1], "m")
+
+
+def stray_fraction(reading: PileReading) -> Value:
+    """Mass fraction of the bodies whose centre lies beyond 2 r50."""
+    mass = reading.pile.mass
+    if mass.size == 0:
+        return Value(float("nan"), "1")
+    return Value(float(mass[reading.radii > 2.0 * reading.r50].sum() / mass.sum()), "1")
+
+
+def height_profile(
+    reading: PileReading, ring_width: float = PROFILE_RING, rings: int = PROFILE_RINGS
+) -> tuple[Array, Array]:
+    """``height_profile_m``: middle radii of rings [m] and mean top surface in them [m]; shape (rings,) each.
+
+    About the pile's own centre of mass; bare plate counts as 0. An empty pile is NaN everywhere.
+    """
+    if reading.pile.mass.size == 0:
+        middle: Array = (np.arange(rings, dtype=np.float64) + 0.5) * ring_width
+        return middle, np.full(rings, np.nan)
+    surface = height_map(reading.pile.spheres, reading.centre[:2], ring_width * rings, ring_width / 8.0)
+    return radial_profile(surface, ring_width, rings)

@@ -1,0 +1,83 @@
+"""A pile with what several observables read from it, each computed once and only when asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from solver.observables import footprint
+from solver.observables.repose import AZIMUTHS_DEG, flank_angles_deg
+from solver.observables.silhouette import PIXEL, Image, largest_part, silhouette
+from solver.observables.surface import HeightMap, height_map
+
+if TYPE_CHECKING:
+    from solver.record import Pile
+
+Array = npt.NDArray[np.float64]
+
+SURFACE_PIXELS = 160
+"""Pixels of the height map along half its width; the half width is three times r50."""
+
+
+@dataclass(frozen=True)
+class PileReading:
+    """Views and integrals of one pile. Needs two bodies: below that its angles are NaN."""
+
+    pile: Pile
+
+    @property
+    def is_pile(self) -> bool:
+        """True from two bodies on."""
+        return self.pile.mass.size >= 2
+
+    @cached_property
+    def silhouettes(self) -> tuple[Image, ...]:
+        """Largest part of the silhouette from each of ``AZIMUTHS_DEG``."""
+        return tuple(largest_part(silhouette(self.pile.spheres, azimuth)) for azimuth in AZIMUTHS_DEG)
+
+    @cached_property
+    def flanks_deg(self) -> Array:
+        """Angles of the left and the right flank [°], shape (azimuths, 2)."""
+        return self._flanks_deg(0.0)
+
+    @cached_property
+    def flanks_above_one_body_deg(self) -> Array:
+        """The same with the floor of the window above a body that lies flat (its thickness and one pixel)."""
+        return self._flanks_deg(self.thickness + PIXEL)
+
+    @cached_property
+    def thickness(self) -> float:
+        """Thickness of a body [m]."""
+        return footprint.body_thickness(self.pile)
+
+    @cached_property
+    def centre(self) -> Array:
+        """Centre of mass [m], shape (3,)."""
+        return footprint.centre_of_mass(self.pile)
+
+    @cached_property
+    def radii(self) -> Array:
+        """Distances of the bodies from the centre of mass in the plane of the plate [m], shape (n,)."""
+        return footprint.mass_radii(self.pile)
+
+    @cached_property
+    def r50(self) -> float:
+        """Radius that holds half of the mass [m]."""
+        return footprint.radius_holding(0.5, self.radii, self.pile.mass)
+
+    @cached_property
+    def surface(self) -> HeightMap | None:
+        """Top surface out to 3 r50; None for a pile whose r50 is below the radius of its largest sphere."""
+        if not self.r50 > self.pile.spheres.radius.max(initial=0.0):
+            return None
+        half_width = 3.0 * self.r50
+        return height_map(self.pile.spheres, self.centre[:2], half_width, half_width / SURFACE_PIXELS)
+
+    def _flanks_deg(self, lowest: float) -> Array:
+        if not self.is_pile:
+            return np.full((len(AZIMUTHS_DEG), 2), np.nan)
+        return np.array([flank_angles_deg(image, PIXEL, lowest) for image in self.silhouettes])

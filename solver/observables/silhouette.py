@@ -1,0 +1,76 @@
+"""Silhouette of a pile: what a camera at plate height sees from far away.
+
+An image is a boolean array, shape (rows, columns): row 0 lies on the plate and rows go up, columns go from
+left to right. Simulated piles and photographs meet here; a photograph, stored from the top down, is flipped
+first.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+from scipy import ndimage
+
+if TYPE_CHECKING:
+    from solver.record import Spheres
+
+Array = npt.NDArray[np.float64]
+Image = npt.NDArray[np.bool_]
+
+PIXEL = 0.25e-3
+"""Side of a pixel [m]."""
+EIGHT_NEIGHBOURS = np.ones((3, 3), dtype=bool)
+
+
+def silhouette(spheres: Spheres, azimuth_deg: float, pixel: float = PIXEL) -> Image:
+    """Image of the union of ``spheres`` on a grid of ``pixel`` [m], shape (rows, columns).
+
+    The image's horizontal axis is u = x cos(azimuth) + y sin(azimuth): azimuth 0 looks along +y and has +x
+    on its right. A pixel is covered where its centre lies in the projection of a sphere, so the outline is
+    within half a pixel of the exact one. What lies below the plate (z < 0) is cut off. No spheres: an image
+    of shape (0, 0).
+    """
+    if spheres.radius.size == 0:
+        return np.zeros((0, 0), dtype=bool)
+    angle = np.radians(azimuth_deg)
+    u = (spheres.centre[:, 0] * np.cos(angle) + spheres.centre[:, 1] * np.sin(angle)) / pixel
+    z = spheres.centre[:, 2] / pixel
+    radius = spheres.radius / pixel
+    u -= np.floor((u - radius).min())
+
+    columns = int(np.ceil((u + radius).max()))
+    rows = max(int(np.ceil((z + radius).max())), 1)
+    # A sphere covers the rows first <= row < past of a column: mark +1 and -1 there, then sum up the column.
+    first_column = np.ceil(u - radius - 0.5).astype(np.int64)
+    column = first_column[:, None] + np.arange(int(np.ceil(2.0 * radius.max())) + 1)
+    half_chord_squared = radius[:, None] ** 2 - (column + 0.5 - u[:, None]) ** 2
+    sphere, _ = hit = np.nonzero((half_chord_squared >= 0.0) & (column < columns))
+    half_chord = np.sqrt(half_chord_squared[hit])
+    first = np.clip(np.ceil(z[sphere] - half_chord - 0.5), 0, rows).astype(np.int64)
+    past = np.clip(np.floor(z[sphere] + half_chord + 0.5), first, rows).astype(np.int64)
+    strip = column[hit] * (rows + 1)
+    size = columns * (rows + 1)
+    edges = np.bincount(strip + first, minlength=size) - np.bincount(strip + past, minlength=size)
+    covered: Image = np.cumsum(edges.reshape(columns, rows + 1), axis=1)[:, :rows] > 0
+    return covered.T
+
+
+def largest_part(image: Image) -> Image:
+    """The largest 8-connected part of ``image``, everything else cleared; same shape."""
+    if not image.any():
+        return image
+    labels, _ = ndimage.label(image, structure=EIGHT_NEIGHBOURS)
+    pixels = np.bincount(labels.ravel())
+    pixels[0] = 0
+    part: Image = labels == pixels.argmax()
+    return part
+
+
+def column_tops(image: Image) -> npt.NDArray[np.int64]:
+    """Pixels from the plate to the top of the highest covered one, per column; shape (columns,)."""
+    if image.size == 0:
+        return np.zeros(image.shape[1], dtype=np.int64)
+    tops = image.shape[0] - image[::-1].argmax(axis=0)
+    return np.where(image.any(axis=0), tops, 0)

@@ -1,0 +1,69 @@
+"""Top surface of a pile: its height map and the azimuthal mean h(r)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from solver.record import Spheres
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class HeightMap:
+    """Height of the top surface above the plate on a square grid about a centre; bare plate counts as 0."""
+
+    height: Array
+    """[m], shape (n, n)."""
+    radius: Array
+    """Distance of the pixels from the centre [m], shape (n, n)."""
+    pixel: float
+    """[m]"""
+
+    def volume(self, within: float) -> float:
+        """Volume between plate and surface where r < ``within`` [m]; [m³]."""
+        return float(self.height[self.radius < within].sum()) * self.pixel**2
+
+
+def height_map(spheres: Spheres, centre: Array, half_width: float, pixel: float) -> HeightMap:
+    """Top surface of ``spheres`` within ``half_width`` [m] of ``centre`` (x, y) [m] in x and in y.
+
+    The height of a pixel is that of the highest sphere over its centre. Holes under an overhang count as
+    filled.
+    """
+    n = 2 * int(np.ceil(half_width / pixel))
+    position = (spheres.centre[:, :2] - centre) / pixel + n / 2
+    radius = spheres.radius / pixel
+    height = np.zeros(n * n)
+    if radius.size:
+        offsets = np.arange(int(np.ceil(2.0 * radius.max())) + 1)
+        first = np.ceil(position - radius[:, None] - 0.5).astype(np.int64)
+        column, row = first[:, 0, None] + offsets, first[:, 1, None] + offsets
+        dx2 = (column + 0.5 - position[:, 0, None]) ** 2
+        dy2 = (row + 0.5 - position[:, 1, None]) ** 2
+        cap2 = (radius**2)[:, None, None] - dx2[:, :, None] - dy2[:, None, :]
+        on_grid = ((column >= 0) & (column < n))[:, :, None] & ((row >= 0) & (row < n))[:, None, :]
+        sphere, i, j = hit = np.nonzero((cap2 >= 0.0) & on_grid)
+        top = spheres.centre[sphere, 2] + pixel * np.sqrt(cap2[hit])
+        np.maximum.at(height, column[sphere, i] * n + row[sphere, j], top)
+    axis = (np.arange(n) + 0.5 - n / 2) * pixel
+    return HeightMap(height.reshape(n, n), np.hypot(axis[:, None], axis[None, :]), pixel)
+
+
+def radial_profile(surface: HeightMap, ring_width: float, rings: int) -> tuple[Array, Array]:
+    """Azimuthal mean of a height map: middle radii of rings [m], mean heights in them [m]; shape (rings,)
+    each.
+
+    The map must reach out to ``ring_width`` · ``rings``.
+    """
+    ring = (surface.radius / ring_width).astype(np.int64).ravel()
+    inside = ring < rings
+    area = np.bincount(ring[inside], minlength=rings)
+    total = np.bincount(ring[inside], weights=surface.height.ravel()[inside], minlength=rings)
+    middle: Array = (np.arange(rings, dtype=np.float64) + 0.5) * ring_width
+    return middle, total / np.maximum(area, 1)

@@ -1,0 +1,87 @@
+"""From the numbers of a running world to the frozen parts of a record."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from solver.insertion import rotation_matrix
+from solver.record import Bodies, Pile, Spheres, Trace
+from solver.scene import Scene
+from solver.world import Layout
+
+Array = npt.NDArray[np.float64]
+
+
+def bodies_of(scene: Scene, order: npt.NDArray[np.int32], places: Layout, state: Array) -> Bodies:
+    """Bodies that have entered, from the rows of ``Batch.bodies``."""
+    n = len(state)
+    return Bodies(
+        component=order[:n].copy(),
+        component_names=tuple(body.name for body in scene.bodies),
+        mass=places.numbers[:n, 0].copy(),
+        position=state[:, 0:3].copy(),
+        quaternion=state[:, 3:7].copy(),
+        velocity=state[:, 7:10].copy(),
+        inside=state[:, 13] > 0.5,
+    )
+
+
+def member_spheres(scene: Scene, bodies: Bodies) -> Spheres:
+    """Member spheres of ``bodies`` in the world; bodies that were taken out have none."""
+    centres, radii, owners = [np.zeros((0, 3))], [np.zeros(0)], [np.zeros(0, dtype=np.int32)]
+    for k, body in enumerate(scene.bodies):
+        chosen = np.flatnonzero((bodies.component == k) & bodies.inside)
+        if len(chosen) == 0:
+            continue
+        clump = body.clump
+        turned = np.einsum("bij,mj->bmi", rotation_matrix(bodies.quaternion[chosen]), clump.centres)
+        centres.append((bodies.position[chosen, None, :] + turned).reshape(-1, 3))
+        radii.append(np.tile(clump.radii, len(chosen)))
+        owners.append(np.repeat(chosen.astype(np.int32), len(clump.radii)))
+    return Spheres(np.concatenate(centres), np.concatenate(radii), np.concatenate(owners))
+
+
+def rolling_away(scene: Scene, state: Array) -> npt.NDArray[np.bool_]:
+    """Bodies that still roll outward on the plate, alone and beyond the feed opening's radius.
+
+    The rule of ``kernels/batch.rolls_away``, for bodies that also move faster than ``numerics.rest_speed``.
+    ``state``: rows of ``Batch.bodies``. Nothing brakes them, so where they are is a matter of when one looks.
+    """
+    x, v, touching = state[:, 0:3], state[:, 7:10], state[:, 14]
+    beyond = np.hypot(x[:, 0], x[:, 1]) > scene.rig.inlet_diameter / 2.0
+    outward = (x[:, :2] * v[:, :2]).sum(axis=1) > 0.0
+    moving = np.linalg.norm(v, axis=1) > scene.numerics.rest_speed
+    return beyond & outward & moving & (touching == 0)
+
+
+def pile_of(scene: Scene, bodies: Bodies, spheres: Spheres, rolling: npt.NDArray[np.bool_] | None = None) -> Pile:
+    """The bodies that lie below the outlet, inside the domain and do not roll away, renumbered from 0."""
+    lying = bodies.inside & (bodies.position[:, 2] < scene.rig.outlet_height)
+    chosen = np.flatnonzero(lying if rolling is None else lying & ~rolling)
+    number = np.full(len(bodies.mass), -1, dtype=np.int32)
+    number[chosen] = np.arange(len(chosen), dtype=np.int32)
+    kept = number[spheres.body] >= 0
+    return Pile(
+        spheres=Spheres(spheres.centre[kept], spheres.radius[kept], number[spheres.body[kept]]),
+        position=bodies.position[chosen],
+        mass=bodies.mass[chosen],
+        component=bodies.component[chosen],
+        component_names=bodies.component_names,
+    )
+
+
+def trace_of(samples: list[dict[str, float]]) -> Trace:
+    """Curves from the samples of a run."""
+
+    def column(name: str) -> Array:
+        return np.array([sample[name] for sample in samples], dtype=float)
+
+    return Trace(
+        time=column("time"),
+        entered_mass=column("entered"),
+        discharged_mass=column("discharged"),
+        kinetic_energy=column("kinetic"),
+        contacts=column("touching").astype(np.int32),
+        max_overlap=column("overlap"),
+    )

@@ -1,0 +1,71 @@
+"""The funnel rig: material falls through a conical funnel onto a plate and piles up.
+
+        inlet_diameter
+      \\              /     ↑
+       \\            /      cone_height
+        \\          /       ↓
+         |outlet  |        ↑ outlet_height
+    ─────────────────────  plate, z = 0
+
+The plate is infinite; bodies that roll further than ``domain_half_width`` from the axis are taken out and counted.
+Source of the shipped dimensions: Processes 2022, 10, 185, §2.6 (funnel); the outlet height is assumed, not published.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from solver.params import ParameterError, param
+from solver.rigs.surface import Plane, Revolved, Surface
+
+
+@dataclass(frozen=True)
+class Funnel:
+    """Dimensions of the rig and the mass that is poured."""
+
+    inlet_diameter: float = param(0.114, unit="m", low=0.01, high=2.0, doc="Inner diameter of the feed opening.")
+    outlet_diameter: float = param(0.030, unit="m", low=0.003, high=2.0, doc="Inner diameter of the outlet.")
+    cone_height: float = param(0.130, unit="m", low=0.005, high=2.0, doc="Length of the funnel along its axis.")
+    outlet_height: float = param(0.065, unit="m", low=0.005, high=2.0, doc="Outlet above the plate.")
+    mass: float = param(0.030, unit="kg", low=1e-5, high=10.0, doc="Mass that is poured.")
+    domain_half_width: float = param(
+        0.4, unit="m", low=0.05, high=10.0, doc="Bodies further than this from the axis are taken out."
+    )
+    wall: str = "rigid_sieve_plate"
+
+    name = "funnel"
+
+    @property
+    def inlet_height(self) -> float:
+        """Height of the feed opening above the plate [m]."""
+        return self.outlet_height + self.cone_height
+
+    def surfaces(self) -> tuple[Surface, ...]:
+        """Plate, cone and gate, in the order of ``SURFACE_NAMES``."""
+        outlet, inlet = self.outlet_diameter / 2.0, self.inlet_diameter / 2.0
+        return (
+            Plane(0.0, self.wall),
+            Revolved(outlet, self.outlet_height, inlet, self.inlet_height, self.wall),
+            Revolved(0.0, self.outlet_height, outlet, self.outlet_height, self.wall),
+        )
+
+    def check(self, widest_body: float) -> None:
+        """Refuse a funnel that narrows upward or whose outlet is narrower than ``widest_body`` [m].
+
+        ``widest_body`` is the smallest width through which the widest of the bodies can pass (its middle extent
+        may turn, its two smaller extents have to go through).
+        """
+        if self.inlet_diameter <= self.outlet_diameter:
+            raise ParameterError(
+                f"rig.inlet_diameter: {self.inlet_diameter:g} m must be larger than rig.outlet_diameter "
+                f"({self.outlet_diameter:g} m)"
+            )
+        if self.outlet_diameter <= widest_body:
+            raise ParameterError(
+                f"rig.outlet_diameter: {self.outlet_diameter:g} m is narrower than a body "
+                f"({widest_body:g} m); allowed: more than {widest_body:g} m"
+            )
+
+
+SURFACE_NAMES = ("plate", "cone", "gate")
+GATE = SURFACE_NAMES.index("gate")

@@ -1,0 +1,116 @@
+"""Run many pours: a batch of worlds whose slots are filled again as pours finish."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from solver import backend
+from solver.body import counts
+from solver.pour import Pour
+from solver.record import Record
+from solver.scene import Scene
+from solver.state import Capacity
+from solver.world import Batch
+
+CONTACTS_PER_MEMBER = 16
+"""Room in the contact list: entries per member sphere. A bed of long bodies holds 2–4."""
+
+
+WORLDS_PER_THREAD = 4
+"""Pours in flight per thread: enough to even out that some are free flight and some a packed pile."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One pour to run."""
+
+    scene: Scene
+    seed: int
+    tag: int = 0
+    """A number of the caller's own, handed back with the record."""
+
+
+def capacity_for(scenes: Sequence[Scene], worlds: int) -> Capacity:
+    """Sizes that hold any of ``scenes``, rounded up so that a small change of the mixture fits as well."""
+    bodies = members = kinds = 0
+    for scene in scenes:
+        numbers = counts(scene.bodies, scene.rig.mass)
+        bodies = max(bodies, sum(numbers))
+        members = max(members, sum(n * len(b.clump.radii) for n, b in zip(numbers, scene.bodies, strict=True)))
+        kinds = max(kinds, len(scene.bodies) + 1)
+    members = 256 * (1 + members // 256)
+    return Capacity(
+        worlds=worlds,
+        bodies=32 * (1 + bodies // 32),
+        members=members,
+        contacts=CONTACTS_PER_MEMBER * members,
+        kinds=kinds,
+    )
+
+
+def run_queue(
+    queue: deque[Job],
+    room: Sequence[Scene],
+    threads: int | None = None,
+    worlds: int | None = None,
+    on_sample: Callable[[Job, Pour], None] | None = None,
+) -> Iterator[tuple[Job, Record]]:
+    """Run the jobs in ``queue`` and yield (job, record) as each finishes; jobs may be appended meanwhile.
+
+    ``room`` lists scenes that any job has to fit into, ``worlds`` is the number of pours in flight (default: four per
+    thread), ``on_sample`` is called with (job, pour) at every moment of decision. Equal job → equal bits, whatever else
+    is in flight.
+    """
+    backend.init(threads=threads)
+    slots = worlds or WORLDS_PER_THREAD * (threads or os.cpu_count() or 1)
+    batch = Batch(capacity_for(room, slots))
+    running: dict[int, tuple[Job, Pour]] = {}
+    steps = np.zeros(slots, dtype=np.int32)
+    # A thread works on a contiguous share of the worlds: fill the shares evenly.
+    places = sorted(range(slots), key=lambda w: (w % max(1, slots // (threads or os.cpu_count() or 1)), w))
+    while True:
+        for w in places:
+            if w not in running and queue:
+                job = queue.popleft()
+                running[w] = (job, Pour(batch, w, job.scene, job.seed))
+        if not running:
+            return
+        for w in range(slots):
+            steps[w] = running[w][1].steps_due() if w in running else 0
+        summary = batch.advance(steps)
+        for w, (job, pour) in list(running.items()):
+            if pour.after(int(steps[w]), summary[w]) and on_sample is not None:
+                on_sample(job, pour)
+            if pour.steps_due() == 0:
+                del running[w]
+                yield job, pour.record()
+
+
+def run_pours(
+    jobs: Sequence[Job],
+    threads: int | None = None,
+    worlds: int | None = None,
+    on_sample: Callable[[int, Pour], None] | None = None,
+) -> Iterator[tuple[int, Record]]:
+    """Run ``jobs`` and yield (index of the job, record) as each finishes (see :func:`run_queue`)."""
+    if not jobs:
+        return
+    tagged = deque(Job(job.scene, job.seed, tag=k) for k, job in enumerate(jobs))
+    slots = min(len(jobs), worlds or WORLDS_PER_THREAD * (threads or os.cpu_count() or 1))
+
+    def sample(job: Job, pour: Pour) -> None:
+        if on_sample is not None:
+            on_sample(job.tag, pour)
+
+    for job, record in run_queue(tagged, [job.scene for job in jobs], threads, slots, sample):
+        yield job.tag, record
+
+
+def run_pour(scene: Scene, seed: int, threads: int | None = None) -> Record:
+    """Run one pour to its end."""
+    return next(run_pours([Job(scene, seed)], threads=threads))[1]

@@ -1,0 +1,154 @@
+"""A scene: everything needed to repeat a run, except the seed. Frozen, hashable, NumPy only.
+
+Parameter paths (the same grammar in ``--set``, study files, sliders and the store):
+
+    material.<material>.density | shear_modulus | poisson_ratio
+    pair.<a>.<b>.static_friction | restitution          (order of a and b is free)
+    body.<body>.mass_fraction | thickness | …           (dimensions of the solid)
+    body.spheres                                         (coarse, standard, fine: for all bodies)
+    rig.<name>   insertion.<name>   numerics.<name>
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+from solver.body import RESOLUTION, Body, body_parameters, with_body_value, with_densities
+from solver.insertion import Insertion
+from solver.material import Material, Pair
+from solver.numerics import Numerics
+from solver.params import Parameter, ParameterError, declared
+from solver.rigs import Funnel
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Materials, pairs, bodies, rig, insertion and numerics of one pour."""
+
+    title: str
+    materials: tuple[Material, ...]
+    bodies: tuple[Body, ...]
+    pairs: tuple[Pair, ...]
+    rig: Funnel = Funnel()
+    insertion: Insertion = Insertion()
+    numerics: Numerics = Numerics()
+    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+    assumed: tuple[str, ...] = ()
+
+    def material(self, name: str) -> Material:
+        """The material of that name, or :class:`ParameterError` naming the ones there are."""
+        for material in self.materials:
+            if material.name == name:
+                return material
+        raise ParameterError(f"material.{name}: no such material; known: {', '.join(m.name for m in self.materials)}")
+
+    def pair(self, a: str, b: str) -> Pair:
+        """The pair of ``a`` and ``b`` in either order, or :class:`ParameterError`."""
+        for pair in self.pairs:
+            if pair.joins(a, b):
+                return pair
+        known = ", ".join(f"{p.a}.{p.b}" for p in self.pairs)
+        raise ParameterError(f"pair.{a}.{b}: no such pair; known: {known}")
+
+    def contact_pair(self, one: Body, other: Body | str) -> Pair:
+        """The pair that rules a contact: by body names first, then by material names."""
+        names = [(one.name, one.material)]
+        names.append((other, other) if isinstance(other, str) else (other.name, other.material))
+        for a in names[0]:
+            for b in names[1]:
+                for pair in self.pairs:
+                    if pair.joins(a, b):
+                        return pair
+        return self.pair(names[0][0], names[1][0])
+
+
+def parameters(scene: Scene) -> dict[str, Parameter]:
+    """Every parameter of ``scene``: path → :class:`Parameter`."""
+    found: dict[str, Parameter] = {}
+    for material in scene.materials:
+        found |= declared(material, f"material.{material.name}")
+    for pair in scene.pairs:
+        found |= declared(pair, f"pair.{pair.a}.{pair.b}")
+    found["body.spheres"] = RESOLUTION
+    for body in scene.bodies:
+        found |= body_parameters(body)
+    found |= declared(scene.rig, "rig")
+    found |= declared(scene.insertion, "insertion")
+    found |= declared(scene.numerics, "numerics")
+    return found
+
+
+def canonical(scene: Scene, path: str) -> str:
+    """``path`` with the names of a pair in the order of the scene; raises if the path does not exist."""
+    known = parameters(scene)
+    if path in known:
+        return path
+    parts = path.split(".")
+    if parts[0] == "pair" and len(parts) == 4:
+        pair = scene.pair(parts[1], parts[2])
+        swapped = f"pair.{pair.a}.{pair.b}.{parts[3]}"
+        if swapped in known:
+            return swapped
+    near = [name for name in known if name.split(".")[0] == parts[0]] or sorted({n.split(".")[0] for n in known})
+    raise ParameterError(f"{path}: no such parameter; known: {', '.join(near)}")
+
+
+def value(scene: Scene, path: str) -> Any:
+    """Value of a parameter in SI (or the name of a choice)."""
+    kind, *rest = canonical(scene, path).split(".")
+    if kind == "material":
+        return getattr(scene.material(rest[0]), rest[1])
+    if kind == "pair":
+        return getattr(scene.pair(rest[0], rest[1]), rest[2])
+    if kind == "body":
+        return scene.bodies[0].spheres if rest == ["spheres"] else _body(scene, rest[0]).value(rest[1])
+    return getattr(getattr(scene, kind), rest[0])
+
+
+def with_values(scene: Scene, values: dict[str, Any]) -> Scene:
+    """``scene`` with parameters replaced; each value is checked against its range, and the result as a whole.
+
+    A mass fraction that is set scales the other fractions so that they add up to one.
+    """
+    for path, raw in values.items():
+        path = canonical(scene, path)
+        checked = parameters(scene)[path].check(raw)
+        scene = _with_value(scene, path.split("."), checked)
+    check(scene)
+    return scene
+
+
+def check(scene: Scene) -> None:
+    """Raise :class:`ParameterError` where the parts of a scene do not fit together."""
+    for body in scene.bodies:
+        scene.material(body.material)
+        scene.contact_pair(body, scene.rig.wall)
+        for other in scene.bodies:
+            scene.contact_pair(body, other)
+    scene.material(scene.rig.wall)
+    scene.rig.check(widest_body=max(sorted(body.extents)[1] for body in scene.bodies))
+    scene.insertion.check(scene.rig.inlet_diameter, longest_body=max(max(body.extents) for body in scene.bodies))
+
+
+def _body(scene: Scene, name: str) -> Body:
+    return next(body for body in scene.bodies if body.name == name)
+
+
+def _with_value(scene: Scene, parts: list[str], new: Any) -> Scene:
+    kind, *rest = parts
+    if kind == "material":
+        old: Any = scene.material(rest[0])
+        materials = _swap(scene.materials, old, {rest[1]: new})
+        return dataclasses.replace(scene, materials=materials, bodies=with_densities(scene.bodies, materials))
+    if kind == "pair":
+        old = scene.pair(rest[0], rest[1])
+        return dataclasses.replace(scene, pairs=_swap(scene.pairs, old, {rest[2]: new}))
+    if kind == "body":
+        return dataclasses.replace(scene, bodies=with_body_value(scene.bodies, rest, new))
+    return dataclasses.replace(scene, **{kind: dataclasses.replace(getattr(scene, kind), **{rest[0]: new})})
+
+
+def _swap(items: tuple[Any, ...], old: Any, changes: dict[str, Any]) -> tuple[Any, ...]:
+    return tuple(dataclasses.replace(item, **changes) if item is old else item for item in items)

@@ -1,0 +1,164 @@
+"""The page in headless Chromium: real mouse and keys; what moved is read from the page's own scene.
+
+`window.__viserSceneTree` is a hook of viser's client for its own tests. viser is pinned; should the hook vanish, this
+test fails at its first use.
+"""
+
+import os
+import re
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.browser
+
+# WebGL 2 in software: there is no graphics card where tests run.
+FLAGS = [
+    "--no-sandbox",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--ignore-gpu-blocklist",
+]
+# A wide outlet close to the plate: a pour that does not jam, and a pile two bodies high.
+SMALL_POUR = (
+    "body.spheres=coarse",
+    "rig.mass=20g",
+    "insertion.rate=40g/s",
+    "rig.outlet_diameter=50mm",
+    "rig.outlet_height=40mm",
+)
+POSITIONS = """() => Object.entries(window.__viserSceneTree.getState())
+    .filter(([name, node]) => /^.bodies.\\d+$/.test(name) && node?.message?.props?.batched_positions)
+    .sort().flatMap(([name, node]) => Array.from(node.message.props.batched_positions))"""
+PATIENCE = 30_000
+"""Milliseconds: software rendering, a solver and other tests share two cores."""
+
+
+@pytest.fixture(scope="module")
+def address():
+    """Address of the page of ``explorer serve``, started as a user does."""
+    settings = [part for one in SMALL_POUR for part in ("--set", one)]
+    server = subprocess.Popen(
+        [sys.executable, "-m", "explorer", "serve", "--port", "0", *settings], stdout=subprocess.PIPE, text=True
+    )
+    found = re.search(r"http://\S+", server.stdout.readline())
+    assert found, "the server did not tell its address"
+    yield found[0]
+    server.terminate()
+    assert server.wait(20) == 0
+
+
+@pytest.fixture(scope="module")
+def page(address, chromium):
+    """The opened page; what its console complains about is collected in ``page.complaints``."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
+        page = browser.new_page(viewport={"width": 1280, "height": 900})
+        page.set_default_timeout(PATIENCE)
+        page.complaints = []
+        page.on("console", lambda said: page.complaints.append(said.text) if said.type == "error" else None)
+        page.on("pageerror", lambda error: page.complaints.append(str(error)))
+        page.goto(address)
+        page.get_by_text("Static friction").first.wait_for()
+        yield page
+        if shot := os.environ.get("REPOSE_SCREENSHOT"):
+            page.screenshot(path=shot)
+        browser.close()
+
+
+def positions(page):
+    """Positions of all bodies as the page has them [m], shape (n, 3)."""
+    return np.array(page.evaluate(POSITIONS)).reshape(-1, 3)
+
+
+def simulated_time(page):
+    """The solver's time as the page shows it [s]."""
+    return float(re.search(r"Simulated time\s*([\d.]+) s", page.locator(".pour").inner_text())[1])
+
+
+def state(page):
+    return page.locator(".pour .state").inner_text()
+
+
+def wait_for(condition, patience=PATIENCE / 1000):
+    end = time.monotonic() + patience
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.1)
+
+
+def slider(page, label):
+    """The thumb of a slider: its own label is empty, so the way leads over the ``for`` of the label beside it."""
+    field = page.locator("label", has_text=label).first.get_attribute("for")
+    return page.locator(f'[id="{field}"]').get_by_role("slider")
+
+
+def test_friction_taken_away_by_mouse_lets_a_resting_pile_flow(page):
+    wait_for(lambda: state(page) == "ended")
+    assert "at rest: a valid pile" in page.locator(".pour").inner_text()
+    time.sleep(1.0)
+    resting = positions(page)
+    time.sleep(1.0)
+    np.testing.assert_array_equal(positions(page), resting)
+    assert resting[:, 2].max() > 0.01
+
+    thumb = slider(page, "Static friction")
+    thumb.scroll_into_view_if_needed()
+    box = thumb.bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x - 400, y, steps=5)
+    page.mouse.up()
+
+    # The line below comes from the solver's scene, not from the slider.
+    page.get_by_text(re.compile(r"In the solver: Static friction 0\s")).wait_for()
+    # Without friction every body slides: most of them further than a seed is thick (6 mm), and the pile gets flatter.
+    wait_for(lambda: np.median(np.linalg.norm(positions(page) - resting, axis=1)) > 6e-3)
+    assert positions(page)[:, 2].mean() < resting[:, 2].mean()
+
+
+def test_space_pauses_and_plays_and_the_arrow_steps(page):
+    page.keyboard.press("Escape")
+    page.evaluate("document.activeElement?.blur()")
+    assert state(page) == "running"
+    page.keyboard.press("Space")
+    wait_for(lambda: state(page) == "paused")
+    time.sleep(1.0)
+    still, paused_at = positions(page), simulated_time(page)
+    time.sleep(1.0)
+    np.testing.assert_array_equal(positions(page), still)
+    assert simulated_time(page) == paused_at
+
+    page.keyboard.press("ArrowRight")
+    wait_for(lambda: simulated_time(page) > paused_at)
+    wait_for(lambda: state(page) == "paused")
+    # 10 ms; the page shows milliseconds.
+    assert 0.009 <= simulated_time(page) - paused_at <= 0.011
+
+    page.keyboard.press("Space")
+    wait_for(lambda: state(page) == "running")
+    wait_for(lambda: simulated_time(page) > paused_at + 0.05)
+    assert (positions(page) != still).any()
+
+
+def test_the_r_key_pours_anew_with_the_parameters_in_force(page):
+    before = simulated_time(page)
+    page.keyboard.press("r")
+    wait_for(lambda: simulated_time(page) < before)
+    page.get_by_text(re.compile(r"In the solver: Static friction 0\s")).wait_for()
+
+
+def test_the_console_has_nothing_to_complain_about(page):
+    assert page.complaints == []

@@ -1,0 +1,45 @@
+"""A runner that answers with a formula instead of a pour: the chain of a study with a known truth."""
+
+import hashlib
+
+import numpy as np
+
+from doe.runner import TRIES, Run, seed_of
+from doe.study import ESTIMATORS
+
+
+class FormulaRunner:
+    """angle = ``formula(values)`` + noise; a share ``jam`` of the runs jams. ``calls`` counts runs per stage.
+
+    ``others`` gives estimators a formula of their own (with the same noise).
+    """
+
+    def __init__(self, formula, sigma=1.0, jam=0.0, others=None):
+        self.formula, self.sigma, self.jam, self.others = formula, sigma, jam, others or {}
+        self.calls = {}
+
+    def run(self, stage, settings):
+        return [self._setting(stage, row, setting) for row, setting in enumerate(settings)]
+
+    def _setting(self, stage, row, setting):
+        runs = []
+        for replicate in range(setting.replicates):
+            for attempt in range(TRIES):
+                run = self._once(stage, row, setting, replicate, attempt)
+                runs.append(run)
+                self.calls[stage] = self.calls.get(stage, 0) + 1
+                if run.valid:
+                    break
+        return runs
+
+    def _once(self, stage, row, setting, replicate, attempt):
+        seed = seed_of(1, stage, row, replicate, attempt)
+        rng = np.random.default_rng(seed)
+        noise = self.sigma * rng.normal()
+        angle = self.formula(setting.values) + noise
+        outcome = "jammed" if rng.uniform() < self.jam else "at_rest"
+        seen = {name: angle + 0.1 * k * rng.normal() for k, name in enumerate(ESTIMATORS)}
+        seen |= {name: formula(setting.values) + noise for name, formula in self.others.items()}
+        seen["bulk_density_kg_m3"] = 150.0 + 5.0 * angle + rng.normal()
+        key = hashlib.sha256(repr((setting.values, seed)).encode()).hexdigest()
+        return Run(setting.label, replicate, attempt, seed, outcome, "", seen, 0.1, key)

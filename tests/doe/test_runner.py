@@ -1,0 +1,60 @@
+"""Settings become pours: seeds, replacement of failed runs, and reuse from the store."""
+
+import numpy as np
+import pytest
+
+from doe.runner import TRIES, PourRunner, Run, Setting, no_pile_shares, responses, seed_of
+from doe.store import Store
+from solver import load_material, with_values
+
+TINY = {"body.spheres": "coarse", "rig.mass": "1.5g", "insertion.rate": "100g/s"}
+
+
+def run_of(label, replicate, attempt, outcome, angle):
+    return Run(label, replicate, attempt, 1, outcome, "", {"angle": angle}, 0.0, "")
+
+
+def test_seeds_differ_and_repeat():
+    seeds = {
+        seed_of(1, stage, row, rep, tries)
+        for stage in ("a", "b")
+        for row in range(9)
+        for rep in range(3)
+        for tries in range(3)
+    }
+    assert len(seeds) == 2 * 9 * 3 * 3
+    assert seed_of(1, "a", 2, 1, 0) == seed_of(1, "a", 2, 1, 0) != seed_of(2, "a", 2, 1, 0)
+
+
+def test_a_failed_run_counts_for_the_no_pile_share_and_not_for_the_response():
+    rows = [
+        [run_of("r", 0, 0, "jammed", 99.0), run_of("r", 0, 1, "at_rest", 20.0), run_of("r", 1, 0, "at_rest", 22.0)],
+        [run_of("s", 0, k, "jammed", 99.0) for k in range(3)],
+    ]
+    table = responses(rows, "angle")
+    assert table[0].tolist() == [20.0, 22.0]
+    assert np.isnan(table[1]).all()
+    assert no_pile_shares(rows).tolist() == pytest.approx([1 / 3, 1.0])
+
+
+@pytest.mark.usefixtures("taichi")
+def test_pours_are_stored_reused_and_replaced(tmp_path):
+    scene = with_values(load_material("sunflower_extract"), TINY)
+    store = Store(tmp_path / "runs.sqlite")
+    seen = []
+    runner = PourRunner(scene, store, "test", 1, on_run=lambda stage, run, left: seen.append((run, left)))
+    settings = [
+        Setting("good", {}, 2),
+        Setting("never at rest", {"numerics.max_time": 0.1}, 1),
+    ]
+    first = runner.run("stage", settings)
+    assert [run.outcome for run in first[0]] == ["at_rest", "at_rest"]
+    assert [(run.outcome, run.attempt) for run in first[1]] == [("time_limit", k) for k in range(TRIES)]
+    assert len({run.seed for run in first[1]}) == TRIES
+    assert seen[-1][1] == 0
+    assert len(list(store.runs("test"))) == 2 + TRIES
+
+    again = runner.run("stage", settings)
+    assert all(run.reused for runs in again for run in runs)
+    assert [run.observables for run in again[0]] == [run.observables for run in first[0]]
+    assert len(list(store.runs("test"))) == 2 + TRIES

@@ -1,0 +1,59 @@
+"""Finished studies with a planted truth, from every stage significant to nothing found, for the tests of the report."""
+
+import dataclasses
+import json
+
+from doe.campaign import run_campaign
+from doe.profile import Profile
+from doe.study import load_study
+from explorer.study_run import result_of
+from tests.doe.formula_runner import FormulaRunner
+
+STUDY = load_study("sunflower_extract")
+BIAS = {name: tuple((k * step - 0.5, 0.1) for step in (0.3, 3.0, -1.5)) for k, name in enumerate(STUDY.estimators)}
+PROFILE = Profile("test", pilot_runs=10, change_runs=6, verification_runs=20)
+QUICK = Profile("quick", "coarse", 0.012, 6, 3, 1, 1, 1, 6, 1, 1, 6)
+DENSITY = dataclasses.replace(
+    STUDY.targets[0], observable="bulk_density_kg_m3", mean=150.0 + 5.0 * 24.68, sd=2.0, sd_source="measured"
+)
+HOSTILE = "<script>alert('x')</script> & | `co` \"q\" 日本"
+
+
+def planted(values):
+    """Three factors and the outlet height act; 23° at the reference setting."""
+    friction = (float(values.get("pair.seed.seed.static_friction", 0.57)) - 0.595) / 0.125
+    modulus = (float(values.get("material.seed.shear_modulus", 56.3e6)) - 55.3e6) / 15.2e6
+    bounce = (float(values.get("pair.seed.seed.restitution", 0.57)) - 0.59) / 0.09
+    height = (float(values.get("rig.outlet_height", 0.065)) - 0.065) / 0.01
+    return 24.0 + 4.0 * friction + 3.0 * modulus + 2.0 * bounce - 3.0 * height
+
+
+class RowWithoutPile(FormulaRunner):
+    """Every pour of the third screening row jams."""
+
+    def _once(self, stage, row, setting, replicate, attempt):
+        run = super()._once(stage, row, setting, replicate, attempt)
+        return dataclasses.replace(run, outcome="jammed") if stage == "screening" and row == 2 else run
+
+
+BARE = dataclasses.replace(STUDY, name=HOSTILE, scan_path=None, scan_values=(), assumptions=(), changes={})
+CASES = {
+    "planted": (STUDY, PROFILE, FormulaRunner(planted, sigma=2.0, jam=0.05)),
+    "nothing acts": (STUDY, PROFILE, FormulaRunner(lambda values: 20.0, sigma=2.0)),
+    "out of reach": (STUDY, PROFILE, FormulaRunner(lambda values: planted(values) - 40.0, sigma=0.5)),
+    "one pour per row": (STUDY, QUICK, FormulaRunner(planted, sigma=0.5, jam=0.05)),
+    "two targets": (
+        dataclasses.replace(STUDY, targets=(*STUDY.targets, DENSITY)),
+        PROFILE,
+        FormulaRunner(planted, sigma=0.5),
+    ),
+    "missing row": (STUDY, PROFILE, RowWithoutPile(planted, sigma=0.8)),
+    "no assumptions, no scan": (BARE, PROFILE, FormulaRunner(planted, sigma=0.8)),
+}
+
+
+def result_of_case(name):
+    """What the report gets: the content of result.json, read back as a reader of the file would."""
+    study, profile, runner = CASES[name]
+    result = result_of(study, profile, run_campaign(study, profile, runner, BIAS), 912.5)
+    return json.loads(json.dumps(result, allow_nan=False))

@@ -1,0 +1,108 @@
+"""`explorer new`: the files that it writes run as they are."""
+
+import json
+import tomllib
+
+import pytest
+import trimesh
+
+from doe.study import load_study
+from explorer.scene_file import load_scene
+from explorer.starter_files import study_text
+from solver import value
+from tests.explorer.command_line import TINY, explorer, refused, settings
+
+
+def test_material_and_study_run(taichi, tmp_path):
+    result = explorer("new", "study", "pellets", "--out", tmp_path)
+    assert result.exit_code == 0, result.output
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["pellets.toml", "pellets_study.toml"]
+    assert str(tmp_path / "pellets_study.toml") in result.stdout
+    poured = explorer("simulate", tmp_path / "pellets_study.toml", *settings(TINY))
+    assert poured.exit_code == 0, poured.output
+    assert "time_limit" in poured.stdout
+
+
+def test_the_grains_of_the_template_come_to_rest(taichi, tmp_path):
+    """Grains that are nearly round roll off the plate, since nothing resists rolling: no pile, and no study of one."""
+    assert explorer("new", "study", "pellets", "--out", tmp_path).exit_code == 0
+    quick = settings({"body.spheres": "coarse", "rig.mass": "6g"})
+    poured = explorer("simulate", tmp_path / "pellets_study.toml", "--json", *quick)
+    assert json.loads(poured.stdout)["outcome"] == "at_rest"
+
+
+def test_material_can_become_a_mesh(tmp_path):
+    """The commented line of the template, uncommented, with a user's own STL beside it."""
+    assert explorer("new", "material", "bolts", "--out", tmp_path).exit_code == 0
+    trimesh.creation.box((0.012, 0.009, 0.006)).export(tmp_path / "grain.stl")
+    path = tmp_path / "bolts.toml"
+    text = path.read_text()
+    ellipsoid = "shape = { ellipsoid = [0.018, 0.008, 0.004] }\n"
+    assert ellipsoid in text
+    path.write_text(
+        text.replace(ellipsoid, "").replace('# shape = { mesh = "grain.stl" }', 'shape = { mesh = "grain.stl" }')
+    )
+    (body,) = load_scene(str(path)).bodies
+    # STL holds single precision
+    assert body.extents == pytest.approx((0.012, 0.009, 0.006), rel=1e-6)
+
+
+def test_what_is_assumed_exists(tmp_path):
+    assert explorer("new", "material", "pellets", "--out", tmp_path).exit_code == 0
+    table = tomllib.loads((tmp_path / "pellets.toml").read_text())
+    for path in table["assumed"]:
+        kind, name, *rest = path.split(".")
+        entry = next(body for body in table["body"] if body["name"] == name) if kind == "body" else table[kind][name]
+        for key in rest:
+            entry = entry[key]
+
+
+@pytest.mark.parametrize("material", [None, "sunflower_extract"])
+def test_study_is_about_its_material(material, tmp_path):
+    chosen = ["--material", material] if material else []
+    assert explorer("new", "study", "own", "--out", tmp_path, *chosen).exit_code == 0
+    path = tmp_path / "own_study.toml"
+    study = load_study(str(path))
+    assert 3 <= len(study.factors) <= 8
+    assert len(study.assumptions) == 4
+    assert study.targets[0].sd_source == "assumed"
+    assert set(study.profiles) == {"quick", "standard", "full"}
+    scene = load_scene("funnel", material or str(tmp_path / "own.toml"))
+    for factor in study.factors:
+        low, reference, high = map(float, (factor.low, factor.reference, factor.high))
+        assert low < reference < high
+        # six printed digits
+        assert value(scene, factor.path) == pytest.approx(reference, rel=1e-5)
+
+
+def test_template_has_no_blank_left(tmp_path):
+    text = study_text(tmp_path / "own_study.toml", "sunflower_extract", load_scene("funnel"))
+    assert "@" not in text
+
+
+def test_existing_files_are_left_alone(tmp_path):
+    assert explorer("new", "material", "pellets", "--out", tmp_path).exit_code == 0
+    path = tmp_path / "pellets.toml"
+    path.write_text(path.read_text().replace("500.0", "1300.0"))
+    mine = path.read_text()
+    assert "exists already" in refused(explorer("new", "material", "pellets", "--out", tmp_path))
+    # a study takes the material that is there
+    assert explorer("new", "study", "pellets", "--out", tmp_path).exit_code == 0
+    assert path.read_text() == mine
+    assert value(load_scene(str(tmp_path / "pellets_study.toml")), "material.grain.density") == 1300.0
+    assert "exists already" in refused(explorer("new", "study", "pellets", "--out", tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        (["material", "../pellets"], "letters, digits"),
+        (["material", ""], "letters, digits"),
+        (["rig", "pellets"], "material"),
+        (["study", "pellets", "--material", "gold"], "gold"),
+        (["material", "pellets", "--material", "sunflower_extract"], "--material"),
+    ],
+)
+def test_new_refuses(arguments, word, tmp_path):
+    assert word in refused(explorer("new", *arguments, "--out", tmp_path))
+    assert list(tmp_path.iterdir()) == []

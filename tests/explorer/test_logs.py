@@ -1,0 +1,238 @@
+"""Recordings, read back with rerun's own reader: what is in the file is what happened."""
+
+import signal
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from rerun.chunk import RrdReader
+
+from explorer.live.frames import Frame
+from explorer.live.messages import SessionState, Status
+from explorer.logs.pour_log import PourLog
+from explorer.logs.pour_recorder import recorder_of
+from explorer.logs.session_recorder import SessionRecorder
+from explorer.scene_file import load_scene, with_settings
+from solver import Job, Outcome, Phase, Scene, run_pours, with_values
+from tests.explorer.command_line import TINY
+
+ROOT = Path(__file__).parents[2]
+
+
+@dataclass(frozen=True)
+class Poses:
+    """Made-up state of bodies."""
+
+    component: npt.NDArray[np.int32]
+    position: npt.NDArray[np.float64]
+    quaternion: npt.NDArray[np.float64]
+    inside: npt.NDArray[np.bool_]
+
+
+def poses(*components: int, inside: tuple[bool, ...] | None = None) -> Poses:
+    """Bodies of the given components, body k at (k, k, k) / 10 with a quaternion of its own."""
+    n = len(components)
+    quaternion = np.random.default_rng(1).normal(size=(n, 4))
+    return Poses(
+        np.array(components, dtype=np.int32),
+        np.arange(n)[:, None] * np.full(3, 0.1),
+        quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True),
+        np.ones(n, dtype=bool) if inside is None else np.array(inside),
+    )
+
+
+def rows(path: Path, entity: str, column: str) -> list[np.ndarray]:
+    """(rows of a component of an entity, in order of simulated time), each flat."""
+    found = []
+    for chunk in RrdReader(str(path)).stream():
+        if chunk.entity_path != entity:
+            continue
+        batch = chunk.to_record_batch()
+        if column not in batch.schema.names:
+            continue
+        values = batch.column(batch.schema.names.index(column)).to_pylist()
+        times = batch.column(batch.schema.names.index("sim_time")).to_pylist() if not chunk.is_static else values
+        found += [(time, np.array(value)) for time, value in zip(times, values, strict=True) if value is not None]
+    return [value for _, value in sorted(found, key=lambda row: row[0])] if len(found) > 1 else [v for _, v in found]
+
+
+def texts(path: Path) -> list[str]:
+    return [str(value[0]) for value in rows(path, "/log", "TextLog:text")]
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return with_settings(load_scene("funnel"), [f"{path}={value}" for path, value in TINY.items()])
+
+
+@pytest.fixture(scope="module")
+def poured(taichi, scene, tmp_path_factory):
+    """A pour that is cut off in flight and its recording."""
+    path = tmp_path_factory.mktemp("logs") / "pour.rrd"
+    with recorder_of(path, [3]) as recorder:
+        ((_, record),) = run_pours([Job(scene, 3)], on_sample=recorder.sample)
+        recorder.finish(0, record)
+    return record, path
+
+
+def test_last_frame_is_the_record(poured):
+    record, path = poured
+    seen = 0
+    for k, name in enumerate(record.bodies.component_names):
+        chosen = record.bodies.component == k
+        if chosen.any():
+            last = rows(path, f"/world/bodies/{name}", "InstancePoses3D:translations")[-1].reshape(-1, 3)
+            assert np.array_equal(last, record.bodies.position[chosen].astype(np.float32))
+            seen += len(last)
+    assert seen == len(record.bodies.mass) > 0
+
+
+def test_curves_are_the_trace(poured):
+    record, path = poured
+    energy = rows(path, "/curves/energy/kinetic_energy_mJ", "Scalars:scalars")
+    # a frame per 20 ms of a trace with 10 ms between samples, and always the last
+    assert len(energy) == 1 + (len(record.trace.time) - 1) // 2 + (len(record.trace.time) - 1) % 2
+    assert energy[-1][0] == 1e3 * record.trace.kinetic_energy[-1]
+    entered = rows(path, "/curves/mass/entered_mass_g", "Scalars:scalars")
+    assert entered[-1][0] == 1e3 * record.trace.entered_mass[-1]
+
+
+def test_events_outcome_and_layout_are_there(poured):
+    record, path = poured
+    assert texts(path)[0] == "phase: fill"
+    assert texts(path)[-1] == f"time limit: {record.message}"
+    (document,) = rows(path, "/outcome", "TextDocument:text")
+    assert "residual_mass_kg" in str(document[0])
+    (parameters,) = rows(path, "/parameters", "TextDocument:text")
+    assert "| rig.mass | 0.001 | kg |" in str(parameters[0])
+    assert "Seed 3" in str(parameters[0])
+    reader = RrdReader(str(path))
+    assert len(reader.recordings()) == 1
+    assert len(reader.blueprints()) == 1
+    assert {"/world/plate", "/world/cone"} <= {chunk.entity_path for chunk in reader.stream()}
+
+
+def test_quaternions_are_turned_round(scene, tmp_path):
+    """wxyz here, xyzw in rerun."""
+    state = poses(0, 0)
+    with PourLog(tmp_path / "q.rrd", scene, seed=1) as log:
+        log.frame(0.0, state, {})
+    (written,) = rows(tmp_path / "q.rrd", "/world/bodies/seed", "InstancePoses3D:quaternions")
+    assert np.array_equal(written.reshape(-1, 4), np.roll(state.quaternion, -1, axis=1).astype(np.float32))
+
+
+def test_only_bodies_in_the_domain_have_an_instance(scene, tmp_path):
+    path = tmp_path / "bodies.rrd"
+    with PourLog(path, scene, seed=1) as log:
+        log.frame(0.0, poses(0), {})
+        log.frame(0.1, poses(0, 1, 0), {})
+        log.frame(0.2, poses(0, 1, 0, inside=(True, False, False)), {})
+        log.frame(0.3, poses(0, 1, 0, 1, inside=(True, False, False, True)), {})
+    seeds = rows(path, "/world/bodies/seed", "InstancePoses3D:translations")
+    assert [value.size // 3 for value in seeds] == [1, 2, 1, 1]
+    plates = rows(path, "/world/bodies/plate", "InstancePoses3D:translations")
+    assert [value.size // 3 for value in plates] == [1, 1]
+    # entered, taken out, entered again: the mesh comes, is cleared, comes again
+    assert len(rows(path, "/world/bodies/plate", "Mesh3D:vertex_positions")) == 2
+    assert len(rows(path, "/world/bodies/plate", "Clear:is_recursive")) == 1
+    assert "/world/bodies/petiole" not in {chunk.entity_path for chunk in RrdReader(str(path)).stream()}
+
+
+def test_gate_is_drawn_while_it_is_shut(scene, tmp_path):
+    path = tmp_path / "gate.rrd"
+    with PourLog(path, scene, seed=1) as log:
+        for k, shut in enumerate((True, True, False, False)):
+            log.frame(0.1 * k, poses(0), {}, gate_shut=shut)
+    assert len(rows(path, "/world/gate", "Mesh3D:vertex_positions")) == 1
+    assert len(rows(path, "/world/gate", "Clear:is_recursive")) == 1
+
+
+def test_a_curve_has_gaps_where_nothing_was_measured(scene, tmp_path):
+    path = tmp_path / "gaps.rrd"
+    with PourLog(path, scene, seed=1) as log:
+        for k, angle in enumerate((np.nan, 20.0, np.nan, 21.0)):
+            log.frame(0.1 * k, poses(0), {"angle_of_repose_deg": angle})
+    angles = rows(path, "/curves/angle/angle_of_repose_deg", "Scalars:scalars")
+    assert [float(value[0]) for value in angles] == [20.0, 21.0]
+
+
+KILLED = """
+import os, signal, sys
+from pathlib import Path
+from explorer.logs.pour_log import PourLog
+from tests.explorer.test_logs import poses
+from explorer.scene_file import load_scene
+log = PourLog(Path(sys.argv[1]), load_scene("funnel"), seed=1)
+for k in range(20):
+    log.frame(0.02 * k, poses(0, 0), {})
+log.flush()
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_a_killed_writer_leaves_a_readable_file(tmp_path):
+    path = tmp_path / "killed.rrd"
+    done = subprocess.run([sys.executable, "-c", KILLED, str(path)], cwd=ROOT, timeout=60)
+    assert done.returncode == -signal.SIGKILL
+    assert len(rows(path, "/world/bodies/seed", "InstancePoses3D:translations")) == 20
+
+
+def frame(number: int, generation: int, time: float) -> Frame:
+    state = poses(0, 0)
+    return Frame(
+        number,
+        generation,
+        time,
+        state.position.astype(np.float32),
+        state.quaternion.astype(np.float32),
+        state.component,
+        state.inside,
+    )
+
+
+def status(scene: Scene, generation: int, **others) -> Status:
+    return Status(SessionState.RUNNING, "", scene, seed=9, generation=generation, speed=1.0, **others)
+
+
+def test_a_session_is_recorded_pour_by_pour(scene, tmp_path):
+    harder = with_values(scene, {"pair.seed.seed.static_friction": 0.7})
+    recorder = SessionRecorder(tmp_path / "live.rrd")
+    recorder.take(frame(1, 1, 0.0), status(scene, 1))
+    recorder.take(frame(2, 1, 0.01), status(scene, 1, discharged_mass=0.5e-3))
+    moving = {"entered_mass": 0.9e-3, "discharged_mass": 0.7e-3, "kinetic_energy": 2e-6, "contacts": 12}
+    recorder.take(frame(3, 1, 0.1), status(harder, 1, phase=Phase.PILE, **moving))
+    # the status is still of the pour before: not to be mixed
+    recorder.take(frame(4, 2, 0.0), status(harder, 1))
+    recorder.take(frame(4, 2, 0.0), status(harder, 2))
+    recorder.close()
+    first, second = tmp_path / "live.rrd", tmp_path / "live_2.rrd"
+    assert sorted(tmp_path.iterdir()) == [first, second]
+    # 10 ms after the first frame none was due
+    assert len(rows(first, "/world/bodies/seed", "InstancePoses3D:translations")) == 2
+    # In the units of the names: g and mJ.
+    expected = {"mass/entered_mass_g": 0.9, "mass/discharged_mass_g": 0.7, "energy/kinetic_energy_mJ": 2e-3}
+    for curve, number in (expected | {"contacts/contacts": 12}).items():
+        assert float(rows(first, f"/curves/{curve}", "Scalars:scalars")[-1][0]) == pytest.approx(number)
+    assert texts(first) == [
+        "phase: fill",
+        "phase: pile",
+        "pair.seed.seed.static_friction: 0.57 → 0.7",
+    ]
+    assert texts(second) == ["phase: fill"]
+
+
+def test_a_session_s_outcome_is_recorded_once(scene, tmp_path):
+    import dataclasses
+
+    ended = dataclasses.replace(status(scene, 1), state=SessionState.ENDED, outcome=Outcome.AT_REST)
+    recorder = SessionRecorder(tmp_path / "live.rrd")
+    recorder.take(frame(1, 1, 0.0), status(scene, 1))
+    recorder.take(frame(2, 1, 0.001), ended)
+    recorder.take(frame(2, 1, 0.001), ended)
+    recorder.close()
+    assert texts(tmp_path / "live.rrd").count("at rest") == 1
+    assert len(rows(tmp_path / "live.rrd", "/world/bodies/seed", "InstancePoses3D:translations")) == 2

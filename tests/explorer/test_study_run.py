@@ -1,0 +1,112 @@
+"""A calibration from the command line to its files, with a formula in place of the pours."""
+
+import dataclasses
+import json
+
+import pytest
+
+from doe.campaign import STAGES
+from explorer import study_run
+from tests.doe.formula_runner import FormulaRunner
+from tests.doe.test_campaign import planted
+from tests.explorer.command_line import explorer
+
+
+class Formula(FormulaRunner):
+    """Takes the arguments of a PourRunner and tells its progress in the same way."""
+
+    def __init__(self, scene, store, study, seed, threads, on_run, observer):
+        super().__init__(planted, sigma=0.5)
+        self._on_run = on_run
+
+    def run(self, stage, settings):
+        rows = super().run(stage, settings)
+        left = sum(setting.replicates for setting in settings)
+        for runs in rows:
+            for one in runs:
+                left -= 1
+                self._on_run(stage, one, left)
+        return rows
+
+
+@pytest.fixture
+def formula(monkeypatch):
+    monkeypatch.setattr(study_run, "PourRunner", Formula)
+
+
+def calibrate(tmp_path, *options):
+    store = ("--store", str(tmp_path / "runs.sqlite"))
+    return explorer("calibrate", "--headless", "--profile", "quick", "--out", str(tmp_path / "out"), *store, *options)
+
+
+@pytest.mark.usefixtures("formula")
+def test_a_study_leaves_result_and_reports(tmp_path):
+    done = calibrate(tmp_path)
+    assert done.exit_code == 0, done.output
+    result = json.loads((tmp_path / "out" / "result.json").read_text())
+    keys = {"screening", "ascent", "surface", "optimum", "verification", "assumptions", "runs", "timing", "versions"}
+    assert keys <= set(result)
+    assert len(result["screening"]["runs"]) == 28
+    assert len(result["surface"]["runs"]) == 17
+    assert result["runs"]["total"] == len(result["runs"]["list"])
+    for name in ("report.html", "report.md"):
+        assert (tmp_path / "out" / name).stat().st_size > 1000
+    events = [json.loads(line) for line in (tmp_path / "out" / "progress.jsonl").read_text().splitlines()]
+    assert [event["stage"] for event in events if event["line"]] == list(STAGES)
+    assert events[-1]["done"] == events[-1]["planned"] == result["runs"]["total"]
+
+
+@pytest.mark.usefixtures("formula")
+def test_a_folder_that_is_not_empty_needs_resume(tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "notes.txt").write_text("mine")
+    refused = calibrate(tmp_path)
+    assert refused.exit_code == 2
+    assert "not empty" in refused.stderr
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["notes.txt"]
+    assert calibrate(tmp_path, "--resume").exit_code == 0
+    assert (tmp_path / "out" / "notes.txt").read_text() == "mine"
+
+
+@pytest.mark.usefixtures("formula")
+def test_an_error_above_the_limit_is_exit_code_3_with_the_files_there(tmp_path):
+    done = calibrate(tmp_path, "--fail-above", "0")
+    assert done.exit_code == 3
+    assert "above the limit" in done.stderr
+    assert (tmp_path / "out" / "result.json").is_file()
+
+
+def test_a_study_that_cannot_be_analysed_ends_in_one_line(tmp_path, monkeypatch):
+    class NoSurface(Formula):
+        def _once(self, stage, row, setting, replicate, attempt):
+            run = super()._once(stage, row, setting, replicate, attempt)
+            return dataclasses.replace(run, outcome="jammed") if stage == "surface" else run
+
+    monkeypatch.setattr(study_run, "PourRunner", NoSurface)
+    stopped = calibrate(tmp_path)
+    assert stopped.exit_code == 1
+    assert stopped.stderr.startswith("error: stopped in the surface stage: ")
+    assert stopped.stderr.count("\n") == 1
+    assert "--resume" in stopped.stderr
+    assert not (tmp_path / "out" / "result.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (("--profile", "huge"), "quick, standard, full"),
+        (("--study", "nowhere.toml"), "sunflower_extract"),
+        (("--fail-above", "-1"), "fail-above"),
+    ],
+)
+def test_bad_orders_are_one_line_and_leave_nothing(tmp_path, options, says):
+    refused = calibrate(tmp_path, *options)
+    assert refused.exit_code == 2
+    assert says in refused.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_without_headless_it_says_where_to_go(tmp_path):
+    refused = explorer("calibrate", "--out", str(tmp_path / "out"))
+    assert refused.exit_code == 2
+    assert "--headless" in refused.stderr

@@ -1,0 +1,304 @@
+"""The rules of the architecture, read from the source itself.
+
+Each rule is a function from one parsed file to its violations. It runs over every file of the repository, and
+over a made-up file that breaks it, so that no rule can pass by finding nothing.
+"""
+
+import ast
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("explorer", "doe", "solver")
+
+MAY_IMPORT = {"explorer": {"explorer", "doe", "solver"}, "doe": {"doe", "solver"}, "solver": {"solver"}}
+
+THIRD_PARTY_HOMES = {
+    "viser": ("explorer/viewer/",),
+    "rerun": ("explorer/logs/",),
+    "typer": ("explorer/cli.py", "explorer/commands/"),
+    "taichi": ("solver/backend.py",),
+}
+
+# The rest of doe is statistics and must stay testable without Taichi.
+DOE_FILES_THAT_MAY_USE_THE_SOLVER = {
+    "doe/runner.py": "turns a row of a design into a batch of simulated worlds",
+    "doe/factors.py": "checks a factor's path and range against the declared parameters",
+    "doe/study.py": "reads a study file: its material, rig and insertion make a scene",
+}
+
+TI_INIT_HOME = "solver/backend.py"
+MAX_LINES = 400
+# Names that say nothing about what is inside.
+EMPTY_NAMES = {"util", "utils", "helper", "helpers", "manager", "managers"}
+
+
+@dataclass(frozen=True)
+class Source:
+    """One Python file: its path from the root, with forward slashes, and its text."""
+
+    path: str
+    text: str
+
+    @property
+    def package(self) -> str:
+        return self.path.split("/")[0]
+
+    @property
+    def tree(self) -> ast.Module:
+        return ast.parse(self.text, filename=self.path)
+
+
+@dataclass(frozen=True)
+class Import:
+    """One imported module, the names taken from it (none in `import a.b`) and the names bound in the file."""
+
+    module: str
+    names: tuple[str, ...]
+    aliases: tuple[str, ...]
+
+    @property
+    def top(self) -> str:
+        return self.module.split(".")[0]
+
+
+def repository_sources(*folders: str) -> list[Source]:
+    paths = sorted(path for folder in folders for path in (ROOT / folder).rglob("*.py"))
+    return [Source(path.relative_to(ROOT).as_posix(), path.read_text(encoding="utf-8")) for path in paths]
+
+
+def public_solver_names(text: str | None = None) -> set[str]:
+    """`solver.__all__`, read without importing Taichi."""
+    tree = ast.parse((ROOT / "solver/__init__.py").read_text(encoding="utf-8") if text is None else text)
+    for node in tree.body:
+        targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+        if any(isinstance(target, ast.Name) and target.id == "__all__" for target in targets):
+            return set(ast.literal_eval(node.value))  # type: ignore[attr-defined]
+    return set()
+
+
+def imports(source: Source) -> Iterator[Import]:
+    """Every import of a file, also inside functions, relative, or by a literal `import_module("…")`."""
+    for node in ast.walk(source.tree):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield Import(alias.name, (), (alias.asname or alias.name.split(".")[0],))
+        elif isinstance(node, ast.ImportFrom):
+            names = tuple(alias.name for alias in node.names)
+            bound = tuple(alias.asname or alias.name for alias in node.names)
+            yield Import(absolute_module(source, node), names, bound)
+        elif isinstance(node, ast.Call) and called_name(node) in {"import_module", "__import__"}:
+            yield from (Import(str(arg.value), (), ()) for arg in node.args[:1] if isinstance(arg, ast.Constant))
+
+
+def absolute_module(source: Source, node: ast.ImportFrom) -> str:
+    if node.level == 0:
+        return node.module or ""
+    folders = source.path.split("/")[: -node.level]
+    return ".".join([*folders, node.module] if node.module else folders)
+
+
+def called_name(node: ast.Call) -> str:
+    if isinstance(node.func, ast.Attribute):
+        return node.func.attr
+    return node.func.id if isinstance(node.func, ast.Name) else ""
+
+
+def taichi_names(source: Source) -> set[str]:
+    """Names that stand for Taichi's module in a file: `ti` from `import taichi as ti` or from the backend."""
+    names: set[str] = set()
+    for imported in imports(source):
+        if imported.top == "taichi" and not imported.names:
+            names.update(imported.aliases)
+        if imported.module == "solver.backend":
+            pairs = zip(imported.names, imported.aliases, strict=True)
+            names.update(alias for name, alias in pairs if name in {"ti", "taichi"})
+    return names
+
+
+def uses_taichi(source: Source) -> bool:
+    return bool(taichi_names(source)) or any(imported.top == "taichi" for imported in imports(source))
+
+
+def imports_follow_the_arrows(source: Source) -> list[str]:
+    allowed = MAY_IMPORT[source.package]
+    wrong = {one.top for one in imports(source) if one.top in {*PACKAGES, "tests"} - allowed}
+    return [f"{source.path}: {source.package} may not import {top}" for top in sorted(wrong)]
+
+
+def third_party_stays_home(source: Source) -> list[str]:
+    tops = {one.top for one in imports(source)}
+    strays = [
+        f"{source.path}: {top} may be imported only in {', '.join(homes)}"
+        for top, homes in THIRD_PARTY_HOMES.items()
+        if top in tops and not source.path.startswith(homes)
+    ]
+    if source.package != "solver" and taichi_names(source) and "taichi" not in tops:
+        strays.append(f"{source.path}: Taichi, also through the backend, stays in solver")
+    return strays
+
+
+def only_the_backend_starts_taichi(source: Source) -> list[str]:
+    if source.path == TI_INIT_HOME:
+        return []
+    modules = taichi_names(source)
+    calls = [
+        node.lineno
+        for node in ast.walk(source.tree)
+        if isinstance(node, ast.Attribute)
+        and node.attr == "init"
+        and isinstance(node.value, ast.Name)
+        and node.value.id in modules
+    ]
+    taken = [one for one in imports(source) if one.top == "taichi" and "init" in one.names]
+    return [f"{source.path}: ti.init belongs in {TI_INIT_HOME} only"] if calls or taken else []
+
+
+def no_future_annotations_beside_taichi(source: Source) -> list[str]:
+    future = any(one.module == "__future__" and "annotations" in one.names for one in imports(source))
+    if future and uses_taichi(source):
+        return [f"{source.path}: `from __future__ import annotations` breaks Taichi kernels"]
+    return []
+
+
+def doe_uses_public_solver_names(source: Source) -> list[str]:
+    if source.package != "doe":
+        return []
+    used = [one for one in imports(source) if one.top == "solver"]
+    if used and source.path not in DOE_FILES_THAT_MAY_USE_THE_SOLVER:
+        return [f"{source.path}: only {', '.join(DOE_FILES_THAT_MAY_USE_THE_SOLVER)} may import solver"]
+    deep = [one.module for one in used if one.module != "solver" or not one.names]
+    public = public_solver_names()
+    private = [name for one in used for name in one.names if one.module == "solver" and name not in public]
+    return [f"{source.path}: write `from solver import …`, not `{module}`" for module in deep] + [
+        f"{source.path}: {name} is not in solver.__all__" for name in private
+    ]
+
+
+def files_stay_short(source: Source) -> list[str]:
+    lines = len(source.text.splitlines())
+    return [f"{source.path}: {lines} lines, more than {MAX_LINES}; split by concept"] if lines > MAX_LINES else []
+
+
+def names_say_something(source: Source) -> list[str]:
+    parts = set(source.path.removesuffix(".py").lower().split("/"))
+    return [f"{source.path}: {part} says nothing about what is inside" for part in parts & EMPTY_NAMES]
+
+
+Rule = Callable[[Source], list[str]]
+
+PACKAGE_RULES: tuple[Rule, ...] = (
+    imports_follow_the_arrows,
+    third_party_stays_home,
+    only_the_backend_starts_taichi,
+    no_future_annotations_beside_taichi,
+    doe_uses_public_solver_names,
+)
+EVERYWHERE_RULES: tuple[Rule, ...] = (files_stay_short, names_say_something)
+
+VIOLATIONS: tuple[tuple[Rule, str, str], ...] = (
+    (imports_follow_the_arrows, "solver/world.py", "import doe"),
+    (imports_follow_the_arrows, "solver/world.py", "def f():\n    from explorer.session import Session"),
+    (imports_follow_the_arrows, "doe/campaign.py", "from explorer import cli"),
+    (imports_follow_the_arrows, "doe/store.py", "import importlib\nimportlib.import_module('explorer.logs')"),
+    (imports_follow_the_arrows, "solver/rigs/funnel.py", "from ...doe import factors"),
+    (imports_follow_the_arrows, "explorer/session.py", "from tests import conftest"),
+    (third_party_stays_home, "explorer/session.py", "import viser.transforms as tf"),
+    (third_party_stays_home, "explorer/viewer/app.py", "import rerun as rr"),
+    (third_party_stays_home, "explorer/report/html.py", "from typer import echo"),
+    (third_party_stays_home, "explorer/session.py", "import taichi as ti"),
+    (third_party_stays_home, "doe/runner.py", "from taichi.lang import field"),
+    (third_party_stays_home, "solver/world.py", "import taichi as ti"),
+    (third_party_stays_home, "explorer/session.py", "from solver.backend import ti"),
+    (only_the_backend_starts_taichi, "solver/world.py", "import taichi as ti\nti.init(arch=ti.cpu)"),
+    (only_the_backend_starts_taichi, "solver/world.py", "from solver.backend import ti\nti.init()"),
+    (only_the_backend_starts_taichi, "solver/world.py", "from .backend import ti as t\nstart = t.init"),
+    (only_the_backend_starts_taichi, "tests/solver/test_world.py", "from taichi import init\ninit()"),
+    (
+        no_future_annotations_beside_taichi,
+        "solver/world.py",
+        "from __future__ import annotations\nimport taichi as ti",
+    ),
+    (
+        no_future_annotations_beside_taichi,
+        "solver/laws/linear.py",
+        "from __future__ import annotations\nfrom ..backend import ti",
+    ),
+    (doe_uses_public_solver_names, "doe/campaign.py", "from solver import __all__"),
+    (doe_uses_public_solver_names, "doe/runner.py", "from solver.world import World"),
+    (doe_uses_public_solver_names, "doe/runner.py", "import solver"),
+    (doe_uses_public_solver_names, "doe/runner.py", "from solver import _not_a_public_name"),
+    (files_stay_short, "doe/anova.py", "x = 1\n" * (MAX_LINES + 1)),
+    (names_say_something, "solver/utils.py", ""),
+    (names_say_something, "tests/doe/helpers.py", ""),
+    (names_say_something, "explorer/manager/__init__.py", ""),
+)
+
+ALLOWED: tuple[tuple[Rule, str, str], ...] = (
+    (imports_follow_the_arrows, "explorer/session.py", "import doe\nimport solver\nimport numpy"),
+    (imports_follow_the_arrows, "solver/rigs/funnel.py", "from ..shape import Shape"),
+    (imports_follow_the_arrows, "doe/surface.py", "import solverlike"),
+    (third_party_stays_home, "explorer/viewer/app.py", "import viser"),
+    (third_party_stays_home, "explorer/cli.py", "import typer"),
+    (third_party_stays_home, "solver/backend.py", "import taichi as ti"),
+    (third_party_stays_home, "solver/world.py", "from solver.backend import ti"),
+    (only_the_backend_starts_taichi, TI_INIT_HOME, "import taichi as ti\nti.init()"),
+    (only_the_backend_starts_taichi, "solver/world.py", "from solver import backend\nbackend.init()"),
+    (
+        no_future_annotations_beside_taichi,
+        "solver/scene.py",
+        "from __future__ import annotations\nimport numpy",
+    ),
+    (doe_uses_public_solver_names, "explorer/session.py", "from solver.world import World"),
+    (files_stay_short, "doe/anova.py", "x = 1\n" * MAX_LINES),
+    (names_say_something, "solver/shape.py", ""),
+)
+
+
+@pytest.mark.parametrize("rule", PACKAGE_RULES, ids=lambda rule: rule.__name__)
+def test_packages_keep_the_rule(rule):
+    assert [line for source in repository_sources(*PACKAGES) for line in rule(source)] == []
+
+
+@pytest.mark.parametrize("rule", EVERYWHERE_RULES, ids=lambda rule: rule.__name__)
+def test_all_files_keep_the_rule(rule):
+    assert [line for source in repository_sources(*PACKAGES, "tests") for line in rule(source)] == []
+
+
+def test_tests_start_taichi_only_through_the_backend():
+    sources = repository_sources("tests")
+    assert [line for source in sources for line in only_the_backend_starts_taichi(source)] == []
+
+
+@pytest.mark.parametrize(("rule", "path", "text"), VIOLATIONS)
+def test_rule_reports_a_violation(rule, path, text):
+    found = rule(Source(path, text))
+    assert found
+    assert all(line.startswith(path) for line in found)
+
+
+@pytest.mark.parametrize(("rule", "path", "text"), ALLOWED)
+def test_rule_accepts_what_is_allowed(rule, path, text):
+    assert rule(Source(path, text)) == []
+
+
+def test_every_rule_has_a_violation_to_catch():
+    assert {rule for rule, _, _ in VIOLATIONS} == {*PACKAGE_RULES, *EVERYWHERE_RULES}
+
+
+def test_the_walk_finds_every_package():
+    assert {source.package for source in repository_sources(*PACKAGES)} == set(PACKAGES)
+
+
+def test_public_names_are_read_in_both_spellings():
+    assert public_solver_names('__all__ = ["World"]') == {"World"}
+    assert public_solver_names('__all__: list[str] = ["Scene"]') == {"Scene"}
+    assert public_solver_names("") == set()
+
+
+def test_files_that_may_use_the_solver_exist():
+    missing = [path for path in DOE_FILES_THAT_MAY_USE_THE_SOLVER if not (ROOT / path).is_file()]
+    assert missing == []
