@@ -15,13 +15,14 @@ import numpy.typing as npt
 
 from solver import insertion
 from solver.body import counts
+from solver.layout import layout
 from solver.record import Bodies, Outcome, Phase, Record
 from solver.record_builder import bodies_of, member_spheres, pile_of, rolling_away, trace_of
 from solver.retune import RAMP_STEPS, RAMP_TIME, Ramp, spring_ratio
 from solver.rigs.funnel import GATE
 from solver.scene import Scene
 from solver.time_step import time_step
-from solver.world import SUMMARY_COLUMNS, Batch, law_table, layout
+from solver.world import SUMMARY_COLUMNS, Batch, law_table
 
 SETTLE_LIMIT = 1.0
 """``fill_then_open``: the gate opens this long [s] after the last body entered even if the fill still moves."""

@@ -6,9 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from solver.insertion import rotation_matrix
+from solver.layout import Layout
 from solver.record import Bodies, Pile, Spheres, Trace
 from solver.scene import Scene
-from solver.world import Layout
 
 Array = npt.NDArray[np.float64]
 

@@ -1,7 +1,5 @@
 """A batch of worlds: the only owner of mutable state. NumPy in, NumPy out; no formula of physics stands here."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
@@ -9,6 +7,7 @@ from solver.body import Body
 from solver.kernels import exchange
 from solver.kernels.batch import advance, measure, take_out
 from solver.laws.hertz_mindlin import constants
+from solver.layout import Layout
 from solver.rigs import Plane, Surface
 from solver.scene import Scene
 from solver.state import Capacity, arrays
@@ -33,32 +32,6 @@ SUMMARY_COLUMNS = (
     "contacts",
 )
 """Columns of a summary, SI; what they mean stands in ``state.SUMMARY`` and ``state.WORLD``."""
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Bodies of one world in order of entry, as the arrays want them (n bodies, m member spheres)."""
-
-    numbers: Array
-    """mass, inertia (3), reach; shape (n, 5)."""
-    places: Ints
-    """first member, number of members, contact class; shape (n, 3)."""
-    spheres: Array
-    """local centre (3) and radius; shape (m, 4)."""
-    owner: Ints
-    """Body of each member; shape (m, 1)."""
-
-
-def layout(scene: Scene, order: Ints) -> Layout:
-    """Arrange bodies of the components in ``order`` (index into ``scene.bodies``, in order of entry)."""
-    clumps = [body.clump for body in scene.bodies]
-    sizes = np.array([len(clumps[k].radii) for k in order], dtype=np.int32)
-    first = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int32)
-    numbers = np.array([[clumps[k].mass, *clumps[k].inertia, clumps[k].bounding_radius] for k in order])
-    spheres = np.concatenate([np.column_stack([clumps[k].centres, clumps[k].radii]) for k in order])
-    owner = np.repeat(np.arange(len(order), dtype=np.int32), sizes)[:, None]
-    places = np.column_stack([first, sizes, order]).astype(np.int32)
-    return Layout(numbers, places, np.ascontiguousarray(spheres), np.ascontiguousarray(owner))
 
 
 def law_table(scene: Scene) -> Array:

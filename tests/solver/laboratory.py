@@ -5,12 +5,13 @@ import dataclasses
 import numpy as np
 
 from solver.body import Body, Members
+from solver.layout import layout
 from solver.material import Material, Pair
 from solver.rigs import Funnel
 from solver.run import capacity_for
 from solver.scene import Scene
 from solver.time_step import time_step
-from solver.world import SUMMARY_COLUMNS, Batch, layout
+from solver.world import SUMMARY_COLUMNS, Batch
 
 GRAIN = Material("grain", density=2500.0, shear_modulus=1e7, poisson_ratio=0.25)
 WALL = Material("wall", density=7800.0, shear_modulus=8e10, poisson_ratio=0.3)
