@@ -88,7 +88,7 @@ MEMBER = {
 }
 """Per member sphere, shape (worlds, members)."""
 
-HISTORY = {"i": ti.i32, "j": ti.i32, "spring": Vec3, "radius": ti.f64}
+HISTORY = {"i": ti.i32, "j": ti.i32, "spring": Vec3, "loss": Vec3, "radius": ti.f64}
 """What a contact keeps when the list is built again, shape (worlds, contacts)."""
 
 CONTACT = {
@@ -100,6 +100,7 @@ CONTACT = {
     "reduced_radius": ti.f64,  # R* = r_i r_j / (r_i + r_j), r_i against a surface [m]
     "reduced_mass": ti.f64,  # m* of the bodies, m_i against a surface [kg]
     "spring": Vec3,  # tangential elastic force on i [N]
+    "loss": Vec3,  # the part of the force at the last step that takes energy, on j [N]
     "radius": ti.f64,  # contact radius a = sqrt(R* δ) at the last step [m]; 0: apart
     "first": ti.i32,  # first of the triangles that may touch, for a patch of a mesh
     "triangles": ti.i32,  # and how many
@@ -203,6 +204,9 @@ class Group:
 @ti.data_oriented
 class State:
     """All arrays of a batch. Taichi never frees fields, so batches of one capacity share them (:func:`state`)."""
+
+    owner: object = None
+    """The batch that uses the arrays at present."""
 
     def __init__(self, capacity: Capacity) -> None:
         c = capacity

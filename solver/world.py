@@ -11,7 +11,7 @@ from solver.kernels.batch import advance, measure, take_out
 from solver.laws.hertz_mindlin import constants
 from solver.layout import Layout
 from solver.scene import Scene
-from solver.state import Capacity, state
+from solver.state import Capacity, State, state
 from solver.wall_tables import WallTables, extent, wall_tables
 
 Array = npt.NDArray[np.float64]
@@ -64,7 +64,8 @@ class Batch:
 
     def __init__(self, capacity: Capacity) -> None:
         self.capacity = capacity
-        self._s = state(capacity)
+        self._arrays = state(capacity)
+        self._arrays.owner = self
         self._steps = np.zeros(capacity.worlds, dtype=np.int32)
         self._scenes: dict[int, Scene] = {}
 
@@ -80,6 +81,13 @@ class Batch:
         self._load_walls(w, scene, wall_tables(rig.surfaces()), active)
         self._scenes[w] = scene
         self.set_law(w, law_table(scene))
+
+    @property
+    def _s(self) -> State:
+        """The arrays, as long as no later batch of the same capacity has taken them over."""
+        if self._arrays.owner is not self:
+            raise RuntimeError("a later batch of the same capacity uses these arrays")
+        return self._arrays
 
     def set_law(self, w: int, table: Array) -> None:
         """Replace the contact constants (see :func:`law_table`); wakes all bodies."""

@@ -44,6 +44,7 @@ def lose(s: ti.template(), w, k, law):
     s.world.dissipated[w] += spring_energy(law, s.contact.spring[w, k].norm_sqr(), s.contact.radius[w, k])
     s.contact.radius[w, k] = 0.0
     s.contact.spring[w, k] = Vec3(0.0, 0.0, 0.0)
+    s.contact.loss[w, k] = Vec3(0.0, 0.0, 0.0)
 
 
 @ti.func
@@ -103,11 +104,13 @@ def push(s: ti.template(), w):
             s.contact.spring[w, k] = spring
             s.contact.radius[w, k] = contact_radius
             force = f_n * n + f_t
-            # What the damper and the slip took: with the speed at the middle of the step that the force itself makes.
-            v_mid = v_n + 0.5 * dt * f_n / mass
-            dissipated += dt * ((elastic - f_n) * v_mid - f_t.dot(v_t))
+            # Work against the damper and the tangential force, at the mean of the velocities before and after the
+            # step: half of it now, half when the next velocity is known; less what has gone into the spring.
+            loss = (elastic - f_n) * n - f_t
+            dissipated += 0.5 * dt * (loss + s.contact.loss[w, k]).dot(velocity)
             dissipated -= spring_energy(law, spring.norm_sqr(), contact_radius)
             dissipated += spring_energy(law, old.norm_sqr(), before)
+            s.contact.loss[w, k] = loss
             if b < 0:
                 push_wall(s, w, -1 - b, point, force, item >= live)
             if item >= live:
