@@ -21,6 +21,7 @@ WORLD = {
     "gravity": Vec3,  # [m/s²]
     "skin": ti.f64,  # reach of the contact list beyond touching [m]
     "moved": ti.f64,  # largest travel of a body or wall since the list was built [m]
+    "loaded": ti.i32,  # bodies that will enter
     "bodies": ti.i32,  # bodies that have entered
     "walls": ti.i32,  # walls of the rig
     "primitives": ti.i32,  # surfaces that are planes or revolved segments; they come before the patches of meshes

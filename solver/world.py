@@ -5,12 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from solver import snapshot
 from solver.body import Body
 from solver.kernels import exchange
 from solver.kernels.batch import advance, measure, take_out
 from solver.laws.hertz_mindlin import constants
 from solver.layout import Layout
 from solver.scene import Scene
+from solver.snapshot import Arrays
 from solver.state import Capacity, State, state
 from solver.wall_tables import WallTables, extent, wall_tables
 
@@ -162,6 +164,14 @@ class Batch:
         out = np.zeros((len(self._scenes[w].rig.surfaces()), 19))
         exchange.read_walls(self._s, w, out)
         return out
+
+    def take(self, w: int) -> Arrays:
+        """World ``w`` as plain arrays (``solver/snapshot.py``)."""
+        return snapshot.take(self._s, w)
+
+    def put(self, w: int, arrays: Arrays) -> None:
+        """Put a world back that :meth:`take` gave, after :meth:`load` with the same scene."""
+        snapshot.put(self._s, w, arrays)
 
     def _load_walls(self, w: int, scene: Scene, tables: WallTables, active: Sequence[bool]) -> None:
         s, walls = self._s, wall_materials(scene)

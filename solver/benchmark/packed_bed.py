@@ -109,7 +109,8 @@ def small_bed(seed: int = 1) -> Bed:
     lattice = np.stack(np.meshgrid(*(np.arange(n) for n in TILE), indexing="ij"), axis=-1).reshape(-1, 3)
     box = Box(TILE[0] * SPACING, TILE[1] * SPACING)
     centres = (lattice + 0.5) * SPACING
-    return settled(Bed(box, centres, rng.normal(0.0, 0.1, centres.shape)), SETTLING_TIME)
+    speeds = np.asarray(rng.normal(0.0, 0.1, centres.shape), dtype=float)
+    return settled(Bed(box, np.asarray(centres, dtype=float), speeds), SETTLING_TIME)
 
 
 def wide_bed(tiles: tuple[int, int], seed: int = 1) -> Bed:

@@ -2,7 +2,13 @@
 
 from solver.backend import ti
 from solver.kernels.walls import from_patch, from_primitive, surface_velocity
-from solver.laws.hertz_mindlin import normal_damping_force, normal_spring_force, spring_energy, spring_energy_gain, tangential_force
+from solver.laws.hertz_mindlin import (
+    normal_damping_force,
+    normal_spring_force,
+    spring_energy,
+    spring_energy_gain,
+    tangential_force,
+)
 from solver.state import Vec3, Vec4
 
 

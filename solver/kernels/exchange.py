@@ -57,6 +57,7 @@ def load_world(s: ti.template(), w: ti.i32, settings: Row):
 @ti.kernel
 def load_bodies(s: ti.template(), w: ti.i32, numbers: Table, places: IntTable, spheres: Table, owner: IntTable):
     """All bodies that will enter. numbers: mass, inertia (3), reach; places: first, members, kind; spheres: x y z r."""
+    s.world.loaded[w] = numbers.shape[0]
     for b in range(numbers.shape[0]):
         s.body.mass[w, b] = numbers[b, 0]
         s.body.inertia[w, b] = triple(numbers, b, 1)
