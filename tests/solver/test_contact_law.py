@@ -5,10 +5,10 @@ import pytest
 
 from solver.backend import ti
 from solver.body import Body, Members
+from solver.laboratory import EARTH, GRAIN, RADIUS, WALL, Laboratory, bench
 from solver.laws.hertz_mindlin import normal_damping, tangential_damping, tangential_force
 from solver.material import effective_shear_modulus, effective_youngs_modulus
 from solver.state import Vec3, Vec5
-from tests.solver.laboratory import EARTH, GRAIN, RADIUS, WALL, Laboratory, bench
 
 pytestmark = pytest.mark.usefixtures("taichi")
 

@@ -7,8 +7,8 @@ import pytest
 
 from solver.body import Body, Members
 from solver.insertion import random_quaternion, rotation_matrix
+from solver.laboratory import EARTH, GRAIN, RADIUS, UPRIGHT, Laboratory, bench
 from solver.material_file import load_material
-from tests.solver.laboratory import EARTH, GRAIN, RADIUS, UPRIGHT, Laboratory, bench
 
 pytestmark = pytest.mark.usefixtures("taichi")
 
