@@ -17,11 +17,13 @@ import numpy.typing as npt
 from solver.body import Body, Members
 from solver.layout import layout
 from solver.material import Material, Pair
+from solver.numerics import Numerics
 from solver.rigs import Funnel
-from solver.rigs.surface import Plane, Surface
+from solver.rigs.surface import Surface, horizontal
 from solver.scene import Scene
 from solver.state import Capacity
 from solver.time_step import time_step
+from solver.wall_tables import wall_tables
 from solver.world import SUMMARY_COLUMNS, Batch
 
 Array = npt.NDArray[np.float64]
@@ -31,7 +33,7 @@ GRAIN = Material("grain", density=2500.0, shear_modulus=1e7, poisson_ratio=0.25)
 WALL = Material("wall", density=7800.0, shear_modulus=8e10, poisson_ratio=0.3)
 FREE = (0.0, 0.0, 0.0)
 EARTH = (0.0, 0.0, -9.81)
-PLATE = Plane(0.0, "wall")
+PLATE = horizontal(0.0, "wall")
 """z = 0, bodies above it."""
 RADIUS = 5e-3
 """Of the grain that :func:`sphere` makes unless told otherwise [m]."""
@@ -39,7 +41,7 @@ AT_REST = np.zeros(3)
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
 ROOM = Capacity(worlds=1, bodies=128, members=1024, contacts=8192, kinds=64)
-"""One size for all laboratories, so that the kernels are compiled once; only the newest laboratory is alive."""
+"""One size for all laboratories without a mesh, so that the kernels are compiled once."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,7 @@ class Bench:
 
     fixed: tuple[Surface, ...]
     wall: str = WALL.name
-    domain_half_width: float = 1e6
+    domain_half_width: float = 10.0
     outlet_height: float = 1e6
     inlet_diameter: float = 0.0
 
@@ -72,9 +74,9 @@ def scene_of(
     surfaces: Sequence[Surface] = (PLATE,),
     gravity: tuple[float, float, float] = FREE,
 ) -> Scene:
-    """A scene whose rig is a :class:`Bench` with ``surfaces`` of the material "wall"."""
-    rig = cast(Funnel, Bench(tuple(surfaces)))
-    return Scene("laboratory", tuple(materials), tuple(bodies), tuple(pairs), rig, gravity=gravity)
+    """A scene whose rig is a :class:`Bench` with ``surfaces`` of the material "wall"; no body falls asleep in it."""
+    rig, awake = cast(Funnel, Bench(tuple(surfaces))), Numerics(sleep_speed=0.0)
+    return Scene("laboratory", tuple(materials), tuple(bodies), tuple(pairs), rig, numerics=awake, gravity=gravity)
 
 
 def bench(
@@ -96,11 +98,11 @@ def bench(
 
 
 class Laboratory:
-    """Bodies of a scene, put where they are wanted; making another laboratory ends this one.
+    """Bodies of a scene, put where they are wanted; the next laboratory takes the arrays over and ends this one.
 
     ``kinds`` says which of the scene's bodies each of them is: a number of bodies of the first kind, or one index per
-    body. The time step [s] is ``dt``, or by the rule of ``time_step.py`` with ``fraction`` of the Rayleigh time. Without
-    ``plate`` the surfaces are switched off.
+    body. The time step [s] is ``dt``, or by the rule of ``time_step.py`` with ``fraction`` of the Rayleigh time.
+    ``active`` says which surfaces are there from the start; without it all of them are if ``plate``, else none.
     """
 
     def __init__(
@@ -110,26 +112,26 @@ class Laboratory:
         dt: float | None = None,
         fraction: float = 0.1,
         plate: bool = True,
+        active: Sequence[bool] | None = None,
     ) -> None:
         order = np.zeros(kinds, dtype=np.int32) if isinstance(kinds, int) else np.array(kinds, dtype=np.int32)
         numerics = dataclasses.replace(scene.numerics, rayleigh_fraction=fraction)
         self.scene = dataclasses.replace(scene, numerics=numerics)
         self.n = len(order)
         self.dt = dt or time_step(self.scene)
-        self._batch = Batch(ROOM)
-        active = (plate,) * len(self.scene.rig.surfaces())
-        self._batch.load(0, self.scene, layout(self.scene, order), self.dt, active)
+        surfaces = self.scene.rig.surfaces()
+        self.batch = Batch(room_for(surfaces))
+        self.batch.load(0, self.scene, layout(self.scene, order), self.dt, active or [plate] * len(surfaces))
 
     def put(
         self, b: int, position: Triple, velocity: Triple = AT_REST, spin: Triple = AT_REST, quaternion: Triple = UPRIGHT
     ) -> None:
         """Place body ``b``: position [m] and velocity [m/s] in the world, spin [rad/s] in the principal frame."""
-        pose = (np.asarray(x, dtype=float) for x in (position, quaternion, velocity, spin))
-        self._batch.enter(0, b, *pose)
+        self.batch.enter(0, b, *(np.asarray(x, dtype=float) for x in (position, quaternion, velocity, spin)))
 
     def run(self, steps: int) -> dict[str, float]:
         """Advance by ``steps``; returns the summary, columns ``world.SUMMARY_COLUMNS``."""
-        row = self._batch.advance(np.array([steps], dtype=np.int32))[0]
+        row = self.batch.advance(np.array([steps], dtype=np.int32))[0]
         return dict(zip(SUMMARY_COLUMNS, row.tolist(), strict=True))
 
     def run_apart(self, steps: int, chunk: int) -> None:
@@ -143,5 +145,18 @@ class Laboratory:
         raise RuntimeError(f"bodies are not apart after {steps} steps of {self.dt:g} s")
 
     def state(self) -> Array:
-        """Position 0:3, quaternion 3:7, velocity 7:10, spin 10:13 of every body, shape (n, 15)."""
-        return self._batch.bodies(0, self.n)
+        """Rows of ``Batch.bodies``: position 0:3, quaternion 3:7, velocity 7:10, spin 10:13 of every body."""
+        return self.batch.bodies(0, self.n)
+
+
+def room_for(surfaces: Sequence[Surface]) -> Capacity:
+    """:data:`ROOM`, with as much room for triangles as ``surfaces`` have."""
+    tables = wall_tables(tuple(surfaces))
+    return dataclasses.replace(
+        ROOM,
+        walls=max(ROOM.walls, len(tables.poses)),
+        surfaces=max(ROOM.surfaces, len(tables.surfaces)),
+        triangles=max(1, len(tables.corners)),
+        cells=max(1, len(tables.first)),
+        cell_items=max(1, len(tables.items)),
+    )

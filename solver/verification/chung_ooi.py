@@ -59,7 +59,7 @@ T4_EXPERIMENT: Curve = (
     *((2.24, 0.797), (4.22, 0.746), (9.84, 0.675), (20.2, 0.599), (30.4, 0.690), (39.5, 0.774), (49.6, 0.848)),
     *((71.1, 0.937), (79.2, 0.970), (85.2, 0.979)),
 )
-"""T4, Al oxide: θ [°], e_t measured by Kharaz, Gorham & Salman (2001, Powder Technology 120:281), as printed in the paper."""
+"""T4, Al oxide: θ [°], e_t measured by Kharaz, Gorham & Salman (2001), Powder Technology 120:281, from the paper."""
 
 T4_SPIN: dict[str, Curve] = {
     "Al oxide": (

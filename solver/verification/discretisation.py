@@ -23,13 +23,13 @@ def halving() -> Iterator[Row]:
     whole, half = rebounds([OBLIQUE], dt)[0], rebounds([OBLIQUE], dt / 2.0)[0]
     for label, name in QUANTITIES:
         quantity = f"{label} after an oblique impact [m/s]"
-        yield of_value("halving dt", quantity, getattr(half, name), getattr(whole, name), LIMIT, "half the step")
+        yield of_value("halving", quantity, getattr(half, name), getattr(whole, name), LIMIT, "half the step")
 
 
 def coincident() -> Iterator[Row]:
     """Four spheres in one place, each a quarter as stiff, are one sphere: elastic, oblique impact with friction.
 
-    e = 1, because n contacts that are damped at once are damped more than one (solver/README.md, restitution of a body).
+    e = 1, because n contacts damped at once are damped more than one (solver/README.md, restitution of a body).
     """
     outcomes = []
     for copies in (1, COPIES):

@@ -112,8 +112,9 @@ def _trace(lab: Laboratory, impact: Elastic, touch: float) -> Trace:
         relative = rows[0] - rows[1] if lab.n == 2 else rows[0]
         height.append(relative[2])
         velocity.append(relative[9])
-    overlap = touch - np.array(height)
-    return Trace(np.arange(len(overlap) - 1) * lab.dt, overlap[:-1], impact.mass * np.diff(velocity) / lab.dt)
+    overlap = np.asarray(touch - np.array(height), dtype=np.float64)
+    time = np.arange(len(overlap) - 1, dtype=np.float64) * lab.dt
+    return Trace(time, overlap[:-1], np.asarray(impact.mass / lab.dt * np.diff(velocity), dtype=np.float64))
 
 
 def _rows(test: str, material: Material, impact: Elastic, trace: Trace) -> Iterator[Row]:

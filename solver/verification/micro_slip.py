@@ -1,9 +1,9 @@
 """T5: oblique impact on the rigid plane, v_n 5 m/s, r 10 µm, e 1, μ 0.3; recoil and spin over the incident slip.
 
 With ψ1 = V_st/(μ V_cn) of the contact point, an impact that slides throughout has ψ2 = ψ1 − 7 and r ω'/(μ V_cn) = −5.
-The printed DEM curve and the printed finite elements differ in the sticking part. The rows "T5 convention" show what the
-printed DEM curve is: this law integrated with half of Mindlin's tangential stiffness 8 G* a (the value for a plane that
-is rigid under the normal force but yields tangentially like the sphere) and without the scaling on unloading.
+The printed DEM curve and the printed finite elements differ in the sticking part. The rows "T5 convention" show what
+the printed DEM curve is: this law integrated with half of Mindlin's tangential stiffness 8 G* a (the value for a plane
+that is rigid under the normal force but yields tangentially like the sphere) and without the scaling on unloading.
 """
 
 from __future__ import annotations

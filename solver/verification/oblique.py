@@ -79,7 +79,7 @@ def t4_conventions() -> Iterator[Row]:
     """The sticking part of e_t again, and the measurement; nothing here is judged.
 
     With e = 1: what is left of the difference has nothing to do with damping. And another law, integrated without the
-    solver: it keeps a displacement instead of a force and damps no tangential motion; the printed curve is nearest to it.
+    solver: it keeps a displacement instead of a force and damps no tangential motion. The printed curve is near to it.
     """
     for material in (OXIDE, ALUMINIUM):
         sticking = tuple(theta for theta in ANGLES if not slides(theta, RESTITUTION))

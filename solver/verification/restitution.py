@@ -15,7 +15,7 @@ import numpy as np
 from solver.laboratory import GRAIN, RADIUS, bench
 from solver.time_step import time_step
 from solver.verification.chung_ooi import CAST_IRON, OXIDE
-from solver.verification.impacts import Impact, contact_time, rebounds
+from solver.verification.impacts import Impact, rebounds
 from solver.verification.row import Row, of_value
 
 LIMIT = 0.5
@@ -38,12 +38,12 @@ def table() -> Iterator[Row]:
     """e out over e in, with a fine step and with that of a pour."""
     grain = [Impact(GRAIN, RADIUS, 1.0, restitution=e) for e in TABLE]
     for e, out in zip(TABLE, rebounds(grain), strict=True):
-        yield of_value("e", "e out, fine step", e, out.v_n, LIMIT, SOURCE, at=f"e = {e:g}")
+        yield of_value("restitution", "e out, fine step", e, out.v_n, LIMIT, SOURCE, at=f"e = {e:g}")
     dt = time_step(bench())
     starts = [k / BEGINNINGS * dt for k in range(BEGINNINGS)]
     begun = [Impact(GRAIN, RADIUS, 1.0, restitution=e, gap=gap) for e in TABLE for gap in starts]
     out_of = np.array([out.v_n for out in rebounds(begun, dt)]).reshape(len(TABLE), BEGINNINGS)
     for e, values in zip(TABLE, out_of, strict=True):
         furthest = values[np.argmax(np.abs(values - e))]
-        yield of_value("e", "e out, pour's step, mean", e, values.mean(), None, SOURCE, at=f"e = {e:g}")
-        yield of_value("e", "e out, pour's step, furthest", e, furthest, None, SOURCE, at=f"e = {e:g}")
+        yield of_value("restitution", "e out, pour's step, mean", e, values.mean(), None, SOURCE, at=f"e = {e:g}")
+        yield of_value("restitution", "e out, pour's step, furthest", e, furthest, None, SOURCE, at=f"e = {e:g}")

@@ -1,8 +1,8 @@
 """T7: two equal spheres that turn like gears. T8: the spinning sphere of T6 falls on a large, heavy sphere.
 
 T7: r 0.1 m, ±0.2 m/s, opposite spins, e 0.5, μ 0.4. The contact points move alike, so that nothing tangential happens.
-T8: target of r 0.5 m and 1000 times the density; case A with 1000 times the stiffness (the rigid plane of T6 again), case
-B with the same stiffness. In the law of this solver both have the same dimensionless contact, so B is A.
+T8: target of r 0.5 m and 1000 times the density; case A with 1000 times the stiffness (the rigid plane of T6 again),
+case B with the same stiffness. In the law of this solver both have the same dimensionless contact, so B is A.
 """
 
 from __future__ import annotations
