@@ -1,6 +1,6 @@
 """Verification: the solver beside closed forms, conservation laws and the benchmark of Chung & Ooi (2011).
 
-``verify()`` runs it and yields the rows of the table; one file per family. What the tables say stands in README.md here.
+``verify()`` runs it and yields the rows of the table; one file per family. What they say stands in README.md here.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ Array = npt.NDArray[np.float64]
 ROUNDING = 1e-9
 """Limit [%] where only rounding may differ."""
 ENERGY_STEPS = 100_000
-ENERGY_LIMIT = 1.0
+ENERGY_LIMIT = 0.5
 TUMBLING_LIMIT = 0.1
 BRICK_INERTIA = np.array([1e-8, 3e-8, 4e-8])
 
