@@ -49,6 +49,8 @@ WORLD = {
 BODY = {
     "mass": ti.f64,  # [kg]
     "inertia": Vec3,  # principal moments [kg m²]
+    "inverse_mass": ti.f64,  # [1/kg]
+    "inverse_inertia": Vec3,  # [1/(kg m²)]
     "position": Vec3,  # centre of mass [m], at the full step
     "quaternion": Vec4,  # orientation wxyz, at the full step
     "velocity": Vec3,  # [m/s], at the half step
@@ -58,7 +60,8 @@ BODY = {
     "force": Vec3,  # contact force [N]
     "torque": Vec3,  # contact torque about the centre of mass, world frame [N m]
     "reach": ti.f64,  # radius of the bounding sphere [m]
-    "travel": ti.f64,  # bound on the motion of any of its points since the list was built [m]
+    "swing": ti.f64,  # largest distance of a member's centre from the centre of mass [m]
+    "travel": ti.f64,  # bound on the motion of any of its members' centres since the list was built [m]
     "first": ti.i32,  # index of the first member sphere
     "members": ti.i32,  # number of member spheres
     "kind": ti.i32,  # contact class

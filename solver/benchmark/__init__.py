@@ -1,0 +1,1 @@
+"""Speed of the solver on declared cases, alone and beside peer engines."""
