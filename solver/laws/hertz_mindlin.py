@@ -8,41 +8,19 @@ Notation: grain i is pushed by j; normal n from j to i; overlap δ > 0 when touc
                   T ← T − k_t v_t dt, capped at μ F_n
                   F_t = T − c_t √(k_t m*) v_t while sticking, T while slipping
 
-R* comes from the member spheres, m* from the bodies. c_n = 2 γ(e) with the polynomial of Thornton, Cummins & Cleary
-(2013, Powder Technology 233:30) for a force that is never tensile, so that the restitution that comes out is the one
-that was asked for; c_t = 2 √(5/6) |β|, β = ln e / √(ln² e + π²) (Tsuji 1992 as used in LIGGGHTS).
-Sources: Hertz 1882; Mindlin & Deresiewicz 1953; rescaling on unloading: Thornton et al. 2013.
+R* comes from the member spheres, m* from the bodies. c_n(e) inverts this contact exactly (`restitution.py`), so that
+the restitution that comes out is the one that was asked for; c_t = 2 √(5/6) |β|, β = ln e / √(ln² e + π²) (Tsuji 1992
+as used in LIGGGHTS).
+Sources: Hertz 1882; Mindlin & Deresiewicz 1953; rescaling on unloading: Thornton, Cummins & Cleary 2013, Powder
+Technology 233:30.
 """
 
 import math
 
 from solver.backend import ti
+from solver.laws.restitution import normal_damping
 from solver.material import Material, Pair, effective_shear_modulus, effective_youngs_modulus
 from solver.state import Vec3
-
-THORNTON = (
-    -6.918798,
-    -16.41105,
-    146.8049,
-    -796.4559,
-    2928.711,
-    -7206.864,
-    11494.29,
-    -11342.18,
-    6276.757,
-    -1489.915,
-)
-"""h₁ … h₁₀ of α(e) = e (h₁ + e (h₂ + …)) (Thornton, Cummins & Cleary 2013)."""
-
-
-def normal_damping(restitution: float) -> float:
-    """c_n = 2 γ, γ = √(1/(1 − (1+e)² exp α(e)) − 1), dimensionless; 0 for e = 1."""
-    if restitution >= 1.0:
-        return 0.0
-    alpha = 0.0
-    for h in reversed(THORNTON):
-        alpha = restitution * (h + alpha)
-    return 2.0 * math.sqrt(max(0.0, 1.0 / (1.0 - (1.0 + restitution) ** 2 * math.exp(alpha)) - 1.0))
 
 
 def tangential_damping(restitution: float) -> float:

@@ -7,10 +7,10 @@ import pytest
 import trimesh
 
 from solver.insertion import rotation_matrix
+from solver.laboratory import EARTH, FREE, RADIUS, Laboratory, bench, sphere
 from solver.mesh_wall import LEAVE, SEE_GUARD, mesh_wall
 from solver.params import ParameterError
 from solver.rigs.surface import Plane, Pose, Revolved, TriangleMesh, load_mesh, rectangle
-from tests.solver.laboratory import EARTH, FREE, RADIUS, Laboratory, bench, sphere
 
 pytestmark = pytest.mark.usefixtures("taichi")
 
