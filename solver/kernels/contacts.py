@@ -3,7 +3,8 @@
 from solver.backend import ti
 from solver.kernels.walls import from_patch, from_primitive, surface_velocity
 from solver.laws.hertz_mindlin import (
-    normal_damping_force,
+    normal_damper,
+    normal_force,
     normal_spring_force,
     spring_energy,
     spring_energy_gain,
@@ -104,8 +105,8 @@ def push(s: ti.template(), w):
             contact_radius = ti.sqrt(s.contact.reduced_radius[w, k] * overlap)
             inertia = ti.sqrt(contact_radius * mass)
             elastic = normal_spring_force(law, contact_radius, overlap)
-            f_n = ti.max(0.0, elastic + normal_damping_force(law, inertia, v_n))
             before = s.contact.radius[w, k]
+            f_n = normal_force(elastic, normal_damper(law, inertia, before, overlap, v_n, dt), v_n, mass, dt)
             old, last_loss = s.contact.spring[w, k], s.contact.loss[w, k]
             spring, f_t = tangential_force(law, contact_radius, before, old, n, v_t, inertia, f_n, dt)
             force = f_n * n + f_t

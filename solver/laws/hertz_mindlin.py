@@ -51,9 +51,24 @@ def normal_spring_force(law, a, overlap):
 
 
 @ti.func
-def normal_damping_force(law, inertia, v_n):
-    """Damping force [N]; ``inertia`` is √(a m*), ``v_n`` [m/s] is positive while separating."""
-    return -law[3] * inertia * v_n
+def normal_damper(law, inertia, a_before, overlap, v_n, dt):
+    """Damping force over approach speed [kg/s]; ``inertia`` is √(a m*), ``v_n`` [m/s] is positive while separating.
+
+    ∝ δ^(1/4), steep where the contact begins: in its first step the mean over the way from the touch to half a step
+    ahead, 4/5 δ₊^(5/4)/(|v_n| dt), stands for the value at δ.
+    """
+    damper = law[3] * inertia
+    if a_before == 0.0 and v_n < 0.0:
+        way = -v_n * dt
+        ahead = overlap + 0.5 * way
+        damper *= 0.8 * ahead / way * ti.sqrt(ti.sqrt(ahead / overlap))
+    return damper
+
+
+@ti.func
+def normal_force(elastic, damper, v_n, mass, dt):
+    """Normal force [N], never tensile; the damper takes the speed in the middle of the step, v_n + dt F/(2 m*)."""
+    return ti.max(0.0, (elastic - damper * v_n) / (1.0 + 0.5 * dt * damper / mass))
 
 
 @ti.func

@@ -5,11 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 
+from solver.laboratory import EARTH, RADIUS, bench
 from solver.layout import layout
 from solver.run import capacity_for
 from solver.time_step import time_step
 from solver.world import Batch
-from tests.solver.laboratory import EARTH, RADIUS, bench
 
 pytestmark = pytest.mark.usefixtures("taichi")
 
