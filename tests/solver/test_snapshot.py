@@ -1,13 +1,11 @@
 """A world that is kept and put back goes on bit by bit, in whatever slot of whatever batch."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
 from solver.laboratory import EARTH, RADIUS, bench
 from solver.layout import layout
-from solver.run import capacity_for
+from solver.state import Capacity
 from solver.time_step import time_step
 from solver.world import Batch
 
@@ -20,9 +18,8 @@ STEPS = 3000
 def crowd(worlds, w, bodies=64):
     """A heap of beads that fall on each other, in world ``w``."""
     scene = bench(gravity=EARTH, friction=0.5)
-    room = dataclasses.replace(capacity_for([scene], worlds), bodies=bodies, members=8 * bodies, contacts=64 * bodies)
-    batch = Batch(room)
-    batch.load(w, scene, layout(scene, np.zeros(N, dtype=np.int32)), time_step(scene), (True, False, False))
+    batch = Batch(Capacity(worlds, bodies, members=8 * bodies, contacts=64 * bodies))
+    batch.load(w, scene, layout(scene, np.zeros(N, dtype=np.int32)), time_step(scene), (True,))
     return batch
 
 
@@ -79,7 +76,6 @@ def test_no_room_is_told():
     drop(whole, 0)
     run(whole, 0, STEPS)
     kept = whole.take(0)
-    scene = bench(gravity=EARTH)
-    small = Batch(dataclasses.replace(capacity_for([scene], 1), bodies=32, members=256, contacts=16))
+    small = Batch(Capacity(worlds=1, bodies=32, members=256, contacts=16))
     with pytest.raises(ValueError, match="do not fit"):
         small.put(0, kept)
