@@ -40,6 +40,10 @@ CUBE = 1e-10
 """Half the edge of the cube in which a centre of mass is placed [m]."""
 SOFT, HARD = 5e6, 1e9
 """Young's moduli [Pa] beyond which LIGGGHTS asks for a confirmation."""
+SKIN, CELL = 0.9, 6.0
+"""Reach of the contact list beyond touching, and size of its cells, in radii of the largest sphere: the fastest that
+were found for the seed pour. By default the box is cut into cells of half a contact distance, and to empty millions of
+them takes longer than everything else."""
 MODEL = "model hertz tangential history"
 
 
@@ -101,7 +105,7 @@ def gravity_lines(gravity: tuple[float, float, float]) -> list[str]:
 
 
 def settings_lines(box: Array, types: int, skin: float) -> list[str]:
-    """Style, box, number of types and contact list; ``box`` is (low, high) [m]."""
+    """Style, box (low, high) [m], number of types and the reach of the contact list beyond touching [m]."""
     sides = " ".join(f"{low:.12g} {high:.12g}" for low, high in zip(*box, strict=True))
     return [
         "units si",
@@ -129,6 +133,11 @@ def run_lines(steps: int, dt: float) -> list[str]:
     ]
 
 
+def plane_line(name: str, wall: int, axis: str, place: float) -> str:
+    """An infinite plane of material ``wall`` across ``axis`` (x, y, z) at ``place`` [m]; R* is the sphere's radius."""
+    return f"fix {name} all wall/gran {MODEL} primitive type {wall} {axis}plane {place!r} limitForce on"
+
+
 COLUMNS = "id radius x y z vx vy vz omegax omegay omegaz"
 FORMAT = " ".join(["%d", *["%.12g"] * 10])
 WRITE_FINAL = f'write_dump all custom {FINAL} {COLUMNS} modify sort id format "{FORMAT}"'
@@ -138,14 +147,16 @@ def _input(deck: Deck) -> list[str]:
     moduli = [*(clump.youngs_modulus for clump in deck.clumps), deck.wall_youngs_modulus]
     ratios = [*(clump.poisson_ratio for clump in deck.clumps), deck.wall_poisson_ratio]
     wall = len(moduli)
-    skin = 0.5 * min(float(clump.radii.min()) for clump in deck.clumps)
+    largest = max(float(clump.radii.max()) for clump in deck.clumps)
     return [
         f"# {deck.title}, seed {deck.seed}: {deck.bodies} bodies, {deck.steps} steps of {deck.dt:.6g} s",
-        *settings_lines(deck.box, wall, skin),
+        *settings_lines(deck.box, wall, SKIN * largest),
+        f"neigh_modify binsize {CELL * largest:.12g}",
         *model_lines(moduli, ratios, deck.restitution, deck.friction),
         *gravity_lines(deck.gravity),
-        *([] if deck.plate is None else [_plane_line("plate", wall, "z", deck.plate)]),
-        *(line for mesh in deck.meshes for line in _mesh_lines(mesh.name, wall)),
+        *([] if deck.plate is None else [plane_line("plate", wall, "z", deck.plate)]),
+        *(f"fix {mesh.name} all mesh/surface file {mesh.name}.stl type {wall}" for mesh in deck.meshes),
+        *_mesh_wall_lines([mesh.name for mesh in deck.meshes]),
         *(line for k, clump in enumerate(deck.clumps, start=1) for line in _template_lines(k, clump)),
         "fix motion all multisphere",
         *run_lines(deck.steps, deck.dt),
@@ -155,15 +166,11 @@ def _input(deck: Deck) -> list[str]:
     ]
 
 
-def _plane_line(name: str, wall: int, axis: str, place: float) -> str:
-    return f"fix {name} all wall/gran {MODEL} primitive type {wall} {axis}plane {place!r} limitForce on"
-
-
-def _mesh_lines(name: str, wall: int) -> list[str]:
-    return [
-        f"fix {name} all mesh/surface file {name}.stl type {wall}",
-        f"fix {name}_wall all wall/gran {MODEL} mesh n_meshes 1 meshes {name} limitForce on",
-    ]
+def _mesh_wall_lines(names: list[str]) -> list[str]:
+    """All meshes as one wall; LIGGGHTS allows no more than one of this kind."""
+    if not names:
+        return []
+    return [f"fix walls all wall/gran {MODEL} mesh n_meshes {len(names)} meshes {' '.join(names)} limitForce on"]
 
 
 def _template_lines(k: int, clump: Clump) -> list[str]:
@@ -189,11 +196,16 @@ def _insertion_lines(deck: Deck, body: int) -> list[str]:
 
 
 def _runs(deck: Deck) -> list[str]:
-    """Runs between the moments at which a wall is taken away; one step more than ours, since theirs begin at 1."""
-    lines, done = [], 0
+    """Runs between the moments at which a mesh is taken away; one step more than ours, since theirs begin at 1.
+
+    The wall is declared anew without it: contacts with the other meshes start over without a tangential spring.
+    """
+    lines, done, there = [], 0, [mesh.name for mesh in deck.meshes]
     for mesh in sorted(deck.meshes, key=lambda mesh: mesh.until_step):
         if 0 <= mesh.until_step < deck.steps:
-            lines += [f"run {mesh.until_step + 1 - done}", f"unfix {mesh.name}_wall", f"unfix {mesh.name}"]
+            there.remove(mesh.name)
+            lines += [f"run {mesh.until_step + 1 - done}", "unfix walls", f"unfix {mesh.name}"]
+            lines += _mesh_wall_lines(there)
             done = mesh.until_step + 1
     return [*lines, f"run {deck.steps + 1 - done}"]
 

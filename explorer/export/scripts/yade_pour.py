@@ -88,10 +88,10 @@ CARRIERS = ((1.0, 1.0, 0.0), (1.0, -1.0, 0.0), (-2.0, 0.0, 0.0))
 def enter(k: int) -> None:
     """Let body k of the deck enter.
 
-    YADE computes a clump's centre of mass and principal axes from the densities of its spheres. Members have none; three
-    carriers that touch nothing have, about the centre of mass and along the principal axes. The clump is made along the
-    world's axes, then given its mass, principal moments and orientation. YADE damps with the mass of the touching
-    sphere: afterwards members are given the body's.
+    YADE computes a clump's centre of mass and principal axes from the densities of its spheres. Members have none;
+    three carriers that touch nothing have, about the centre of mass and along the principal axes. The clump is made
+    along the world's axes, then given its mass, principal moments and orientation. YADE damps with the mass of the
+    touching sphere: afterwards members are given the body's.
     """
     entries = deck["entries"]
     component = entries["component"][k]
