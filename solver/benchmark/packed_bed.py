@@ -5,11 +5,14 @@ have the same height and the same contacts per sphere.
 Spheres: d 5 mm, ρ 2500 kg/m³, G 10 MPa, ν 0.25, μ 0.5, e 0.5.
 """
 
+import time
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from solver import backend
+from solver.benchmark.measurement import Measurement
 from solver.body import Body, Members
 from solver.layout import layout
 from solver.material import Material, Pair
@@ -125,3 +128,20 @@ def wide_bed(tiles: tuple[int, int], seed: int = 1) -> Bed:
 def summary_of(batch: Batch) -> dict[str, float]:
     """Summary of the one world by name."""
     return dict(zip(SUMMARY_COLUMNS, batch.measure(0)[0].tolist(), strict=True))
+
+
+def measure_bed(bed: Bed, steps: int) -> Measurement:
+    """``steps`` of ``bed`` on one thread."""
+    backend.init(threads=1)
+    batch, dt = load_bed(bed)
+    batch.advance(np.array([1], dtype=np.int32))
+    begin = time.perf_counter()
+    batch.advance(np.array([steps], dtype=np.int32))
+    wall = time.perf_counter() - begin
+    n, contacts = len(bed.centres), summary_of(batch)["touching"]
+    return Measurement(bed_name(n), "ours, nothing sleeps", n, n, steps, wall, steps * dt, contacts, contacts)
+
+
+def bed_name(n: int) -> str:
+    """Name of the case with ``n`` spheres."""
+    return f"bed of {n} spheres"
