@@ -18,7 +18,7 @@ import numpy.typing as npt
 from explorer.errors import CommandError
 from explorer.export.triangles import revolved_triangles
 from solver import Body, Entries, Record, Scene
-from solver.rigs import Funnel, Plane
+from solver.rigs import Funnel, Plane, Revolved
 from solver.rigs.funnel import GATE, SURFACE_NAMES
 
 Array = npt.NDArray[np.float64]
@@ -206,7 +206,7 @@ def _until(entries: Entries, steps: int) -> Entries:
 
 
 def _plate(rig: Funnel) -> float:
-    return next(surface.height for surface in rig.surfaces() if isinstance(surface, Plane))
+    return next(surface.pose.origin[2] for surface in rig.surfaces() if isinstance(surface, Plane))
 
 
 def _meshes(scene: Scene, record: Record) -> tuple[Mesh, ...]:
@@ -214,7 +214,7 @@ def _meshes(scene: Scene, record: Record) -> tuple[Mesh, ...]:
     opening = round(record.gate_opened / record.dt) if record.gate_opened > 0.0 else -1
     meshes = []
     for k, (name, surface) in enumerate(zip(SURFACE_NAMES, scene.rig.surfaces(), strict=True)):
-        if isinstance(surface, Plane) or (k == GATE and not gated):
+        if not isinstance(surface, Revolved) or (k == GATE and not gated):
             continue
         meshes.append(Mesh(name, revolved_triangles(surface), opening if k == GATE else -1))
     return tuple(meshes)

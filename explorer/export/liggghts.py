@@ -28,7 +28,7 @@ from explorer.export.deck import Clump, Deck, write_deck
 from explorer.export.frames import FINAL, TRAJECTORY
 from explorer.export.readme import write_readme
 from explorer.export.triangles import write_stl
-from solver.laws.hertz_mindlin import normal_damping
+from solver.laws.restitution import normal_damping
 
 Array = npt.NDArray[np.float64]
 INPUT = "in.liggghts"

@@ -20,7 +20,8 @@ import numpy as np
 from explorer.export.deck import Deck, write_deck
 from explorer.export.readme import write_readme
 from explorer.export.triangles import write_stl
-from solver.laws.hertz_mindlin import normal_damping, tangential_damping
+from solver.laws.hertz_mindlin import tangential_damping
+from solver.laws.restitution import normal_damping
 
 SCRIPT = "yade_pour.py"
 SCRIPTS = Path(__file__).with_name("scripts")
