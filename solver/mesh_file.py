@@ -23,6 +23,8 @@ WELD = 1e-7
 """Corners nearer than about this, relative to the largest extent, are one: single precision resolves 6e-8."""
 FLAT = 1e-9
 """Volume over the cube of the largest extent below which a surface encloses nothing; a hair 1 : 1 : 1000 has 1e-6."""
+THIN = 1e-6
+"""Deviation of the corners from a plane, relative to that within it, below which they lie in it."""
 WINDING_CELLS = 200_000
 FEWEST_BAD_RAYS = 2
 
@@ -66,7 +68,7 @@ def _check_size(path: Path) -> None:
 
 def _parts(file: str) -> list[trimesh.Trimesh]:
     try:
-        found = trimesh.load_scene(file).dump(concatenate=False)
+        found = trimesh.load_scene(file, process=False).dump(concatenate=False)
     except Exception as error:  # the readers of a damaged file raise anything from KeyError to struct.error
         raise MeshFileError(f"cannot be read ({' '.join(str(error).split())[:120]})") from None
     parts = [part for part in found if isinstance(part, trimesh.Trimesh) and len(part.faces) > 0]
@@ -85,7 +87,8 @@ def _side_by_side(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
 
 def _welded(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     """Without texture and normals, equal corners made one, faces dropped in which a corner repeats."""
-    cells = np.round(mesh.vertices / (WELD * max(mesh.extents.max(), np.finfo(float).tiny)))
+    # 1e-30: a mesh that is one point has no extent
+    cells = np.round(mesh.vertices / (WELD * max(mesh.extents.max(), 1e-30)))
     _, first, corner = np.unique(cells, axis=0, return_index=True, return_inverse=True)
     # in the order of the file
     order = np.argsort(first)
@@ -97,9 +100,14 @@ def _welded(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
 def _check_closed(mesh: trimesh.Trimesh, part: str) -> None:
     if len(mesh.faces) == 0:
         raise MeshFileError(f"{part}is degenerate: it has no face with an area")
+    spread = np.linalg.eigvalsh(np.cov(mesh.vertices.T))
+    if spread[0] < THIN**2 * spread[2]:
+        raise MeshFileError(f"{part}is degenerate: all its corners lie in one plane")
     if not mesh.is_watertight:
         raise MeshFileError(f"{part}is not watertight: {_edge_fault(mesh.edges_sorted)}")
-    volume, extent = float(mesh.volume), float(mesh.extents.max())
+    # trimesh also divides by the volume, and would warn
+    with np.errstate(divide="ignore", invalid="ignore"):
+        volume, extent = float(mesh.volume), float(mesh.extents.max())
     if not abs(volume) > FLAT * extent**3:
         raise MeshFileError(f"{part}is degenerate: it encloses no volume")
     if not mesh.is_winding_consistent:

@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from solver.clump_fit import measured_fit
 from solver.shape import Solid, surface_mesh
 from solver.solid_points import FINE, points_on
-from solver.sphere_union import open_points
+from solver.sphere_union import distance_to_union, open_points
 
 Array = npt.NDArray[np.float64]
 
@@ -55,11 +55,14 @@ def sphere_error(solid: Solid, centres: Array, radii: Array) -> SphereError:
     points, owner = open_points(centres, radii, max(200, POINTS // len(radii)))
     area = radii[owner] ** 2
     back = distance_to_mesh(solid, points)
+    # what is furthest from the spheres is often a corner, where no sampled point lies
+    vertices = surface_mesh(solid).vertices
+    corners = np.asarray(vertices[:: 1 + len(vertices) // POINTS])
     volume, second = union_moments(centres, radii)
     return SphereError(
         number=len(radii),
         rms=max(fit.surface_rms, float(np.sqrt((area * back**2).sum() / area.sum()))),
-        largest=max(fit.surface_max, float(back.max())),
+        largest=max(fit.surface_max, float(back.max()), float(distance_to_union(corners, centres, radii).max())),
         covered=fit.covered_ratio,
         volume=volume,
         second=second,

@@ -47,10 +47,11 @@ def fitted(solid: Solid, numbers: list[int], least_radius: float = LEAST_RADIUS)
     floor = least_radius * target.inscribed_radius
     rows = start_layouts(target, min(max(numbers), MOST_IN_ROWS), floor)
     inside = target.interior[:: max(1, len(target.interior) // START_POINTS)]
+    cover = _cover(target, inside, max(numbers), floor)
     before: Orbits | None = None
     for number in numbers:
         starts = list(rows.get(number, [])[:LAYOUTS])
-        starts += [_cells(target, inside, number, floor), _cover(target, inside, number, floor)]
+        starts += [_cells(target, inside, number, floor), orbits_of(cover[0][:number], cover[1][:number], False)]
         if before is not None and len(before.radii) < number:
             starts.append(_grown(target, before, number, floor))
         trials = [without_idle(refine(start, target, floor, STEPS), target) for start in starts]
@@ -101,18 +102,19 @@ def _cells(target: Target, inside: Array, number: int, floor: float) -> Orbits:
     return orbits_of(centres, _inscribed(target, centres, floor), symmetric=False)
 
 
-def _cover(target: Target, inside: Array, number: int, floor: float) -> Orbits:
-    """Inscribed spheres by the volume that each adds; spheres smaller than the floor are not used."""
+def _cover(target: Target, inside: Array, number: int, floor: float) -> tuple[Array, Array]:
+    """Centres and radii of inscribed spheres by the volume that each adds; smaller ones than the floor are not used."""
     depth = cKDTree(target.surface).query(inside)[0]
     deep = np.flatnonzero(depth >= min(floor, depth.max()))
     deep = deep[:: max(1, len(deep) // 2000)]
     covers = squared_distances(inside[deep], inside) <= depth[deep, None] ** 2
-    uncovered, chosen = np.ones(len(inside), dtype=bool), []
+    uncovered = np.ones(len(inside), dtype=bool)
+    chosen: list[int] = []
     for _ in range(number):
         best = int((covers & uncovered).sum(axis=1).argmax())
         uncovered &= ~covers[best]
-        chosen.append(deep[best])
-    return orbits_of(inside[chosen], np.maximum(depth[chosen], floor), symmetric=False)
+        chosen.append(int(deep[best]))
+    return inside[chosen], np.maximum(depth[chosen], floor)
 
 
 def _grown(target: Target, before: Orbits, number: int, floor: float) -> Orbits:
