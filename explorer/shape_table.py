@@ -24,7 +24,9 @@ body; radius of the smallest sphere."""
 
 def mm(length: float | None) -> str:
     """A length [m] in millimetres, four digits; a dash for none."""
-    return "-" if length is None else f"{1e3 * length:.4g}"
+    if length is None:
+        return "-"
+    return f"{1e3 * length:.4g}" if length < 1.0 else f"{1e3 * length:.0f}"
 
 
 def heading() -> str:
