@@ -56,8 +56,8 @@ GATE_NAME = SURFACE_NAMES[GATE]
 
 def _surface(surface: Surface, plate_radius: float) -> Triangles:
     if isinstance(surface, Plane):
-        surface = Revolved(0.0, surface.height, plate_radius, surface.height, surface.material)
-    return _revolved(surface)
+        surface = Revolved(0.0, surface.pose.origin[2], plate_radius, surface.pose.origin[2], surface.material)
+    return _revolved(cast(Revolved, surface))
 
 
 def _revolved(surface: Revolved) -> Triangles:

@@ -16,7 +16,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from solver.params import ParameterError, param
-from solver.rigs.surface import Plane, Revolved, Surface
+from solver.rigs.surface import Revolved, Surface, horizontal
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Funnel:
         """Plate, cone and gate, in the order of ``SURFACE_NAMES``."""
         outlet, inlet = self.outlet_diameter / 2.0, self.inlet_diameter / 2.0
         return (
-            Plane(0.0, self.wall),
+            horizontal(0.0, self.wall),
             Revolved(outlet, self.outlet_height, inlet, self.inlet_height, self.wall),
             Revolved(0.0, self.outlet_height, outlet, self.outlet_height, self.wall),
         )
