@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from solver.assets import asset_path
 from solver.body import Body, counts
-from solver.material_file import load_material, read_toml
+from solver.material_file import load_material
 from solver.observables import Value, observable_names, observe
 from solver.params import Parameter, ParameterError, parse_quantity
 from solver.record import Bodies, Entries, Outcome, Phase, Pile, Record, Spheres, Trace
 from solver.scene import Scene, canonical, parameters, value, with_values
+from solver.toml_table import read_toml
 from solver.version import code_version
 
 if TYPE_CHECKING:

@@ -15,12 +15,14 @@ import numpy.typing as npt
 
 from solver import insertion
 from solver.body import counts
+from solver.clump import scaled
 from solver.layout import layout
 from solver.record import Bodies, Outcome, Phase, Record
 from solver.record_builder import bodies_of, entries_of, member_spheres, pile_of, rolling_away, trace_of
 from solver.retune import RAMP_STEPS, RAMP_TIME, Ramp, spring_ratio
 from solver.rigs.funnel import GATE
 from solver.scene import Scene
+from solver.sizes import drawn_sizes
 from solver.time_step import time_step
 from solver.world import SUMMARY_COLUMNS, Batch, law_table
 
@@ -41,7 +43,8 @@ class Pour:
         self.batch, self.w, self.scene, self.seed = batch, w, scene, seed
         self._rng = np.random.default_rng(seed)
         self.order = insertion.shuffled_components(counts(scene.bodies, scene.rig.mass), self._rng)
-        self._layout = layout(scene, self.order)
+        sizes = drawn_sizes([body.sizes for body in scene.bodies], self.order, seed)
+        self._layout = layout(scene, self.order, sizes)
         self.dt = time_step(scene)
         self.gate_shut = scene.insertion.protocol == "fill_then_open"
         self.gate_opened = 0.0
@@ -153,7 +156,7 @@ class Pour:
             spheres = member_spheres(self.scene, self.bodies())
             near = spheres.centre[:, 2] + spheres.radius > self.scene.rig.inlet_height
             pose = insertion.find_place(
-                self.scene.bodies[self.order[self.entered]].clump,
+                scaled(self.scene.bodies[self.order[self.entered]].clump, self._layout.scale[self.entered]),
                 self.scene.insertion,
                 self.scene.rig.inlet_height,
                 spheres.centre[near],

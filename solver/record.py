@@ -45,6 +45,8 @@ class Bodies:
     component_names: tuple[str, ...]
     mass: Array
     """[kg], shape (n,)."""
+    scale: Array
+    """Linear size relative to the declared one, shape (n,)."""
     position: Array
     """Centres of mass [m], shape (n, 3)."""
     quaternion: Array

@@ -20,6 +20,7 @@ def bodies_of(scene: Scene, order: npt.NDArray[np.int32], places: Layout, state:
         component=order[:n].copy(),
         component_names=tuple(body.name for body in scene.bodies),
         mass=places.numbers[:n, 0].copy(),
+        scale=places.scale[:n].copy(),
         position=state[:, 0:3].copy(),
         quaternion=state[:, 3:7].copy(),
         velocity=state[:, 7:10].copy(),
@@ -35,9 +36,10 @@ def member_spheres(scene: Scene, bodies: Bodies) -> Spheres:
         if len(chosen) == 0:
             continue
         clump = body.clump
+        scale = bodies.scale[chosen]
         turned = np.einsum("bij,mj->bmi", rotation_matrix(bodies.quaternion[chosen]), clump.centres)
-        centres.append((bodies.position[chosen, None, :] + turned).reshape(-1, 3))
-        radii.append(np.tile(clump.radii, len(chosen)))
+        centres.append((bodies.position[chosen, None, :] + scale[:, None, None] * turned).reshape(-1, 3))
+        radii.append((scale[:, None] * clump.radii).ravel())
         owners.append(np.repeat(chosen.astype(np.int32), len(clump.radii)))
     return Spheres(np.concatenate(centres), np.concatenate(radii), np.concatenate(owners))
 

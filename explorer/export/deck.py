@@ -103,6 +103,12 @@ def deck_of(record: Record, time: float | None = None) -> Deck:
     scene = record.scene
     if not isinstance(scene.rig, Funnel):
         raise CommandError(f"rig {getattr(scene.rig, 'name', '?')!r} cannot be exported; allowed: funnel")
+    for body in scene.bodies:
+        if body.sizes.varies:
+            raise CommandError(
+                f"body.{body.name}.size_distribution: {body.sizes.kind!r} cannot be exported, a deck has one clump per "
+                "component; allowed: none"
+            )
     steps = record.steps if time is None else math.ceil(time / record.dt)
     return assembled(
         scene,

@@ -30,6 +30,7 @@ SLOT = np.dtype(
         ("quaternion", np.float32, (MAX_BODIES, 4)),
         ("component", np.int32, (MAX_BODIES,)),
         ("inside", np.bool_, (MAX_BODIES,)),
+        ("scale", np.float32, (MAX_BODIES,)),
     ],
     align=True,
 )
@@ -59,6 +60,8 @@ class Frame:
     """Index into ``scene.bodies``, shape (n,)."""
     inside: npt.NDArray[np.bool_]
     """False for bodies that rolled out of the domain, shape (n,)."""
+    scale: npt.NDArray[np.float32]
+    """Linear size relative to the declared one, shape (n,)."""
 
 
 def shared_block(context: Any) -> Any:
@@ -82,6 +85,7 @@ class FrameWriter:
         slot["quaternion"][0, :n] = bodies.quaternion
         slot["component"][0, :n] = bodies.component
         slot["inside"][0, :n] = bodies.inside
+        slot["scale"][0, :n] = bodies.scale
         self._buffer["counter"] = following
 
 
@@ -122,4 +126,5 @@ def _copy(slot: Any, number: int) -> Frame:
         quaternion=slot["quaternion"][:n].copy(),
         component=slot["component"][:n].copy(),
         inside=slot["inside"][:n].copy(),
+        scale=slot["scale"][:n].copy(),
     )

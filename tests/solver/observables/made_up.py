@@ -102,6 +102,7 @@ def record_of(
         component=pile.component,
         component_names=pile.component_names,
         mass=pile.mass,
+        scale=np.ones(n),
         position=pile.position,
         quaternion=np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)),
         velocity=np.zeros((n, 3)),
