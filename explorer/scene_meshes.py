@@ -10,8 +10,7 @@ import numpy.typing as npt
 import trimesh
 
 from solver.body import Body, Members
-from solver.rigs import Funnel, Plane, Revolved, Surface
-from solver.rigs.funnel import GATE, SURFACE_NAMES
+from solver.rigs import Plane, Revolved, Rig, Surface
 from solver.shape import surface_mesh
 
 SIDES = 96
@@ -41,15 +40,15 @@ def body_triangles(body: Body) -> Triangles:
     return _smooth(mesh) if body.shape.kind in ("ellipsoid", "sphere") else _faceted(mesh)
 
 
-def rig_triangles(rig: Funnel) -> dict[str, Triangles]:
-    """Plate, cone and gate by name, in the world's frame."""
+def rig_triangles(rig: Rig) -> dict[str, Triangles]:
+    """The surfaces of ``rig`` by name, in the world's frame."""
     surfaces = rig.surfaces()
     radius = PLATE_OVERHANG * max(s.r1 for s in surfaces if isinstance(s, Revolved))
-    return {name: _surface(surface, radius) for name, surface in zip(SURFACE_NAMES, surfaces, strict=True)}
+    return {name: _surface(surface, radius) for name, surface in zip(rig.surface_names, surfaces, strict=True)}
 
 
-GATE_NAME = SURFACE_NAMES[GATE]
-"""The surface that is there only while the gate is shut."""
+GATE_NAME = "gate"
+"""The surface that is there only until the rig acts."""
 
 
 def _surface(surface: Surface, plate_radius: float) -> Triangles:

@@ -8,6 +8,7 @@ assumed = [paths of values that nobody measured]
 [[body]]                 name, material, mass_fraction, shape = { ellipsoid = […] } and spheres = "standard",
                          or sphere_centres, sphere_radii, mass, inertia
 [pair.<a>.<b>]           static_friction, restitution
+[rig] [insertion] [numerics]     optional: another rig than the default funnel, and settings (see set_up.py)
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from solver.body import RESOLUTION, Body, Members
 from solver.material import Material, Pair
 from solver.params import ParameterError, declared, parse_quantity
 from solver.rigs import Funnel
-from solver.scene import Scene, check
+from solver.scene import Scene
+from solver.set_up import TABLES, with_set_up
 from solver.shape import ShapeError, Solid
 
 WALL = "rigid_sieve_plate"
@@ -38,6 +40,7 @@ KNOWN = {
     "pair",
     "measured",
     "wall",
+    *TABLES,
 }
 
 
@@ -56,7 +59,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def load_material(name: str, relative_to: Path | None = None) -> Scene:
-    """Scene with the default funnel from a shipped material's name or the path of a material file."""
+    """Scene, in the default funnel unless the file says otherwise, from a shipped material's name or the path of a material file."""
     path = asset_path("materials", name, relative_to=relative_to)
     try:
         return scene_from(read_toml(path), path)
@@ -66,7 +69,7 @@ def load_material(name: str, relative_to: Path | None = None) -> Scene:
 
 
 def scene_from(table: dict[str, Any], path: Path) -> Scene:
-    """Scene with the default rig from a parsed material file."""
+    """Scene from a parsed material file; its rig is the default funnel unless it has a table ``[rig]``."""
     unknown = sorted(set(table) - KNOWN)
     if unknown:
         raise ParameterError(f"unknown key {unknown[0]!r}; allowed: {', '.join(sorted(KNOWN))}")
@@ -92,8 +95,7 @@ def scene_from(table: dict[str, Any], path: Path) -> Scene:
         gravity=_vector(table.get("gravity", (0.0, 0.0, -9.81)), "gravity"),
         assumed=tuple(str(name) for name in _list(table, "assumed")),
     )
-    check(scene)
-    return scene
+    return with_set_up(scene, table)
 
 
 def _wall(table: dict[str, Any], materials: tuple[Material, ...], bodies: tuple[Body, ...]) -> str:

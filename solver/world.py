@@ -9,6 +9,7 @@ from solver.kernels.batch import advance, measure, take_out
 from solver.laws.hertz_mindlin import constants
 from solver.layout import Layout
 from solver.rigs import Plane, Surface
+from solver.rigs.rig import Container
 from solver.scene import Scene
 from solver.state import Capacity, arrays
 
@@ -72,7 +73,8 @@ class Batch:
     def load(self, w: int, scene: Scene, bodies: Layout, dt: float, active: tuple[bool, ...]) -> None:
         """Empty world ``w`` and set it up for ``scene``; no body has entered yet."""
         a, rig = self._a, scene.rig
-        settings = [dt, scene.numerics.skin, rig.domain_half_width, rig.outlet_height, rig.inlet_diameter / 2]
+        inside = rig.container(0.0)
+        settings = [dt, scene.numerics.skin, rig.domain_half_width, inside.height, inside.radius]
         exchange.load_world(a.world, w, np.array([*settings, *scene.gravity]))
         exchange.load_bodies(a.body, a.member, w, bodies.numbers, bodies.places, bodies.spheres, bodies.owner)
         tables = surface_tables(rig.surfaces(), len(scene.bodies), active)
@@ -101,6 +103,10 @@ class Batch:
     def set_active(self, w: int, surface: int, active: bool) -> None:
         """Switch a surface on or off."""
         exchange.set_active(self._a.world, self._a.surface, w, surface, int(active))
+
+    def set_container(self, w: int, inside: Container) -> None:
+        """What counts as inside the rig from now on (a cylinder that is lifted takes its inside along)."""
+        exchange.set_container(self._a.world, w, inside.height, inside.radius)
 
     def advance(self, steps: Ints) -> Array:
         """Run world w for ``steps[w]`` steps; returns :meth:`summary`."""

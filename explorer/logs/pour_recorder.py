@@ -103,4 +103,4 @@ def _curves(sample: Mapping[str, float]) -> Mapping[str, float]:
 
 def _angle_deg(pour: Pour) -> float:
     bodies = pour.bodies()
-    return angle_of_repose(PileReading(pile_of(pour.scene, bodies, member_spheres(pour.scene, bodies)))).value
+    return angle_of_repose(PileReading(pile_of(pour.container, bodies, member_spheres(pour.scene, bodies)))).value

@@ -12,8 +12,7 @@ import viser
 from explorer.live.frames import Frame
 from explorer.scene_meshes import GATE_NAME, body_triangles, rig_triangles
 from explorer.viewer.palette import BODY_COLOURS, GLASS, PLATE, RIM, RING, Colour, linear
-from solver.body import counts
-from solver.scene import Scene
+from solver.scene import Scene, body_counts
 
 Array = npt.NDArray[np.float64]
 
@@ -45,7 +44,7 @@ class SceneNodes:
     """Nodes of one scene; :meth:`show` moves the bodies."""
 
     def __init__(self, server: viser.ViserServer, scene: Scene) -> None:
-        self._numbers = counts(scene.bodies, scene.rig.mass)
+        self._numbers = body_counts(scene)
         self._bodies: list[Any] = []
         for k, (body, n) in enumerate(zip(scene.bodies, self._numbers, strict=True)):
             mesh, none = body_triangles(body), nowhere(n)
@@ -138,9 +137,7 @@ def rig_nodes(server: viser.ViserServer, scene: Scene) -> dict[str, Any]:
 
 
 def _circles(server: viser.ViserServer, scene: Scene) -> dict[str, Any]:
-    rig = scene.rig
-    ends = ((rig.outlet_diameter, rig.outlet_height), (rig.inlet_diameter, rig.inlet_height))
-    rims = np.concatenate([circle(diameter / 2.0, height) for diameter, height in ends])
+    rims = np.concatenate([circle(radius, height) for radius, height in rims_of(scene.rig)])
     radii = np.arange(RING_SPACING, PLATE_RADIUS + 1e-9, RING_SPACING)
     # Above the plate by the lines' thickness, so that they are not lost in it.
     rings = np.concatenate([circle(radius, LINE) for radius in radii])

@@ -103,6 +103,13 @@ def set_active(world: ti.template(), surface: ti.template(), w: ti.i32, s: ti.i3
 
 
 @ti.kernel
+def set_container(world: ti.template(), w: ti.i32, height: ti.f64, radius: ti.f64):
+    """What counts as inside the rig: above ``height`` [m] and within ``radius`` [m] of the z axis."""
+    world.outlet[w] = height
+    world.inlet_radius[w] = radius
+
+
+@ti.kernel
 def set_time_step(world: ti.template(), w: ti.i32, dt: ti.f64):
     """Replace the time step [s]."""
     world.dt[w] = dt
