@@ -40,6 +40,8 @@ def init(threads: int | None = None, arch: str = "cpu") -> None:
             default_fp=ti.f64,
             default_ip=ti.i32,
             fast_math=False,
+            # Leaving the data flow to LLVM makes the large kernel compile four times as fast and run 5–10 % slower.
+            cfg_optimization=False,
             log_level=ti.ERROR,
             **options,
         )

@@ -59,7 +59,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def load_material(name: str, relative_to: Path | None = None) -> Scene:
-    """Scene, in the default funnel unless the file says otherwise, from a shipped material's name or the path of a material file."""
+    """Scene from a shipped material's name or a material file's path, in the funnel unless the file says else."""
     path = asset_path("materials", name, relative_to=relative_to)
     try:
         return scene_from(read_toml(path), path)

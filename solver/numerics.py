@@ -21,6 +21,14 @@ class Numerics:
         doc="A pile whose bodies all move slower, √(2 kinetic energy / mass), is at rest.",
     )
     rest_time: float = param(0.1, unit="s", low=0.01, high=5.0, doc="How long it has to stay that slow.")
+    sleep_speed: float = param(
+        5e-4,
+        unit="m/s",
+        low=0.0,
+        high=0.1,
+        doc="A body slower than this, √(2 kinetic energy / mass), stands still until the forces on it change; 0: none.",
+    )
+    sleep_time: float = param(0.05, unit="s", low=1e-3, high=5.0, doc="How long it has to be that slow before.")
     hanging_bodies: float = param(
         1.0, low=0.0, high=1e3, doc="Number of bodies that may be left hanging in the funnel without a jam."
     )

@@ -142,6 +142,10 @@ class Pour:
         """Present state of all bodies that have entered."""
         return bodies_of(self.scene, self.order, self._layout, self.batch.bodies(self.w, self.entered))
 
+    def surface_poses(self) -> npt.NDArray[np.float64]:
+        """Where the rig's surfaces are: origin [m] and orientation wxyz, shape (k, 7)."""
+        return self.batch.surface_state(self.w)[:, :7]
+
     def record(self) -> Record:
         """What the run leaves behind."""
         state = self.batch.bodies(self.w, self.entered)
@@ -199,8 +203,7 @@ class Pour:
             if isinstance(action, Switch):
                 self.batch.set_active(self.w, action.surface, action.active)
             else:
-                velocity, spin = np.array(action.velocity), np.array(action.angular_velocity)
-                self.batch.set_motion(self.w, action.surface, velocity, spin)
+                self.batch.set_motion(self.w, action.surface, action.velocity, action.angular_velocity)
         if self.container != self._inside:
             self._inside = self.container
             self.batch.set_container(self.w, self._inside)

@@ -14,7 +14,8 @@ from solver.pour import Pour
 from solver.record import Record
 from solver.scene import Scene, body_counts
 from solver.state import Capacity
-from solver.world import Batch
+from solver.wall_tables import wall_tables
+from solver.world import Batch, wall_materials
 
 CONTACTS_PER_MEMBER = 16
 """Room in the contact list: entries per member sphere. A bed of long bodies holds 2–4."""
@@ -41,14 +42,20 @@ def capacity_for(scenes: Sequence[Scene], worlds: int) -> Capacity:
         numbers = body_counts(scene)
         bodies = max(bodies, sum(numbers))
         members = max(members, sum(n * len(b.clump.radii) for n, b in zip(numbers, scene.bodies, strict=True)))
-        kinds = max(kinds, len(scene.bodies) + 1)
+        kinds = max(kinds, len(scene.bodies) + len(wall_materials(scene)))
     members = 256 * (1 + members // 256)
+    tables = [wall_tables(scene.rig.surfaces()) for scene in scenes]
     return Capacity(
         worlds=worlds,
         bodies=32 * (1 + bodies // 32),
         members=members,
         contacts=CONTACTS_PER_MEMBER * members,
         kinds=kinds,
+        walls=max(8, *(len(table.poses) for table in tables)),
+        surfaces=max(8, *(len(table.surfaces) for table in tables)),
+        triangles=max(1, *(len(table.corners) for table in tables)),
+        cells=max(1, *(len(table.first) for table in tables)),
+        cell_items=max(1, *(len(table.items) for table in tables)),
     )
 
 

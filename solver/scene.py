@@ -8,7 +8,7 @@ Parameter paths (the same grammar in ``--set``, study files, sliders and the sto
     body.spheres                                         (coarse, standard, fine: for all bodies)
     rig.<name>   insertion.<name>   numerics.<name>
 
-Which rig it is (``rig.name`` in files and ``--set``) is no parameter: another rig has other parameters (:func:`with_rig`).
+Which rig it is (``rig.name`` in files and ``--set``) is no parameter: another rig has others (:func:`with_rig`).
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class Scene:
 
 def pour_rig(scene: Scene) -> PourRig:
     """The rig of ``scene``, if bodies are poured into it; :class:`ParameterError` for a bench test."""
-    if scene.rig.name not in RIGS:
+    if scene.rig.name in BENCH_RIGS:
         raise ParameterError(f"rig.name: {scene.rig.name!r} is a bench test; a pour needs one of {', '.join(RIGS)}")
     return cast(PourRig, scene.rig)
 
@@ -85,7 +85,7 @@ def body_counts(scene: Scene) -> tuple[int, ...]:
 
 
 def with_rig(scene: Scene, name: str) -> Scene:
-    """``scene`` in the rig ``name`` with its default dimensions, its wall as before, and the settings that suit the rig.
+    """``scene`` in the rig ``name``: default dimensions, the wall as before, and the settings that suit the rig.
 
     The result is not checked as a whole: dimensions may have to be set before the bodies fit in.
     """

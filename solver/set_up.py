@@ -27,7 +27,7 @@ def with_set_up(scene: Scene, table: Mapping[str, Any]) -> Scene:
 
 
 def with_settings(scene: Scene, values: Mapping[str, Any]) -> Scene:
-    """``scene`` with parameters replaced by path, as in :func:`solver.scene.with_values`, and ``rig.name`` before them."""
+    """``scene`` with parameters replaced by path (:func:`solver.scene.with_values`), ``rig.name`` before them."""
     settings = dict(values)
     name = settings.pop("rig.name", scene.rig.name)
     if name != scene.rig.name:

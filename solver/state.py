@@ -1,6 +1,6 @@
 """Arrays of a batch of worlds: what the kernels read and write, each with its unit and shape.
 
-Worlds are independent pours. Every array has the world as its leading axis; capacities are fixed when a batch is
+Worlds are independent runs. Every array has the world as its leading axis; capacities are fixed when a batch is
 allocated, and a world that outgrows them stops with the outcome ``buffer_overflow``.
 """
 
@@ -12,6 +12,7 @@ from solver.backend import ti
 Vec3 = ti.types.vector(3, ti.f64)
 Vec4 = ti.types.vector(4, ti.f64)
 Vec5 = ti.types.vector(5, ti.f64)
+Ints3 = ti.types.vector(3, ti.i32)
 Mat3 = ti.types.matrix(3, 3, ti.f64)
 
 
@@ -19,13 +20,26 @@ WORLD = {
     "dt": ti.f64,  # time step [s]
     "gravity": Vec3,  # [m/s²]
     "skin": ti.f64,  # reach of the contact list beyond touching [m]
-    "moved": ti.f64,  # largest travel of a body since the list was built [m]
+    "moved": ti.f64,  # largest travel of a body or wall since the list was built [m]
     "bodies": ti.i32,  # bodies that have entered
-    "surfaces": ti.i32,  # surfaces of the rig
+    "walls": ti.i32,  # walls of the rig
+    "primitives": ti.i32,  # surfaces that are planes or revolved segments; they come before the patches of meshes
     "contacts": ti.i32,  # entries of the contact list
+    "candidates": ti.i32,  # triangles that the entries refer to
     "rebuilds": ti.i32,  # how often the list was built
     "overflow": ti.i32,  # 1 once the contact list did not fit
     "overlap": ti.f64,  # largest overlap / member radius since it was cleared
+    "cell": ti.f64,  # edge of a cell of the body grid [m]
+    "kinds": ti.i32,  # contact classes
+    "sleep_speed": ti.f64,  # a body slower than this may fall asleep [m/s]; 0: none does
+    "sleep_time": ti.f64,  # once it has been so slow for this long [s]
+    "stirred": ti.i32,  # 1: who is awake has changed, or the list was built
+    "awake": ti.i32,  # bodies that move
+    "border": ti.i32,  # sleepers that something awake may push
+    "live": ti.i32,  # entries of the list whose force may change
+    "dissipated": ti.f64,  # energy that contacts and falling asleep have taken [J]
+    "wall_work": ti.f64,  # work of moving walls on the bodies [J]
+    "taken_out": ti.f64,  # kinetic and potential energy of bodies that were taken out [J]
     "domain": ti.f64,  # bodies beyond |x| or |y| of this are taken out [m]
     "outlet": ti.f64,  # height of the outlet [m]
     "inlet_radius": ti.f64,  # radius of the feed opening [m]
@@ -53,7 +67,15 @@ BODY = {
     "touching": ti.i32,  # number of touching contacts with other bodies, set by ``summarise``
     "low": Vec3,  # bounding box when the list was built [m]
     "high": Vec3,
-    "near": ti.i32,  # scratch of the list build: bodies whose boxes overlap
+    "next": ti.i32,  # the next body in the same cell of the grid, -1: none
+    "near": ti.i32,  # scratch of the list build: bodies, then triangles, that may be near
+    "quiet": ti.f64,  # how long it has been slower than ``sleep_speed`` [s]
+    "asleep": ti.i32,  # 1: stands still until the forces on it change
+    "held": Vec3,  # force [N] and
+    "held_torque": Vec3,  # torque [N m] on a sleeper from contacts in which nothing moves
+    "awake": ti.i32,  # list of the bodies that move, ascending
+    "border": ti.i32,  # list of the sleepers that something awake may push, ascending
+    "at_border": ti.i32,  # 1: is in that list
 }
 """Per body, shape (worlds, bodies)."""
 
@@ -72,21 +94,58 @@ HISTORY = {"i": ti.i32, "j": ti.i32, "spring": Vec3, "radius": ti.f64}
 CONTACT = {
     "i": ti.i32,  # member sphere
     "j": ti.i32,  # the other member sphere (> i), or members' capacity + index of a surface
+    "a": ti.i32,  # body of i
+    "b": ti.i32,  # body of j, or -1 - wall
+    "law": ti.i32,  # row of the law table
     "reduced_radius": ti.f64,  # R* = r_i r_j / (r_i + r_j), r_i against a surface [m]
     "reduced_mass": ti.f64,  # m* of the bodies, m_i against a surface [kg]
-    "kind": ti.i32,  # contact class of j's body or surface
     "spring": Vec3,  # tangential elastic force on i [N]
     "radius": ti.f64,  # contact radius a = sqrt(R* δ) at the last step [m]; 0: apart
+    "first": ti.i32,  # first of the triangles that may touch, for a patch of a mesh
+    "triangles": ti.i32,  # and how many
+    "live": ti.i32,  # list of the entries that have a body awake or a moving wall, ascending; then the others
 }
 """Per entry of the contact list, ordered by (i, j), shape (worlds, contacts)."""
 
-SURFACE = {
-    "shape": ti.i32,  # 0 plane z = geometry[0]; 1 revolved segment (r0, z0, r1, z1)
-    "geometry": Vec4,  # [m]
+WALL = {
+    "origin": Vec3,  # pose: local frame → world [m]
+    "quaternion": Vec4,
+    "turn": Mat3,  # the same as a matrix
+    "velocity": Vec3,  # of the origin [m/s]
+    "omega": Vec3,  # angular velocity about the origin, world frame [rad/s]
+    "moving": ti.i32,  # 1: the velocities are not zero
+    "extent": ti.f64,  # distance of its furthest point from the origin that a turn displaces [m]
+    "travel": ti.f64,  # bound on the motion of any of its points since the list was built [m]
     "kind": ti.i32,  # contact class
     "active": ti.i32,
+    "force": Vec3,  # force of the bodies on the wall at the last step [N]
+    "torque": Vec3,  # torque about the origin [N m]
+    "held": Vec3,  # the parts of both that contacts make in which nothing moves
+    "held_torque": Vec3,
+    "low": Vec3,  # lower corner of a mesh's grid, local frame [m]
+    "cell": ti.f64,  # edge of its cells [m]; 0: no mesh
+    "cells": Ints3,  # number of cells along each axis
+    "first_cell": ti.i32,  # where its cells begin
 }
-"""Per surface, shape (worlds, surfaces)."""
+"""Per surface of the rig as declared, shape (worlds, walls)."""
+
+SURFACE = {
+    "shape": ti.i32,  # 0 plane, 1 revolved segment, 2 smooth patch of a triangle mesh
+    "geometry": Vec4,  # of a revolved segment: r0, z0, r1, z1 [m]
+    "wall": ti.i32,
+}
+"""What a sphere can touch: a primitive is one, a mesh one per smooth patch; shape (worlds, surfaces)."""
+
+TRIANGLE = {
+    "a": Vec3,  # corners in the frame of the wall [m]
+    "b": Vec3,
+    "c": Vec3,
+    "surface": ti.i32,
+    "edges": Ints3,  # what to do with a nearest point on ab, bc, ca: 0 keep, 1 leave it to the other patch, 2 see guard
+    "corners": Ints3,  # the same at a, b, c: 0 keep, 1 leave it to the other patch
+    "guards": Mat3,  # row per edge: unit vector in the neighbour's plane, away from the edge
+}
+"""Per triangle of the meshes, ordered by surface, shape (worlds, triangles)."""
 
 SUMMARY = {
     "kinetic": ti.f64,  # kinetic energy [J]
@@ -98,6 +157,7 @@ SUMMARY = {
     "in_funnel": ti.f64,  # mass above the outlet [kg]
     "touching": ti.i32,  # touching contacts
     "hanging": ti.i32,  # bodies above the outlet
+    "asleep": ti.i32,  # bodies that sleep
     "finite": ti.i32,  # 0 once a number is not finite
 }
 """Per world, written by the kernel at the end of a launch, shape (worlds,)."""
@@ -111,8 +171,24 @@ class Capacity:
     bodies: int
     members: int
     contacts: int
-    surfaces: int = 4
     kinds: int = 6
+    walls: int = 8
+    surfaces: int = 8
+    triangles: int = 1
+    cells: int = 1
+    """Cells of all meshes' grids, and one more."""
+    cell_items: int = 1
+    """Triangles in those cells, counted once per cell."""
+
+    @property
+    def buckets(self) -> int:
+        """Size of the body grid's hash table: a power of two, at least twice the bodies."""
+        return 1 << (2 * self.bodies - 1).bit_length()
+
+    @property
+    def candidates(self) -> int:
+        """Triangles that the contact list may refer to."""
+        return 8 * self.contacts if self.triangles > 1 else 1
 
 
 @ti.data_oriented
@@ -124,8 +200,9 @@ class Group:
             setattr(self, name, _field(dtype, shape))
 
 
-class Arrays:
-    """All arrays of a batch. Taichi never frees fields, so batches of one capacity share them (:func:`arrays`)."""
+@ti.data_oriented
+class State:
+    """All arrays of a batch. Taichi never frees fields, so batches of one capacity share them (:func:`state`)."""
 
     def __init__(self, capacity: Capacity) -> None:
         c = capacity
@@ -134,9 +211,15 @@ class Arrays:
         self.member = Group(MEMBER, (c.worlds, c.members))
         self.contact = Group(CONTACT, (c.worlds, c.contacts))
         self.history = Group(HISTORY, (c.worlds, c.contacts))
+        self.wall = Group(WALL, (c.worlds, c.walls))
         self.surface = Group(SURFACE, (c.worlds, c.surfaces))
+        self.triangle = Group(TRIANGLE, (c.worlds, c.triangles))
         self.summary = Group(SUMMARY, (c.worlds,))
-        self.law = Group({"pair": Vec5}, (c.worlds, c.kinds, c.kinds))
+        self.grid = Group({"bucket": ti.i32}, (c.worlds, c.buckets))  # first body of each cell, -1: none
+        self.mesh_cell = Group({"first": ti.i32}, (c.worlds, c.cells))  # where the cell's triangles begin
+        self.mesh_item = Group({"triangle": ti.i32}, (c.worlds, c.cell_items))
+        self.candidate = Group({"triangle": ti.i32}, (c.worlds, c.candidates))
+        self.law = Group({"row": Vec5}, (c.worlds, c.kinds * c.kinds))
 
 
 def _field(dtype, shape):
@@ -146,6 +229,6 @@ def _field(dtype, shape):
 
 
 @cache
-def arrays(capacity: Capacity) -> Arrays:
+def state(capacity: Capacity) -> State:
     """Arrays of that capacity; the same ones at every call, so only one batch of a capacity may live at a time."""
-    return Arrays(capacity)
+    return State(capacity)

@@ -1,5 +1,7 @@
 """A batch of worlds: the only owner of mutable state. NumPy in, NumPy out; no formula of physics stands here."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
@@ -8,10 +10,10 @@ from solver.kernels import exchange
 from solver.kernels.batch import advance, measure, take_out
 from solver.laws.hertz_mindlin import constants
 from solver.layout import Layout
-from solver.rigs import Plane, Surface
 from solver.rigs.rig import Container
 from solver.scene import Scene
-from solver.state import Capacity, arrays
+from solver.state import Capacity, state
+from solver.wall_tables import WallTables, extent, wall_tables
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]
@@ -31,120 +33,140 @@ SUMMARY_COLUMNS = (
     "overlap",
     "rebuilds",
     "contacts",
+    "asleep",
+    "dissipated",
+    "wall_work",
+    "taken_out",
 )
 """Columns of a summary, SI; what they mean stands in ``state.SUMMARY`` and ``state.WORLD``."""
 
 
+def wall_materials(scene: Scene) -> tuple[str, ...]:
+    """Materials of the rig's surfaces, each once, in order of appearance."""
+    return tuple(dict.fromkeys(surface.material for surface in scene.rig.surfaces()))
+
+
 def law_table(scene: Scene) -> Array:
-    """Contact constants for all pairs of classes: the bodies in order, then the wall; shape (kinds, kinds, 5)."""
+    """Contact constants of all pairs of classes, shape (kinds, kinds, 5): the bodies, then the wall materials."""
+    walls = wall_materials(scene)
     n = len(scene.bodies)
-    wall = scene.rig.wall
-    materials = [scene.material(body.material) for body in scene.bodies] + [scene.material(wall)]
-    table = np.zeros((n + 1, n + 1, 5))
+    materials = [scene.material(body.material) for body in scene.bodies] + [scene.material(name) for name in walls]
+    table = np.zeros((n + len(walls), n + len(walls), 5))
     for a, one in enumerate(scene.bodies):
-        others: tuple[Body | str, ...] = (*scene.bodies, wall)
+        others: tuple[Body | str, ...] = (*scene.bodies, *walls)
         for b, other in enumerate(others):
             row = constants(materials[a], materials[b], scene.contact_pair(one, other))
             table[a, b] = table[b, a] = row
     return table
 
 
-def surface_tables(surfaces: tuple[Surface, ...], kind: int, active: tuple[bool, ...]) -> tuple[Array, Ints]:
-    """Geometry (s, 4) and marks (shape, kind, active) (s, 3) of surfaces that share contact class ``kind``."""
-    geometry = np.zeros((len(surfaces), 4))
-    marks = np.zeros((len(surfaces), 3), dtype=np.int32)
-    for s, surface in enumerate(surfaces):
-        if isinstance(surface, Plane):
-            geometry[s] = (surface.height, 0, 0, 0)
-        else:
-            geometry[s] = (surface.r0, surface.z0, surface.r1, surface.z1)
-        marks[s] = (0 if isinstance(surface, Plane) else 1, kind, active[s])
-    return geometry, marks
-
-
 class Batch:
-    """Worlds side by side. ``w`` is the index of a world throughout."""
+    """Worlds side by side. ``w`` is the index of a world throughout, ``wall`` that of a surface of its rig."""
 
     def __init__(self, capacity: Capacity) -> None:
         self.capacity = capacity
-        self._a = arrays(capacity)
+        self._s = state(capacity)
         self._steps = np.zeros(capacity.worlds, dtype=np.int32)
+        self._scenes: dict[int, Scene] = {}
 
-    def load(self, w: int, scene: Scene, bodies: Layout, dt: float, active: tuple[bool, ...]) -> None:
-        """Empty world ``w`` and set it up for ``scene``; no body has entered yet."""
-        a, rig = self._a, scene.rig
+    def load(self, w: int, scene: Scene, bodies: Layout, dt: float, active: Sequence[bool]) -> None:
+        """Empty world ``w`` and set it up for ``scene``; no body has entered yet. ``active``: one per surface."""
+        s, rig, numerics = self._s, scene.rig, scene.numerics
+        cell = 2.0 * float(bodies.numbers[:, 4].max()) + numerics.skin
+        sleep_speed = numerics.sleep_speed if any(scene.gravity) else 0.0
+        settings = [dt, numerics.skin, cell, sleep_speed, numerics.sleep_time]
         inside = rig.container(0.0)
-        settings = [dt, scene.numerics.skin, rig.domain_half_width, inside.height, inside.radius]
-        exchange.load_world(a.world, w, np.array([*settings, *scene.gravity]))
-        exchange.load_bodies(a.body, a.member, w, bodies.numbers, bodies.places, bodies.spheres, bodies.owner)
-        tables = surface_tables(rig.surfaces(), len(scene.bodies), active)
-        exchange.load_surfaces(a.world, a.surface, w, *tables)
+        settings += [rig.domain_half_width, inside.height, inside.radius, *scene.gravity]
+        exchange.load_world(s, w, np.array(settings))
+        exchange.load_bodies(s, w, bodies.numbers, bodies.places, bodies.spheres, bodies.owner)
+        self._load_walls(w, scene, wall_tables(rig.surfaces()), active)
+        self._scenes[w] = scene
         self.set_law(w, law_table(scene))
 
     def set_law(self, w: int, table: Array) -> None:
-        """Replace the contact constants (see :func:`law_table`)."""
-        exchange.load_law(self._a.law, w, np.ascontiguousarray(table))
+        """Replace the contact constants (see :func:`law_table`); wakes all bodies."""
+        kinds = len(table)
+        exchange.load_law(self._s, w, np.ascontiguousarray(table.reshape(kinds * kinds, -1)), kinds)
 
     def set_time_step(self, w: int, dt: float) -> None:
         """Replace the time step [s]."""
-        exchange.set_time_step(self._a.world, w, dt)
+        exchange.set_time_step(self._s, w, dt)
+
+    def set_sleep(self, w: int, speed: float, time: float) -> None:
+        """Replace ``numerics.sleep_speed`` [m/s] (0: no body sleeps) and ``sleep_time`` [s]; wakes all bodies."""
+        exchange.set_sleep(self._s, w, speed, time)
+
+    def set_gravity(self, w: int, gravity: Sequence[float]) -> None:
+        """Replace gravity [m/s²]; wakes all bodies."""
+        exchange.set_gravity(self._s, w, *(float(g) for g in gravity))
 
     def scale_springs(self, w: int, ratio: Array) -> None:
         """Multiply tangential springs by ``ratio[kind, kind]``."""
-        a = self._a
-        table = np.ascontiguousarray(ratio)
-        exchange.scale_springs(a.world, a.body, a.member, a.contact, w, table)
+        exchange.scale_springs(self._s, w, np.ascontiguousarray(ratio.ravel()))
 
     def enter(self, w: int, b: int, position: Array, quaternion: Array, velocity: Array, spin: Array) -> None:
         """Let body ``b`` enter (or put it somewhere else): SI, quaternion wxyz, spin in the principal frame."""
         pose = np.concatenate([position, quaternion, velocity, spin]).astype(float)
-        exchange.load_state(self._a.world, self._a.body, w, b, pose)
+        exchange.load_state(self._s, w, b, pose)
 
-    def set_active(self, w: int, surface: int, active: bool) -> None:
-        """Switch a surface on or off."""
-        exchange.set_active(self._a.world, self._a.surface, w, surface, int(active))
+    def set_active(self, w: int, wall: int, active: bool) -> None:
+        """Switch a surface on or off; wakes all bodies."""
+        exchange.set_active(self._s, w, wall, int(active))
+
+    def set_motion(self, w: int, wall: int, velocity: Sequence[float], angular_velocity: Sequence[float]) -> None:
+        """Let a surface move: ``velocity`` [m/s] of its pose's origin, ``angular_velocity`` [rad/s, world] about it."""
+        rig = self._scenes[w].rig
+        reach = extent(rig.surfaces()[wall], angular_velocity, rig.domain_half_width)
+        exchange.set_motion(self._s, w, wall, np.array([*velocity, *angular_velocity, reach], dtype=float))
 
     def set_container(self, w: int, inside: Container) -> None:
         """What counts as inside the rig from now on (a cylinder that is lifted takes its inside along)."""
-        exchange.set_container(self._a.world, w, inside.height, inside.radius)
+        exchange.set_container(self._s, w, inside.height, inside.radius)
 
     def advance(self, steps: Ints) -> Array:
         """Run world w for ``steps[w]`` steps; returns :meth:`summary`."""
-        a = self._a
         self._steps[:] = steps
-        advance(
-            a.world,
-            a.body,
-            a.member,
-            a.contact,
-            a.history,
-            a.surface,
-            a.law,
-            a.summary,
-            self._steps,
-        )
+        advance(self._s, self._steps)
         return self.summary()
 
     def measure(self, w: int) -> Array:
         """Bring the summary of world ``w`` up to date without a step; returns :meth:`summary`."""
-        a = self._a
-        measure(a.world, a.body, a.member, a.contact, a.surface, a.law, a.summary, w)
+        measure(self._s, w)
         return self.summary()
 
     def summary(self) -> Array:
         """One row per world, columns ``SUMMARY_COLUMNS``, as of the last launch."""
         out = np.zeros((self.capacity.worlds, len(SUMMARY_COLUMNS)))
-        exchange.read_summary(self._a.world, self._a.summary, out)
+        exchange.read_summary(self._s, out)
         return out
 
     def take_out(self, w: int) -> int:
         """Take bodies out that left the domain, and start looking for the largest overlap anew; returns the lost."""
-        exchange.clear_overlap(self._a.world, w)
-        return int(take_out(self._a.world, self._a.body, w))
+        exchange.clear_overlap(self._s, w)
+        return int(take_out(self._s, w))
 
     def bodies(self, w: int, n: int) -> Array:
-        """State of the first ``n`` bodies: position 0:3, quaternion 3:7, velocity 7:10, spin 10:13, alive, touching."""
-        out = np.zeros((n, 15))
+        """First ``n`` bodies: position 0:3, quaternion 3:7, velocity 7:10, spin 10:13, alive, touching, asleep."""
+        out = np.zeros((n, 16))
         if n:
-            exchange.read_bodies(self._a.body, w, out)
+            exchange.read_bodies(self._s, w, out)
         return out
+
+    def surface_state(self, w: int) -> Array:
+        """Per surface: origin 0:3, quaternion 3:7, velocity 7:10, angular velocity 10:13, force 13:16, torque 16:19.
+
+        The pose is that after the last step, force [N] and torque about the origin [N m] are those at its beginning.
+        """
+        out = np.zeros((len(self._scenes[w].rig.surfaces()), 19))
+        exchange.read_walls(self._s, w, out)
+        return out
+
+    def _load_walls(self, w: int, scene: Scene, tables: WallTables, active: Sequence[bool]) -> None:
+        s, walls = self._s, wall_materials(scene)
+        kinds = [len(scene.bodies) + walls.index(surface.material) for surface in scene.rig.surfaces()]
+        marks = np.array(list(zip(kinds, map(int, active), strict=True)), dtype=np.int32)
+        exchange.load_walls(s, w, tables.poses, marks, tables.grids, tables.cells)
+        exchange.load_surfaces(s, w, tables.geometry, tables.surfaces, tables.primitives)
+        if len(tables.corners):
+            exchange.load_triangles(s, w, tables.corners, tables.guards, tables.triangles)
+            exchange.load_cells(s, w, tables.first, tables.items)

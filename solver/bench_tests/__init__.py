@@ -1,7 +1,7 @@
 """Bench tests: the paper's own measurements of single bodies, run on the solver that was given the answers.
 
-Each has a rig (``solver/rigs``, ``BENCH_RIGS``) with its parameters and a file here with ``measure(scene)``. A new one is
-those two files and a line in each of the two lists.
+Each has a rig (``solver/rigs``, ``BENCH_RIGS``) with its parameters, and a file here with ``measure(scene)``. A new one
+is those two files and a line in each of the two lists.
 """
 
 from __future__ import annotations

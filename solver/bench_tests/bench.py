@@ -1,4 +1,4 @@
-"""A bench with one body on it: the small driver of the tests that measure a single body. No pour, no sleeping bodies."""
+"""A bench with one body on it: the driver of the tests that measure a single body. No pour, and nothing sleeps."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """Contact moduli from squeezing and shearing a sphere between plates (``rigs/compression.py``).
 
-    E*       least squares of F on 4/3 √R δ^1.5 over the upper three quarters of the approach
-    G*       least-squares slope of F_t on u, divided by 8 a, at the preload where the squeezing ended
-    paper    Equation (1): E = (F/A)/(ΔL/T), A = π R δ the area of the contact, ΔL = 2 δ, T = 2 R
-             = 4 E* √R/(3 π √δ): no constant of the material, which is why it is shown over the approach
+E*       least squares of F on 4/3 √R δ^1.5 over the upper three quarters of the approach
+G*       least-squares slope of F_t on u, divided by 8 a, at the preload where the squeezing ended
+paper    Equation (1): E = (F/A)/(ΔL/T), A = π R δ the area of the contact, ΔL = 2 δ, T = 2 R
+         = 4 E* √R/(3 π √δ): no constant of the material, which is why it is shown over the approach
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def measure(scene: Scene) -> BenchResult:
     g_star = math.nan
     if friction > 0.0:
         contact_radius = math.sqrt(radius * overlap[-1])
-        # The shift at which the tangential force would be the wanted share of sliding, if G* were 0.4 E* (ν = 0.3 is 0.37).
+        # Where the tangential force is the wanted share of sliding, were G* = 0.4 E* (for ν = 0.3 it is 0.41 E*).
         shift = 2.0 * rig.shear_load * friction * force[-1] / (8.0 * 0.4 * e_star * contact_radius)
         slip, tangential = _shear(bench, rig, shift)
         g_star = float(np.polyfit(slip, tangential, 1)[0]) / (8.0 * contact_radius)

@@ -4,8 +4,8 @@
     paper             e = L/(2H), L the horizontal distance flown until H below the place of the impact:
                       L = v_x (v_z + √(v_z² + 2gH))/g
 
-A sphere that grips the plate leaves with 5/7 of its tangential speed: v_x = (e + 5/7)/2 · √(2gH), v_z = (e − 5/7)/2 · √(2gH),
-so that the paper's estimate gives 0.546 for e = 0.50, and a smooth one gives 0.586.
+A sphere that grips the plate leaves with 5/7 of its tangential speed, v_x = (e + 5/7)/2 · √(2gH) and
+v_z = (e − 5/7)/2 · √(2gH), so that the paper's estimate gives 0.546 for e = 0.50; a smooth one gives 0.586.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ NORMAL = np.array([1.0, 0.0, 1.0]) / math.sqrt(2.0)
 BEFORE_IMPACT = 1e-3
 """From this long [s] before the impact on, the body is watched closely."""
 FLIGHT = 3e-3
-"""A body that has not touched the plate for this long [s] has bounced off; shorter flights are rocking from end to end."""
+"""A body that has not touched the plate for this long [s] has bounced off; before, it may rock from end to end."""
 GIVEN_UP = 1.0
 """A body that has not bounced off this long [s] after the impact is given up."""
 MOMENT_STEPS = 5
@@ -75,7 +75,7 @@ def measure(scene: Scene) -> BenchResult:
             ("restitution", tuple(tracked.tolist())),
         ),
         table=paper_bias(scene),
-        note="" if rig.specimen == "sphere" else "a body that hits off centre gives back less than the pair's restitution",
+        note="" if rig.specimen == "sphere" else "a body that hits off centre gives back less than its contact does",
     )
 
 

@@ -1,9 +1,9 @@
 """Angle at which a body begins to slide (``rigs/inclined_plane.py``).
 
-First a fast tilt finds the angle roughly, then a slow one from ``MARGIN`` below it measures. Sliding is noticed late, at
-``SLIDING`` speed; as the tilt grows in proportion to time, so does the acceleration, s = v Δt/3 after the onset, and the
-onset is traced back by Δt = 3 s/v. What the elastic contact yields before it slides (micrometres) is in s and adds to Δt
-a few thousandths of a degree.
+First a fast tilt finds the angle roughly, then a slow one from ``MARGIN`` below it measures. Sliding is noticed late,
+at ``SLIDING`` speed; as the tilt grows in proportion to time, so does the acceleration, s = v Δt/3 after the onset, and
+the onset is traced back by Δt = 3 s/v. What the elastic contact yields before it slides (micrometres) is in s and adds
+a few thousandths of a degree to Δt.
 """
 
 from __future__ import annotations

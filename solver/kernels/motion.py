@@ -15,39 +15,48 @@ MIDPOINT_ITERATIONS = 3
 
 
 @ti.func
-def prepare(body: ti.template(), member: ti.template(), w, b):
+def prepare(s: ti.template(), w, b):
     """What contacts need of a listed body: member centres and the angular velocity in the world frame."""
-    place_members(body, member, w, b, False)
-    body.omega[w, b] = body.rotation[w, b] @ body.spin[w, b]
+    if s.body.listed[w, b] == 1:
+        place_members(s, w, b, False)
+        s.body.omega[w, b] = s.body.rotation[w, b] @ s.body.spin[w, b]
 
 
 @ti.func
 def spun(spin, inertia, torque, dt):
     """Spin [rad/s] after ``dt`` under ``torque`` [N m], both in the principal frame."""
+    scale = dt / inertia
     new = spin
     for _ in ti.static(range(MIDPOINT_ITERATIONS)):
         mid = 0.5 * (spin + new)
-        new = spin + dt * (torque - mid.cross(inertia * mid)) / inertia
+        new = spin + scale * (torque - mid.cross(inertia * mid))
     return new
 
 
 @ti.func
-def move(world: ti.template(), body: ti.template(), w, b):
+def energy_per_mass(s: ti.template(), w, b):
+    """Kinetic energy of a body divided by half its mass [m²/s²]."""
+    v, spin = s.body.velocity[w, b], s.body.spin[w, b]
+    return v.dot(v) + spin.dot(s.body.inertia[w, b] * spin) / s.body.mass[w, b]
+
+
+@ti.func
+def move(s: ti.template(), w, b):
     """Advance one body by a step and clear its force and torque."""
-    dt = world.dt[w]
-    velocity = body.velocity[w, b] + dt * world.gravity[w]
+    dt = s.world.dt[w]
+    velocity = s.body.velocity[w, b] + dt * s.world.gravity[w]
     torque = Vec3(0.0, 0.0, 0.0)
-    if body.listed[w, b] == 1:
-        velocity += dt / body.mass[w, b] * body.force[w, b]
-        torque = body.rotation[w, b].transpose() @ body.torque[w, b]
-        body.force[w, b] = Vec3(0.0, 0.0, 0.0)
-        body.torque[w, b] = Vec3(0.0, 0.0, 0.0)
-    spin = spun(body.spin[w, b], body.inertia[w, b], torque, dt)
-    body.velocity[w, b] = velocity
-    body.spin[w, b] = spin
-    body.position[w, b] += dt * velocity
-    body.quaternion[w, b] = turned(body.quaternion[w, b], spin, dt)
-    speed = ti.sqrt(velocity.dot(velocity)) + ti.sqrt(spin.dot(spin)) * body.reach[w, b]
-    travel = body.travel[w, b] + dt * speed
-    body.travel[w, b] = travel
-    world.moved[w] = ti.max(world.moved[w], travel)
+    if s.body.listed[w, b] == 1:
+        velocity += dt / s.body.mass[w, b] * s.body.force[w, b]
+        torque = s.body.rotation[w, b].transpose() @ s.body.torque[w, b]
+        s.body.force[w, b] = Vec3(0.0, 0.0, 0.0)
+        s.body.torque[w, b] = Vec3(0.0, 0.0, 0.0)
+    spin = spun(s.body.spin[w, b], s.body.inertia[w, b], torque, dt)
+    s.body.velocity[w, b] = velocity
+    s.body.spin[w, b] = spin
+    s.body.position[w, b] += dt * velocity
+    s.body.quaternion[w, b] = turned(s.body.quaternion[w, b], spin, dt)
+    speed = ti.sqrt(velocity.dot(velocity)) + ti.sqrt(spin.dot(spin)) * s.body.reach[w, b]
+    travel = s.body.travel[w, b] + dt * speed
+    s.body.travel[w, b] = travel
+    s.world.moved[w] = ti.max(s.world.moved[w], travel)

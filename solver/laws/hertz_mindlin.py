@@ -67,9 +67,15 @@ def constants(one: Material, two: Material, pair: Pair) -> tuple[float, float, f
 
 
 @ti.func
-def normal_force(law, a, overlap, inertia, v_n):
-    """Normal force [N], never tensile; ``inertia`` is √(a m*), ``v_n`` [m/s] is positive while separating."""
-    return ti.max(0.0, 4.0 / 3.0 * law[0] * a * overlap - law[3] * inertia * v_n)
+def normal_spring_force(law, a, overlap):
+    """Elastic normal force 4/3 E* a δ [N]."""
+    return 4.0 / 3.0 * law[0] * a * overlap
+
+
+@ti.func
+def normal_damping_force(law, inertia, v_n):
+    """Damping force [N]; ``inertia`` is √(a m*), ``v_n`` [m/s] is positive while separating."""
+    return -law[3] * inertia * v_n
 
 
 @ti.func
@@ -102,6 +108,15 @@ def tangential_force(law, a, a_before, spring, n, v_t, inertia, f_n, dt):
 
 
 @ti.func
-def elastic_energy(law, a, overlap, spring):
-    """Energy in the springs of a contact [J]: 8/15 E* a δ² (Hertz) + T²/(2 k_t)."""
-    return 8.0 / 15.0 * law[0] * a * overlap * overlap + spring.dot(spring) / (16.0 * law[1] * a)
+def hertz_energy(law, a, overlap):
+    """Energy in the normal spring [J]: 8/15 E* a δ²."""
+    return 8.0 / 15.0 * law[0] * a * overlap * overlap
+
+
+@ti.func
+def spring_energy(law, spring2, a):
+    """Energy in the tangential spring T of a contact of radius ``a`` [J]: T²/(2 k_t), ``spring2`` = T²; 0 apart."""
+    energy = 0.0
+    if a > 0.0:
+        energy = spring2 / (16.0 * law[1] * a)
+    return energy

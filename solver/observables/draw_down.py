@@ -12,6 +12,7 @@ import dataclasses
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from solver.observables.repose import flank_angles_deg
 from solver.observables.silhouette import PIXEL, largest_part, silhouette
@@ -37,7 +38,7 @@ def draw_down_angle_right(record: Record) -> Value:
 
 
 def slopes_deg(spheres: Spheres, floor: float) -> tuple[float, float]:
-    """Angles [°] at which ``spheres`` above ``floor`` [m] slope down towards x = 0, from -x and from +x; NaN for none."""
+    """Angles [°] at which ``spheres`` above ``floor`` [m] slope down towards x = 0, from -x and +x; NaN if none."""
     left = _part(spheres, spheres.centre[:, 0] < 0.0, floor)
     right = _part(spheres, spheres.centre[:, 0] > 0.0, floor)
     return (
@@ -52,9 +53,10 @@ def _sides_deg(record: Record) -> tuple[float, float]:
     upper = np.flatnonzero(inside & (position[:, 2] > floor))
     spheres = record.spheres
     kept = np.isin(spheres.body, upper)
-    return slopes_deg(dataclasses.replace(spheres, centre=spheres.centre[kept], radius=spheres.radius[kept]), floor)
+    return slopes_deg(_part(spheres, kept, 0.0), floor)
 
 
-def _part(spheres: Spheres, chosen: np.ndarray, floor: float) -> Spheres:
+def _part(spheres: Spheres, chosen: npt.NDArray[np.bool_], floor: float) -> Spheres:
     """The chosen spheres, with heights from ``floor`` [m]."""
-    return dataclasses.replace(spheres, centre=spheres.centre[chosen] - [0.0, 0.0, floor], radius=spheres.radius[chosen])
+    centre = spheres.centre[chosen] - np.array([0.0, 0.0, floor])
+    return dataclasses.replace(spheres, centre=centre, radius=spheres.radius[chosen], body=spheres.body[chosen])

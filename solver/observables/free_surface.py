@@ -71,7 +71,7 @@ def slope_angle_deg(x: Array, height: Array, half_width: float) -> float:
 
 
 def time_profile(surface: FreeSurface) -> Array:
-    """Median over time of the height over each column [m], shape (c,); NaN where the bed stands half of the time or less."""
+    """Median over time of the height over each column [m], shape (c,); NaN where half of the time there is no bed."""
     known = np.isfinite(surface.height)
     filled = np.where(known, surface.height, -np.inf)
     median = np.median(filled, axis=0)

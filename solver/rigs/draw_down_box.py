@@ -1,5 +1,5 @@
-"""The draw-down box: an upper box with a slot in its floor is filled, the slot opens, material stays on both sides of it
-and a pile forms below.
+"""The draw-down box: an upper box with a slot in its floor is filled, the slot opens, material stays on both sides of
+it and a pile forms below.
 
     |                |     ↑ box_height
     |\\              /|
@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from solver.params import ParameterError, param
 from solver.rigs.feed import BoxFeed
 from solver.rigs.rig import DISCHARGE, Action, Container, PourRig, Switch
-from solver.rigs.surface import Plane, Surface, horizontal, rectangle
+from solver.rigs.surface import Surface, horizontal, rectangle
 from solver.rigs.turns import FACING_MINUS_Y, FACING_PLUS_Y, turned_plane
 
 

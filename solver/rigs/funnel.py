@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from solver.params import ParameterError, param
 from solver.rigs.feed import RoundFeed
 from solver.rigs.rig import DISCHARGE, PILE, Action, Container, PourRig, Switch
-from solver.rigs.surface import Plane, Revolved, Surface
+from solver.rigs.surface import Revolved, Surface, horizontal
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Funnel(PourRig):
         """Plate, cone and gate, in the order of ``surface_names``."""
         outlet, inlet = self.outlet_diameter / 2.0, self.inlet_diameter / 2.0
         return (
-            Plane(0.0, self.wall),
+            horizontal(0.0, self.wall),
             Revolved(outlet, self.outlet_height, inlet, self.inlet_height, self.wall),
             Revolved(0.0, self.outlet_height, outlet, self.outlet_height, self.wall),
         )
@@ -87,4 +87,3 @@ class Funnel(PourRig):
                 f"rig.outlet_diameter: {self.outlet_diameter:g} m is narrower than a body "
                 f"({widest_body:g} m); allowed: more than {widest_body:g} m"
             )
-

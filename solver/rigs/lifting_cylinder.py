@@ -6,8 +6,8 @@
        |________|   ↓
     ─────────────────────  plate, z = 0
 
-A slow rig: the material flows out at the bottom edge without falling, so that a pile shows friction where a funnel shows
-impacts. The plate is infinite; bodies that roll further than ``domain_half_width`` from the axis are taken out.
+A slow rig: the material flows out at the bottom edge without falling, so that a pile shows friction where a funnel
+shows impacts. The plate is infinite; bodies that roll further than ``domain_half_width`` from the axis are taken out.
 Source: Roessler & Katterfeld 2019, Particuology 45:17 (angle of repose test); dimensions are ours.
 """
 

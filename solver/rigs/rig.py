@@ -75,8 +75,8 @@ class Switch:
 
 @dataclass(frozen=True)
 class Move:
-    """Let surface number ``surface`` move from ``after`` [s] on: its origin at ``velocity`` [m/s], the surface about it at
-    ``angular_velocity`` [rad/s], both in the world."""
+    """Let surface number ``surface`` move from ``after`` [s] on: its origin at ``velocity`` [m/s], the surface about it
+    at ``angular_velocity`` [rad/s], both in the world."""
 
     after: float
     surface: int
@@ -89,7 +89,7 @@ Action = Switch | Move
 
 @dataclass(frozen=True)
 class Watch:
-    """Keep the free surface y(x) at every sample from ``after`` [s] on: |x| up to ``half_width``, y from ``height`` [m]."""
+    """Keep the free surface at every sample from ``after`` [s] on: |x| up to ``half_width``, y from ``height`` [m]."""
 
     after: float
     half_width: float
@@ -155,6 +155,7 @@ class BenchRig(Rig, Protocol):
 
     def check(self, widest_body: float) -> None:
         """Every body fits."""
+        return
 
 
 class PourRig(Rig, Protocol):

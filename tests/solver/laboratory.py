@@ -49,7 +49,7 @@ def bench(body=None, friction=0.3, restitution=0.5, wall_friction=None, gravity=
 class Laboratory:
     """``n`` bodies of a scene, put where a test wants them."""
 
-    def __init__(self, scene, n, dt=None, fraction=0.1, plate=True):
+    def __init__(self, scene, n, dt=None, fraction=0.1, plate=True, active=None):
         self.scene = dataclasses.replace(
             scene, numerics=dataclasses.replace(scene.numerics, rayleigh_fraction=fraction)
         )
@@ -58,7 +58,7 @@ class Laboratory:
         room = dataclasses.replace(capacity_for([self.scene], 1), bodies=256, members=2048, contacts=32768)
         self.batch = Batch(room)
         order = np.zeros(n, dtype=np.int32)
-        self.batch.load(0, self.scene, layout(self.scene, order), self.dt, (plate, False, False))
+        self.batch.load(0, self.scene, layout(self.scene, order), self.dt, active or (plate, False, False))
 
     def put(self, b, position, velocity=AT_REST, spin=AT_REST, quaternion=UPRIGHT):
         """Place body ``b``: velocity in the world, spin in the principal frame."""

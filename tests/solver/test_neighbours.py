@@ -6,7 +6,7 @@ from scipy.optimize import minimize_scalar
 
 from solver.backend import ti
 from solver.insertion import rotation_matrix
-from solver.kernels.geometry import nearest
+from solver.kernels.geometry import nearest_on_revolved
 from solver.material_file import load_material
 from solver.run import Job, run_pours
 from solver.scene import with_values
@@ -20,7 +20,7 @@ SMALL = {"rig.mass": "5g", "body.spheres": "coarse", "insertion.rate": "100g/s",
 @ti.kernel
 def distance_to_cone(out: ti.types.ndarray(dtype=ti.f64, ndim=1), g: ti.types.ndarray(dtype=ti.f64, ndim=1)):
     for _ in range(1):
-        hit = nearest(1, Vec4(g[0], g[1], g[2], g[3]), Vec3(g[4], g[5], g[6]))
+        hit = nearest_on_revolved(Vec4(g[0], g[1], g[2], g[3]), Vec3(g[4], g[5], g[6]))
         for k in ti.static(range(4)):
             out[k] = hit[k]
 

@@ -49,9 +49,7 @@ def surface_of(heights, times=None):
 
 
 def record_with(surface):
-    return dataclasses.replace(
-        record_of(empty_pile(), np.array([0.0]), np.array([0.0]), 0.03), free_surface=surface
-    )
+    return dataclasses.replace(record_of(empty_pile(), np.array([0.0]), np.array([0.0]), 0.03), free_surface=surface)
 
 
 @pytest.mark.parametrize("angle", [0.0, 20.0, 35.0, -25.0])

@@ -1,0 +1,82 @@
+"""Sums over a world as it stands: energies, masses, the fastest body. Nothing of the motion is changed."""
+
+from solver.backend import ti
+from solver.kernels.motion import energy_per_mass
+from solver.laws.hertz_mindlin import hertz_energy, spring_energy
+
+
+@ti.func
+def rolls_away(s: ti.template(), w, b):
+    """1 for a single body that rolls outward on the plate, beyond the feed opening's radius: no part of the pile.
+
+    There is no rolling resistance, so it may roll for ever; it must not keep the run going.
+    """
+    x, v = s.body.position[w, b], s.body.velocity[w, b]
+    beyond = x[0] * x[0] + x[1] * x[1] > s.world.inlet_radius[w] ** 2
+    outward = x[0] * v[0] + x[1] * v[1] > 0.0
+    away = 0
+    if s.body.touching[w, b] == 0 and x[2] < s.body.reach[w, b] and beyond and outward:
+        away = 1
+    return away
+
+
+@ti.func
+def body_energy(s: ti.template(), w, b):
+    """Kinetic and potential energy of a body [J]."""
+    half = 0.5 * energy_per_mass(s, w, b)
+    return s.body.mass[w, b] * (half - s.world.gravity[w].dot(s.body.position[w, b]))
+
+
+@ti.func
+def sum_contacts(s: ti.template(), w):
+    """Touching contacts, how many of them each body has with others, and the energy in the springs (last step)."""
+    s.summary.elastic[w] = 0.0
+    s.summary.touching[w] = 0
+    for b in range(s.world.bodies[w]):
+        s.body.touching[w, b] = 0
+    for k in range(s.world.contacts[w]):
+        radius = s.contact.radius[w, k]
+        if radius > 0.0:
+            law = s.law.row[w, s.contact.law[w, k]]
+            overlap = radius * radius / s.contact.reduced_radius[w, k]
+            energy = hertz_energy(law, radius, overlap) + spring_energy(law, s.contact.spring[w, k].norm_sqr(), radius)
+            s.summary.elastic[w] += energy
+            s.summary.touching[w] += 1
+            if s.contact.b[w, k] >= 0:
+                s.body.touching[w, s.contact.a[w, k]] += 1
+                s.body.touching[w, s.contact.b[w, k]] += 1
+
+
+@ti.func
+def summarise(s: ti.template(), w):
+    """Energies, masses and speeds of world ``w``."""
+    sum_contacts(s, w)
+    s.summary.kinetic[w] = 0.0
+    s.summary.potential[w] = 0.0
+    s.summary.speed[w] = 0.0
+    s.summary.funnel_speed[w] = 0.0
+    s.summary.discharged[w] = 0.0
+    s.summary.in_funnel[w] = 0.0
+    s.summary.hanging[w] = 0
+    s.summary.asleep[w] = 0
+    s.summary.finite[w] = 1
+    for b in range(s.world.bodies[w]):
+        mass, x = s.body.mass[w, b], s.body.position[w, b]
+        if s.body.alive[w, b] == 0:
+            s.summary.discharged[w] += mass
+        else:
+            energy = energy_per_mass(s, w, b)
+            s.summary.kinetic[w] += 0.5 * mass * energy
+            s.summary.potential[w] -= mass * s.world.gravity[w].dot(x)
+            s.summary.asleep[w] += s.body.asleep[w, b]
+            if not (energy < 1e30 and x.dot(x) < 1e30):
+                s.summary.finite[w] = 0
+            speed = ti.sqrt(energy)
+            if x[2] > s.world.outlet[w] and x[0] * x[0] + x[1] * x[1] < s.world.inlet_radius[w] ** 2:
+                s.summary.in_funnel[w] += mass
+                s.summary.hanging[w] += 1
+                s.summary.funnel_speed[w] = ti.max(s.summary.funnel_speed[w], speed)
+            else:
+                s.summary.discharged[w] += mass
+                if rolls_away(s, w, b) == 0:
+                    s.summary.speed[w] = ti.max(s.summary.speed[w], speed)
