@@ -42,14 +42,14 @@ def load_scene(source: str, material: str | None = None) -> Scene:
     A rig with its default dimensions is not checked against the bodies: :func:`with_settings` does that.
     """
     if source in SOURCES:
-        scene = _material_scene(material or DEFAULT_MATERIAL)
+        scene = material_scene(material or DEFAULT_MATERIAL)
         return scene if scene.rig.name == source else with_rig(scene, source)
     path = _file_of(source)
     if material is not None:
         raise ParameterError(f"--material {material}: {path} has a material of its own; only a rig takes one")
     table = read_toml(path)
     if "materials" in table or "body" in table:
-        return _material_scene(str(path))
+        return material_scene(str(path))
     if "target" in table or "factor" in table:
         return study_scene(path)
     with _naming(path):
@@ -97,7 +97,8 @@ def _file_of(source: str) -> Path:
     )
 
 
-def _material_scene(name: str, relative_to: Path | None = None) -> Scene:
+def material_scene(name: str, relative_to: Path | None = None) -> Scene:
+    """The scene of a material by its path or shipped name; its rig is the funnel unless the file says otherwise."""
     path = asset_path("materials", name, relative_to=relative_to)
     with _naming(path):
         return load_material(str(path))
@@ -112,7 +113,7 @@ def _set_up_scene(table: dict[str, Any], path: Path) -> Scene:
     material = table.get("material")
     if not isinstance(material, str):
         raise ParameterError(f"material: a name or a path is needed, not {material!r}")
-    return with_set_up(_material_scene(material, path.parent), table)
+    return with_set_up(material_scene(material, path.parent), table)
 
 
 @contextmanager

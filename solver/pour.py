@@ -264,18 +264,24 @@ class Pour:
             return Outcome.LOST_BODY, f"{row['lost']:.0f} left the domain above the outlet or through the plate"
         if row["overlap"] > numerics.overlap_limit:
             return Outcome.OVERLAP_LIMIT, f"overlap of {row['overlap']:.3g} radii at {self.time:.3f} s"
-        ended = self._full() or (self._run_out() if self.rig.running_time is not None else self._come_to_rest(row))
+        ended = self._overfull(row) or (
+            self._run_out() if self.rig.running_time is not None else self._come_to_rest(row)
+        )
         if ended is not None:
             return ended
         if self.time >= numerics.max_time:
             return Outcome.TIME_LIMIT, f"still moving at {self._moving:.3g} m/s after {numerics.max_time:g} s"
         return Outcome.RUNNING, ""
 
-    def _full(self) -> tuple[Outcome, str] | None:
-        """A rig that is not refilled cannot take all of the bodies."""
-        if self.rig.refills or not self.gate_shut or not self._blocked():
+    def _overfull(self, row: Summary) -> tuple[Outcome, str] | None:
+        """A rig that is filled once cannot take all of the bodies."""
+        if self.rig.refills or not self.gate_shut:
             return None
-        return Outcome.JAMMED, f"the rig is full: {len(self.order) - self.entered} bodies find no place in it"
+        if row["discharged"] > 0.0:
+            return Outcome.JAMMED, f"the rig overflows: {1e3 * row['discharged']:.3g} g lie beside it"
+        if self._blocked():
+            return Outcome.JAMMED, f"the rig is full: {len(self.order) - self.entered} bodies find no place in it"
+        return None
 
     def _run_out(self) -> tuple[Outcome, str] | None:
         """The rig has run for its time."""

@@ -14,7 +14,7 @@ from solver.bench_tests.result import BenchResult, Quantity
 from solver.params import ParameterError
 from solver.scene import Scene
 
-BENCH_TESTS: dict[str, Callable[[Scene], BenchResult]] = {
+BENCH_TESTS: dict[str, Callable[[Scene, int], BenchResult]] = {
     "inclined_plane": inclined_plane.measure,
     "drop_plate_45": drop_plate_45.measure,
     "compression": compression.measure,
@@ -23,9 +23,9 @@ BENCH_TESTS: dict[str, Callable[[Scene], BenchResult]] = {
 __all__ = ["BENCH_TESTS", "BenchResult", "Quantity", "run_bench_test"]
 
 
-def run_bench_test(scene: Scene) -> BenchResult:
-    """Run the bench test that is the rig of ``scene``."""
+def run_bench_test(scene: Scene, seed: int = 1) -> BenchResult:
+    """Run the bench test that is the rig of ``scene``; ``seed`` draws the orientations where some are drawn."""
     if scene.rig.name not in BENCH_TESTS:
         raise ParameterError(f"rig.name: {scene.rig.name!r} is no bench test; known: {', '.join(BENCH_TESTS)}")
     backend.init(threads=1)
-    return BENCH_TESTS[scene.rig.name](scene)
+    return BENCH_TESTS[scene.rig.name](scene, seed)

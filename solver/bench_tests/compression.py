@@ -31,7 +31,7 @@ SETTLING = 0.02
 """Time at rest between squeezing and shearing [s]."""
 
 
-def measure(scene: Scene) -> BenchResult:
+def measure(scene: Scene, seed: int) -> BenchResult:
     """Squeeze and shear; E* and G* beside those of the two materials, and the paper's apparent modulus."""
     body = next(body for body in scene.bodies if body.name == cast(Compression, scene.rig).body)
     specimen = ball(body)

@@ -1,6 +1,6 @@
 """Restitution from the drop on a plate at 45° (``rigs/drop_plate_45.py``).
 
-    tracked rebound   e = (v_x + v_z)/√(2gH), v_z upward, at the moment when the body leaves the plate
+    tracked rebound   e = (v_x + v_z)/√(2gH), v_z upward, the flight traced back to the moment of the impact
     paper             e = L/(2H), L the horizontal distance flown until H below the place of the impact:
                       L = v_x (v_z + √(v_z² + 2gH))/g
 
@@ -35,7 +35,7 @@ FLIGHT = 3e-3
 """A body that has not touched the plate for this long [s] has bounced off; before, it may rock from end to end."""
 GIVEN_UP = 1.0
 """A body that has not bounced off this long [s] after the impact is given up."""
-MOMENT_STEPS = 5
+MOMENT_STEPS = 20
 RESTITUTIONS = (0.2, 0.35, 0.5, 0.65, 0.8)
 FRICTIONS = (0.0, 0.1, 0.3, 0.6)
 """What the bias of the paper's estimate is shown over."""
@@ -43,13 +43,13 @@ FRICTIONS = (0.0, 0.1, 0.3, 0.6)
 
 @dataclass(frozen=True)
 class Rebound:
-    """Velocity of the centre of mass when the body leaves the plate [m/s]; NaN if it does not."""
+    """Velocity of the centre of mass after the impact [m/s]; NaN for a body that stays on the plate."""
 
     v_x: float
     v_z: float
 
 
-def measure(scene: Scene) -> BenchResult:
+def measure(scene: Scene, seed: int) -> BenchResult:
     """Drop the specimen; the restitution from its rebound beside that of the pair, and the paper's estimate."""
     rig = cast(DropPlate45, scene.rig)
     body = next(body for body in scene.bodies if body.name == rig.body)
@@ -57,7 +57,7 @@ def measure(scene: Scene) -> BenchResult:
     if rig.specimen == "sphere":
         rebounds = [drop(scene, ball(body), UPRIGHT)]
     else:
-        rng = np.random.default_rng(0)
+        rng = np.random.default_rng(seed)
         rebounds = [drop(scene, body, random_quaternion(rng)) for _ in range(round(rig.drops))]
     tracked = np.array([restitution(one, gravity, height) for one in rebounds])
     paper = np.array([paper_estimate(one, gravity, height) for one in rebounds])
@@ -118,16 +118,17 @@ def drop(scene: Scene, specimen: Body, quaternion: Array) -> Rebound:
     fall = math.sqrt(2.0 * rig.drop_height / gravity)
     bench.run(max(bench.dt, fall - BEFORE_IMPACT))
     moment = MOMENT_STEPS * bench.dt
-    since, met = 0.0, False
+    contact, flight = 0.0, math.inf
     for _ in range(math.ceil(GIVEN_UP / moment)):
         if bench.run(moment)["touching"] > 0:
-            since, met = 0.0, True
+            contact = moment if flight > 0.0 else contact + moment
+            flight = 0.0
         else:
-            since += moment
-        if met and since >= FLIGHT:
+            flight += moment
+        if FLIGHT <= flight < math.inf:
             v = bench.state()[7:10]
-            # Back to the middle of the moment in which it left.
-            return Rebound(float(v[0]), float(v[2]) + gravity * (since - 0.5 * moment))
+            # Gravity acts during the contact, too: back to where the contact began, in the middle of a moment.
+            return Rebound(float(v[0]), float(v[2]) + gravity * (flight + contact - 0.5 * moment))
     return Rebound(math.nan, math.nan)
 
 

@@ -34,7 +34,7 @@ SETTLING = 0.1
 Path = list[tuple[float, float]]
 
 
-def measure(scene: Scene) -> BenchResult:
+def measure(scene: Scene, seed: int) -> BenchResult:
     """Tilt the plane under the held body; the angle of sliding beside atan μ_s of the pair."""
     rig = cast(InclinedPlane, scene.rig)
     body = next(body for body in scene.bodies if body.name == rig.body)

@@ -26,7 +26,7 @@ from solver.rigs.surface import Revolved, Surface, horizontal
 class LiftingCylinder(PourRig):
     """Dimensions of the rig, the motion of the cylinder and the mass that is poured."""
 
-    diameter: float = param(0.100, unit="m", low=0.005, high=2.0, doc="Inner diameter of the cylinder.")
+    diameter: float = param(0.080, unit="m", low=0.005, high=2.0, doc="Inner diameter of the cylinder.")
     cylinder_height: float = param(0.150, unit="m", low=0.005, high=2.0, doc="Height of the cylinder.")
     lift_speed: float = param(0.020, unit="m/s", low=1e-3, high=1.0, doc="Speed at which the cylinder is lifted.")
     lift_height: float = param(0.150, unit="m", low=0.01, high=2.0, doc="How far it is lifted; then it stands still.")
@@ -42,8 +42,13 @@ class LiftingCylinder(PourRig):
 
     @property
     def suits(self) -> Mapping[str, float | str]:
-        """Fill first; time for the lift at any allowed speed."""
-        return {"insertion.protocol": "fill_then_open", "insertion.rate": 0.05, "numerics.max_time": 30.0}
+        """Fill first, over nearly the whole opening; time for a slow lift."""
+        return {
+            "insertion.protocol": "fill_then_open",
+            "insertion.rate": 0.05,
+            "insertion.region_radius": 0.04,
+            "numerics.max_time": 30.0,
+        }
 
     def surfaces(self) -> tuple[Surface, ...]:
         """Plate and cylinder."""
