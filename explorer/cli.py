@@ -12,7 +12,7 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from explorer.commands import calibrate, new, parameters, replay, runs, serve, simulate
+from explorer.commands import bench, calibrate, export, new, parameters, replay, runs, serve, simulate, verify
 
 BAD_INPUT, INTERRUPTED = 2, 130
 OWN_PACKAGES = ("explorer", "doe", "solver")
@@ -93,7 +93,10 @@ app.command()(calibrate.calibrate)
 app.command()(runs.runs)
 app.command()(parameters.parameters)
 app.command()(new.new)
+app.command()(export.export)
 app.command()(replay.replay)
+app.command()(verify.verify)
+app.command()(bench.bench)
 
 
 def main() -> None:

@@ -34,21 +34,21 @@ TRACE_COLUMNS = {
 """Columns of a trace file → curves of ``solver.Trace``; ``max_overlap`` is in radii of the sphere."""
 
 
-def check_vacant(folder: Path) -> None:
-    """Raise :class:`CommandError` unless ``folder`` is missing or empty."""
+def check_vacant(folder: Path, option: str = "--out") -> None:
+    """Raise :class:`CommandError` unless ``folder``, which ``option`` named, is missing or empty."""
     if folder.exists() and not folder.is_dir():
-        raise CommandError(f"--out {folder}: is a file; name a folder that is new or empty")
+        raise CommandError(f"{option} {folder}: is a file; name a folder that is new or empty")
     if folder.is_dir() and any(folder.iterdir()):
-        raise CommandError(f"--out {folder}: is not empty; name a folder that is new or empty")
+        raise CommandError(f"{option} {folder}: is not empty; name a folder that is new or empty")
 
 
 @contextmanager
-def appearing(folder: Path) -> Iterator[Path]:
+def appearing(folder: Path, option: str = "--out") -> Iterator[Path]:
     """A temporary folder that becomes ``folder`` when the block ends, and is removed when the block fails.
 
     Raises :class:`CommandError` where ``folder`` is not vacant, OSError where it cannot be made.
     """
-    check_vacant(folder)
+    check_vacant(folder, option)
     folder = folder.absolute()
     folder.parent.mkdir(parents=True, exist_ok=True)
     temporary = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
@@ -56,7 +56,7 @@ def appearing(folder: Path) -> Iterator[Path]:
         yield temporary
         # mkdtemp gives access to the owner only; a result folder has the rights of any new folder.
         temporary.chmod(0o777 & ~_umask())
-        check_vacant(folder)
+        check_vacant(folder, option)
         if folder.is_dir():
             folder.rmdir()
         temporary.rename(folder)

@@ -14,7 +14,7 @@ from typing import Any
 
 from doe.study import load_study
 from solver import ParameterError, Scene, load_material, read_toml, with_set_up
-from solver.assets import AssetNotFoundError, asset_path, shipped_assets
+from solver.assets import AssetKind, AssetNotFoundError, asset_path, shipped_assets
 from solver.rigs import BENCH_RIGS, RIGS
 from solver.scene import with_rig
 from solver.set_up import TABLES
@@ -23,6 +23,8 @@ from solver.shape import ShapeError
 
 DEFAULT_MATERIAL = "sunflower_extract"
 DEFAULT_STUDY = "sunflower_extract"
+SHIPPED: tuple[AssetKind, ...] = ("materials", "studies", "benchmarks")
+"""Where a shipped name is looked for, in this order."""
 SET_UP_KEYS = ("format", "title", "material", *TABLES)
 SOURCES = (*RIGS, *BENCH_RIGS)
 """Rigs that can be named on the command line."""
@@ -33,7 +35,8 @@ def load_scene(source: str, material: str | None = None) -> Scene:
 
     Args:
         source: a rig ("funnel", "rotating_drum"), or a material, set-up or study by the path of its file or its
-            shipped name. Where a material and a study share a shipped name, it means the material.
+            shipped name (shipped set-ups are benchmarks). Where a material and a study share a shipped name, it means
+            the material.
         material: path or shipped name of the material in the rig; only a rig takes one.
 
     Raises:
@@ -87,13 +90,13 @@ def _file_of(source: str) -> Path:
     if own.is_file():
         return own
     stem = source.removesuffix(".toml")
-    if stem in shipped_assets("materials"):
-        return asset_path("materials", stem)
-    if stem in shipped_assets("studies"):
-        return asset_path("studies", stem)
-    rigs, materials, studies = map(", ".join, (SOURCES, shipped_assets("materials"), shipped_assets("studies")))
+    for kind in SHIPPED:
+        if stem in shipped_assets(kind):
+            return asset_path(kind, stem)
+    rigs, materials, studies, benchmarks = map(", ".join, (SOURCES, *map(shipped_assets, SHIPPED)))
     raise ParameterError(
-        f"{source}: no such file, and no rig ({rigs}), shipped material ({materials}) or study ({studies}) of that name"
+        f"{source}: no such file, and no rig ({rigs}), shipped material ({materials}), study ({studies}) or "
+        f"benchmark ({benchmarks}) of that name"
     )
 
 

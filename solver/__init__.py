@@ -12,7 +12,7 @@ from solver.body import Body
 from solver.material_file import load_material, read_toml
 from solver.observables import Value, observable_names, observe
 from solver.params import Parameter, ParameterError, parse_quantity
-from solver.record import Bodies, Outcome, Phase, Pile, Record, Spheres, Trace
+from solver.record import Bodies, Entries, Outcome, Phase, Pile, Record, Spheres, Trace
 from solver.scene import Scene, body_counts, canonical, parameters, value, with_values
 from solver.set_up import with_set_up
 from solver.version import code_version
@@ -37,6 +37,7 @@ def __getattr__(name: str) -> Any:
 __all__ = [
     "Bodies",
     "Body",
+    "Entries",
     "Job",
     "Outcome",
     "Parameter",

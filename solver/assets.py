@@ -3,11 +3,12 @@
 from pathlib import Path
 from typing import Literal, get_args
 
-AssetKind = Literal["materials", "studies", "meshes", "source_tables"]
+AssetKind = Literal["materials", "studies", "benchmarks", "meshes", "source_tables"]
 
 _SUFFIX: dict[AssetKind, str] = {
     "materials": ".toml",
     "studies": ".toml",
+    "benchmarks": ".toml",
     "meshes": ".stl",
     "source_tables": ".csv",
 }
@@ -16,6 +17,7 @@ _SUFFIX: dict[AssetKind, str] = {
 _SINGULAR: dict[AssetKind, str] = {
     "materials": "material",
     "studies": "study",
+    "benchmarks": "benchmark",
     "meshes": "mesh",
     "source_tables": "source table",
 }

@@ -18,7 +18,15 @@ from solver import insertion
 from solver.layout import layout
 from solver.observables.free_surface import surface_heights
 from solver.record import Bodies, Outcome, Phase, Record
-from solver.record_builder import bodies_of, free_surface_of, member_spheres, pile_of, rolling_away, trace_of
+from solver.record_builder import (
+    bodies_of,
+    entries_of,
+    free_surface_of,
+    member_spheres,
+    pile_of,
+    rolling_away,
+    trace_of,
+)
 from solver.retune import RAMP_STEPS, RAMP_TIME, Ramp, spring_ratio
 from solver.rigs.rig import Container, Switch
 from solver.scene import Scene, body_counts, pour_rig
@@ -51,6 +59,7 @@ class Pour:
         self._ramp: Ramp | None = None
         self.energy_put_in = 0.0
         self.entered = 0
+        self._entries: list[tuple[float, int, insertion.Pose, npt.NDArray[np.float64]]] = []
         self.steps = 0
         self._time_base, self._steps_base = 0.0, 0
         self.outcome, self.message = Outcome.RUNNING, ""
@@ -161,6 +170,7 @@ class Pour:
             pile=pile_of(self.container, bodies, spheres, rolling_away(self.scene, self.container, state)),
             free_surface=free_surface_of(self.rig.watch, self._free_surface),
             trace=trace_of(self.samples),
+            entries=entries_of(self.order, self._entries),
             gate_opened=self.gate_opened,
             poured_mass=self.poured_mass,
             dt=self.dt,
@@ -190,6 +200,7 @@ class Pour:
             if pose is None:
                 return
             self.batch.enter(self.w, self.entered, pose.position, pose.quaternion, speed, np.zeros(3))
+            self._entries.append((self.time, self.steps, pose, speed))
             self.entered += 1
             self._last_entry = self.time
 

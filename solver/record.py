@@ -124,6 +124,27 @@ class FreeSurface:
 
 
 @dataclass(frozen=True)
+class Entries:
+    """How the bodies of a run entered, in order of entry (n of them): what another program needs to repeat the feed.
+
+    A body is at its place when ``step`` steps are done and takes part from the next one on; it does not turn.
+    """
+
+    time: Array
+    """[s], shape (n,)."""
+    step: Ints
+    """Steps done by then, shape (n,)."""
+    component: Ints
+    """Index into the scene's bodies, shape (n,)."""
+    position: Array
+    """Centres of mass [m], shape (n, 3)."""
+    quaternion: Array
+    """Orientation of the principal frame, wxyz, shape (n, 4)."""
+    velocity: Array
+    """[m/s], shape (n, 3)."""
+
+
+@dataclass(frozen=True)
 class Record:
     """One finished run."""
 
@@ -135,6 +156,7 @@ class Record:
     spheres: Spheres
     pile: Pile
     trace: Trace
+    entries: Entries
     gate_opened: float
     """Time [s] at which the rig began to act (the gate opened); 0 for ``pour_through``."""
     poured_mass: float

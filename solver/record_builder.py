@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from solver.insertion import rotation_matrix
+from solver.insertion import Pose, rotation_matrix
 from solver.layout import Layout
 from solver.observables.free_surface import column_places
-from solver.record import Bodies, FreeSurface, Pile, Spheres, Trace
+from solver.record import Bodies, Entries, FreeSurface, Pile, Spheres, Trace
 from solver.rigs.rig import Container, Watch
 from solver.scene import Scene
 
@@ -99,4 +99,17 @@ def trace_of(samples: list[dict[str, float]]) -> Trace:
         kinetic_energy=column("kinetic"),
         contacts=column("touching").astype(np.int32),
         max_overlap=column("overlap"),
+    )
+
+
+def entries_of(order: npt.NDArray[np.int32], log: list[tuple[float, int, Pose, Array]]) -> Entries:
+    """How bodies entered, from the log (time [s], steps done, pose, velocity [m/s]) of a run."""
+    n = len(log)
+    return Entries(
+        time=np.array([time for time, *_ in log], dtype=float),
+        step=np.array([step for _, step, *_ in log], dtype=np.int32),
+        component=order[:n].copy(),
+        position=np.array([pose.position for _, _, pose, _ in log], dtype=float).reshape(n, 3),
+        quaternion=np.array([pose.quaternion for _, _, pose, _ in log], dtype=float).reshape(n, 4),
+        velocity=np.array([velocity for *_, velocity in log], dtype=float).reshape(n, 3),
     )

@@ -21,6 +21,7 @@ WORLD = {
     "gravity": Vec3,  # [m/s²]
     "skin": ti.f64,  # reach of the contact list beyond touching [m]
     "moved": ti.f64,  # largest travel of a body or wall since the list was built [m]
+    "loaded": ti.i32,  # bodies that will enter
     "bodies": ti.i32,  # bodies that have entered
     "walls": ti.i32,  # walls of the rig
     "primitives": ti.i32,  # surfaces that are planes or revolved segments; they come before the patches of meshes
@@ -49,6 +50,8 @@ WORLD = {
 BODY = {
     "mass": ti.f64,  # [kg]
     "inertia": Vec3,  # principal moments [kg m²]
+    "inverse_mass": ti.f64,  # [1/kg]
+    "inverse_inertia": Vec3,  # [1/(kg m²)]
     "position": Vec3,  # centre of mass [m], at the full step
     "quaternion": Vec4,  # orientation wxyz, at the full step
     "velocity": Vec3,  # [m/s], at the half step
@@ -58,7 +61,8 @@ BODY = {
     "force": Vec3,  # contact force [N]
     "torque": Vec3,  # contact torque about the centre of mass, world frame [N m]
     "reach": ti.f64,  # radius of the bounding sphere [m]
-    "travel": ti.f64,  # bound on the motion of any of its points since the list was built [m]
+    "swing": ti.f64,  # largest distance of a member's centre from the centre of mass [m]
+    "travel": ti.f64,  # bound on the motion of any of its members' centres since the list was built [m]
     "first": ti.i32,  # index of the first member sphere
     "members": ti.i32,  # number of member spheres
     "kind": ti.i32,  # contact class
@@ -88,7 +92,7 @@ MEMBER = {
 }
 """Per member sphere, shape (worlds, members)."""
 
-HISTORY = {"i": ti.i32, "j": ti.i32, "spring": Vec3, "radius": ti.f64}
+HISTORY = {"i": ti.i32, "j": ti.i32, "spring": Vec3, "loss": Vec3, "radius": ti.f64}
 """What a contact keeps when the list is built again, shape (worlds, contacts)."""
 
 CONTACT = {
@@ -100,6 +104,7 @@ CONTACT = {
     "reduced_radius": ti.f64,  # R* = r_i r_j / (r_i + r_j), r_i against a surface [m]
     "reduced_mass": ti.f64,  # m* of the bodies, m_i against a surface [kg]
     "spring": Vec3,  # tangential elastic force on i [N]
+    "loss": Vec3,  # the part of the force at the last step that takes energy, on j [N]
     "radius": ti.f64,  # contact radius a = sqrt(R* δ) at the last step [m]; 0: apart
     "first": ti.i32,  # first of the triangles that may touch, for a patch of a mesh
     "triangles": ti.i32,  # and how many
@@ -203,6 +208,9 @@ class Group:
 @ti.data_oriented
 class State:
     """All arrays of a batch. Taichi never frees fields, so batches of one capacity share them (:func:`state`)."""
+
+    owner: object = None
+    """The batch that uses the arrays at present."""
 
     def __init__(self, capacity: Capacity) -> None:
         c = capacity

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from solver import snapshot
 from solver.body import Body
 from solver.kernels import exchange
 from solver.kernels.batch import advance, measure, take_out
@@ -12,7 +13,8 @@ from solver.laws.hertz_mindlin import constants
 from solver.layout import Layout
 from solver.rigs.rig import Container
 from solver.scene import Scene
-from solver.state import Capacity, state
+from solver.snapshot import Arrays
+from solver.state import Capacity, State, state
 from solver.wall_tables import WallTables, extent, wall_tables
 
 Array = npt.NDArray[np.float64]
@@ -65,7 +67,8 @@ class Batch:
 
     def __init__(self, capacity: Capacity) -> None:
         self.capacity = capacity
-        self._s = state(capacity)
+        self._arrays = state(capacity)
+        self._arrays.owner = self
         self._steps = np.zeros(capacity.worlds, dtype=np.int32)
         self._scenes: dict[int, Scene] = {}
 
@@ -82,6 +85,13 @@ class Batch:
         self._load_walls(w, scene, wall_tables(rig.surfaces()), active)
         self._scenes[w] = scene
         self.set_law(w, law_table(scene))
+
+    @property
+    def _s(self) -> State:
+        """The arrays, as long as no later batch of the same capacity has taken them over."""
+        if self._arrays.owner is not self:
+            raise RuntimeError("a later batch of the same capacity uses these arrays")
+        return self._arrays
 
     def set_law(self, w: int, table: Array) -> None:
         """Replace the contact constants (see :func:`law_table`); wakes all bodies."""
@@ -160,6 +170,14 @@ class Batch:
         out = np.zeros((len(self._scenes[w].rig.surfaces()), 19))
         exchange.read_walls(self._s, w, out)
         return out
+
+    def take(self, w: int) -> Arrays:
+        """World ``w`` as plain arrays (``solver/snapshot.py``)."""
+        return snapshot.take(self._s, w)
+
+    def put(self, w: int, arrays: Arrays) -> None:
+        """Put a world back that :meth:`take` gave, after :meth:`load` with the same scene."""
+        snapshot.put(self._s, w, arrays)
 
     def _load_walls(self, w: int, scene: Scene, tables: WallTables, active: Sequence[bool]) -> None:
         s, walls = self._s, wall_materials(scene)

@@ -2,7 +2,14 @@
 
 from solver.backend import ti
 from solver.kernels.walls import from_patch, from_primitive, surface_velocity
-from solver.laws.hertz_mindlin import normal_damping_force, normal_spring_force, spring_energy, tangential_force
+from solver.laws.hertz_mindlin import (
+    normal_damper,
+    normal_force,
+    normal_spring_force,
+    spring_energy,
+    spring_energy_gain,
+    tangential_force,
+)
 from solver.state import Vec3, Vec4
 
 
@@ -44,6 +51,7 @@ def lose(s: ti.template(), w, k, law):
     s.world.dissipated[w] += spring_energy(law, s.contact.spring[w, k].norm_sqr(), s.contact.radius[w, k])
     s.contact.radius[w, k] = 0.0
     s.contact.spring[w, k] = Vec3(0.0, 0.0, 0.0)
+    s.contact.loss[w, k] = Vec3(0.0, 0.0, 0.0)
 
 
 @ti.func
@@ -80,7 +88,8 @@ def push(s: ti.template(), w):
             a, b, i = s.contact.a[w, k], s.contact.b[w, k], s.contact.i[w, k]
             law = s.law.row[w, s.contact.law[w, k]]
             radius = s.member.radius[w, i]
-            largest = ti.max(largest, overlap / radius)
+            if overlap > largest * radius:
+                largest = overlap / radius
             n = Vec3(hit[0], hit[1], hit[2])
             point = s.member.centre[w, i] - n * (radius - 0.5 * overlap)
             arm, other_arm = point - s.body.position[w, a], Vec3(0.0, 0.0, 0.0)
@@ -96,18 +105,19 @@ def push(s: ti.template(), w):
             contact_radius = ti.sqrt(s.contact.reduced_radius[w, k] * overlap)
             inertia = ti.sqrt(contact_radius * mass)
             elastic = normal_spring_force(law, contact_radius, overlap)
-            f_n = ti.max(0.0, elastic + normal_damping_force(law, inertia, v_n))
             before = s.contact.radius[w, k]
-            old = s.contact.spring[w, k]
+            f_n = normal_force(elastic, normal_damper(law, inertia, before, overlap, v_n, dt), v_n, mass, dt)
+            old, last_loss = s.contact.spring[w, k], s.contact.loss[w, k]
             spring, f_t = tangential_force(law, contact_radius, before, old, n, v_t, inertia, f_n, dt)
+            force = f_n * n + f_t
+            # Work against the damper and the tangential force, at the mean of the velocities before and after the
+            # step: half of it now, half when the next velocity is known; less what has gone into the spring.
+            loss = (elastic - f_n) * n - f_t
+            dissipated += 0.5 * dt * (loss + last_loss).dot(velocity)
+            dissipated -= spring_energy_gain(law, old.norm_sqr(), before, spring.norm_sqr(), contact_radius)
             s.contact.spring[w, k] = spring
             s.contact.radius[w, k] = contact_radius
-            force = f_n * n + f_t
-            # What the damper and the slip took: with the speed at the middle of the step that the force itself makes.
-            v_mid = v_n + 0.5 * dt * f_n / mass
-            dissipated += dt * ((elastic - f_n) * v_mid - f_t.dot(v_t))
-            dissipated -= spring_energy(law, spring.norm_sqr(), contact_radius)
-            dissipated += spring_energy(law, old.norm_sqr(), before)
+            s.contact.loss[w, k] = loss
             if b < 0:
                 push_wall(s, w, -1 - b, point, force, item >= live)
             if item >= live:

@@ -57,10 +57,14 @@ def load_world(s: ti.template(), w: ti.i32, settings: Row):
 @ti.kernel
 def load_bodies(s: ti.template(), w: ti.i32, numbers: Table, places: IntTable, spheres: Table, owner: IntTable):
     """All bodies that will enter. numbers: mass, inertia (3), reach; places: first, members, kind; spheres: x y z r."""
+    s.world.loaded[w] = numbers.shape[0]
     for b in range(numbers.shape[0]):
         s.body.mass[w, b] = numbers[b, 0]
         s.body.inertia[w, b] = triple(numbers, b, 1)
+        s.body.inverse_mass[w, b] = 1.0 / numbers[b, 0]
+        s.body.inverse_inertia[w, b] = 1.0 / triple(numbers, b, 1)
         s.body.reach[w, b] = numbers[b, 4]
+        s.body.swing[w, b] = 0.0
         s.body.first[w, b] = places[b, 0]
         s.body.members[w, b] = places[b, 1]
         s.body.kind[w, b] = places[b, 2]
@@ -72,6 +76,7 @@ def load_bodies(s: ti.template(), w: ti.i32, numbers: Table, places: IntTable, s
         s.member.local[w, m] = triple(spheres, m, 0)
         s.member.radius[w, m] = spheres[m, 3]
         s.member.body[w, m] = owner[m, 0]
+        s.body.swing[w, owner[m, 0]] = ti.max(s.body.swing[w, owner[m, 0]], s.member.local[w, m].norm())
 
 
 @ti.kernel

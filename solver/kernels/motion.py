@@ -23,13 +23,14 @@ def prepare(s: ti.template(), w, b):
 
 
 @ti.func
-def spun(spin, inertia, torque, dt):
-    """Spin [rad/s] after ``dt`` under ``torque`` [N m], both in the principal frame."""
-    scale = dt / inertia
-    new = spin
-    for _ in ti.static(range(MIDPOINT_ITERATIONS)):
-        mid = 0.5 * (spin + new)
-        new = spin + scale * (torque - mid.cross(inertia * mid))
+def spun(spin, inertia, inverse, torque, dt):
+    """Spin [rad/s] after ``dt`` under ``torque`` [N m], both in the principal frame; ``inverse`` of the inertia."""
+    scale = dt * inverse
+    new = spin + scale * torque
+    if inertia[0] != inertia[1] or inertia[1] != inertia[2]:
+        for _ in ti.static(range(MIDPOINT_ITERATIONS)):
+            mid = 0.5 * (spin + new)
+            new = spin + scale * (torque - mid.cross(inertia * mid))
     return new
 
 
@@ -47,16 +48,18 @@ def move(s: ti.template(), w, b):
     velocity = s.body.velocity[w, b] + dt * s.world.gravity[w]
     torque = Vec3(0.0, 0.0, 0.0)
     if s.body.listed[w, b] == 1:
-        velocity += dt / s.body.mass[w, b] * s.body.force[w, b]
+        velocity += dt * s.body.inverse_mass[w, b] * s.body.force[w, b]
         torque = s.body.rotation[w, b].transpose() @ s.body.torque[w, b]
         s.body.force[w, b] = Vec3(0.0, 0.0, 0.0)
         s.body.torque[w, b] = Vec3(0.0, 0.0, 0.0)
-    spin = spun(s.body.spin[w, b], s.body.inertia[w, b], torque, dt)
+    spin = spun(s.body.spin[w, b], s.body.inertia[w, b], s.body.inverse_inertia[w, b], torque, dt)
     s.body.velocity[w, b] = velocity
     s.body.spin[w, b] = spin
     s.body.position[w, b] += dt * velocity
     s.body.quaternion[w, b] = turned(s.body.quaternion[w, b], spin, dt)
-    speed = ti.sqrt(velocity.dot(velocity)) + ti.sqrt(spin.dot(spin)) * s.body.reach[w, b]
+    speed = ti.sqrt(velocity.dot(velocity))
+    if s.body.swing[w, b] > 0.0:
+        speed += ti.sqrt(spin.dot(spin)) * s.body.swing[w, b]
     travel = s.body.travel[w, b] + dt * speed
     s.body.travel[w, b] = travel
     s.world.moved[w] = ti.max(s.world.moved[w], travel)

@@ -20,6 +20,7 @@ def keep_history(s: ti.template(), w):
             s.history.i[w, kept] = s.contact.i[w, k]
             s.history.j[w, kept] = s.contact.j[w, k]
             s.history.spring[w, kept] = s.contact.spring[w, k]
+            s.history.loss[w, kept] = s.contact.loss[w, k]
             s.history.radius[w, kept] = s.contact.radius[w, k]
             kept += 1
     return kept
@@ -151,8 +152,10 @@ def carry_over(s: ti.template(), w, n_old):
             old += 1
         s.contact.radius[w, k] = 0.0
         s.contact.spring[w, k] = Vec3(0.0, 0.0, 0.0)
+        s.contact.loss[w, k] = Vec3(0.0, 0.0, 0.0)
         if old < n_old and s.history.i[w, old] == i and s.history.j[w, old] == j:
             s.contact.spring[w, k] = s.history.spring[w, old]
+            s.contact.loss[w, k] = s.history.loss[w, old]
             s.contact.radius[w, k] = s.history.radius[w, old]
 
 

@@ -62,6 +62,8 @@ class Container:
 
 EVERYWHERE = Container(-math.inf, math.inf)
 """The inside of a rig without an outside."""
+NOWHERE = Container(math.inf, 0.0)
+"""The inside of a rig without an inside."""
 
 
 @dataclass(frozen=True)
@@ -141,21 +143,35 @@ class Rig(Protocol):
         ...
 
 
-class BenchRig(Rig, Protocol):
+class BareRig(Rig, Protocol):
+    """Surfaces and nothing else: single bodies are put there by hand."""
+
+    @property
+    def name(self) -> str:
+        """Not one that can be asked for."""
+        return "bare"
+
+    @property
+    def surface_names(self) -> tuple[str, ...]:
+        """Numbers."""
+        return tuple(str(k) for k in range(len(self.surfaces())))
+
+    def container(self, since: float) -> Container:
+        """Nowhere: no body is fed, none flows out."""
+        return NOWHERE
+
+    def check(self, widest_body: float) -> None:
+        """Every body fits."""
+        return
+
+
+class BenchRig(BareRig, Protocol):
     """A rig that measures one property on a single body (``solver/bench_tests``)."""
 
     @property
     def body(self) -> str:
         """Name of the component that is measured; empty: the first one."""
         ...
-
-    def container(self, since: float) -> Container:
-        """Everywhere: nothing flows out."""
-        return EVERYWHERE
-
-    def check(self, widest_body: float) -> None:
-        """Every body fits."""
-        return
 
 
 class PourRig(Rig, Protocol):

@@ -195,7 +195,7 @@ def test_contact_list_overflow_is_a_named_outcome():
 
 def test_four_times_the_stiffness_at_rest_moves_the_apex_by_less_than_a_body():
     heap = with_values(QUICK, {"rig.mass": "12g"})
-    pour = drive(heap, 12)
+    pour = drive(heap, 13)
     assert pour.outcome == Outcome.AT_REST
     apex, dt, time = apex_of(pour), pour.dt, pour.time
     stored = pour.batch.measure(0)[0, SUMMARY_COLUMNS.index("elastic")]

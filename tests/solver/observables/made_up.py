@@ -9,6 +9,7 @@ from solver.body import Body, Members
 from solver.material import Material
 from solver.observables.made_up import SEED_AXES, cone, pile_of, seed_spheres, seeds_in_cone, solid_of
 from solver.record import Bodies, Outcome, Pile, Record, Spheres, Trace
+from solver.record_builder import entries_of
 from solver.scene import Scene
 
 __all__ = [
@@ -117,6 +118,7 @@ def record_of(
         pile.spheres,
         pile,
         trace,
+        entries_of(pile.component, []),
         gate_opened,
         poured_mass,
         1e-6,

@@ -1,0 +1,124 @@
+"""A bed of spheres in a box with a floor and four walls, for timing engines on one and the same state.
+
+Both engines take it as plain spheres, no clumps. They stop after a number of steps, print the time of their stepping
+loop and write ``final.txt`` (see ``frames.py``). Contacts begin without tangential springs in either.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from explorer.export.liggghts import (
+    INPUT,
+    WRITE_FINAL,
+    gravity_lines,
+    model_lines,
+    plane_line,
+    run_lines,
+    settings_lines,
+)
+from explorer.export.yade import SCRIPTS, write_law
+
+Array = npt.NDArray[np.float64]
+SKIN = 0.4
+"""Reach of LIGGGHTS's contact list beyond touching, in radii of the largest sphere."""
+DATA, SCRIPT = "spheres.data", "yade_bed.py"
+
+
+@dataclass(frozen=True)
+class Bed:
+    """Spheres of one material in a box of the same material, open at the top (n of them)."""
+
+    position: Array
+    """Centres [m], shape (n, 3)."""
+    radius: Array
+    """[m], shape (n,)."""
+    velocity: Array
+    """[m/s], shape (n, 3)."""
+    low: tuple[float, float, float]
+    """Corner of the box; the floor is at ``low[2]`` [m]."""
+    high: tuple[float, float, float]
+    """Opposite corner; the sides end nowhere and there is no lid [m]."""
+    dt: float
+    """[s]."""
+    steps: int
+    density: float = 2500.0
+    shear_modulus: float = 1e7
+    poisson_ratio: float = 0.25
+    friction: float = 0.5
+    restitution: float = 0.5
+    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+
+    @property
+    def youngs_modulus(self) -> float:
+        """E = 2 G (1 + ν) [Pa]."""
+        return 2.0 * self.shear_modulus * (1.0 + self.poisson_ratio)
+
+
+def write_liggghts_bed(folder: Path, bed: Bed) -> None:
+    """Write ``in.liggghts`` and ``spheres.data`` into ``folder``; run it with ``run_liggghts``."""
+    table = np.full((2, 2), bed.restitution), np.full((2, 2), bed.friction)
+    largest = float(bed.radius.max())
+    room = np.array([np.array(bed.low) - 4.0 * largest, np.array(bed.high) + 4.0 * largest])
+    settings = settings_lines(room, 2, SKIN * largest)
+    walls = [
+        plane_line("low_x", 2, "x", bed.low[0]),
+        plane_line("high_x", 2, "x", bed.high[0]),
+        plane_line("low_y", 2, "y", bed.low[1]),
+        plane_line("high_y", 2, "y", bed.high[1]),
+        plane_line("floor", 2, "z", bed.low[2]),
+    ]
+    lines = [
+        f"# {len(bed.radius)} spheres, {bed.steps} steps of {bed.dt:.6g} s",
+        *[line for line in settings if not line.startswith(("region", "create_box"))],
+        f"read_data {DATA}",
+        *model_lines([bed.youngs_modulus] * 2, [bed.poisson_ratio] * 2, *table),
+        *gravity_lines(bed.gravity),
+        *walls,
+        "fix motion all nve/sphere",
+        *run_lines(bed.steps, bed.dt),
+        f"run {bed.steps}",
+        WRITE_FINAL,
+    ]
+    (folder / INPUT).write_text("\n".join(lines) + "\n", encoding="ascii")
+    _write_data(folder / DATA, bed, room)
+
+
+def write_yade_bed(folder: Path, bed: Bed) -> None:
+    """Write ``yade_bed.py``, ``bed.json`` and ``law.json`` into ``folder``; run it with ``run_yade``."""
+    table = dataclasses.asdict(bed) | {"youngs_modulus": bed.youngs_modulus}
+    text = json.dumps(table, default=lambda array: array.tolist(), allow_nan=False)
+    (folder / "bed.json").write_text(text + "\n", encoding="utf-8")
+    write_law(folder, np.full((1, 1), bed.restitution), np.full((1, 1), bed.friction))
+    shutil.copyfile(SCRIPTS / SCRIPT, folder / SCRIPT)
+
+
+BED_WRITERS: dict[str, Callable[[Path, Bed], None]] = {"liggghts": write_liggghts_bed, "yade": write_yade_bed}
+"""Engine → what writes its bed into an existing folder."""
+
+
+def sphere_mass(bed: Bed) -> Array:
+    """4/3 π r³ ρ [kg], shape (n,)."""
+    return 4.0 / 3.0 * math.pi * bed.radius**3 * bed.density
+
+
+def _write_data(path: Path, bed: Bed, room: Array) -> None:
+    """The state as ``read_data`` takes it for ``atom_style granular``: id, type, diameter, density, place."""
+    sides = [f"{low:.12g} {high:.12g} {a}lo {a}hi" for a, low, high in zip("xyz", *room, strict=True)]
+    places = [
+        f"{k} 1 {2.0 * r:.15g} {bed.density:.15g} {x:.15g} {y:.15g} {z:.15g}"
+        for k, (r, (x, y, z)) in enumerate(zip(bed.radius, bed.position, strict=True), start=1)
+    ]
+    speeds = [f"{k} {x:.15g} {y:.15g} {z:.15g} 0 0 0" for k, (x, y, z) in enumerate(bed.velocity, start=1)]
+    head = ["a bed of spheres", "", f"{len(bed.radius)} atoms", "2 atom types", "", *sides]
+    text = "\n".join([*head, "", "Atoms", "", *places, "", "Velocities", "", *speeds])
+    path.write_text(text + "\n", encoding="ascii")

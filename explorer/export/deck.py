@@ -1,0 +1,205 @@
+"""A deck: everything that another engine needs to repeat a pour, in SI and in no engine's terms.
+
+``deck.json`` holds it in every exported folder; LIGGGHTS's input is written from it, YADE's script reads it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from explorer.errors import CommandError
+from explorer.export.triangles import revolved_triangles
+from solver import Body, Entries, Record, Scene
+from solver.rigs import Funnel, Plane, Revolved
+from solver.scene import pour_rig
+
+Array = npt.NDArray[np.float64]
+FILE = "deck.json"
+
+
+@dataclass(frozen=True)
+class Clump:
+    """One component: member spheres in the principal frame about the centre of mass, mass, inertia and material."""
+
+    name: str
+    centres: Array
+    """[m], shape (m, 3)."""
+    radii: Array
+    """[m], shape (m,)."""
+    mass: float
+    """[kg]."""
+    inertia: Array
+    """Principal moments about x, y, z [kg m²], shape (3,)."""
+    density: float
+    """Of the material [kg/m³]; the mass does not follow from it."""
+    youngs_modulus: float
+    poisson_ratio: float
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A thin wall of triangles, which pushes from either side."""
+
+    name: str
+    triangles: Array
+    """Corners [m], shape (t, 3, 3)."""
+    until_step: int = -1
+    """The wall is taken away when this many steps are done; −1: never."""
+
+
+@dataclass(frozen=True)
+class Deck:
+    """A pour. The wall's contact class is the last one, after the components."""
+
+    title: str
+    seed: int
+    dt: float
+    """[s]."""
+    steps: int
+    gravity: tuple[float, float, float]
+    """[m/s²]."""
+    clumps: tuple[Clump, ...]
+    wall_youngs_modulus: float
+    wall_poisson_ratio: float
+    friction: Array
+    """μ, shape (classes, classes)."""
+    restitution: Array
+    """e of a single contact, shape (classes, classes)."""
+    entries: Entries
+    plate: float | None
+    """Height of the infinite plate [m]; None: there is none."""
+    meshes: tuple[Mesh, ...]
+    box: Array
+    """Corners (low, high) of the room in which bodies are expected [m], shape (2, 3)."""
+
+    @property
+    def bodies(self) -> int:
+        """Number of bodies that enter."""
+        return len(self.entries.step)
+
+    def members(self, body: int) -> Array:
+        """Centres of the member spheres of a body in its principal frame [m], shape (m, 3)."""
+        return self.clumps[int(self.entries.component[body])].centres
+
+
+def deck_of(record: Record, time: float | None = None) -> Deck:
+    """The deck that repeats ``record``: the same bodies at the same moments and places, the same number of steps.
+
+    Args:
+        record: a pour of ours; its entries say how bodies enter, and its gate when it opens.
+        time: simulated time [s] instead of the record's; bodies that enter later are left out.
+
+    Raises:
+        CommandError: the scene has something that no exported deck can hold.
+    """
+    scene = record.scene
+    if not isinstance(scene.rig, Funnel):
+        raise CommandError(f"rig {getattr(scene.rig, 'name', '?')!r} cannot be exported; allowed: funnel")
+    steps = record.steps if time is None else math.ceil(time / record.dt)
+    friction, restitution = _pair_tables(scene)
+    wall = scene.material(scene.rig.wall)
+    return Deck(
+        title=scene.title,
+        seed=record.seed,
+        dt=record.dt,
+        steps=steps,
+        gravity=scene.gravity,
+        clumps=_clumps(scene),
+        wall_youngs_modulus=wall.youngs_modulus,
+        wall_poisson_ratio=wall.poisson_ratio,
+        friction=friction,
+        restitution=restitution,
+        entries=_until(record.entries, steps),
+        plate=_plate(scene.rig),
+        meshes=_meshes(scene, record),
+        box=_box(scene),
+    )
+
+
+def write_deck(folder: Path, deck: Deck) -> None:
+    """Write ``deck.json`` into ``folder``."""
+    text = json.dumps(dataclasses.asdict(deck), indent=1, default=lambda array: array.tolist(), allow_nan=False)
+    (folder / FILE).write_text(text + "\n", encoding="utf-8")
+
+
+def read_deck(folder: Path) -> Deck:
+    """The deck in ``folder``; OSError where there is none."""
+    table: dict[str, Any] = json.loads((folder / FILE).read_text(encoding="utf-8"))
+    table["clumps"] = tuple(Clump(**_arrays(entry, "centres", "radii", "inertia")) for entry in table["clumps"])
+    table["meshes"] = tuple(Mesh(**_arrays(entry, "triangles")) for entry in table["meshes"])
+    entries = table["entries"]
+    whole = {key: np.array(entries[key], dtype=np.int32) for key in ("step", "component")}
+    table["entries"] = Entries(**(_arrays(entries, "time", "position", "quaternion", "velocity") | whole))
+    table["gravity"] = tuple(table["gravity"])
+    return Deck(**_arrays(table, "friction", "restitution", "box"))
+
+
+def _arrays(table: dict[str, Any], *keys: str) -> dict[str, Any]:
+    return table | {key: np.array(table[key], dtype=float) for key in keys}
+
+
+def _clumps(scene: Scene) -> tuple[Clump, ...]:
+    clumps = []
+    for body in scene.bodies:
+        clump, material = body.clump, scene.material(body.material)
+        clumps.append(
+            Clump(
+                name=body.name,
+                centres=np.array(clump.centres),
+                radii=np.array(clump.radii),
+                mass=float(clump.mass),
+                inertia=np.array(clump.inertia),
+                density=material.density,
+                youngs_modulus=material.youngs_modulus,
+                poisson_ratio=material.poisson_ratio,
+            )
+        )
+    return tuple(clumps)
+
+
+def _pair_tables(scene: Scene) -> tuple[Array, Array]:
+    """Friction and restitution of all classes; wall against wall, which never meet, get those of the first body."""
+    n, wall = len(scene.bodies), scene.rig.wall
+    others: tuple[Body | str, ...] = (*scene.bodies, wall)
+    pairs = [[scene.contact_pair(one, other) for other in others] for one in scene.bodies]
+    friction, restitution = np.zeros((n + 1, n + 1)), np.zeros((n + 1, n + 1))
+    for table, key in ((friction, "static_friction"), (restitution, "restitution")):
+        for a in range(n):
+            for b in range(n + 1):
+                table[a, b] = table[b, a] = getattr(pairs[a][b], key)
+        table[n, n] = table[0, n]
+    return friction, restitution
+
+
+def _until(entries: Entries, steps: int) -> Entries:
+    kept = entries.step < steps
+    return Entries(**{field.name: getattr(entries, field.name)[kept] for field in dataclasses.fields(Entries)})
+
+
+def _plate(rig: Funnel) -> float:
+    return next(surface.pose.origin[2] for surface in rig.surfaces() if isinstance(surface, Plane))
+
+
+def _meshes(scene: Scene, record: Record) -> tuple[Mesh, ...]:
+    gated = scene.insertion.protocol == "fill_then_open"
+    opening = round(record.gate_opened / record.dt) if record.gate_opened > 0.0 else -1
+    meshes = []
+    for name, surface in zip(scene.rig.surface_names, scene.rig.surfaces(), strict=True):
+        if not isinstance(surface, Revolved) or (name == "gate" and not gated):
+            continue
+        meshes.append(Mesh(name, revolved_triangles(surface), opening if name == "gate" else -1))
+    return tuple(meshes)
+
+
+def _box(scene: Scene) -> Array:
+    half, longest = scene.rig.domain_half_width, max(max(body.extents) for body in scene.bodies)
+    top = pour_rig(scene).feed().floor + scene.insertion.region_height + longest
+    return np.array([[-half, -half, -0.01], [half, half, top]])

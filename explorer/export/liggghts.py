@@ -1,0 +1,218 @@
+"""The deck for LIGGGHTS-PUBLIC 3.8: ``in.liggghts``, one file per clump, one STL per mesh.
+
+What makes it repeat our pour, in the order of the input:
+
+- ``limitForce on`` cuts tension as our law does, and every restitution is replaced by the one whose damping is ours
+  (:func:`unclamped_restitution`), so the two normal laws are the same function.
+- ``mass … inertia_tensor … use_density`` takes the declared centre of mass; ``use_volume`` would shift it to a Monte
+  Carlo estimate. The reduced mass of a contact is that of the bodies by itself.
+- One ``fix insert/pack`` per body in a cube of 0.2 nm, with the orientation as a quaternion, at its own step. LIGGGHTS
+  inserts after it moved the bodies of a step, so its step k + 1 is our k.
+- ``boundary m`` lets the box follow bodies that roll out of it; ``f`` would delete them.
+
+What stays different: the tangential spring is a displacement times the present stiffness (ours is a force that does
+not grow while the contact is loaded), it is projected when the normal turns (ours keeps its length), and its damping
+follows from the replaced restitution (18 % stronger at e = 0.5).
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from explorer.errors import CommandError
+from explorer.export.deck import Clump, Deck, write_deck
+from explorer.export.frames import FINAL, TRAJECTORY
+from explorer.export.readme import write_readme
+from explorer.export.triangles import write_stl
+from solver.laws.restitution import normal_damping
+
+Array = npt.NDArray[np.float64]
+INPUT = "in.liggghts"
+LEAST_RESTITUTION = 0.05
+"""LIGGGHTS refuses a coefficient of restitution up to this one."""
+SEEDS = (15485863, 15485867, 32452843)
+"""Primes for templates, distributions and insertion, which have to differ; nothing is drawn that acts on the result."""
+CUBE = 1e-10
+"""Half the edge of the cube in which a centre of mass is placed [m]."""
+SOFT, HARD = 5e6, 1e9
+"""Young's moduli [Pa] beyond which LIGGGHTS asks for a confirmation."""
+SKIN, CELL = 0.9, 6.0
+"""Reach of the contact list beyond touching, and size of its cells, in radii of the largest sphere: the fastest that
+were found for the seed pour. By default the box is cut into cells of half a contact distance, and to empty millions of
+them takes longer than everything else."""
+MODEL = "model hertz tangential history"
+
+
+def unclamped_restitution(restitution: float) -> float:
+    """The e for which LIGGGHTS's damping, 2 √(5/6) |β(e)|, is our c_n.
+
+    β = ln e / √(ln² e + π²), so e = exp(−π b / √(1 − b²)) with b = c_n / (2 √(5/6)); 0 where b ≥ 1.
+    """
+    b = normal_damping(restitution) / (2.0 * math.sqrt(5.0 / 6.0))
+    return math.exp(-math.pi * b / math.sqrt(1.0 - b * b)) if b < 1.0 else 0.0
+
+
+def write_liggghts(folder: Path, deck: Deck) -> None:
+    """Write the deck into ``folder``; :class:`CommandError` for what LIGGGHTS cannot take."""
+    for clump in deck.clumps:
+        if len(clump.radii) < 2:
+            raise CommandError(f"body {clump.name!r}: LIGGGHTS takes clumps of at least 2 spheres, not of one")
+    text = "\n".join(_input(deck)) + "\n"
+    for k, clump in enumerate(deck.clumps, start=1):
+        rows = np.column_stack([clump.centres, clump.radii])
+        (folder / _clump_file(k)).write_text("\n".join(map(_row, rows)) + "\n", encoding="ascii")
+    for mesh in deck.meshes:
+        write_stl(folder / f"{mesh.name}.stl", mesh.name, mesh.triangles)
+    (folder / INPUT).write_text(text, encoding="utf-8")
+    write_deck(folder, deck)
+    write_readme(folder, "liggghts", deck)
+
+
+def model_lines(moduli: list[float], ratios: list[float], restitution: Array, friction: Array) -> list[str]:
+    """Materials by class and pairs of classes, and the contact law between particles.
+
+    Raises :class:`CommandError` where a restitution is too low for LIGGGHTS.
+    """
+    n = len(moduli)
+    replaced = np.vectorize(unclamped_restitution, otypes=[float])(restitution)
+    if replaced.min() <= LEAST_RESTITUTION:
+        raise CommandError(
+            f"restitution {restitution.min():g}: LIGGGHTS needs more than {LEAST_RESTITUTION:g} after its damping is "
+            "matched to ours; allowed: 0.22 … 1"
+        )
+    confirmations = [f"soft_particles yes  # a modulus below {SOFT:g} Pa"] if min(moduli) < SOFT else []
+    if max(moduli) > HARD:
+        confirmations.append(f"hard_particles yes  # a modulus above {HARD:g} Pa")
+    return [
+        *confirmations,
+        f"fix youngs all property/global youngsModulus peratomtype {_row(moduli)}",
+        f"fix poisson all property/global poissonsRatio peratomtype {_row(ratios)}",
+        f"fix restitution all property/global coefficientRestitution peratomtypepair {n} {_row(replaced.ravel())}",
+        f"fix friction all property/global coefficientFriction peratomtypepair {n} {_row(friction.ravel())}",
+        f"pair_style gran {MODEL} limitForce on",
+        "pair_coeff * *",
+    ]
+
+
+def gravity_lines(gravity: tuple[float, float, float]) -> list[str]:
+    """The acceleration [m/s²] as a magnitude and a direction."""
+    size = math.hypot(*gravity)
+    return [f"fix gravity all gravity {size!r} vector {_row([g / size for g in gravity])}"] if size > 0.0 else []
+
+
+def settings_lines(box: Array, types: int, skin: float) -> list[str]:
+    """Style, box (low, high) [m], number of types and the reach of the contact list beyond touching [m]."""
+    sides = " ".join(f"{low:.12g} {high:.12g}" for low, high in zip(*box, strict=True))
+    return [
+        "units si",
+        "atom_style granular",
+        "atom_modify map array",
+        "boundary m m m  # grows with what rolls out; f would delete it",
+        "newton off",
+        "communicate single vel yes",
+        f"region room block {sides} units box",
+        f"create_box {types} room",
+        f"neighbor {skin:.12g} bin",
+        "neigh_modify delay 0",
+    ]
+
+
+def run_lines(steps: int, dt: float) -> list[str]:
+    """Time step and what is printed and written along the way: nothing, unless ``-var dump_every N`` asks for it."""
+    return [
+        f"timestep {dt!r}",
+        "variable dump_every index 0",
+        f'if "${{dump_every}} > 0" then "dump trajectory all custom ${{dump_every}} {TRAJECTORY} {COLUMNS}" '
+        f"\"dump_modify trajectory sort id format '{FORMAT}'\"",
+        f"thermo {max(1, steps // 10)}",
+        "thermo_style custom step atoms cpu",
+    ]
+
+
+def plane_line(name: str, wall: int, axis: str, place: float) -> str:
+    """An infinite plane of material ``wall`` across ``axis`` (x, y, z) at ``place`` [m]; R* is the sphere's radius."""
+    return f"fix {name} all wall/gran {MODEL} primitive type {wall} {axis}plane {place!r} limitForce on"
+
+
+COLUMNS = "id radius x y z vx vy vz omegax omegay omegaz"
+FORMAT = " ".join(["%d", *["%.12g"] * 10])
+WRITE_FINAL = f'write_dump all custom {FINAL} {COLUMNS} modify sort id format "{FORMAT}"'
+
+
+def _input(deck: Deck) -> list[str]:
+    moduli = [*(clump.youngs_modulus for clump in deck.clumps), deck.wall_youngs_modulus]
+    ratios = [*(clump.poisson_ratio for clump in deck.clumps), deck.wall_poisson_ratio]
+    wall = len(moduli)
+    largest = max(float(clump.radii.max()) for clump in deck.clumps)
+    return [
+        f"# {deck.title}, seed {deck.seed}: {deck.bodies} bodies, {deck.steps} steps of {deck.dt:.6g} s",
+        *settings_lines(deck.box, wall, SKIN * largest),
+        f"neigh_modify binsize {CELL * largest:.12g}",
+        *model_lines(moduli, ratios, deck.restitution, deck.friction),
+        *gravity_lines(deck.gravity),
+        *([] if deck.plate is None else [plane_line("plate", wall, "z", deck.plate)]),
+        *(f"fix {mesh.name} all mesh/surface file {mesh.name}.stl type {wall}" for mesh in deck.meshes),
+        *_mesh_wall_lines([mesh.name for mesh in deck.meshes]),
+        *(line for k, clump in enumerate(deck.clumps, start=1) for line in _template_lines(k, clump)),
+        "fix motion all multisphere",
+        *run_lines(deck.steps, deck.dt),
+        *(line for body in range(deck.bodies) for line in _insertion_lines(deck, body)),
+        *_runs(deck),
+        WRITE_FINAL,
+    ]
+
+
+def _mesh_wall_lines(names: list[str]) -> list[str]:
+    """All meshes as one wall; LIGGGHTS allows no more than one of this kind."""
+    if not names:
+        return []
+    return [f"fix walls all wall/gran {MODEL} mesh n_meshes {len(names)} meshes {' '.join(names)} limitForce on"]
+
+
+def _template_lines(k: int, clump: Clump) -> list[str]:
+    x, y, z = map(float, clump.inertia)
+    return [
+        f"fix clump{k} all particletemplate/multisphere {SEEDS[0]} atom_type {k} volume_limit 1e-30 "
+        f"density constant {clump.density!r} nspheres {len(clump.radii)} ntry 1000 spheres file {_clump_file(k)} "
+        f"scale 1.0 type {k} mass {clump.mass!r} inertia_tensor {x!r} 0 0 {y!r} 0 {z!r} use_density",
+        f"fix only{k} all particledistribution/discrete {SEEDS[1]} 1 clump{k} 1.0",
+    ]
+
+
+def _insertion_lines(deck: Deck, body: int) -> list[str]:
+    entries = deck.entries
+    place = " ".join(f"{c - CUBE:.12f} {c + CUBE:.12f}" for c in entries.position[body])
+    return [
+        f"region place{body} block {place} volume_limit 1e-60 units box",
+        f"fix enter{body} all insert/pack seed {SEEDS[2]} distributiontemplate only{entries.component[body] + 1} "
+        f"insert_every once start {entries.step[body] + 1} overlapcheck no all_in no verbose no "
+        f"vel constant {_row(entries.velocity[body])} orientation constant {_row(entries.quaternion[body])} "
+        f"region place{body} particles_in_region 1 ntry_mc 1000",
+    ]
+
+
+def _runs(deck: Deck) -> list[str]:
+    """Runs between the moments at which a mesh is taken away; one step more than ours, since theirs begin at 1.
+
+    The wall is declared anew without it: contacts with the other meshes start over without a tangential spring.
+    """
+    lines, done, there = [], 0, [mesh.name for mesh in deck.meshes]
+    for mesh in sorted(deck.meshes, key=lambda mesh: mesh.until_step):
+        if 0 <= mesh.until_step < deck.steps:
+            there.remove(mesh.name)
+            lines += [f"run {mesh.until_step + 1 - done}", "unfix walls", f"unfix {mesh.name}"]
+            lines += _mesh_wall_lines(there)
+            done = mesh.until_step + 1
+    return [*lines, f"run {deck.steps + 1 - done}"]
+
+
+def _clump_file(k: int) -> str:
+    return f"clump{k}.txt"
+
+
+def _row(values: Array | list[float]) -> str:
+    return " ".join(f"{float(value)!r}" for value in values)

@@ -1,0 +1,84 @@
+"""``README.txt`` of an exported folder: how to run it, how to read it, what is not as in our solver."""
+
+from __future__ import annotations
+
+import textwrap
+from pathlib import Path
+
+from explorer.export.deck import Deck
+
+RUN = {
+    "liggghts": """\
+        liggghts -in in.liggghts
+        liggghts -in in.liggghts -var dump_every 1000      writes trajectory.txt every 1000 steps as well
+
+        Made for LIGGGHTS-PUBLIC 3.8.0 (Debian: apt install liggghts). One process: clumps are serial.
+        "Loop time of … s" in the output is the time of the stepping loop.""",
+    "yade": """\
+        yade -n -x -j1 yade_pour.py
+        yade -n -x -j1 yade_pour.py 1000                   writes trajectory.txt every 1000 steps as well
+
+        Made for YADE 2023.02a (Debian: apt install yade). "Loop time of … s" at the end is the time of the stepping
+        loop. On a busy machine set OMP_WAIT_POLICY=passive.""",
+}
+FILES = {
+    "liggghts": """\
+        in.liggghts   the input            clump<k>.txt   member spheres x y z r of component k [m]""",
+    "yade": """\
+        yade_pour.py  the script           law.json       damping ratios and friction angles of all pairs""",
+}
+DIFFERENCES = {
+    "liggghts": """\
+        Normal force: the same function (limitForce on, and restitutions replaced by those with the same damping).
+        Tangential force: LIGGGHTS stores a displacement and multiplies it with the present stiffness, so the force
+        grows while a contact is loaded; ours stores the force. Its tangential damping is stronger, by 18 % at e = 0.5.
+        Where a body is placed is drawn in a cube of 0.2 nm. Counting of steps: its step k + 1 is our k.""",
+    "yade": """\
+        Normal force and both dampings: the same functions. Tangential force: YADE does not scale the spring down while
+        a contact unloads. A sphere on an edge between two triangles of the cone is pushed by both.""",
+}
+TEXT = """\
+{title}
+{bodies} bodies, {spheres} member spheres, seed {seed}; {steps} steps of {dt:.6g} s = {time:.6g} s simulated.
+Bodies enter at the moments, places, orientations and velocities of the pour of this seed in explorer.
+
+Run
+{run}
+
+Files
+{files}
+    deck.json     all of it, in SI and in no engine's terms
+    *.stl         cone and gate [m]; the plate is an infinite plane{plate}
+
+Read
+    final.txt     the last moment, one row per member sphere: id, radius, position, velocity of its centre, angular
+                  velocity of its body (world's frame); SI. Ids follow the order of entry, the spheres of a body stand
+                  one after the other in the order of its clump (deck.json: clumps, entries.component).
+                  The form is that of a LAMMPS dump; OVITO opens it.
+
+Not as in explorer
+{differences}
+    The cone is a polygon of the same area with 96 sides; bodies that roll far away stay in the calculation.
+"""
+
+
+def write_readme(folder: Path, engine: str, deck: Deck) -> None:
+    """Write ``README.txt`` into ``folder``."""
+    text = TEXT.format(
+        title=deck.title,
+        bodies=deck.bodies,
+        spheres=sum(len(deck.members(body)) for body in range(deck.bodies)),
+        seed=deck.seed,
+        steps=deck.steps,
+        dt=deck.dt,
+        time=deck.steps * deck.dt,
+        run=_block(RUN[engine]),
+        files=_block(FILES[engine]),
+        differences=_block(DIFFERENCES[engine]),
+        plate="" if deck.plate is None else f" z = {deck.plate:g} m",
+    )
+    (folder / "README.txt").write_text(text, encoding="utf-8")
+
+
+def _block(text: str) -> str:
+    return textwrap.indent(textwrap.dedent(text), "    ")

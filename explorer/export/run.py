@@ -1,0 +1,103 @@
+"""Run an exported folder with the installed engine, and say how long its stepping loop took."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from explorer.errors import CommandError
+from explorer.export.frames import FINAL, Frame, final_frame
+from explorer.export.liggghts import INPUT
+
+LOOP = re.compile(r"Loop time of ([\d.eE+-]+) (?:s |on \d+ procs )?for (\d+) steps")
+
+
+@dataclass(frozen=True)
+class PeerRun:
+    """A finished run of another engine."""
+
+    engine: str
+    version: str
+    steps: int
+    wall_s: float
+    """Of the stepping loop, as the engine reports it [s]."""
+    setup_s: float
+    """The rest: start, reading, setting up, writing [s]."""
+    final: Frame
+
+
+def run_liggghts(folder: Path, dump_every: int = 0) -> PeerRun:
+    """Run ``in.liggghts`` in ``folder``; one process.
+
+    Raises:
+        CommandError: LIGGGHTS is not installed, or it failed (the line says why).
+    """
+    program = _installed("liggghts")
+    log = "log.liggghts"
+    options = ["-var", "dump_every", str(dump_every)]
+    output, elapsed = _run([program, "-in", INPUT, "-log", log, "-nocite", *options], folder, {})
+    version = re.search(r"Version (LIGGGHTS\S* \S+?),", output)
+    return _finished("liggghts", version[1] if version else "unknown", folder, output, elapsed)
+
+
+def run_yade(folder: Path, threads: int = 1, dump_every: int = 0) -> PeerRun:
+    """Run the YADE script in ``folder``.
+
+    Raises:
+        CommandError: YADE is not installed, or it failed (the line says why).
+    """
+    program = _installed("yade")
+    script = next((path.name for path in sorted(folder.glob("yade_*.py"))), None)
+    if script is None:
+        raise CommandError(f"{folder}: holds no yade_*.py; export it with --to yade")
+    command = [program, "-n", "-x", f"-j{threads}", script, *([str(dump_every)] if dump_every else [])]
+    output, elapsed = _run(command, folder, {"OMP_WAIT_POLICY": "passive"})
+    version = re.search(r"Welcome to Yade (\S+)", output)
+    return _finished("yade", f"YADE {version[1]}" if version else "unknown", folder, output, elapsed)
+
+
+def _installed(name: str) -> str:
+    program = shutil.which(name)
+    if program is None:
+        raise CommandError(f"{name}: not installed (Debian: apt install {name})")
+    return program
+
+
+def _run(command: list[str], folder: Path, environment: dict[str, str]) -> tuple[str, float]:
+    """Output and duration [s] of a program; the final state of an earlier run is removed first."""
+    (folder / FINAL).unlink(missing_ok=True)
+    started = time.perf_counter()
+    done = subprocess.run(
+        command,
+        cwd=folder,
+        env=os.environ | environment,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+        check=False,
+    )
+    elapsed = time.perf_counter() - started
+    if done.returncode != 0 or not (folder / FINAL).is_file():
+        raise CommandError(f"{Path(command[0]).name} failed in {folder}: {_reason(done.stdout)}")
+    return done.stdout, elapsed
+
+
+def _reason(output: str) -> str:
+    lines = [line.strip() for line in output.splitlines() if line.strip()]
+    told = [line for line in lines if "error" in line.lower()]
+    return (told or lines or ["no output"])[-1]
+
+
+def _finished(engine: str, version: str, folder: Path, output: str, elapsed: float) -> PeerRun:
+    loops = LOOP.findall(output)
+    if not loops:
+        raise CommandError(f"{engine} in {folder}: reported no loop time")
+    wall = sum(float(seconds) for seconds, _ in loops)
+    return PeerRun(engine, version, sum(int(steps) for _, steps in loops), wall, elapsed - wall, final_frame(folder))

@@ -1,0 +1,145 @@
+"""Beds of equal spheres at rest under gravity: the case in which every sphere has contacts at every step.
+
+A small bed is settled in a box, then copied side by side to the wanted number, so that beds of 10³ and 10⁵ spheres
+have the same height and the same contacts per sphere.
+Spheres: d 5 mm, ρ 2500 kg/m³, G 10 MPa, ν 0.25, μ 0.5, e 0.5.
+"""
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from solver import backend
+from solver.benchmark.measurement import Measurement
+from solver.body import Body, Members
+from solver.layout import layout
+from solver.material import Material, Pair
+from solver.numerics import Numerics
+from solver.rigs.rig import BareRig
+from solver.rigs.surface import Plane, Pose, Surface, horizontal
+from solver.scene import Scene
+from solver.state import Capacity
+from solver.time_step import time_step
+from solver.world import SUMMARY_COLUMNS, Batch
+
+Array = npt.NDArray[np.float64]
+
+RADIUS = 2.5e-3
+SKIN = 0.2e-3
+TILE = (10, 10, 10)
+"""Spheres of the small bed along x, y and z before it settles."""
+SPACING = 2.06 * RADIUS
+SETTLING_TIME = 0.25
+"""Simulated time [s] for the small bed to come to rest."""
+RELAXING_TIME = 0.01
+"""The same for a bed put together of copies."""
+
+
+@dataclass(frozen=True)
+class Box(BareRig):
+    """An open box: floor z = 0 and four walls, ``width`` × ``depth`` [m]."""
+
+    width: float
+    depth: float
+    wall: str = "wall"
+    domain_half_width: float = 1e3
+
+    def surfaces(self) -> tuple[Surface, ...]:
+        """Floor, then the walls at x = 0, x = width, y = 0, y = depth."""
+        half = float(np.sqrt(0.5))
+        return (
+            horizontal(0.0, self.wall),
+            Plane(self.wall, Pose((0.0, 0.0, 0.0), (half, 0.0, half, 0.0))),
+            Plane(self.wall, Pose((self.width, 0.0, 0.0), (half, 0.0, -half, 0.0))),
+            Plane(self.wall, Pose((0.0, 0.0, 0.0), (half, -half, 0.0, 0.0))),
+            Plane(self.wall, Pose((0.0, self.depth, 0.0), (half, half, 0.0, 0.0))),
+        )
+
+
+@dataclass(frozen=True)
+class Bed:
+    """Centres (n, 3) and velocities (n, 3) of equal spheres of ``RADIUS`` in a box."""
+
+    box: Box
+    centres: Array
+    velocities: Array
+
+
+def bed_scene(box: Box) -> Scene:
+    """The scene of a bed; no body sleeps, so that the figures are those of a bed that moves."""
+    mass = 4.0 / 3.0 * np.pi * RADIUS**3 * 2500.0
+    sphere = Members(((0.0, 0.0, 0.0),), (RADIUS,), mass, (0.4 * mass * RADIUS**2,) * 3)
+    material = Material("glass", density=2500.0, shear_modulus=1e7, poisson_ratio=0.25)
+    wall = Material("wall", density=2500.0, shear_modulus=1e7, poisson_ratio=0.25)
+    return Scene(
+        title="packed bed",
+        materials=(material, wall),
+        bodies=(Body("sphere", "glass", 1.0, sphere, 2500.0),),
+        pairs=(Pair("glass", "glass", 0.5, 0.5), Pair("glass", "wall", 0.5, 0.5)),
+        rig=box,
+        numerics=Numerics(rayleigh_fraction=0.2, skin=SKIN, sleep_speed=0.0),
+    )
+
+
+def load_bed(bed: Bed) -> tuple[Batch, float]:
+    """A batch of one world that holds ``bed``, and its time step [s]."""
+    n = len(bed.centres)
+    batch = Batch(Capacity(worlds=1, bodies=n, members=n, contacts=8 * n, kinds=2))
+    scene = bed_scene(bed.box)
+    dt = time_step(scene)
+    batch.load(0, scene, layout(scene, np.zeros(n, dtype=np.int32)), dt, [True] * 5)
+    upright, still = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)
+    for b in range(n):
+        batch.enter(0, b, bed.centres[b], upright, bed.velocities[b], still)
+    return batch, dt
+
+
+def settled(bed: Bed, duration: float) -> Bed:
+    """``bed`` after ``duration`` [s]."""
+    batch, dt = load_bed(bed)
+    batch.advance(np.array([round(duration / dt)], dtype=np.int32))
+    state = batch.bodies(0, len(bed.centres))
+    return Bed(bed.box, state[:, 0:3], state[:, 7:10])
+
+
+def small_bed(seed: int = 1) -> Bed:
+    """The small bed at rest: a loose lattice with random speeds, dropped into its box."""
+    rng = np.random.default_rng(seed)
+    lattice = np.stack(np.meshgrid(*(np.arange(n) for n in TILE), indexing="ij"), axis=-1).reshape(-1, 3)
+    box = Box(TILE[0] * SPACING, TILE[1] * SPACING)
+    centres = (lattice + 0.5) * SPACING
+    speeds = np.asarray(rng.normal(0.0, 0.1, centres.shape), dtype=float)
+    return settled(Bed(box, np.asarray(centres, dtype=float), speeds), SETTLING_TIME)
+
+
+def wide_bed(tiles: tuple[int, int], seed: int = 1) -> Bed:
+    """``tiles`` copies of the small bed side by side, in the order of their places, relaxed for a moment."""
+    tile = small_bed(seed)
+    shift = np.array([(i * tile.box.width, j * tile.box.depth, 0.0) for i in range(tiles[0]) for j in range(tiles[1])])
+    centres = (shift[:, None, :] + tile.centres[None]).reshape(-1, 3)
+    box = Box(tiles[0] * tile.box.width, tiles[1] * tile.box.depth)
+    return settled(Bed(box, centres, np.zeros_like(centres)), RELAXING_TIME)
+
+
+def summary_of(batch: Batch) -> dict[str, float]:
+    """Summary of the one world by name."""
+    return dict(zip(SUMMARY_COLUMNS, batch.measure(0)[0].tolist(), strict=True))
+
+
+def measure_bed(bed: Bed, steps: int) -> Measurement:
+    """``steps`` of ``bed`` on one thread."""
+    backend.init(threads=1)
+    batch, dt = load_bed(bed)
+    batch.advance(np.array([1], dtype=np.int32))
+    begin = time.perf_counter()
+    batch.advance(np.array([steps], dtype=np.int32))
+    wall = time.perf_counter() - begin
+    n, contacts = len(bed.centres), summary_of(batch)["touching"]
+    return Measurement(bed_name(n), "ours, nothing sleeps", n, n, steps, wall, steps * dt, contacts, contacts)
+
+
+def bed_name(n: int) -> str:
+    """Name of the case with ``n`` spheres."""
+    return f"bed of {n} spheres"

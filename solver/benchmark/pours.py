@@ -1,0 +1,71 @@
+"""Pours against the clock: one world step by step, and many worlds on several threads."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+import numpy as np
+
+from solver import backend
+from solver.benchmark.measurement import Measurement
+from solver.pour import Pour
+from solver.record import Outcome
+from solver.run import Job, capacity_for, run_pours
+from solver.scene import Scene, with_values
+from solver.world import SUMMARY_COLUMNS, Batch
+
+WARM_UP = {"numerics.max_time": 0.1}
+"""A run as short as the declared range allows compiles every kernel."""
+
+
+def measure_pour(case: str, scene: Scene, seed: int, duration: float | None, sleeping: bool) -> Measurement:
+    """One pour on one thread for ``duration`` [s] of simulated time, or to rest if None.
+
+    For a duration the run goes on when the pile is at rest, as other engines' runs do.
+    """
+    backend.init(threads=1)
+    values: dict[str, float] = {} if sleeping else {"numerics.sleep_speed": 0.0}
+    if duration is not None:
+        # A rest time beyond the end: nothing but the clock stops the run.
+        values |= {"numerics.max_time": duration, "numerics.rest_time": 5.0}
+    scene = with_values(scene, values)
+    batch = Batch(capacity_for([scene], 1))
+    _drive(batch, Pour(batch, 0, with_values(scene, WARM_UP), seed))
+    pour = Pour(batch, 0, scene, seed)
+    begin = time.perf_counter()
+    contacts = _drive(batch, pour)
+    wall = time.perf_counter() - begin
+    if pour.outcome not in (Outcome.AT_REST, Outcome.TIME_LIMIT, Outcome.JAMMED):
+        raise RuntimeError(f"{case}: the pour ended with {pour.outcome}: {pour.message}")
+    spheres = sum(len(scene.bodies[k].clump.radii) for k in pour.order)
+    name = "ours" if sleeping else "ours, nothing sleeps"
+    return Measurement(
+        case, name, len(pour.order), spheres, pour.steps, wall, pour.time, contacts[-1], float(np.mean(contacts))
+    )
+
+
+def measure_batch(case: str, scene: Scene, seeds: Sequence[int], threads: int) -> Measurement:
+    """Pours of ``seeds`` to rest in one batch on ``threads`` threads; steps are those of all pours together."""
+    backend.init(threads=threads)
+    list(run_pours([Job(with_values(scene, WARM_UP), seed) for seed in seeds], threads=threads))
+    begin = time.perf_counter()
+    records = [record for _, record in run_pours([Job(scene, seed) for seed in seeds], threads=threads)]
+    wall = time.perf_counter() - begin
+    steps = sum(record.steps for record in records)
+    bodies = max(len(record.bodies.mass) for record in records)
+    spheres = max(len(record.spheres.radius) for record in records)
+    simulated = sum(record.steps * record.dt for record in records)
+    name = f"{len(seeds)} pours, {threads} thread{'s' if threads > 1 else ''}"
+    return Measurement(case, name, bodies, spheres, steps, wall, simulated, float("nan"), float("nan"))
+
+
+def _drive(batch: Batch, pour: Pour) -> list[float]:
+    """Run ``pour`` to its end; touching contacts at its moments of decision."""
+    touching = SUMMARY_COLUMNS.index("touching")
+    contacts = [0.0]
+    while steps := pour.steps_due():
+        row = batch.advance(np.array([steps], dtype=np.int32))[0]
+        contacts.append(float(row[touching]))
+        pour.after(steps, row)
+    return contacts
