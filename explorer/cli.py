@@ -83,8 +83,13 @@ def options(
     version: bool = typer.Option(
         False, "--version", callback=_print_version, is_eager=True, help="Print the version and exit."
     ),
+    arch: str | None = typer.Option(None, metavar="ARCH", help="Where the solver computes: cpu, cuda or vulkan."),
 ) -> None:
     """Pour, pile and calibrate granular material."""
+    from solver.arch import choose
+
+    if arch is not None:
+        choose(arch)
 
 
 app.command()(serve.serve)

@@ -2,7 +2,7 @@
 
     outcome, message, seed, dt, steps    of the first seed
     observables     name → value and spread (within the pile) of the first seed, unit, and mean, sd, n over
-                    the replicates at rest in which it could be measured
+                    the valid replicates (at rest, or measured) in which it could be measured
     outcomes        outcome → number of replicates
     runs            per seed: outcome, message, dt, steps, wall_s, and name → value and spread
     parameters      path → value in SI, unit
@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from solver import Outcome, Record, Scene, parameters, value
+from solver import Record, Scene, parameters, value
 from solver.observables import Value, observe
 
 RUNTIME = ("taichi", "numpy")
@@ -72,9 +72,9 @@ def package_version(distribution: str) -> str | None:
 
 
 def _observables(records: Sequence[Record], observed: Sequence[dict[str, Value]]) -> dict[str, dict[str, Any]]:
-    at_rest = [values for record, values in zip(records, observed, strict=True) if record.outcome == Outcome.AT_REST]
+    valid = [values for record, values in zip(records, observed, strict=True) if record.outcome.valid]
     return {
-        name: _value(first) | {"unit": first.unit} | _over_replicates([values[name].value for values in at_rest])
+        name: _value(first) | {"unit": first.unit} | _over_replicates([values[name].value for values in valid])
         for name, first in observed[0].items()
     }
 

@@ -57,7 +57,7 @@ class RunTable:
             self._echo(f"        {record.message}")
 
     def summarise(self, result: dict[str, Any]) -> None:
-        """Print the observables: of the pile, or of several replicates the means over those at rest."""
+        """Print the observables: of the pile, or of several replicates the means over those that are valid."""
         several = len(result["seeds"]) > 1
         keys = ("mean", "sd", "n") if several else ("value", "spread")
         rows = [
@@ -68,7 +68,7 @@ class RunTable:
         self._echo(text_table(("observable", *keys, "unit"), rows))
         if several:
             counted = ", ".join(f"{count} {outcome}" for outcome, count in result["outcomes"].items())
-            self._echo(f"\n{len(result['seeds'])} pours: {counted}; means over those at rest")
+            self._echo(f"\n{len(result['seeds'])} pours: {counted}; means over those that are valid")
 
 
 def _number(number: float | None, form: str) -> str:

@@ -7,6 +7,7 @@ assumed = [paths of values that nobody measured]
 [materials.<name>]       density, and two of youngs_modulus, shear_modulus, poisson_ratio (SI or with a unit)
 [[body]]                 name, material, mass_fraction, shape, … (`solver.body_table`)
 [pair.<a>.<b>]           static_friction, restitution
+[rig] [insertion] [numerics]     optional: another rig than the default funnel, and settings (see set_up.py)
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ from solver.body_table import read_body
 from solver.material import Material, Pair
 from solver.params import ParameterError, declared, parse_quantity
 from solver.rigs import Funnel
-from solver.scene import Scene, check
+from solver.scene import Scene
+from solver.set_up import TABLES, with_set_up
 from solver.shape import ShapeError
 from solver.toml_table import as_table, list_at, read_toml, table_at, vector
 
@@ -38,11 +40,12 @@ KNOWN = {
     "pair",
     "measured",
     "wall",
+    *TABLES,
 }
 
 
 def load_material(name: str, relative_to: Path | None = None) -> Scene:
-    """Scene with the default funnel from a shipped material's name or the path of a material file."""
+    """Scene from a shipped material's name or a material file's path, in the funnel unless the file says else."""
     path = asset_path("materials", name, relative_to=relative_to)
     try:
         return scene_from(read_toml(path), path)
@@ -52,7 +55,7 @@ def load_material(name: str, relative_to: Path | None = None) -> Scene:
 
 
 def scene_from(table: dict[str, Any], path: Path) -> Scene:
-    """Scene with the default rig from a parsed material file."""
+    """Scene from a parsed material file; its rig is the default funnel unless it has a table ``[rig]``."""
     unknown = sorted(set(table) - KNOWN)
     if unknown:
         raise ParameterError(f"unknown key {unknown[0]!r}; allowed: {', '.join(sorted(KNOWN))}")
@@ -78,8 +81,7 @@ def scene_from(table: dict[str, Any], path: Path) -> Scene:
         gravity=vector(table.get("gravity", (0.0, 0.0, -9.81)), "gravity"),
         assumed=tuple(str(name) for name in list_at(table, "assumed")),
     )
-    check(scene)
-    return scene
+    return with_set_up(scene, table)
 
 
 def _wall(table: dict[str, Any], materials: tuple[Material, ...], bodies: tuple[Body, ...]) -> str:

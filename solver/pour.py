@@ -1,8 +1,9 @@
-"""One pour in one world of a batch: bodies enter, fall, pile up and come to rest.
+"""One pour in one world of a batch: bodies enter, the rig acts, they pile up or flow, and the run ends.
 
-Everything that decides about a run happens at fixed simulated moments, every ``numerics.sample_interval``: bodies
-enter, curves are sampled, phases and outcomes are detected. How the steps in between are cut into launches makes no
-difference to a single bit.
+The rig says what it does and when a run is over (``rigs/rig.py``); nothing here knows a funnel from a drum. Everything
+that decides about a run happens at fixed simulated moments, every ``numerics.sample_interval``: bodies enter, curves
+are sampled, surfaces are set in motion, phases and outcomes are detected. How the steps in between are cut into
+launches makes no difference to a single bit.
 """
 
 from __future__ import annotations
@@ -14,24 +15,32 @@ import numpy as np
 import numpy.typing as npt
 
 from solver import insertion
-from solver.body import counts
 from solver.clump import scaled
 from solver.layout import layout
+from solver.observables.free_surface import surface_heights
 from solver.record import Bodies, Outcome, Phase, Record
-from solver.record_builder import bodies_of, entries_of, member_spheres, pile_of, rolling_away, trace_of
+from solver.record_builder import (
+    bodies_of,
+    entries_of,
+    free_surface_of,
+    member_spheres,
+    pile_of,
+    rolling_away,
+    trace_of,
+)
 from solver.retune import RAMP_STEPS, RAMP_TIME, Ramp, spring_ratio
-from solver.rigs.funnel import GATE
-from solver.scene import Scene
+from solver.rigs.rig import Container, Switch
+from solver.scene import Scene, body_counts, pour_rig
 from solver.sizes import drawn_sizes
 from solver.time_step import time_step
 from solver.world import SUMMARY_COLUMNS, Batch, law_table
 
 SETTLE_LIMIT = 1.0
-"""``fill_then_open``: the gate opens this long [s] after the last body entered even if the fill still moves."""
+"""``fill_then_open``: the rig acts this long [s] after the last body entered even if the fill still moves."""
 
 STALL_TIME = 0.5
-"""A funnel that has let nothing through for this long [s] is done, even if what is stuck in it rocks: twice the time
-that a body needs to fall through."""
+"""A container that has let nothing out for this long [s] is done, even if what is stuck in it rocks: twice the time
+that a body needs to fall through the funnel."""
 
 Summary = dict[str, float]
 
@@ -41,14 +50,13 @@ class Pour:
 
     def __init__(self, batch: Batch, w: int, scene: Scene, seed: int) -> None:
         self.batch, self.w, self.scene, self.seed = batch, w, scene, seed
+        self.rig = pour_rig(scene)
         self._rng = np.random.default_rng(seed)
-        self.order = insertion.shuffled_components(counts(scene.bodies, scene.rig.mass), self._rng)
+        self.order = insertion.shuffled_components(body_counts(scene), self._rng)
         sizes = drawn_sizes([body.sizes for body in scene.bodies], self.order, seed)
         self._layout = layout(scene, self.order, sizes)
         self.dt = time_step(scene)
-        self.gate_shut = scene.insertion.protocol == "fill_then_open"
-        self.gate_opened = 0.0
-        batch.load(w, scene, self._layout, self.dt, (True, True, self.gate_shut))
+        batch.load(w, scene, self._layout, self.dt, (True,) * len(self.rig.surfaces()))
         self._due = insertion.entry_times(self._layout.numbers[:, 0], scene.insertion.rate)
         self._table = law_table(scene)
         self._ramp: Ramp | None = None
@@ -59,8 +67,12 @@ class Pour:
         self._time_base, self._steps_base = 0.0, 0
         self.outcome, self.message = Outcome.RUNNING, ""
         self.samples: list[Summary] = []
-        self._quiet_samples = 0
+        self._free_surface: list[tuple[float, npt.NDArray[np.float64]]] = []
+        self._moving, self._quiet_samples = 0.0, 0
         self._last_entry = 0.0
+        self._began: float | None = None if scene.insertion.protocol == "fill_then_open" else 0.0
+        self._to_do, self._inside = list(self.rig.actions()), self.container
+        self._act()
         self._started = clock.perf_counter()
         self._left = self._interval_steps()
         self._insert()
@@ -76,12 +88,29 @@ class Pour:
         return float(self._layout.numbers[:, 0].sum())
 
     @property
+    def gate_shut(self) -> bool:
+        """Whether the rig is still being filled and has not begun to act."""
+        return self._began is None
+
+    @property
+    def gate_opened(self) -> float:
+        """Time [s] at which the rig began to act; 0 for ``pour_through``, and as long as it has not."""
+        return self._began or 0.0
+
+    @property
+    def container(self) -> Container:
+        """The inside of the rig at this moment."""
+        return self.rig.container(0.0 if self._began is None else self.time - self._began)
+
+    @property
     def phase(self) -> Phase:
         """Where the pour is."""
         if self.outcome == Outcome.AT_REST:
             return Phase.AT_REST
         if self.entered < len(self.order) or self.gate_shut:
             return Phase.FILL
+        if self.rig.running_time is not None:
+            return Phase.RUN
         return Phase.DISCHARGE if self.samples and self.samples[-1]["in_funnel"] > 0.0 else Phase.PILE
 
     def steps_due(self, at_most: int | None = None) -> int:
@@ -125,6 +154,10 @@ class Pour:
         """Present state of all bodies that have entered."""
         return bodies_of(self.scene, self.order, self._layout, self.batch.bodies(self.w, self.entered))
 
+    def surface_poses(self) -> npt.NDArray[np.float64]:
+        """Where the rig's surfaces are: origin [m] and orientation wxyz, shape (k, 7)."""
+        return self.batch.surface_state(self.w)[:, :7]
+
     def record(self) -> Record:
         """What the run leaves behind."""
         state = self.batch.bodies(self.w, self.entered)
@@ -137,7 +170,8 @@ class Pour:
             message=self.message,
             bodies=bodies,
             spheres=spheres,
-            pile=pile_of(self.scene, bodies, spheres, rolling_away(self.scene, state)),
+            pile=pile_of(self.container, bodies, spheres, rolling_away(self.scene, self.container, state)),
+            free_surface=free_surface_of(self.rig.watch, self._free_surface),
             trace=trace_of(self.samples),
             entries=entries_of(self.order, self._entries),
             gate_opened=self.gate_opened,
@@ -151,14 +185,17 @@ class Pour:
         return max(1, round(self.scene.numerics.sample_interval / self.dt))
 
     def _insert(self) -> None:
+        if self._began is not None and not self.rig.refills:
+            return
+        feed = self.rig.feed()
         speed = np.array([0.0, 0.0, -self.scene.insertion.drop_speed])
         while self.entered < len(self.order) and self._due[self.entered] <= self.time:
             spheres = member_spheres(self.scene, self.bodies())
-            near = spheres.centre[:, 2] + spheres.radius > self.scene.rig.inlet_height
+            near = spheres.centre[:, 2] + spheres.radius > feed.floor
             pose = insertion.find_place(
                 scaled(self.scene.bodies[self.order[self.entered]].clump, self._layout.scale[self.entered]),
                 self.scene.insertion,
-                self.scene.rig.inlet_height,
+                feed,
                 spheres.centre[near],
                 spheres.radius[near],
                 self._rng,
@@ -170,19 +207,44 @@ class Pour:
             self.entered += 1
             self._last_entry = self.time
 
+    def _act(self) -> None:
+        """Carry out what the rig has to do by now."""
+        if self._began is None:
+            return
+        # Less a hair: the sum of many steps must not miss a moment by rounding.
+        while self._to_do and self._to_do[0].after <= self.time - self._began + 1e-9:
+            action = self._to_do.pop(0)
+            if isinstance(action, Switch):
+                self.batch.set_active(self.w, action.surface, action.active)
+            else:
+                self.batch.set_motion(self.w, action.surface, action.velocity, action.angular_velocity)
+        if self.container != self._inside:
+            self._inside = self.container
+            self.batch.set_container(self.w, self._inside)
+
     def _sample(self, row: Summary) -> None:
         row["time"] = self.time
         row["entered"] = float(self._layout.numbers[: self.entered, 0].sum())
         row["lost"] = float(self.batch.take_out(self.w))
         self.samples.append(row)
         self._insert()
-        moving = max(row["speed"], row["funnel_speed"] if self.gate_shut else 0.0)
-        self._quiet_samples = self._quiet_samples + 1 if moving < self.scene.numerics.rest_speed else 0
+        # What moves in the container counts where it is to come to rest there.
+        inside = self.gate_shut or self.rig.keeps_material
+        self._moving = max(row["speed"], row["funnel_speed"] if inside else 0.0)
+        self._quiet_samples = self._quiet_samples + 1 if self._moving < self.scene.numerics.rest_speed else 0
+        self._watch()
         self.outcome, self.message = self._verdict(row)
         waiting = self.time > self._last_entry + SETTLE_LIMIT
         if self.gate_shut and (self._all_in() or self._blocked()) and (self._quiet() or waiting):
-            self.batch.set_active(self.w, GATE, False)
-            self.gate_shut, self.gate_opened, self._quiet_samples = False, self.time, 0
+            self._began, self._quiet_samples = self.time, 0
+        self._act()
+
+    def _watch(self) -> None:
+        """Keep the free surface of this moment, if the rig wants it."""
+        watch = self.rig.watch
+        if watch is not None and self._began is not None and self.time - self._began >= watch.after:
+            spheres = member_spheres(self.scene, self.bodies())
+            self._free_surface.append((self.time, surface_heights(spheres, watch.half_width) - watch.height))
 
     def _quiet(self) -> bool:
         numerics = self.scene.numerics
@@ -192,11 +254,11 @@ class Pour:
         return self.entered == len(self.order)
 
     def _blocked(self) -> bool:
-        """The next body has been due for long and finds no place: the funnel is full to the inlet."""
+        """The next body has been due for long and finds no place: the rig is full to the feed opening."""
         return not self._all_in() and self.time > self._due[self.entered] + SETTLE_LIMIT
 
     def _stalled(self) -> bool:
-        """Nothing has passed the outlet for ``STALL_TIME``, although it could."""
+        """Nothing has left the container for ``STALL_TIME``, although it could."""
         since = self.time - max(self._last_entry, self.gate_opened)
         back = math.ceil(STALL_TIME / self.scene.numerics.sample_interval)
         if since <= STALL_TIME or len(self.samples) <= back:
@@ -216,18 +278,43 @@ class Pour:
             return Outcome.LOST_BODY, f"{row['lost']:.0f} left the domain above the outlet or through the plate"
         if row["overlap"] > numerics.overlap_limit:
             return Outcome.OVERLAP_LIMIT, f"overlap of {row['overlap']:.3g} radii at {self.time:.3f} s"
-        fed = not self.gate_shut and (self._all_in() or self._blocked())
-        empty = row["hanging"] == 0
-        if fed and self._quiet() and (empty or self._stalled()):
-            if self._blocked() or row["hanging"] > numerics.hanging_bodies:
-                return (
-                    Outcome.JAMMED,
-                    f"{row['hanging']:.0f} bodies ({1e3 * row['in_funnel']:.3g} g) stay in the funnel",
-                )
-            return Outcome.AT_REST, "" if empty else f"{1e3 * row['in_funnel']:.3g} g hang in the funnel"
+        ended = self._overfull(row) or (
+            self._run_out() if self.rig.running_time is not None else self._come_to_rest(row)
+        )
+        if ended is not None:
+            return ended
         if self.time >= numerics.max_time:
-            return Outcome.TIME_LIMIT, f"still moving at {row['speed']:.3g} m/s after {numerics.max_time:g} s"
+            return Outcome.TIME_LIMIT, f"still moving at {self._moving:.3g} m/s after {numerics.max_time:g} s"
         return Outcome.RUNNING, ""
+
+    def _overfull(self, row: Summary) -> tuple[Outcome, str] | None:
+        """A rig that is filled once cannot take all of the bodies."""
+        if self.rig.refills or not self.gate_shut:
+            return None
+        if row["discharged"] > 0.0:
+            return Outcome.JAMMED, f"the rig overflows: {1e3 * row['discharged']:.3g} g lie beside it"
+        if self._blocked():
+            return Outcome.JAMMED, f"the rig is full: {len(self.order) - self.entered} bodies find no place in it"
+        return None
+
+    def _run_out(self) -> tuple[Outcome, str] | None:
+        """The rig has run for its time."""
+        over = self._began is not None and self.time - self._began >= (self.rig.running_time or 0.0)
+        return (Outcome.MEASURED, "") if over else None
+
+    def _come_to_rest(self, row: Summary) -> tuple[Outcome, str] | None:
+        """All is at rest: a pile, or a jam where more stays in the container than belongs there."""
+        fed = not self.gate_shut and not self._to_do and (self._all_in() or self._blocked())
+        empty, left = row["hanging"] == 0, f"{1e3 * row['in_funnel']:.3g} g"
+        where = self.rig.name.replace("_", " ")
+        if not (fed and self._quiet() and (empty or self.rig.keeps_material or self._stalled())):
+            return None
+        if self.rig.keeps_material:
+            stuck = row["discharged"] == 0.0
+            return (Outcome.JAMMED, f"nothing passes the outlet: {left} stay") if stuck else (Outcome.AT_REST, "")
+        if self._blocked() or row["hanging"] > self.scene.numerics.hanging_bodies:
+            return Outcome.JAMMED, f"{row['hanging']:.0f} bodies ({left}) stay in the {where}"
+        return Outcome.AT_REST, "" if empty else f"{left} hang in the {where}"
 
     def _follow_ramp(self, ramp: Ramp) -> None:
         self._set_table(ramp.table(self.time))

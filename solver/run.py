@@ -10,10 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from solver import backend
-from solver.body import counts
 from solver.pour import Pour
 from solver.record import Record
-from solver.scene import Scene
+from solver.scene import Scene, body_counts
 from solver.state import Capacity
 from solver.wall_tables import wall_tables
 from solver.world import Batch, wall_materials
@@ -40,7 +39,7 @@ def capacity_for(scenes: Sequence[Scene], worlds: int) -> Capacity:
     """Sizes that hold any of ``scenes``, rounded up so that a small change of the mixture fits as well."""
     bodies = members = kinds = 0
     for scene in scenes:
-        numbers = counts(scene.bodies, scene.rig.mass)
+        numbers = body_counts(scene)
         bodies = max(bodies, sum(numbers))
         members = max(members, sum(n * len(b.clump.radii) for n, b in zip(numbers, scene.bodies, strict=True)))
         kinds = max(kinds, len(scene.bodies) + len(wall_materials(scene)))

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
 def simulate(
     source: str = typer.Argument(
         metavar="RIG_OR_FILE",
-        help="A rig (funnel), or a material, set-up or study, by file or shipped name.",
+        help="A rig or bench test (funnel, lifting_cylinder, draw_down_box, rotating_drum, inclined_plane, "
+        "drop_plate_45, compression), or a material, set-up or study, by file or shipped name.",
     ),
     material: str | None = typer.Option(None, help="Material in the rig: file or shipped name."),
     set_: list[str] = typer.Option([], "--set", metavar="PATH=VALUE", help="Set a parameter; may be repeated."),
@@ -27,22 +28,36 @@ def simulate(
     ),
     json: bool = typer.Option(False, "--json", help="Print the result as JSON, and nothing else."),
 ) -> None:
-    """Pour a scene and print what came out.
+    """Pour a scene and print what came out, or run a bench test and print what it measured beside what was put in.
 
     A jam, a lost body or a cut-off is an outcome, not an error: the result names it, and the exit code is 0.
     """
     from contextlib import ExitStack
     from time import perf_counter
 
+    from explorer.bench_report import bench_data, bench_text, write_bench
+    from explorer.errors import CommandError
     from explorer.run_folder import appearing, json_text, write_run
     from explorer.run_result import result_of
     from explorer.run_table import RunTable
     from explorer.scene_file import load_scene, with_settings
     from solver import Job, run_pours
+    from solver.bench_tests import run_bench_test
+    from solver.rigs import BENCH_RIGS
 
     if record:
         from explorer.logs.pour_recorder import recorder_of
     scene = with_settings(load_scene(source, material), set_)
+    if scene.rig.name in BENCH_RIGS:
+        if record or replicates > 1:
+            raise CommandError(f"{scene.rig.name} is a bench test: --record and --replicates are for pours")
+        with ExitStack() as stack:
+            folder = stack.enter_context(appearing(out)) if out else None
+            data = bench_data(scene, run_bench_test(scene, seed))
+            if folder:
+                write_bench(folder, data)
+        typer.echo(json_text(data) if json else bench_text(data))
+        return
     seeds = range(seed, seed + replicates)
     started = perf_counter()
     with ExitStack() as stack:
