@@ -15,7 +15,7 @@ from solver.layout import layout
 from solver.material_file import load_material
 from solver.params import ParameterError
 from solver.record import Outcome
-from solver.run import run_pour
+from solver.run import Job, run_pour, run_pours
 from solver.scene import value, with_values
 from solver.shape import Solid
 from solver.sizes import KINDS, SizeDistribution, drawn_sizes
@@ -143,6 +143,23 @@ def test_three_components_are_mixed_by_mass(kind, spread):
     error = largest / 0.6 + 4.0 * np.std(shares, axis=0) / math.sqrt(8)
     assert np.abs(np.mean(shares, axis=0) - declared).max() < error.max()
     assert error.max() < 0.01
+
+
+def test_a_pour_of_three_components_leaves_the_declared_mixture(taichi):
+    """The whole way: material file, counts, shuffled entry, pour, record; over three seeds."""
+    scene = with_values(QUICK, {"rig.mass": "15g", "insertion.rate": "150g/s", "numerics.max_time": 0.6})
+    declared = np.array([body.mass_fraction for body in scene.bodies])
+    single = np.array([body.mass for body in scene.bodies])
+    orders = []
+    for _, record in run_pours([Job(scene, seed) for seed in range(3)]):
+        assert record.trace.entered_mass[-1] == pytest.approx(record.poured_mass)
+        shares = np.bincount(record.bodies.component, record.bodies.mass, minlength=3) / record.bodies.mass.sum()
+        # whole bodies: none of the three is off by one, and the total by half a body
+        assert (np.abs(shares - declared) < (single + single.max() / 2) / record.poured_mass).all()
+        orders.append(record.bodies.component.tolist())
+    # mixed: another order for another seed, and no component enters in one go
+    assert orders[0] != orders[1] != orders[2]
+    assert min(np.count_nonzero(np.diff(order)) for order in orders) > 3
 
 
 def test_fewer_bodies_make_the_mass_when_sizes_scatter():
