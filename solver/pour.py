@@ -228,9 +228,7 @@ class Pour:
         row["lost"] = float(self.batch.take_out(self.w))
         self.samples.append(row)
         self._insert()
-        # What moves in the container counts where it is to come to rest there.
-        inside = self.gate_shut or self.rig.keeps_material
-        self._moving = max(row["speed"], row["funnel_speed"] if inside else 0.0)
+        self._moving = max(row["speed"], row["funnel_speed"] if self.gate_shut else 0.0)
         self._quiet_samples = self._quiet_samples + 1 if self._moving < self.scene.numerics.rest_speed else 0
         self._watch()
         self.outcome, self.message = self._verdict(row)
@@ -307,7 +305,7 @@ class Pour:
         fed = not self.gate_shut and not self._to_do and (self._all_in() or self._blocked())
         empty, left = row["hanging"] == 0, f"{1e3 * row['in_funnel']:.3g} g"
         where = self.rig.name.replace("_", " ")
-        if not (fed and self._quiet() and (empty or self.rig.keeps_material or self._stalled())):
+        if not (fed and self._quiet() and (empty or self._stalled())):
             return None
         if self.rig.keeps_material:
             stuck = row["discharged"] == 0.0

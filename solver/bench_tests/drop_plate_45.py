@@ -1,6 +1,6 @@
 """Restitution from the drop on a plate at 45° (``rigs/drop_plate_45.py``).
 
-    tracked rebound   e = (v_x + v_z)/√(2gH), v_z upward, the flight traced back to the moment of the impact
+    tracked rebound   e = (v_x + v_z)/√(2gH), v_z upward, the flight traced back to the middle of the contact
     paper             e = L/(2H), L the horizontal distance flown until H below the place of the impact:
                       L = v_x (v_z + √(v_z² + 2gH))/g
 
@@ -35,7 +35,7 @@ FLIGHT = 3e-3
 """A body that has not touched the plate for this long [s] has bounced off; before, it may rock from end to end."""
 GIVEN_UP = 1.0
 """A body that has not bounced off this long [s] after the impact is given up."""
-MOMENT_STEPS = 20
+MOMENT_STEPS = 5
 RESTITUTIONS = (0.2, 0.35, 0.5, 0.65, 0.8)
 FRICTIONS = (0.0, 0.1, 0.3, 0.6)
 """What the bias of the paper's estimate is shown over."""
@@ -121,14 +121,13 @@ def drop(scene: Scene, specimen: Body, quaternion: Array) -> Rebound:
     contact, flight = 0.0, math.inf
     for _ in range(math.ceil(GIVEN_UP / moment)):
         if bench.run(moment)["touching"] > 0:
-            contact = moment if flight > 0.0 else contact + moment
-            flight = 0.0
+            contact, flight = (contact if flight == 0.0 else 0.0) + moment, 0.0
         else:
             flight += moment
         if FLIGHT <= flight < math.inf:
             v = bench.state()[7:10]
-            # Gravity acts during the contact, too: back to where the contact began, in the middle of a moment.
-            return Rebound(float(v[0]), float(v[2]) + gravity * (flight + contact - 0.5 * moment))
+            # Gravity acts during the contact, too: taken as an impact in its middle.
+            return Rebound(float(v[0]), float(v[2]) + gravity * (flight + 0.5 * contact))
     return Rebound(math.nan, math.nan)
 
 

@@ -1,9 +1,8 @@
 """Angle at which a body begins to slide (``rigs/inclined_plane.py``).
 
 First a fast tilt finds the angle roughly, then a slow one from ``MARGIN`` below it measures. Sliding is noticed late,
-at ``SLIDING`` speed; as the tilt grows in proportion to time, so does the acceleration, s = v Δt/3 after the onset, and
-the onset is traced back by Δt = 3 s/v. What the elastic contact yields before it slides (micrometres) is in s and adds
-a few thousandths of a degree to Δt.
+at ``SLIDING`` speed. As the tilt grows in proportion to time, so does the acceleration: √v grows in proportion to the
+time, and to the tilt, since the onset, which is where the line through two of its values meets zero.
 """
 
 from __future__ import annotations
@@ -31,7 +30,8 @@ MOMENT = 1e-3
 SETTLING = 0.1
 """Time to settle on the level plane [s]."""
 
-Path = list[tuple[float, float]]
+Path = list[tuple[float, float, float]]
+"""Tilt [°], displacement [m], speed [m/s]."""
 
 
 def measure(scene: Scene, seed: int) -> BenchResult:
@@ -51,15 +51,15 @@ def measure(scene: Scene, seed: int) -> BenchResult:
             Quantity("static_friction", "1", math.tan(math.radians(angle)), friction),
         ),
         series=(
-            ("tilt_deg", tuple(tilt for tilt, _ in path)),
-            ("displacement_m", tuple(displacement for _, displacement in path)),
+            ("tilt_deg", tuple(tilt for tilt, _, _ in path)),
+            ("displacement_m", tuple(displacement for _, displacement, _ in path)),
         ),
         note="" if math.isfinite(angle) else f"the body still holds at {STEEPEST:g} deg",
     )
 
 
 def _tilt(scene: Scene, rig: InclinedPlane, start: float, rate: float) -> tuple[float, Path]:
-    """Angle of sliding [°], NaN if the body holds, and the path (tilt [°], displacement [m]) at ``rate`` [°/s]."""
+    """Angle of sliding [°], NaN if the body holds, and the path; the tilt grows by ``rate`` [°/s] from ``start`` on."""
     body = next(body for body in scene.bodies if body.name == rig.body)
     bench = Bench(scene, rig, held(body))
     gravity = math.hypot(*scene.gravity)
@@ -67,18 +67,26 @@ def _tilt(scene: Scene, rig: InclinedPlane, start: float, rate: float) -> tuple[
     bench.put(np.array([0.0, 0.0, float((clump.radii - clump.centres[:, 2]).max())]))
     _set_tilt(bench, gravity, 0.0)
     bench.run(SETTLING)
-    origin, tilt, path = float(bench.state()[0]), 0.0, list[tuple[float, float]]()
+    origin, tilt, path = float(bench.state()[0]), 0.0, Path()
     moment = bench.steps_of(MOMENT)
     while tilt < STEEPEST:
         tilt += (rate if tilt >= start else FAST) * moment
         _set_tilt(bench, gravity, tilt)
         bench.run(MOMENT)
         state = bench.state()
-        path.append((tilt, float(state[0]) - origin))
-        speed = float(state[7])
-        if speed > SLIDING:
-            return max(0.0, tilt - rate * 3.0 * path[-1][1] / speed), path
+        path.append((tilt, float(state[0]) - origin, float(state[7])))
+        if state[7] > SLIDING:
+            return _onset(path), path
     return math.nan, path
+
+
+def _onset(path: Path) -> float:
+    """Tilt [°] where √v = 0, on the line through the first moment above a quarter of ``SLIDING`` and the last one."""
+    first, _, slow = next(moment for moment in path if moment[2] > 0.25 * SLIDING)
+    last, _, fast = path[-1]
+    if last == first:
+        return first
+    return max(0.0, first - (last - first) * math.sqrt(slow) / (math.sqrt(fast) - math.sqrt(slow)))
 
 
 def _set_tilt(bench: Bench, gravity: float, tilt_deg: float) -> None:

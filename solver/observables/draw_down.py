@@ -9,7 +9,7 @@ known as the angle of drain.
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,7 @@ import numpy.typing as npt
 from solver.observables.repose import flank_angles_deg
 from solver.observables.silhouette import PIXEL, largest_part, silhouette
 from solver.observables.value import Value, mean_value
+from solver.rigs.draw_down_box import DrawDownBox
 
 if TYPE_CHECKING:
     from solver.record import Record, Spheres
@@ -48,7 +49,7 @@ def slopes_deg(spheres: Spheres, floor: float) -> tuple[float, float]:
 
 
 def _sides_deg(record: Record) -> tuple[float, float]:
-    floor = record.scene.rig.container(np.inf).height
+    floor = cast(DrawDownBox, record.scene.rig).shelf_height
     position, inside = record.bodies.position, record.bodies.inside
     upper = np.flatnonzero(inside & (position[:, 2] > floor))
     spheres = record.spheres

@@ -65,6 +65,11 @@ class DrawDownBox(PourRig):
             "numerics.max_time": 20.0,
         }
 
+    @property
+    def floor(self) -> float:
+        """Height below which a body has left the upper box [m]: half a slot's width below the shelf."""
+        return max(0.5 * self.shelf_height, self.shelf_height - 0.5 * self.slot_width)
+
     def surfaces(self) -> tuple[Surface, ...]:
         """In the order of ``surface_names``."""
         x, y, slot = self.width / 2.0, self.depth / 2.0, self.slot_width / 2.0
@@ -90,8 +95,8 @@ class DrawDownBox(PourRig):
         return BoxFeed(self.shelf_height + self.box_height, self.width / 2.0, self.depth / 2.0)
 
     def container(self, since: float) -> Container:
-        """The upper box."""
-        return Container(self.shelf_height, math.hypot(self.width, self.depth) / 2.0)
+        """The upper box and the upper half of the way through the slot, where a body may lie across it."""
+        return Container(self.floor, math.hypot(self.width, self.depth) / 2.0)
 
     def actions(self) -> tuple[Action, ...]:
         """The slot opens."""

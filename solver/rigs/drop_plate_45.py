@@ -14,7 +14,6 @@ Source of the test: Processes 2022, 10, 185, §2.5, Equations (4)–(7); H is 20
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from solver.params import param
@@ -42,11 +41,6 @@ class DropPlate45(BenchRig):
 
     name = "drop_plate_45"
     surface_names = ("plate",)
-
-    @property
-    def suits(self) -> Mapping[str, float | str]:
-        """A fine time step: 25 steps per contact, as in a pour, leave e uncertain by 2 % at 0.5 and 7 % at 0.2."""
-        return {"numerics.rayleigh_fraction": 0.02}
 
     def surfaces(self) -> tuple[Surface, ...]:
         """The plate, through the origin."""

@@ -159,7 +159,7 @@ def test_what_stays_in_a_draw_down_box_and_what_falls_add_up():
     assert stays > 0.0
     assert falls > 0.0
     assert stays + falls == pytest.approx(record.poured_mass)
-    upper = record.bodies.position[:, 2] > BOX.rig.shelf_height
+    upper = record.bodies.position[:, 2] > BOX.rig.floor
     assert record.bodies.mass[upper & record.bodies.inside].sum() == pytest.approx(stays)
     # Nothing went through a wall: y within the depth, and x within the width while above the shelf.
     assert np.abs(record.bodies.position[:, 1]).max() < BOX.rig.depth / 2
