@@ -84,6 +84,12 @@ def trace_of(samples: list[dict[str, float]]) -> Trace:
         kinetic_energy=column("kinetic"),
         contacts=column("touching").astype(np.int32),
         max_overlap=column("overlap"),
+        potential_energy=column("potential"),
+        elastic_energy=column("elastic"),
+        dissipated_energy=column("dissipated"),
+        wall_work=column("wall_work"),
+        taken_out_energy=column("taken_out"),
+        supplied_energy=column("supplied"),
     )
 
 
