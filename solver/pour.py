@@ -61,6 +61,7 @@ class Pour:
         self._table = law_table(scene)
         self._ramp: Ramp | None = None
         self.energy_put_in = 0.0
+        self._supplied = 0.0
         self.entered = 0
         self._entries: list[tuple[float, int, insertion.Pose, npt.NDArray[np.float64]]] = []
         self.steps = 0
@@ -204,6 +205,7 @@ class Pour:
                 return
             self.batch.enter(self.w, self.entered, pose.position, pose.quaternion, speed, np.zeros(3))
             self._entries.append((self.time, self.steps, pose, speed))
+            self._supplied += self._mechanical_energy(self.entered, pose.position, speed)
             self.entered += 1
             self._last_entry = self.time
 
@@ -222,8 +224,14 @@ class Pour:
             self._inside = self.container
             self.batch.set_container(self.w, self._inside)
 
+    def _mechanical_energy(self, b: int, position: npt.NDArray[np.float64], velocity: npt.NDArray[np.float64]) -> float:
+        """Kinetic and potential energy [J] of body ``b`` that does not turn."""
+        mass, gravity = self._layout.numbers[b, 0], np.array(self.scene.gravity)
+        return float(mass * (0.5 * velocity @ velocity - gravity @ position))
+
     def _sample(self, row: Summary) -> None:
         row["time"] = self.time
+        row["supplied"] = self._supplied
         row["entered"] = float(self._layout.numbers[: self.entered, 0].sum())
         row["lost"] = float(self.batch.take_out(self.w))
         self.samples.append(row)
@@ -326,7 +334,9 @@ class Pour:
         self.batch.set_law(self.w, table)
         self.batch.scale_springs(self.w, spring_ratio(self._table, table))
         self._table = table
-        self.energy_put_in += float(self.batch.measure(self.w)[self.w, elastic] - before)
+        gained = float(self.batch.measure(self.w)[self.w, elastic] - before)
+        self.energy_put_in += gained
+        self._supplied += gained
 
     def _set_time_step(self, dt: float) -> None:
         self._time_base, self._steps_base = self.time, self.steps

@@ -109,7 +109,7 @@ def record_of(
         inside=np.ones(n, dtype=bool) if inside is None else inside,
     )
     contacts = np.zeros(time.size, dtype=np.int32)
-    trace = Trace(time, np.full_like(time, poured_mass), discharged_mass, zero, contacts, zero)
+    trace = Trace(time, np.full_like(time, poured_mass), discharged_mass, zero, contacts, *[zero] * 7)
     return Record(
         scene,
         0,
