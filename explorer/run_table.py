@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
+
+import numpy as np
 
 from explorer.text_table import table_line, text_table
 from solver import Record
@@ -70,6 +72,18 @@ class RunTable:
         if several:
             counted = ", ".join(f"{count} {outcome}" for outcome, count in result["outcomes"].items())
             self._echo(f"\n{len(result['seeds'])} pours: {counted}; means over those that are valid")
+        self._echo(f"\n{energy_line([run['energy'] for run in result['runs']])}")
+
+
+def energy_line(accounts: Sequence[dict[str, float | None]]) -> str:
+    """Energy put in (mean), the share of it that was dissipated, and how far the worst account is off."""
+    keys = ("put_in_J", "dissipated_J", "largest_error")
+    put_in, dissipated, error = np.array([[account[key] for key in keys] for account in accounts], dtype=float).T
+    return (
+        f"energy put in: {_number(1e3 * put_in.mean(), '.4g')} mJ, "
+        f"dissipated: {_number(100.0 * dissipated.sum() / put_in.sum(), '.4g')} %; "
+        f"the account closes within {_number(100.0 * error.max(), '.2g')} %"
+    )
 
 
 def _number(number: float | None, form: str) -> str:

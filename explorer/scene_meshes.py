@@ -39,8 +39,10 @@ class Triangles:
 
 
 def body_triangles(body: Body) -> Triangles:
-    """The true shape in the principal frame of the body; the member spheres where it is declared by them."""
+    """The true shape in the principal frame of the body; the member spheres where it is declared by nothing else."""
     if isinstance(body.shape, Members):
+        if body.shape.drawn is not None:
+            return _faceted(surface_mesh(body.shape.drawn))
         clump = body.clump
         spheres = [trimesh.creation.icosphere(subdivisions=2, radius=radius) for radius in clump.radii]
         for sphere, centre in zip(spheres, clump.centres, strict=True):

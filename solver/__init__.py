@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 from solver.assets import asset_path
 from solver.body import Body
-from solver.material_file import load_material, read_toml
+from solver.material_file import load_material
 from solver.observables import Value, observable_names, observe
 from solver.params import Parameter, ParameterError, parse_quantity
 from solver.record import Bodies, Entries, Outcome, Phase, Pile, Record, Spheres, Trace
 from solver.scene import Scene, body_counts, canonical, parameters, value, with_values
 from solver.set_up import with_set_up
+from solver.toml_table import read_toml
 from solver.version import code_version
 
 if TYPE_CHECKING:

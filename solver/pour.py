@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from solver import insertion
+from solver.clump import scaled
 from solver.layout import layout
 from solver.observables.free_surface import surface_heights
 from solver.record import Bodies, Outcome, Phase, Record
@@ -30,6 +31,7 @@ from solver.record_builder import (
 from solver.retune import RAMP_STEPS, RAMP_TIME, Ramp, spring_ratio
 from solver.rigs.rig import Container, Switch
 from solver.scene import Scene, body_counts, pour_rig
+from solver.sizes import drawn_sizes
 from solver.time_step import time_step
 from solver.world import SUMMARY_COLUMNS, Batch, law_table
 
@@ -51,13 +53,15 @@ class Pour:
         self.rig = pour_rig(scene)
         self._rng = np.random.default_rng(seed)
         self.order = insertion.shuffled_components(body_counts(scene), self._rng)
-        self._layout = layout(scene, self.order)
+        sizes = drawn_sizes([body.sizes for body in scene.bodies], self.order, seed)
+        self._layout = layout(scene, self.order, sizes)
         self.dt = time_step(scene)
         batch.load(w, scene, self._layout, self.dt, (True,) * len(self.rig.surfaces()))
         self._due = insertion.entry_times(self._layout.numbers[:, 0], scene.insertion.rate)
         self._table = law_table(scene)
         self._ramp: Ramp | None = None
         self.energy_put_in = 0.0
+        self._supplied = 0.0
         self.entered = 0
         self._entries: list[tuple[float, int, insertion.Pose, npt.NDArray[np.float64]]] = []
         self.steps = 0
@@ -190,7 +194,7 @@ class Pour:
             spheres = member_spheres(self.scene, self.bodies())
             near = spheres.centre[:, 2] + spheres.radius > feed.floor
             pose = insertion.find_place(
-                self.scene.bodies[self.order[self.entered]].clump,
+                scaled(self.scene.bodies[self.order[self.entered]].clump, self._layout.scale[self.entered]),
                 self.scene.insertion,
                 feed,
                 spheres.centre[near],
@@ -201,6 +205,7 @@ class Pour:
                 return
             self.batch.enter(self.w, self.entered, pose.position, pose.quaternion, speed, np.zeros(3))
             self._entries.append((self.time, self.steps, pose, speed))
+            self._supplied += self._mechanical_energy(self.entered, pose.position, speed)
             self.entered += 1
             self._last_entry = self.time
 
@@ -219,8 +224,14 @@ class Pour:
             self._inside = self.container
             self.batch.set_container(self.w, self._inside)
 
+    def _mechanical_energy(self, b: int, position: npt.NDArray[np.float64], velocity: npt.NDArray[np.float64]) -> float:
+        """Kinetic and potential energy [J] of body ``b`` that does not turn."""
+        mass, gravity = self._layout.numbers[b, 0], np.array(self.scene.gravity)
+        return float(mass * (0.5 * velocity @ velocity - gravity @ position))
+
     def _sample(self, row: Summary) -> None:
         row["time"] = self.time
+        row["supplied"] = self._supplied
         row["entered"] = float(self._layout.numbers[: self.entered, 0].sum())
         row["lost"] = float(self.batch.take_out(self.w))
         self.samples.append(row)
@@ -323,7 +334,9 @@ class Pour:
         self.batch.set_law(self.w, table)
         self.batch.scale_springs(self.w, spring_ratio(self._table, table))
         self._table = table
-        self.energy_put_in += float(self.batch.measure(self.w)[self.w, elastic] - before)
+        gained = float(self.batch.measure(self.w)[self.w, elastic] - before)
+        self.energy_put_in += gained
+        self._supplied += gained
 
     def _set_time_step(self, dt: float) -> None:
         self._time_base, self._steps_base = self.time, self.steps

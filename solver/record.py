@@ -52,6 +52,8 @@ class Bodies:
     component_names: tuple[str, ...]
     mass: Array
     """[kg], shape (n,)."""
+    scale: Array
+    """Linear size relative to the declared one, shape (n,)."""
     position: Array
     """Centres of mass [m], shape (n, 3)."""
     quaternion: Array
@@ -109,6 +111,29 @@ class Trace:
     """Number of touching pairs of member spheres or sphere and surface."""
     max_overlap: Array
     """Largest overlap since the last sample, as a fraction of the member sphere's radius."""
+    potential_energy: Array
+    """− m g·x of the bodies that are in the world [J]; 0 at the plate."""
+    elastic_energy: Array
+    """In the normal and tangential springs of the contacts [J]."""
+    dissipated_energy: Array
+    """What contacts, and bodies that fell asleep, have taken so far [J]."""
+    wall_work: Array
+    """Work of moving surfaces on the bodies so far [J]."""
+    taken_out_energy: Array
+    """Kinetic and potential energy that bodies had when they were taken out of the domain [J]."""
+    supplied_energy: Array
+    """Kinetic and potential energy of the bodies as they entered, and what changes of the stiffness put in [J]."""
+
+    @property
+    def energy_error(self) -> Array:
+        """By how much the account misses, as a fraction of the energy put in; NaN where none was.
+
+        (kinetic + potential + elastic + dissipated + taken out − supplied − wall work) / (supplied + |wall work|)
+        """
+        held = self.kinetic_energy + self.potential_energy + self.elastic_energy
+        missing = held + self.dissipated_energy + self.taken_out_energy - self.supplied_energy - self.wall_work
+        put_in = self.supplied_energy + np.abs(self.wall_work)
+        return np.divide(missing, put_in, out=np.full_like(put_in, np.nan), where=put_in > 0.0)
 
 
 @dataclass(frozen=True)

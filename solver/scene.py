@@ -5,7 +5,8 @@ Parameter paths (the same grammar in ``--set``, study files, sliders and the sto
     material.<material>.density | shear_modulus | poisson_ratio
     pair.<a>.<b>.static_friction | restitution          (order of a and b is free)
     body.<body>.mass_fraction | thickness | …           (dimensions of the solid)
-    body.spheres                                         (coarse, standard, fine: for all bodies)
+    body.<body>.size_distribution | size_spread          (of the linear size about the declared one)
+    body.spheres                                         (coarse, standard, fine or a number: for all bodies)
     rig.<name>   insertion.<name>   numerics.<name>
 
 Which rig it is (``rig.name`` in files and ``--set``) is no parameter: another rig has others (:func:`with_rig`).
@@ -17,7 +18,7 @@ import dataclasses
 from dataclasses import dataclass
 from typing import Any, cast
 
-from solver.body import RESOLUTION, Body, body_parameters, counts, with_body_value, with_densities
+from solver.body import SPHERES, Body, body_parameters, counts, with_body_value, with_densities
 from solver.insertion import Insertion
 from solver.material import Material, Pair
 from solver.numerics import Numerics
@@ -107,7 +108,7 @@ def parameters(scene: Scene) -> dict[str, Parameter]:
         found |= declared(material, f"material.{material.name}")
     for pair in scene.pairs:
         found |= declared(pair, f"pair.{pair.a}.{pair.b}")
-    found["body.spheres"] = RESOLUTION
+    found["body.spheres"] = SPHERES
     for body in scene.bodies:
         found |= body_parameters(body)
     found |= declared(scene.rig, "rig")
@@ -168,13 +169,13 @@ def check(scene: Scene) -> None:
         for other in scene.bodies:
             scene.contact_pair(body, other)
     scene.material(scene.rig.wall)
-    scene.rig.check(widest_body=max(sorted(body.extents)[1] for body in scene.bodies))
+    scene.rig.check(widest_body=max(sorted(body.largest_extents)[1] for body in scene.bodies))
     if scene.rig.name in RIGS:
         rig = pour_rig(scene)
         if scene.insertion.protocol not in rig.protocols:
             allowed = ", ".join(rig.protocols)
             raise ParameterError(f"insertion.protocol: {scene.insertion.protocol!r} is not {allowed} in a {rig.name}")
-        longest = max(max(body.extents) for body in scene.bodies)
+        longest = max(max(body.largest_extents) for body in scene.bodies)
         rig.feed().check(scene.insertion.region_radius, longest)
 
 

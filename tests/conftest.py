@@ -1,4 +1,4 @@
-"""What all tests share: one Taichi runtime per session, and the rule for tests that need a browser."""
+"""What all tests share: one Taichi runtime per session, and the rule for tests that need an installed program."""
 
 import os
 import shutil
@@ -6,6 +6,8 @@ import shutil
 import pytest
 
 CHROMIUM_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
+REQUIRE = {"liggghts": "REPOSE_REQUIRE_LIGGGHTS", "yade": "REPOSE_REQUIRE_YADE"}
+"""Engines that `@pytest.mark.peers(engine)` may name, and the variables that make a missing one a failure."""
 NO_CHROMIUM = f"no Chromium found (looked for {', '.join(CHROMIUM_NAMES)} on PATH)"
 
 
@@ -15,12 +17,20 @@ def find_chromium() -> str | None:
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Where there is no Chromium, skip `browser` tests; fail them if REPOSE_REQUIRE_BROWSER is set (CI)."""
-    if item.get_closest_marker("browser") is None or find_chromium() is not None:
-        return
-    if os.environ.get("REPOSE_REQUIRE_BROWSER"):
-        pytest.fail(f"{NO_CHROMIUM} and REPOSE_REQUIRE_BROWSER is set", pytrace=False)
-    pytest.skip(NO_CHROMIUM)
+    """Skip what needs a program that is not installed; fail it instead if REPOSE_REQUIRE_<PROGRAM> is set (CI)."""
+    if item.get_closest_marker("browser") is not None and find_chromium() is None:
+        skip_or_fail(NO_CHROMIUM, "REPOSE_REQUIRE_BROWSER")
+    for marker in item.iter_markers("peers"):
+        for engine in marker.args:
+            if shutil.which(engine) is None:
+                skip_or_fail(f"no {engine} found on PATH (Debian: apt install {engine})", REQUIRE[engine])
+
+
+def skip_or_fail(reason: str, variable: str) -> None:
+    """Fail with ``reason`` if the environment has ``variable``, skip otherwise."""
+    if os.environ.get(variable):
+        pytest.fail(f"{reason} and {variable} is set", pytrace=False)
+    pytest.skip(reason)
 
 
 @pytest.fixture(scope="session")

@@ -103,13 +103,40 @@ def deck_of(record: Record, time: float | None = None) -> Deck:
     scene = record.scene
     if not isinstance(scene.rig, Funnel):
         raise CommandError(f"rig {getattr(scene.rig, 'name', '?')!r} cannot be exported; allowed: funnel")
+    for body in scene.bodies:
+        if body.sizes.varies:
+            raise CommandError(
+                f"body.{body.name}.size_distribution: {body.sizes.kind!r} cannot be exported, a deck has one clump per "
+                "component; allowed: none"
+            )
     steps = record.steps if time is None else math.ceil(time / record.dt)
+    return assembled(
+        scene,
+        record.seed,
+        record.dt,
+        steps,
+        _until(record.entries, steps),
+        plate=_plate(scene.rig),
+        meshes=_meshes(scene, record),
+    )
+
+
+def assembled(
+    scene: Scene,
+    seed: int,
+    dt: float,
+    steps: int,
+    entries: Entries,
+    plate: float | None = None,
+    meshes: tuple[Mesh, ...] = (),
+) -> Deck:
+    """A deck with the materials and bodies of ``scene`` that enter as ``entries`` say, and whatever walls are given."""
     friction, restitution = _pair_tables(scene)
     wall = scene.material(scene.rig.wall)
     return Deck(
         title=scene.title,
-        seed=record.seed,
-        dt=record.dt,
+        seed=seed,
+        dt=dt,
         steps=steps,
         gravity=scene.gravity,
         clumps=_clumps(scene),
@@ -117,9 +144,9 @@ def deck_of(record: Record, time: float | None = None) -> Deck:
         wall_poisson_ratio=wall.poisson_ratio,
         friction=friction,
         restitution=restitution,
-        entries=_until(record.entries, steps),
-        plate=_plate(scene.rig),
-        meshes=_meshes(scene, record),
+        entries=entries,
+        plate=plate,
+        meshes=meshes,
         box=_box(scene),
     )
 

@@ -34,6 +34,7 @@ SLOT = np.dtype(
         ("quaternion", np.float32, (MAX_BODIES, 4)),
         ("component", np.int32, (MAX_BODIES,)),
         ("inside", np.bool_, (MAX_BODIES,)),
+        ("scale", np.float32, (MAX_BODIES,)),
         ("surfaces", np.int64),
         ("pose", np.float64, (MAX_SURFACES, 7)),
     ],
@@ -65,6 +66,8 @@ class Frame:
     """Index into ``scene.bodies``, shape (n,)."""
     inside: npt.NDArray[np.bool_]
     """False for bodies that rolled out of the domain, shape (n,)."""
+    scale: npt.NDArray[np.float32]
+    """Linear size relative to the declared one, shape (n,)."""
     surfaces: npt.NDArray[np.float64] = field(default_factory=lambda: NO_SURFACES)
     """Poses of the rig's surfaces: origin [m] and orientation wxyz, shape (k, 7)."""
 
@@ -92,6 +95,7 @@ class FrameWriter:
         slot["quaternion"][0, :n] = bodies.quaternion
         slot["component"][0, :n] = bodies.component
         slot["inside"][0, :n] = bodies.inside
+        slot["scale"][0, :n] = bodies.scale
         slot["surfaces"], slot["pose"][0, : len(surfaces)] = len(surfaces), surfaces
         self._buffer["counter"] = following
 
@@ -133,5 +137,6 @@ def _copy(slot: Any, number: int) -> Frame:
         quaternion=slot["quaternion"][:n].copy(),
         component=slot["component"][:n].copy(),
         inside=slot["inside"][:n].copy(),
+        scale=slot["scale"][:n].copy(),
         surfaces=slot["pose"][: int(slot["surfaces"])].copy(),
     )

@@ -65,6 +65,10 @@ class Poses(Protocol):
     def inside(self) -> npt.NDArray[np.bool_]:
         """False for bodies that were taken out of the domain, shape (n,)."""
 
+    @property
+    def scale(self) -> npt.NDArray[np.floating]:
+        """Linear size relative to the declared one, shape (n,)."""
+
 
 class PourLog:
     """Writes one pour into a new file ``path``. Use as a context manager, or end with :meth:`close`.
@@ -180,7 +184,13 @@ class PourLog:
         turned = poses.quaternion[chosen][:, [1, 2, 3, 0]].astype(np.float32)
         self._stream.log(
             entity,
-            rr.InstancePoses3D(translations=poses.position[chosen].astype(np.float32), quaternions=turned),
+            rr.InstancePoses3D(
+                translations=poses.position[chosen].astype(np.float32),
+                quaternions=turned,
+                scales=np.repeat(poses.scale[chosen, None], 3, axis=1).astype(np.float32)
+                if body.sizes.varies
+                else None,
+            ),
         )
 
     def _gate(self, shut: bool) -> None:

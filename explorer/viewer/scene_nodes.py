@@ -37,7 +37,7 @@ class Poses:
     quaternion: npt.NDArray[np.float32]
     """wxyz, shape (n, 4)."""
     scale: npt.NDArray[np.float32]
-    """1 or 0, shape (n,)."""
+    """Size of a body relative to its mesh, or 0, shape (n,)."""
 
 
 class SceneNodes:
@@ -113,7 +113,7 @@ def component_poses(frame: Frame, component: int, n: int) -> Poses:
     chosen = np.flatnonzero(frame.component == component)[:n]
     poses.position[: len(chosen)] = frame.position[chosen]
     poses.quaternion[: len(chosen)] = frame.quaternion[chosen]
-    poses.scale[: len(chosen)] = frame.inside[chosen]
+    poses.scale[: len(chosen)] = np.where(frame.inside[chosen], frame.scale[chosen], 0.0)
     return poses
 
 
