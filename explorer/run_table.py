@@ -10,7 +10,7 @@ import numpy as np
 
 from explorer.text_table import table_line, text_table
 from solver import Record
-from solver.observables import observe
+from solver.observables import Value, observable_names, observe
 
 COLUMNS = {
     "seed": -6,
@@ -20,12 +20,13 @@ COLUMNS = {
     "angle °": -7,
     "within °": -8,
     "apex mm": -7,
-    "funnel g": -8,
+    "in rig g": -8,
     "wall s": -6,
 }
 """Heading → width, negative for a column of numbers.
 
-"within" is the standard deviation of the angle over the views of one pile, "funnel" the mass left in it.
+"angle" is the first observable of the rig, "within" its standard deviation over the views of one pile (the flanks, the
+parts of the time), "in rig" the mass left in the container.
 """
 
 
@@ -42,7 +43,7 @@ class RunTable:
             self._echo(table_line(list(COLUMNS), list(COLUMNS.values())))
             self._started = True
         seen = observe(record)
-        angle = seen["angle_of_repose_deg"]
+        angle, missing = seen[observable_names(record.scene)[0]], Value(math.nan, "")
         row = [
             str(record.seed),
             str(record.outcome),
@@ -50,8 +51,8 @@ class RunTable:
             str(len(record.bodies.mass)),
             _number(angle.value, ".1f"),
             _number(angle.spread, ".1f"),
-            _number(1e3 * seen["apex_height_m"].value, ".1f"),
-            _number(1e3 * seen["residual_mass_kg"].value, ".2f"),
+            _number(1e3 * seen.get("apex_height_m", missing).value, ".1f"),
+            _number(1e3 * seen.get("residual_mass_kg", missing).value, ".2f"),
             f"{record.wall_s:.1f}",
         ]
         self._echo(table_line(row, list(COLUMNS.values())))

@@ -194,6 +194,8 @@ class PourLog:
         )
 
     def _gate(self, shut: bool) -> None:
+        if GATE_NAME not in self._rig:
+            return
         if shut and not self._gate_shown:
             self._stream.log(f"world/{GATE_NAME}", _mesh(self._rig[GATE_NAME], PLATE_COLOUR))
         elif self._gate_shown and not shut:

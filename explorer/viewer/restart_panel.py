@@ -16,12 +16,16 @@ from solver.scene import Scene, parameters, value, with_values
 PATHS = (
     "rig.mass",
     "rig.outlet_height",
+    "rig.lift_speed",
+    "rig.slot_width",
+    "rig.filled_volume",
+    "rig.speed_rpm",
     "insertion.rate",
     "insertion.drop_speed",
     "insertion.protocol",
     "body.spheres",
 )
-"""Parameters in this panel, in order."""
+"""Parameters in this panel, in order; those that the rig has."""
 LARGEST_SEED = 2**31 - 1
 SIGNIFICANT_STEP = {"mm": 1.0, "g": 1.0, "g/s": 1.0, "m/s": 0.1, "": 0.01}
 
@@ -37,9 +41,10 @@ class RestartPanel:
     def __init__(self, server: viser.ViserServer, session: Session, scene: Scene, seed: int, post: Post) -> None:
         self._session, self._generation = session, session.status().generation
         known = parameters(scene)
-        self._shown = {path: known[path] for path in (*PATHS, *size_paths(scene))}
+        set_up = [path for path in PATHS if path in known]
+        self._shown = {path: known[path] for path in (*set_up, *size_paths(scene))}
         with server.gui.add_folder("Set-up (on restart)"):
-            self._inputs = {path: _input(server.gui, known[path], scene) for path in PATHS}
+            self._inputs = {path: _input(server.gui, known[path], scene) for path in set_up}
             with server.gui.add_folder("Sizes of the bodies", expand_by_default=False):
                 self._inputs |= {path: _input(server.gui, known[path], scene) for path in size_paths(scene)}
             self._seed = server.gui.add_number(

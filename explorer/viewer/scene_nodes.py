@@ -152,8 +152,8 @@ def rig_nodes(server: viser.ViserServer, scene: Scene) -> dict[str, Any]:
         )
         if name in rims:
             ends = np.concatenate([circle(radius, height) for radius, height in rims[name]])
-            # Below the surface's node, with which it moves.
-            nodes[f"{name}/rims"] = server.scene.add_line_segments(f"/rig/{name}/rims", ends, RIM, thickness=LINE)
+            # Below the surface's node: it moves, and goes, with that.
+            server.scene.add_line_segments(f"/rig/{name}/rims", ends, RIM, thickness=LINE)
     return nodes | (_scale(server) if PLATE_NAME in nodes else {})
 
 

@@ -12,7 +12,6 @@ Source of the test: Processes 2022, 10, 185, §2.3; Hertz 1882; Mindlin 1949.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from solver.params import param
@@ -36,11 +35,6 @@ class Compression(BenchRig):
 
     name = "compression"
     surface_names = ("lower", "upper")
-
-    @property
-    def suits(self) -> Mapping[str, float | str]:
-        """A fine time step: the damper makes a contact at rest softer, by 4 % at the step of a pour and e = 0.5."""
-        return {"numerics.rayleigh_fraction": 0.02}
 
     def surfaces(self) -> tuple[Surface, ...]:
         """Lower and upper plate."""

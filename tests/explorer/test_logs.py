@@ -17,9 +17,11 @@ from explorer.logs.pour_log import PourLog
 from explorer.logs.pour_recorder import recorder_of
 from explorer.logs.session_recorder import SessionRecorder
 from explorer.scene_file import load_scene, with_settings
+from explorer.scene_meshes import rig_poses
 from solver import Job, Outcome, Phase, Scene, run_pours, with_values
 from tests.explorer.command_line import TINY
 
+QUARTER_TURN = (0.5**0.5, 0.0, 0.5**0.5, 0.0)
 ROOT = Path(__file__).parents[2]
 
 
@@ -125,6 +127,22 @@ def test_quaternions_are_turned_round(scene, tmp_path):
         log.frame(0.0, state, {})
     (written,) = rows(tmp_path / "q.rrd", "/world/bodies/seed", "InstancePoses3D:quaternions")
     assert np.array_equal(written.reshape(-1, 4), np.roll(state.quaternion, -1, axis=1).astype(np.float32))
+
+
+def test_surfaces_are_where_they_have_moved(tmp_path):
+    scene = with_settings(load_scene("lifting_cylinder"), ["rig.mass=1g", "body.spheres=coarse"])
+    path, moved = tmp_path / "lift.rrd", rig_poses(scene.rig)
+    with PourLog(path, scene, seed=1) as log:
+        log.frame(0.0, poses(0), {}, gate_shut=True, surfaces=moved)
+        moved = moved.copy()
+        moved[1] = (0.0, 0.0, 0.04, *QUARTER_TURN)
+        log.frame(0.1, poses(0), {}, surfaces=moved)
+        log.frame(0.2, poses(0), {}, surfaces=moved)
+    (place,) = rows(path, "/world/cylinder", "Transform3D:translation")
+    (turn,) = rows(path, "/world/cylinder", "Transform3D:quaternion")
+    assert place.ravel() == pytest.approx([0.0, 0.0, 0.04])
+    assert turn.ravel() == pytest.approx([*QUARTER_TURN[1:], QUARTER_TURN[0]])
+    assert rows(path, "/world/plate", "Transform3D:translation") == []
 
 
 def test_bodies_are_drawn_at_their_size(scene, tmp_path):
