@@ -74,7 +74,7 @@ def find_place(
     are not rarer. ``occupied_centres`` (n, 3) and ``occupied_radii`` (n,) are the member spheres already there [m].
     """
     quaternion = random_quaternion(rng)
-    offsets = clump.centres @ rotation_matrix(quaternion).T
+    offsets = turned(clump.centres, quaternion)
     lowest, highest = (offsets[:, 2] - clump.radii).min(), (offsets[:, 2] + clump.radii).max()
     height = min(insertion.region_height, feed.ceiling - feed.floor)
     spare = max(0.0, height - (highest - lowest))
@@ -92,6 +92,11 @@ def random_quaternion(rng: np.random.Generator) -> Array:
     """Uniformly distributed orientation, wxyz (Marsaglia 1972: a normalised 4-D Gaussian)."""
     q = rng.normal(size=4)
     return q / np.linalg.norm(q)
+
+
+def turned(points: Array, quaternion: Array) -> Array:
+    """``points`` (n, 3) turned about the origin by a unit quaternion wxyz."""
+    return points @ rotation_matrix(quaternion).T
 
 
 def rotation_matrix(quaternion: Array) -> Array:

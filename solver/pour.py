@@ -33,6 +33,7 @@ from solver.rigs.rig import Container, Switch
 from solver.scene import Scene, body_counts, pour_rig
 from solver.sizes import drawn_sizes
 from solver.time_step import time_step
+from solver.verdict import Moment, verdict
 from solver.world import SUMMARY_COLUMNS, Batch, law_table
 
 SETTLE_LIMIT = 1.0
@@ -188,21 +189,20 @@ class Pour:
     def _insert(self) -> None:
         if self._began is not None and not self.rig.refills:
             return
+        if self.entered == len(self.order) or self._due[self.entered] > self.time:
+            return
         feed = self.rig.feed()
         speed = np.array([0.0, 0.0, -self.scene.insertion.drop_speed])
+        spheres = member_spheres(self.scene, self.bodies())
+        near = spheres.centre[:, 2] + spheres.radius > feed.floor
+        centres, radii = spheres.centre[near], spheres.radius[near]
         while self.entered < len(self.order) and self._due[self.entered] <= self.time:
-            spheres = member_spheres(self.scene, self.bodies())
-            near = spheres.centre[:, 2] + spheres.radius > feed.floor
-            pose = insertion.find_place(
-                scaled(self.scene.bodies[self.order[self.entered]].clump, self._layout.scale[self.entered]),
-                self.scene.insertion,
-                feed,
-                spheres.centre[near],
-                spheres.radius[near],
-                self._rng,
-            )
+            clump = scaled(self.scene.bodies[self.order[self.entered]].clump, self._layout.scale[self.entered])
+            pose = insertion.find_place(clump, self.scene.insertion, feed, centres, radii, self._rng)
             if pose is None:
                 return
+            centres = np.concatenate([centres, pose.position + insertion.turned(clump.centres, pose.quaternion)])
+            radii = np.concatenate([radii, clump.radii])
             self.batch.enter(self.w, self.entered, pose.position, pose.quaternion, speed, np.zeros(3))
             self._entries.append((self.time, self.steps, pose, speed))
             self._supplied += self._mechanical_energy(self.entered, pose.position, speed)
@@ -239,7 +239,7 @@ class Pour:
         self._moving = max(row["speed"], row["funnel_speed"] if self.gate_shut else 0.0)
         self._quiet_samples = self._quiet_samples + 1 if self._moving < self.scene.numerics.rest_speed else 0
         self._watch()
-        self.outcome, self.message = self._verdict(row)
+        self.outcome, self.message = verdict(self.rig, self.scene.numerics, self._moment(row))
         waiting = self.time > self._last_entry + SETTLE_LIMIT
         if self.gate_shut and (self._all_in() or self._blocked()) and (self._quiet() or waiting):
             self._began, self._quiet_samples = self.time, 0
@@ -271,56 +271,19 @@ class Pour:
             return False
         return self.samples[-1 - back]["discharged"] == self.samples[-1]["discharged"]
 
-    def _verdict(self, row: Summary) -> tuple[Outcome, str]:
-        numerics = self.scene.numerics
-        if not row["finite"]:
-            return Outcome.NON_FINITE, f"a position or speed is not finite at {self.time:.3f} s"
-        if row["overflow"]:
-            return (
-                Outcome.BUFFER_OVERFLOW,
-                f"more than {self.batch.capacity.contacts} entries in the contact list",
-            )
-        if row["lost"]:
-            return Outcome.LOST_BODY, f"{row['lost']:.0f} left the domain above the outlet or through the plate"
-        if row["overlap"] > numerics.overlap_limit:
-            return Outcome.OVERLAP_LIMIT, f"overlap of {row['overlap']:.3g} radii at {self.time:.3f} s"
-        ended = self._overfull(row) or (
-            self._run_out() if self.rig.running_time is not None else self._come_to_rest(row)
+    def _moment(self, row: Summary) -> Moment:
+        return Moment(
+            time=self.time,
+            row=row,
+            acting=None if self._began is None else self.time - self._began,
+            acted=not self._to_do,
+            missing=len(self.order) - self.entered,
+            blocked=self._blocked(),
+            quiet=self._quiet(),
+            stalled=self._stalled(),
+            speed=self._moving,
+            room=self.batch.capacity.contacts,
         )
-        if ended is not None:
-            return ended
-        if self.time >= numerics.max_time:
-            return Outcome.TIME_LIMIT, f"still moving at {self._moving:.3g} m/s after {numerics.max_time:g} s"
-        return Outcome.RUNNING, ""
-
-    def _overfull(self, row: Summary) -> tuple[Outcome, str] | None:
-        """A rig that is filled once cannot take all of the bodies."""
-        if self.rig.refills or not self.gate_shut:
-            return None
-        if row["discharged"] > 0.0:
-            return Outcome.JAMMED, f"the rig overflows: {1e3 * row['discharged']:.3g} g lie beside it"
-        if self._blocked():
-            return Outcome.JAMMED, f"the rig is full: {len(self.order) - self.entered} bodies find no place in it"
-        return None
-
-    def _run_out(self) -> tuple[Outcome, str] | None:
-        """The rig has run for its time."""
-        over = self._began is not None and self.time - self._began >= (self.rig.running_time or 0.0)
-        return (Outcome.MEASURED, "") if over else None
-
-    def _come_to_rest(self, row: Summary) -> tuple[Outcome, str] | None:
-        """All is at rest: a pile, or a jam where more stays in the container than belongs there."""
-        fed = not self.gate_shut and not self._to_do and (self._all_in() or self._blocked())
-        empty, left = row["hanging"] == 0, f"{1e3 * row['in_funnel']:.3g} g"
-        where = self.rig.name.replace("_", " ")
-        if not (fed and self._quiet() and (empty or self._stalled())):
-            return None
-        if self.rig.keeps_material:
-            stuck = row["discharged"] == 0.0
-            return (Outcome.JAMMED, f"nothing passes the outlet: {left} stay") if stuck else (Outcome.AT_REST, "")
-        if self._blocked() or row["hanging"] > self.scene.numerics.hanging_bodies:
-            return Outcome.JAMMED, f"{row['hanging']:.0f} bodies ({left}) stay in the {where}"
-        return Outcome.AT_REST, "" if empty else f"{left} hang in the {where}"
 
     def _follow_ramp(self, ramp: Ramp) -> None:
         self._set_table(ramp.table(self.time))
