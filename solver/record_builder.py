@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from solver.insertion import Pose, rotation_matrix
 from solver.layout import Layout
+from solver.numerics import ROLLING_SLOPE
 from solver.record import Bodies, Entries, Pile, Spheres, Trace
 from solver.scene import Scene
 
@@ -45,14 +46,15 @@ def member_spheres(scene: Scene, bodies: Bodies) -> Spheres:
 def rolling_away(scene: Scene, state: Array) -> npt.NDArray[np.bool_]:
     """Bodies that still roll outward on the plate, alone and beyond the feed opening's radius.
 
-    The rule of ``kernels/batch.rolls_away``, for bodies that also move faster than ``numerics.rest_speed``.
+    The rule of ``kernels/summary.rolls_away``, for bodies that also move faster than ``numerics.rest_speed``.
     ``state``: rows of ``Batch.bodies``. Nothing brakes them, so where they are is a matter of when one looks.
     """
     x, v, touching = state[:, 0:3], state[:, 7:10], state[:, 14]
     beyond = np.hypot(x[:, 0], x[:, 1]) > scene.rig.inlet_diameter / 2.0
     outward = (x[:, :2] * v[:, :2]).sum(axis=1) > 0.0
-    moving = np.linalg.norm(v, axis=1) > scene.numerics.rest_speed
-    return beyond & outward & moving & (touching == 0)
+    speed = np.linalg.norm(v, axis=1)
+    level = np.abs(v[:, 2]) < ROLLING_SLOPE * speed
+    return beyond & outward & level & (speed > scene.numerics.rest_speed) & (touching == 0)
 
 
 def pile_of(scene: Scene, bodies: Bodies, spheres: Spheres, rolling: npt.NDArray[np.bool_] | None = None) -> Pile:
