@@ -8,7 +8,7 @@ BIN := .venv/bin
 EXPLORER := $(BIN)/explorer
 
 .DEFAULT_GOAL := help
-.PHONY: help venv serve calibrate calibrate-quick test slow clean
+.PHONY: help venv serve calibrate calibrate-quick test slow peers clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 18
@@ -37,8 +37,11 @@ test: .venv/.ready ## format check, lint, types, fast tests
 	$(BIN)/mypy
 	$(BIN)/pytest
 
-slow: .venv/.ready ## the tests marked slow
-	$(BIN)/pytest -m slow
+slow: .venv/.ready ## the tests marked slow, but for those of `make peers`
+	$(BIN)/pytest -m "slow and not peers"
+
+peers: .venv/.ready ## our solver against installed LIGGGHTS and YADE, with 18 pours each (hours)
+	$(BIN)/pytest tests/peers -m "slow or not slow" -s
 
 clean: ## remove .venv and the caches; results stay
 	rm -rf .venv .mypy_cache .pytest_cache .ruff_cache .hypothesis

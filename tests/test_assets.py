@@ -213,3 +213,39 @@ def test_an_unknown_kind_lists_the_kinds():
 
 def test_all_ten_tables_are_shipped():
     assert len(shipped_assets("source_tables")) == 10
+
+
+def test_the_benchmark_s_pour_is_the_one_that_its_file_describes():
+    from explorer.scene_file import load_scene
+    from solver import counts
+    from solver.shape import Solid, mass_properties
+    from solver.time_step import time_step
+
+    scene = load_scene("seed_pour")
+    body = scene.bodies[0]
+    assert counts(scene.bodies, scene.rig.mass) == (87,)
+    assert len(body.clump.radii) == 9
+    assert time_step(scene) == pytest.approx(3.3e-6, rel=1e-5)  # digits of rayleigh_fraction
+    whole = mass_properties(Solid("ellipsoid", (27.92e-3, 11.18e-3, 6.11e-3)), 346.0)
+    assert body.mass == pytest.approx(whole.mass, rel=1e-4)  # printed digits
+    assert list(body.clump.inertia) == pytest.approx(list(whole.inertia), rel=1e-4)
+    # Every sphere inside the ellipsoid, to the last digit of its radius: distance of its centre from the surface.
+    half = [13.96e-3, 5.59e-3, 3.055e-3]
+    for centre, radius in zip(body.clump.centres, body.clump.radii, strict=True):
+        assert distance_to_ellipsoid(half, centre) >= radius - 1e-7
+
+
+def distance_to_ellipsoid(half, point):
+    """Distance [m] of a point inside in the plane z = 0 from an ellipsoid: the foot is a² p/(a² + t), t its own."""
+    (a, b, c), (x, y, _) = half, [abs(coordinate) for coordinate in point]
+
+    def height(t):
+        """1 − (x/a)² − (y/b)² of the foot with multiplier t; its z is c times the root of it."""
+        return 1.0 - (a * x / (a * a + t)) ** 2 - (b * y / (b * b + t)) ** 2
+
+    # z ≠ 0 needs t = −c²: the foot lies above or below, if there is one.
+    above = height(-c * c)
+    if above < 0.0:
+        raise ValueError("the nearest point lies in the plane of the centres")
+    foot = a * a * x / (a * a - c * c), b * b * y / (b * b - c * c), c * above**0.5
+    return ((foot[0] - x) ** 2 + (foot[1] - y) ** 2 + foot[2] ** 2) ** 0.5

@@ -14,11 +14,11 @@ from explorer.export.run import run_liggghts, run_yade
 from explorer.export.yade import LAW
 from explorer.scene_file import load_scene
 from solver.insertion import rotation_matrix
+from solver.laboratory import Laboratory
 from solver.record import Entries
 from solver.scene import with_values
 from solver.time_step import time_step
 from solver.world import law_table
-from tests.solver.laboratory import Laboratory
 
 RUNNERS = {"liggghts": run_liggghts, "yade": run_yade}
 LENGTH = 24.6e-3
@@ -40,9 +40,12 @@ class Case:
 
     @property
     def scene(self):
-        """The seed pour's scene with the friction of the case for all pairs."""
+        """The seed pour's scene with the friction of the case for all pairs; without a plate there is no weight."""
         paths = ("pair.seed.seed.static_friction", "pair.seed.rigid_sieve_plate.static_friction")
-        return with_values(load_scene("seed_pour"), dict.fromkeys(paths, self.friction))
+        scene = with_values(
+            load_scene("seed_pour"), dict.fromkeys(paths, self.friction) | {"numerics.sleep_speed": 0.0}
+        )
+        return scene if self.plate else dataclasses.replace(scene, gravity=(0.0, 0.0, 0.0))
 
     @property
     def dt(self):
@@ -51,23 +54,18 @@ class Case:
 
     @property
     def deck(self):
-        """The case for another engine; without a plate there is no weight either."""
+        """The case for another engine."""
         n = len(self.position)
         zero = np.zeros(n, dtype=np.int32)
         entries = Entries(zero.astype(float), zero, zero, self.position, self.quaternion, self.velocity)
-        return assembled(self.weighed, 0, self.dt, self.steps, entries, plate=0.0 if self.plate else None)
-
-    @property
-    def weighed(self):
-        """The scene with or without weight."""
-        return self.scene if self.plate else dataclasses.replace(self.scene, gravity=(0.0, 0.0, 0.0))
+        return assembled(self.scene, 0, self.dt, self.steps, entries, plate=0.0 if self.plate else None)
 
 
 def ours(case):
     """Step → :class:`Motion` from our solver."""
-    lab = Laboratory(case.weighed, len(case.position), dt=case.dt, plate=case.plate)
+    lab = Laboratory(case.scene, len(case.position), dt=case.dt, active=(case.plate, False, False))
     if not case.tangential_damping:
-        table = law_table(case.weighed)
+        table = law_table(case.scene)
         table[..., 4] = 0.0
         lab.batch.set_law(0, table)
     for b in range(len(case.position)):
