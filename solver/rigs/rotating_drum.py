@@ -41,8 +41,8 @@ class RotatingDrum(PourRig):
     filled_volume: float = param(8e-4, unit="m3", low=1e-9, high=10.0, doc="Volume of the bed at rest, pores included.")
     packing: float = param(0.55, low=0.1, high=1.0, doc="Solid fraction by which the filled volume becomes a mass.")
     speed_rpm: float = param(15.0, unit="rpm", low=0.1, high=300.0, doc="Speed of rotation.")
-    transient_turns: float = param(1.0, low=0.0, high=100.0, doc="Turns before the free surface is measured.")
-    averaging_turns: float = param(2.0, low=0.05, high=1000.0, doc="Turns over which it is averaged.")
+    transient_turns: float = param(0.5, low=0.0, high=100.0, doc="Turns before the free surface is measured.")
+    averaging_turns: float = param(1.0, low=0.05, high=1000.0, doc="Turns over which it is averaged.")
     end_plates: str = param(
         "turning",
         doc="turning: the end plates turn with the shell; standing: they do not.",

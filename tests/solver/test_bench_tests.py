@@ -100,21 +100,20 @@ def test_the_paper_s_estimate_is_biased_and_shown_over_e_and_friction():
     assert (paper[e == 0.2] > 0.3).all()
 
 
-def test_a_body_that_hits_off_centre_gives_back_less():
+def test_a_body_that_hits_off_centre_scatters_and_makes_no_energy():
     scene = with_settings(
         load_material("sunflower_extract"),
-        {
-            "rig.name": "drop_plate_45",
-            "rig.specimen": "body",
-            "rig.drops": 4,
-            "body.spheres": "coarse",
-            "numerics.rayleigh_fraction": 0.1,
-        },
+        {"rig.name": "drop_plate_45", "rig.specimen": "body", "rig.drops": 6, "body.spheres": "coarse"},
     )
-    first, again, other = (run_bench_test(scene, seed).quantity("restitution") for seed in (1, 1, 2))
-    assert first == again != other
-    assert first.value < 0.58
-    assert first.spread > 0.0
+    first, again, other = (run_bench_test(scene, seed) for seed in (1, 1, 2))
+    assert first == again
+    found = first.quantity("restitution")
+    assert found.value != other.quantity("restitution").value
+    assert found.spread > 0.05
+    speed = np.hypot(*(np.array(dict(first.series)[name]) for name in ("v_x_m_s", "v_z_m_s")))
+    assert len(speed) == 6
+    # It fell through 0.2 m.
+    assert speed.max() < math.sqrt(2.0 * 9.81 * 0.2)
 
 
 @pytest.mark.parametrize("shear", [2e6, 5e7])

@@ -10,7 +10,7 @@ from solver.material_file import load_material
 from solver.observables import observe
 from solver.pour import Pour
 from solver.record import Outcome, Phase
-from solver.run import capacity_for
+from solver.run import Job, capacity_for, run_pours
 from solver.scene import with_values
 from solver.set_up import with_settings
 from solver.world import Batch
@@ -226,3 +226,23 @@ def test_end_plates_turn_or_stand():
         velocity = pour.batch.surface_state(1)[:, 10:13]
         moving = [k for k in range(3) if np.allclose(velocity[k], (0.0, 2.0 * np.pi, 0.0), rtol=1e-12)]
         assert len(moving) == turning
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("length", ["26mm", "120mm"])
+def test_friction_and_speed_steepen_a_drum_s_bed(length):
+    """Thin (two beads between the end plates) and long. A bed of some 150 or 700 beads, two turns each."""
+    volume = float(length.removesuffix("mm")) * 1e-3 * np.pi * 0.1**2 * 0.3
+
+    def angle(friction, speed):
+        both = {f"pair.bead.{other}.static_friction": friction for other in ("bead", "steel")}
+        size = {"rig.diameter": "200mm", "rig.axial_length": length, "rig.filled_volume": volume}
+        turns = {"rig.speed_rpm": speed, "rig.transient_turns": 0.5, "rig.averaging_turns": 1.5}
+        ((_, record),) = run_pours([Job(with_settings(DRUM, size | both | turns), 1)])
+        assert record.outcome == Outcome.MEASURED
+        return observe(record)["dynamic_angle_deg"]
+
+    smooth, rough, fast = angle(0.1, 20.0), angle(0.6, 20.0), angle(0.6, 60.0)
+    for flatter, steeper in ((smooth, rough), (rough, fast)):
+        # more than the spread between parts of the time
+        assert steeper.value > flatter.value + flatter.spread
