@@ -25,7 +25,7 @@ class Numerics:
     )
     rest_time: float = param(0.1, unit="s", low=0.01, high=5.0, doc="How long it has to stay that slow.")
     sleep_speed: float = param(
-        5e-4,
+        2e-3,  # as rest_speed: nothing in a pile at rest rolls on
         unit="m/s",
         low=0.0,
         high=0.1,

@@ -1,4 +1,4 @@
-"""Same seed, same bits: whatever the threads, the place in the batch, who was there before, the launches
+"""Same seed, same bits: whatever the threads, the slot and who used it before, the launches, the onlookers.
 
 Bodies sleep and wake in all of these pours. ``test_pour.py`` has the plainest cases, ``test_snapshot.py`` restarts.
 """

@@ -118,11 +118,10 @@ def test_what_is_lost_comes_back_within_a_few_steps_neither():
 
 def test_without_friction_and_damping_a_pour_loses_nothing():
     """e = 1, μ = 0: the damper and the tangential force are zero, so what is lost is, too, in every bit."""
-    ideal = {
-        f"pair.{p.a}.{p.b}.{k}": v for p in HEAP.pairs for k, v in (("static_friction", 0.0), ("restitution", 1.0))
-    }
+    pairs = [f"pair.{pair.a}.{pair.b}" for pair in HEAP.pairs]
+    ideal = {f"{pair}.static_friction": 0.0 for pair in pairs} | {f"{pair}.restitution": 1.0 for pair in pairs}
     wide = {"rig.domain_half_width": "10m", "numerics.max_time": 0.6}
-    record = run_pour(with_values(HEAP, {**ideal, **wide}), 1)
+    record = run_pour(with_values(HEAP, ideal | wide), 1)
     assert record.outcome == Outcome.TIME_LIMIT
     assert np.all(record.trace.dissipated_energy == 0.0)
     assert record.trace.max_overlap.max() > 1e-3  # they have met
