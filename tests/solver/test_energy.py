@@ -39,7 +39,7 @@ SETTLED = 80
 @pytest.fixture(scope="module")
 def records(taichi):
     """Every pour of ``POURS``."""
-    finished = dict(run_pours([Job(scene, 1) for scene in POURS.values()], worlds=1))
+    finished = dict(run_pours([Job(scene, 2) for scene in POURS.values()], worlds=1))
     return {name: finished[k] for k, name in enumerate(POURS)}
 
 
