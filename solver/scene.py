@@ -176,6 +176,11 @@ def check(scene: Scene) -> None:
             allowed = ", ".join(rig.protocols)
             raise ParameterError(f"insertion.protocol: {scene.insertion.protocol!r} is not {allowed} in a {rig.name}")
         longest = max(max(body.largest_extents) for body in scene.bodies)
+        if rig.running_time is not None and rig.running_time >= scene.numerics.max_time:
+            raise ParameterError(
+                f"numerics.max_time: {scene.numerics.max_time:g} s end before the {rig.name} has run for its "
+                f"{rig.running_time:g} s; turn faster, or fewer times"
+            )
         rig.feed().check(scene.insertion.region_radius, longest)
 
 
