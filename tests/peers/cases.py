@@ -107,7 +107,7 @@ def _undamp(folder, engine):
 
 
 def impact_ends(found):
-    """Steps at which an impact of body 0 was over: its vertical velocity had risen by 0.01 m/s or more."""
+    """Steps at which an impact of body 0 was over: its vertical velocity had risen by 0.05 m/s or more."""
     steps = sorted(found)
     height = np.array([found[step].velocity[0, 2] for step in steps])
     rising = np.append(np.diff(height) > 0.0, False)
@@ -116,7 +116,7 @@ def impact_ends(found):
         if rising[k] and start is None:
             start = k
         elif not rising[k] and start is not None:
-            if height[k] - height[start] > 0.01:
+            if height[k] - height[start] > 0.05:
                 ends.append(steps[k])
             start = None
     return ends

@@ -16,14 +16,15 @@ pytestmark = pytest.mark.usefixtures("taichi")
 ENGINES = [pytest.param(name, marks=pytest.mark.peers(name)) for name in ("liggghts", "yade")]
 SPEED = 0.8
 """Of the first impact [m/s]."""
-ASKEW = np.array([[0.9, 0.1, 0.3, 0.2]]) / np.linalg.norm([0.9, 0.1, 0.3, 0.2])
+ASKEW = np.array([[0.8, 0.8, -0.6, -0.1]]) / np.linalg.norm([0.8, 0.8, -0.6, -0.1])
+"""An orientation with three separate impacts within 13 ms whatever the friction."""
 PER_CENT = 0.01
 
 
-def falling(friction, steps=9000, **options):
-    """The seed 10 mm above the plate, 0.8 m/s downwards and 0.2 m/s along it."""
-    place, velocity = np.array([[0.0, 0.0, 0.010]]), np.array([[0.2, 0.0, -SPEED]])
-    return Case(place, ASKEW, velocity, steps=steps, every=50, friction=friction, **options)
+def falling(friction, **options):
+    """The seed 2.5 mm above the plate, 0.8 m/s downwards and 0.2 m/s along it."""
+    place, velocity = np.array([[0.0, 0.0, 0.0095]]), np.array([[0.2, 0.0, -SPEED]])
+    return Case(place, ASKEW, velocity, steps=4000, every=25, friction=friction, **options)
 
 
 def compared(case, one, other):
@@ -47,33 +48,39 @@ def reference(case, law):
 def test_without_friction_the_motion_is_the_same(engine, tmp_path):
     case = falling(0.0)
     found = compared(case, ours(case), theirs(case, engine, tmp_path))
-    # 1 % is the aim; 0.3 % came out with either: ours takes the damper at the middle of the step, they at its start.
+    # 1 % is the aim; 0.1 % came out with either: ours takes the damper at the middle of the step, they at its start.
     assert max(found.place, found.velocity, found.spin) < PER_CENT
 
 
-@pytest.mark.peers("yade")
-@pytest.mark.parametrize("friction", [0.1, 0.73])
-def test_with_friction_but_no_tangential_dashpot_yade_moves_as_we_do(friction, tmp_path):
-    case = falling(friction, steps=30_000, tangential_damping=False)
-    found = compared(case, ours(case), theirs(case, "yade", tmp_path))
-    # 0.2 % came out at 0.1, 0.7 % at 0.73, and 2.0 % of the spin. Left: its spring is not scaled down on unloading.
-    assert max(found.place, found.velocity) < PER_CENT
-    assert found.spin < 3 * PER_CENT
+@pytest.mark.parametrize(
+    ("engine", "friction"),
+    [
+        # 0.6 %: its spring is a displacement, which matters little while the seed slides; 7 % of the spin at 0.73.
+        pytest.param("liggghts", 0.1, marks=pytest.mark.peers("liggghts")),
+        # 0.2 and 0.6 %: its spring is not scaled down on unloading.
+        pytest.param("yade", 0.1, marks=pytest.mark.peers("yade")),
+        pytest.param("yade", 0.73, marks=pytest.mark.peers("yade")),
+    ],
+)
+def test_with_friction_but_no_tangential_dashpot_the_motion_is_the_same(engine, friction, tmp_path):
+    case = falling(friction, tangential_damping=False)
+    found = compared(case, ours(case), theirs(case, engine, tmp_path))
+    assert max(found.place, found.velocity, found.spin) < PER_CENT
 
 
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("friction", [0.1, 0.73])
 def test_as_exported_an_engine_moves_by_its_own_tangential_law(engine, friction, tmp_path):
-    case = falling(friction, steps=12_000)
-    motion = theirs(case, engine, tmp_path)
+    case = falling(friction)
+    own, motion = ours(case), theirs(case, engine, tmp_path)
     found = compared(case, reference(case, engine), motion)
-    assert max(found.place, found.velocity) < PER_CENT
-    # LIGGGHTS: 0.01 %. YADE: 1.5 % after the third impact at 0.73, 0.3 % with a quarter of the step.
-    assert found.spin < 2 * PER_CENT
+    # LIGGGHTS 0.01 %, which is its one step of delay; YADE 0.6 %.
+    assert max(found.place, found.velocity, found.spin) < PER_CENT
     # And ours by ours: the kernels against plain NumPy; rounding, amplified by three impacts.
-    own = ours(case)
     rounding = compared(case, own, reference(case, "ours"))
     assert max(rounding.place, rounding.velocity, rounding.spin) < 1e-6
-    # What the difference of the two laws amounts to: dashpots that may exceed the Coulomb limit at first touch (both),
-    # a spring that grows while the contact is loaded (LIGGGHTS).
-    assert compared(case, own, motion).place < 0.05
+    # The laws differ: dashpots that may exceed the Coulomb limit at first touch (both), a spring that grows while the
+    # contact is loaded (LIGGGHTS). Velocities and spins come out up to 2 and 7 % apart; the path stays within 1 %.
+    found = compared(case, own, motion)
+    assert found.place < PER_CENT
+    assert max(found.velocity, found.spin) < 10 * PER_CENT

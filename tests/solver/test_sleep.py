@@ -12,7 +12,6 @@ from solver.insertion import rotation_matrix
 from solver.kernels.sleep import BALANCE, WAKE
 from solver.laboratory import EARTH, PLATE, RADIUS, Bench, Laboratory, bench
 from solver.pour import Pour
-from solver.rigs.funnel import GATE
 from solver.rigs.surface import Pose, Revolved, horizontal
 from solver.run import capacity_for
 from solver.scene import with_values
@@ -124,11 +123,11 @@ def test_the_fill_sleeps_on_the_gate_and_falls_when_it_opens():
         row = pour.batch.advance(np.array([n], dtype=np.int32))[0]
         pour.after(n, row)
     assert row[ASLEEP] > 0.8 * pour.entered
-    gate = -pour.batch.surface_state(0)[GATE, 15]
+    gate = -pour.batch.surface_state(0)[pour.rig.surface_names.index("gate"), 15]
     assert 0.05 < gate / (9.81 * pour.poured_mass) < 1.0  # the cone carries the rest
     row = onward(pour.batch, round(0.1 / pour.dt))
     assert row[ASLEEP] < 0.2 * pour.entered
-    assert pour.batch.surface_state(0)[GATE, 15] == 0.0
+    assert pour.batch.surface_state(0)[pour.rig.surface_names.index("gate"), 15] == 0.0
     assert row[SUMMARY_COLUMNS.index("discharged")] > 0.2 * pour.poured_mass
 
 
