@@ -116,6 +116,7 @@ def small_bed(seed: int = 1) -> Bed:
 
 def wide_bed(tiles: tuple[int, int], seed: int = 1) -> Bed:
     """``tiles`` copies of the small bed side by side, in the order of their places, relaxed for a moment."""
+    backend.init(threads=1)
     tile = small_bed(seed)
     shift = np.array([(i * tile.box.width, j * tile.box.depth, 0.0) for i in range(tiles[0]) for j in range(tiles[1])])
     centres = (shift[:, None, :] + tile.centres[None]).reshape(-1, 3)
