@@ -33,7 +33,7 @@ TILE = (10, 10, 10)
 SPACING = 2.06 * RADIUS
 SETTLING_TIME = 0.25
 """Simulated time [s] for the small bed to come to rest."""
-RELAXING_TIME = 0.01
+RELAXING_TIME = 0.04
 """The same for a bed put together of copies."""
 
 
