@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from solver import ParameterError, Scene, canonical, counts, parameters, with_values
+from solver import ParameterError, Scene, body_counts, canonical, parameters, with_values
 
 MIN_BODIES = 5
 """A factor that touches fewer bodies than this cannot be tested: its effect is that of a handful of places."""
@@ -35,7 +35,7 @@ def bodies_touched(scene: Scene, path: str) -> float:
     body touches the bodies of that component; the resolution of the shapes and a mass fraction, which moves all the
     others, touch every body.
     """
-    number = list(zip(scene.bodies, counts(scene.bodies, scene.rig.mass), strict=True))
+    number = list(zip(scene.bodies, body_counts(scene), strict=True))
 
     def of_end(name: str) -> float:
         of_wall = name == scene.rig.wall

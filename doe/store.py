@@ -61,7 +61,7 @@ def default_store() -> Path:
 
 def run_key(scene: Any, seed: int, code_version: str) -> str:
     """Digest of a frozen scene (all its fields, mesh files by content), seed and code version."""
-    content = dataclasses.asdict(scene)
+    content = (type(scene.rig).__name__, dataclasses.asdict(scene))
     meshes = [Path(body.shape.file) for body in scene.bodies if getattr(body.shape, "file", "")]
     digest = hashlib.sha256(repr((content, seed, code_version)).encode())
     for mesh in meshes:

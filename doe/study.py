@@ -4,7 +4,7 @@ format = 1
 material = "name or file"      fallback = ["X4", …]
 dummies = 3                    columns of the screening that stay free of factors, at least
 estimators = [observables]     candidates for the screening's response; those of the targets always belong to them
-[rig] name and dimensions      [insertion] …
+[rig] name and dimensions      [insertion] …      [numerics] …
 [[target]]      observable, mean, n, sd, weight, margin
 [[factor]]      name, path, low, high, reference        screened, then calibrated; numbers
 [[assumption]]  the same keys, or named levels           screened beside them: what nobody published
@@ -34,6 +34,7 @@ from solver import (
     parameters,
     parse_quantity,
     read_toml,
+    with_set_up,
     with_values,
 )
 
@@ -90,7 +91,7 @@ ESTIMATORS = (
 )
 KEYS = {
     "format", "title", "material", "dummies", "fallback", "rig", "insertion", "target", "factor", "assumption",
-    "change", "scan", "profile", "estimators", "seed",
+    "change", "scan", "profile", "estimators", "seed", "numerics",
 }  # fmt: skip
 
 
@@ -113,7 +114,8 @@ def with_profile(study: Study, name: str) -> tuple[Study, Profile]:
     if name not in study.profiles:
         raise ParameterError(f"profile: {name!r} is not one of {', '.join(study.profiles)}")
     profile = study.profiles[name]
-    scene = with_values(study.scene, {"body.spheres": profile.spheres, "rig.mass": profile.mass})
+    mass = {"rig.mass": profile.mass} if "rig.mass" in parameters(study.scene) else {}
+    scene = with_values(study.scene, {"body.spheres": profile.spheres, **mass})
     observable = study.targets[0].observable
     if profile.resolution_deg is not None and not is_angle(observable):
         raise ParameterError(
@@ -139,7 +141,7 @@ def study_from(table: Table, path: Path) -> Study:
         raise StudyFileError(f"format: {table.get('format')!r} is not 1")
     if "material" not in table:
         raise ParameterError("material: a shipped material or the path of a material file is needed")
-    scene = _set_up(table, load_material(str(table["material"]), relative_to=path.parent))
+    scene = with_set_up(load_material(str(table["material"]), relative_to=path.parent), table)
     factors = tuple(_factor(scene, entry) for entry in entries(table, "factor"))
     scene = with_values(scene, {factor.path: factor.reference for factor in factors})
     dummies = whole(table.get("dummies", 3), "dummies", least=1)
@@ -157,11 +159,12 @@ def study_from(table: Table, path: Path) -> Study:
         raise StudyFileError(f"fallback: {len(fallback)} factors; at least {CALIBRATED} are needed")
     if not entries(table, "target"):
         raise StudyFileError("target: at least one [[target]] is needed")
-    targets = tuple(target_from(entry, observable_names()) for entry in entries(table, "target"))
+    targets = tuple(target_from(entry, observable_names(scene)) for entry in entries(table, "target"))
     scan_path, scan_values = _scan(scene, section(table, "scan"))
     wanted = section(table, "profile")
     profiles = {name: _profile(scene, name, section(wanted, name)) for name in wanted}
-    estimators = names(table.get("estimators", list(ESTIMATORS)), "estimators", observable_names())
+    given = observable_names(scene)
+    estimators = names(table.get("estimators", [e for e in ESTIMATORS if e in given]), "estimators", given)
     return Study(
         name=path.stem,
         file=path,
@@ -177,14 +180,6 @@ def study_from(table: Table, path: Path) -> Study:
         estimators=tuple(dict.fromkeys([*(target.observable for target in targets), *estimators])),
         seed=whole(table.get("seed", 1), "seed", least=0),
     )
-
-
-def _set_up(table: Table, scene: Scene) -> Scene:
-    """The scene with the study's rig and insertion."""
-    rig = section(table, "rig")
-    one_of(rig.get("name", "funnel"), "rig.name", ("funnel",))
-    settings = {f"rig.{key}": value for key, value in rig.items() if key != "name"}
-    return with_values(scene, settings | {f"insertion.{k}": v for k, v in section(table, "insertion").items()})
 
 
 def _levels(scene: Scene, entry: Table, where: str) -> Factor:

@@ -12,7 +12,7 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from explorer.commands import bench, calibrate, export, new, parameters, replay, runs, serve, simulate, verify
+from explorer.commands import bench, calibrate, export, new, parameters, replay, runs, serve, shape, simulate, verify
 
 BAD_INPUT, INTERRUPTED = 2, 130
 OWN_PACKAGES = ("explorer", "doe", "solver")
@@ -83,8 +83,13 @@ def options(
     version: bool = typer.Option(
         False, "--version", callback=_print_version, is_eager=True, help="Print the version and exit."
     ),
+    arch: str | None = typer.Option(None, metavar="ARCH", help="Where the solver computes: cpu, cuda or vulkan."),
 ) -> None:
     """Pour, pile and calibrate granular material."""
+    from solver.arch import choose
+
+    if arch is not None:
+        choose(arch)
 
 
 app.command()(serve.serve)
@@ -93,6 +98,7 @@ app.command()(calibrate.calibrate)
 app.command()(runs.runs)
 app.command()(parameters.parameters)
 app.command()(new.new)
+app.command()(shape.shape)
 app.command()(export.export)
 app.command()(replay.replay)
 app.command()(verify.verify)

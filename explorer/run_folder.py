@@ -30,6 +30,12 @@ TRACE_COLUMNS = {
     "kinetic_energy_J": "kinetic_energy",
     "contacts": "contacts",
     "max_overlap": "max_overlap",
+    "potential_energy_J": "potential_energy",
+    "elastic_energy_J": "elastic_energy",
+    "dissipated_energy_J": "dissipated_energy",
+    "wall_work_J": "wall_work",
+    "taken_out_energy_J": "taken_out_energy",
+    "supplied_energy_J": "supplied_energy",
 }
 """Columns of a trace file → curves of ``solver.Trace``; ``max_overlap`` is in radii of the sphere."""
 

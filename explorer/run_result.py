@@ -2,9 +2,10 @@
 
     outcome, message, seed, dt, steps    of the first seed
     observables     name → value and spread (within the pile) of the first seed, unit, and mean, sd, n over
-                    the replicates at rest in which it could be measured
+                    the valid replicates (at rest, or measured) in which it could be measured
     outcomes        outcome → number of replicates
-    runs            per seed: outcome, message, dt, steps, wall_s, and name → value and spread
+    runs            per seed: outcome, message, dt, steps, wall_s, energy, and name → value and spread;
+                    energy: put in and dissipated [J], and the account's largest error as a fraction of what was put in
     parameters      path → value in SI, unit
     seeds, wall_s (of all), title, versions
 
@@ -22,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from solver import Outcome, Record, Scene, parameters, value
+from solver import Record, Scene, Trace, parameters, value
 from solver.observables import Value, observe
 
 RUNTIME = ("taichi", "numpy")
@@ -72,9 +73,9 @@ def package_version(distribution: str) -> str | None:
 
 
 def _observables(records: Sequence[Record], observed: Sequence[dict[str, Value]]) -> dict[str, dict[str, Any]]:
-    at_rest = [values for record, values in zip(records, observed, strict=True) if record.outcome == Outcome.AT_REST]
+    valid = [values for record, values in zip(records, observed, strict=True) if record.outcome.valid]
     return {
-        name: _value(first) | {"unit": first.unit} | _over_replicates([values[name].value for values in at_rest])
+        name: _value(first) | {"unit": first.unit} | _over_replicates([values[name].value for values in valid])
         for name, first in observed[0].items()
     }
 
@@ -96,7 +97,17 @@ def _run(record: Record, values: dict[str, Value]) -> dict[str, Any]:
         "dt": record.dt,
         "steps": record.steps,
         "wall_s": record.wall_s,
+        "energy": _energy(record.trace),
         "observables": {name: _value(observed) for name, observed in values.items()},
+    }
+
+
+def _energy(trace: Trace) -> dict[str, float | None]:
+    put_in = trace.supplied_energy + trace.wall_work
+    return {
+        "put_in_J": _finite(put_in[-1]),
+        "dissipated_J": _finite(trace.dissipated_energy[-1]),
+        "largest_error": _finite(np.abs(trace.energy_error).max()),
     }
 
 

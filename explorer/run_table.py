@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
+
+import numpy as np
 
 from explorer.text_table import table_line, text_table
 from solver import Record
-from solver.observables import observe
+from solver.observables import Value, observable_names, observe
 
 COLUMNS = {
     "seed": -6,
@@ -18,12 +20,13 @@ COLUMNS = {
     "angle °": -7,
     "within °": -8,
     "apex mm": -7,
-    "funnel g": -8,
+    "in rig g": -8,
     "wall s": -6,
 }
 """Heading → width, negative for a column of numbers.
 
-"within" is the standard deviation of the angle over the views of one pile, "funnel" the mass left in it.
+"angle" is the first observable of the rig, "within" its standard deviation over the views of one pile (the flanks, the
+parts of the time), "in rig" the mass left in the container.
 """
 
 
@@ -40,7 +43,7 @@ class RunTable:
             self._echo(table_line(list(COLUMNS), list(COLUMNS.values())))
             self._started = True
         seen = observe(record)
-        angle = seen["angle_of_repose_deg"]
+        angle, missing = seen[observable_names(record.scene)[0]], Value(math.nan, "")
         row = [
             str(record.seed),
             str(record.outcome),
@@ -48,8 +51,8 @@ class RunTable:
             str(len(record.bodies.mass)),
             _number(angle.value, ".1f"),
             _number(angle.spread, ".1f"),
-            _number(1e3 * seen["apex_height_m"].value, ".1f"),
-            _number(1e3 * seen["residual_mass_kg"].value, ".2f"),
+            _number(1e3 * seen.get("apex_height_m", missing).value, ".1f"),
+            _number(1e3 * seen.get("residual_mass_kg", missing).value, ".2f"),
             f"{record.wall_s:.1f}",
         ]
         self._echo(table_line(row, list(COLUMNS.values())))
@@ -57,7 +60,7 @@ class RunTable:
             self._echo(f"        {record.message}")
 
     def summarise(self, result: dict[str, Any]) -> None:
-        """Print the observables: of the pile, or of several replicates the means over those at rest."""
+        """Print the observables: of the pile, or of several replicates the means over those that are valid."""
         several = len(result["seeds"]) > 1
         keys = ("mean", "sd", "n") if several else ("value", "spread")
         rows = [
@@ -68,7 +71,19 @@ class RunTable:
         self._echo(text_table(("observable", *keys, "unit"), rows))
         if several:
             counted = ", ".join(f"{count} {outcome}" for outcome, count in result["outcomes"].items())
-            self._echo(f"\n{len(result['seeds'])} pours: {counted}; means over those at rest")
+            self._echo(f"\n{len(result['seeds'])} pours: {counted}; means over those that are valid")
+        self._echo(f"\n{energy_line([run['energy'] for run in result['runs']])}")
+
+
+def energy_line(accounts: Sequence[dict[str, float | None]]) -> str:
+    """Energy put in (mean), the share of it that was dissipated, and how far the worst account is off."""
+    keys = ("put_in_J", "dissipated_J", "largest_error")
+    put_in, dissipated, error = np.array([[account[key] for key in keys] for account in accounts], dtype=float).T
+    return (
+        f"energy put in: {_number(1e3 * put_in.mean(), '.4g')} mJ, "
+        f"dissipated: {_number(100.0 * dissipated.sum() / put_in.sum(), '.4g')} %; "
+        f"the account closes within {_number(100.0 * error.max(), '.2g')} %"
+    )
 
 
 def _number(number: float | None, form: str) -> str:

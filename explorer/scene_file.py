@@ -1,8 +1,8 @@
 """From what a person names on the command line to a scene: a rig, a material or a study, and settings on top.
 
 A file with ``material`` but neither targets nor factors is a set-up: its tables ``[rig]``, ``[insertion]`` and
-``[numerics]`` lie over the material; their keys are the last parts of parameter paths (``outlet_height`` in
-``[rig]`` is ``rig.outlet_height``). With targets or factors it is a study and is read as `explorer calibrate` does.
+``[numerics]`` lie over the material (``solver/set_up.py``), as they may in a material file itself. With targets or
+factors it is a study and is read as `explorer calibrate` does.
 """
 
 from __future__ import annotations
@@ -13,38 +13,46 @@ from pathlib import Path
 from typing import Any
 
 from doe.study import load_study
-from solver import ParameterError, Scene, load_material, read_toml, with_values
+from solver import ParameterError, Scene, load_material, read_toml, with_set_up
 from solver.assets import AssetKind, AssetNotFoundError, asset_path, shipped_assets
-from solver.rigs import RIGS
+from solver.rigs import BENCH_RIGS, RIGS
+from solver.scene import with_rig
+from solver.set_up import TABLES
+from solver.set_up import with_settings as with_values_and_rig
 from solver.shape import ShapeError
 
 DEFAULT_MATERIAL = "sunflower_extract"
 DEFAULT_STUDY = "sunflower_extract"
 SHIPPED: tuple[AssetKind, ...] = ("materials", "studies", "benchmarks")
 """Where a shipped name is looked for, in this order."""
-SCENE_TABLES = ("rig", "insertion", "numerics")
-SET_UP_KEYS = ("format", "title", "material", *SCENE_TABLES)
+SET_UP_KEYS = ("format", "title", "material", *TABLES)
+SOURCES = (*RIGS, *BENCH_RIGS)
+"""Rigs that can be named on the command line."""
 
 
 def load_scene(source: str, material: str | None = None) -> Scene:
     """The scene that ``source`` names.
 
     Args:
-        source: a rig ("funnel"), or a material, set-up or study by the path of its file or its shipped name (shipped
-            set-ups are benchmarks). Where a material and a study share a shipped name, it means the material.
+        source: a rig ("funnel", "rotating_drum"), or a material, set-up or study by the path of its file or its
+            shipped name (shipped set-ups are benchmarks). Where a material and a study share a shipped name, it means
+            the material.
         material: path or shipped name of the material in the rig; only a rig takes one.
 
     Raises:
         ParameterError, AssetNotFoundError: one line with file, key, value and what is allowed.
+
+    A rig with its default dimensions is not checked against the bodies: :func:`with_settings` does that.
     """
-    if source in RIGS:
-        return _material_scene(material or DEFAULT_MATERIAL)
+    if source in SOURCES:
+        scene = material_scene(material or DEFAULT_MATERIAL)
+        return scene if scene.rig.name == source else with_rig(scene, source)
     path = _file_of(source)
     if material is not None:
         raise ParameterError(f"--material {material}: {path} has a material of its own; only a rig takes one")
     table = read_toml(path)
     if "materials" in table or "body" in table:
-        return _material_scene(str(path))
+        return material_scene(str(path))
     if "target" in table or "factor" in table:
         return study_scene(path)
     with _naming(path):
@@ -67,7 +75,7 @@ def with_settings(scene: Scene, settings: Sequence[str]) -> Scene:
         values.pop(path.strip(), None)
         values[path.strip()] = value.strip()
     try:
-        return with_values(scene, values)
+        return with_values_and_rig(scene, values)
     except ParameterError as error:
         raise ParameterError(f"--set: {error}") from None
 
@@ -85,14 +93,15 @@ def _file_of(source: str) -> Path:
     for kind in SHIPPED:
         if stem in shipped_assets(kind):
             return asset_path(kind, stem)
-    rigs, materials, studies, benchmarks = map(", ".join, (RIGS, *map(shipped_assets, SHIPPED)))
+    rigs, materials, studies, benchmarks = map(", ".join, (SOURCES, *map(shipped_assets, SHIPPED)))
     raise ParameterError(
         f"{source}: no such file, and no rig ({rigs}), shipped material ({materials}), study ({studies}) or "
         f"benchmark ({benchmarks}) of that name"
     )
 
 
-def _material_scene(name: str, relative_to: Path | None = None) -> Scene:
+def material_scene(name: str, relative_to: Path | None = None) -> Scene:
+    """The scene of a material by its path or shipped name; its rig is the funnel unless the file says otherwise."""
     path = asset_path("materials", name, relative_to=relative_to)
     with _naming(path):
         return load_material(str(path))
@@ -107,21 +116,7 @@ def _set_up_scene(table: dict[str, Any], path: Path) -> Scene:
     material = table.get("material")
     if not isinstance(material, str):
         raise ParameterError(f"material: a name or a path is needed, not {material!r}")
-    return with_values(_material_scene(material, path.parent), _table_values(table))
-
-
-def _table_values(table: dict[str, Any]) -> dict[str, Any]:
-    """Parameter path → value for the scene's tables of a set-up."""
-    values: dict[str, Any] = {}
-    for kind in SCENE_TABLES:
-        entries = table.get(kind, {})
-        if not isinstance(entries, dict):
-            raise ParameterError(f"{kind}: a table is needed, not {entries!r}")
-        values |= {f"{kind}.{key}": value for key, value in entries.items()}
-    rig = values.pop("rig.name", "funnel")
-    if rig not in RIGS:
-        raise ParameterError(f"rig.name: {rig!r} is not one of {', '.join(RIGS)}")
-    return values
+    return with_set_up(material_scene(material, path.parent), table)
 
 
 @contextmanager

@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
 import trimesh
 
 from solver.body import Body, Members
-from solver.rigs import Funnel, Plane, Revolved, Surface
-from solver.rigs.funnel import GATE, SURFACE_NAMES
+from solver.insertion import rotation_matrix
+from solver.rigs import Plane, Revolved, Rig, Surface, TriangleMesh
+from solver.scene import Scene, pour_rig
 from solver.shape import surface_mesh
 
 SIDES = 96
 """Corners of a circle."""
+PLATE_NAME = "plate"
+"""The surface that bodies pile up on."""
+GATE_NAME = "gate"
+"""The surface that is there only until the rig acts."""
 PLATE_OVERHANG = 2.0
-"""Radius at which the infinite plate is drawn, as a multiple of the funnel's largest radius."""
+"""Radius at which the infinite plate is drawn, as a multiple of the largest radius of the rest of the rig."""
+BARE_SQUARE = np.array([(-0.05, -0.05, -0.05), (0.05, 0.05, 0.05)])
+"""Where nothing but planes is there, they are drawn this far [m]."""
+
+Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -30,8 +39,10 @@ class Triangles:
 
 
 def body_triangles(body: Body) -> Triangles:
-    """The true shape in the principal frame of the body; the member spheres where it is declared by them."""
+    """The true shape in the principal frame of the body; the member spheres where it is declared by nothing else."""
     if isinstance(body.shape, Members):
+        if body.shape.drawn is not None:
+            return _faceted(surface_mesh(body.shape.drawn))
         clump = body.clump
         spheres = [trimesh.creation.icosphere(subdivisions=2, radius=radius) for radius in clump.radii]
         for sphere, centre in zip(spheres, clump.centres, strict=True):
@@ -41,21 +52,65 @@ def body_triangles(body: Body) -> Triangles:
     return _smooth(mesh) if body.shape.kind in ("ellipsoid", "sphere") else _faceted(mesh)
 
 
-def rig_triangles(rig: Funnel) -> dict[str, Triangles]:
-    """Plate, cone and gate by name, in the world's frame."""
+def rig_triangles(rig: Rig) -> dict[str, Triangles]:
+    """The surfaces of ``rig`` by name, each in its own frame; :func:`rig_poses` says where that is in the world."""
     surfaces = rig.surfaces()
-    radius = PLATE_OVERHANG * max(s.r1 for s in surfaces if isinstance(s, Revolved))
-    return {name: _surface(surface, radius) for name, surface in zip(SURFACE_NAMES, surfaces, strict=True)}
+    corners = [_in_world(surface, _finite(surface).vertices) for surface in surfaces if not isinstance(surface, Plane)]
+    reach = np.concatenate(corners) if corners else BARE_SQUARE
+    return {
+        name: _plane(surface, name, reach) if isinstance(surface, Plane) else _finite(surface)
+        for name, surface in zip(rig.surface_names, surfaces, strict=True)
+    }
 
 
-GATE_NAME = SURFACE_NAMES[GATE]
-"""The surface that is there only while the gate is shut."""
+def rig_poses(rig: Rig) -> Array:
+    """Where the surfaces of ``rig`` are before it acts, in order: origin [m] and orientation wxyz, shape (k, 7)."""
+    return np.array([(*surface.pose.origin, *surface.pose.quaternion) for surface in rig.surfaces()])
 
 
-def _surface(surface: Surface, plate_radius: float) -> Triangles:
-    if isinstance(surface, Plane):
-        surface = Revolved(0.0, surface.pose.origin[2], plate_radius, surface.pose.origin[2], surface.material)
-    return _revolved(cast(Revolved, surface))
+def rim_circles(rig: Rig) -> dict[str, list[tuple[float, float]]]:
+    """Open ends of the shells of revolution by name: (radius, height) [m] of their circles, each in its own frame."""
+    return {
+        name: [(surface.r0, surface.z0), (surface.r1, surface.z1)]
+        for name, surface in zip(rig.surface_names, rig.surfaces(), strict=True)
+        if isinstance(surface, Revolved) and surface.z0 != surface.z1
+    }
+
+
+def scene_height(scene: Scene) -> float:
+    """Top of the rig and of the feed above it [m]."""
+    poses, meshes = rig_poses(scene.rig), rig_triangles(scene.rig)
+    tops = [
+        float(_in_world(surface, meshes[name].vertices)[:, 2].max())
+        for name, surface in zip(scene.rig.surface_names, scene.rig.surfaces(), strict=True)
+        if not isinstance(surface, Plane)
+    ]
+    feed = pour_rig(scene).feed()
+    return max(*tops, min(feed.floor + scene.insertion.region_height, feed.ceiling), float(poses[:, 2].max()))
+
+
+def _in_world(surface: Surface, points: npt.NDArray[Any]) -> Array:
+    turn = rotation_matrix(np.array(surface.pose.quaternion))
+    placed: Array = points @ turn.T + np.array(surface.pose.origin)
+    return placed
+
+
+def _plane(plane: Plane, name: str, reach: Array) -> Triangles:
+    """The infinite ``plane``: a disc about the z axis if it is the plate, else a rectangle beside ``reach`` (n, 3)."""
+    if name == PLATE_NAME:
+        radius = PLATE_OVERHANG * float(np.hypot(reach[:, 0], reach[:, 1]).max())
+        return _revolved(Revolved(0.0, 0.0, radius, 0.0, plane.material))
+    turn = rotation_matrix(np.array(plane.pose.quaternion))
+    seen = (reach - np.array(plane.pose.origin)) @ turn
+    (x0, y0), (x1, y1) = seen[:, :2].min(axis=0), seen[:, :2].max(axis=0)
+    corners = np.array([(x0, y0, 0.0), (x1, y0, 0.0), (x1, y1, 0.0), (x0, y1, 0.0)])
+    return _triangles(corners, np.tile([0.0, 0.0, 1.0], (4, 1)), np.array([(0, 1, 2), (0, 2, 3)]))
+
+
+def _finite(surface: Revolved | TriangleMesh) -> Triangles:
+    if isinstance(surface, Revolved):
+        return _revolved(surface)
+    return _faceted(trimesh.Trimesh(np.array(surface.vertices), np.array(surface.faces), process=False))
 
 
 def _revolved(surface: Revolved) -> Triangles:

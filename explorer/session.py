@@ -32,9 +32,8 @@ from explorer.live.messages import (
     Step,
 )
 from explorer.live.process import run
-from solver.body import counts
 from solver.params import ParameterError
-from solver.scene import Scene, canonical, parameters, with_values
+from solver.scene import Scene, body_counts, canonical, parameters, poured_mass, with_values
 
 SPEED_RANGE = (0.01, 10.0)
 """Allowed ratio of simulated to wall time."""
@@ -66,10 +65,11 @@ class Session:
 
         Raises ParameterError for a scene with more bodies than a frame holds.
         """
-        bodies = sum(counts(scene.bodies, scene.rig.mass))
+        bodies = sum(body_counts(scene))
         if bodies > MAX_BODIES:
+            path = "rig.mass" if "rig.mass" in parameters(scene) else "rig"
             raise ParameterError(
-                f"rig.mass: {scene.rig.mass:g} kg are {bodies} bodies; the live view holds at most {MAX_BODIES}"
+                f"{path}: {poured_mass(scene):g} kg are {bodies} bodies; the live view holds at most {MAX_BODIES}"
             )
         self._generation += 1
         # A process that has failed may live on for a moment, but takes no commands any more.

@@ -7,6 +7,11 @@ from pathlib import Path
 
 def write_whole(path: Path, text: str) -> None:
     """Write ``text`` beside ``path`` and move it into place in one step."""
+    write_whole_bytes(path, text.encode())
+
+
+def write_whole_bytes(path: Path, contents: bytes) -> None:
+    """The same for ``contents``."""
     temporary = path.with_name(f".{path.name}.part")
-    temporary.write_text(text, encoding="utf-8")
+    temporary.write_bytes(contents)
     temporary.replace(path)

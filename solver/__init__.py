@@ -8,12 +8,14 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from solver.assets import asset_path
-from solver.body import Body, counts
-from solver.material_file import load_material, read_toml
+from solver.body import Body
+from solver.material_file import load_material
 from solver.observables import Value, observable_names, observe
 from solver.params import Parameter, ParameterError, parse_quantity
 from solver.record import Bodies, Entries, Outcome, Phase, Pile, Record, Spheres, Trace
-from solver.scene import Scene, canonical, parameters, value, with_values
+from solver.scene import Scene, body_counts, canonical, parameters, value, with_values
+from solver.set_up import with_set_up
+from solver.toml_table import read_toml
 from solver.version import code_version
 
 if TYPE_CHECKING:
@@ -49,9 +51,9 @@ __all__ = [
     "Trace",
     "Value",
     "asset_path",
+    "body_counts",
     "canonical",
     "code_version",
-    "counts",
     "load_material",
     "observable_names",
     "observe",
@@ -62,5 +64,6 @@ __all__ = [
     "run_pours",
     "run_queue",
     "value",
+    "with_set_up",
     "with_values",
 ]

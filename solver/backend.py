@@ -12,37 +12,48 @@ import threading
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
 
 import taichi as ti
+from taichi.lang import impl
 
-ARCHITECTURES = {"cpu": ti.cpu, "cuda": ti.cuda}
+from solver.arch import chosen
+from solver.params import ParameterError
+
+LANES_ON_CPU = 512
+"""Taichi gives a CPU thread at least this many iterations of a loop in a row."""
 
 _owner: int | None = None
 
 
-def init(threads: int | None = None, arch: str = "cpu") -> None:
-    """Start Taichi once: double precision, no fast math (results repeat bit by bit), ``threads`` CPU threads.
+def init(threads: int | None = None) -> None:
+    """Start Taichi once on the chosen processor: double precision, no fast math, ``threads`` CPU threads.
 
-    Raises ValueError for an unknown ``arch`` and RuntimeError when another thread already owns Taichi.
+    Raises ParameterError for a processor that this machine lacks and RuntimeError when another thread owns Taichi.
     """
     global _owner
-    if arch not in ARCHITECTURES:
-        raise ValueError(f"arch: {arch!r} is not one of {', '.join(ARCHITECTURES)}")
     current = threading.get_ident()
     if _owner is not None:
         if _owner != current:
             raise RuntimeError("Taichi belongs to the thread that called solver.backend.init first")
         return
+    arch = getattr(ti, chosen())
     options = {} if threads is None else {"cpu_max_num_threads": threads}
     ti.set_logging_level(ti.ERROR)
     # ti.init prints a banner that no option silences; it would stand in front of JSON on standard output.
     with contextlib.redirect_stdout(io.StringIO()):
         ti.init(
-            arch=ARCHITECTURES[arch],
+            arch=arch,
             default_fp=ti.f64,
             default_ip=ti.i32,
             fast_math=False,
-            # Leaving the data flow to LLVM makes the large kernel compile four times as fast and run 5–10 % slower.
+            # Leaving the data flow to LLVM makes the large kernel compile four times as fast and run no slower.
             cfg_optimization=False,
             log_level=ti.ERROR,
             **options,
         )
+    if impl.current_cfg().arch != arch:
+        raise ParameterError(f"--arch {chosen()}: this machine has no such device that Taichi can use")
     _owner = current
+
+
+def lanes() -> int:
+    """Loop iterations per world (see ``kernels/batch.py``): one on a GPU, whose threads take one each."""
+    return LANES_ON_CPU if impl.current_cfg().arch == ti.cpu else 1

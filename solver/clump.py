@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
+from solver.clump_fit import ClumpFit, extent_errors, measured_fit
 from solver.shape import ShapeError, Solid, file_stamp, mass_properties, surface_mesh
 from solver.solid_points import interior_points, surface_points
 from solver.sphere_fit import Orbits, Target, not_facing, refine, without_idle
 from solver.sphere_layout import start_layouts
-from solver.sphere_union import distance_to_union, outer_dimensions, squared_distances, union_volume
+from solver.sphere_number import LEAST_RADIUS, doubling, fitted
+from solver.sphere_union import squared_distances
 
 Array = npt.NDArray[np.float64]
-Resolution = Literal["coarse", "standard", "fine"]
 
 
 @dataclass(frozen=True)
@@ -40,33 +40,12 @@ DEMANDS: dict[str, Demand] = {
     "standard": Demand(rms=0.0312, least_radius=0.7, most_spheres=40),
     "fine": Demand(rms=0.0145, least_radius=0.6, most_spheres=48),
 }
+RESOLUTIONS = tuple(DEMANDS)
+MOST_SPHERES = 128
 EXTENT_LIMIT = 0.02
 # points of equal area: a symmetric solid folds them into one octant, eight times as dense
-FIT_POINTS, FIT_POINTS_SYMMETRIC, CHECK_POINTS = 1000, 800, 4000
-INTERIOR_POINTS, CHECK_INTERIOR_POINTS = 30_000, 200_000
-
-
-@dataclass(frozen=True)
-class ClumpFit:
-    """How well the member spheres stand for the solid.
-
-    Args:
-        n_spheres: number of member spheres.
-        volume_ratio: volume of the union of spheres / volume of the solid.
-        covered_ratio: volume of the union within the solid / volume of the solid.
-        surface_rms: RMS over the solid's surface (by area) of the distance to the union's surface [m].
-        surface_max: largest such distance [m].
-        extent_errors: (x, y, z) outer dimension of the union / that of the solid - 1.
-        smallest_radius: radius of the smallest member sphere [m].
-    """
-
-    n_spheres: int
-    volume_ratio: float
-    covered_ratio: float
-    surface_rms: float
-    surface_max: float
-    extent_errors: tuple[float, float, float]
-    smallest_radius: float
+FIT_POINTS, FIT_POINTS_SYMMETRIC = 1000, 800
+INTERIOR_POINTS = 30_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,34 +69,43 @@ class Clump:
     fit: ClumpFit
 
 
-def fit_clump(solid: Solid, density: float, resolution: Resolution) -> Clump:
-    """The clump of as few spheres as meet the resolution's demand; the same bits every time.
+def fit_clump(solid: Solid, density: float, spheres: str) -> Clump:
+    """The clump of as few spheres as meet the resolution's demand, or of a number of them; the same bits every time.
 
-    Starting layouts are tried by ascending number of spheres and refined by least squares
+    Resolution: starting layouts are tried by ascending number of spheres and refined by least squares
     (`solver.sphere_fit`); the first number whose best layout meets the RMS deviation, and outer dimensions
     within 2 %, is taken. If none does, the layout of least deviation is, and `fit` says by how much it
-    misses. A sphere is its own clump, exactly. Mass and inertia are the solid's, never the spheres'. Cached
-    by solid and resolution, a mesh also by the time of its file's last change.
+    misses. Number: the best symmetric layout of so many spheres where the solid is symmetric and there is one,
+    else the best of `solver.sphere_number`. A sphere is its own clump, exactly. Mass and inertia are the
+    solid's, never the spheres'. Cached by solid and spheres, a mesh also by the time of its file's last change.
 
     Args:
         solid: true shape.
         density: [kg/m3].
-        resolution: coarse, standard or fine.
+        spheres: coarse, standard or fine, or a number as text.
 
     Raises:
-        ShapeError: unknown resolution, bad density or unusable mesh.
+        ShapeError: neither a resolution nor a number, bad density or unusable mesh.
     """
-    if resolution not in DEMANDS:
-        raise ShapeError(f"resolution = {resolution!r}: allowed are {', '.join(get_args(Resolution))}")
+    if spheres not in DEMANDS and not (spheres.isdecimal() and 1 <= int(spheres) <= MOST_SPHERES):
+        raise ShapeError(
+            f"spheres = {spheres!r}: allowed are {', '.join(DEMANDS)} and numbers from 1 to {MOST_SPHERES}"
+        )
     properties = mass_properties(solid, density)
-    centres, radii, fit = _fit_spheres(solid, resolution, file_stamp(solid))
+    centres, radii, fit = _fit_spheres(solid, spheres, file_stamp(solid))
     return _clump(centres, radii, properties.mass, properties.inertia, fit)
 
 
-def explicit_clump(centres: npt.ArrayLike, radii: npt.ArrayLike, mass: float, inertia: npt.ArrayLike) -> Clump:
+def explicit_clump(
+    centres: npt.ArrayLike,
+    radii: npt.ArrayLike,
+    mass: float,
+    inertia: npt.ArrayLike,
+    fit: ClumpFit | None = None,
+) -> Clump:
     """A body that is declared by its spheres.
 
-    The union of spheres is the body itself, hence `fit` states no error. Nothing is recentred: the
+    Without a `fit` the union of spheres is the body itself and has no error. Nothing is recentred: the
     declaration says where the centre of mass is.
 
     Args:
@@ -125,6 +113,7 @@ def explicit_clump(centres: npt.ArrayLike, radii: npt.ArrayLike, mass: float, in
         radii: (n,) [m].
         mass: [kg].
         inertia: (3,) principal moments [kg m2].
+        fit: how well the spheres stand for another solid.
 
     Raises:
         ShapeError: wrong array shapes, values that are not finite, a radius, mass or moment that is not
@@ -148,8 +137,22 @@ def explicit_clump(centres: npt.ArrayLike, radii: npt.ArrayLike, mass: float, in
     # 1e-6: moments are declared with few digits, and those of a thin plate meet the limit exactly
     if inertia.max() > (1.0 + 1e-6) * (inertia.sum() - inertia.max()):
         raise ShapeError(f"inertia = {inertia.tolist()}: no moment may exceed the sum of the other two")
-    fit = ClumpFit(len(radii), 1.0, 1.0, 0.0, 0.0, (0.0, 0.0, 0.0), float(radii.min()))
+    fit = fit or ClumpFit(len(radii), 1.0, 1.0, 0.0, 0.0, (0.0, 0.0, 0.0), float(radii.min()))
     return _clump(centres, radii, float(mass), inertia, fit)
+
+
+def scaled(clump: Clump, scale: float) -> Clump:
+    """A geometrically similar clump of the same density: lengths times s, mass times s³, inertia times s⁵."""
+    if scale == 1.0:
+        return clump
+    fit = replace(
+        clump.fit,
+        surface_rms=clump.fit.surface_rms * scale,
+        surface_max=clump.fit.surface_max * scale,
+        smallest_radius=clump.fit.smallest_radius * scale,
+    )
+    centres, radii, inertia = clump.centres * scale, clump.radii * scale, clump.inertia * scale**5
+    return _clump(centres, radii, clump.mass * scale**3, inertia, fit)
 
 
 def _numbers(name: str, values: npt.ArrayLike) -> Array:
@@ -170,22 +173,41 @@ def _clump(centres: Array, radii: Array, mass: float, inertia: Array, fit: Clump
 
 
 @lru_cache(maxsize=64)
-def _fit_spheres(solid: Solid, resolution: Resolution, stamp: int) -> tuple[Array, Array, ClumpFit]:
+def _fit_spheres(solid: Solid, spheres: str, stamp: int) -> tuple[Array, Array, ClumpFit]:
     if solid.kind == "sphere":
         radius = solid.dimensions[0] / 2.0
         return np.zeros((1, 3)), np.array([radius]), ClumpFit(1, 1.0, 1.0, 0.0, 0.0, (0.0, 0.0, 0.0), radius)
+    if spheres in DEMANDS:
+        volume = mass_properties(solid, 1.0).volume
+        diameter = np.cbrt(6.0 * volume / np.pi)
+        centres, radii = _fewest_spheres(_target(solid), DEMANDS[spheres], diameter).spheres()
+    else:
+        centres, radii = _so_many_spheres(solid, int(spheres))
+    return centres, radii, measured_fit(solid, centres, radii)
+
+
+def _target(solid: Solid) -> Target:
     symmetric = solid.kind != "mesh"
     surface, normals = surface_points(solid, FIT_POINTS_SYMMETRIC if symmetric else FIT_POINTS)
-    target = Target(
+    return Target(
         np.abs(surface) if symmetric else surface,
         np.abs(normals) if symmetric else normals,
         interior_points(solid, INTERIOR_POINTS),
         np.array(surface_mesh(solid).bounds),
         symmetric,
     )
-    volume = mass_properties(solid, 1.0).volume
-    centres, radii = _fewest_spheres(target, DEMANDS[resolution], np.cbrt(6.0 * volume / np.pi)).spheres()
-    return centres, radii, _measure(solid, target, volume, centres, radii)
+
+
+def _so_many_spheres(solid: Solid, number: int) -> tuple[Array, Array]:
+    if solid.kind != "mesh":
+        target = _target(solid)
+        floor = LEAST_RADIUS * target.inscribed_radius
+        layouts = start_layouts(target, number, floor).get(number, [])
+        trials = [without_idle(refine(layout, target, floor, 100), target) for layout in layouts]
+        whole = [trial for trial in trials if len(trial.owner) == number]
+        if whole:
+            return min(whole, key=lambda orbits: _score(orbits, target)).spheres()
+    return list(fitted(solid, doubling(number)))[-1]
 
 
 def _fewest_spheres(target: Target, demand: Demand, diameter: float) -> Orbits:
@@ -213,26 +235,5 @@ def _score(orbits: Orbits, target: Target) -> float:
     centres, radii = orbits.spheres()
     distance = np.sqrt(squared_distances(target.surface, centres))
     gap = (distance - radii + not_facing(target.surface, target.normals, centres)).min(axis=1)
-    excess = np.abs(_extent_errors(target.bounds, centres, radii)).max() - EXTENT_LIMIT
+    excess = np.abs(extent_errors(target.bounds, centres, radii)).max() - EXTENT_LIMIT
     return float(np.sqrt((gap**2).mean()) + max(excess, 0.0) * 100.0 * target.inscribed_radius)
-
-
-def _extent_errors(bounds: Array, centres: Array, radii: Array) -> Array:
-    return outer_dimensions(centres, radii) / (bounds[1] - bounds[0]) - 1.0
-
-
-def _measure(solid: Solid, target: Target, volume: float, centres: Array, radii: Array) -> ClumpFit:
-    """The fit's errors, on other and more points than it was made with."""
-    deviation = distance_to_union(surface_points(solid, CHECK_POINTS)[0], centres, radii)
-    inside = interior_points(solid, CHECK_INTERIOR_POINTS)
-    covered = np.any([((inside - c) ** 2).sum(axis=1) <= r**2 for c, r in zip(centres, radii, strict=True)], axis=0)
-    errors = _extent_errors(target.bounds, centres, radii)
-    return ClumpFit(
-        n_spheres=len(radii),
-        volume_ratio=float(union_volume(centres, radii) / volume),
-        covered_ratio=float(covered.mean()),
-        surface_rms=float(np.sqrt((deviation**2).mean())),
-        surface_max=float(deviation.max()),
-        extent_errors=(float(errors[0]), float(errors[1]), float(errors[2])),
-        smallest_radius=float(radii.min()),
-    )

@@ -1,8 +1,8 @@
 """Insertion: when and where bodies enter. A body is placed only where it fits; if the inlet is full it waits.
 
-Bodies start in a cylinder above the feed opening, whole bodies inside it, at a constant mass rate, with uniformly
-random orientation and a downward speed, to which they add what they fall until the opening (1.1 m/s over 60 mm). Order,
-orientations and places come from one NumPy generator per run, so a seed repeats a run.
+Bodies start above the feed opening of the rig (``rigs/feed.py``), whole bodies inside it, at a constant mass rate, with
+uniformly random orientation and a downward speed, to which they add what they fall until the opening (1.1 m/s over
+60 mm). Order, orientations and places come from one NumPy generator per run, so a seed repeats a run.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from solver.clump import Clump
-from solver.params import ParameterError, param
+from solver.params import param
+from solver.rigs.feed import Feed
 
 Array = npt.NDArray[np.float64]
 
@@ -28,28 +29,15 @@ class Insertion:
 
     protocol: str = param(
         "pour_through",
-        doc="pour_through: the outlet is open from the start; fill_then_open: gate shut, fill, settle, open.",
+        doc="pour_through: the outlet is open from the start; fill_then_open: fill, settle, then open, lift or turn.",
         choices=PROTOCOLS,
     )
     rate: float = param(0.020, unit="kg/s", low=1e-4, high=10.0, doc="Mass fed per second.")
     drop_speed: float = param(0.5, unit="m/s", low=0.0, high=10.0, doc="Downward speed of a body where it enters.")
-    region_radius: float = param(0.045, unit="m", low=0.002, high=1.0, doc="Radius of the feeding cylinder.")
+    region_radius: float = param(0.045, unit="m", low=0.002, high=1.0, doc="Radius of the feed.")
     region_height: float = param(
-        0.060, unit="m", low=0.002, high=1.0, doc="Height of the feeding cylinder; longer bodies stick out of its top."
+        0.060, unit="m", low=0.002, high=1.0, doc="Height of the feed; longer bodies stick out of its top."
     )
-
-    def check(self, inlet_diameter: float, longest_body: float) -> None:
-        """Refuse a feeding cylinder that is wider than the feed opening or into which a body does not fit."""
-        if self.region_radius > inlet_diameter / 2.0:
-            raise ParameterError(
-                f"insertion.region_radius: {self.region_radius:g} m is wider than the feed opening; "
-                f"allowed: up to {inlet_diameter / 2.0:g} m"
-            )
-        if 2.0 * self.region_radius <= longest_body:
-            raise ParameterError(
-                f"insertion.region_radius: {self.region_radius:g} m is too narrow for a body of "
-                f"{longest_body:g} m; allowed: more than {longest_body / 2.0:g} m"
-            )
 
 
 @dataclass(frozen=True)
@@ -75,28 +63,27 @@ def entry_times(masses: Array, rate: float) -> Array:
 def find_place(
     clump: Clump,
     insertion: Insertion,
-    floor: float,
+    feed: Feed,
     occupied_centres: Array,
     occupied_radii: Array,
     rng: np.random.Generator,
 ) -> Pose | None:
-    """A random pose inside the feeding cylinder (bottom at height ``floor`` [m]) that touches nothing, or None.
+    """A random pose above the opening of ``feed`` that touches nothing, or None.
 
     The orientation is drawn once and kept, and places are tried for it, so that orientations that are harder to place
     are not rarer. ``occupied_centres`` (n, 3) and ``occupied_radii`` (n,) are the member spheres already there [m].
     """
     quaternion = random_quaternion(rng)
-    offsets = clump.centres @ rotation_matrix(quaternion).T
+    offsets = turned(clump.centres, quaternion)
     lowest, highest = (offsets[:, 2] - clump.radii).min(), (offsets[:, 2] + clump.radii).max()
-    spare = max(0.0, insertion.region_height - (highest - lowest))
+    height = min(insertion.region_height, feed.ceiling - feed.floor)
+    spare = max(0.0, height - (highest - lowest))
     for _ in range(TRIES):
-        angle, spread = rng.uniform(0.0, 2.0 * np.pi), np.sqrt(rng.uniform())
-        radius = insertion.region_radius * spread
-        height = floor - lowest + rng.uniform() * spare
-        position = np.array([radius * np.cos(angle), radius * np.sin(angle), height])
+        x, y = feed.draw(insertion.region_radius, rng)
+        position = np.array([x, y, feed.floor - lowest + rng.uniform() * spare])
         centres = position + offsets
-        reach = np.hypot(centres[:, 0], centres[:, 1]) + clump.radii
-        if reach.max() <= insertion.region_radius and _clear(centres, clump.radii, occupied_centres, occupied_radii):
+        inside = feed.holds(centres, clump.radii, insertion.region_radius)
+        if inside and _clear(centres, clump.radii, occupied_centres, occupied_radii):
             return Pose(position, quaternion)
     return None
 
@@ -105,6 +92,11 @@ def random_quaternion(rng: np.random.Generator) -> Array:
     """Uniformly distributed orientation, wxyz (Marsaglia 1972: a normalised 4-D Gaussian)."""
     q = rng.normal(size=4)
     return q / np.linalg.norm(q)
+
+
+def turned(points: Array, quaternion: Array) -> Array:
+    """``points`` (n, 3) turned about the origin by a unit quaternion wxyz."""
+    return points @ rotation_matrix(quaternion).T
 
 
 def rotation_matrix(quaternion: Array) -> Array:

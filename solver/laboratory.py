@@ -9,7 +9,6 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import cast
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +17,7 @@ from solver.body import Body, Members
 from solver.layout import layout
 from solver.material import Material, Pair
 from solver.numerics import Numerics
-from solver.rigs import Funnel
+from solver.rigs.rig import BareRig
 from solver.rigs.surface import Surface, horizontal
 from solver.scene import Scene
 from solver.state import Capacity
@@ -45,14 +44,12 @@ ROOM = Capacity(worlds=1, bodies=128, members=1024, contacts=8192, kinds=64)
 
 
 @dataclass(frozen=True)
-class Bench:
+class Bench(BareRig):
     """The rig of a laboratory: the surfaces it is given and nothing else."""
 
     fixed: tuple[Surface, ...]
     wall: str = WALL.name
     domain_half_width: float = 10.0
-    outlet_height: float = 1e6
-    inlet_diameter: float = 0.0
 
     def surfaces(self) -> tuple[Surface, ...]:
         """Surfaces in the order in which they were given."""
@@ -75,7 +72,7 @@ def scene_of(
     gravity: tuple[float, float, float] = FREE,
 ) -> Scene:
     """A scene whose rig is a :class:`Bench` with ``surfaces`` of the material "wall"; no body falls asleep in it."""
-    rig, awake = cast(Funnel, Bench(tuple(surfaces))), Numerics(sleep_speed=0.0)
+    rig, awake = Bench(tuple(surfaces)), Numerics(sleep_speed=0.0)
     return Scene("laboratory", tuple(materials), tuple(bodies), tuple(pairs), rig, numerics=awake, gravity=gravity)
 
 

@@ -23,15 +23,24 @@ class Layout:
     """local centre (3) and radius; shape (m, 4)."""
     owner: Ints
     """Body of each member; shape (m, 1)."""
+    scale: Array
+    """Linear size of each body relative to the declared one; shape (n,)."""
 
 
-def layout(scene: Scene, order: Ints) -> Layout:
-    """Arrange bodies of the components in ``order`` (index into ``scene.bodies``, in order of entry)."""
+def layout(scene: Scene, order: Ints, scale: Array | None = None) -> Layout:
+    """Arrange bodies of the components in ``order`` (index into ``scene.bodies``, in order of entry).
+
+    ``scale`` (n,) is the linear size s of each body, by default 1: spheres and reach go with s, mass with s³, inertia
+    with s⁵.
+    """
+    scale = np.ones(len(order)) if scale is None else scale
     clumps = [body.clump for body in scene.bodies]
     sizes = np.array([len(clumps[k].radii) for k in order], dtype=np.int32)
     first = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int32)
     numbers = np.array([[clumps[k].mass, *clumps[k].inertia, clumps[k].bounding_radius] for k in order])
+    numbers *= scale[:, None] ** np.array([3, 5, 5, 5, 1])
     spheres = np.concatenate([np.column_stack([clumps[k].centres, clumps[k].radii]) for k in order])
+    spheres *= np.repeat(scale, sizes)[:, None]
     owner = np.repeat(np.arange(len(order), dtype=np.int32), sizes)[:, None]
     places = np.column_stack([first, sizes, order]).astype(np.int32)
-    return Layout(numbers, places, np.ascontiguousarray(spheres), np.ascontiguousarray(owner))
+    return Layout(numbers, places, np.ascontiguousarray(spheres), np.ascontiguousarray(owner), scale)

@@ -5,25 +5,27 @@ gravity = [0.0, 0.0, -9.81]
 contact_law = "hertz_mindlin"
 assumed = [paths of values that nobody measured]
 [materials.<name>]       density, and two of youngs_modulus, shear_modulus, poisson_ratio (SI or with a unit)
-[[body]]                 name, material, mass_fraction, shape = { ellipsoid = […] } and spheres = "standard",
-                         or sphere_centres, sphere_radii, mass, inertia
+[[body]]                 name, material, mass_fraction, shape, … (`solver.body_table`)
 [pair.<a>.<b>]           static_friction, restitution
+[rig] [insertion] [numerics]     optional: another rig than the default funnel, and settings (see set_up.py)
 """
 
 from __future__ import annotations
 
 import math
-import tomllib
 from pathlib import Path
 from typing import Any
 
 from solver.assets import asset_path
-from solver.body import RESOLUTION, Body, Members
+from solver.body import Body
+from solver.body_table import read_body
 from solver.material import Material, Pair
 from solver.params import ParameterError, declared, parse_quantity
 from solver.rigs import Funnel
-from solver.scene import Scene, check
-from solver.shape import ShapeError, Solid
+from solver.scene import Scene
+from solver.set_up import TABLES, with_set_up
+from solver.shape import ShapeError
+from solver.toml_table import as_table, list_at, read_toml, table_at, vector
 
 WALL = "rigid_sieve_plate"
 KNOWN = {
@@ -38,25 +40,12 @@ KNOWN = {
     "pair",
     "measured",
     "wall",
+    *TABLES,
 }
 
 
-def read_toml(path: Path) -> dict[str, Any]:
-    """Parsed TOML file; a missing or malformed file is a :class:`ParameterError` with file and line."""
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise ParameterError(f"{path}: no such file") from None
-    except (IsADirectoryError, PermissionError) as error:
-        raise ParameterError(f"{path}: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise ParameterError(f"{path}: not a text file in UTF-8") from None
-    except tomllib.TOMLDecodeError as error:
-        raise ParameterError(f"{path}: {error}") from None
-
-
 def load_material(name: str, relative_to: Path | None = None) -> Scene:
-    """Scene with the default funnel from a shipped material's name or the path of a material file."""
+    """Scene from a shipped material's name or a material file's path, in the funnel unless the file says else."""
     path = asset_path("materials", name, relative_to=relative_to)
     try:
         return scene_from(read_toml(path), path)
@@ -66,7 +55,7 @@ def load_material(name: str, relative_to: Path | None = None) -> Scene:
 
 
 def scene_from(table: dict[str, Any], path: Path) -> Scene:
-    """Scene with the default rig from a parsed material file."""
+    """Scene from a parsed material file; its rig is the default funnel unless it has a table ``[rig]``."""
     unknown = sorted(set(table) - KNOWN)
     if unknown:
         raise ParameterError(f"unknown key {unknown[0]!r}; allowed: {', '.join(sorted(KNOWN))}")
@@ -74,8 +63,8 @@ def scene_from(table: dict[str, Any], path: Path) -> Scene:
         raise ParameterError(f"format: {table.get('format')!r} is not 1")
     if table.get("contact_law", "hertz_mindlin") != "hertz_mindlin":
         raise ParameterError(f"contact_law: {table['contact_law']!r} is not hertz_mindlin")
-    materials = tuple(_material(name, entry) for name, entry in _table(table, "materials").items())
-    bodies = tuple(_body(entry, materials, path) for entry in _list(table, "body"))
+    materials = tuple(_material(name, entry) for name, entry in table_at(table, "materials").items())
+    bodies = tuple(read_body(entry, materials, path) for entry in list_at(table, "body"))
     if not bodies:
         raise ParameterError("body: at least one [[body]] is needed")
     total = sum(body.mass_fraction for body in bodies)
@@ -87,13 +76,12 @@ def scene_from(table: dict[str, Any], path: Path) -> Scene:
         title=str(table.get("title", table.get("name", path.stem))),
         materials=materials,
         bodies=bodies,
-        pairs=tuple(_pairs(_table(table, "pair"))),
+        pairs=tuple(_pairs(table_at(table, "pair"))),
         rig=Funnel(wall=_wall(table, materials, bodies)),
-        gravity=_vector(table.get("gravity", (0.0, 0.0, -9.81)), "gravity"),
-        assumed=tuple(str(name) for name in _list(table, "assumed")),
+        gravity=vector(table.get("gravity", (0.0, 0.0, -9.81)), "gravity"),
+        assumed=tuple(str(name) for name in list_at(table, "assumed")),
     )
-    check(scene)
-    return scene
+    return with_set_up(scene, table)
 
 
 def _wall(table: dict[str, Any], materials: tuple[Material, ...], bodies: tuple[Body, ...]) -> str:
@@ -110,7 +98,7 @@ def _material(name: str, entry: Any) -> Material:
     where = f"materials.{name}"
     known = declared(Material, where)
     values: dict[str, float] = {}
-    for key, raw in _as_table(entry, where).items():
+    for key, raw in as_table(entry, where).items():
         if key == "youngs_modulus":
             values[key] = parse_quantity(raw, "Pa", f"{where}.{key}")
         elif f"{where}.{key}" in known:
@@ -135,51 +123,14 @@ def _material(name: str, entry: Any) -> Material:
     return Material(name=name, **values)
 
 
-def _body(entry: Any, materials: tuple[Material, ...], path: Path) -> Body:
-    entry = _as_table(entry, "body")
-    name = str(entry.get("name", ""))
-    where = f"body.{name}"
-    if not name or "." in name:
-        raise ParameterError(f"body.name: {name!r} must be a non-empty name without a dot")
-    names = {material.name: material for material in materials}
-    material = names.get(str(entry.get("material", name)))
-    if material is None:
-        raise ParameterError(f"{where}.material: {entry.get('material')!r} is not one of {', '.join(names)}")
-    fraction = parse_quantity(entry.get("mass_fraction", 1.0), "1", f"{where}.mass_fraction")
-    if not 0.0 <= fraction <= 1.0:
-        raise ParameterError(f"{where}.mass_fraction: {fraction:g} is outside 0 … 1")
-    spheres = RESOLUTION.check(entry.get("spheres", "standard"))
-    shape = _members(entry, where) if "sphere_centres" in entry else _solid(entry, where, path)
-    return Body(name, material.name, fraction, shape, material.density, spheres)  # type: ignore[arg-type]
-
-
-def _solid(entry: dict[str, Any], where: str, path: Path) -> Solid:
-    shape = dict(_as_table(entry.get("shape"), f"{where}.shape"))
-    if "mesh" in shape:
-        shape["mesh"] = str(path.parent / str(shape["mesh"]))
-    return Solid.from_toml(shape, f"{where}.shape")
-
-
-def _members(entry: dict[str, Any], where: str) -> Members:
-    centres = tuple(_vector(row, f"{where}.sphere_centres") for row in _list(entry, "sphere_centres"))
-    radii = tuple(parse_quantity(r, "m", f"{where}.sphere_radii") for r in _list(entry, "sphere_radii"))
-    mass = parse_quantity(entry.get("mass", 0.0), "kg", f"{where}.mass")
-    inertia = _vector(entry.get("inertia", ()), f"{where}.inertia")
-    if len(radii) != len(centres) or not centres:
-        raise ParameterError(f"{where}.sphere_radii: {len(radii)} radii for {len(centres)} sphere_centres")
-    if min(radii) <= 0.0 or mass <= 0.0 or min(inertia) <= 0.0:
-        raise ParameterError(f"{where}: sphere_radii, mass and inertia must be positive")
-    return Members(centres, radii, mass, inertia)
-
-
 def _pairs(table: dict[str, Any]) -> list[Pair]:
     pairs: list[Pair] = []
     for a, partners in table.items():
-        for b, entry in _as_table(partners, f"pair.{a}").items():
+        for b, entry in as_table(partners, f"pair.{a}").items():
             where = f"pair.{a}.{b}"
             known = declared(Pair, where)
             values = {}
-            for key, raw in _as_table(entry, where).items():
+            for key, raw in as_table(entry, where).items():
                 if f"{where}.{key}" not in known:
                     raise ParameterError(f"{where}.{key}: unknown key; allowed: static_friction, restitution")
                 values[key] = float(known[f"{where}.{key}"].check(raw))
@@ -190,29 +141,3 @@ def _pairs(table: dict[str, Any]) -> list[Pair]:
                 raise ParameterError(f"{where}: this pair stands twice")
             pairs.append(Pair(a, b, **values))
     return pairs
-
-
-def _table(table: dict[str, Any], key: str) -> dict[str, Any]:
-    if key not in table:
-        raise ParameterError(f"[{key}] is missing")
-    return _as_table(table[key], key)
-
-
-def _list(table: dict[str, Any], key: str) -> list[Any]:
-    value = table.get(key, [])
-    if not isinstance(value, list):
-        raise ParameterError(f"{key}: a list is needed, not {value!r}")
-    return value
-
-
-def _as_table(value: Any, where: str) -> dict[str, Any]:
-    if not isinstance(value, dict):
-        raise ParameterError(f"{where}: a table is needed, not {value!r}")
-    return value
-
-
-def _vector(value: Any, where: str) -> tuple[float, float, float]:
-    if not isinstance(value, (list, tuple)) or len(value) != 3:
-        raise ParameterError(f"{where}: three numbers are needed, not {value!r}")
-    x, y, z = (parse_quantity(part, "1", where) for part in value)
-    return x, y, z

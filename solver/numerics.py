@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 from solver.params import param
 
+ROLLING_SLOPE = 0.01
+"""A single body on the plate whose path is no steeper than this rolls, for ever; others tumble and come to rest."""
+
 
 @dataclass(frozen=True)
 class Numerics:
@@ -22,7 +25,7 @@ class Numerics:
     )
     rest_time: float = param(0.1, unit="s", low=0.01, high=5.0, doc="How long it has to stay that slow.")
     sleep_speed: float = param(
-        5e-4,
+        2e-3,  # as rest_speed: nothing in a pile at rest rolls on
         unit="m/s",
         low=0.0,
         high=0.1,

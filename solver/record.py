@@ -15,16 +15,22 @@ Ints = npt.NDArray[np.int32]
 
 
 class Outcome(StrEnum):
-    """How a run ended. Only ``AT_REST`` gives a valid pile."""
+    """How a run ended. Only ``AT_REST`` gives a valid pile, and ``MEASURED`` a valid run of a rig that keeps moving."""
 
     RUNNING = "running"
     AT_REST = "at_rest"
+    MEASURED = "measured"
     JAMMED = "jammed"
     TIME_LIMIT = "time_limit"
     LOST_BODY = "lost_body"
     NON_FINITE = "non_finite"
     OVERLAP_LIMIT = "overlap_limit"
     BUFFER_OVERFLOW = "buffer_overflow"
+
+    @property
+    def valid(self) -> bool:
+        """True if what is read off the run counts."""
+        return self in (Outcome.AT_REST, Outcome.MEASURED)
 
 
 class Phase(StrEnum):
@@ -33,6 +39,7 @@ class Phase(StrEnum):
     FILL = "fill"
     DISCHARGE = "discharge"
     PILE = "pile"
+    RUN = "run"
     AT_REST = "at rest"
 
 
@@ -45,6 +52,8 @@ class Bodies:
     component_names: tuple[str, ...]
     mass: Array
     """[kg], shape (n,)."""
+    scale: Array
+    """Linear size relative to the declared one, shape (n,)."""
     position: Array
     """Centres of mass [m], shape (n, 3)."""
     quaternion: Array
@@ -69,11 +78,11 @@ class Spheres:
 
 @dataclass(frozen=True)
 class Pile:
-    """Bodies that lie on the plate (centres below the outlet), the only input of the pile's observables.
+    """Bodies that lie on the plate (centres below the container), the only input of the pile's observables.
 
-    Single bodies that still roll outward, beyond the feed opening's radius, are strays and not among them.
+    Single bodies that still roll outward, beyond the container's radius, are strays and not among them.
 
-    ``axis`` is the funnel's axis (x, y) [m]; the plate is z = 0.
+    ``axis`` is the rig's axis (x, y) [m]; the plate is z = 0.
     """
 
     spheres: Spheres
@@ -95,13 +104,48 @@ class Trace:
     entered_mass: Array
     """[kg]."""
     discharged_mass: Array
-    """Mass below the outlet [kg], bodies taken out of the domain included."""
+    """Mass outside the container [kg], bodies taken out of the domain included."""
     kinetic_energy: Array
     """Translation and rotation [J]."""
     contacts: Ints
     """Number of touching pairs of member spheres or sphere and surface."""
     max_overlap: Array
     """Largest overlap since the last sample, as a fraction of the member sphere's radius."""
+    potential_energy: Array
+    """− m g·x of the bodies that are in the world [J]; 0 at the plate."""
+    elastic_energy: Array
+    """In the normal and tangential springs of the contacts [J]."""
+    dissipated_energy: Array
+    """What contacts, and bodies that fell asleep, have taken so far [J]."""
+    wall_work: Array
+    """Work of moving surfaces on the bodies so far [J]."""
+    taken_out_energy: Array
+    """Kinetic and potential energy that bodies had when they were taken out of the domain [J]."""
+    supplied_energy: Array
+    """Kinetic and potential energy of the bodies as they entered, and what changes of the stiffness put in [J]."""
+
+    @property
+    def energy_error(self) -> Array:
+        """By how much the account misses, as a fraction of the energy put in; NaN where none was.
+
+        (kinetic + potential + elastic + dissipated + taken out − supplied − wall work) / (supplied + |wall work|)
+        """
+        held = self.kinetic_energy + self.potential_energy + self.elastic_energy
+        missing = held + self.dissipated_energy + self.taken_out_energy - self.supplied_energy - self.wall_work
+        put_in = self.supplied_energy + np.abs(self.wall_work)
+        return np.divide(missing, put_in, out=np.full_like(put_in, np.nan), where=put_in > 0.0)
+
+
+@dataclass(frozen=True)
+class FreeSurface:
+    """The free surface of a moving bed at k moments, seen along +y: top of the bed over c columns of pixels."""
+
+    time: Array
+    """[s], shape (k,)."""
+    x: Array
+    """Middles of the columns [m], shape (c,)."""
+    height: Array
+    """Height above the rig's centre [m], shape (k, c); NaN over a column without bed."""
 
 
 @dataclass(frozen=True)
@@ -139,10 +183,12 @@ class Record:
     trace: Trace
     entries: Entries
     gate_opened: float
-    """Time [s] at which the gate opened; 0 for ``pour_through``."""
+    """Time [s] at which the rig began to act (the gate opened); 0 for ``pour_through``."""
     poured_mass: float
     """Mass that was to be poured, from the integer counts of bodies [kg]."""
     dt: float
     """Time step [s]."""
     steps: int
     wall_s: float
+    free_surface: FreeSurface | None = None
+    """Only of rigs that ask for it (``PourRig.watch``)."""

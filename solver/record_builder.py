@@ -7,7 +7,10 @@ import numpy.typing as npt
 
 from solver.insertion import Pose, rotation_matrix
 from solver.layout import Layout
-from solver.record import Bodies, Entries, Pile, Spheres, Trace
+from solver.numerics import ROLLING_SLOPE
+from solver.observables.free_surface import column_places
+from solver.record import Bodies, Entries, FreeSurface, Pile, Spheres, Trace
+from solver.rigs.rig import Container, Watch
 from solver.scene import Scene
 
 Array = npt.NDArray[np.float64]
@@ -20,6 +23,7 @@ def bodies_of(scene: Scene, order: npt.NDArray[np.int32], places: Layout, state:
         component=order[:n].copy(),
         component_names=tuple(body.name for body in scene.bodies),
         mass=places.numbers[:n, 0].copy(),
+        scale=places.scale[:n].copy(),
         position=state[:, 0:3].copy(),
         quaternion=state[:, 3:7].copy(),
         velocity=state[:, 7:10].copy(),
@@ -35,29 +39,33 @@ def member_spheres(scene: Scene, bodies: Bodies) -> Spheres:
         if len(chosen) == 0:
             continue
         clump = body.clump
+        scale = bodies.scale[chosen]
         turned = np.einsum("bij,mj->bmi", rotation_matrix(bodies.quaternion[chosen]), clump.centres)
-        centres.append((bodies.position[chosen, None, :] + turned).reshape(-1, 3))
-        radii.append(np.tile(clump.radii, len(chosen)))
+        centres.append((bodies.position[chosen, None, :] + scale[:, None, None] * turned).reshape(-1, 3))
+        radii.append((scale[:, None] * clump.radii).ravel())
         owners.append(np.repeat(chosen.astype(np.int32), len(clump.radii)))
     return Spheres(np.concatenate(centres), np.concatenate(radii), np.concatenate(owners))
 
 
-def rolling_away(scene: Scene, state: Array) -> npt.NDArray[np.bool_]:
-    """Bodies that still roll outward on the plate, alone and beyond the feed opening's radius.
+def rolling_away(scene: Scene, container: Container, state: Array) -> npt.NDArray[np.bool_]:
+    """Bodies that still roll outward on the plate, alone and beyond the container's radius.
 
-    The rule of ``kernels/batch.rolls_away``, for bodies that also move faster than ``numerics.rest_speed``.
+    The rule of ``kernels/summary.rolls_away``, for bodies that also move faster than ``numerics.rest_speed``.
     ``state``: rows of ``Batch.bodies``. Nothing brakes them, so where they are is a matter of when one looks.
     """
     x, v, touching = state[:, 0:3], state[:, 7:10], state[:, 14]
-    beyond = np.hypot(x[:, 0], x[:, 1]) > scene.rig.inlet_diameter / 2.0
+    beyond = np.hypot(x[:, 0], x[:, 1]) > container.radius
     outward = (x[:, :2] * v[:, :2]).sum(axis=1) > 0.0
-    moving = np.linalg.norm(v, axis=1) > scene.numerics.rest_speed
-    return beyond & outward & moving & (touching == 0)
+    speed = np.linalg.norm(v, axis=1)
+    level = np.abs(v[:, 2]) < ROLLING_SLOPE * speed
+    return beyond & outward & level & (speed > scene.numerics.rest_speed) & (touching == 0)
 
 
-def pile_of(scene: Scene, bodies: Bodies, spheres: Spheres, rolling: npt.NDArray[np.bool_] | None = None) -> Pile:
-    """The bodies that lie below the outlet, inside the domain and do not roll away, renumbered from 0."""
-    lying = bodies.inside & (bodies.position[:, 2] < scene.rig.outlet_height)
+def pile_of(
+    container: Container, bodies: Bodies, spheres: Spheres, rolling: npt.NDArray[np.bool_] | None = None
+) -> Pile:
+    """The bodies that lie below the container, inside the domain and do not roll away, renumbered from 0."""
+    lying = bodies.inside & (bodies.position[:, 2] < container.height)
     chosen = np.flatnonzero(lying if rolling is None else lying & ~rolling)
     number = np.full(len(bodies.mass), -1, dtype=np.int32)
     number[chosen] = np.arange(len(chosen), dtype=np.int32)
@@ -68,6 +76,17 @@ def pile_of(scene: Scene, bodies: Bodies, spheres: Spheres, rolling: npt.NDArray
         mass=bodies.mass[chosen],
         component=bodies.component[chosen],
         component_names=bodies.component_names,
+    )
+
+
+def free_surface_of(watch: Watch | None, kept: list[tuple[float, Array]]) -> FreeSurface | None:
+    """The free surface at the moments ``kept`` (time, heights); None where none was kept."""
+    if watch is None or not kept:
+        return None
+    return FreeSurface(
+        time=np.array([time for time, _ in kept]),
+        x=column_places(watch.half_width),
+        height=np.array([height for _, height in kept]),
     )
 
 
@@ -84,6 +103,12 @@ def trace_of(samples: list[dict[str, float]]) -> Trace:
         kinetic_energy=column("kinetic"),
         contacts=column("touching").astype(np.int32),
         max_overlap=column("overlap"),
+        potential_energy=column("potential"),
+        elastic_energy=column("elastic"),
+        dissipated_energy=column("dissipated"),
+        wall_work=column("wall_work"),
+        taken_out_energy=column("taken_out"),
+        supplied_energy=column("supplied"),
     )
 
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 import os
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from solver import backend
-from solver.body import counts
+from solver.checkpoint import Checkpoint, resumed
 from solver.pour import Pour
 from solver.record import Record
-from solver.scene import Scene
+from solver.scene import Scene, body_counts
 from solver.state import Capacity
 from solver.wall_tables import wall_tables
 from solver.world import Batch, wall_materials
@@ -34,13 +34,21 @@ class Job:
     seed: int
     tag: int = 0
     """A number of the caller's own, handed back with the record."""
+    interrupted: Checkpoint | None = None
+    """Go on from here instead of beginning."""
+
+    def begin(self, batch: Batch, w: int) -> Pour:
+        """The pour in world ``w``, ready to be driven."""
+        if self.interrupted is not None:
+            return resumed(batch, w, self.scene, self.interrupted)
+        return Pour(batch, w, self.scene, self.seed)
 
 
 def capacity_for(scenes: Sequence[Scene], worlds: int) -> Capacity:
     """Sizes that hold any of ``scenes``, rounded up so that a small change of the mixture fits as well."""
     bodies = members = kinds = 0
     for scene in scenes:
-        numbers = counts(scene.bodies, scene.rig.mass)
+        numbers = body_counts(scene)
         bodies = max(bodies, sum(numbers))
         members = max(members, sum(n * len(b.clump.radii) for n, b in zip(numbers, scene.bodies, strict=True)))
         kinds = max(kinds, len(scene.bodies) + len(wall_materials(scene)))
@@ -84,7 +92,7 @@ def run_queue(
         for w in places:
             if w not in running and queue:
                 job = queue.popleft()
-                running[w] = (job, Pour(batch, w, job.scene, job.seed))
+                running[w] = (job, job.begin(batch, w))
         if not running:
             return
         for w in range(slots):
@@ -107,7 +115,7 @@ def run_pours(
     """Run ``jobs`` and yield (index of the job, record) as each finishes (see :func:`run_queue`)."""
     if not jobs:
         return
-    tagged = deque(Job(job.scene, job.seed, tag=k) for k, job in enumerate(jobs))
+    tagged = deque(replace(job, tag=k) for k, job in enumerate(jobs))
     slots = min(len(jobs), worlds or WORLDS_PER_THREAD * (threads or os.cpu_count() or 1))
 
     def sample(job: Job, pour: Pour) -> None:

@@ -5,22 +5,25 @@ Parameter paths (the same grammar in ``--set``, study files, sliders and the sto
     material.<material>.density | shear_modulus | poisson_ratio
     pair.<a>.<b>.static_friction | restitution          (order of a and b is free)
     body.<body>.mass_fraction | thickness | …           (dimensions of the solid)
-    body.spheres                                         (coarse, standard, fine: for all bodies)
+    body.<body>.size_distribution | size_spread          (of the linear size about the declared one)
+    body.spheres                                         (coarse, standard, fine or a number: for all bodies)
     rig.<name>   insertion.<name>   numerics.<name>
+
+Which rig it is (``rig.name`` in files and ``--set``) is no parameter: another rig has others (:func:`with_rig`).
 """
 
 from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
-from solver.body import RESOLUTION, Body, body_parameters, with_body_value, with_densities
+from solver.body import SPHERES, Body, body_parameters, counts, with_body_value, with_densities
 from solver.insertion import Insertion
 from solver.material import Material, Pair
 from solver.numerics import Numerics
 from solver.params import Parameter, ParameterError, declared
-from solver.rigs import Funnel
+from solver.rigs import BENCH_RIGS, RIGS, Funnel, PourRig, Rig
 
 
 @dataclass(frozen=True)
@@ -31,7 +34,7 @@ class Scene:
     materials: tuple[Material, ...]
     bodies: tuple[Body, ...]
     pairs: tuple[Pair, ...]
-    rig: Funnel = Funnel()
+    rig: Rig = Funnel()
     insertion: Insertion = Insertion()
     numerics: Numerics = Numerics()
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
@@ -64,6 +67,40 @@ class Scene:
         return self.pair(names[0][0], names[1][0])
 
 
+def pour_rig(scene: Scene) -> PourRig:
+    """The rig of ``scene``, if bodies are poured into it; :class:`ParameterError` for a bench test."""
+    if scene.rig.name in BENCH_RIGS:
+        raise ParameterError(f"rig.name: {scene.rig.name!r} is a bench test; a pour needs one of {', '.join(RIGS)}")
+    return cast(PourRig, scene.rig)
+
+
+def poured_mass(scene: Scene) -> float:
+    """Mass that is poured [kg]; the solid density of the mixture is 1 / Σ (mass fraction / density)."""
+    specific_volume = sum(body.mass_fraction / body.density for body in scene.bodies)
+    return pour_rig(scene).poured_mass(1.0 / specific_volume)
+
+
+def body_counts(scene: Scene) -> tuple[int, ...]:
+    """Number of bodies of each component that are poured."""
+    return counts(scene.bodies, poured_mass(scene))
+
+
+def with_rig(scene: Scene, name: str) -> Scene:
+    """``scene`` in the rig ``name``: default dimensions, the wall as before, and the settings that suit the rig.
+
+    The result is not checked as a whole: dimensions may have to be set before the bodies fit in.
+    """
+    known: dict[str, Any] = {**RIGS, **BENCH_RIGS}
+    if name not in known:
+        raise ParameterError(f"rig.name: {name!r} is not one of {', '.join(known)}")
+    own = {"body": scene.bodies[0].name} if name in BENCH_RIGS else {}
+    rig: Rig = known[name](wall=scene.rig.wall, **own)
+    scene = dataclasses.replace(scene, rig=rig, insertion=Insertion())
+    for path, value in rig.suits.items():
+        scene = _with_value(scene, path.split("."), value)
+    return scene
+
+
 def parameters(scene: Scene) -> dict[str, Parameter]:
     """Every parameter of ``scene``: path → :class:`Parameter`."""
     found: dict[str, Parameter] = {}
@@ -71,11 +108,15 @@ def parameters(scene: Scene) -> dict[str, Parameter]:
         found |= declared(material, f"material.{material.name}")
     for pair in scene.pairs:
         found |= declared(pair, f"pair.{pair.a}.{pair.b}")
-    found["body.spheres"] = RESOLUTION
+    found["body.spheres"] = SPHERES
     for body in scene.bodies:
         found |= body_parameters(body)
     found |= declared(scene.rig, "rig")
-    found |= declared(scene.insertion, "insertion")
+    if scene.rig.name in RIGS:
+        found |= declared(scene.insertion, "insertion")
+    else:
+        names = tuple(body.name for body in scene.bodies)
+        found["rig.body"] = Parameter("rig.body", "1", 0, 0, "The component that is measured.", choices=names)
     found |= declared(scene.numerics, "numerics")
     return found
 
@@ -128,8 +169,19 @@ def check(scene: Scene) -> None:
         for other in scene.bodies:
             scene.contact_pair(body, other)
     scene.material(scene.rig.wall)
-    scene.rig.check(widest_body=max(sorted(body.extents)[1] for body in scene.bodies))
-    scene.insertion.check(scene.rig.inlet_diameter, longest_body=max(max(body.extents) for body in scene.bodies))
+    scene.rig.check(widest_body=max(sorted(body.largest_extents)[1] for body in scene.bodies))
+    if scene.rig.name in RIGS:
+        rig = pour_rig(scene)
+        if scene.insertion.protocol not in rig.protocols:
+            allowed = ", ".join(rig.protocols)
+            raise ParameterError(f"insertion.protocol: {scene.insertion.protocol!r} is not {allowed} in a {rig.name}")
+        longest = max(max(body.largest_extents) for body in scene.bodies)
+        if rig.running_time is not None and rig.running_time >= scene.numerics.max_time:
+            raise ParameterError(
+                f"numerics.max_time: {scene.numerics.max_time:g} s end before the {rig.name} has run for its "
+                f"{rig.running_time:g} s; turn faster, or fewer times"
+            )
+        rig.feed().check(scene.insertion.region_radius, longest)
 
 
 def _body(scene: Scene, name: str) -> Body:

@@ -17,6 +17,8 @@ import numpy as np
 import numpy.typing as npt
 import trimesh
 
+from solver.mesh_file import LENGTH_UNITS, SUFFIXES, MeshFileError, read_solid_mesh
+
 Kind = Literal["ellipsoid", "cylinder", "box", "sphere", "mesh"]
 Array = npt.NDArray[np.float64]
 
@@ -27,10 +29,9 @@ DIMENSION_NAMES: dict[str, tuple[str, ...]] = {
     "sphere": ("diameter",),
     "mesh": (),
 }
-MESH_SUFFIXES = (".stl", ".obj", ".ply")
 ALLOWED = (
     "{ ellipsoid = [a, b, c] }, { cylinder = [diameter, length] }, { box = [x, y, z] }, "
-    '{ sphere = diameter } or { mesh = "file.stl" }, in metres'
+    '{ sphere = diameter } in metres, or { mesh = "file.stl", unit = "mm" }'
 )
 
 
@@ -46,26 +47,30 @@ class Solid:
         kind: which form.
         dimensions: full lengths [m]. Ellipsoid: three axes; cylinder: (diameter, length); box: three edges;
             sphere: (diameter,); mesh: empty.
-        file: path of an STL, OBJ or PLY file with coordinates in metres; only for a mesh.
+        file: path of an STL, OBJ, PLY or GLB file; only for a mesh.
+        unit: unit of the coordinates in the file.
 
     The order of axes or edges does not matter: the frame puts the longest along x and the shortest along z.
     A cylinder at least as long as wide has its axis along x, a disc has it along z.
 
     Raises:
         ShapeError: unknown kind, wrong number of dimensions, a dimension that is not positive and finite, or
-            a mesh without a file of a known type.
+            a mesh without a file of a known type and a unit of length.
     """
 
     kind: Kind
     dimensions: tuple[float, ...] = ()
     file: str = ""
+    unit: str = "m"
 
     def __post_init__(self) -> None:
         if self.kind not in get_args(Kind):
             raise ShapeError(f"unknown solid {self.kind!r}; allowed: {ALLOWED}")
         if self.kind == "mesh":
-            if Path(self.file).suffix.lower() not in MESH_SUFFIXES:
-                raise ShapeError(f"mesh = {self.file!r}: allowed are files ending in {', '.join(MESH_SUFFIXES)}")
+            if Path(self.file).suffix.lower() not in SUFFIXES:
+                raise ShapeError(f"mesh = {self.file!r}: allowed are files ending in {', '.join(SUFFIXES)}")
+            if self.unit not in LENGTH_UNITS:
+                raise ShapeError(f"unit = {self.unit!r}: allowed are {', '.join(LENGTH_UNITS)}")
         elif self.file:
             raise ShapeError(f"{self.kind} takes no file, got {self.file!r}")
         names = DIMENSION_NAMES[self.kind]
@@ -85,7 +90,7 @@ class Solid:
         """The solid that a TOML table declares, e.g. `{ ellipsoid = [27.92e-3, 11.18e-3, 6.11e-3] }` [m].
 
         Args:
-            table: exactly one key: ellipsoid, cylinder, box, sphere or mesh.
+            table: exactly one key: ellipsoid, cylinder, box, sphere or mesh; beside mesh perhaps unit.
             where: file and key of the table, for messages.
             folder: a relative mesh file is looked for here (default: the working directory). The mesh is read
                 at once, so that a bad file is refused together with the rest of the declaration.
@@ -101,7 +106,7 @@ class Solid:
     def to_toml(self) -> dict[str, Any]:
         """The table that `from_toml` reads back as this solid. Dimensions in metres."""
         if self.kind == "mesh":
-            return {"mesh": self.file}
+            return {"mesh": self.file} if self.unit == "m" else {"mesh": self.file, "unit": self.unit}
         if self.kind == "sphere":
             return {"sphere": self.dimensions[0]}
         return {self.kind: list(self.dimensions)}
@@ -192,7 +197,7 @@ def surface_mesh(solid: Solid, refinement: int = 2) -> trimesh.Trimesh:
         A copy of the caller's own.
 
     Raises:
-        ShapeError: a mesh file that is missing, unreadable, not watertight or without positive volume.
+        ShapeError: a mesh file that `solver.mesh_file` refuses.
     """
     stamp = file_stamp(solid)
     return _surface_mesh(solid, refinement, stamp).copy()
@@ -218,15 +223,15 @@ def _is_length(value: object) -> bool:
 
 
 def _solid_from_table(table: Mapping[str, Any], folder: Path | None) -> Solid:
-    if not isinstance(table, Mapping) or len(table) != 1:
+    if not isinstance(table, Mapping) or len(table) - ("mesh" in table and "unit" in table) != 1:
         raise ShapeError(f"{table!r}: exactly one of {ALLOWED}")
-    [(key, value)] = table.items()
+    key, value = next(item for item in table.items() if item[0] != "unit" or len(table) == 1)
     if key not in get_args(Kind):
         raise ShapeError(f"unknown key {key!r}; allowed: {ALLOWED}")
     if key == "mesh":
         if not isinstance(value, str):
             raise ShapeError(f"mesh = {value!r}: the name of a file is expected")
-        solid = Solid("mesh", file=str((folder or Path()) / value))
+        solid = Solid("mesh", file=str((folder or Path()) / value), unit=str(table.get("unit", "m")))
         surface_mesh(solid)
         return solid
     if key == "sphere":
@@ -239,7 +244,7 @@ def _solid_from_table(table: Mapping[str, Any], folder: Path | None) -> Solid:
 @lru_cache(maxsize=64)
 def _surface_mesh(solid: Solid, refinement: int, stamp: int) -> trimesh.Trimesh:
     if solid.kind == "mesh":
-        return _in_principal_frame(_read_mesh(solid.file))
+        return _in_principal_frame(_read_mesh(solid))
     extents = principal_extents(solid)
     if solid.kind == "box":
         return trimesh.creation.box(extents)
@@ -255,19 +260,11 @@ def _surface_mesh(solid: Solid, refinement: int, stamp: int) -> trimesh.Trimesh:
     return mesh
 
 
-def _read_mesh(file: str) -> trimesh.Trimesh:
+def _read_mesh(solid: Solid) -> trimesh.Trimesh:
     try:
-        mesh = trimesh.load_mesh(file)
-    except Exception as error:  # the readers of a damaged file raise anything from KeyError to struct.error
-        raise ShapeError(f"mesh = {file!r}: cannot be read ({' '.join(str(error).split())[:120]})") from None
-    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0 or not np.isfinite(mesh.vertices).all():
-        raise ShapeError(f"mesh = {file!r}: holds no faces, or coordinates that are not finite")
-    mesh.merge_vertices()
-    if not (mesh.is_watertight and mesh.is_winding_consistent):
-        raise ShapeError(f"mesh = {file!r}: is not watertight: the surface must be closed, with consistent normals")
-    if not mesh.volume > 0.0:
-        raise ShapeError(f"mesh = {file!r}: volume {mesh.volume:.3g} m3 is not positive; normals must point outwards")
-    return mesh
+        return read_solid_mesh(solid.file, solid.unit)
+    except MeshFileError as error:
+        raise ShapeError(f"mesh = {solid.file!r}: {error}") from None
 
 
 def _in_principal_frame(mesh: trimesh.Trimesh) -> trimesh.Trimesh:

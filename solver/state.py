@@ -92,7 +92,7 @@ MEMBER = {
 }
 """Per member sphere, shape (worlds, members)."""
 
-HISTORY = {"i": ti.i32, "j": ti.i32, "spring": Vec3, "loss": Vec3, "radius": ti.f64}
+HISTORY = {"i": ti.i32, "j": ti.i32, "spring": Vec3, "loss": Vec3, "radius": ti.f64, "expected": ti.f64}
 """What a contact keeps when the list is built again, shape (worlds, contacts)."""
 
 CONTACT = {
@@ -106,6 +106,7 @@ CONTACT = {
     "spring": Vec3,  # tangential elastic force on i [N]
     "loss": Vec3,  # the part of the force at the last step that takes energy, on j [N]
     "radius": ti.f64,  # contact radius a = sqrt(R* δ) at the last step [m]; 0: apart
+    "expected": ti.f64,  # speed along the normal [m/s] after the last step if this contact alone had acted
     "first": ti.i32,  # first of the triangles that may touch, for a patch of a mesh
     "triangles": ti.i32,  # and how many
     "live": ti.i32,  # list of the entries that have a body awake or a moving wall, ascending; then the others

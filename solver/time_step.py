@@ -6,13 +6,15 @@ Two limits, the smaller one rules:
     body        dt = 0.35 √(m_eff / k),  k = 2 E* √(R δ) at the overlap that a 2 m/s impact makes, with the mass that a
                 body shows at its far end, 1/m_eff = 1/m + reach²/I (a rod's tip is lighter than the rod)
 
-f is ``numerics.rayleigh_fraction``.
+f is ``numerics.rayleigh_fraction``. Both limits are proportional to the size of a body, so the smallest that its
+distribution of sizes allows is taken, whatever the seed draws.
 """
 
 from __future__ import annotations
 
 import math
 
+from solver.clump import scaled
 from solver.material import Material, effective_youngs_modulus
 from solver.scene import Scene
 
@@ -32,7 +34,7 @@ def time_step(scene: Scene) -> float:
     wall = scene.material(scene.rig.wall)
     steps = []
     for body in scene.bodies:
-        clump, material = body.clump, scene.material(body.material)
+        clump, material = scaled(body.clump, body.sizes.low), scene.material(body.material)
         smallest = float(clump.radii.min())
         steps.append(scene.numerics.rayleigh_fraction * rayleigh_time(smallest, material))
         e_star = max(effective_youngs_modulus(material, other) for other in (*scene.materials, wall))

@@ -11,6 +11,7 @@ from solver.kernels import exchange
 from solver.kernels.batch import advance, measure, take_out
 from solver.laws.hertz_mindlin import constants
 from solver.layout import Layout
+from solver.rigs.rig import Container
 from solver.scene import Scene
 from solver.snapshot import Arrays
 from solver.state import Capacity, State, state
@@ -77,7 +78,8 @@ class Batch:
         cell = 2.0 * float(bodies.numbers[:, 4].max()) + numerics.skin
         sleep_speed = numerics.sleep_speed if any(scene.gravity) else 0.0
         settings = [dt, numerics.skin, cell, sleep_speed, numerics.sleep_time]
-        settings += [rig.domain_half_width, rig.outlet_height, rig.inlet_diameter / 2, *scene.gravity]
+        inside = rig.container(0.0)
+        settings += [rig.domain_half_width, inside.height, inside.radius, *scene.gravity]
         exchange.load_world(s, w, np.array(settings))
         exchange.load_bodies(s, w, bodies.numbers, bodies.places, bodies.spheres, bodies.owner)
         self._load_walls(w, scene, wall_tables(rig.surfaces()), active)
@@ -126,6 +128,10 @@ class Batch:
         rig = self._scenes[w].rig
         reach = extent(rig.surfaces()[wall], angular_velocity, rig.domain_half_width)
         exchange.set_motion(self._s, w, wall, np.array([*velocity, *angular_velocity, reach], dtype=float))
+
+    def set_container(self, w: int, inside: Container) -> None:
+        """What counts as inside the rig from now on (a cylinder that is lifted takes its inside along)."""
+        exchange.set_container(self._s, w, inside.height, inside.radius)
 
     def advance(self, steps: Ints) -> Array:
         """Run world w for ``steps[w]`` steps; returns :meth:`summary`."""

@@ -21,11 +21,18 @@ def serve(
 ) -> None:
     """Open the page: watch a pour, turn its parameters, calibrate."""
     from explorer.errors import CommandError
-    from explorer.scene_file import DEFAULT_STUDY, load_scene, study_path, study_scene, with_settings
+    from explorer.scene_file import (
+        DEFAULT_MATERIAL,
+        DEFAULT_STUDY,
+        material_scene,
+        study_path,
+        study_scene,
+        with_settings,
+    )
     from explorer.viewer.app import serve as serve_page
 
     if study and material:
         raise CommandError(f"--material {material}: the study {study} has a material of its own; name one of the two")
     file = None if material else study_path(study or DEFAULT_STUDY)
-    scene = with_settings(study_scene(file) if file else load_scene("funnel", material), set_)
+    scene = with_settings(study_scene(file) if file else material_scene(material or DEFAULT_MATERIAL), set_)
     serve_page(scene, host=host, port=port, seed=seed, study_file=file, store=store, record_path=record)

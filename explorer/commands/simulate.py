@@ -9,12 +9,17 @@ import typer
 
 if TYPE_CHECKING:
     from solver import Record
+    from solver.pour import Pour
+
+CHECKPOINT_INTERVAL = 0.5
+"""Simulated time [s] between two checkpoints."""
 
 
 def simulate(
     source: str = typer.Argument(
         metavar="RIG_OR_FILE",
-        help="A rig (funnel), or a material, set-up or study, by file or shipped name.",
+        help="A rig or bench test (funnel, lifting_cylinder, draw_down_box, rotating_drum, inclined_plane, "
+        "drop_plate_45, compression), or a material, set-up or study, by file or shipped name.",
     ),
     material: str | None = typer.Option(None, help="Material in the rig: file or shipped name."),
     set_: list[str] = typer.Option([], "--set", metavar="PATH=VALUE", help="Set a parameter; may be repeated."),
@@ -25,24 +30,53 @@ def simulate(
     record: Path | None = typer.Option(
         None, metavar="FILE.rrd", help="New recording; FILE_<seed>.rrd for several pours."
     ),
+    checkpoint: Path | None = typer.Option(
+        None, metavar="FILE.npz", help="Keep the state of the pour in this file, twice per simulated second."
+    ),
+    resume: Path | None = typer.Option(None, metavar="FILE.npz", help="Go on from this checkpoint of the same scene."),
     json: bool = typer.Option(False, "--json", help="Print the result as JSON, and nothing else."),
 ) -> None:
-    """Pour a scene and print what came out.
+    """Pour a scene and print what came out, or run a bench test and print what it measured beside what was put in.
 
     A jam, a lost body or a cut-off is an outcome, not an error: the result names it, and the exit code is 0.
     """
     from contextlib import ExitStack
     from time import perf_counter
 
+    from explorer.bench_report import bench_data, bench_text, write_bench
+    from explorer.checkpoint_writer import CheckpointWriter
+    from explorer.errors import CommandError
     from explorer.run_folder import appearing, json_text, write_run
     from explorer.run_result import result_of
     from explorer.run_table import RunTable
     from explorer.scene_file import load_scene, with_settings
     from solver import Job, run_pours
+    from solver.bench_tests import run_bench_test
+    from solver.checkpoint import read_checkpoint
+    from solver.rigs import BENCH_RIGS
 
+    if replicates > 1 and (checkpoint or resume):
+        raise CommandError("--checkpoint and --resume are for one pour, not for --replicates")
+    interrupted = read_checkpoint(resume) if resume else None
+    if interrupted:
+        seed = interrupted.seed
+    if checkpoint and not checkpoint.absolute().parent.is_dir():
+        raise CommandError(f"--checkpoint: {checkpoint}: no folder {checkpoint.absolute().parent}")
     if record:
         from explorer.logs.pour_recorder import recorder_of
     scene = with_settings(load_scene(source, material), set_)
+    if scene.rig.name in BENCH_RIGS:
+        if record or checkpoint or resume or replicates > 1:
+            raise CommandError(
+                f"{scene.rig.name} is a bench test: --record, --checkpoint, --resume and --replicates are for pours"
+            )
+        with ExitStack() as stack:
+            folder = stack.enter_context(appearing(out)) if out else None
+            data = bench_data(scene, run_bench_test(scene, seed))
+            if folder:
+                write_bench(folder, data)
+        typer.echo(json_text(data) if json else bench_text(data))
+        return
     seeds = range(seed, seed + replicates)
     started = perf_counter()
     with ExitStack() as stack:
@@ -50,8 +84,15 @@ def simulate(
         recorder = stack.enter_context(recorder_of(record, seeds)) if record else None
         table = None if json else RunTable(typer.echo)
         records: dict[int, Record] = {}
+        kept = CheckpointWriter(checkpoint, CHECKPOINT_INTERVAL) if checkpoint else None
+
+        def sample(k: int, pour: Pour) -> None:
+            for listener in (recorder, kept):
+                if listener:
+                    listener.sample(k, pour)
+
         for k, finished in run_pours(
-            [Job(scene, s) for s in seeds], threads=threads, on_sample=recorder.sample if recorder else None
+            [Job(scene, s, interrupted=interrupted) for s in seeds], threads=threads, on_sample=sample
         ):
             records[k] = finished
             if recorder:

@@ -19,7 +19,7 @@ from explorer.errors import CommandError
 from explorer.export.triangles import revolved_triangles
 from solver import Body, Entries, Record, Scene
 from solver.rigs import Funnel, Plane, Revolved
-from solver.rigs.funnel import GATE, SURFACE_NAMES
+from solver.scene import pour_rig
 
 Array = npt.NDArray[np.float64]
 FILE = "deck.json"
@@ -103,6 +103,12 @@ def deck_of(record: Record, time: float | None = None) -> Deck:
     scene = record.scene
     if not isinstance(scene.rig, Funnel):
         raise CommandError(f"rig {getattr(scene.rig, 'name', '?')!r} cannot be exported; allowed: funnel")
+    for body in scene.bodies:
+        if body.sizes.varies:
+            raise CommandError(
+                f"body.{body.name}.size_distribution: {body.sizes.kind!r} cannot be exported, a deck has one clump per "
+                "component; allowed: none"
+            )
     steps = record.steps if time is None else math.ceil(time / record.dt)
     return assembled(
         scene,
@@ -213,14 +219,14 @@ def _meshes(scene: Scene, record: Record) -> tuple[Mesh, ...]:
     gated = scene.insertion.protocol == "fill_then_open"
     opening = round(record.gate_opened / record.dt) if record.gate_opened > 0.0 else -1
     meshes = []
-    for k, (name, surface) in enumerate(zip(SURFACE_NAMES, scene.rig.surfaces(), strict=True)):
-        if not isinstance(surface, Revolved) or (k == GATE and not gated):
+    for name, surface in zip(scene.rig.surface_names, scene.rig.surfaces(), strict=True):
+        if not isinstance(surface, Revolved) or (name == "gate" and not gated):
             continue
-        meshes.append(Mesh(name, revolved_triangles(surface), opening if k == GATE else -1))
+        meshes.append(Mesh(name, revolved_triangles(surface), opening if name == "gate" else -1))
     return tuple(meshes)
 
 
 def _box(scene: Scene) -> Array:
     half, longest = scene.rig.domain_half_width, max(max(body.extents) for body in scene.bodies)
-    top = scene.rig.inlet_height + scene.insertion.region_height + longest
+    top = pour_rig(scene).feed().floor + scene.insertion.region_height + longest
     return np.array([[-half, -half, -0.01], [half, half, top]])

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,10 @@ from solver.record import Bodies
 MAX_BODIES = 8192
 """Bodies for which there is room in a frame."""
 
+MAX_SURFACES = 64
+"""Surfaces of a rig for which there is room in a frame."""
+NO_SURFACES: npt.NDArray[np.float64] = np.zeros((0, 7))
+
 SLOT = np.dtype(
     [
         ("generation", np.int64),
@@ -30,10 +34,13 @@ SLOT = np.dtype(
         ("quaternion", np.float32, (MAX_BODIES, 4)),
         ("component", np.int32, (MAX_BODIES,)),
         ("inside", np.bool_, (MAX_BODIES,)),
+        ("scale", np.float32, (MAX_BODIES,)),
+        ("surfaces", np.int64),
+        ("pose", np.float64, (MAX_SURFACES, 7)),
     ],
     align=True,
 )
-"""One frame in memory; the first ``bodies`` rows of the arrays are filled."""
+"""One frame in memory; the first ``bodies`` rows of the arrays, and the first ``surfaces`` poses, are filled."""
 
 BUFFER = np.dtype([("counter", np.int64), ("slots", SLOT, (2,))], align=True)
 """The shared block. ``counter`` is the number of frames published so far; frame k lies in slot k mod 2."""
@@ -59,6 +66,10 @@ class Frame:
     """Index into ``scene.bodies``, shape (n,)."""
     inside: npt.NDArray[np.bool_]
     """False for bodies that rolled out of the domain, shape (n,)."""
+    scale: npt.NDArray[np.float32]
+    """Linear size relative to the declared one, shape (n,)."""
+    surfaces: npt.NDArray[np.float64] = field(default_factory=lambda: NO_SURFACES)
+    """Poses of the rig's surfaces: origin [m] and orientation wxyz, shape (k, 7)."""
 
 
 def shared_block(context: Any) -> Any:
@@ -72,8 +83,10 @@ class FrameWriter:
     def __init__(self, block: Any) -> None:
         self._buffer = np.frombuffer(block, dtype=BUFFER)[0:1]
 
-    def publish(self, bodies: Bodies, generation: int, time: float) -> None:
-        """Write a frame; ``bodies`` must not be more than ``MAX_BODIES``."""
+    def publish(
+        self, bodies: Bodies, generation: int, time: float, surfaces: npt.NDArray[np.float64] = NO_SURFACES
+    ) -> None:
+        """Write a frame; there must not be more than ``MAX_BODIES`` bodies and ``MAX_SURFACES`` poses (k, 7)."""
         n = len(bodies.mass)
         following = int(self._buffer["counter"][0]) + 1
         slot = self._buffer["slots"][0, following % 2 : following % 2 + 1]
@@ -82,6 +95,8 @@ class FrameWriter:
         slot["quaternion"][0, :n] = bodies.quaternion
         slot["component"][0, :n] = bodies.component
         slot["inside"][0, :n] = bodies.inside
+        slot["scale"][0, :n] = bodies.scale
+        slot["surfaces"], slot["pose"][0, : len(surfaces)] = len(surfaces), surfaces
         self._buffer["counter"] = following
 
 
@@ -122,4 +137,6 @@ def _copy(slot: Any, number: int) -> Frame:
         quaternion=slot["quaternion"][:n].copy(),
         component=slot["component"][:n].copy(),
         inside=slot["inside"][:n].copy(),
+        scale=slot["scale"][:n].copy(),
+        surfaces=slot["pose"][: int(slot["surfaces"])].copy(),
     )

@@ -180,7 +180,7 @@ class LivePour:
     def _publish(self) -> None:
         # The last finite frame stays on the screen when the state is no longer finite.
         if self._pour.outcome != Outcome.NON_FINITE:
-            self._frames.publish(self._pour.bodies(), self._generation, self._pour.time)
+            self._frames.publish(self._pour.bodies(), self._generation, self._pour.time, self._pour.surface_poses())
         self._published = clock.perf_counter()
 
     def _observe(self) -> None:

@@ -1,7 +1,7 @@
 """One recording: a pour as moving bodies, curves, events and parameters in a ``.rrd`` file.
 
     world/bodies/<component>    the mesh once, then one pose per body that is in the domain, per frame
-    world/plate, world/cone     the rig; world/gate while the gate is shut
+    world/plate, world/cone …   the rig, and where its surfaces are when they move; world/gate while it is shut
     curves/<plot>/<name>        scalars, the unit in the name
     log                         events
     parameters, outcome         Markdown
@@ -24,7 +24,15 @@ import rerun as rr
 from explorer.logs.blueprint import CURVES, TIMELINE, blueprint, curve_entity
 from explorer.logs.documents import outcome_document, parameters_document
 from explorer.new_file import check_new_file
-from explorer.scene_meshes import GATE_NAME, Triangles, body_triangles, rig_triangles
+from explorer.scene_meshes import (
+    GATE_NAME,
+    PLATE_NAME,
+    Triangles,
+    body_triangles,
+    rig_poses,
+    rig_triangles,
+    scene_height,
+)
 from explorer.viewer.palette import BODY_COLOURS, GLASS, PLATE
 from solver import Scene
 from solver.observables import Value
@@ -33,7 +41,9 @@ APPLICATION = "repose-explorer"
 FLUSH_INTERVAL = 1.0
 """Wall time [s] after which what was logged is written out: a killed program loses no more than this."""
 PLATE_COLOUR, CONE_COLOUR = (*PLATE, 255), (*GLASS, 70)
-"""RGBA, 0 … 255; the colours of the page, the cone as if of glass."""
+"""RGBA, 0 … 255; the colours of the page, all but the plate as if of glass."""
+IN_PLACE = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+"""Pose of a surface that nobody has placed."""
 
 
 class Poses(Protocol):
@@ -55,6 +65,10 @@ class Poses(Protocol):
     def inside(self) -> npt.NDArray[np.bool_]:
         """False for bodies that were taken out of the domain, shape (n,)."""
 
+    @property
+    def scale(self) -> npt.NDArray[np.floating]:
+        """Linear size relative to the declared one, shape (n,)."""
+
 
 class PourLog:
     """Writes one pour into a new file ``path``. Use as a context manager, or end with :meth:`close`.
@@ -69,9 +83,11 @@ class PourLog:
         self._scene = scene
         self._shown: set[int] = set()
         self._gate_shown = False
+        self._poses = rig_poses(scene.rig)
+        self._placed = np.tile(IN_PLACE, (len(self._poses), 1))
         self._stream = rr.RecordingStream(APPLICATION)
         self._stream.set_sinks(rr.FileSink(str(path)))
-        self._stream.send_blueprint(blueprint(eye_distance=3.0 * scene.rig.inlet_height))
+        self._stream.send_blueprint(blueprint(eye_distance=2.3 * scene_height(scene)))
         self._static(seed)
         self.flush()
 
@@ -83,12 +99,17 @@ class PourLog:
         *,
         step: int | None = None,
         gate_shut: bool = False,
+        surfaces: npt.NDArray[np.float64] | None = None,
     ) -> None:
-        """Log the state at ``time`` [s]; ``curves`` by the names of ``CURVES``, leaving out NaN."""
+        """Log the state at ``time`` [s]; ``curves`` by the names of ``CURVES``, leaving out NaN.
+
+        ``surfaces``: poses of the rig's surfaces, as in ``rig_poses``; None: as they were.
+        """
         self._at(time, step)
         for k in range(len(self._scene.bodies)):
             self._component(k, poses)
         self._gate(gate_shut)
+        self._surfaces(self._poses if surfaces is None or not len(surfaces) else surfaces)
         for curve in CURVES:
             number = curves.get(curve.name, np.nan)
             if np.isfinite(number):
@@ -134,7 +155,7 @@ class PourLog:
         self._rig = rig_triangles(self._scene.rig)
         for name, triangles in self._rig.items():
             if name != GATE_NAME:
-                colour = PLATE_COLOUR if name == "plate" else CONE_COLOUR
+                colour = PLATE_COLOUR if name == PLATE_NAME else CONE_COLOUR
                 self._stream.log(f"world/{name}", _mesh(triangles, colour), static=True)
 
     def _at(self, time: float, step: int | None) -> None:
@@ -163,15 +184,32 @@ class PourLog:
         turned = poses.quaternion[chosen][:, [1, 2, 3, 0]].astype(np.float32)
         self._stream.log(
             entity,
-            rr.InstancePoses3D(translations=poses.position[chosen].astype(np.float32), quaternions=turned),
+            rr.InstancePoses3D(
+                translations=poses.position[chosen].astype(np.float32),
+                quaternions=turned,
+                scales=np.repeat(poses.scale[chosen, None], 3, axis=1).astype(np.float32)
+                if body.sizes.varies
+                else None,
+            ),
         )
 
     def _gate(self, shut: bool) -> None:
+        if GATE_NAME not in self._rig:
+            return
         if shut and not self._gate_shown:
             self._stream.log(f"world/{GATE_NAME}", _mesh(self._rig[GATE_NAME], PLATE_COLOUR))
         elif self._gate_shown and not shut:
             self._stream.log(f"world/{GATE_NAME}", rr.Clear(recursive=False))
         self._gate_shown = shut
+
+    def _surfaces(self, poses: npt.NDArray[np.float64]) -> None:
+        """Place the surfaces that have moved since they were placed last."""
+        for name, pose, before in zip(self._scene.rig.surface_names, poses, self._placed, strict=True):
+            if not np.array_equal(pose, before):
+                # wxyz here, xyzw in rerun
+                turned = rr.Quaternion(xyzw=pose[[4, 5, 6, 3]])
+                self._stream.log(f"world/{name}", rr.Transform3D(translation=pose[:3], quaternion=turned))
+        self._placed = self._poses = poses
 
 
 def _mesh(triangles: Triangles, colour: tuple[int, int, int, int]) -> rr.Mesh3D:

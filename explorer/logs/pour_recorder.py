@@ -94,7 +94,10 @@ class _Recording:
             curves["angle_of_repose_deg"] = _angle_deg(pour)
         # The last finite state stays on the screen when a run has diverged.
         if finite:
-            self.log.frame(pour.time, pour.bodies(), curves, step=pour.steps, gate_shut=pour.gate_shut)
+            surfaces = pour.surface_poses()
+            self.log.frame(
+                pour.time, pour.bodies(), curves, step=pour.steps, gate_shut=pour.gate_shut, surfaces=surfaces
+            )
 
 
 def _curves(sample: Mapping[str, float]) -> Mapping[str, float]:
@@ -103,4 +106,4 @@ def _curves(sample: Mapping[str, float]) -> Mapping[str, float]:
 
 def _angle_deg(pour: Pour) -> float:
     bodies = pour.bodies()
-    return angle_of_repose(PileReading(pile_of(pour.scene, bodies, member_spheres(pour.scene, bodies)))).value
+    return angle_of_repose(PileReading(pile_of(pour.container, bodies, member_spheres(pour.scene, bodies)))).value

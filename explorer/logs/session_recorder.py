@@ -48,7 +48,7 @@ class SessionRecorder:
             self._frame_due = frame.time + FRAME_INTERVAL
             curves = {name: observed.value for name, observed in status.observables.items()}
             curves |= motion_curves(status.entered_mass, status.discharged_mass, status.kinetic_energy, status.contacts)
-            log.frame(frame.time, frame, curves, gate_shut=status.gate_shut)
+            log.frame(frame.time, frame, curves, gate_shut=status.gate_shut, surfaces=frame.surfaces)
         if just_ended:
             log.outcome(frame.time, outcome_text(status.outcome, status.message), status.observables)
         self._last = status

@@ -8,7 +8,7 @@ from functools import cache
 
 from explorer.screen_units import SCREEN_UNIT
 from solver import load_material, parameters
-from solver.observables import OBSERVABLES
+from solver.observables import REGISTRY
 from solver.params import UNITS
 
 MISSING = "–"
@@ -56,8 +56,7 @@ def unit_of_parameter(path: str) -> ReadingUnit:
 
 def unit_of_observable(name: str) -> ReadingUnit:
     """Unit in which the observable ``name`` is read."""
-    units = {observable.name: observable.unit for observable in OBSERVABLES}
-    return _reading_unit(units.get(name, "1"))
+    return _reading_unit(REGISTRY[name].unit if name in REGISTRY else "1")
 
 
 def parameter_value(path: str, value: float | str | None) -> str:

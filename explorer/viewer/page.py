@@ -13,6 +13,7 @@ import viser
 
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, Status
+from explorer.scene_meshes import scene_height
 from explorer.session import Session
 from explorer.study_process import StudyProcess
 from explorer.viewer.actions import Actions
@@ -148,7 +149,7 @@ def light(server: viser.ViserServer) -> None:
 
 def look(server: viser.ViserServer, scene: Scene) -> None:
     """Camera that new clients start with: pile, funnel and feed in one picture."""
-    height = scene.rig.inlet_height + scene.insertion.region_height
+    height = scene_height(scene)
     distance = height / FILL / (2.0 * math.tan(VIEW_FIELD / 2.0))
     middle = (0.0, 0.0, 0.42 * height)
     camera = server.initial_camera

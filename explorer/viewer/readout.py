@@ -20,12 +20,14 @@ PHASE_WORDS = {
     Phase.FILL: "filling",
     Phase.DISCHARGE: "discharging",
     Phase.PILE: "settling",
+    Phase.RUN: "turning",
     Phase.AT_REST: "at rest",
 }
 OUTCOME_WORDS = {
     Outcome.RUNNING: "still running",
     Outcome.AT_REST: "at rest: a valid pile",
-    Outcome.JAMMED: "jammed: material stays in the funnel",
+    Outcome.MEASURED: "measured: the rig ran for its time",
+    Outcome.JAMMED: "jammed: material stays in the rig",
     Outcome.TIME_LIMIT: "cut off: still moving at the time limit",
     Outcome.LOST_BODY: "lost a body through the plate",
     Outcome.NON_FINITE: "diverged: a number is not finite",

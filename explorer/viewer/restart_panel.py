@@ -16,14 +16,23 @@ from solver.scene import Scene, parameters, value, with_values
 PATHS = (
     "rig.mass",
     "rig.outlet_height",
+    "rig.lift_speed",
+    "rig.slot_width",
+    "rig.filled_volume",
+    "rig.speed_rpm",
     "insertion.rate",
     "insertion.drop_speed",
     "insertion.protocol",
     "body.spheres",
 )
-"""Parameters in this panel, in order."""
+"""Parameters in this panel, in order; those that the rig has."""
 LARGEST_SEED = 2**31 - 1
-SIGNIFICANT_STEP = {"mm": 1.0, "g": 1.0, "g/s": 1.0, "m/s": 0.1}
+SIGNIFICANT_STEP = {"mm": 1.0, "g": 1.0, "g/s": 1.0, "m/s": 0.1, "": 0.01}
+
+
+def size_paths(scene: Scene) -> tuple[str, ...]:
+    """Parameters of the folder of sizes: how the bodies of each component scatter."""
+    return tuple(f"body.{body.name}.{key}" for body in scene.bodies for key in ("size_distribution", "size_spread"))
 
 
 class RestartPanel:
@@ -32,9 +41,12 @@ class RestartPanel:
     def __init__(self, server: viser.ViserServer, session: Session, scene: Scene, seed: int, post: Post) -> None:
         self._session, self._generation = session, session.status().generation
         known = parameters(scene)
-        self._shown = {path: known[path] for path in PATHS}
+        set_up = [path for path in PATHS if path in known]
+        self._shown = {path: known[path] for path in (*set_up, *size_paths(scene))}
         with server.gui.add_folder("Set-up (on restart)"):
-            self._inputs = {path: _input(server.gui, p, scene) for path, p in self._shown.items()}
+            self._inputs = {path: _input(server.gui, known[path], scene) for path in set_up}
+            with server.gui.add_folder("Sizes of the bodies", expand_by_default=False):
+                self._inputs |= {path: _input(server.gui, known[path], scene) for path in size_paths(scene)}
             self._seed = server.gui.add_number(
                 "Seed", seed, min=0, max=LARGEST_SEED, step=1, hint="Same seed, same pour."
             )
@@ -48,7 +60,10 @@ class RestartPanel:
         self._generation = status.generation
         self._seed.value = status.seed  # type: ignore[misc]
         for path, parameter in self._shown.items():
-            self._inputs[path].value = on_screen(parameter, status.scene)
+            present = on_screen(parameter, status.scene)
+            if parameter.choices:
+                self._inputs[path].options = options(parameter, present)
+            self._inputs[path].value = present
 
     def _restart(self) -> None:
         """Read all inputs, check them as a whole, and pour; parameters changed live keep their values."""
@@ -75,13 +90,25 @@ def on_screen(parameter: Parameter, scene: Scene) -> Any:
     return present if isinstance(present, str) else screen_unit(parameter).to_screen(present)
 
 
+def options(parameter: Parameter, present: str) -> tuple[str, ...]:
+    """What a choice offers: the declared names, and what is there now (a number of spheres)."""
+    return parameter.choices if present in parameter.choices else (*parameter.choices, present)
+
+
+def label(parameter: Parameter) -> str:
+    """Title of an input; for a component's own parameter with the component's name."""
+    kind, *names = parameter.path.split(".")
+    return f"{names[0].capitalize()}: {title(parameter).lower()}" if kind == "body" and names[1:] else title(parameter)
+
+
 def _input(gui: viser.GuiApi, parameter: Parameter, scene: Scene) -> Any:
     present = on_screen(parameter, scene)
     if parameter.choices:
-        return gui.add_dropdown(title(parameter), parameter.choices, initial_value=present, hint=parameter.doc)
+        offered = options(parameter, present)
+        return gui.add_dropdown(label(parameter), offered, initial_value=present, hint=parameter.doc)
     unit = screen_unit(parameter)
     return gui.add_number(
-        title(parameter),
+        label(parameter),
         present,
         min=unit.to_screen(parameter.low),
         max=unit.to_screen(parameter.high),

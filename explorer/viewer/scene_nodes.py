@@ -10,10 +10,9 @@ import numpy.typing as npt
 import viser
 
 from explorer.live.frames import Frame
-from explorer.scene_meshes import GATE_NAME, body_triangles, rig_triangles
+from explorer.scene_meshes import GATE_NAME, PLATE_NAME, body_triangles, rig_poses, rig_triangles, rim_circles
 from explorer.viewer.palette import BODY_COLOURS, GLASS, PLATE, RIM, RING, Colour, linear
-from solver.body import counts
-from solver.scene import Scene
+from solver.scene import Scene, body_counts
 
 Array = npt.NDArray[np.float64]
 
@@ -25,8 +24,8 @@ CORNERS = 72
 """Corners of such a circle."""
 LINE = 8e-4
 """Thickness of lines [m]."""
-CLEAR = {"cone": 0.16, "gate": 0.5}
-"""Opacity of what one has to look through."""
+CLEAR, OPACITY = 0.16, {GATE_NAME: 0.5}
+"""Opacity of what one has to look through: all surfaces but the plate."""
 
 
 @dataclass(frozen=True)
@@ -38,14 +37,14 @@ class Poses:
     quaternion: npt.NDArray[np.float32]
     """wxyz, shape (n, 4)."""
     scale: npt.NDArray[np.float32]
-    """1 or 0, shape (n,)."""
+    """Size of a body relative to its mesh, or 0, shape (n,)."""
 
 
 class SceneNodes:
-    """Nodes of one scene; :meth:`show` moves the bodies."""
+    """Nodes of one scene; :meth:`show` moves the bodies and the surfaces of the rig."""
 
     def __init__(self, server: viser.ViserServer, scene: Scene) -> None:
-        self._numbers = counts(scene.bodies, scene.rig.mass)
+        self._numbers = body_counts(scene)
         self._bodies: list[Any] = []
         for k, (body, n) in enumerate(zip(scene.bodies, self._numbers, strict=True)):
             mesh, none = body_triangles(body), nowhere(n)
@@ -64,22 +63,36 @@ class SceneNodes:
                 else None
             )
         self._rig = rig_nodes(server, scene)
+        self._surface_names, self._at_first = scene.rig.surface_names, rig_poses(scene.rig)
+        self._surfaces = self._at_first
 
     def show(self, frame: Frame) -> None:
-        """Move the bodies to where ``frame`` has them; call it inside ``server.atomic()``."""
+        """Move bodies and surfaces to where ``frame`` has them; call it inside ``server.atomic()``."""
+        self._show_surfaces(frame.surfaces)
         for k, (node, n) in enumerate(zip(self._bodies, self._numbers, strict=True)):
             if node is not None:
                 _place(node, component_poses(frame, k, n))
 
     def clear(self) -> None:
-        """Hide all bodies: a new pour has not begun to fall yet."""
+        """Hide all bodies, surfaces where they were: a new pour has not begun to fall yet."""
+        self._show_surfaces(self._at_first)
         for node, n in zip(self._bodies, self._numbers, strict=True):
             if node is not None:
                 _place(node, nowhere(n))
 
+    def _show_surfaces(self, poses: Array) -> None:
+        """Move those surfaces whose pose has changed; ``poses`` as in ``rig_poses``, or empty where none is known."""
+        if poses.shape != self._surfaces.shape:
+            return
+        for name, pose, before in zip(self._surface_names, poses, self._surfaces, strict=True):
+            if not np.array_equal(pose, before):
+                self._rig[name].position, self._rig[name].wxyz = pose[:3], pose[3:]
+        self._surfaces = poses
+
     def show_gate(self, shut: bool) -> None:
-        """Draw the gate or not."""
-        self._rig[GATE_NAME].visible = shut
+        """Draw the gate or not, if the rig has one."""
+        if GATE_NAME in self._rig:
+            self._rig[GATE_NAME].visible = shut
 
     def remove(self) -> None:
         """Take all nodes off the page."""
@@ -100,7 +113,7 @@ def component_poses(frame: Frame, component: int, n: int) -> Poses:
     chosen = np.flatnonzero(frame.component == component)[:n]
     poses.position[: len(chosen)] = frame.position[chosen]
     poses.quaternion[: len(chosen)] = frame.quaternion[chosen]
-    poses.scale[: len(chosen)] = frame.inside[chosen]
+    poses.scale[: len(chosen)] = np.where(frame.inside[chosen], frame.scale[chosen], 0.0)
     return poses
 
 
@@ -117,37 +130,38 @@ def component_colour(k: int) -> Colour:
 
 
 def rig_nodes(server: viser.ViserServer, scene: Scene) -> dict[str, Any]:
-    """Nodes of the rig by name: its surfaces, the rims of the funnel, circles on the plate as a scale."""
+    """Nodes of the rig by name: its surfaces with the rims of shells, and circles on the plate as a scale."""
     nodes: dict[str, Any] = {}
-    for name, mesh in rig_triangles(scene.rig).items():
-        clear = name in CLEAR
-        widened = PLATE_RADIUS / float(np.hypot(*mesh.vertices[:, :2].T).max()) if name == "plate" else 1.0
+    poses, rims = rig_poses(scene.rig), rim_circles(scene.rig)
+    for (name, mesh), pose in zip(rig_triangles(scene.rig).items(), poses, strict=True):
+        clear = name != PLATE_NAME
+        widened = 1.0 if clear else PLATE_RADIUS / float(np.hypot(*mesh.vertices[:, :2].T).max())
         nodes[name] = server.scene.add_mesh_simple(
             f"/rig/{name}",
             mesh.vertices,
             mesh.faces,
             scale=(widened, widened, 1.0),
             color=GLASS if clear else PLATE,
-            opacity=CLEAR.get(name),
+            opacity=OPACITY.get(name, CLEAR) if clear else None,
             side="double",
             cast_shadow=False,
             receive_shadow=not clear,
             visible=name != GATE_NAME,
+            position=pose[:3],
+            wxyz=pose[3:],
         )
-    return nodes | _circles(server, scene)
+        if name in rims:
+            ends = np.concatenate([circle(radius, height) for radius, height in rims[name]])
+            # Below the surface's node: it moves, and goes, with that.
+            server.scene.add_line_segments(f"/rig/{name}/rims", ends, RIM, thickness=LINE)
+    return nodes | (_scale(server) if PLATE_NAME in nodes else {})
 
 
-def _circles(server: viser.ViserServer, scene: Scene) -> dict[str, Any]:
-    rig = scene.rig
-    ends = ((rig.outlet_diameter, rig.outlet_height), (rig.inlet_diameter, rig.inlet_height))
-    rims = np.concatenate([circle(diameter / 2.0, height) for diameter, height in ends])
+def _scale(server: viser.ViserServer) -> dict[str, Any]:
     radii = np.arange(RING_SPACING, PLATE_RADIUS + 1e-9, RING_SPACING)
     # Above the plate by the lines' thickness, so that they are not lost in it.
     rings = np.concatenate([circle(radius, LINE) for radius in radii])
-    return {
-        "rims": server.scene.add_line_segments("/rig/rims", rims, RIM, thickness=LINE),
-        "scale": server.scene.add_line_segments("/rig/scale", rings, RING, thickness=LINE),
-    }
+    return {"scale": server.scene.add_line_segments("/rig/scale", rings, RING, thickness=LINE)}
 
 
 def circle(radius: float, height: float) -> Array:

@@ -17,6 +17,7 @@ from solver.body import Body, Members
 from solver.layout import layout
 from solver.material import Material, Pair
 from solver.numerics import Numerics
+from solver.rigs.rig import BareRig
 from solver.rigs.surface import Plane, Pose, Surface, horizontal
 from solver.scene import Scene
 from solver.state import Capacity
@@ -32,20 +33,17 @@ TILE = (10, 10, 10)
 SPACING = 2.06 * RADIUS
 SETTLING_TIME = 0.25
 """Simulated time [s] for the small bed to come to rest."""
-RELAXING_TIME = 0.01
+RELAXING_TIME = 0.04
 """The same for a bed put together of copies."""
 
 
 @dataclass(frozen=True)
-class Box:
+class Box(BareRig):
     """An open box: floor z = 0 and four walls, ``width`` × ``depth`` [m]."""
 
     width: float
     depth: float
     wall: str = "wall"
-    mass: float = 1.0
-    outlet_height: float = 1e3
-    inlet_diameter: float = 1e3
     domain_half_width: float = 1e3
 
     def surfaces(self) -> tuple[Surface, ...]:
@@ -80,7 +78,7 @@ def bed_scene(box: Box) -> Scene:
         materials=(material, wall),
         bodies=(Body("sphere", "glass", 1.0, sphere, 2500.0),),
         pairs=(Pair("glass", "glass", 0.5, 0.5), Pair("glass", "wall", 0.5, 0.5)),
-        rig=box,  # type: ignore[arg-type]
+        rig=box,
         numerics=Numerics(rayleigh_fraction=0.2, skin=SKIN, sleep_speed=0.0),
     )
 
@@ -118,6 +116,7 @@ def small_bed(seed: int = 1) -> Bed:
 
 def wide_bed(tiles: tuple[int, int], seed: int = 1) -> Bed:
     """``tiles`` copies of the small bed side by side, in the order of their places, relaxed for a moment."""
+    backend.init(threads=1)
     tile = small_bed(seed)
     shift = np.array([(i * tile.box.width, j * tile.box.depth, 0.0) for i in range(tiles[0]) for j in range(tiles[1])])
     centres = (shift[:, None, :] + tile.centres[None]).reshape(-1, 3)

@@ -1,16 +1,12 @@
 """The kernel that runs a batch: worlds in parallel, the steps of a world one after the other."""
 
-from solver.backend import ti
+from solver.backend import lanes, ti
 from solver.kernels.contacts import push
 from solver.kernels.motion import move, prepare
 from solver.kernels.neighbours import rebuild
 from solver.kernels.sleep import fall_asleep, list_bodies, list_border, list_entries, watch
 from solver.kernels.summary import body_energy, summarise
 from solver.kernels.walls import clear_walls, move_walls
-
-LANES = 512
-"""Loop iterations per world, all but one of them idle: Taichi gives a CPU thread at least 512 iterations in a row, so a
-loop over fewer worlds than that would run on one thread. Threads get equal, contiguous shares of the worlds."""
 
 
 @ti.func
@@ -41,10 +37,14 @@ def step(s: ti.template(), w):
 
 @ti.kernel
 def advance(s: ti.template(), steps: ti.types.ndarray(dtype=ti.i32, ndim=1)):
-    """Run world w for ``steps[w]`` steps and summarise it; worlds with no steps stay untouched."""
-    for lane in range(steps.shape[0] * LANES):
-        w = lane // LANES
-        if lane % LANES == 0 and steps[w] > 0:
+    """Run world w for ``steps[w]`` steps and summarise it; worlds with no steps stay untouched.
+
+    A world has several loop iterations, all but one of them idle: a CPU thread is given so many in a row that a loop
+    over few worlds would run on one thread. Threads get equal, contiguous shares of the worlds.
+    """
+    for lane in range(steps.shape[0] * ti.static(lanes())):
+        w = lane // ti.static(lanes())
+        if lane % ti.static(lanes()) == 0 and steps[w] > 0:
             for _ in range(steps[w]):
                 step(s, w)
             summarise(s, w)

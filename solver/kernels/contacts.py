@@ -106,7 +106,11 @@ def push(s: ti.template(), w):
             inertia = ti.sqrt(contact_radius * mass)
             elastic = normal_spring_force(law, contact_radius, overlap)
             before = s.contact.radius[w, k]
-            f_n = normal_force(elastic, normal_damper(law, inertia, before, overlap, v_n, dt), v_n, mass, dt)
+            damper = normal_damper(law, inertia, before, overlap, v_n, dt)
+            expected = v_n
+            if before > 0.0:
+                expected = s.contact.expected[w, k]
+            f_n = normal_force(elastic, damper, v_n, expected, mass, dt)
             old, last_loss = s.contact.spring[w, k], s.contact.loss[w, k]
             spring, f_t = tangential_force(law, contact_radius, before, old, n, v_t, inertia, f_n, dt)
             force = f_n * n + f_t
@@ -117,6 +121,7 @@ def push(s: ti.template(), w):
             dissipated -= spring_energy_gain(law, old.norm_sqr(), before, spring.norm_sqr(), contact_radius)
             s.contact.spring[w, k] = spring
             s.contact.radius[w, k] = contact_radius
+            s.contact.expected[w, k] = v_n + dt * f_n / mass
             s.contact.loss[w, k] = loss
             if b < 0:
                 push_wall(s, w, -1 - b, point, force, item >= live)

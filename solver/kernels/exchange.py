@@ -170,6 +170,13 @@ def set_active(s: ti.template(), w: ti.i32, wall: ti.i32, active: ti.i32):
 
 
 @ti.kernel
+def set_container(s: ti.template(), w: ti.i32, height: ti.f64, radius: ti.f64):
+    """What counts as inside the rig: above ``height`` [m] and within ``radius`` [m] of the z axis."""
+    s.world.outlet[w] = height
+    s.world.inlet_radius[w] = radius
+
+
+@ti.kernel
 def set_motion(s: ti.template(), w: ti.i32, wall: ti.i32, motion: Row):
     """Let a wall move; motion: velocity (3), angular velocity in the world (3), extent [m]."""
     s.wall.velocity[w, wall] = Vec3(motion[0], motion[1], motion[2])

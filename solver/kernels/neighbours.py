@@ -22,6 +22,7 @@ def keep_history(s: ti.template(), w):
             s.history.spring[w, kept] = s.contact.spring[w, k]
             s.history.loss[w, kept] = s.contact.loss[w, k]
             s.history.radius[w, kept] = s.contact.radius[w, k]
+            s.history.expected[w, kept] = s.contact.expected[w, k]
             kept += 1
     return kept
 
@@ -157,6 +158,7 @@ def carry_over(s: ti.template(), w, n_old):
             s.contact.spring[w, k] = s.history.spring[w, old]
             s.contact.loss[w, k] = s.history.loss[w, old]
             s.contact.radius[w, k] = s.history.radius[w, old]
+            s.contact.expected[w, k] = s.history.expected[w, old]
 
 
 @ti.func

@@ -3,6 +3,7 @@
 from solver.backend import ti
 from solver.kernels.motion import energy_per_mass
 from solver.laws.hertz_mindlin import hertz_energy, spring_energy
+from solver.numerics import ROLLING_SLOPE
 
 
 @ti.func
@@ -14,8 +15,9 @@ def rolls_away(s: ti.template(), w, b):
     x, v = s.body.position[w, b], s.body.velocity[w, b]
     beyond = x[0] * x[0] + x[1] * x[1] > s.world.inlet_radius[w] ** 2
     outward = x[0] * v[0] + x[1] * v[1] > 0.0
+    level = v[2] * v[2] < ROLLING_SLOPE**2 * v.dot(v)
     away = 0
-    if s.body.touching[w, b] == 0 and x[2] < s.body.reach[w, b] and beyond and outward:
+    if s.body.touching[w, b] == 0 and x[2] < s.body.reach[w, b] and beyond and outward and level:
         away = 1
     return away
 

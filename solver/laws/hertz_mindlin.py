@@ -66,9 +66,14 @@ def normal_damper(law, inertia, a_before, overlap, v_n, dt):
 
 
 @ti.func
-def normal_force(elastic, damper, v_n, mass, dt):
-    """Normal force [N], never tensile; the damper takes the speed in the middle of the step, v_n + dt F/(2 m*)."""
-    return ti.max(0.0, (elastic - damper * v_n) / (1.0 + 0.5 * dt * damper / mass))
+def normal_force(elastic, damper, v_n, v_expected, mass, dt):
+    """Normal force F [N], never tensile; the damper takes the speed in the middle of the step, v_n + dt (F/m* + A)/2.
+
+    A is the acceleration by everything else, known from the last step: dt A = v_n − ``v_expected``, the speed that the
+    contact's own force would have led to. A contact at rest, held by others, is thus not damped at all.
+    """
+    middle = v_n + 0.5 * (v_n - v_expected)
+    return ti.max(0.0, (elastic - damper * middle) / (1.0 + 0.5 * dt * damper / mass))
 
 
 @ti.func

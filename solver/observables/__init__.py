@@ -1,7 +1,8 @@
 """Observables: what is read off a finished run. NumPy and SciPy only, no kernels.
 
-A new observable is one function and one line in ``OBSERVABLES``. Scalars stand in the tables; the curves are
-functions of their own: :func:`discharge_curve` and :func:`height_profile`.
+A new observable is one function and one line in ``OBSERVABLES`` (or in the table of the rigs it belongs to). Each rig
+names those that it gives. Scalars stand in the tables; the curves are functions of their own: :func:`discharge_curve`,
+:func:`height_profile` and :func:`surface_profile`.
 """
 
 from __future__ import annotations
@@ -12,13 +13,15 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
-from solver.observables import discharge, packing, pile, segregation
+from solver.observables import discharge, draw_down, free_surface, packing, pile, segregation
 from solver.observables.discharge import discharge_curve
+from solver.observables.free_surface import surface_profile
 from solver.observables.pile import height_profile
 from solver.observables.reading import PileReading
 from solver.observables.repose import AZIMUTHS_DEG, flank_angles_deg
 from solver.observables.silhouette import largest_part, silhouette
 from solver.observables.value import Value
+from solver.scene import Scene, pour_rig
 
 if TYPE_CHECKING:
     from solver.record import Pile, Record
@@ -27,6 +30,7 @@ __all__ = [
     "AZIMUTHS_DEG",
     "COMPONENT_OBSERVABLES",
     "OBSERVABLES",
+    "REGISTRY",
     "ComponentObservable",
     "Observable",
     "PileReading",
@@ -39,6 +43,7 @@ __all__ = [
     "observe",
     "observe_pile",
     "silhouette",
+    "surface_profile",
 ]
 
 PileFunction: TypeAlias = Callable[[PileReading], Value]
@@ -115,6 +120,21 @@ OBSERVABLES: tuple[Observable, ...] = (
     _of_record("left_domain_fraction", "1", discharge.left_domain_fraction),
 )
 
+DRUM_OBSERVABLES: tuple[Observable, ...] = (
+    _of_record("dynamic_angle_deg", "deg", free_surface.dynamic_angle),
+    _of_record("slope_deg", "deg", free_surface.slope),
+    _of_record("slope_core_deg", "deg", free_surface.slope_core),
+)
+
+BOX_OBSERVABLES: tuple[Observable, ...] = (
+    _of_record("draw_down_angle_deg", "deg", draw_down.draw_down_angle),
+    _of_record("draw_down_angle_left_deg", "deg", draw_down.draw_down_angle_left),
+    _of_record("draw_down_angle_right_deg", "deg", draw_down.draw_down_angle_right),
+)
+
+REGISTRY = {observable.name: observable for observable in OBSERVABLES + DRUM_OBSERVABLES + BOX_OBSERVABLES}
+"""Every scalar that some rig gives, by name."""
+
 COMPONENT_OBSERVABLES: tuple[ComponentObservable, ...] = (
     _of_component("inner_mass_share", "1", segregation.inner_mass_share),
     _of_component("outer_mass_share", "1", segregation.outer_mass_share),
@@ -122,18 +142,24 @@ COMPONENT_OBSERVABLES: tuple[ComponentObservable, ...] = (
 )
 
 
-def observable_names() -> tuple[str, ...]:
-    """Names of the scalars that every run gives; those per component (``<name>.<component>``) are not among them."""
-    return tuple(observable.name for observable in OBSERVABLES)
+def observable_names(scene: Scene) -> tuple[str, ...]:
+    """Names of the scalars that a run of ``scene`` gives; those per component (``<name>.<component>``) are not among
+    them."""
+    return pour_rig(scene).observables
 
 
 def observe(record: Record) -> dict[str, Value]:
-    """Every observable of a run by name, whatever its outcome; NaN where one cannot be measured."""
-    of_record = {o.name: o.function(record) for o in OBSERVABLES if o.needs == "record"}
-    return observe_pile(record.pile) | of_record
+    """The observables of the rig by name, whatever the outcome; NaN where one cannot be measured."""
+    wanted = [REGISTRY[name] for name in observable_names(record.scene)]
+    of_record = {o.name: o.function(record) for o in wanted if o.needs == "record"}
+    of_pile = tuple(o for o in wanted if o.needs == "pile")
+    return (observe_pile(record.pile, of_pile) if of_pile else {}) | of_record
 
 
-def observe_pile(pile: Pile) -> dict[str, Value]:
+PILE_OBSERVABLES = tuple(observable for observable in OBSERVABLES if observable.needs == "pile")
+
+
+def observe_pile(pile: Pile, wanted: tuple[Observable, ...] = PILE_OBSERVABLES) -> dict[str, Value]:
     """The observables that a pile alone gives (a simulated one or a scan), by name.
 
     Those per component are left out where there is one component. A pile with a coordinate that is not finite
@@ -141,8 +167,7 @@ def observe_pile(pile: Pile) -> dict[str, Value]:
     """
     finite = bool(np.isfinite(pile.position).all() and np.isfinite(pile.spheres.centre).all())
     reading = PileReading(pile)
-    of_pile = [o for o in OBSERVABLES if o.needs == "pile"]
-    values = {o.name: o.function(reading) if finite else Value(float("nan"), o.unit) for o in of_pile}
+    values = {o.name: o.function(reading) if finite else Value(float("nan"), o.unit) for o in wanted}
     if len(pile.component_names) > 1:
         for observable in COMPONENT_OBSERVABLES:
             found = observable.function(reading) if finite else {}

@@ -1,8 +1,37 @@
-"""Rigs: one file per rig, listed here."""
+"""Rigs: one file per rig, listed here. Into ``RIGS`` bodies are poured, ``BENCH_RIGS`` measure a single body."""
 
+from solver.rigs.compression import Compression
+from solver.rigs.draw_down_box import DrawDownBox
+from solver.rigs.drop_plate_45 import DropPlate45
 from solver.rigs.funnel import Funnel
+from solver.rigs.inclined_plane import InclinedPlane
+from solver.rigs.lifting_cylinder import LiftingCylinder
+from solver.rigs.rig import BenchRig, PourRig, Rig
+from solver.rigs.rotating_drum import RotatingDrum
 from solver.rigs.surface import Plane, Pose, Revolved, Surface, TriangleMesh
 
-RIGS = {"funnel": Funnel}
+RIGS: dict[str, type[PourRig]] = {
+    "funnel": Funnel,
+    "lifting_cylinder": LiftingCylinder,
+    "draw_down_box": DrawDownBox,
+    "rotating_drum": RotatingDrum,
+}
+BENCH_RIGS: dict[str, type[BenchRig]] = {
+    "inclined_plane": InclinedPlane,
+    "drop_plate_45": DropPlate45,
+    "compression": Compression,
+}
 
-__all__ = ["RIGS", "Funnel", "Plane", "Pose", "Revolved", "Surface", "TriangleMesh"]
+__all__ = [
+    "BENCH_RIGS",
+    "RIGS",
+    "BenchRig",
+    "Funnel",
+    "Plane",
+    "Pose",
+    "PourRig",
+    "Revolved",
+    "Rig",
+    "Surface",
+    "TriangleMesh",
+]

@@ -16,11 +16,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from solver.params import ParameterError, param
+from solver.rigs.feed import RoundFeed
+from solver.rigs.rig import DISCHARGE, PILE, Action, Container, PourRig, Switch
 from solver.rigs.surface import Revolved, Surface, horizontal
 
 
 @dataclass(frozen=True)
-class Funnel:
+class Funnel(PourRig):
     """Dimensions of the rig and the mass that is poured."""
 
     inlet_diameter: float = param(0.114, unit="m", low=0.01, high=2.0, doc="Inner diameter of the feed opening.")
@@ -34,6 +36,10 @@ class Funnel:
     wall: str = "rigid_sieve_plate"
 
     name = "funnel"
+    surface_names = ("plate", "cone", "gate")
+    observables = PILE + DISCHARGE
+    protocols = ("pour_through", "fill_then_open")
+    refills = True
 
     @property
     def inlet_height(self) -> float:
@@ -41,13 +47,29 @@ class Funnel:
         return self.outlet_height + self.cone_height
 
     def surfaces(self) -> tuple[Surface, ...]:
-        """Plate, cone and gate, in the order of ``SURFACE_NAMES``."""
+        """Plate, cone and gate, in the order of ``surface_names``."""
         outlet, inlet = self.outlet_diameter / 2.0, self.inlet_diameter / 2.0
         return (
             horizontal(0.0, self.wall),
             Revolved(outlet, self.outlet_height, inlet, self.inlet_height, self.wall),
             Revolved(0.0, self.outlet_height, outlet, self.outlet_height, self.wall),
         )
+
+    def poured_mass(self, density: float) -> float:
+        """Mass that is poured [kg], whatever its density."""
+        return self.mass
+
+    def feed(self) -> RoundFeed:
+        """The feed opening."""
+        return RoundFeed(self.inlet_height, self.inlet_diameter / 2.0)
+
+    def container(self, since: float) -> Container:
+        """Above the outlet, within the radius of the feed opening."""
+        return Container(self.outlet_height, self.inlet_diameter / 2.0)
+
+    def actions(self) -> tuple[Action, ...]:
+        """The gate opens."""
+        return (Switch(0.0, self.surface_names.index("gate"), False),)
 
     def check(self, widest_body: float) -> None:
         """Refuse a funnel that narrows upward or whose outlet is narrower than ``widest_body`` [m].
@@ -65,7 +87,3 @@ class Funnel:
                 f"rig.outlet_diameter: {self.outlet_diameter:g} m is narrower than a body "
                 f"({widest_body:g} m); allowed: more than {widest_body:g} m"
             )
-
-
-SURFACE_NAMES = ("plate", "cone", "gate")
-GATE = SURFACE_NAMES.index("gate")

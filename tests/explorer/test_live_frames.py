@@ -14,6 +14,7 @@ def bodies(n, shift=0.0):
         component=np.arange(n, dtype=np.int32) % 3,
         component_names=("a", "b", "c"),
         mass=np.ones(n),
+        scale=rng.uniform(0.5, 1.5, size=n),
         position=rng.normal(size=(n, 3)) + shift,
         quaternion=rng.normal(size=(n, 4)),
         velocity=np.zeros((n, 3)),
@@ -38,6 +39,7 @@ def test_a_frame_comes_out_as_it_went_in(block):
     # Frames are single precision: half an ulp of float32.
     np.testing.assert_allclose(frame.position, one.position, rtol=2**-24)
     np.testing.assert_allclose(frame.quaternion, one.quaternion, rtol=2**-24)
+    np.testing.assert_allclose(frame.scale, one.scale, rtol=2**-24)
     np.testing.assert_array_equal(frame.component, one.component)
     np.testing.assert_array_equal(frame.inside, one.inside)
 

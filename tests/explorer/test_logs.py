@@ -17,9 +17,11 @@ from explorer.logs.pour_log import PourLog
 from explorer.logs.pour_recorder import recorder_of
 from explorer.logs.session_recorder import SessionRecorder
 from explorer.scene_file import load_scene, with_settings
+from explorer.scene_meshes import rig_poses
 from solver import Job, Outcome, Phase, Scene, run_pours, with_values
 from tests.explorer.command_line import TINY
 
+QUARTER_TURN = (0.5**0.5, 0.0, 0.5**0.5, 0.0)
 ROOT = Path(__file__).parents[2]
 
 
@@ -31,6 +33,7 @@ class Poses:
     position: npt.NDArray[np.float64]
     quaternion: npt.NDArray[np.float64]
     inside: npt.NDArray[np.bool_]
+    scale: npt.NDArray[np.float64]
 
 
 def poses(*components: int, inside: tuple[bool, ...] | None = None) -> Poses:
@@ -42,6 +45,7 @@ def poses(*components: int, inside: tuple[bool, ...] | None = None) -> Poses:
         np.arange(n)[:, None] * np.full(3, 0.1),
         quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True),
         np.ones(n, dtype=bool) if inside is None else np.array(inside),
+        1.0 + 0.1 * np.arange(n),
     )
 
 
@@ -125,6 +129,33 @@ def test_quaternions_are_turned_round(scene, tmp_path):
     assert np.array_equal(written.reshape(-1, 4), np.roll(state.quaternion, -1, axis=1).astype(np.float32))
 
 
+def test_surfaces_are_where_they_have_moved(tmp_path):
+    scene = with_settings(load_scene("lifting_cylinder"), ["rig.mass=1g", "body.spheres=coarse"])
+    path, moved = tmp_path / "lift.rrd", rig_poses(scene.rig)
+    with PourLog(path, scene, seed=1) as log:
+        log.frame(0.0, poses(0), {}, gate_shut=True, surfaces=moved)
+        moved = moved.copy()
+        moved[1] = (0.0, 0.0, 0.04, *QUARTER_TURN)
+        log.frame(0.1, poses(0), {}, surfaces=moved)
+        log.frame(0.2, poses(0), {}, surfaces=moved)
+    (place,) = rows(path, "/world/cylinder", "Transform3D:translation")
+    (turn,) = rows(path, "/world/cylinder", "Transform3D:quaternion")
+    assert place.ravel() == pytest.approx([0.0, 0.0, 0.04])
+    assert turn.ravel() == pytest.approx([*QUARTER_TURN[1:], QUARTER_TURN[0]])
+    assert rows(path, "/world/plate", "Transform3D:translation") == []
+
+
+def test_bodies_are_drawn_at_their_size(scene, tmp_path):
+    """Scales are there for a component whose sizes scatter, and only for it."""
+    varied = with_values(scene, {"body.seed.size_distribution": "uniform", "body.seed.size_spread": 0.1})
+    with PourLog(tmp_path / "sizes.rrd", varied, seed=1) as log:
+        log.frame(0.0, poses(0, 1, 0, inside=(True, True, True)), {})
+    (written,) = rows(tmp_path / "sizes.rrd", "/world/bodies/seed", "InstancePoses3D:scales")
+    # single precision
+    assert written.reshape(-1, 3) == pytest.approx(np.repeat([[1.0], [1.2]], 3, axis=1), rel=1e-7)
+    assert rows(tmp_path / "sizes.rrd", "/world/bodies/plate", "InstancePoses3D:scales") == []
+
+
 def test_only_bodies_in_the_domain_have_an_instance(scene, tmp_path):
     path = tmp_path / "bodies.rrd"
     with PourLog(path, scene, seed=1) as log:
@@ -191,6 +222,7 @@ def frame(number: int, generation: int, time: float) -> Frame:
         state.quaternion.astype(np.float32),
         state.component,
         state.inside,
+        state.scale.astype(np.float32),
     )
 
 

@@ -10,9 +10,10 @@ from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.live_controls import LiveControl, decade_mark, decades_around, mean_value
 from explorer.viewer.live_panel import echo_html, live_parameters, material_targets, pair_targets
-from explorer.viewer.restart_panel import PATHS, RestartPanel, entered
+from explorer.viewer.restart_panel import PATHS, RestartPanel, entered, size_paths
 from solver import load_material, parameters, with_values
 from solver.scene import value
+from solver.sizes import SizeDistribution
 
 SCENE = load_material("sunflower_extract")
 KNOWN = parameters(SCENE)
@@ -81,7 +82,29 @@ def live_parameters_by_name(prefixes):
 
 
 def test_what_acts_on_restart_is_declared_so():
-    assert [path for path in PATHS if KNOWN[path].live] == []
+    assert [path for path in PATHS if path in KNOWN and KNOWN[path].live] == []
+
+
+def test_sizes_of_every_component_are_in_the_set_up(server):
+    first = Status(SessionState.RUNNING, "", SCENE, seed=1, generation=1, speed=1.0)
+    started = []
+    session = type(
+        "Session", (), {"status": lambda _: first, "restart": lambda _, scene, seed: started.append(scene)}
+    )()
+    panel = RestartPanel(server, session, SCENE, 1, lambda action: action())
+    assert [path for path in size_paths(SCENE) if KNOWN[path].live] == []
+    panel._inputs["body.plate.size_distribution"].value = "log_normal"
+    panel._inputs["body.plate.size_spread"].value = 0.2
+    panel._restart()
+    assert [body.sizes for body in started[0].bodies] == [
+        SizeDistribution(),
+        SizeDistribution("log_normal", 0.2),
+        SizeDistribution(),
+    ]
+    # a number of spheres that was set elsewhere is offered beside the names
+    other = with_values(SCENE, {"body.spheres": 12})
+    panel.show(Status(SessionState.RUNNING, "", other, seed=1, generation=2, speed=1.0))
+    assert panel._inputs["body.spheres"].value == "12"
 
 
 def test_settings_of_the_next_pour_are_clamped_and_choices_checked():

@@ -31,6 +31,7 @@ def drop(scene, dt, steps, every, position, quaternion, velocity, law):
     inertia, gravity = np.asarray(clump.inertia), np.array(scene.gravity)
     x, q, v, w = np.array(position, float), np.array(quaternion, float), np.array(velocity, float), np.zeros(3)
     memory, a_before = np.zeros((len(clump.radii), 2)), np.zeros(len(clump.radii))
+    expected = np.zeros(len(clump.radii))
     rows = []
     for step in range(steps + 1):
         turn = rotation_matrix(q)
@@ -47,7 +48,10 @@ def drop(scene, dt, steps, every, position, quaternion, velocity, law):
             elastic, damper = 4 / 3 * e_star * a * overlap[i], c_n * np.sqrt(2 * e_star * a * clump.mass)
             if law == "ours":
                 damper *= _first_step(slip[2], overlap[i], dt) if a_before[i] == 0.0 else 1.0
-                normal = max(0.0, (elastic - damper * slip[2]) / (1 + 0.5 * dt * damper / clump.mass))
+                others = slip[2] - expected[i] if a_before[i] > 0.0 else 0.0
+                middle = slip[2] + 0.5 * others
+                normal = max(0.0, (elastic - damper * middle) / (1 + 0.5 * dt * damper / clump.mass))
+                expected[i] = slip[2] + dt * normal / clump.mass
             else:
                 normal = max(0.0, elastic - damper * slip[2])
             stiffness, limit = 8 * g_star * a, pair.static_friction * normal

@@ -10,21 +10,19 @@ from solver.insertion import rotation_matrix
 from solver.laboratory import EARTH, FREE, RADIUS, Laboratory, bench, sphere
 from solver.mesh_wall import LEAVE, SEE_GUARD, mesh_wall
 from solver.params import ParameterError
+from solver.rigs.rig import BareRig
 from solver.rigs.surface import Plane, Pose, Revolved, TriangleMesh, load_mesh, rectangle
 
 pytestmark = pytest.mark.usefixtures("taichi")
 
 
 @dataclasses.dataclass(frozen=True)
-class Walls:
+class Walls(BareRig):
     """A rig of bare surfaces."""
 
     parts: tuple
     wall: str = "wall"
-    outlet_height: float = 1e3
-    inlet_diameter: float = 1.0
     domain_half_width: float = 10.0
-    mass: float = 1e-3
 
     def surfaces(self):
         return self.parts

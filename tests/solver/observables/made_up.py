@@ -102,13 +102,14 @@ def record_of(
         component=pile.component,
         component_names=pile.component_names,
         mass=pile.mass,
+        scale=np.ones(n),
         position=pile.position,
         quaternion=np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)),
         velocity=np.zeros((n, 3)),
         inside=np.ones(n, dtype=bool) if inside is None else inside,
     )
     contacts = np.zeros(time.size, dtype=np.int32)
-    trace = Trace(time, np.full_like(time, poured_mass), discharged_mass, zero, contacts, zero)
+    trace = Trace(time, np.full_like(time, poured_mass), discharged_mass, zero, contacts, *[zero] * 7)
     return Record(
         scene,
         0,

@@ -1,0 +1,220 @@
+"""What the rest of the program asks of a rig. A new rig is one file with one frozen dataclass and one line in ``RIGS``.
+
+Bodies are poured into every rig in the same way (``solver/pour.py``): the rig is filled, the fill settles, the rig acts
+(a gate opens, a cylinder is lifted, a drum begins to turn), and the run ends, at rest or after a given time. All of it
+is decided at the moments at which a pour is sampled, so that a seed repeats a run bit by bit.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Protocol
+
+from solver.rigs.feed import Feed
+from solver.rigs.surface import Surface
+
+NOTHING: Mapping[str, float | str] = MappingProxyType({})
+
+PILE = (
+    "angle_of_repose_deg",
+    "angle_of_repose_left_deg",
+    "angle_of_repose_right_deg",
+    "angle_of_repose_deg@0",
+    "angle_of_repose_deg@45",
+    "angle_of_repose_deg@90",
+    "angle_of_repose_deg@135",
+    "angle_of_repose_above_one_body_deg",
+    "angle_of_repose_cone_deg",
+    "angle_of_repose_mass_cone_deg",
+    "angle_of_repose_volume_cone_deg",
+    "apex_height_m",
+    "footprint_r50_m",
+    "footprint_r90_m",
+    "centroid_x_m",
+    "centroid_y_m",
+    "stray_fraction",
+    "bulk_density_kg_m3",
+    "solid_fraction",
+)
+"""Observables of a free pile on the plate, whatever made it."""
+
+DISCHARGE = (
+    "discharge_t10_s",
+    "discharge_t50_s",
+    "discharge_t90_s",
+    "discharge_time_s",
+    "residual_mass_kg",
+    "left_domain_fraction",
+)
+"""Observables of the flow out of a container."""
+
+
+@dataclass(frozen=True)
+class Container:
+    """The part of the world that is inside the rig: above ``height`` [m] and within ``radius`` [m] of the z axis."""
+
+    height: float
+    radius: float
+
+
+EVERYWHERE = Container(-math.inf, math.inf)
+"""The inside of a rig without an outside."""
+NOWHERE = Container(math.inf, 0.0)
+"""The inside of a rig without an inside."""
+
+
+@dataclass(frozen=True)
+class Switch:
+    """Put surface number ``surface`` there or take it away, ``after`` [s] from when the rig begins to act."""
+
+    after: float
+    surface: int
+    active: bool
+
+
+@dataclass(frozen=True)
+class Move:
+    """Let surface number ``surface`` move from ``after`` [s] on: its origin at ``velocity`` [m/s], the surface about it
+    at ``angular_velocity`` [rad/s], both in the world."""
+
+    after: float
+    surface: int
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    angular_velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+Action = Switch | Move
+
+
+@dataclass(frozen=True)
+class Watch:
+    """Keep the free surface at every sample from ``after`` [s] on: |x| up to ``half_width``, y from ``height`` [m]."""
+
+    after: float
+    half_width: float
+    height: float
+
+
+class Rig(Protocol):
+    """Surfaces with a name and parameters. All of a scene's surfaces are of one material, ``wall``."""
+
+    @property
+    def name(self) -> str:
+        """As it is written in files and on the command line."""
+        ...
+
+    @property
+    def wall(self) -> str:
+        """Name of the material of its surfaces."""
+        ...
+
+    @property
+    def domain_half_width(self) -> float:
+        """Bodies with |x| or |y| beyond this are taken out [m]."""
+        ...
+
+    @property
+    def surface_names(self) -> tuple[str, ...]:
+        """Names of ``surfaces()``, in order. One called ``gate`` is there only until the rig acts."""
+        ...
+
+    @property
+    def suits(self) -> Mapping[str, float | str]:
+        """Parameter path → value: settings of insertion and numerics that a scene gets along with the rig."""
+        return NOTHING
+
+    def surfaces(self) -> tuple[Surface, ...]:
+        """Plate, walls, gates; where they stand before the rig acts."""
+        ...
+
+    def container(self, since: float) -> Container:
+        """Inside of the rig, ``since`` [s] after it began to act (0 while it is filled)."""
+        ...
+
+    def check(self, widest_body: float) -> None:
+        """Raise ParameterError where dimensions do not fit together.
+
+        ``widest_body`` [m] is the smallest width that all of the bodies can pass: their middle extent, as a body may
+        turn and only its two smaller extents have to go through.
+        """
+        ...
+
+
+class BareRig(Rig, Protocol):
+    """Surfaces and nothing else: single bodies are put there by hand."""
+
+    @property
+    def name(self) -> str:
+        """Not one that can be asked for."""
+        return "bare"
+
+    @property
+    def surface_names(self) -> tuple[str, ...]:
+        """Numbers."""
+        return tuple(str(k) for k in range(len(self.surfaces())))
+
+    def container(self, since: float) -> Container:
+        """Nowhere: no body is fed, none flows out."""
+        return NOWHERE
+
+    def check(self, widest_body: float) -> None:
+        """Every body fits."""
+        return
+
+
+class BenchRig(BareRig, Protocol):
+    """A rig that measures one property on a single body (``solver/bench_tests``)."""
+
+    @property
+    def body(self) -> str:
+        """Name of the component that is measured; empty: the first one."""
+        ...
+
+
+class PourRig(Rig, Protocol):
+    """A rig that bodies are poured into."""
+
+    @property
+    def observables(self) -> tuple[str, ...]:
+        """Names of what is read off a run by default."""
+        ...
+
+    @property
+    def protocols(self) -> tuple[str, ...]:
+        """Values of ``insertion.protocol`` that make sense."""
+        return ("fill_then_open",)
+
+    @property
+    def refills(self) -> bool:
+        """Whether what did not fit in goes on entering while the rig acts. Otherwise a rig too full is a jam."""
+        return False
+
+    @property
+    def keeps_material(self) -> bool:
+        """Whether what stays in the container at rest belongs to the result. Otherwise it is a jam."""
+        return False
+
+    @property
+    def running_time(self) -> float | None:
+        """The run ends this long [s] after the rig began to act; None: when everything is at rest."""
+        return None
+
+    @property
+    def watch(self) -> Watch | None:
+        """When and where the free surface is kept; None: never."""
+        return None
+
+    def poured_mass(self, density: float) -> float:
+        """Mass to be poured [kg] of bodies whose solid has ``density`` [kg/m³]."""
+        ...
+
+    def feed(self) -> Feed:
+        """The opening that bodies enter through."""
+        ...
+
+    def actions(self) -> tuple[Action, ...]:
+        """What the rig does once it is filled, in order of time."""
+        ...

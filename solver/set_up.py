@@ -1,0 +1,35 @@
+"""The tables of a file that lie over a material: ``[rig]``, ``[insertion]`` and ``[numerics]``.
+
+Keys are the last parts of parameter paths (``outlet_height`` in ``[rig]`` is ``rig.outlet_height``); ``name`` in
+``[rig]`` chooses the rig.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from solver.params import ParameterError
+from solver.scene import Scene, with_rig, with_values
+
+TABLES = ("rig", "insertion", "numerics")
+
+
+def with_set_up(scene: Scene, table: Mapping[str, Any]) -> Scene:
+    """``scene`` with the set-up tables in ``table``, a parsed file whose other keys are of no concern here."""
+    values: dict[str, Any] = {}
+    for kind in TABLES:
+        entries = table.get(kind, {})
+        if not isinstance(entries, dict):
+            raise ParameterError(f"{kind}: a table is needed, not {entries!r}")
+        values |= {f"{kind}.{key}": value for key, value in entries.items()}
+    return with_settings(scene, values)
+
+
+def with_settings(scene: Scene, values: Mapping[str, Any]) -> Scene:
+    """``scene`` with parameters replaced by path (:func:`solver.scene.with_values`), ``rig.name`` before them."""
+    settings = dict(values)
+    name = settings.pop("rig.name", scene.rig.name)
+    if name != scene.rig.name:
+        scene = with_rig(scene, name if isinstance(name, str) else repr(name))
+    return with_values(scene, settings)

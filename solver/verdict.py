@@ -1,0 +1,101 @@
+"""How a pour stands at a moment of decision: still running, or over, and how. Pure functions of that moment."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from solver.numerics import Numerics
+from solver.record import Outcome
+from solver.rigs.rig import PourRig
+
+Verdict = tuple[Outcome, str]
+RUNNING: Verdict = (Outcome.RUNNING, "")
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What a verdict depends on."""
+
+    time: float
+    """[s]"""
+    row: Mapping[str, float]
+    """Columns of ``world.SUMMARY_COLUMNS``, and ``lost``: bodies that left where none may."""
+    acting: float | None
+    """Time since the rig began to act [s]; None while it is filled."""
+    acted: bool
+    """The rig has done all that it does."""
+    missing: int
+    """Bodies that have not entered."""
+    blocked: bool
+    """The next one has been due for long and finds no place."""
+    quiet: bool
+    """What counts has been slow for ``numerics.rest_time``."""
+    stalled: bool
+    """Nothing has left the container for long, although it could."""
+    speed: float
+    """Largest speed of what counts [m/s]."""
+    room: int
+    """Entries that the contact list holds."""
+
+
+def verdict(rig: PourRig, numerics: Numerics, moment: Moment) -> Verdict:
+    """Outcome and message; RUNNING while the pour goes on."""
+    for judged in (_broken(numerics, moment), _overfull(rig, moment), _ended(rig, numerics, moment)):
+        if judged is not RUNNING:
+            return judged
+    if moment.time >= numerics.max_time:
+        return Outcome.TIME_LIMIT, f"still moving at {moment.speed:.3g} m/s after {numerics.max_time:g} s"
+    return RUNNING
+
+
+def _broken(numerics: Numerics, moment: Moment) -> Verdict:
+    """The numbers cannot be trusted any more."""
+    row = moment.row
+    if not row["finite"]:
+        return Outcome.NON_FINITE, f"a position or speed is not finite at {moment.time:.3f} s"
+    if row["overflow"]:
+        return Outcome.BUFFER_OVERFLOW, f"more than {moment.room} entries in the contact list"
+    if row["lost"]:
+        return Outcome.LOST_BODY, f"{row['lost']:.0f} left the domain above the outlet or through the plate"
+    if row["overlap"] > numerics.overlap_limit:
+        return Outcome.OVERLAP_LIMIT, f"overlap of {row['overlap']:.3g} radii at {moment.time:.3f} s"
+    return RUNNING
+
+
+def _overfull(rig: PourRig, moment: Moment) -> Verdict:
+    """A rig that is filled once cannot take all of the bodies."""
+    if rig.refills or moment.acting is not None:
+        return RUNNING
+    if moment.row["discharged"] > 0.0:
+        return Outcome.JAMMED, f"the rig overflows: {1e3 * moment.row['discharged']:.3g} g lie beside it"
+    if moment.blocked:
+        return Outcome.JAMMED, f"the rig is full: {moment.missing} bodies find no place in it"
+    return RUNNING
+
+
+def _ended(rig: PourRig, numerics: Numerics, moment: Moment) -> Verdict:
+    """The rig has run for its time, or all has come to rest."""
+    if rig.running_time is None:
+        return _come_to_rest(rig, numerics, moment)
+    # Without a limit on time a person at the screen ends the run.
+    limited = math.isfinite(numerics.max_time)
+    over = limited and moment.acting is not None and moment.acting >= rig.running_time
+    return (Outcome.MEASURED, "") if over else RUNNING
+
+
+def _come_to_rest(rig: PourRig, numerics: Numerics, moment: Moment) -> Verdict:
+    """All is at rest: a pile, or a jam where more stays in the container than belongs there."""
+    row = moment.row
+    fed = moment.acting is not None and moment.acted and (moment.missing == 0 or moment.blocked)
+    empty = row["hanging"] == 0
+    if not (fed and moment.quiet and (empty or moment.stalled)):
+        return RUNNING
+    left, where = f"{1e3 * row['in_funnel']:.3g} g", rig.name.replace("_", " ")
+    if rig.keeps_material:
+        stuck = row["discharged"] == 0.0
+        return (Outcome.JAMMED, f"nothing passes the outlet: {left} stay") if stuck else (Outcome.AT_REST, "")
+    if moment.blocked or row["hanging"] > numerics.hanging_bodies:
+        return Outcome.JAMMED, f"{row['hanging']:.0f} bodies ({left}) stay in the {where}"
+    return Outcome.AT_REST, "" if empty else f"{left} hang in the {where}"
