@@ -1,7 +1,7 @@
 """What "at rest" is worth, and that sleeping changes no result. Slow: five minutes on one core.
 
-Last run in full on 2026-11-21, before the last change of the damping law: with all bodies awake 48 small piles drifted by
-at most 0.06 % in 2 s.
+Last run in full on 2026-11-21, before the last change of the damping law: with all bodies awake 48 small piles drifted
+by at most 0.06 % in 2 s.
 """
 
 import numpy as np
