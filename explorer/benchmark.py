@@ -27,7 +27,7 @@ BEDS = {1_000: (1, 1), 10_000: (2, 5), 100_000: (10, 10)}
 """Number of spheres → copies of the small bed along x and y."""
 SPHERE_STEPS = {"ours": 2e7, "liggghts": 2e7, "yade": 4e6}
 """Length of a bed's run: some seconds for each engine."""
-BATCH_POURS = 16
+BATCH_POURS = 32
 PEERS: dict[str, Callable[[Path], PeerRun]] = {"liggghts": run_liggghts, "yade": run_yade}
 
 
@@ -73,11 +73,11 @@ def bed_cases(options: Options) -> Iterator[Measurement]:
 
 
 def batch_cases(options: Options) -> Iterator[Measurement]:
-    """The same pours on one thread and on two."""
+    """The same pours by one worker and by two."""
     scene = load_scene(POUR)
     seeds = list(range(1, BATCH_POURS + 1))
-    for threads in (1, 2):
-        yield apart(measure_batch, "batch of pours", scene, seeds, threads)
+    for workers in (1, 2):
+        yield measure_batch("batch of pours", scene, seeds, workers)
 
 
 CASES: dict[str, Callable[[Options], Iterator[Measurement]]] = {

@@ -24,7 +24,7 @@ HEADER = (
     "ns/contact",
     "ratio",
 )
-RATIO_NOTE = "ratio: steps per second over LIGGGHTS's in the same run (over one thread's for the batch)"
+RATIO_NOTE = "ratio: steps per second over LIGGGHTS's in the same run (over one worker's for the batch)"
 
 
 def table_text(measurements: Sequence[Measurement]) -> str:
@@ -78,9 +78,9 @@ def result_of(measurements: Sequence[Measurement]) -> dict[str, Any]:
 
 
 def _ratio(one: Measurement, measurements: Sequence[Measurement]) -> float:
-    """Steps per second over those of LIGGGHTS on the same case, or of one thread on the same batch."""
+    """Steps per second over those of LIGGGHTS on the same case, or of one worker on the same batch."""
     for other in measurements:
-        if other.case == one.case and (other.engine.startswith("liggghts") or other.engine.endswith("1 thread")):
+        if other.case == one.case and (other.engine.startswith("liggghts") or other.engine.endswith("1 worker")):
             return one.steps_per_s / other.steps_per_s
     return math.nan
 

@@ -1,17 +1,19 @@
-"""Pours against the clock: one world step by step, and many worlds on several threads."""
+"""Pours against the clock: one world step by step, and many worlds on several cores."""
 
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Sequence
 
 import numpy as np
 
 from solver import backend
 from solver.benchmark.measurement import Measurement
+from solver.crew import Crew
 from solver.pour import Pour
 from solver.record import Outcome
-from solver.run import Job, capacity_for, run_pours
+from solver.run import Job, capacity_for
 from solver.scene import Scene, with_values
 from solver.world import SUMMARY_COLUMNS, Batch
 
@@ -45,18 +47,18 @@ def measure_pour(case: str, scene: Scene, seed: int, duration: float | None, sle
     )
 
 
-def measure_batch(case: str, scene: Scene, seeds: Sequence[int], threads: int) -> Measurement:
-    """Pours of ``seeds`` to rest in one batch on ``threads`` threads; steps are those of all pours together."""
-    backend.init(threads=threads)
-    list(run_pours([Job(with_values(scene, WARM_UP), seed) for seed in seeds], threads=threads))
-    begin = time.perf_counter()
-    records = [record for _, record in run_pours([Job(scene, seed) for seed in seeds], threads=threads)]
-    wall = time.perf_counter() - begin
+def measure_batch(case: str, scene: Scene, seeds: Sequence[int], workers: int) -> Measurement:
+    """Pours of ``seeds`` to rest by a crew of ``workers``, as studies run them; steps are those of all together."""
+    with Crew(workers) as crew:
+        list(crew.run_queue(deque(Job(with_values(scene, WARM_UP), seed) for seed in seeds), [scene]))
+        begin = time.perf_counter()
+        records = [record for _, record in crew.run_queue(deque(Job(scene, seed) for seed in seeds), [scene])]
+        wall = time.perf_counter() - begin
     steps = sum(record.steps for record in records)
     bodies = max(len(record.bodies.mass) for record in records)
     spheres = max(len(record.spheres.radius) for record in records)
     simulated = sum(record.steps * record.dt for record in records)
-    name = f"{len(seeds)} pours, {threads} thread{'s' if threads > 1 else ''}"
+    name = f"{len(seeds)} pours, {workers} worker{'s' if workers > 1 else ''}"
     return Measurement(case, name, bodies, spheres, steps, wall, simulated, float("nan"), float("nan"))
 
 
