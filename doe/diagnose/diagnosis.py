@@ -1,0 +1,145 @@
+"""The whole loop: simulate the declared model, judge the data, confirm by fresh pours, say what to measure next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from doe.diagnose.confirm import Confirmed, Model, confirm
+from doe.diagnose.decide import diagnose
+from doe.diagnose.holdout import HoldoutCondition, HoldoutError, holdout_errors
+from doe.diagnose.menu import Suggestion, next_experiment
+from doe.diagnose.pours import ModelPours, OnPour
+from doe.diagnose.runs import Condition, Declared, Effect, Observed, Parameter
+from doe.diagnose.screen import Budget, Say, Screened, further, screen
+from doe.diagnose.verdict import Verdict
+from doe.measurement.measurement import Condition as MeasuredCondition
+from doe.measurement.measurement import Measurement
+from doe.measurement.summaries import summaries_of_data, summary_names, summary_uncertainties
+from doe.runner import Pours
+from doe.store import Store
+from solver import EFFECTS, parameters
+
+SURVIVORS = 5
+"""Effects that are simulated further: the best of the race so far."""
+SURVIVING_GAP = 12.0
+"""Distance in the criterion to the best beyond which an effect is not simulated further."""
+FRESH = 12
+"""Pours per model and condition in the confirmation, at least."""
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What came out. ``fit_error`` and ``holdout_error`` are by fresh pours; the latter is empty without a holdout."""
+
+    declared: Declared
+    verdict: Verdict
+    before: Confirmed
+    after: Confirmed
+    """The same as ``before`` where no effect is named."""
+    fit_error: tuple[HoldoutError, ...]
+    holdout_error: tuple[HoldoutError, ...]
+    suggestions: tuple[Suggestion, ...]
+    pours: int
+    """Pours that were really run; the others were found in the store."""
+    settings: int
+
+
+def run_diagnosis(
+    measurement: Measurement,
+    store: Store,
+    pours: Pours,
+    effects: Sequence[str],
+    budget: Budget,
+    say: Say,
+    on_pour: OnPour | None = None,
+) -> Diagnosis:
+    """Diagnose ``measurement`` against its declared model, with ``effects`` as candidates."""
+    declared, paths = declare(measurement, effects), [p.path for p in measurement.parameters]
+    model = ModelPours(measurement.fit, paths, store, pours, on_pour)
+    everywhere = ModelPours(measurement.conditions, paths, store, pours, on_pour)
+    observed = observe(measurement.fit)
+    screened = screen(declared, model, budget, say)
+    verdict = diagnose(screened.declared, screened.runs, observed)
+    say(f"after screening: {verdict.kind}")
+    names = survivors(verdict)
+    if names:
+        screened = further(screened, names, model, budget, say)
+        verdict = diagnose(screened.declared, screened.runs, observed)
+    say(f"verdict: {verdict.kind}")
+    before, after = models(verdict)
+    fresh = max(FRESH, *(2 * condition.replicates for condition in measurement.conditions))
+    widths = [len(summary_names(condition)) for condition in measurement.conditions]
+    one = confirm(before, everywhere, fresh, widths)
+    other = one if after == before else confirm(after, everywhere, fresh, widths)
+    suggestions = next_experiment(verdict, screened, measurement.fit[0], paths, store, pours, on_pour)
+    return Diagnosis(
+        declared=screened.declared,
+        verdict=verdict,
+        before=one,
+        after=other,
+        fit_error=_errors(measurement, "fit", one, other),
+        holdout_error=_errors(measurement, "holdout", one, other),
+        suggestions=suggestions,
+        pours=model.run_now + everywhere.run_now,
+        settings=len(screened.points),
+    )
+
+
+def declare(measurement: Measurement, effects: Sequence[str]) -> Declared:
+    """The declared model in the terms of the decision: parameters, effects with their widest ranges, conditions."""
+    known = parameters(measurement.fit[0].scene)
+    found = []
+    for name in effects:
+        kind = EFFECTS[name]
+        ends = [known[f"effect.{name}.{field}"] for field in kind.amplitudes]
+        low = tuple(max(end.low, -kind.strongest) for end in ends)
+        found.append(Effect(name, low, tuple(min(end.high, kind.strongest) for end in ends)))
+    return Declared(
+        tuple(Parameter(p.path, p.low, p.high, p.mean, p.sd) for p in measurement.parameters),
+        tuple(found),
+        tuple(Condition(c.name, summary_names(c)) for c in measurement.fit),
+    )
+
+
+def observe(conditions: Sequence[MeasuredCondition]) -> Observed:
+    """The measured side of ``conditions``; what states no uncertainty of its own has none beside its replicates."""
+    stated = [np.nan_to_num(summary_uncertainties(condition)) for condition in conditions]
+    return Observed(tuple(summaries_of_data(condition) for condition in conditions), tuple(stated))
+
+
+def survivors(verdict: Verdict) -> tuple[str, ...]:
+    """Effects worth more pours: the best of the race, as far as they are within reach of it."""
+    raced = [row for row in verdict.effects if row.status == "raced" and np.isfinite(row.criterion)]
+    near = sorted((row for row in raced if row.delta <= SURVIVING_GAP), key=lambda row: row.criterion)
+    return tuple(row.name for row in near[:SURVIVORS])
+
+
+def models(verdict: Verdict) -> tuple[Model, Model]:
+    """The calibrated base model, and the best one that the verdict names (the base model where it names none)."""
+    before = Model(tuple(p.before for p in verdict.parameters))
+    if not verdict.names:
+        return before, before
+    members = verdict.names[0].split("+")
+    amplitudes = {
+        name: tuple(a.value for a in sorted(verdict.amplitudes, key=lambda a: a.index) if a.effect == name)
+        for name in members
+    }
+    return before, Model(tuple(p.after for p in verdict.parameters), tuple(amplitudes.items()))
+
+
+def _errors(measurement: Measurement, role: str, before: Confirmed, after: Confirmed) -> tuple[HoldoutError, ...]:
+    chosen = [c for c, condition in enumerate(measurement.conditions) if condition.role == role]
+    if not chosen:
+        return ()
+    conditions = []
+    for c in chosen:
+        data = summaries_of_data(measurement.conditions[c])
+        complete = data[np.isfinite(data).all(axis=1)]
+        names = summary_names(measurement.conditions[c])
+        conditions.append(
+            HoldoutCondition(measurement.conditions[c].name, names, complete, before.blocks[c], after.blocks[c])
+        )
+    return holdout_errors(conditions)

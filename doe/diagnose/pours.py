@@ -1,0 +1,175 @@
+"""Pours of the declared model: points of a plan in, summaries per condition out; every pour is kept in the store."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.diagnose.plan import Point
+from doe.diagnose.runs import BASE, Declared, Runs
+from doe.measurement.measurement import Condition
+from doe.measurement.summaries import summaries_of_record, summary_names
+from doe.runner import Pours, seed_of
+from doe.store import Store, StoredRun, run_key
+from solver import EFFECTS, Job, Outcome, Record, Scene, SetUpEffect, code_version, parameters, value, with_values
+
+FloatArray = npt.NDArray[np.float64]
+
+ROOT = 0
+"""Root of the seeds: the same for every data set of a model, so that its pours are found again."""
+
+OnPour = Callable[[str, int], None]
+"""Called with (what is being run, pours still to come)."""
+
+
+@dataclass(frozen=True)
+class Pour:
+    """What one pour of a point in a condition gave; NaN where nothing could be read."""
+
+    summaries: tuple[float, ...]
+    outcome: str
+
+    @property
+    def valid(self) -> bool:
+        """Whether the run came to its end."""
+        return Outcome(self.outcome).valid
+
+
+class ModelPours:
+    """Runs points of one declared model under its conditions. Points asked for before are not run again."""
+
+    def __init__(
+        self,
+        conditions: Sequence[Condition],
+        paths: Sequence[str],
+        store: Store,
+        pours: Pours,
+        on_pour: OnPour | None = None,
+        root: int = ROOT,
+    ) -> None:
+        self._conditions, self._paths, self._store = tuple(conditions), tuple(paths), store
+        self._pours, self._on_pour, self._root = pours, on_pour, root
+        self._known: dict[tuple[str, int, int], Pour] = {}
+        self.run_now = 0
+        """Pours that were really run, not found in the store."""
+
+    def run(self, what: str, points: Sequence[Point]) -> list[list[Pour]]:
+        """Pours of every point, one per condition."""
+        places = [(point, c) for point in points for c in range(len(self._conditions))]
+        wanted = [(point, c) for point, c in places if not self._find(point, c)]
+        left = len(wanted)
+        # Two kinds of arrays, with and without effects compiled in; each is compiled once for all points.
+        for acting in (False, True):
+            queue = deque(
+                Job(self.scene(point, c), self.seed(point, c), tag=tag)
+                for tag, (point, c) in enumerate(wanted)
+                if any(acts(name) for name, _ in point.effects) == acting
+            )
+            for job, record in self._pours(queue, self._room(acting)) if queue else ():
+                point, c = wanted[job.tag]
+                self._known[self._place(point, c)] = self._keep(what, point, c, job, record)
+                self.run_now += 1
+                left -= 1
+                if self._on_pour is not None:
+                    self._on_pour(what, left)
+        return [[self._known[self._place(point, c)] for c in range(len(self._conditions))] for point in points]
+
+    def scene(self, point: Point, condition: int) -> Scene:
+        """The scene of ``point`` in a condition."""
+        values: dict[str, float | str] = dict(zip(self._paths, point.theta, strict=True))
+        for effect, amplitude in point.effects:
+            names = EFFECTS[effect].amplitudes
+            values |= {f"effect.{effect}.{n}": a for n, a in zip(names, amplitude, strict=True)}
+        return with_values(self._conditions[condition].scene, values)
+
+    def seed(self, point: Point, condition: int) -> int:
+        """Seed of the pour of ``point`` in a condition."""
+        return seed_of(self._root, point.sequence, point.number, condition, 0)
+
+    def _find(self, point: Point, condition: int) -> bool:
+        """Whether the pour is known, here or in the store."""
+        place = self._place(point, condition)
+        if place not in self._known:
+            stored = self._store.find(run_key(self.scene(point, condition), self.seed(point, condition), code_version()))
+            found = None if stored is None else self._stored(stored, condition)
+            if found is not None:
+                self._known[place] = found
+        return place in self._known
+
+    def _room(self, acting: bool) -> list[Scene]:
+        """Scenes that need as much room as any point: every condition, as declared and at the ends of each effect."""
+        room = []
+        for condition in self._conditions:
+            for name, kind in EFFECTS.items():
+                if acts(name) != acting:
+                    continue
+                for share in (-1.0, 1.0):
+                    ends = {f"effect.{name}.{field}": share * kind.strongest for field in kind.amplitudes}
+                    known = parameters(condition.scene)
+                    inside = {path: max(known[path].low, x) for path, x in ends.items()}
+                    room.append(with_values(condition.scene, inside))
+        return room
+
+    def _place(self, point: Point, condition: int) -> tuple[str, int, int]:
+        return point.sequence, point.number, condition
+
+    def _stored(self, stored: StoredRun, condition: int) -> Pour | None:
+        names = summary_names(self._conditions[condition])
+        if any(name not in stored.observables for name in names):
+            return None
+        numbers = [stored.observables[name] for name in names]
+        return Pour(tuple(math.nan if x is None else x for x in numbers), stored.outcome)
+
+    def _keep(self, what: str, point: Point, condition: int, job: Job, record: Record) -> Pour:
+        asked = self._conditions[condition]
+        numbers = tuple(float(x) for x in summaries_of_record(asked, record))
+        pour = Pour(numbers, str(record.outcome))
+        self._store.add(
+            StoredRun(
+                key=run_key(job.scene, job.seed, code_version()),
+                study="diagnose",
+                stage=what,
+                label=f"{point.sequence} {point.number}",
+                seed=job.seed,
+                code_version=code_version(),
+                outcome=str(record.outcome),
+                message=record.message,
+                parameters={path: value(job.scene, path) for path in parameters(job.scene)},
+                observables={
+                    name: x if math.isfinite(x) else None for name, x in zip(summary_names(asked), numbers, strict=True)
+                },
+                dt=record.dt,
+                steps=record.steps,
+                wall_s=record.wall_s,
+            )
+        )
+        return pour
+
+
+def acts(effect: str) -> bool:
+    """Whether an effect acts in the kernels, rather than on material or set-up before a run."""
+    return not issubclass(EFFECTS[effect], SetUpEffect)
+
+
+def as_runs(declared: Declared, points: Sequence[Point], pours: Sequence[Sequence[Pour]]) -> Runs:
+    """Points with at most one effect and their pours as arrays; a pour that broke off counts as not simulated."""
+    names = [effect.name for effect in declared.effects]
+    effect = np.full(len(points), BASE, dtype=np.int64)
+    amplitude = np.zeros((len(points), 2))
+    for k, point in enumerate(points):
+        for name, values in point.effects:
+            effect[k] = names.index(name)
+            amplitude[k, : len(values)] = values
+    blocks = []
+    for c, condition in enumerate(declared.conditions):
+        block = np.full((len(points), len(condition.summaries)), np.nan)
+        for k, row in enumerate(pours):
+            if row[c].valid:
+                block[k] = row[c].summaries
+        blocks.append(block)
+    return Runs(np.array([p.theta for p in points]), effect, amplitude, tuple(blocks))

@@ -1,0 +1,27 @@
+"""``explorer diagnose``: which physical effect do measured data ask for that the declared model lacks?"""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+
+import typer
+
+
+def diagnose(
+    folder: Path = typer.Argument(..., metavar="DIR", help="Folder with measurement.toml."),
+    out: Path = typer.Option(Path("diagnosis"), help="Folder for diagnosis.json, report.html and report.md."),
+    effects: str = typer.Option("", metavar="A,B,…", help="Candidates; all effects if not given."),
+    budget: int | None = typer.Option(None, min=60, metavar="POURS", help="About so many pours for the emulator."),
+    resume: bool = typer.Option(False, "--resume", help="Go on in a folder that is not empty."),
+    store: Path | None = typer.Option(None, help="SQLite file that keeps every pour."),
+    threads: int | None = typer.Option(None, min=1, help="Worker processes; one per core if not given."),
+    apply: bool = typer.Option(False, "--apply", help="Also write the corrected material as OUT/corrected.toml."),
+) -> None:
+    """Calibrate the declared model, test what is left, name the missing effect, confirm it by fresh pours."""
+    from explorer.diagnose_run import DiagnoseOrder, run_diagnose
+
+    # The page cancels with SIGTERM; that has to end like Ctrl-C, with the store closed and finished pours kept.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    names = tuple(name.strip() for name in effects.split(",") if name.strip())
+    run_diagnose(DiagnoseOrder(folder, out, names, budget, resume, store, threads, apply), typer.echo)

@@ -1,0 +1,159 @@
+"""A diagnosis from its order to its files: the data are read, the loop is run, and its answer written."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from doe.diagnose.confirm import Confirmed
+from doe.diagnose.diagnosis import Diagnosis, run_diagnosis
+from doe.diagnose.holdout import HoldoutError
+from doe.diagnose.screen import Budget
+from doe.measurement.load import load_measurement
+from doe.measurement.measurement import Measurement
+from doe.measurement.summaries import summaries
+from doe.record import plain
+from doe.store import Store, default_store
+from explorer.corrected_material import corrected_toml
+from explorer.errors import CommandError
+from explorer.pour_progress import PourProgress
+from explorer.report.diagnosis import write_diagnosis_report
+from explorer.run_result import versions
+from explorer.whole_file import write_whole
+from solver import EFFECTS, Crew, code_version
+
+SCHEMA = 1
+
+
+@dataclass(frozen=True)
+class DiagnoseOrder:
+    """What a user asked for."""
+
+    folder: Path
+    out: Path
+    effects: tuple[str, ...] = ()
+    budget: int | None = None
+    resume: bool = False
+    store: Path | None = None
+    threads: int | None = None
+    apply: bool = False
+
+
+def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> Diagnosis:
+    """Run the loop and write the files. Finished pours are kept in the store, so an interrupted one goes on."""
+    unknown = [name for name in order.effects if name not in EFFECTS]
+    if unknown:
+        raise CommandError(f"--effects: {unknown[0]!r} is not one of {', '.join(EFFECTS)}")
+    measurement = load_measurement(order.folder)
+    if order.out.is_file() or (order.out.is_dir() and any(order.out.iterdir()) and not order.resume):
+        raise CommandError(f"--out {order.out}: is not empty; name a new folder, or add --resume to go on there")
+    names = order.effects or tuple(EFFECTS)
+    path = order.store or default_store()
+    budget = Budget()
+    if order.budget is not None:
+        budget = budget.scaled(order.budget, len(names), len(measurement.fit))
+    order.out.mkdir(parents=True, exist_ok=True)
+    say(f"{order.folder}: {len(measurement.fit)} fitted and {len(measurement.holdout)} held-out conditions; store {path}")
+    progress = PourProgress(order.out / "progress.jsonl", say, terminal=sys.stdout.isatty())
+    with ExitStack() as stack:
+        store = Store(path)
+        stack.callback(store.close)
+        crew = stack.enter_context(Crew(order.threads))
+        found = run_diagnosis(
+            measurement, store, crew.run_queue, names, budget, progress.stage, progress.pour
+        )
+    result = result_of(measurement, order, found, progress.elapsed)
+    write_whole(order.out / "diagnosis.json", json.dumps(result, ensure_ascii=False, allow_nan=False, indent=1) + "\n")
+    write_diagnosis_report(result, order.out)
+    say(f"{order.out}/report.html, report.md, diagnosis.json")
+    if order.apply:
+        write_whole(order.out / "corrected.toml", corrected_toml(measurement, found))
+        say(f"{order.out}/corrected.toml: the corrected model, for every command that takes a material")
+    for line in error_lines(result):
+        say(line)
+    return found
+
+
+def result_of(measurement: Measurement, order: DiagnoseOrder, found: Diagnosis, total_s: float) -> dict[str, Any]:
+    """The content of ``diagnosis.json``."""
+    verdict = found.verdict
+    units = {s.name: s.unit for condition in measurement.conditions for s in summaries(condition)}
+    return plain(
+        {
+            "schema": SCHEMA,
+            "verdict": verdict.kind,
+            "statement": verdict.statement,
+            "effects": verdict.effects,
+            "amplitudes": verdict.amplitudes,
+            "gates": verdict.gates,
+            "parameters": verdict.parameters,
+            "error": {
+                role: [_error(row, units) for row in rows]
+                for role, rows in (("fit", found.fit_error), ("holdout", found.holdout_error))
+            },
+            "next_experiment": found.suggestions,
+            "residuals": verdict.residuals,
+            "where": verdict.where,
+            "signatures": verdict.signatures,
+            "variances": verdict.variances,
+            "t2": {
+                "before": [verdict.t2_before, verdict.df_before],
+                "after": [verdict.t2_after, verdict.df_after],
+            },
+            "dropped": verdict.dropped,
+            "floored": verdict.floored,
+            "ranges": found.declared.effects,
+            "confirmation": {
+                "before": _confirmed(measurement, found.before),
+                "after": _confirmed(measurement, found.after),
+            },
+            "measured": [
+                {
+                    "condition": condition.name,
+                    "role": condition.role,
+                    "rig": condition.scene.rig.name,
+                    "replicates": condition.replicates,
+                    "summaries": [s.name for s in summaries(condition)],
+                }
+                for condition in measurement.conditions
+            ],
+            "data": {"folder": str(order.folder), "title": measurement.title, "ignored": measurement.ignored},
+            "units": units,
+            "pours": {"run": found.pours, "settings": found.settings},
+            "timing": {"total_s": total_s},
+            "versions": {**versions(), "solver": code_version()},
+        }
+    )
+
+
+def error_lines(result: dict[str, Any]) -> list[str]:
+    """The table *before | after | noise floor* on held-out data, or on fitted data where there are none."""
+    rows: Sequence[dict[str, Any]] = result["error"]["holdout"] or result["error"]["fit"]
+    role = "held-out" if result["error"]["holdout"] else "fitted"
+    lines = [f"error on {role} data", f"{'observable':26} {'before':>10} {'after':>10} {'noise floor':>12}"]
+    for row in rows:
+        numbers = (row["before"], row["after"], row["noise_floor"])
+        before, after, floor = (f"{x:.3g}" if x is not None else "–" for x in numbers)
+        lines.append(f"{row['observable']:26} {before:>10} {after:>10} {floor:>12}")
+    return lines
+
+
+def _error(row: HoldoutError, units: dict[str, str]) -> dict[str, Any]:
+    return {**row.to_dict(), "unit": units.get(row.observable, "σ")}
+
+
+def _confirmed(measurement: Measurement, found: Confirmed) -> dict[str, Any]:
+    return {
+        "theta": found.model.theta,
+        "effects": found.model.effects,
+        "broken": found.broken,
+        "conditions": [
+            {"condition": condition.name, "pours": len(block), "mean": block.mean(axis=0), "sd": block.std(axis=0, ddof=1)}
+            for condition, block in zip(measurement.conditions, found.blocks, strict=True)
+        ],
+    }
