@@ -1,6 +1,7 @@
 """Sums over a world as it stands: energies, masses, the fastest body. Nothing of the motion is changed."""
 
 from solver.backend import ti
+from solver.kernels.contacts import meet
 from solver.kernels.motion import energy_per_mass
 from solver.laws.hertz_mindlin import hertz_energy, spring_energy
 from solver.numerics import ROLLING_SLOPE
@@ -40,8 +41,11 @@ def sum_contacts(s: ti.template(), w):
         radius = s.contact.radius[w, k]
         if radius > 0.0:
             law = s.law.row[w, s.contact.law[w, k]]
-            overlap = radius * radius / s.contact.reduced_radius[w, k]
-            energy = hertz_energy(law, radius, overlap) + spring_energy(law, s.contact.spring[w, k].norm_sqr(), radius)
+            overlap, hertz = radius * radius / s.contact.reduced_radius[w, k], radius
+            if ti.static(s.effects):
+                overlap = ti.max(0.0, meet(s, w, k)[3])
+                hertz = ti.sqrt(s.contact.reduced_radius[w, k] * overlap)
+            energy = hertz_energy(law, hertz, overlap) + spring_energy(law, s.contact.spring[w, k].norm_sqr(), radius)
             s.summary.elastic[w] += energy
             s.summary.touching[w] += 1
             if s.contact.b[w, k] >= 0:
