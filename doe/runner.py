@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -100,8 +100,15 @@ def no_pile_shares(rows: Sequence[Sequence[Run]]) -> FloatArray:
     return np.array([np.mean([not run.valid for run in runs]) if runs else math.nan for runs in rows])
 
 
+Pours = Callable[[deque[Job], Sequence[Scene]], Iterable[tuple[Job, PourRecord]]]
+"""Runs the jobs of a queue, to which more may be added meanwhile, with room for the scenes named."""
+
+
 class PourRunner:
-    """Runs settings as pours in this process and keeps every run in the store."""
+    """Runs settings as pours and keeps every run in the store.
+
+    Pours run in this process, where ``observer`` can watch them, or as ``pours`` says (``solver.Crew.run_queue``).
+    """
 
     def __init__(
         self,
@@ -112,9 +119,11 @@ class PourRunner:
         threads: int | None = None,
         on_run: OnRun | None = None,
         observer: PourObserver | None = None,
+        pours: Pours | None = None,
     ) -> None:
         self._scene, self._store, self._study, self._seed = scene, store, study, study_seed
         self._threads, self._on_run, self._observer = threads, on_run, observer
+        self._pours = pours
 
     def run(self, stage: str, settings: Sequence[Setting]) -> list[list[Run]]:
         """See :class:`Runner`. Runs found in the store are taken from there."""
@@ -150,8 +159,11 @@ class PourRunner:
             if self._observer is not None:
                 self._observer.sample(stage, job.seed, pour)
 
+        def here(jobs: deque[Job], room: Sequence[Scene]) -> Iterable[tuple[Job, PourRecord]]:
+            return run_queue(jobs, room, self._threads, on_sample=sample)
+
         if queue:
-            for job, record in run_queue(queue, scenes, self._threads, on_sample=sample):
+            for job, record in (self._pours or here)(queue, scenes):
                 row, replicate, attempt = places[job.tag]
                 if self._observer is not None:
                     self._observer.finish(stage, job.seed, record)

@@ -21,7 +21,8 @@ from explorer.progress import Progress
 from explorer.report import write_report
 from explorer.run_result import versions
 from explorer.whole_file import write_whole
-from solver import code_version
+from solver import Crew, code_version
+from solver.arch import chosen
 from solver.observables.made_up import estimator_bias
 
 if TYPE_CHECKING:
@@ -59,8 +60,17 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> float:
     with ExitStack() as stack:
         stack.callback(store.close)
         recorder = stack.enter_context(_recorder(order.record)) if order.record else None
+        # A recorder watches pours from within; all others run in processes of their own.
+        crew = stack.enter_context(Crew(order.threads)) if recorder is None and chosen() == "cpu" else None
         runner = PourRunner(
-            study.scene, store, study.name, study.seed, order.threads, on_run=progress.run, observer=recorder
+            study.scene,
+            store,
+            study.name,
+            study.seed,
+            order.threads,
+            on_run=progress.run,
+            observer=recorder,
+            pours=crew.run_queue if crew else None,
         )
         found = run_campaign(study, profile, runner, estimator_bias(study.estimators), on_stage=progress.stage)
     result = result_of(study, profile, found, progress.elapsed)

@@ -19,9 +19,11 @@ from solver.toml_table import read_toml
 from solver.version import code_version
 
 if TYPE_CHECKING:
+    from solver.crew import Crew
     from solver.run import Job, run_pour, run_pours, run_queue
 
 _NEEDS_TAICHI = {
+    "Crew": "solver.crew",
     "Job": "solver.run",
     "run_pour": "solver.run",
     "run_pours": "solver.run",
@@ -38,6 +40,7 @@ def __getattr__(name: str) -> Any:
 __all__ = [
     "Bodies",
     "Body",
+    "Crew",
     "Entries",
     "Job",
     "Outcome",

@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 import numpy.typing as npt
 
+from solver.clump_cache import kept_fit
 from solver.clump_fit import ClumpFit, extent_errors, measured_fit
 from solver.shape import ShapeError, Solid, file_stamp, mass_properties, surface_mesh
 from solver.solid_points import interior_points, surface_points
@@ -77,7 +78,8 @@ def fit_clump(solid: Solid, density: float, spheres: str) -> Clump:
     within 2 %, is taken. If none does, the layout of least deviation is, and `fit` says by how much it
     misses. Number: the best symmetric layout of so many spheres where the solid is symmetric and there is one,
     else the best of `solver.sphere_number`. A sphere is its own clump, exactly. Mass and inertia are the
-    solid's, never the spheres'. Cached by solid and spheres, a mesh also by the time of its file's last change.
+    solid's, never the spheres'. Kept in memory (a mesh by the time of its file's last change) and on disk
+    (`solver.clump_cache`).
 
     Args:
         solid: true shape.
@@ -177,6 +179,10 @@ def _fit_spheres(solid: Solid, spheres: str, stamp: int) -> tuple[Array, Array, 
     if solid.kind == "sphere":
         radius = solid.dimensions[0] / 2.0
         return np.zeros((1, 3)), np.array([radius]), ClumpFit(1, 1.0, 1.0, 0.0, 0.0, (0.0, 0.0, 0.0), radius)
+    return kept_fit(solid, spheres, _new_fit)
+
+
+def _new_fit(solid: Solid, spheres: str) -> tuple[Array, Array, ClumpFit]:
     if spheres in DEMANDS:
         volume = mass_properties(solid, 1.0).volume
         diameter = np.cbrt(6.0 * volume / np.pi)

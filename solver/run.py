@@ -110,6 +110,16 @@ def run_queue(
                 yield job, pour.record()
 
 
+def run_job(batch: Batch, job: Job) -> Record:
+    """Run one job in world 0 of ``batch``, which nothing else uses meanwhile."""
+    pour = job.begin(batch, 0)
+    steps = np.zeros(batch.capacity.worlds, dtype=np.int32)
+    while (due := pour.steps_due()) > 0:
+        steps[0] = due
+        pour.after(due, batch.advance(steps)[0])
+    return pour.record()
+
+
 def run_pours(
     jobs: Sequence[Job],
     threads: int | None = None,

@@ -26,6 +26,8 @@ def take(state: Any, w: int) -> Arrays:
         for name in table:
             row = getattr(getattr(state, group), name).to_numpy()[w]
             found[f"{group}.{name}"] = row if group == "world" else row[: used[group]].copy()
+    if state.effects:
+        found["memory.number"] = state.memory.number.to_numpy()[w][: used["contact"]].copy()
     found["candidate.triangle"] = state.candidate.triangle.to_numpy()[w][: used["candidate"]].copy()
     # Surfaces are numbered after the members' capacity; free the numbers of it.
     partner, room = found["contact.j"], state.member.body.shape[1]

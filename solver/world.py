@@ -76,6 +76,9 @@ class Batch:
     def load(self, w: int, scene: Scene, bodies: Layout, dt: float, active: Sequence[bool]) -> None:
         """Empty world ``w`` and set it up for ``scene``; no body has entered yet. ``active``: one per surface."""
         s, rig, numerics = self._s, scene.rig, scene.numerics
+        for name, needed in (("bodies", len(bodies.numbers)), ("members", len(bodies.spheres))):
+            if needed > getattr(self.capacity, name):
+                raise ValueError(f"{needed} {name} do not fit into a batch of {getattr(self.capacity, name)}")
         grip = reach_of_pulls(scene, wall_materials(scene))
         cell = 2.0 * float(bodies.numbers[:, 4].max()) + numerics.skin + grip
         sleep_speed = numerics.sleep_speed if any(scene.gravity) else 0.0

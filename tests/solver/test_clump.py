@@ -130,8 +130,9 @@ def test_clump_scales_with_the_solid():
     np.testing.assert_allclose(large.radii, 2.0 * small.radii, rtol=1e-7)
 
 
-def test_same_bits_again():
+def test_same_bits_again(tmp_path, monkeypatch):
     first = fit_clump(SEED, 346.0, "standard")
+    monkeypatch.setenv("REPOSE_CACHE", str(tmp_path))  # empty: it is fitted again
     _fit_spheres.cache_clear()
     again = fit_clump(SEED, 346.0, "standard")
     assert again.centres is not first.centres

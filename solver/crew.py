@@ -1,0 +1,128 @@
+"""Worker processes that run pours side by side: one thread and one world each, so that none waits for another.
+
+In one process all worlds wait at the end of a launch for the slowest, and while Python feeds and samples one world the
+other cores rest: two threads of :func:`solver.run.run_queue` do the work of 1.5, two workers that of 2. The bits are
+the same. A worker ends with its pipe: at :meth:`Crew.close`, or when the process that made it is gone.
+"""
+
+from __future__ import annotations
+
+import multiprocessing as mp
+import os
+import signal
+from collections import deque
+from collections.abc import Iterator, Sequence
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from typing import TYPE_CHECKING, Any
+
+from solver.scene import Scene
+
+if TYPE_CHECKING:
+    from solver.record import Record
+    from solver.run import Job
+
+
+GONE = "a worker process has ended before its work was done"
+
+
+class Crew:
+    """Processes that are started when they are first needed and kept for the next queue."""
+
+    def __init__(self, workers: int | None = None) -> None:
+        self._number = workers or os.cpu_count() or 1
+        self._workers: list[tuple[BaseProcess, Connection]] = []
+
+    def run_queue(self, queue: deque[Job], room: Sequence[Scene]) -> Iterator[tuple[Job, Record]]:
+        """Run the jobs in ``queue`` and yield (job, record) as each finishes; jobs may be appended meanwhile.
+
+        ``room`` lists scenes that any job has to fit into. Raises RuntimeError with a worker's error, or if one died.
+        """
+        if not self._workers:
+            self._workers = [_worker() for _ in range(self._number)]
+        for _, pipe in self._workers:
+            _send(pipe, list(room))
+        idle = [pipe for _, pipe in self._workers]
+        busy: dict[Connection, Job] = {}
+        try:
+            while queue or busy:
+                while queue and idle:
+                    pipe = idle.pop(0)
+                    busy[pipe] = queue.popleft()
+                    _send(pipe, busy[pipe])
+                for pipe in [ready for ready in wait(list(busy)) if isinstance(ready, Connection)]:
+                    record = _answer(pipe)
+                    idle.append(pipe)
+                    yield busy.pop(pipe), record
+        finally:
+            if busy:  # left before the end: what still runs is of no use
+                self.close(at_once=True)
+
+    def close(self, at_once: bool = False) -> None:
+        """End the workers; ``at_once`` also those that are in the middle of a pour."""
+        for process, pipe in self._workers:
+            pipe.close()
+            if at_once:
+                process.kill()
+            process.join()
+        self._workers = []
+
+    def __enter__(self) -> Crew:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close(at_once=error[0] is not None)
+
+
+def _worker() -> tuple[BaseProcess, Connection]:
+    ours, theirs = mp.Pipe()
+    process = mp.get_context("spawn").Process(target=_work, args=(theirs,), name="pours")
+    process.start()
+    theirs.close()
+    return process, ours
+
+
+def _send(pipe: Connection, order: Any) -> None:
+    try:
+        pipe.send(order)
+    except OSError:
+        raise RuntimeError(GONE) from None
+
+
+def _answer(pipe: Connection) -> Any:
+    try:
+        answer = pipe.recv()
+    except (EOFError, OSError):
+        raise RuntimeError(GONE) from None
+    if isinstance(answer, BaseException):
+        raise RuntimeError(f"a pour broke off: {answer!r}") from answer
+    return answer
+
+
+def _work(pipe: Connection) -> None:
+    """Run what comes through ``pipe``: a list of scenes makes room for them, a job is answered by its record."""
+    # Ctrl-C reaches the whole group; the process in charge decides, and its end closes the pipe.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    from solver import backend
+    from solver.run import capacity_for, run_job
+    from solver.world import Batch
+
+    backend.init(threads=1)
+    batch: Batch | None = None
+    while True:
+        try:
+            order = pipe.recv()
+        except EOFError:
+            return
+        try:
+            if isinstance(order, list):
+                batch = Batch(capacity_for(order, 1))
+                continue
+            assert batch is not None, "room is made before the first job"
+            answer: Any = run_job(batch, order)
+        except Exception as error:  # whatever it is, the process in charge has to know
+            answer = error
+        try:
+            pipe.send(answer)
+        except BrokenPipeError:
+            return

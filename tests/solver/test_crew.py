@@ -1,0 +1,66 @@
+"""Worker processes: the same bits as in this process, errors that arrive, and nothing left behind."""
+
+import os
+import signal
+from collections import deque
+
+import numpy as np
+import pytest
+
+from solver import load_material, with_values
+from solver.crew import Crew
+from solver.run import Job, run_pours
+
+HEAP = with_values(
+    load_material("sunflower_extract"), {"rig.mass": 0.003, "body.spheres": "coarse", "numerics.max_time": 0.4}
+)
+
+
+@pytest.fixture(scope="module")
+def crew():
+    with Crew(2) as workers:
+        yield workers
+
+
+def test_same_bits_as_in_one_process(taichi, crew):
+    jobs = [Job(HEAP, seed, tag=seed) for seed in range(3)]
+    apart = {job.tag: record for job, record in crew.run_queue(deque(jobs), [HEAP])}
+    here = dict(run_pours(jobs, worlds=2))
+    assert sorted(apart) == [0, 1, 2]
+    for seed, record in here.items():
+        np.testing.assert_array_equal(apart[seed].bodies.position, record.bodies.position)
+        assert apart[seed].outcome == record.outcome
+
+
+def test_jobs_may_be_added_while_it_runs(crew):
+    queue = deque([Job(HEAP, 1, tag=0)])
+    seen = []
+    for job, _ in crew.run_queue(queue, [HEAP]):
+        seen.append(job.tag)
+        if job.tag < 2:
+            queue.append(Job(HEAP, 2, tag=job.tag + 1))
+    assert seen == [0, 1, 2]
+
+
+def test_a_workers_error_arrives_with_its_text(crew):
+    queue = deque([Job(with_values(HEAP, {"rig.mass": 0.2}), 1)])
+    with pytest.raises(RuntimeError, match="a pour broke off"):
+        list(crew.run_queue(queue, [HEAP]))
+
+
+def test_a_worker_that_is_killed_is_named():
+    with Crew(1) as crew:
+        pours = crew.run_queue(deque([Job(HEAP, 1), Job(HEAP, 2)]), [HEAP])
+        next(pours)
+        ((process, _),) = crew._workers
+        os.kill(process.pid, signal.SIGKILL)
+        with pytest.raises(RuntimeError, match="a worker process has ended"):
+            list(pours)
+
+
+def test_nothing_is_left_after_close():
+    crew = Crew(1)
+    list(crew.run_queue(deque([Job(HEAP, 1)]), [HEAP]))
+    ((process, _),) = crew._workers
+    crew.close()
+    assert process.exitcode == 0
