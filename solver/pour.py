@@ -157,6 +157,14 @@ class Pour:
         if self.outcome in (Outcome.AT_REST, Outcome.JAMMED):
             self.outcome, self.message = Outcome.RUNNING, ""
 
+    def move_to(self, batch: Batch) -> None:
+        """Go on in ``batch``, in the same world, with the same bits: for instance in one with effects compiled in."""
+        kept = self.batch.take(self.w)
+        batch.load(self.w, self.scene, self._layout, self.dt, (True,) * len(self.rig.surfaces()))
+        batch.set_law(self.w, self._table)
+        batch.put(self.w, kept)
+        self.batch = batch
+
     def bodies(self) -> Bodies:
         """Present state of all bodies that have entered."""
         return bodies_of(self.scene, self.order, self._layout, self.batch.bodies(self.w, self.entered))
