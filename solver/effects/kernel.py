@@ -36,6 +36,11 @@ class KernelFunction:
         """The same as ``ti.func`` makes it."""
         return ti.func(self.body)  # type: ignore[no-any-return]
 
+    @property
+    def func(self) -> Any:
+        """Taichi's own object, which it asks for after a call."""
+        return self.compiled.func  # type: ignore[attr-defined]
+
     def __call__(self, *args: Any) -> Any:
         return self.compiled(*args)
 

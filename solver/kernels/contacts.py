@@ -133,6 +133,7 @@ def respond(s: ti.template(), w, k, n, overlap, velocity, omega):
     hertz = normal_spring_force(law, contact_radius, pressed)
     damper = normal_damper(law, ti.sqrt(contact_radius * mass), before, pressed, v_n, dt)
     elastic, floor, pull, released = hertz, 0.0, 0.0, 0
+    touch = Touch(force=0.0)
     if ti.static(s.effects):
         touch = touch_of(s, w, k, n, overlap, velocity, omega, contact_radius, hertz, damper)
         touch = pass_stage(s, w, k, touch, Stage.NORMAL)
