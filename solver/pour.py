@@ -49,7 +49,10 @@ Summary = dict[str, float]
 
 
 class Pour:
-    """State of one pour; ``scene`` is the one with its set-up effects carried out. Drive it with :meth:`steps_due`, ``batch.advance`` and :meth:`after`."""
+    """State of one pour; ``scene`` is the one with its set-up effects carried out.
+
+    Drive it with :meth:`steps_due`, ``batch.advance`` and :meth:`after`.
+    """
 
     def __init__(self, batch: Batch, w: int, scene: Scene, seed: int) -> None:
         scene = actual(scene)
@@ -143,12 +146,13 @@ class Pour:
         """Let the running pour follow the material of ``scene``; wakes it up if it had come to rest.
 
         Friction and effects act at once; stiffness and damping are ramped (see ``solver/retune.py``). Only materials,
-        pairs and effects of contacts and bodies may differ from the present scene; anything else takes a new pour.
+        pairs and effects of contacts and bodies may differ from the present scene; anything else takes a new pour. For
+        effects the batch needs them compiled in (RuntimeError otherwise): see :meth:`move_to`.
         """
         scene = actual(scene)
         target = law_table(scene)
-        self.scene = scene
         self.batch.set_effects(self.w, scene)
+        self.scene = scene
         self._ramp = Ramp(self._table, target, self.time)
         self._set_time_step(min(self.dt, time_step(scene)))
         self.energy_put_in = 0.0

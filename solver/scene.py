@@ -21,6 +21,7 @@ from typing import Any, cast
 
 from solver.body import SPHERES, Body, body_parameters, counts, with_body_value, with_densities
 from solver.effects import EFFECTS, Effect
+from solver.effects.set_up import actual
 from solver.insertion import Insertion
 from solver.material import Material, Pair
 from solver.numerics import Numerics
@@ -189,7 +190,8 @@ def with_values(scene: Scene, values: dict[str, Any]) -> Scene:
 
 
 def check(scene: Scene) -> None:
-    """Raise :class:`ParameterError` where the parts of a scene do not fit together."""
+    """Raise :class:`ParameterError` where the parts of a scene, as it is after its set-up effects, do not fit."""
+    scene = actual(scene)
     for body in scene.bodies:
         scene.material(body.material)
         scene.contact_pair(body, scene.rig.wall)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from solver.backend import ti
-from solver.effects.columns import COLUMNS, MEMORY
+from solver.effects.columns import COLUMNS, KEPT
 
 Vec3 = ti.types.vector(3, ti.f64)
 Vec4 = ti.types.vector(4, ti.f64)
@@ -238,7 +238,7 @@ class State:
         self.law = Group({"row": Vec5}, (c.worlds, c.kinds * c.kinds))
         # Parameters of effects by contact class, and what they keep of a contact (``effects/columns.py``).
         self.effects = c.effects
-        room = (c.worlds, c.contacts, MEMORY[-1]) if c.effects else (1, 1, 1)
+        room = (c.worlds, c.contacts, KEPT) if c.effects else (1, 1, 1)
         self.effect = Group({"row": ti.f64}, (c.worlds, c.kinds * c.kinds, COLUMNS[-1] + 1))
         self.memory = Group({"number": ti.f64, "kept": ti.f64}, room)
 

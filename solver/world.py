@@ -79,8 +79,7 @@ class Batch:
         for name, needed in (("bodies", len(bodies.numbers)), ("members", len(bodies.spheres))):
             if needed > getattr(self.capacity, name):
                 raise ValueError(f"{needed} {name} do not fit into a batch of {getattr(self.capacity, name)}")
-        grip = reach_of_pulls(scene, wall_materials(scene))
-        cell = 2.0 * float(bodies.numbers[:, 4].max()) + numerics.skin + grip
+        cell = 2.0 * float(bodies.numbers[:, 4].max()) + numerics.skin
         sleep_speed = numerics.sleep_speed if any(scene.gravity) else 0.0
         settings = [dt, numerics.skin, cell, sleep_speed, numerics.sleep_time]
         inside = rig.container(0.0)

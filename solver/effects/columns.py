@@ -24,7 +24,13 @@ COLUMNS = (0, *accumulate(WIDTHS))
 """First column of each effect's parameters, contact effects before body effects; the restitution stands in the last."""
 MEMORIES = tuple(kind.memory for kind in CONTACT_EFFECTS)
 MEMORY = (0, *accumulate(MEMORIES))
-"""First column of what each contact effect keeps of a contact; the last entry is the number of columns."""
+"""First column of what each contact effect keeps of a contact; after them stand ``COUPLE`` and ``HERTZ``."""
+COUPLE = MEMORY[-1]
+"""First of three columns: torque of the effects on the first body at the last step [N m], for the energy account."""
+HERTZ = COUPLE + 3
+"""Contact radius without adhesion, √(R* δ), at the last step [m], for the energy account."""
+KEPT = HERTZ + 1
+"""Number of columns that a contact keeps."""
 
 
 def kernel_effects(scene: Scene) -> bool:
@@ -57,17 +63,24 @@ def effect_table(scene: Scene, walls: tuple[str, ...]) -> Array:
 
 
 def reach_of_pulls(scene: Scene, walls: tuple[str, ...]) -> float:
-    """Largest distance [m] at which an effect of ``scene`` may still hold two surfaces together."""
-    reach = 0.0
-    for effect in scene.effects:
-        if not effect.on or not isinstance(effect, ContactEffect):
-            continue
-        for body in scene.bodies:
-            radius = float(body.clump.radii.max()) * body.sizes.high
-            for other in (*(b.material for b in scene.bodies), *walls):
-                e_star = effective_youngs_modulus(scene.material(body.material), scene.material(other))
-                reach = max(reach, effect.grip(e_star, radius), effect.grip(e_star, radius / 2.0))
-    return reach
+    """Distance [m] beyond which no effect of ``scene`` holds two surfaces together.
+
+    A grip is monotonic in R* or falls and rises again, so the ends of the range of R* bound it: half the smallest member
+    sphere's radius and the largest's. Grips are added: that of two works of adhesion is no longer than both of theirs.
+    """
+    pulling = [effect for effect in scene.effects if effect.on and isinstance(effect, ContactEffect)]
+    if not pulling:
+        return 0.0
+    radii = [(body.clump.radii, body.sizes) for body in scene.bodies]
+    least = min(float(radius.min()) * sizes.low for radius, sizes in radii) / 2.0
+    largest = max(float(radius.max()) * sizes.high for radius, sizes in radii)
+    materials = {body.material for body in scene.bodies}
+    moduli = [
+        effective_youngs_modulus(scene.material(one), scene.material(other))
+        for one in materials
+        for other in (*materials, *walls)
+    ]
+    return sum(max(effect.grip(e, radius) for e in moduli for radius in (least, largest)) for effect in pulling)
 
 
 def _row(effect: ContactEffect, at_wall: bool, width: int) -> Array:

@@ -2,6 +2,7 @@
 
     x → (1 + ε) x,   y, z → y, z/√(1 + ε)        along the principal axes, x the longest
 
+A cylinder wider than long gets the wider for it: d → (1 + ε) d, l → l/(1 + ε)².
 A solid's dimensions change so; of a body that is declared by spheres the centres move and the radii stay. Vanishes for
 ε → 0. Inertia follows the dimensions: those of a solid anew, those of spheres by the second moments of the stretch.
 """
@@ -46,6 +47,8 @@ class ShapeElongation(SetUpEffect):
             ellipsoid = replace(solid, kind="ellipsoid", dimensions=(size * along, size * across, size * across))
             return replace(body, shape=ellipsoid)
         longest = int(np.argmax(solid.dimensions))
+        if solid.kind == "cylinder" and longest == DIMENSIONS["cylinder"].index("diameter"):
+            across = along**-2.0
         stretched = tuple(size * (along if k == longest else across) for k, size in enumerate(solid.dimensions))
         return replace(body, shape=replace(solid, dimensions=stretched))
 

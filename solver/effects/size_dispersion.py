@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from solver.effects.effect import SetUpEffect
-from solver.params import param
-from solver.sizes import SizeDistribution
+from solver.params import ParameterError, param
+from solver.sizes import MOST_SPREAD, SizeDistribution
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,12 @@ class SizeDispersion(SetUpEffect):
         def spread(sizes: SizeDistribution) -> SizeDistribution:
             kind = sizes.kind if sizes.kind != "none" else "log_normal"
             before = sizes.spread if sizes.varies else 0.0
-            return SizeDistribution(kind, (before**2 + self.spread**2) ** 0.5)
+            together = (before**2 + self.spread**2) ** 0.5
+            if together > MOST_SPREAD:
+                raise ParameterError(
+                    f"effect.size_dispersion.spread: {self.spread:g} beside the declared {before:g} makes "
+                    f"{together:.3g}; allowed: up to {MOST_SPREAD:g}"
+                )
+            return SizeDistribution(kind, together)
 
         return replace(scene, bodies=tuple(replace(body, sizes=spread(body.sizes)) for body in scene.bodies))

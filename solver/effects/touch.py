@@ -22,6 +22,8 @@ Touch = ti.types.struct(
     # What the stages work out
     radius=ti.f64,  # contact radius a [m]
     elastic=ti.f64,  # NORMAL, ADHESION: force without damping [N], tensile where negative
+    adhesive=ti.f64,  # the part of it that JKR sets: Hertz's force, with adhesion JKR's [N]
+    work=ti.f64,  # ADHESION: work of adhesion so far [J/m²]; those of several effects add up
     damper=ti.f64,  # NORMAL: damping force over speed [kg/s]
     floor=ti.f64,  # ADHESION: the normal force never falls below this [N], ≤ 0
     pull=ti.f64,  # ADHESION: what the Coulomb limit takes in addition to the normal force [N], ≥ 0

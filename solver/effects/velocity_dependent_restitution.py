@@ -4,7 +4,8 @@
 
 e is the declared restitution, taken to hold at v₀ = 1 m/s; q = 1 is the law of viscoelastic spheres to leading order,
 q = 0 the base model. The damper of a contact is that of e(v), kept within 0.05 … 1, by the exact inverse of
-``laws/restitution.py``, which is read from a table.
+``laws/restitution.py`` as a series. A contact that stood when the effect was switched on keeps its damper; one that
+began slowly keeps a weak one, however hard it is hit later.
 Source: Brilliantov, Spahn, Hertzsch & Pöschel 1996, Physical Review E 53:5382; Schwager & Pöschel 1998, PRE 57:650.
 """
 
@@ -44,15 +45,14 @@ def damping_of(restitution):
 
 @kernel_function
 def damp_by_speed(p, m, c):
-    """p: q, v₀; m: factor on the damper, found when the contact began."""
+    """p: q, v₀; m: by how much the damper is off from that of e, as a fraction; found when the contact began."""
     if c.fresh == 1:
         speed = ti.max(1e-4, -c.v_n) / p[1]
         loss = (1.0 - c.restitution) * (1.0 + p[0] * (speed**0.2 - 1.0))
         now = ti.max(0.05, ti.min(1.0, 1.0 - loss))
-        m[0] = 1.0
         if c.restitution < 1.0:
-            m[0] = damping_of(now) / damping_of(c.restitution)
-    c.damper *= m[0]
+            m[0] = damping_of(now) / damping_of(c.restitution) - 1.0
+    c.damper *= 1.0 + m[0]
     return c, m
 
 

@@ -4,7 +4,7 @@ from solver.backend import ti
 from solver.effects import Stage
 from solver.effects.columns import COLUMNS
 from solver.effects.touch import Touch
-from solver.kernels.effects import forget, pass_stage
+from solver.kernels.effects import forget, keep, last_couple, pass_stage
 from solver.kernels.walls import from_patch, from_primitive, surface_velocity
 from solver.laws.hertz_mindlin import (
     normal_damper,
@@ -15,7 +15,6 @@ from solver.laws.hertz_mindlin import (
     tangential_force,
 )
 from solver.state import Vec3, Vec4
-
 
 HELD_OVERLAP = 1e-21
 """Overlap [m] that stands for surfaces held together at a gap: their contact radius, 1e-12 m, bears nothing."""
@@ -36,19 +35,27 @@ def meet_surface(s: ti.template(), w, k):
 
 
 @ti.func
+def may_hold(s: ti.template(), w, k):
+    """Whether the surfaces of entry ``k`` have touched and an effect that pulls may hold them at a gap."""
+    return s.contact.radius[w, k] > 0.0 and s.world.grip[w] > 0.0
+
+
+@ti.func
 def meet(s: ti.template(), w, k):
-    """Normal from j to i and overlap [m] of entry ``k``: (nx, ny, nz, overlap); the overlap is ≤ 0 when apart,
-    and −1 when further apart than any pull reaches."""
+    """Normal from j to i and overlap [m] of entry ``k``: (nx, ny, nz, overlap); the overlap is ≤ 0 when apart.
+
+    The true distance is found only of surfaces that overlap or may hold each other.
+    """
     i, j = s.contact.i[w, k], s.contact.j[w, k]
     found = Vec4(0.0, 0.0, 0.0, -1.0)
     if j < s.member.body.shape[1]:
         gap = s.member.centre[w, i] - s.member.centre[w, j]
         reach = s.member.radius[w, i] + s.member.radius[w, j]
-        limit = reach
-        if ti.static(s.effects):
-            limit += s.world.grip[w]
         distance2 = gap.dot(gap)
-        if distance2 < limit * limit and distance2 > 0.0:
+        near = distance2 < reach * reach
+        if ti.static(s.effects):
+            near = near or may_hold(s, w, k)
+        if near and distance2 > 0.0:
             distance = ti.sqrt(distance2)
             n = (1.0 / distance) * gap
             found = Vec4(n[0], n[1], n[2], reach - distance)
@@ -104,6 +111,8 @@ def touch_of(s: ti.template(), w, k, n, overlap, velocity, omega, a, elastic, da
         friction=law[2],
         radius=a,
         elastic=elastic,
+        adhesive=elastic,
+        work=0.0,
         damper=damper,
         floor=0.0,
         pull=0.0,
@@ -130,9 +139,10 @@ def respond(s: ti.template(), w, k, n, overlap, velocity, omega):
     if ti.static(s.effects):
         pressed = ti.max(HELD_OVERLAP, overlap)
     contact_radius = ti.sqrt(s.contact.reduced_radius[w, k] * pressed)
+    hertz_radius = contact_radius
     hertz = normal_spring_force(law, contact_radius, pressed)
     damper = normal_damper(law, ti.sqrt(contact_radius * mass), before, pressed, v_n, dt)
-    elastic, floor, pull, released = hertz, 0.0, 0.0, 0
+    elastic, floor, pull, released, last_half = hertz, 0.0, 0.0, 0, 0.0
     touch = Touch(force=0.0)
     if ti.static(s.effects):
         touch = touch_of(s, w, k, n, overlap, velocity, omega, contact_radius, hertz, damper)
@@ -165,7 +175,9 @@ def respond(s: ti.template(), w, k, n, overlap, velocity, omega):
         touch = pass_stage(s, w, k, touch, Stage.ROLLING)
         touch = pass_stage(s, w, k, touch, Stage.TWISTING)
         torque = touch.torque
-        lost -= dt * torque.dot(omega)
+        lost -= 0.5 * dt * (torque + last_couple(s, w, k)).dot(omega)
+        last_half = 0.5 * dt * (last_loss.dot(velocity) - last_couple(s, w, k).dot(omega))
+        keep(s, w, k, torque, hertz_radius)
     s.contact.spring[w, k] = spring
     s.contact.radius[w, k] = contact_radius
     s.contact.expected[w, k] = v_n + dt * f_n / mass
@@ -174,7 +186,7 @@ def respond(s: ti.template(), w, k, n, overlap, velocity, omega):
         if released == 1:
             s.contact.spring[w, k], s.contact.radius[w, k] = old, before
             lose(s, w, k, law)
-            force, torque, lost = Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0), 0.0
+            force, torque, lost = Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0), last_half
     return force, torque, lost
 
 
@@ -183,7 +195,7 @@ def lasts(s: ti.template(), w, k, overlap):
     """Whether entry ``k`` may act: its surfaces overlap, or have touched and something may hold them still."""
     acts = overlap > 0.0
     if ti.static(s.effects):
-        acts = overlap > 0.0 or (s.contact.radius[w, k] > 0.0 and overlap > -s.world.grip[w])
+        acts = overlap > 0.0 or may_hold(s, w, k)
     return acts
 
 

@@ -7,7 +7,7 @@ its columns of ``effect.memory``.
 
 from solver.backend import ti
 from solver.effects import BODY_EFFECTS, CONTACT_EFFECTS
-from solver.effects.columns import COLUMNS, MEMORIES, MEMORY, WIDTHS
+from solver.effects.columns import COLUMNS, COUPLE, HERTZ, KEPT, MEMORIES, MEMORY, WIDTHS
 from solver.effects.touch import Flight
 from solver.kernels.geometry import rotation
 from solver.state import Vec3
@@ -37,8 +37,22 @@ def pass_stage(s: ti.template(), w, k, touch, stage: ti.template()):
 @ti.func
 def forget(s: ti.template(), w, k):
     """Entry ``k`` has come apart: what effects kept of it is gone."""
-    for column in ti.static(range(MEMORY[-1])):
+    for column in ti.static(range(KEPT)):
         s.memory.number[w, k, column] = 0.0
+
+
+@ti.func
+def last_couple(s: ti.template(), w, k):
+    """Torque [N m] of the effects on the first body of entry ``k`` at the last step."""
+    return Vec3(s.memory.number[w, k, COUPLE], s.memory.number[w, k, COUPLE + 1], s.memory.number[w, k, COUPLE + 2])
+
+
+@ti.func
+def keep(s: ti.template(), w, k, torque, hertz):
+    """Note what the energy account needs of entry ``k``: torque [N m] and contact radius without adhesion [m]."""
+    for d in ti.static(range(3)):
+        s.memory.number[w, k, ti.static(COUPLE + d)] = torque[d]
+    s.memory.number[w, k, HERTZ] = hertz
 
 
 @ti.func

@@ -57,7 +57,7 @@ def load_world(s: ti.template(), w: ti.i32, settings: Row):
 
 @ti.kernel
 def load_bodies(s: ti.template(), w: ti.i32, numbers: Table, places: IntTable, spheres: Table, owner: IntTable):
-    """All bodies that will enter. numbers: the columns of ``layout.Layout.numbers``; places: first, members, kind; spheres: x y z r."""
+    """All bodies that will enter, by the columns of ``layout.Layout``: numbers, places, spheres (x y z r), owner."""
     s.world.loaded[w] = numbers.shape[0]
     for b in range(numbers.shape[0]):
         s.body.mass[w, b] = numbers[b, 0]
@@ -152,6 +152,8 @@ def load_law(s: ti.template(), w: ti.i32, table: Table, kinds: ti.i32):
 def load_effects(s: ti.template(), w: ti.i32, table: Table, grip: ti.f64):
     """Parameters of the effects of every pair of kinds, row a · kinds + b, and how far apart [m] a pull may hold."""
     rouse_all(s, w)
+    # A cell is as long as the largest body, the skin and the grip.
+    s.world.cell[w] += grip - s.world.grip[w]
     s.world.grip[w] = grip
     s.world.moved[w] = s.world.skin[w]
     for k in range(table.shape[0]):

@@ -2,7 +2,8 @@
 
 Bodies are found by a hashed grid, then sorted out by bounding boxes, then member against box, then member against
 member, so the cost grows with the number of bodies. The list reaches as far as a pull may hold (``grip``) and the skin
-beyond; it holds while no two points have approached by more than the skin. Tangential springs are carried over by merging two ordered lists.
+beyond; it holds while no two points have approached by more than the skin. Tangential springs, and what effects keep
+of a contact, are carried over by merging two ordered lists.
 """
 
 from solver.backend import ti

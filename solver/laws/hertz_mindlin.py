@@ -67,8 +67,9 @@ def normal_damper(law, inertia, a_before, overlap, v_n, dt):
 
 @ti.func
 def normal_force(elastic, damper, v_n, v_expected, mass, dt, floor):
-    """Normal force F [N], never below ``floor`` (0: never tensile); the damper takes the speed in the middle of the step, v_n + dt (F/m* + A)/2.
+    """Normal force F [N], never below ``floor`` (0: never tensile).
 
+    The damper takes the speed in the middle of the step, v_n + dt (F/m* + A)/2.
     A is the acceleration by everything else, known from the last step: dt A = v_n − ``v_expected``, the speed that the
     contact's own force would have led to. A contact at rest, held by others, is thus not damped at all.
     """
