@@ -2,7 +2,7 @@
 
 name, material, mass_fraction      which material (by default that of the body's name), its share of the mass
 size_distribution, size_spread     how the sizes scatter (`solver.sizes`)
-size                               instead of these two, measured diameters: { mean, sd } or { quantiles = { p05, p50 } }
+size                               instead of these two, measured diameters: { mean, sd } or { quantiles = { p05, … } }
                                    become log-normal sizes about the declared one (`solver.size_table`)
 
 and one of

@@ -17,6 +17,7 @@ from pathlib import Path
 from doe.errors import MeasurementError, StudyFileError
 from doe.measurement.condition_table import KEYS as CONDITION_KEYS
 from doe.measurement.condition_table import condition_scene, in_rig
+from doe.measurement.feasible import narrowed
 from doe.measurement.measurement import Condition, CrossCheck, MeasuredParameter, Measurement, Role
 from doe.measurement.observations import read_observations
 from doe.measurement.parameter_table import read_parameters
@@ -72,14 +73,15 @@ def _read(folder: Path, table: Table) -> Measurement:
         ignored += unused
         if "images" in entry:
             ignored.append(f"condition {name}: images: photographs are not read yet")
+    suited = tuple(narrowed(parameter, [condition.scene for condition in conditions]) for parameter in measured)
     return Measurement(
         folder=folder,
         title=str(table.get("title", "")),
         scene=base,
-        parameters=measured,
+        parameters=suited,
         conditions=tuple(conditions),
         ignored=tuple(ignored),
-        notes=(*notes, *_assumed(base, measured)),
+        notes=(*notes, *_narrowed(measured, suited), *_assumed(base, measured)),
         cross_check=tuple(checks),
     )
 
@@ -110,6 +112,13 @@ def _uncertainty(table: Table) -> dict[str, float]:
         if found[name] <= 0.0:
             raise MeasurementError(f"uncertainty.{name}: {found[name]:g}; allowed: more than 0")
     return found
+
+
+def _narrowed(before: Sequence[MeasuredParameter], after: Sequence[MeasuredParameter]) -> Iterator[str]:
+    """Notes on ranges that a rig does not take."""
+    for old, new in zip(before, after, strict=True):
+        if old != new:
+            yield f"{old.path}: range {old.low:g} … {old.high:g} narrowed to {new.low:g} … {new.high:g} by the rig"
 
 
 def _assumed(base: Scene, measured: Sequence[MeasuredParameter]) -> Iterator[str]:

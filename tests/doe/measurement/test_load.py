@@ -158,3 +158,13 @@ def test_the_order_of_rows_does_not_matter(tmp_path):
     folder = write(tmp_path / "one")
     other = write(tmp_path / "two", {"slow.csv": shuffled, "fast.csv": shuffled})
     assert without_names(folder) == without_names(other)
+
+
+def test_a_range_is_narrowed_to_what_the_rig_takes():
+    """A drum of 84 mm and 20 mm takes up to half of its 110.8 mL; 50 ± 3 · 2 mL would reach beyond."""
+    measurement = load_measurement(measurement_folder("granudrum_mcc"))
+    volume = next(p for p in measurement.parameters if p.path == "rig.filled_volume")
+    # Bisected to a billionth of the range.
+    assert volume.high == pytest.approx(0.5 * np.pi * 0.042**2 * 0.020, rel=1e-8)
+    assert volume.low == pytest.approx(44e-6, rel=1e-12)
+    assert any(note.startswith("rig.filled_volume: range 4.4e-05 … 5.6e-05 narrowed") for note in measurement.notes)
