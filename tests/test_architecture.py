@@ -28,6 +28,14 @@ DOE_FILES_THAT_MAY_USE_THE_SOLVER = {
     "doe/runner.py": "turns a row of a design into a batch of simulated worlds",
     "doe/factors.py": "checks a factor's path and range against the declared parameters",
     "doe/study.py": "reads a study file: its material, rig and insertion make a scene",
+    "doe/measurement/load.py": "reads a measurement: its material is the base of every condition's scene",
+    "doe/measurement/condition_table.py": "a condition's rig and insertion make a scene",
+    "doe/measurement/parameter_table.py": "checks a parameter's path and range against the declared parameters",
+    "doe/measurement/feasible.py": "asks the scenes of all conditions which values they take",
+    "doe/measurement/long_form.py": "names and units of the observables, one table for data and runs",
+    "doe/measurement/piles.py": "scanned piles are read by the estimators of simulated ones",
+    "doe/measurement/readings.py": "runs are read by the same functions as data",
+    "doe/measurement/measurement.py": "a condition holds the scene that repeats it",
 }
 
 TI_INIT_HOME = "solver/backend.py"
