@@ -51,12 +51,12 @@ def parameter_units() -> dict[str, str]:
 
 def unit_of_parameter(path: str) -> ReadingUnit:
     """Unit in which the parameter ``path`` is read; without symbol for a plain number."""
-    return _reading_unit(parameter_units().get(path.rsplit(".", 1)[-1], "1"))
+    return reading_unit(parameter_units().get(path.rsplit(".", 1)[-1], "1"))
 
 
 def unit_of_observable(name: str) -> ReadingUnit:
     """Unit in which the observable ``name`` is read."""
-    return _reading_unit(REGISTRY[name].unit if name in REGISTRY else "1")
+    return reading_unit(REGISTRY[name].unit if name in REGISTRY else "1")
 
 
 def parameter_value(path: str, value: float | str | None) -> str:
@@ -170,6 +170,7 @@ def enumeration(items: list[str]) -> str:
     return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
 
 
-def _reading_unit(si: str) -> ReadingUnit:
+def reading_unit(si: str) -> ReadingUnit:
+    """Unit in which a number in the SI unit ``si`` is read."""
     name = SCREEN_UNIT.get(si, si)
     return ReadingUnit(SYMBOLS.get(name, name), UNITS.get(si, {}).get(name, 1.0))

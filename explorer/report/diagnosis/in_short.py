@@ -1,0 +1,206 @@
+"""In short: the answer in one sentence, what it rests on, and what it does not say."""
+
+from __future__ import annotations
+
+from explorer.report.content import Block, Bullets, Caution, Facts, Section, Text
+from explorer.report.diagnosis.findings import (
+    amplitudes_of,
+    confirmation,
+    edges,
+    kind_of,
+    named,
+    out_of_sight,
+    overall,
+    raced,
+    spelled,
+    split_label,
+    summary_label,
+)
+from explorer.report.findings import Plain
+from explorer.report.units_for_people import code, enumeration, fixed, number, p_value, percent
+
+
+def in_short(result: Plain) -> Section:
+    """The answer for a reader who reads nothing else."""
+    blocks: list[Block] = [Text(verdict_sentence(result)), Facts(tuple(_facts(result)))]
+    blocks += [Caution(text) for text in cautions(result)]
+    blocks += [Text("What this does not say:"), Bullets(tuple(limits(result)))]
+    return Section("In short", tuple(blocks))
+
+
+def verdict_sentence(result: Plain) -> str:
+    """The verdict for an engineer, with what held-out data say of it."""
+    names = named(result)
+    match kind_of(result):
+        case "no_missing_effect":
+            return (
+                "Nothing is missing that these data could show: the calibrated declared model differs from the "
+                "measurement by no more than noise."
+            )
+        case "effect":
+            return (
+                f"The declared model lacks {code(names[0])}: with {amplitudes_of(result['amplitudes'])} it agrees with "
+                f"the fitted data, and no other effect in the list comes near. {confirmation_sentence(result)}"
+            )
+        case "effects":
+            return (
+                f"No single effect in the list is enough; {spelled(names[0])} together are, with "
+                f"{amplitudes_of(result['amplitudes'])}. {confirmation_sentence(result)}"
+            )
+        case "ambiguous":
+            choices = " or ".join(spelled(name) for name in names)
+            return (
+                f"The declared model lacks something, and these data cannot tell whether it is {choices}. "
+                f"{_asked_for(result)}"
+            )
+        case "unexplained":
+            sits = f" What is left sits in {result['where'][0]}." if result["where"] else ""
+            return (
+                f"The declared model lacks something that none of the {len(raced(result))} effects that these data can "
+                f"see explains.{sits}"
+            )
+
+
+def confirmation_sentence(result: Plain) -> str:
+    """What conditions that were not fitted say, by fresh simulations."""
+    row = overall(result, "holdout")
+    if row is None:
+        return "No condition was held out, so nothing independent confirms it."
+    numbers = (
+        f"from {number(row['before'])} σ to {number(row['after'])} σ, where noise alone gives "
+        f"{number(row['noise_floor'])} σ"
+    )
+    return {
+        "no holdout": "",
+        "within noise": "The held-out data cannot confirm it: there the declared model is within the noise already.",
+        "confirmed": f"On data that were not fitted the error falls {numbers}.",
+        "not certain": f"On data that were not fitted the error goes {numbers}; the noise leaves open whether that is a gain.",
+        "contradicted": f"The held-out data do not confirm it: there the error goes {numbers}.",
+    }[confirmation(result)]
+
+
+def cautions(result: Plain) -> list[str]:
+    """What keeps the numbers of this diagnosis from meaning more than they do, one sentence each."""
+    found = []
+    state = confirmation(result)
+    if state == "no holdout":
+        found.append(
+            "Without held-out data the error after is counted on the data that chose the model; it is smaller than on "
+            "new ones."
+        )
+    if state == "contradicted" and named(result):
+        found.append(
+            "The correction does not carry over to the held-out conditions. The effect may stand in for another one, or "
+            "its amplitude may depend on the set-up; do not use the corrected model beyond the fitted conditions."
+        )
+    found += edges(result)
+    found += [
+        f"`{one['effect']}` stands at the end of its simulated range; the true amplitude may be larger, and its interval "
+        "is cut there."
+        for one in result["amplitudes"]
+        if one["at_edge"] and named(result)
+    ]
+    differing = _differing(result)
+    if differing:
+        found.append(
+            f"Measured and simulated pours scatter differently in {enumeration(differing)}; these take the measured spread. "
+            "Something in the model or in the measurement differs in scatter, not only in the mean."
+        )
+    broken = {name: result["confirmation"][name]["broken"] for name in ("before", "after")}
+    if max(broken.values()):
+        found.append(
+            f"{broken['before']} fresh pours of the declared model and {broken['after']} of the final one broke off and "
+            "are left out; means are given that a pour ends."
+        )
+    if result["floored"]:
+        found.append(
+            f"{enumeration(_short(result['floored']))} never vary in the simulations but differ in the data; they are "
+            "compared with an assumed spread."
+        )
+    return found
+
+
+def limits(result: Plain) -> list[str]:
+    """What the answer leaves open."""
+    hidden = out_of_sight(result)
+    seen = len(raced(result))
+    found = [
+        f"Only the {len(result['effects'])} effects in the table were considered, {seen} of which these data can see; "
+        "something outside the list is found as `unexplained` at best."
+    ]
+    if hidden:
+        found.append(
+            f"{enumeration([code(row['name']) for row in hidden])} cannot be seen in these data, or were not simulated; "
+            "each may act all the same."
+        )
+    kind = kind_of(result)
+    if kind == "no_missing_effect":
+        found.append("Not found is not absent: the section on what could have been seen says how weak an effect may hide.")
+    if kind in ("effect", "effects", "ambiguous"):
+        found.append(
+            "An effect that is not in the list but changes the same numbers in the same proportions would look the same."
+        )
+        found.append(
+            "Amplitudes hold together with the declared contact law, shapes and parameter ranges; they are not measured "
+            "constants of the material."
+        )
+    if kind == "unexplained":
+        found.append(
+            "Nothing here tells a physical effect from a mistake in the measurement (a scale, a unit, a wrong set-up); "
+            "look there first."
+        )
+    return found
+
+
+def _asked_for(result: Plain) -> str:
+    if not result["next_experiment"]:
+        return "No change of the rig that was tried would tell them apart."
+    best = result["next_experiment"][0]["experiment"]
+    if best["replicates"] is None:
+        return f"Most telling would be {code(best['name'])}, though no hundred pours of it settle the question."
+    return f"Measure {code(best['name'])} with {best['replicates']} pours to tell."
+
+
+def _facts(result: Plain) -> list[tuple[str, str]]:
+    detect, before, after = result["gates"][0], result["t2"]["before"], result["t2"]["after"]
+    measured = ", ".join(
+        f"{row['condition']} ({row['role']}, {row['replicates']} pours, {len(row['summaries'])} numbers each)"
+        for row in result["measured"]
+    )
+    fit = f"T² = {fixed(before[0], 1)} on {before[1]} degrees of freedom, p = {p_value(detect['p'])}"
+    if result["amplitudes"]:
+        fit += f"; with the effect {fixed(after[0], 1)} on {after[1]}"
+    facts = [
+        ("Verdict", code(result["verdict"])),
+        ("Measured", measured),
+        ("Residual of the calibrated declared model", fit),
+    ]
+    for role, words in (("holdout", "Error on held-out data"), ("fit", "Error on fitted data")):
+        row = overall(result, role)
+        if row is not None:
+            facts.append(
+                (
+                    words,
+                    f"{number(row['before'])} σ before, {number(row['after'])} σ after, {number(row['noise_floor'])} σ "
+                    f"noise floor; {percent(row['coverage_before'])} → {percent(row['coverage_after'])} of the pours "
+                    "inside the model's 90 % interval",
+                )
+            )
+    facts.append(
+        (
+            "Rests on",
+            f"{result['pours']['settings']} simulated settings ({result['pours']['run']} pours run now, the others found "
+            f"in the store), {result['bootstrap']} bootstrap data sets per test; errors by fresh pours, not by the emulator",
+        )
+    )
+    return facts
+
+
+def _differing(result: Plain) -> list[str]:
+    labels = iter(row["label"] for row in result["residuals"])
+    flags = [differs for comparison in result["variances"] for differs in comparison["differs"]]
+    return _short([label for label, differs in zip(labels, flags, strict=True) if differs])
+
+
+def _short(labels: list[str]) -> list[str]:
+    return [f"{summary_label(summary)} ({condition})" for condition, summary in map(split_label, labels)]
