@@ -8,7 +8,7 @@ BIN := .venv/bin
 EXPLORER := $(BIN)/explorer
 
 .DEFAULT_GOAL := help
-.PHONY: help venv serve calibrate calibrate-quick test slow peers clean
+.PHONY: help venv serve calibrate calibrate-quick diagnose test slow peers clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 18
@@ -30,6 +30,9 @@ calibrate: .venv/.ready ## calibrate the shipped material, profile standard, int
 
 calibrate-quick: .venv/.ready ## the same chain with coarse shapes and less mass, into results/quick (resumes)
 	$(EXPLORER) calibrate --headless --profile quick --out results/quick $(if $(wildcard results/quick),--resume)
+
+diagnose: .venv/.ready ## find the effect that a shipped measurement asks for, into results/diagnosis (resumes)
+	$(EXPLORER) diagnose trefoil_1 --out results/diagnosis --apply $(if $(wildcard results/diagnosis),--resume)
 
 test: .venv/.ready ## format check, lint, types, fast tests
 	$(BIN)/ruff format --check .

@@ -15,6 +15,7 @@ from typer.core import TyperGroup
 from explorer.commands import (
     bench,
     calibrate,
+    diagnose,
     export,
     measurements,
     new,
@@ -108,6 +109,7 @@ def options(
 app.command()(serve.serve)
 app.command()(simulate.simulate)
 app.command()(calibrate.calibrate)
+app.command()(diagnose.diagnose)
 app.command()(runs.runs)
 app.command()(parameters.parameters)
 app.command()(new.new)

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy.typing as npt
+
 from doe.diagnose.confirm import Confirmed
 from doe.diagnose.diagnosis import Diagnosis, run_diagnosis
 from doe.diagnose.holdout import HoldoutError
+from doe.diagnose.profiles import measured_profile
 from doe.diagnose.screen import Budget
 from doe.measurement.load import load_measurement
 from doe.measurement.measurement import Measurement
@@ -58,15 +61,15 @@ def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> Diagnosis:
     if order.budget is not None:
         budget = budget.scaled(order.budget, len(names), len(measurement.fit))
     order.out.mkdir(parents=True, exist_ok=True)
-    say(f"{order.folder}: {len(measurement.fit)} fitted and {len(measurement.holdout)} held-out conditions; store {path}")
+    say(
+        f"{order.folder}: {len(measurement.fit)} fitted and {len(measurement.holdout)} held-out conditions; store {path}"
+    )
     progress = PourProgress(order.out / "progress.jsonl", say, terminal=sys.stdout.isatty())
     with ExitStack() as stack:
         store = Store(path)
         stack.callback(store.close)
         crew = stack.enter_context(Crew(order.threads))
-        found = run_diagnosis(
-            measurement, store, crew.run_queue, names, budget, progress.stage, progress.pour
-        )
+        found = run_diagnosis(measurement, store, crew.run_queue, names, budget, progress.stage, progress.pour)
     result = result_of(measurement, order, found, progress.elapsed)
     write_whole(order.out / "diagnosis.json", json.dumps(result, ensure_ascii=False, allow_nan=False, indent=1) + "\n")
     write_diagnosis_report(result, order.out)
@@ -101,6 +104,9 @@ def result_of(measurement: Measurement, order: DiagnoseOrder, found: Diagnosis, 
             "where": verdict.where,
             "signatures": verdict.signatures,
             "variances": verdict.variances,
+            "limits": verdict.limits,
+            "bootstrap": verdict.bootstrap,
+            "seed": verdict.seed,
             "t2": {
                 "before": [verdict.t2_before, verdict.df_before],
                 "after": [verdict.t2_after, verdict.df_after],
@@ -122,7 +128,14 @@ def result_of(measurement: Measurement, order: DiagnoseOrder, found: Diagnosis, 
                 }
                 for condition in measurement.conditions
             ],
-            "data": {"folder": str(order.folder), "title": measurement.title, "ignored": measurement.ignored},
+            "piles": [picture for c in range(len(measurement.conditions)) for picture in _piles(measurement, found, c)],
+            "data": {
+                "folder": str(order.folder),
+                "title": measurement.title,
+                "ignored": measurement.ignored,
+                "notes": measurement.notes,
+            },
+            "order": {"out": str(order.out), "effects": order.effects, "budget": order.budget},
             "units": units,
             "pours": {"run": found.pours, "settings": found.settings},
             "timing": {"total_s": total_s},
@@ -147,13 +160,31 @@ def _error(row: HoldoutError, units: dict[str, str]) -> dict[str, Any]:
     return {**row.to_dict(), "unit": units.get(row.observable, "σ")}
 
 
+def _piles(measurement: Measurement, found: Diagnosis, number: int) -> Iterator[dict[str, Any]]:
+    """Mean height profiles of condition ``number``, measured and by both models [m]; none where data have no profile."""
+    condition = measurement.conditions[number]
+    profile = measured_profile(condition)
+    blocks = [profile.values, *(one.profiles[number] for one in (found.before, found.after))] if profile else []
+    if profile is not None and min(map(len, blocks)) > 1:
+        yield {
+            "condition": condition.name,
+            "role": condition.role,
+            "radius": profile.x,
+            **{key: _mean_and_sd(block) for key, block in zip(("measured", "before", "after"), blocks, strict=True)},
+        }
+
+
+def _mean_and_sd(block: npt.NDArray[np.float64]) -> dict[str, Any]:
+    return {"mean": block.mean(axis=0), "sd": block.std(axis=0, ddof=1)}
+
+
 def _confirmed(measurement: Measurement, found: Confirmed) -> dict[str, Any]:
     return {
         "theta": found.model.theta,
         "effects": found.model.effects,
         "broken": found.broken,
         "conditions": [
-            {"condition": condition.name, "pours": len(block), "mean": block.mean(axis=0), "sd": block.std(axis=0, ddof=1)}
+            {"condition": condition.name, "pours": len(block), **_mean_and_sd(block)}
             for condition, block in zip(measurement.conditions, found.blocks, strict=True)
         ],
     }

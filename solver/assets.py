@@ -63,13 +63,18 @@ def measurement_folder(name: str) -> Path:
     own = Path(name).expanduser()
     if own.is_dir():
         return own
-    shipped = tuple(sorted(path.parent.name for path in _folder("measurements").glob("*/measurement.toml")))
+    shipped = shipped_measurements()
     if name in shipped:
         return _folder("measurements") / name
     raise AssetNotFoundError(
         f"measurement {name!r} is neither a folder (looked for {own.absolute()}) nor shipped; "
         f"shipped: {', '.join(shipped) or 'none'}"
     )
+
+
+def shipped_measurements() -> tuple[str, ...]:
+    """Names of the shipped measured data sets, sorted."""
+    return tuple(sorted(path.parent.name for path in _folder("measurements").glob("*/measurement.toml")))
 
 
 def shipped_assets(kind: AssetKind) -> tuple[str, ...]:

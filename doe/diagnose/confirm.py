@@ -28,26 +28,31 @@ class Model(Record):
 
     @property
     def name(self) -> str:
-        """"base", or the effects' names."""
+        """ "base", or the effects' names."""
         return "+".join(name for name, _ in self.effects) or "base"
 
 
 @dataclass(frozen=True)
 class Confirmed:
-    """Summaries of the fresh pours of one model, per condition (n, d_c); pours that broke off are left out."""
+    """Summaries of the fresh pours of one model, per condition (n, d_c); pours that broke off are left out.
+
+    profiles: the height profiles of the same pours, per condition (n, k_c) [m]; k_c = 0 without measured ones.
+    """
 
     model: Model
     blocks: tuple[FloatArray, ...]
     broken: int
+    profiles: tuple[FloatArray, ...] = ()
 
 
 def confirm(model: Model, pours: ModelPours, number: int, widths: Sequence[int]) -> Confirmed:
     """Pour ``model`` ``number`` times in every condition of ``pours``; ``widths``: summaries per condition."""
     points = [Point(f"confirm {number}", k, model.theta, model.effects) for k in range(number)]
     rows = pours.run(f"confirmation of {model.name}", points)
-    blocks, broken = [], 0
+    blocks, profiles, broken = [], [], 0
     for c, width in enumerate(widths):
-        valid = [row[c].summaries for row in rows if row[c].valid]
+        valid = [row[c] for row in rows if row[c].valid]
         broken += len(rows) - len(valid)
-        blocks.append(np.array(valid).reshape(len(valid), width))
-    return Confirmed(model, tuple(blocks), broken)
+        blocks.append(np.array([pour.summaries for pour in valid]).reshape(len(valid), width))
+        profiles.append(np.array([pour.profile for pour in valid]).reshape(len(valid), -1 if valid else 0))
+    return Confirmed(model, tuple(blocks), broken, tuple(profiles))

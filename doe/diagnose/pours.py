@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.diagnose.plan import Point
+from doe.diagnose.profiles import profile_names, profile_of_record
 from doe.diagnose.runs import BASE, Declared, Runs
 from doe.measurement.measurement import Condition
 from doe.measurement.summaries import summaries_of_record, summary_names
@@ -33,6 +34,8 @@ class Pour:
 
     summaries: tuple[float, ...]
     outcome: str
+    profile: tuple[float, ...] = ()
+    """Mean heights [m] for a picture (`profiles`); nothing is decided by them."""
 
     @property
     def valid(self) -> bool:
@@ -95,7 +98,9 @@ class ModelPours:
         """Whether the pour is known, here or in the store."""
         place = self._place(point, condition)
         if place not in self._known:
-            stored = self._store.find(run_key(self.scene(point, condition), self.seed(point, condition), code_version()))
+            stored = self._store.find(
+                run_key(self.scene(point, condition), self.seed(point, condition), code_version())
+            )
             found = None if stored is None else self._stored(stored, condition)
             if found is not None:
                 self._known[place] = found
@@ -122,13 +127,16 @@ class ModelPours:
         names = summary_names(self._conditions[condition])
         if any(name not in stored.observables for name in names):
             return None
-        numbers = [stored.observables[name] for name in names]
-        return Pour(tuple(math.nan if x is None else x for x in numbers), stored.outcome)
+        return Pour(
+            _numbers(stored, names), stored.outcome, _numbers(stored, profile_names(self._conditions[condition]))
+        )
 
     def _keep(self, what: str, point: Point, condition: int, job: Job, record: Record) -> Pour:
         asked = self._conditions[condition]
         numbers = tuple(float(x) for x in summaries_of_record(asked, record))
-        pour = Pour(numbers, str(record.outcome))
+        heights = profile_of_record(asked, record)
+        pour = Pour(numbers, str(record.outcome), heights)
+        kept = zip((*profile_names(asked), *summary_names(asked)), (*heights, *numbers), strict=True)
         self._store.add(
             StoredRun(
                 key=run_key(job.scene, job.seed, code_version()),
@@ -140,15 +148,19 @@ class ModelPours:
                 outcome=str(record.outcome),
                 message=record.message,
                 parameters={path: value(job.scene, path) for path in parameters(job.scene)},
-                observables={
-                    name: x if math.isfinite(x) else None for name, x in zip(summary_names(asked), numbers, strict=True)
-                },
+                observables={name: x if math.isfinite(x) else None for name, x in kept},
                 dt=record.dt,
                 steps=record.steps,
                 wall_s=record.wall_s,
             )
         )
         return pour
+
+
+def _numbers(stored: StoredRun, names: Sequence[str]) -> tuple[float, ...]:
+    """What a stored run holds under ``names``; NaN for what it could not read, or does not hold."""
+    found = (stored.observables.get(name) for name in names)
+    return tuple(math.nan if x is None else x for x in found)
 
 
 def acts(effect: str) -> bool:

@@ -9,7 +9,9 @@ import typer
 
 
 def diagnose(
-    folder: Path = typer.Argument(..., metavar="DIR", help="Folder with measurement.toml."),
+    folder: str = typer.Argument(
+        ..., metavar="DIR", help="Folder with measurement.toml, or a shipped data set's name."
+    ),
     out: Path = typer.Option(Path("diagnosis"), help="Folder for diagnosis.json, report.html and report.md."),
     effects: str = typer.Option("", metavar="A,B,…", help="Candidates; all effects if not given."),
     budget: int | None = typer.Option(None, min=60, metavar="POURS", help="About so many pours for the emulator."),
@@ -20,8 +22,11 @@ def diagnose(
 ) -> None:
     """Calibrate the declared model, test what is left, name the missing effect, confirm it by fresh pours."""
     from explorer.diagnose_run import DiagnoseOrder, run_diagnose
+    from solver.assets import measurement_folder
 
     # The page cancels with SIGTERM; that has to end like Ctrl-C, with the store closed and finished pours kept.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     names = tuple(name.strip() for name in effects.split(",") if name.strip())
-    run_diagnose(DiagnoseOrder(folder, out, names, budget, resume, store, threads, apply), typer.echo)
+    run_diagnose(
+        DiagnoseOrder(measurement_folder(folder), out, names, budget, resume, store, threads, apply), typer.echo
+    )

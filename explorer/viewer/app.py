@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from platformdirs import user_data_path
 
+from explorer.diagnosis_process import DiagnoseProcess
 from explorer.session import Session
 from explorer.study_process import CalibrationProcess
 from explorer.viewer.guarded_server import guarded_server
@@ -48,7 +49,7 @@ def serve(
         port: port to listen on; 0 takes a free one.
         seed: seed of the first pour.
         study_file: the study that the page can run, None for a page without.
-        store: file of the study's runs; None for the default store.
+        store: file of the runs of study and diagnosis; None for the default store.
         record_path: new file (``.rrd``) that the session is recorded into; a restart begins another beside
         it. ready: called with the address once the page can be opened.
 
@@ -65,9 +66,11 @@ def serve(
         study = _study(study_file, store)
         if study is not None:
             ending.callback(study.close)
+        diagnosis = DiagnoseProcess(diagnoses_folder(), store)
+        ending.callback(diagnosis.close)
         session = ending.enter_context(closing(Session()))
         session.start(scene, seed)
-        page = Page(server, session, study, study_file.stem if study_file else "", recorder)
+        page = Page(server, session, study, study_file.stem if study_file else "", diagnosis, recorder)
         ready(f"http://{address(host)}:{server.get_port()}")
         page.run(stop)
 
@@ -86,6 +89,11 @@ def _study(file: Path | None, store: Path | None) -> CalibrationProcess | None:
 def studies_folder() -> Path:
     """Where studies that the page starts put their results."""
     return user_data_path("repose-explorer") / "studies"
+
+
+def diagnoses_folder() -> Path:
+    """Where diagnoses that the page starts put their results."""
+    return user_data_path("repose-explorer") / "diagnoses"
 
 
 def address(host: str) -> str:

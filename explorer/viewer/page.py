@@ -11,6 +11,7 @@ from typing import Protocol
 import numpy as np
 import viser
 
+from explorer.diagnosis_process import DiagnosisProcess
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, Status
 from explorer.scene_meshes import scene_height
@@ -18,6 +19,7 @@ from explorer.session import Session
 from explorer.study_process import StudyProcess
 from explorer.viewer.actions import Actions
 from explorer.viewer.chart import Chart
+from explorer.viewer.diagnosis_panel import DiagnosisPanel
 from explorer.viewer.live_panel import LivePanel
 from explorer.viewer.palette import BRAND
 from explorer.viewer.readout import readout_html
@@ -25,6 +27,7 @@ from explorer.viewer.restart_panel import RestartPanel
 from explorer.viewer.run_panel import RunPanel
 from explorer.viewer.scene_nodes import SceneNodes
 from explorer.viewer.study_panel import StudyPanel
+from solver.assets import shipped_measurements
 from solver.scene import Scene
 
 
@@ -39,7 +42,8 @@ EVENTS_REMEMBERED = 50
 
 FRAME_INTERVAL = 1.0 / 30.0
 PANEL_INTERVAL = 0.2
-STUDY_INTERVAL = 0.5
+BACKGROUND_INTERVAL = 0.5
+"""Seconds between two looks at studies and diagnoses."""
 
 VIEW_DIRECTION = (0.62, -0.75, 0.24)
 """From the pile to the camera."""
@@ -58,6 +62,7 @@ class Page:
         session: Session,
         study: StudyProcess | None,
         study_name: str,
+        diagnosis: DiagnosisProcess,
         recorder: Recorder | None = None,
     ) -> None:
         self._server, self._session, self._recorder = server, session, recorder
@@ -70,9 +75,11 @@ class Page:
         self._generation = status.generation
         light(server)
         look(server, status.scene)
-        self._build_panels(status, study, study_name)
+        self._build_panels(status, study, study_name, diagnosis)
 
-    def _build_panels(self, status: Status, study: StudyProcess | None, study_name: str) -> None:
+    def _build_panels(
+        self, status: Status, study: StudyProcess | None, study_name: str, diagnosis: DiagnosisProcess
+    ) -> None:
         server, session, post = self._server, self._session, self._actions.post
         server.gui.configure_theme(
             dark_mode=True, show_share_button=False, show_logo=False, brand_color=BRAND, control_width="large"
@@ -89,10 +96,12 @@ class Page:
         if study is not None:
             with tabs.add_tab("Calibrate", viser.Icon.TARGET):
                 self._study = StudyPanel(server, study, study_name, post)
+        with tabs.add_tab("Diagnose", viser.Icon.STETHOSCOPE):
+            self._diagnosis = DiagnosisPanel(server, diagnosis, shipped_measurements(), post)
 
     def run(self, stop: threading.Event) -> None:
         """Keep the page up to date until ``stop`` is set."""
-        panels_due = study_due = 0.0
+        panels_due = background_due = 0.0
         while not stop.is_set():
             began = time.monotonic()
             notice = self._actions.carry_out()
@@ -105,9 +114,9 @@ class Page:
                 if began >= panels_due or notice is not None:
                     panels_due = began + PANEL_INTERVAL
                     self._show_panels(status)
-                if self._study is not None and began >= study_due:
-                    study_due = began + STUDY_INTERVAL
-                    self._study.show(self._notice)
+                if began >= background_due:
+                    background_due = began + BACKGROUND_INTERVAL
+                    self._show_background()
             stop.wait(max(0.0, FRAME_INTERVAL - (time.monotonic() - began)))
 
     def _take_events(self) -> None:
@@ -139,6 +148,11 @@ class Page:
         self._chart.show(status)
         self._live.show(status)
         self._restart.show(status)
+
+    def _show_background(self) -> None:
+        if self._study is not None:
+            self._study.show(self._notice)
+        self._diagnosis.show(self._notice)
 
 
 def light(server: viser.ViserServer) -> None:

@@ -7,7 +7,8 @@ import time
 
 import pytest
 
-from explorer.study_process import CalibrationProcess, StudyError, StudyStatus, advanced
+from explorer.command_process import BackgroundError, CommandStatus, advanced
+from explorer.study_process import CalibrationProcess
 
 PROGRAM = """
 import json, pathlib, sys, time
@@ -48,7 +49,7 @@ def only_folder(tmp_path):
 
 def test_a_study_runs_to_its_end_at_lower_priority(tmp_path):
     process = study(tmp_path)
-    assert process.status() == StudyStatus("idle")
+    assert process.status() == CommandStatus("idle")
     process.start("quick")
     wait_for(lambda: process.status().state != "running")
     status = process.status()
@@ -67,7 +68,7 @@ def test_cancel_and_resume(tmp_path):
     process.start("standard")
     wait_for(lambda: process.status().done == 3)
     assert process.status().state == "running"
-    with pytest.raises(StudyError, match="already"):
+    with pytest.raises(BackgroundError, match="already"):
         process.start("quick")
     process.cancel()
     wait_for(lambda: process.status().state != "running")
@@ -79,7 +80,7 @@ def test_cancel_and_resume(tmp_path):
 
 
 def test_a_study_that_ignores_cancel_is_ended(tmp_path, monkeypatch):
-    monkeypatch.setattr("explorer.study_process.CANCEL_WAIT", 0.2)
+    monkeypatch.setattr("explorer.command_process.CANCEL_WAIT", 0.2)
     deaf = "import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); (out / 'deaf').touch(); time.sleep(60)"
     process = study(tmp_path, deaf)
     process.start("quick")
@@ -107,9 +108,9 @@ def test_above_the_error_limit_is_a_finished_study(tmp_path):
 
 def test_what_cannot_be_started_or_resumed(tmp_path):
     process = study(tmp_path)
-    with pytest.raises(StudyError, match="profile: 'fast' is not one of quick, standard, full"):
+    with pytest.raises(BackgroundError, match="profile: 'fast' is not one of quick, standard, full"):
         process.start("fast")
-    with pytest.raises(StudyError, match="nothing to resume"):
+    with pytest.raises(BackgroundError, match="nothing to resume"):
         process.resume()
     process.cancel()
     assert process.status().state == "idle"
@@ -133,12 +134,12 @@ def test_a_study_that_another_page_runs_is_not_resumed(tmp_path):
     first, second = study(tmp_path, "time.sleep(60)"), study(tmp_path, "time.sleep(60)")
     first.start("quick")
     wait_for(lambda: first.status().done == 3)
-    with pytest.raises(StudyError, match="started from another page"):
+    with pytest.raises(BackgroundError, match="started from another page"):
         second.resume()
     first.close()
 
 
 @pytest.mark.parametrize("line", [b"", b"{", b"[]", b'{"stage": "x"}', b"\xff\xfe\n", b"3"])
 def test_a_line_that_is_no_event_changes_nothing(line):
-    status = StudyStatus("running", "ascent", 2, 9)
+    status = CommandStatus("running", "ascent", 2, 9)
     assert advanced(status, line) == status

@@ -23,7 +23,9 @@ def data(result: Plain) -> Section:
     )
     header = ("condition", "role", "rig", "replicates", "numbers", "summaries")
     blocks: list[Block] = [
-        Table(header, rows, "Summaries are chosen by name before any value is looked at, the same way for data and runs.")
+        Table(
+            header, rows, "Summaries are chosen by name before any value is looked at, the same way for data and runs."
+        )
     ]
     blocks += _left_out(result)
     blocks.append(Folded("Scatter of measured and simulated pours", (_variances(result),)))
@@ -54,9 +56,11 @@ def _variances(result: Plain) -> Table:
     for comparison in result["variances"]:
         for ratio, p, differs in zip(comparison["ratio"], comparison["p"], comparison["differs"], strict=True):
             condition, summary = split_label(next(labels))
-            rows.append((condition, summary_label(summary), fixed(ratio), p_value(p), "differs" if differs else "alike"))
-    statements = " ".join(dict.fromkeys(comparison["statement"].rstrip(".") + "." for comparison in result["variances"]))
+            rows.append(
+                (condition, summary_label(summary), fixed(ratio), p_value(p), "differs" if differs else "alike")
+            )
+    statements = " ".join(
+        dict.fromkeys(comparison["statement"].rstrip(".") + "." for comparison in result["variances"])
+    )
     header = ("condition", "summary", "measured / simulated variance", "p", "judged")
     return Table(header, tuple(rows), f"F test, corrected for the number of summaries. {statements}")
-
-

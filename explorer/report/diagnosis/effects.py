@@ -83,7 +83,9 @@ def _bounds(result: Plain) -> Table:
         for row in result["effects"]
     )
     header = ("effect", "simulated", "strongest supported", "by", "what reveals it")
-    return Table(header, rows, "A range ends where the effect shifts the numbers far enough to be told, or at that bound.")
+    return Table(
+        header, rows, "A range ends where the effect shifts the numbers far enough to be told, or at that bound."
+    )
 
 
 def _order(row: Plain) -> tuple[bool, float, float]:

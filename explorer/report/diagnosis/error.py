@@ -35,7 +35,9 @@ def error(result: Plain) -> Section:
     if result["error"]["holdout"]:
         blocks += [Text("On held-out conditions, which no fit has seen:"), _table(result, "holdout")]
         blocks.append(
-            Figure("error", error_chart(result, "holdout"), "Errors as multiples of the noise floor; 1 is a perfect model.")
+            Figure(
+                "error", error_chart(result, "holdout"), "Errors as multiples of the noise floor; 1 is a perfect model."
+            )
         )
     else:
         blocks.append(Caution("No condition is held out. The table below is on the data that were fitted."))

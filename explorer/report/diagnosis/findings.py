@@ -103,7 +103,9 @@ def amplitude_label(effect: str, index: int) -> str:
 def amplitude_text(estimate: Plain) -> str:
     """Value and 95 % interval with unit; says so where a bound holds it."""
     path = amplitude_path(estimate["effect"], estimate["index"])
-    text = f"{parameter_value(path, estimate['value'])} (95 % {parameter_range(path, estimate['low'], estimate['high'])})"
+    text = (
+        f"{parameter_value(path, estimate['value'])} (95 % {parameter_range(path, estimate['low'], estimate['high'])})"
+    )
     return text + (", at the end of its range" if estimate["at_edge"] else "")
 
 

@@ -135,7 +135,9 @@ def limits(result: Plain) -> list[str]:
         )
     kind = kind_of(result)
     if kind == "no_missing_effect":
-        found.append("Not found is not absent: the section on what could have been seen says how weak an effect may hide.")
+        found.append(
+            "Not found is not absent: the section on what could have been seen says how weak an effect may hide."
+        )
     if kind in ("effect", "effects", "ambiguous"):
         found.append(
             "An effect that is not in the list but changes the same numbers in the same proportions would look the same."

@@ -19,10 +19,25 @@ def parameters(result: Plain) -> Section:
             held = EDGE[row[f"edge_{when}"]]
             cells += [parameter_value(name, row[when]), f"± {error}", _held(held, row[f"pull_{when}"])]
         rows.append((parameter_label(name), parameter_range(name, row["low"], row["high"]), *cells))
-    header = ("parameter", "measured range", "before", "standard error", "held at", "after", "standard error", "held at")
+    header = (
+        "parameter",
+        "measured range",
+        "before",
+        "standard error",
+        "held at",
+        "after",
+        "standard error",
+        "held at",
+    )
     blocks: list[Block] = [
-        Text(f"Calibrated within their measured ranges, and to their measured means where there are some. After: {final_model(result)}."),
-        Table(header, tuple(rows), "Held at: the end of the range that stops the fit, and the fall of T² per standard error beyond it."),
+        Text(
+            f"Calibrated within their measured ranges, and to their measured means where there are some. After: {final_model(result)}."
+        ),
+        Table(
+            header,
+            tuple(rows),
+            "Held at: the end of the range that stops the fit, and the fall of T² per standard error beyond it.",
+        ),
     ]
     blocks += [Caution(text) for text in edges(result)]
     return Section("Parameters", tuple(blocks))

@@ -25,7 +25,9 @@ def residuals(result: Plain) -> Section:
         (
             Text(text),
             Text(after),
-            Figure("residuals", residual_chart(result, one, every), "Dashed: 95 % for one number; solid: for all of them."),
+            Figure(
+                "residuals", residual_chart(result, one, every), "Dashed: 95 % for one number; solid: for all of them."
+            ),
             Folded("The numbers", (_table(result),)),
         ),
     )

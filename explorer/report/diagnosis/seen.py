@@ -34,7 +34,9 @@ def could_have_seen(result: Plain) -> Section | None:
         f"An effect that shifts the numbers by {fixed(shift[1], 1)} σ after recalibration ({fixed(shift[2], 1)} σ with two "
         f"amplitudes) would have been detected with chance {fixed(POWER, 1)}. Weaker ones may be there."
     )
-    caption = "Found from about: by proportion to the shift at the bound. Detected, which is less than told from all others."
+    caption = (
+        "Found from about: by proportion to the shift at the bound. Detected, which is less than told from all others."
+    )
     header = ("effect", "reach at its bound", "found from about", "what reveals it")
     return Section("What could have been seen", (Text(text), Table(header, tuple(rows), caption)))
 

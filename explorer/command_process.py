@@ -1,0 +1,202 @@
+"""A command of the command line in a process of its own, at lower priority, so that the live pour stays smooth.
+
+The command writes ``progress.jsonl`` into its output folder, one object per event, which is all that is read here:
+
+    {"time": seconds, "stage": text, "done": runs, "planned": runs, "eta_s": seconds or null, "line": text or null}
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import IO, Any, Literal
+
+from explorer.errors import CommandError
+
+CommandState = Literal["idle", "running", "cancelled", "finished", "failed"]
+
+NICENESS = 10
+CANCEL_WAIT = 5.0
+"""Seconds that a cancelled command has to write what it has, before it is ended for good."""
+STAMP = r"\d{8}-\d{6}(?:-\d+)?"
+"""Date, time and perhaps a number: the end of an output folder's name."""
+PROGRAM = (sys.executable, "-m", "explorer")
+"""How the command line is called."""
+
+
+@dataclass(frozen=True)
+class CommandStatus:
+    """How far a command is. ``lines`` are partial results, one per finished stage."""
+
+    state: CommandState
+    stage: str = ""
+    done: int = 0
+    planned: int = 0
+    eta_s: float | None = None
+    lines: tuple[str, ...] = ()
+    message: str = ""
+
+
+class BackgroundError(CommandError):
+    """A command that cannot be started or resumed; one line, fit for a user."""
+
+
+class CommandProcess:
+    """One command at a time as a child process.
+
+    Args:
+        what: what a run of it is called, such as "study".
+        endings: exit code of a finished command → what to say before the path of the report.
+        program: how the command line is called.
+    """
+
+    def __init__(self, what: str, endings: Mapping[int, str], program: Sequence[str] = PROGRAM) -> None:
+        self._what, self._endings, self._program = what, dict(endings), tuple(program)
+        self._process: subprocess.Popen[bytes] | None = None
+        self._command = ""
+        self._cancelled_at: float | None = None
+        self._read = 0
+        self._status = CommandStatus("idle")
+        self.out: Path | None = None
+        """Output folder of the command that was started last."""
+
+    def start(self, out: Path, arguments: Sequence[str]) -> None:
+        """Start a command with the new output folder ``out``; ``arguments`` without it. Raises BackgroundError."""
+        self.refuse_while_running()
+        self._read = 0
+        self._launch(out, arguments)
+
+    def resume(self, out: Path, arguments: Sequence[str]) -> None:
+        """Go on in ``out``, where a command was stopped. Raises BackgroundError."""
+        self.refuse_while_running()
+        # A resumed command tells every stage again, so what it said before it was stopped is dropped.
+        progress = out / "progress.jsonl"
+        self._read = progress.stat().st_size if progress.is_file() else 0
+        self._launch(out, (*arguments, "--resume"))
+
+    def cancel(self) -> None:
+        """Ask the command to stop; :meth:`status` ends it for good if it has not after ``CANCEL_WAIT``."""
+        if self._process is not None and self._process.poll() is None:
+            self._process.terminate()
+            self._cancelled_at = time.monotonic()
+            self._status = replace(self._status, message="stopping")
+
+    def close(self) -> None:
+        """Cancel what runs and wait for its end."""
+        self.cancel()
+        while self.status().state == "running":
+            time.sleep(0.05)
+
+    def status(self) -> CommandStatus:
+        """State, progress and partial results, as far as the command has written them."""
+        if self._process is None:
+            return self._status
+        code = self._process.poll()
+        # Read after asking: what a process that is over wrote last is in the file by now.
+        self._take_progress()
+        if code is not None:
+            self._process = None
+            self._status = replace(self._status, eta_s=None, **self._ending(code))
+        elif self._cancelled_at is not None and time.monotonic() > self._cancelled_at + CANCEL_WAIT:
+            os.killpg(self._process.pid, signal.SIGKILL)
+        return self._status
+
+    def refuse_while_running(self) -> None:
+        """Raise BackgroundError while a command runs."""
+        if self.status().state == "running":
+            raise BackgroundError(f"a {self._what} is running already; cancel it first")
+
+    def _launch(self, out: Path, arguments: Sequence[str]) -> None:
+        self.out, self._command = out, arguments[0]
+        nice = shutil.which("nice")
+        lower = [nice, "-n", str(NICENESS)] if nice else []
+        with self._log().open("ab") as log:
+            # The child inherits the lock with the open file, and holds it to its end, whatever becomes of the page.
+            try:
+                fcntl.flock(log, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise BackgroundError(f"{out}: runs already, started from another page") from None
+            # A session of its own: Ctrl-C for the page must not cut a run in two, cancel() ends it in order.
+            self._process = subprocess.Popen(
+                [*lower, *self._program, *arguments],
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+            )
+        self._cancelled_at = None
+        self._status = CommandStatus("running")
+
+    def _log(self) -> Path:
+        # Beside the output folder: that one has to be empty for a new command.
+        return Path(f"{self.out}.log")
+
+    def _ending(self, code: int) -> dict[str, Any]:
+        if self._cancelled_at is not None and code != 0:
+            return {"state": "cancelled", "message": "finished runs are kept; resume goes on from there"}
+        if code in self._endings:
+            return {"state": "finished", "message": f"{self._endings[code]}: {self.out}/report.html"}
+        return {"state": "failed", "message": f"{self._command} ended with exit code {code}: {self._last_words()}"}
+
+    def _last_words(self) -> str:
+        lines = self._log().read_text(encoding="utf-8", errors="replace").strip().splitlines()
+        return lines[-1][:300] if lines else f"no output; see {self._log()}"
+
+    def _take_progress(self) -> None:
+        if self.out is None or not (file := self.out / "progress.jsonl").is_file():
+            return
+        if file.stat().st_size < self._read:  # a resumed command begins the file anew
+            self._read = 0
+        with file.open("rb") as stream:
+            stream.seek(self._read)
+            for line in _whole_lines(stream):
+                self._read += len(line)
+                self._status = advanced(self._status, line)
+
+
+def new_folder(folder: Path, stem: str) -> Path:
+    """A name in ``folder``, which is made, that nobody has: ``<stem>-<date>-<time>``, with a number if need be."""
+    folder.mkdir(parents=True, exist_ok=True)
+    dated = f"{stem}-{time.strftime('%Y%m%d-%H%M%S')}"
+    names = [dated, *(f"{dated}-{k}" for k in range(2, 100))]
+    return next(folder / name for name in names if not (folder / name).exists())
+
+
+def newest_unfinished(folder: Path, stems: Sequence[str], result: str) -> tuple[Path, str] | None:
+    """The newest of the folders ``<stem>-<date>-<time>`` that holds no file ``result``, and its stem."""
+    name = re.compile(rf"({'|'.join(map(re.escape, stems))})-({STAMP})")
+    named = [(match, one) for one in folder.glob("*/") if (match := name.fullmatch(one.name))]
+    stopped = [(match[2], match[1], one) for match, one in named if not (one / result).exists()]
+    if not stopped:
+        return None
+    _, stem, found = max(stopped)
+    return found, stem
+
+
+def advanced(status: CommandStatus, line: bytes) -> CommandStatus:
+    """``status`` after one line of ``progress.jsonl``; a line that is no such object leaves it as it is."""
+    try:
+        event = json.loads(line)
+        eta = event["eta_s"]
+        stage, done, planned = str(event["stage"]), int(event["done"]), int(event["planned"])
+        eta_s = None if eta is None else float(eta)
+        result = event["line"]
+    except (ValueError, KeyError, TypeError):
+        return status
+    lines = status.lines if result is None else (*status.lines, str(result))
+    return replace(status, stage=stage, done=done, planned=planned, eta_s=eta_s, lines=lines)
+
+
+def _whole_lines(stream: IO[bytes]) -> list[bytes]:
+    """Lines that end in a newline; the writer may be in the middle of the last one."""
+    return [line for line in stream if line.endswith(b"\n")]

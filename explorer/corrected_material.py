@@ -1,0 +1,33 @@
+"""The corrected model as a material file that every command takes."""
+
+from __future__ import annotations
+
+from doe.diagnose.diagnosis import Diagnosis
+from doe.measurement.measurement import Measurement
+from explorer.scene_text import material_toml
+from solver import EFFECTS, Scene, with_values
+
+
+def corrected_toml(measurement: Measurement, diagnosis: Diagnosis) -> str:
+    """The final model of ``diagnosis`` in the set-up of the first fitted condition.
+
+    Parameters are those of the final fit; effects that the verdict names stand in ``[effect.<name>]``. Without a named
+    effect it is the calibrated declared model.
+    """
+    condition = measurement.fit[0].name
+    heading = (
+        f"{measurement.title or measurement.folder.name}: {diagnosis.verdict.kind}\n"
+        f"{diagnosis.verdict.statement}\n"
+        f"Set-up of condition {condition}; parameters of the final fit. SI."
+    )
+    return material_toml(corrected_scene(measurement, diagnosis), heading)
+
+
+def corrected_scene(measurement: Measurement, diagnosis: Diagnosis) -> Scene:
+    """The scene that :func:`corrected_toml` writes."""
+    model = diagnosis.after.model
+    values: dict[str, float | str] = dict(zip((p.path for p in measurement.parameters), model.theta, strict=True))
+    for effect, amplitudes in model.effects:
+        names = EFFECTS[effect].amplitudes
+        values |= {f"effect.{effect}.{name}": value for name, value in zip(names, amplitudes, strict=True)}
+    return with_values(measurement.fit[0].scene, dict(values))

@@ -1,0 +1,85 @@
+"""Buttons, bar and text of a command that runs in the background; what stands in the text is the panel's own."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+import viser
+
+from explorer.command_process import CommandStatus
+from explorer.viewer.actions import Action, Post
+
+MARKDOWN_MARKS = re.compile(r"([\\`*_{}\[\]<>()#+!|~&])")
+
+STATE_WORDS = {
+    "running": "Running at low priority; the pour goes on.",
+    "cancelled": "Cancelled.",
+    "finished": "Finished.",
+    "failed": "Failed.",
+}
+
+
+class ProcessView:
+    """A group of buttons named ``title``, which post the ``acts`` of their names; under it a bar and a text."""
+
+    def __init__(self, server: viser.ViserServer, title: str, acts: Mapping[str, Action], post: Post) -> None:
+        self._buttons = server.gui.add_button_group(title, tuple(acts))
+
+        @self._buttons.on_click
+        def _(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
+            if event.client_id is not None and event.target.value in acts:
+                post(acts[event.target.value])
+
+        self._bar = server.gui.add_progress_bar(0.0)
+        self._text = server.gui.add_markdown("")
+
+    def show(self, status: CommandStatus, text: str) -> None:
+        """Bar and text; call it inside ``server.atomic()``."""
+        percent = 100.0 * progress(status)
+        if self._bar.value != percent:
+            self._bar.value = percent  # type: ignore[misc]
+        if self._bar.animated != (status.state == "running"):
+            self._bar.animated = status.state == "running"
+        if self._text.content != text:
+            self._text.content = text
+
+
+def progress(status: CommandStatus) -> float:
+    """Share of the planned runs that are done, 0 … 1."""
+    return min(1.0, max(0.0, status.done / status.planned)) if status.planned > 0 else 0.0
+
+
+def status_markdown(status: CommandStatus, what: str, runs: str, notice: str = "") -> str:
+    """State, stage and partial results as markdown; texts of the command are escaped.
+
+    Args:
+        status: how far it is.
+        what: what a run of the command is called, such as "study".
+        runs: heading of what is counted, such as "Runs".
+        notice: the page's own last message, such as a refused click.
+    """
+    parts = [STATE_WORDS.get(status.state, f"No {what} runs.")]
+    parts += [escaped(text) for text in dict.fromkeys((notice, status.message)) if text]
+    if status.stage:
+        parts.append(
+            f"| Stage | {runs} | Time left |\n|:--|--:|--:|\n"
+            f"| {escaped(status.stage)} | {status.done} of {status.planned} | {time_left(status.eta_s)} |"
+        )
+    if status.lines:
+        rows = "\n".join(f"| {k} | {escaped(line)} |" for k, line in enumerate(status.lines, start=1))
+        parts.append(f"| | Partial results |\n|--:|:--|\n{rows}")
+    return "\n\n".join(parts)
+
+
+def time_left(eta_s: float | None) -> str:
+    """Seconds as "2 min 05 s"; a dash where nobody knows."""
+    if eta_s is None or not 0.0 <= eta_s < 1e6:
+        return "–"
+    minutes, seconds = divmod(round(eta_s), 60)
+    return f"{minutes} min {seconds:02d} s" if minutes else f"{seconds} s"
+
+
+def escaped(text: str) -> str:
+    """``text`` as one line that markdown shows as it is."""
+    return MARKDOWN_MARKS.sub(r"\\\1", " ".join(text.split()))
