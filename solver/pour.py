@@ -64,7 +64,7 @@ class Pour:
         self._layout = layout(scene, self.order, sizes)
         self.dt = time_step(scene)
         batch.load(w, scene, self._layout, self.dt, (True,) * len(self.rig.surfaces()))
-        self._due = insertion.entry_times(self._layout.numbers[:, 0], scene.insertion.rate)
+        self._due = insertion.entry_times(self._layout.numbers[:, 0], scene.insertion.rate) - scene.insertion.lead
         self._table = law_table(scene)
         self._ramp: Ramp | None = None
         self.energy_put_in = 0.0

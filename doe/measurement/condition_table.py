@@ -7,7 +7,9 @@ name, role, rig, data              role: fit (calibrated against) or holdout (on
 [condition.domain]                 half_width
 
 The feed of a rig begins at its opening, so region_z must begin there. ``duration`` is the time from the first body to
-the reading; the run is read then, at rest or not. ``batch_interval`` becomes the interval at which a run decides.
+the reading; the run is read then, at rest or not. ``batch_interval`` becomes the interval at which a run decides. A
+batch holds what the interval after it feeds, the first one at time 0: with batches of what was due before, the shipped
+pours of 262 bodies pass the outlet one interval late, 20 ± 2 ms.
 """
 
 from __future__ import annotations
@@ -81,7 +83,7 @@ def _insertion(table: Table) -> dict[str, Any]:
             raise MeasurementError(f"insertion.velocity: {table['velocity']}; allowed: straight down, [0, 0, −v]")
         settings["insertion.drop_speed"] = -z
     if "batch_interval" in table:
-        settings["numerics.sample_interval"] = table["batch_interval"]
+        settings["numerics.sample_interval"] = settings["insertion.lead"] = table["batch_interval"]
     return settings
 
 

@@ -24,8 +24,8 @@ def at_rest():
     return run_pour(with_values(BEADS, {"numerics.max_time": 3.0}), 1)
 
 
-# 0.25 s: in the funnel and in the air; 0.3037 s: between two samples.
-@pytest.mark.parametrize("duration", [0.25, 0.3037])
+# 0.15 s: in the funnel and in the air; 0.3037 s: between two samples.
+@pytest.mark.parametrize("duration", [0.15, 0.3037])
 def test_a_pour_runs_exactly_so_long(duration):
     record = run_pour(with_values(BEADS, {"numerics.duration": duration}), 1)
     assert (record.outcome, record.message) == (Outcome.MEASURED, "")
@@ -44,7 +44,7 @@ def test_until_then_it_is_the_same_pour(at_rest):
 
 
 def test_what_is_still_in_the_funnel_is_not_in_the_pile():
-    record = run_pour(with_values(BEADS, {"numerics.duration": 0.25}), 1)
+    record = run_pour(with_values(BEADS, {"numerics.duration": 0.2}), 1)
     lying = record.bodies.position[:, 2] < BEADS.rig.outlet_height
     assert 0 < lying.sum() < 4
     assert record.pile.mass.size == lying.sum()
@@ -80,3 +80,13 @@ def test_a_drum_runs_for_its_own_time():
 def test_a_duration_beyond_the_end_of_the_run_is_refused():
     with pytest.raises(ParameterError, match=r"numerics\.duration: 9 s .* allowed: up to 8 s"):
         with_values(BEADS, {"numerics.duration": 9.0})
+
+
+def test_a_batch_may_hold_what_the_interval_after_it_feeds():
+    """Beads due every 22.6 ms, batches every 50 ms: due up to then at the batch, or one interval earlier."""
+    batches = {"numerics.sample_interval": 0.05, "numerics.duration": 0.2}
+    after = run_pour(with_values(BEADS, batches), 1)
+    before = run_pour(with_values(BEADS, batches | {"insertion.lead": 0.05}), 1)
+    # By hand: due at 0, 22.6, 45.2, 67.9 ms.
+    np.testing.assert_allclose(after.entries.time, [0.0, 0.05, 0.05, 0.1], atol=before.dt)
+    np.testing.assert_allclose(before.entries.time, [0.0, 0.0, 0.0, 0.05], atol=before.dt)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from doe.errors import MeasurementError
 from doe.measurement import load_measurement, reach_of, summaries_of_data, summary_names
 from doe.record import plain
 from solver import with_values
@@ -17,7 +18,8 @@ SHIPPED = ("granudrum_mcc", "trefoil_1", "trefoil_2")
 def test_a_condition_is_a_scene_to_simulate(tmp_path):
     slow, fast = load_measurement(write(tmp_path)).conditions
     assert slow.scene.rig == Funnel(outlet_height=0.060, mass=0.014, domain_half_width=0.3, wall="steel")
-    assert slow.scene.insertion == Insertion(rate=0.1, drop_speed=0.4, region_radius=0.030, region_height=0.050)
+    feed = Insertion(rate=0.1, lead=0.02, drop_speed=0.4, region_radius=0.030, region_height=0.240 - 0.190)
+    assert slow.scene.insertion == feed
     assert (slow.scene.numerics.duration, slow.scene.numerics.sample_interval) == (2.6, 0.02)
     assert (fast.scene.numerics.duration, fast.scene.rig) == (0.0, Funnel(wall="steel"))
     assert (slow.role, fast.role, slow.replicates) == ("fit", "holdout", 2)
@@ -91,8 +93,6 @@ def test_scanned_piles_come_before_the_table(tmp_path):
 
 
 def test_a_gap_in_the_replicates_is_refused(tmp_path):
-    from doe.errors import MeasurementError
-
     folder = write(tmp_path)
     write_pile(folder / "piles/slow_4.npz")
     with pytest.raises(MeasurementError, match=r"slow_4\.npz: replicate 3 is missing of 4"):

@@ -14,11 +14,11 @@ from doe.measurement import (
     summary_uncertainties,
 )
 from doe.measurement.measurement import Condition, Observation
+from doe.measurement.piles import read_pile
 from doe.measurement.summaries import ASYMMETRY, MOST, PREFERRED, Summary
 from solver.assets import measurement_folder
 from solver.observables.free_surface import column_places
 from solver.record import FreeSurface
-from solver.scan import scanned_pile
 from tests.doe.measurement.folders import TABLE, write
 from tests.solver.observables.made_up import pile_of, record_of
 
@@ -98,8 +98,7 @@ def test_a_run_with_a_scanned_pile_has_the_summaries_of_that_scan():
     """The contract of the diagnosis: one code for both. Data and run are the same pile, so the numbers are equal."""
     measurement = load_measurement(measurement_folder("trefoil_1"))
     condition = measurement.conditions[0]
-    with np.load(measurement.folder / "piles/fit_2.npz") as arrays:
-        pile = scanned_pile(condition.scene, arrays["xyz"], arrays["radius"], arrays["body"])
+    pile = read_pile(measurement.folder / "piles/fit_2.npz", condition.scene)
     time, mass = condition.offered["discharged_mass_kg"].x, condition.offered["discharged_mass_kg"].values[1]
     record = dataclasses.replace(record_of(pile, time, mass, mass[-1]), scene=condition.scene)
     data, run = summaries_of_data(condition)[1], summaries_of_record(condition, record)
