@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
 from doe.diagnose.confirm import Confirmed
@@ -62,7 +63,8 @@ def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> Diagnosis:
         budget = budget.scaled(order.budget, len(names), len(measurement.fit))
     order.out.mkdir(parents=True, exist_ok=True)
     say(
-        f"{order.folder}: {len(measurement.fit)} fitted and {len(measurement.holdout)} held-out conditions; store {path}"
+        f"{order.folder}: {len(measurement.fit)} fitted and {len(measurement.holdout)} held-out conditions; store "
+        f"{path}"
     )
     progress = PourProgress(order.out / "progress.jsonl", say, terminal=sys.stdout.isatty())
     with ExitStack() as stack:
@@ -161,7 +163,7 @@ def _error(row: HoldoutError, units: dict[str, str]) -> dict[str, Any]:
 
 
 def _piles(measurement: Measurement, found: Diagnosis, number: int) -> Iterator[dict[str, Any]]:
-    """Mean height profiles of condition ``number``, measured and by both models [m]; none where data have no profile."""
+    """Height profiles [m] of condition ``number``, measured and by both models; none where the data have none."""
     condition = measurement.conditions[number]
     profile = measured_profile(condition)
     blocks = [profile.values, *(one.profiles[number] for one in (found.before, found.after))] if profile else []

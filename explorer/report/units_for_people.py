@@ -21,7 +21,9 @@ OBSERVABLE_LABELS = {
     "angle_of_repose_mass_cone_deg": "angle of repose, centre-of-mass cone",
     "angle_of_repose_volume_cone_deg": "angle of repose, volume cone",
 }
-SYMBOLS = {"deg": "°", "kg/m3": "kg/m³", "m/s2": "m/s²", "1": ""}
+SYMBOLS = {"deg": "°", "kg/m3": "kg/m³", "m/s2": "m/s²", "kJ/m3": "kJ/m³", "mJ/m2": "mJ/m²", "1": ""}
+READING_UNIT = SCREEN_UNIT | {"J/m3": "kJ/m3", "J/m2": "mJ/m2", "N/m": "mN/m"}
+"""What is written instead of the SI unit."""
 
 
 @dataclass(frozen=True)
@@ -172,5 +174,5 @@ def enumeration(items: list[str]) -> str:
 
 def reading_unit(si: str) -> ReadingUnit:
     """Unit in which a number in the SI unit ``si`` is read."""
-    name = SCREEN_UNIT.get(si, si)
+    name = READING_UNIT.get(si, si)
     return ReadingUnit(SYMBOLS.get(name, name), UNITS.get(si, {}).get(name, 1.0))

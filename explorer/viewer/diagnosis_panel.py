@@ -1,4 +1,4 @@
-"""The diagnosis on the page: choose measured data, start, watch, cancel, resume; the answer, and the error before and after."""
+"""The diagnosis on the page: choose measured data, start, watch, cancel, resume, and read the answer."""
 
 from __future__ import annotations
 

@@ -110,17 +110,18 @@ def pile_chart(picture: Plain) -> Spec:
     traces: list[Json] = []
     for key, colour, dash in (("measured", MEASURED, "solid"), ("before", BEFORE, "dot"), ("after", AFTER, "dash")):
         profile = picture[key]
-        mean, sd = (_mirrored(profile[part]) for part in ("mean", "sd"))
-        known = [k for k in range(len(x)) if mean[k] is not None and sd[k] is not None]
-        at = [x[k] for k in known]
-        high = [mean[k] + sd[k] for k in known]
-        low = [max(0.0, mean[k] - sd[k]) for k in known]
+        mean = [None if h is None else MM * h for h in _mirrored(profile["mean"])]
+        known = [
+            (at, MM * (middle - spread), MM * (middle + spread))
+            for at, middle, spread in zip(x, _mirrored(profile["mean"]), _mirrored(profile["sd"]), strict=True)
+            if middle is not None and spread is not None
+        ]
         traces.append(
             {
                 "type": "scatter",
                 "mode": "lines",
-                "x": at + at[::-1],
-                "y": high + low[::-1],
+                "x": [at for at, _, _ in known] + [at for at, _, _ in known[::-1]],
+                "y": [high for _, _, high in known] + [max(0.0, low) for _, low, _ in known[::-1]],
                 "fill": "toself",
                 "fillcolor": BAND[colour],
                 "line": {"width": 0},
@@ -139,8 +140,7 @@ def pile_chart(picture: Plain) -> Spec:
 
 
 def _mirrored(values: list[float | None]) -> list[float | None]:
-    both = [*reversed(values), *values]
-    return [None if value is None else MM * value for value in both]
+    return [*reversed(values), *values]
 
 
 def _heat_map(rows: list[list[float]], names: list[str], labels: list[str], height: int, hover: str) -> Spec:

@@ -19,11 +19,11 @@ from solver.effects import EFFECTS
 def effects(result: Plain) -> Section:
     """The race, and beside it the range, literature and lever of every effect."""
     text = (
-        "Every effect is calibrated with the parameters on equal footing. Reach: the largest shift that it can cause within "
-        f"its range, in σ of these data after recalibration; below {fixed(result['limits']['reach'], 1)} it is not "
-        "identifiable here and does not race. T² and ΔB: misfit, and distance to the best (ΔB charges for parameters and "
-        "for uncertainty that an effect brings). Drop: fall of T² under the declared model's own noise, with its chance "
-        "p where nothing is missing. Cosine: likeness of its pattern to that of the best."
+        "Every effect is calibrated with the parameters on equal footing. Reach: the largest shift that it can cause "
+        f"within its range, in σ of these data after recalibration; below {fixed(result['limits']['reach'], 1)} it is "
+        "not identifiable here and does not race. T² and ΔB: misfit, and distance to the best (ΔB charges for "
+        "parameters and for uncertainty that an effect brings). Drop: fall of T² under the declared model's own noise, "
+        "with its chance p where nothing is missing. Cosine: likeness of its pattern to that of the best."
     )
     return Section("Effects", (Text(text), _race(result), _bounds(result)))
 
@@ -40,8 +40,10 @@ def effect_verdict(result: Plain, row: Plain) -> str:
     if row["delta"] is None:
         return "no residual to explain"
     if row["delta"] > 0.0:
-        within = row["delta"] < limits["gap"]
-        return f"{'within' if within else 'behind'} {fixed(limits['gap'], 0)} of the best (ΔB {fixed(row['delta'], 1)})"
+        distance = (
+            f"ΔB {fixed(row['delta'], 1)} {'<' if row['delta'] < limits['gap'] else '≥'} {fixed(limits['gap'], 0)}"
+        )
+        return f"behind the best: {distance}" if row["delta"] >= limits["gap"] else f"close to the best: {distance}"
     gate = gate_named(result, f"adequate: {row['name']}")
     return "best single effect" if gate is None else f"best, but not adequate (p = {p_value(gate['p'])})"
 
@@ -65,8 +67,9 @@ def _race(result: Plain) -> Table:
         )
     header = ("effect", "verdict", "amplitude", "reach", "T²", "drop", "p", "ΔB", "weight", "cosine")
     caption = (
-        "Amplitudes by the standard error of the fit; the winner's interval in the first section is by bootstrap. Weight: "
-        "exp(−B/2), shared out among the single effects in the race; it is no probability that an effect is there."
+        "Amplitudes by the standard error of the fit; the winner's interval in the first section is by bootstrap. "
+        "Weight: exp(−B/2), shared out among the single effects in the race; it is no probability that an effect is "
+        "there."
     )
     return Table(header, tuple(rows), caption)
 

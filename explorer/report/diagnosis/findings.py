@@ -1,4 +1,4 @@
-"""What the sections of a diagnosis say is read off ``diagnosis.json`` here: the kind of answer, who is named, what was confirmed.
+"""What the sections say is read off ``diagnosis.json`` here: the kind of answer, who is named, what was confirmed.
 
 A result is plain JSON: dict, list, str, float, None (no number), never NaN. Numbers are SI, residuals in σ.
 """
@@ -26,6 +26,8 @@ Confirmation = Literal["no holdout", "within noise", "confirmed", "not certain",
 
 OVERALL = "overall"
 UNIT_ENDINGS = ("_deg", "_kg_m3", "_m", "_s", "_kg")
+NOISE_FALL = 3.84
+"""95 % of χ² with one degree of freedom: by how much a free parameter lowers T² by chance."""
 EDGE = {-1: "lower end", 0: "", 1: "upper end"}
 
 
@@ -106,7 +108,7 @@ def amplitude_text(estimate: Plain) -> str:
     text = (
         f"{parameter_value(path, estimate['value'])} (95 % {parameter_range(path, estimate['low'], estimate['high'])})"
     )
-    return text + (", at the end of its range" if estimate["at_edge"] else "")
+    return text + (", at the end of its range" if estimate["at_edge"] and estimate["value"] else "")
 
 
 def amplitudes_of(estimates: list[Plain]) -> str:
@@ -168,19 +170,36 @@ def residual_label(label: str) -> str:
     return f"{condition} · {summary_label(summary)}"
 
 
-def edges(result: Plain) -> list[str]:
-    """A sentence for every parameter that calibration drove to an end of its range."""
+def pressed(result: Plain) -> list[str]:
+    """Parameters that the declared model presses against an end of their range by more than noise asks for."""
+    rows = [row for row in result["parameters"] if row["edge_before"] and fall_beyond(row["pull_before"]) > NOISE_FALL]
+    return [parameter_label(row["name"]) for row in rows]
+
+
+def edges(result: Plain, least: float = 0.0) -> list[str]:
+    """A sentence for every parameter that calibration drove to an end of its range, at a cost in T² above ``least``."""
     found = []
     for row in result["parameters"]:
         for when, words in (("before", "the declared model"), ("after", "the final model")):
-            if row[f"edge_{when}"] and (when == "before" or result["amplitudes"]):
+            fall = fall_beyond(row[f"pull_{when}"])
+            if row[f"edge_{when}"] and fall >= least and (when == "before" or result["amplitudes"]):
+                tail = (
+                    "more than noise asks for: range and model do not fit together, which is evidence in itself"
+                    if fall > NOISE_FALL
+                    else "no more than noise may ask for"
+                )
                 found.append(
                     f"In {words} calibration drives {parameter_label(row['name'])} ({code(row['name'])}) to the "
-                    f"{EDGE[row[f'edge_{when}']]} of its measured range, {parameter_value(row['name'], row[when])}; one "
-                    f"standard deviation further T² would fall by about {fixed(row[f'pull_{when}'], 1)}. That is evidence "
-                    "in itself: the range and this model do not fit together."
+                    f"{EDGE[row[f'edge_{when}']]} of its measured range, {parameter_value(row['name'], row[when])}. "
+                    f"Without that end T² would fall by about {fixed(fall, 1)}, {tail} ({fixed(NOISE_FALL, 1)} in one "
+                    "case of twenty)."
                 )
     return found
+
+
+def fall_beyond(pull: float) -> float:
+    """Fall of T² if the end were not there: (pull/2)², T² being a parabola with pull = 2 |slope| · standard error."""
+    return (pull / 2.0) ** 2
 
 
 def final_model(result: Plain) -> str:

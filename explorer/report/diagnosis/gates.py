@@ -13,9 +13,10 @@ def gates(result: Plain) -> Section:
     text = (
         "A residual counts as more than noise if either detection test has p ≤ "
         f"{number(limits['detect'])}; both are calibrated by {result['bootstrap']} data sets made up from the declared "
-        f"model and fitted anew. A model is adequate if its own misfit has p ≥ {number(limits['adequate'])}, and "
-        f"unambiguous if the next one is at least {fixed(limits['gap'], 0)} behind in B. A pair is asked only where no "
-        f"single effect is adequate, and has to gain more than {fixed(limits['pair_gain'], 0)}."
+        f"model and fitted anew, so that no p can be below {number(1 / (1 + result['bootstrap']))}. A model is "
+        f"adequate if its own misfit has p ≥ {number(limits['adequate'])}, and unambiguous if the next one is at least "
+        f"{fixed(limits['gap'], 0)} behind in B. A pair is asked only where no single effect is adequate, and has to "
+        f"gain more than {fixed(limits['pair_gain'], 0)}."
     )
     rows = tuple(
         (

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from explorer.report.content import Block, Bullets, Caution, Facts, Section, Text
 from explorer.report.diagnosis.findings import (
+    NOISE_FALL,
     amplitudes_of,
     confirmation,
     edges,
+    final_model,
     kind_of,
     named,
     out_of_sight,
     overall,
+    pressed,
     raced,
     spelled,
     split_label,
@@ -33,13 +36,22 @@ def verdict_sentence(result: Plain) -> str:
     names = named(result)
     match kind_of(result):
         case "no_missing_effect":
+            at_an_end = pressed(result)
+            but = (
+                f" But it needs {enumeration(at_an_end)} at the end of the measured range for that."
+                if at_an_end
+                else ""
+            )
             return (
                 "Nothing is missing that these data could show: the calibrated declared model differs from the "
-                "measurement by no more than noise."
+                f"measurement by no more than noise.{but}"
             )
         case "effect":
+            opening = (
+                "The fitted data ask for" if confirmation(result) == "contradicted" else "The declared model lacks"
+            )
             return (
-                f"The declared model lacks {code(names[0])}: with {amplitudes_of(result['amplitudes'])} it agrees with "
+                f"{opening} {code(names[0])}: with {amplitudes_of(result['amplitudes'])} it agrees with "
                 f"the fitted data, and no other effect in the list comes near. {confirmation_sentence(result)}"
             )
         case "effects":
@@ -54,7 +66,7 @@ def verdict_sentence(result: Plain) -> str:
                 f"{_asked_for(result)}"
             )
         case "unexplained":
-            sits = f" What is left sits in {result['where'][0]}." if result["where"] else ""
+            sits = f" What is left, worst condition first: {'; '.join(result['where'])}." if result["where"] else ""
             return (
                 f"The declared model lacks something that none of the {len(raced(result))} effects that these data can "
                 f"see explains.{sits}"
@@ -74,7 +86,7 @@ def confirmation_sentence(result: Plain) -> str:
         "no holdout": "",
         "within noise": "The held-out data cannot confirm it: there the declared model is within the noise already.",
         "confirmed": f"On data that were not fitted the error falls {numbers}.",
-        "not certain": f"On data that were not fitted the error goes {numbers}; the noise leaves open whether that is a gain.",
+        "not certain": f"On data that were not fitted the error goes {numbers}; noise may make that gain.",
         "contradicted": f"The held-out data do not confirm it: there the error goes {numbers}.",
     }[confirmation(result)]
 
@@ -90,27 +102,27 @@ def cautions(result: Plain) -> list[str]:
         )
     if state == "contradicted" and named(result):
         found.append(
-            "The correction does not carry over to the held-out conditions. The effect may stand in for another one, or "
-            "its amplitude may depend on the set-up; do not use the corrected model beyond the fitted conditions."
+            "The correction does not carry over to the held-out conditions. The effect may stand in for another one, "
+            "or its amplitude may depend on the set-up; do not use the corrected model beyond the fitted conditions."
         )
-    found += edges(result)
+    found += edges(result, NOISE_FALL)
     found += [
-        f"`{one['effect']}` stands at the end of its simulated range; the true amplitude may be larger, and its interval "
-        "is cut there."
+        f"`{one['effect']}` stands at the end of its simulated range; the true amplitude may be larger, and its "
+        "interval is cut there."
         for one in result["amplitudes"]
         if one["at_edge"] and named(result)
     ]
     differing = _differing(result)
     if differing:
         found.append(
-            f"Measured and simulated pours scatter differently in {enumeration(differing)}; these take the measured spread. "
-            "Something in the model or in the measurement differs in scatter, not only in the mean."
+            f"Measured and simulated pours scatter differently in {enumeration(differing)}; these take the measured "
+            "spread. Something in the model or in the measurement differs in scatter, not only in the mean."
         )
     broken = {name: result["confirmation"][name]["broken"] for name in ("before", "after")}
     if max(broken.values()):
         found.append(
-            f"{broken['before']} fresh pours of the declared model and {broken['after']} of the final one broke off and "
-            "are left out; means are given that a pour ends."
+            f"Fresh pours that broke off and are left out: {broken['before']} of the declared model, {broken['after']} "
+            "of the final one. Means are given that a pour ends."
         )
     if result["floored"]:
         found.append(
@@ -130,8 +142,8 @@ def limits(result: Plain) -> list[str]:
     ]
     if hidden:
         found.append(
-            f"{enumeration([code(row['name']) for row in hidden])} cannot be seen in these data, or were not simulated; "
-            "each may act all the same."
+            f"{enumeration([code(row['name']) for row in hidden])} cannot be seen in these data, or were not "
+            "simulated; each may act all the same."
         )
     kind = kind_of(result)
     if kind == "no_missing_effect":
@@ -140,11 +152,12 @@ def limits(result: Plain) -> list[str]:
         )
     if kind in ("effect", "effects", "ambiguous"):
         found.append(
-            "An effect that is not in the list but changes the same numbers in the same proportions would look the same."
+            "An effect that is not in the list but changes the same numbers in the same proportions would look the "
+            "same."
         )
         found.append(
-            "Amplitudes hold together with the declared contact law, shapes and parameter ranges; they are not measured "
-            "constants of the material."
+            "Amplitudes hold together with the declared contact law, shapes and parameter ranges; they are not "
+            "measured constants of the material."
         )
     if kind == "unexplained":
         found.append(
@@ -166,12 +179,13 @@ def _asked_for(result: Plain) -> str:
 def _facts(result: Plain) -> list[tuple[str, str]]:
     detect, before, after = result["gates"][0], result["t2"]["before"], result["t2"]["after"]
     measured = ", ".join(
-        f"{row['condition']} ({row['role']}, {row['replicates']} pours, {len(row['summaries'])} numbers each)"
+        f"{row['condition']} ({'fitted' if row['role'] == 'fit' else 'held out'}, {row['replicates']} pours, "
+        f"{len(row['summaries'])} numbers each)"
         for row in result["measured"]
     )
     fit = f"T² = {fixed(before[0], 1)} on {before[1]} degrees of freedom, p = {p_value(detect['p'])}"
     if result["amplitudes"]:
-        fit += f"; with the effect {fixed(after[0], 1)} on {after[1]}"
+        fit += f"; {fixed(after[0], 1)} on {after[1]} by {final_model(result)}"
     facts = [
         ("Verdict", code(result["verdict"])),
         ("Measured", measured),
@@ -180,22 +194,28 @@ def _facts(result: Plain) -> list[tuple[str, str]]:
     for role, words in (("holdout", "Error on held-out data"), ("fit", "Error on fitted data")):
         row = overall(result, role)
         if row is not None:
-            facts.append(
-                (
-                    words,
-                    f"{number(row['before'])} σ before, {number(row['after'])} σ after, {number(row['noise_floor'])} σ "
-                    f"noise floor; {percent(row['coverage_before'])} → {percent(row['coverage_after'])} of the pours "
-                    "inside the model's 90 % interval",
-                )
-            )
+            facts.append((words, _error_words(result, row)))
     facts.append(
         (
             "Rests on",
-            f"{result['pours']['settings']} simulated settings ({result['pours']['run']} pours run now, the others found "
-            f"in the store), {result['bootstrap']} bootstrap data sets per test; errors by fresh pours, not by the emulator",
+            f"{result['pours']['settings']} simulated settings ({result['pours']['run']} pours run now, the others "
+            f"found in the store), {result['bootstrap']} bootstrap data sets per test; errors by "
+            "fresh pours, not by the emulator",
         )
     )
     return facts
+
+
+def _error_words(result: Plain, row: Plain) -> str:
+    floor = f"noise floor {number(row['noise_floor'])} σ"
+    if not named(result):
+        inside = f"{percent(row['coverage_before'])} of the pours inside the model's 90 % interval"
+        return f"{number(row['before'])} σ, {floor}; {inside}"
+    inside = f"{percent(row['coverage_before'])} → {percent(row['coverage_after'])}"
+    return (
+        f"{number(row['before'])} σ before, {number(row['after'])} σ after, {floor}; {inside} of the pours inside the "
+        "model's 90 % interval"
+    )
 
 
 def _differing(result: Plain) -> list[str]:

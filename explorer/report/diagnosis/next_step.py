@@ -28,8 +28,8 @@ def next_step(result: Plain) -> Section:
                 Bullets(tuple(result["where"])),
                 Text(
                     "Before looking for new physics: pour the same set-up again, check scale and units of what was "
-                    "measured, and the set-up itself. A condition with another outlet height or feed rate shows whether "
-                    "the residual goes with the rig or with the material."
+                    "measured, and the set-up itself. A condition with another outlet height or feed rate shows "
+                    "whether the residual goes with the rig or with the material."
                 ),
             ]
         case _:
@@ -61,8 +61,8 @@ def _ranked(result: Plain) -> list[Block]:
         Table(
             ("set-up", "score", "least separation of one pour", "pours for odds of 20 : 1"),
             rows,
-            "Score: expected information of six pours, 0 where nothing is learnt. Separation: distance of the two rivals "
-            "that are closest, in σ of one pour and of the prediction.",
+            "Score: expected information of six pours, 0 where nothing is learnt. Separation: distance of the two "
+            "rivals that are closest, in σ of one pour and of the prediction.",
         ),
     ]
     if all(row["experiment"]["score"] <= 0.0 for row in result["next_experiment"]):

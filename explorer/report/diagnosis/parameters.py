@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from explorer.report.content import Block, Caution, Section, Table, Text
-from explorer.report.diagnosis.findings import EDGE, edges, final_model
+from explorer.report.diagnosis.findings import EDGE, edges, fall_beyond, final_model
 from explorer.report.findings import Plain
 from explorer.report.units_for_people import MISSING, fixed, parameter_label, parameter_range, parameter_value
 
@@ -31,12 +31,13 @@ def parameters(result: Plain) -> Section:
     )
     blocks: list[Block] = [
         Text(
-            f"Calibrated within their measured ranges, and to their measured means where there are some. After: {final_model(result)}."
+            "Calibrated within their measured ranges, and to their measured means where there are some. After: "
+            f"{final_model(result)}."
         ),
         Table(
             header,
             tuple(rows),
-            "Held at: the end of the range that stops the fit, and the fall of T² per standard error beyond it.",
+            "Held at: the end of the range that stops the fit, and the fall of T² if it were not there.",
         ),
     ]
     blocks += [Caution(text) for text in edges(result)]
@@ -44,4 +45,4 @@ def parameters(result: Plain) -> Section:
 
 
 def _held(end: str, pull: float) -> str:
-    return f"{end} (T² −{fixed(pull, 1)})" if end else MISSING
+    return f"{end} (T² −{fixed(fall_beyond(pull), 1)})" if end else MISSING

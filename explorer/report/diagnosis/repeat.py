@@ -15,8 +15,8 @@ def repeat(result: Plain) -> Section:
     text = (
         f"{pours['settings']} settings of the declared model and its effects, each poured in every fitted condition; "
         f"{pours['run']} pours were run in {duration(result['timing']['total_s'])}, the others were in the store. The "
-        f"bootstrap has seed {result['seed']}; pours have seeds of their own, so that the same order gives the same answer. "
-        "`diagnosis.json` holds every number of this report."
+        f"bootstrap has seed {result['seed']}; pours have seeds of their own, so that the same order gives the same "
+        "answer. `diagnosis.json` holds every number of this report."
     )
     versions = tuple((name, version or "not installed") for name, version in result["versions"].items())
     return Section("How to repeat", (Text(text), Code(command(result)), Table(("program", "version"), versions)))

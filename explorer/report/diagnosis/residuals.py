@@ -15,9 +15,10 @@ def residuals(result: Plain) -> Section:
     """Bar chart with the bands, and the numbers behind it."""
     one, every = bands(len(result["residuals"]))
     text = (
-        "Measured mean minus model in units of σ, which holds the noise of the measured mean, that of the model and the "
-        f"instrument's. A correct model leaves one number within ± {fixed(one)} in 95 % of cases, and all "
-        f"{len(result['residuals'])} within ± {fixed(every)}. Neighbours are correlated: T² counts that, single bars do not."
+        "Measured mean minus model in units of σ, which holds the noise of the measured mean, that of the model and "
+        f"the instrument's. A correct model leaves one number within ± {fixed(one)} in 95 % of cases, and all "
+        f"{len(result['residuals'])} within ± {fixed(every)}. Neighbours are correlated: T² counts that, single bars "
+        "do not."
     )
     after = f"After: {final_model(result)}."
     return Section(

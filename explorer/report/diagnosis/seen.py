@@ -1,10 +1,11 @@
-"""What these data could have seen: for every effect the amplitude that would have been found, and what would reveal it.
+"""What these data could have seen: for every effect the amplitude that would have been found, and its lever.
 
-An effect is found with chance 0.8 where its shift δ [σ] gives the directed test, at level p over K effects, that power:
+An effect is found with chance 0.8 where its shift δ [σ] gives the directed test over K effects, level p, that power:
 
     P(χ'²(m, δ²) > χ²_{1 − p/K}(m)) = 0.8,   amplitude ≈ bound · δ / reach
 
-with m amplitudes and the reach at the bound. Linear in the amplitude, hence "about". Source: noncentral χ², Patnaik 1949.
+with m amplitudes and the reach at the bound. Linear in the amplitude, hence "about".
+Source: noncentral χ², Patnaik 1949.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ def could_have_seen(result: Plain) -> Section | None:
         wanted = shift[len(bounds["high"])]
         rows.append((code(row["name"]), _reach(row), _visible(row, bounds, wanted), EFFECTS[row["name"]].lever))
     text = (
-        f"An effect that shifts the numbers by {fixed(shift[1], 1)} σ after recalibration ({fixed(shift[2], 1)} σ with two "
-        f"amplitudes) would have been detected with chance {fixed(POWER, 1)}. Weaker ones may be there."
+        f"An effect that shifts the numbers by {fixed(shift[1], 1)} σ after recalibration ({fixed(shift[2], 1)} σ with "
+        f"two amplitudes) would have been detected with chance {fixed(POWER, 1)}. Weaker ones may be there."
     )
     caption = (
         "Found from about: by proportion to the shift at the bound. Detected, which is less than told from all others."

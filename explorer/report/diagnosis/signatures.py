@@ -16,8 +16,8 @@ def signatures(result: Plain) -> Section | None:
     text = (
         "Each column is a pattern over the fitted numbers, whitened by their noise and freed from what calibration can "
         "take up, and brought to length one: first the residual of the declared model, then each effect. A cosine near "
-        "± 1 with the residual says that the effect has the right pattern; near ± 1 between two effects, that these data "
-        "cannot tell them apart. A sign is turned by an amplitude of the other sign, where that is allowed."
+        "± 1 with the residual says that the effect has the right pattern; near ± 1 between two effects, that these "
+        "data cannot tell them apart. A sign is turned by an amplitude of the other sign, where that is allowed."
     )
     caution = (
         "Whitening goes down the list: a row is the part of its number that the rows above it do not predict. Read the "
