@@ -38,7 +38,7 @@ def error_chart(result: Plain, role: str) -> Spec:
         for key, words, colour in (("before", "before", BEFORE), ("after", "after", AFTER))
     ]
     layout: Json = {
-        "xaxis": axis("error / noise floor", type="log"),
+        "xaxis": axis("error / noise floor", rangemode="tozero"),
         "yaxis": axis("", tickfont={"size": 11}),
         "shapes": [vertical_line(1.0, DUMMY, dash="dash")],
     }

@@ -41,7 +41,9 @@ def error(result: Plain) -> Section:
         blocks += [Text("On held-out conditions, which no fit has seen:"), _table(result, "holdout", CAPTION)]
         blocks.append(
             Figure(
-                "error", error_chart(result, "holdout"), "Errors as multiples of the noise floor; 1 is a perfect model."
+                "error",
+                error_chart(result, "holdout"),
+                "Errors as multiples of the noise floor; a perfect model lies about 1.",
             )
         )
     else:

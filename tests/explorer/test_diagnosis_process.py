@@ -1,0 +1,187 @@
+"""A diagnosis in the background and its panel, with a small program in place of the command line."""
+
+import json
+import os
+import sys
+import time
+
+import pytest
+
+from explorer.command_process import BackgroundError, CommandStatus
+from explorer.diagnosis_process import DiagnoseProcess
+from explorer.viewer.actions import Actions
+from explorer.viewer.diagnosis_panel import OWN, DiagnosisPanel, answer_markdown
+from explorer.viewer.guarded_server import guarded_server
+from solver import AssetNotFoundError
+from solver.assets import measurement_folder, shipped_measurements
+from tests.explorer.diagnosed import result_of_case
+
+PROGRAM = """
+import json, os, pathlib, sys, time
+arguments = sys.argv[1:]
+out = pathlib.Path(arguments[arguments.index("--out") + 1])
+out.mkdir(parents=True, exist_ok="--resume" in arguments)
+(out / "arguments.json").write_text(json.dumps(arguments))
+(out / "niceness").write_text(str(os.nice(0)))
+with (out / "progress.jsonl").open("a") as progress:
+    for left in (2, 1, 0):
+        line = "base model: 3 settings" if left == 0 else None
+        event = {"time": 1, "stage": "base model", "done": 3 - left, "planned": 3, "eta_s": left, "line": line}
+        progress.write(json.dumps(event) + "\\n")
+        progress.flush()
+BEHAVIOUR
+(out / "diagnosis.json").write_text('{"verdict": "no_missing_effect"}')
+"""
+
+
+def diagnosis(tmp_path, behaviour=""):
+    program = tmp_path / "program.py"
+    program.write_text(PROGRAM.replace("BEHAVIOUR", behaviour))
+    return DiagnoseProcess(tmp_path / "out", tmp_path / "runs.sqlite", (sys.executable, str(program)))
+
+
+def wait_for(condition, patience=20.0):
+    end = time.monotonic() + patience
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.02)
+
+
+def only_folder(tmp_path):
+    (folder,) = [entry for entry in (tmp_path / "out").iterdir() if entry.is_dir()]
+    return folder
+
+
+def test_a_diagnosis_runs_to_its_end_at_lower_priority(tmp_path):
+    process = diagnosis(tmp_path)
+    assert process.status() == CommandStatus("idle")
+    assert process.result() is None
+    process.start("trefoil_1")
+    wait_for(lambda: process.status().state != "running")
+    status = process.status()
+    assert (status.state, status.stage, status.done, status.planned) == ("finished", "base model", 3, 3)
+    assert status.lines == ("base model: 3 settings",)
+    folder = only_folder(tmp_path)
+    assert status.message == f"report: {folder}/report.html"
+    assert process.result() == {"verdict": "no_missing_effect"}
+    data = str(measurement_folder("trefoil_1").absolute())
+    arguments = json.loads((folder / "arguments.json").read_text())
+    assert arguments == ["diagnose", data, "--out", str(folder), "--apply", "--store", str(tmp_path / "runs.sqlite")]
+    assert folder.name.startswith("trefoil_1-")
+    assert int((folder / "niceness").read_text()) == min(19, os.nice(0) + 10)
+
+
+def test_cancel_and_resume_also_from_a_later_page(tmp_path):
+    process = diagnosis(tmp_path, "time.sleep(0 if '--resume' in arguments else 60)")
+    process.start("trefoil_1")
+    wait_for(lambda: process.status().done == 3)
+    with pytest.raises(BackgroundError, match="a diagnosis is running already"):
+        process.start("trefoil_1")
+    with pytest.raises(BackgroundError, match="a diagnosis is running already"):
+        process.resume("trefoil_1")
+    process.cancel()
+    wait_for(lambda: process.status().state != "running")
+    assert process.status().state == "cancelled"
+    assert process.result() is None
+    later = diagnosis(tmp_path)
+    with pytest.raises(BackgroundError, match="no diagnosis of trefoil_2 has been stopped"):
+        later.resume("trefoil_2")
+    later.resume("trefoil_1")
+    wait_for(lambda: later.status().state != "running")
+    assert later.status().state == "finished"
+    assert json.loads((only_folder(tmp_path) / "arguments.json").read_text())[-1] == "--resume"
+    with pytest.raises(BackgroundError, match="no diagnosis of trefoil_1 has been stopped"):
+        later.resume("trefoil_1")
+
+
+def test_a_diagnosis_that_fails_says_why(tmp_path):
+    process = diagnosis(tmp_path, "sys.exit('error: condition fit: rate: -1')")
+    process.start(str(measurement_folder("trefoil_2")))
+    wait_for(lambda: process.status().state != "running")
+    assert process.status().state == "failed"
+    assert process.status().message == "diagnose ended with exit code 1: error: condition fit: rate: -1"
+    assert process.result() is None
+
+
+def test_data_that_are_not_there_are_refused_before_a_start(tmp_path):
+    process = diagnosis(tmp_path)
+    with pytest.raises(AssetNotFoundError, match=r"shipped: .*trefoil_1"):
+        process.start("no such data")
+    with pytest.raises(BackgroundError, match="choose measured data"):
+        process.start("  ")
+    assert process.status().state == "idle"
+    assert not (tmp_path / "out").exists()
+
+
+class FakeDiagnosis:
+    """Keeps what it was asked; status and result are what the test says."""
+
+    def __init__(self):
+        self.asked, self.now, self.found = [], CommandStatus("idle"), None
+
+    def start(self, data):
+        self.asked.append(f"start {data}")
+
+    def cancel(self):
+        self.asked.append("cancel")
+
+    def resume(self, data):
+        self.asked.append(f"resume {data}")
+
+    def status(self):
+        return self.now
+
+    def result(self):
+        return self.found
+
+
+def press(panel, button):
+    click = type("Event", (), {"client_id": 0, "target": type("Group", (), {"value": button})})
+    for callback in panel._view._buttons._impl.update_cb:
+        callback(click)
+
+
+def test_the_panel_asks_and_shows():
+    server, process, actions = guarded_server("127.0.0.1", 0, "test"), FakeDiagnosis(), Actions()
+    try:
+        panel = DiagnosisPanel(server, process, shipped_measurements(), actions.post)
+        panel._data.value = "trefoil_2"
+        for button in ("Start", "Cancel", "Delete everything"):
+            press(panel, button)
+        actions.carry_out()
+        panel._data.value = OWN
+        panel._folder.value = "/home/me/my data"
+        press(panel, "Resume")
+        actions.carry_out()
+        assert process.asked == ["start trefoil_2", "cancel", "resume /home/me/my data"]
+        process.now = CommandStatus("running", "screening", 5, 20, 125.0, ("base model: *64* settings",))
+        panel.show("no such folder")
+        assert panel._view._bar.value == 25.0
+        text = panel._view._text.content
+        assert "| screening | 5 of 20 | 2 min 05 s |" in text
+        assert r"base model: \*64\* settings" in text
+        assert "no such folder" in text
+        process.now = CommandStatus("finished", message="report: /home/me/out/report.html")
+        process.found = result_of_case("effect")
+        panel.show("")
+        text = panel._view._text.content
+        assert text.startswith(r"**effect:adhesion\_sjkr**")
+        assert "/home/me/out/report.html" in text
+    finally:
+        server.stop()
+
+
+def test_the_answer_holds_errors_before_after_and_by_noise_alone():
+    for case, role in (("effect", "holdout"), ("no holdout", "fit")):
+        result = result_of_case(case)
+        rows = [line.split(" | ") for line in answer_markdown(result).splitlines() if line.startswith("| ")]
+        assert rows[0] == [
+            f"| Error on {'held-out' if role == 'holdout' else 'fitted'} data",
+            "Before",
+            "After",
+            "Noise floor |",
+        ]
+        assert len(rows) == 1 + len(result["error"][role])
+        overall = result["error"][role][-1]
+        for cell, key in zip(rows[-1][1:], ("before", "after", "noise_floor"), strict=True):
+            assert float(cell.split()[0]) == pytest.approx(overall[key], rel=6e-3)  # three printed digits
