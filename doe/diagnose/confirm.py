@@ -34,7 +34,9 @@ class Model(Record):
 
 @dataclass(frozen=True)
 class Confirmed:
-    """Summaries of the fresh pours of one model, per condition (n, d_c); pours that broke off are left out.
+    """Summaries of the fresh pours of one model, per condition (n, d_c).
+
+    broken: pours left out because they broke off or left nothing to be read.
 
     profiles: the height profiles of the same pours, per condition (n, k_c) [m]; k_c = 0 without measured ones.
     """
@@ -51,7 +53,7 @@ def confirm(model: Model, pours: ModelPours, number: int, widths: Sequence[int])
     rows = pours.run(f"confirmation of {model.name}", points)
     blocks, profiles, broken = [], [], 0
     for c, width in enumerate(widths):
-        valid = [row[c] for row in rows if row[c].valid]
+        valid = [row[c] for row in rows if row[c].valid and np.isfinite(row[c].summaries).all()]
         broken += len(rows) - len(valid)
         blocks.append(np.array([pour.summaries for pour in valid]).reshape(len(valid), width))
         profiles.append(np.array([pour.profile for pour in valid]).reshape(len(valid), -1 if valid else 0))

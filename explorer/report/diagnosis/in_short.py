@@ -121,7 +121,7 @@ def cautions(result: Plain) -> list[str]:
     broken = {name: result["confirmation"][name]["broken"] for name in ("before", "after")}
     if max(broken.values()):
         found.append(
-            f"Fresh pours that broke off and are left out: {broken['before']} of the declared model, {broken['after']} "
+            f"Fresh pours that broke off or left nothing to be read: {broken['before']} of the declared model, {broken['after']} "
             "of the final one. Means are given that a pour ends."
         )
     if result["floored"]:
