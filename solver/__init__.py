@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from solver.assets import AssetNotFoundError, asset_path
 from solver.body import Body
+from solver.effects import EFFECTS, SetUpEffect
 from solver.material_file import load_material
 from solver.observables import Value, observable_names, observe
 from solver.observables.free_surface import slope_angle_deg
@@ -41,6 +42,7 @@ def __getattr__(name: str) -> Any:
 
 
 __all__ = [
+    "EFFECTS",
     "AssetNotFoundError",
     "Bodies",
     "Body",
@@ -55,6 +57,7 @@ __all__ = [
     "Pile",
     "Record",
     "Scene",
+    "SetUpEffect",
     "Spheres",
     "Trace",
     "Value",
