@@ -55,10 +55,15 @@ def _number_of_values(observation: Observation) -> int:
 
 
 def _mean_and_sd(observation: Observation) -> tuple[str, str]:
-    """Of a scalar; of a curve the range of its values, its scatter standing in the stated uncertainty if any."""
+    """Of a scalar; of a curve the range of its values, and the SD over replicates, root mean square over places."""
     values = observation.values[np.isfinite(observation.values)]
     if observation.x is not None:
-        return f"{observation.x.size} places, {values.min():.4g} … {values.max():.4g}", _stated(observation)
+        span = f"{observation.x.size} places, {values.min():.4g} … {values.max():.4g}"
+        repeated = np.isfinite(observation.values).sum(axis=0) >= 2
+        if not repeated.any():
+            return span, _stated(observation)
+        variance = np.nanvar(observation.values[:, repeated], axis=0, ddof=1)
+        return span, f"{np.sqrt(variance.mean()):.3g}"
     if values.size >= 2:
         return f"{values.mean():.5g}", f"{values.std(ddof=1):.3g}"
     return f"{values.mean():.5g}" if values.size else "-", _stated(observation)

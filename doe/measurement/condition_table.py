@@ -8,8 +8,8 @@ name, role, rig, data              role: fit (calibrated against) or holdout (on
 
 The feed of a rig begins at its opening, so region_z must begin there. ``duration`` is the time from the first body to
 the reading; the run is read then, at rest or not. ``batch_interval`` becomes the interval at which a run decides. A
-batch holds what the interval after it feeds, the first one at time 0: with batches of what was due before, the shipped
-pours of 262 bodies pass the outlet one interval late, 20 ± 2 ms.
+batch holds what the interval after it feeds, the first one at time 0. The shipped pours show it: t10 of the fast one of
+trefoil_1 is 177.5 ± 1.8 ms, simulated so 177.6 ± 1.2 ms, and 197.5 ms with batches of what was due before.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def in_rig(base: Scene, name: str) -> Scene:
 
 
 def condition_scene(base: Scene, entry: Table, measured: Sequence[MeasuredParameter]) -> Scene:
-    """The scene of a condition: ``base`` with its rig and insertion, and the means of what was ``measured``."""
+    """The scene of a condition: ``base`` with its rig and insertion, and what was ``measured`` within its range."""
     bare = in_rig(base, str(entry["rig"]))
     settings = {f"rig.{key}": value for key, value in section(entry, "rig_parameters").items()}
     if half_width := section(entry, "domain"):
@@ -61,12 +61,20 @@ def condition_scene(base: Scene, entry: Table, measured: Sequence[MeasuredParame
             raise MeasurementError(
                 f"rig_parameters.{parameter.path.removeprefix('rig.')}: stands in [parameters] too; allowed: in one"
             )
-        if parameter.path in known and parameter.mean is not None:
-            settings[parameter.path] = parameter.mean
+        if parameter.path in known:
+            settings[parameter.path] = _start(parameter, float(value(bare, parameter.path)))
     insertion = section(entry, "insertion")
     scene = with_settings(bare, settings | _insertion(insertion) | _duration(entry, insertion, bare))
     _check_feed(scene, insertion)
     return scene
+
+
+def _start(parameter: MeasuredParameter, declared: float) -> float:
+    """The mean; without one the declared value, or the middle of the range where that is outside."""
+    if parameter.mean is not None:
+        return parameter.mean
+    inside = parameter.low <= declared <= parameter.high
+    return declared if inside else 0.5 * (parameter.low + parameter.high)
 
 
 def _insertion(table: Table) -> dict[str, Any]:

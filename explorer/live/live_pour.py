@@ -28,10 +28,10 @@ from explorer.live.messages import (
 from explorer.live.pace import Pace
 from explorer.outcomes import outcome_text
 from explorer.scene_changes import changes
+from solver.effects.columns import kernel_effects
 from solver.params import ParameterError
 from solver.pour import Pour
 from solver.record import Outcome
-from solver.effects.columns import kernel_effects
 from solver.run import capacity_for
 from solver.scene import Scene, with_values
 from solver.world import Batch

@@ -2,9 +2,9 @@
 
     F_n ← F_n − k A,   A = 2π R* δ        [N]
 
-k is the cohesion energy density [J/m³]. A is the area of the lens in which two spheres intersect, to first order in δ
-(LIGGGHTS takes the lens exactly: a difference of δ/(8 R*)). There is no pull at a gap. Vanishes for k → 0. Its effect is
-a softer contact that holds by k A at the overlap it rests at, so unlike JKR it grows with the load.
+k is the cohesion energy density [J/m³]. A is the area of the lens in which two spheres intersect, to first order in
+δ (LIGGGHTS takes the lens exactly: a difference of δ/(8 R*)). There is no pull at a gap. Vanishes for k → 0. Its
+effect is a softer contact that holds by k A at the overlap it rests at, so unlike JKR it grows with the load.
 Source: LIGGGHTS-PUBLIC documentation, "cohesion model sjkr".
 """
 

@@ -4,10 +4,11 @@
     at a gap s  F = 2π R γ cos θ / (1 + 2.1 S + 10 S²),   S = (s/2) √(R/V),   R = 2 R*
     breaks at   s_c = (1 + θ/2)(V*^⅓ + 0.1 V*^⅔) R,       V* = V/R³
 
-A bridge forms on touching and lasts until s_c (hysteresis). V is the volume of one bridge, θ the contact angle. The pull
-hardly depends on V; the amplitude is the surface tension γ. Vanishes for γ → 0.
+A bridge forms on touching and lasts until s_c (hysteresis). V is the volume of one bridge, θ the contact angle. The
+pull hardly depends on V; the amplitude is the surface tension γ. Vanishes for γ → 0.
 Source: Willett, Adams, Johnson & Seville 2000, Langmuir 16:9396, closed form and Eq. (15), as in YADE.
-Limits: no viscous part, no sharing of liquid, a sphere on a plane by Derjaguin's R = 2 R*.
+Limits: no viscous part, no sharing of liquid, a sphere on a plane by Derjaguin's R = 2 R*, V* below 0.1; every member
+sphere of a clump that touches has a bridge of its own.
 """
 
 import math

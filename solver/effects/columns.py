@@ -65,8 +65,8 @@ def effect_table(scene: Scene, walls: tuple[str, ...]) -> Array:
 def reach_of_pulls(scene: Scene, walls: tuple[str, ...]) -> float:
     """Distance [m] beyond which no effect of ``scene`` holds two surfaces together.
 
-    A grip is monotonic in R* or falls and rises again, so the ends of the range of R* bound it: half the smallest member
-    sphere's radius and the largest's. Grips are added: that of two works of adhesion is no longer than both of theirs.
+    A grip is monotonic in R* or falls and rises again, so the ends of the range of R* bound it: half the smallest
+    member sphere's radius and the largest's. Grips are added: two works of adhesion reach no further than that.
     """
     pulling = [effect for effect in scene.effects if effect.on and isinstance(effect, ContactEffect)]
     if not pulling:

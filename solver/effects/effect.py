@@ -1,7 +1,7 @@
 """What an effect is to everything outside it: a name, parameters, an amplitude, and the limit in which it vanishes.
 
 An effect is one frozen dataclass in one file. Its fields are ordinary parameters (``effect.<name>.<field>`` in files,
-``--set``, sliders and study factors). Those named in ``amplitudes`` switch it on: all zero, and the effect is not there.
+``--set``, sliders and study factors). Those named in ``amplitudes`` switch it on: all zero, and it is not there.
 Three kinds:
 
     ContactEffect   a ``ti.func`` on one contact: changes the normal force, adds a pull, a torque, another Coulomb limit

@@ -42,6 +42,7 @@ class KernelFunction:
         return self.compiled.func  # type: ignore[attr-defined]
 
     def __call__(self, *args: Any) -> Any:
+        """Compile the call into the kernel that makes it."""
         return self.compiled(*args)
 
 

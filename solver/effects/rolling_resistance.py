@@ -6,8 +6,8 @@
 
 ω_r is the relative angular velocity across the normal. Vanishes for μ_r → 0. A sphere on a slope then holds up to
 tan⁻¹ μ_r, and rolls with an acceleration lowered by μ_r g cos α beyond.
-Source: Ai, Chen, Rotter & Ooi 2011, Powder Technology 206:269; LIGGGHTS-PUBLIC `rolling_model_epsd2.h`. On member spheres
-of clumps it stands for what their shape lacks: edges and roughness finer than a sphere.
+Source: Ai, Chen, Rotter & Ooi 2011, Powder Technology 206:269; LIGGGHTS-PUBLIC `rolling_model_epsd2.h`. On member
+spheres of clumps it stands for what their shape lacks: edges and roughness finer than a sphere.
 """
 
 from dataclasses import dataclass

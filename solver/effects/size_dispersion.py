@@ -28,6 +28,8 @@ class SizeDispersion(SetUpEffect):
 
     def applied(self, scene: Any) -> Any:
         """``scene`` with the spread added, in squares, to that of every component."""
+        if self.spread == 0.0:
+            return scene
 
         def spread(sizes: SizeDistribution) -> SizeDistribution:
             kind = sizes.kind if sizes.kind != "none" else "log_normal"

@@ -3,7 +3,6 @@
 from solver.effects.kernel import kernel_function, ti
 
 
-
 @kernel_function
 def turned_with(spring, n):
     """``spring`` laid into the plane across the new normal ``n``, with its length kept."""

@@ -2,8 +2,8 @@
 
     spring   T ← T − k_w (ω·n) dt,  k_w = ½ k_t a² = 4 G* a³,  capped at s ⅔ a μ F_n        [N m]
 
-The cap is the torque of Coulomb friction over a Hertzian contact area, for s = 1; the model has no other free parameter,
-so its ``strength`` s scales stiffness and cap together. Vanishes for s → 0.
+The cap is the torque of Coulomb friction over a Hertzian contact area, for s = 1; the model has no free parameter, so
+its ``strength`` s scales stiffness and cap together. Vanishes for s → 0.
 Source: Marshall 2009, Journal of Computational Physics 228:1541; LAMMPS `pair granular`, twisting "marshall".
 """
 

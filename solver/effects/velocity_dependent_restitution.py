@@ -3,7 +3,7 @@
     1 − e(v) = (1 − e) [1 + q ((v/v₀)^{1/5} − 1)]           v: speed at which the contact began
 
 e is the declared restitution, taken to hold at v₀ = 1 m/s; q = 1 is the law of viscoelastic spheres to leading order,
-q = 0 the base model. The damper of a contact is that of e(v), kept within 0.05 … 1, by the exact inverse of
+vanishes for q → 0. The damper of a contact is that of e(v), kept within 0.05 … 1, by the exact inverse of
 ``laws/restitution.py`` as a series. A contact that stood when the effect was switched on keeps its damper; one that
 began slowly keeps a weak one, however hard it is hit later.
 Source: Brilliantov, Spahn, Hertzsch & Pöschel 1996, Physical Review E 53:5382; Schwager & Pöschel 1998, PRE 57:650.

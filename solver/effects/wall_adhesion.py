@@ -1,5 +1,7 @@
 """Adhesion to the walls only (JKR; formulas in ``jkr.py``): sticky or charged surfaces, clean bodies.
 
+    F = F_JKR(δ; w + w')  at walls,  F_JKR(δ; w') among bodies       w': that of ``adhesion_jkr``
+
 Vanishes for a work of adhesion w → 0. Bodies stay on the funnel's wall, and the pile's foot is held.
 Source: as ``adhesion_jkr``.
 """

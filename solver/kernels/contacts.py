@@ -16,8 +16,8 @@ from solver.laws.hertz_mindlin import (
 )
 from solver.state import Vec3, Vec4
 
-HELD_OVERLAP = 1e-21
-"""Overlap [m] that stands for surfaces held together at a gap: their contact radius, 1e-12 m, bears nothing."""
+HELD_OVERLAP = 1e-45
+"""Overlap [m] that stands for surfaces held at a gap: their contact radius, 1e-24 m, bears and damps nothing."""
 
 
 @ti.func

@@ -79,7 +79,7 @@ def normal_force(elastic, damper, v_n, v_expected, mass, dt, floor):
 
 @ti.func
 def tangential_force(law, a, a_before, spring, n, v_t, inertia, limit, dt):
-    """New tangential spring [N] and the tangential force on i [N] within Coulomb's ``limit``; ``inertia`` is √(a m*)."""
+    """New tangential spring [N] and force on i [N], both within Coulomb's ``limit`` [N]; ``inertia`` is √(a m*)."""
     stiffness = 8.0 * law[1] * a
     length2 = spring.dot(spring)
     if length2 > 0.0:

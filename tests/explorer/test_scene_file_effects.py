@@ -3,6 +3,7 @@
 import pytest
 
 from explorer.scene_file import load_scene, with_settings
+from solver.assets import asset_path
 from solver.params import ParameterError
 from solver.scene import value
 
@@ -37,3 +38,10 @@ def test_a_setting_on_the_command_line():
     assert value(scene, "effect.adhesion_jkr.work_of_adhesion") == pytest.approx(0.5)
     with pytest.raises(ParameterError, match=r"--set: effect\.air_drag\.strength: 21 is outside 0 … 20"):
         with_settings(scene, ["effect.air_drag.strength=21"])
+
+
+def test_a_study_is_of_a_material_with_its_effects(tmp_path):
+    path = tmp_path / "study.toml"
+    shipped = asset_path("studies", "sunflower_extract").read_text()
+    path.write_text(shipped + "\n[effect.air_drag]\nstrength = 1.0\n")
+    assert value(load_scene(str(path)), "effect.air_drag.strength") == 1.0

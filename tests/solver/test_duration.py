@@ -9,6 +9,7 @@ from solver.run import run_pour
 from solver.scene import with_values
 from solver.set_up import with_settings
 from tests.explorer.beads import bead_scene
+from tests.solver.rigs.test_rig_pours import BOX, CYLINDER
 from tests.solver.test_pour import COARSE
 
 pytestmark = pytest.mark.usefixtures("taichi")
@@ -65,6 +66,13 @@ def test_a_jam_is_read_as_it_is():
     record = run_pour(with_values(COARSE, jam), 1)
     assert record.outcome == Outcome.MEASURED
     assert record.trace.discharged_mass[-1] < 0.9 * record.poured_mass
+
+
+@pytest.mark.parametrize(("rig", "duration"), [(CYLINDER, 0.3), (BOX, 0.2)], ids=["cylinder", "box"])
+def test_the_other_pours_are_read_at_a_given_time_too(rig, duration):
+    record = run_pour(with_values(rig, {"numerics.duration": duration}), 1)
+    assert record.outcome == Outcome.MEASURED
+    assert record.trace.time[-1] == pytest.approx(duration, abs=record.dt)
 
 
 def test_a_broken_run_keeps_its_name():

@@ -168,3 +168,11 @@ def test_a_range_is_narrowed_to_what_the_rig_takes():
     assert volume.high == pytest.approx(0.5 * np.pi * 0.042**2 * 0.020, rel=1e-8)
     assert volume.low == pytest.approx(44e-6, rel=1e-12)
     assert any(note.startswith("rig.filled_volume: range 4.4e-05 … 5.6e-05 narrowed") for note in measurement.notes)
+
+
+def test_without_a_mean_a_run_starts_within_the_range(tmp_path):
+    """The declared friction, 0.3, where the range holds it; the middle where it does not."""
+    for low, high, expected in ((0.1, 0.5, 0.3), (0.4, 0.8, 0.6)):
+        text = changed(MEASUREMENT, "{ mean = 0.3, sd = 0.05 }", f"{{ low = {low}, high = {high} }}")
+        slow = load_measurement(write(tmp_path, {"measurement.toml": text})).conditions[0]
+        assert slow.scene.pair("glass", "glass").static_friction == pytest.approx(expected, rel=1e-12)

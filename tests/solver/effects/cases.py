@@ -6,7 +6,7 @@ import numpy as np
 
 from solver.body import Body, Members
 from solver.effects import BODY_EFFECTS, CONTACT_EFFECTS, EFFECTS, Effect
-from solver.laboratory import FREE, GRAIN, RADIUS, ROOM, WALL, Laboratory, scene_of, sphere
+from solver.laboratory import FREE, GRAIN, RADIUS, ROOM, UPRIGHT, WALL, Laboratory, scene_of, sphere
 from solver.layout import layout
 from solver.material import Pair
 from solver.rigs.surface import Plane, Pose
@@ -15,6 +15,7 @@ from solver.world import SUMMARY_COLUMNS, Batch
 
 ROOM_WITH_EFFECTS = dataclasses.replace(ROOM, effects=True)
 """That of a laboratory with an effect on."""
+NOT_TURNED = np.eye(3)
 THREE_WORLDS = dataclasses.replace(ROOM_WITH_EFFECTS, worlds=3)
 
 FELT: dict[str, dict[str, float]] = {
@@ -28,7 +29,7 @@ FELT: dict[str, dict[str, float]] = {
     "plastic_contact": {"plasticity": 0.5},
     "kinetic_friction": {"friction_drop": 0.5, "transition_speed": 0.05},
     "wall_adhesion": {"work_of_adhesion": 2.0},
-    "size_dispersion": {"spread": 0.2},
+    "size_dispersion": {"spread": 0.05},
     "shape_elongation": {"elongation": 0.2},
     "density_error": {"excess": 0.2},
     "plate_tilt": {"tilt_x": 3.0, "tilt_y": -2.0},
@@ -96,12 +97,17 @@ def hertz_rest(force, e_star, radius=RADIUS):
 def crowd(capacity, scene, n=24, w=0):
     """``n`` spheres of ``scene`` in world ``w`` that fall on each other: the batch, ready to run."""
     batch = Batch(capacity)
+    fill(batch, scene, w, n)
+    return batch
+
+
+def fill(batch, scene, w, n=24):
+    """The same in a batch that is there."""
     batch.load(w, scene, layout(scene, np.zeros(n, dtype=np.int32)), time_step(scene), (True,))
     rng = np.random.default_rng(3)
     for b in range(n):
         place = RADIUS * np.array([2.1 * (b % 3 - 1), 2.1 * (b // 3 % 3 - 1), 1.1 + 2.1 * (b // 9)])
         batch.enter(w, b, place, np.array([1.0, 0, 0, 0]), rng.normal(0, 0.1, 3), rng.normal(0, 5.0, 3))
-    return batch
 
 
 def onward(batch, steps, w=0):
@@ -111,14 +117,14 @@ def onward(batch, steps, w=0):
     return dict(zip(SUMMARY_COLUMNS, batch.advance(todo)[w].tolist(), strict=True))
 
 
-def tumble(scene, dt=None, scale=(1.0, 1.0), turn=np.eye(3), quaternion=(1.0, 0.0, 0.0, 0.0), seconds=0.06):
+def tumble(scene, dt=None, scale=(1.0, 1.0), turn=NOT_TURNED, quaternion=UPRIGHT, seconds=0.06):
     """Three spheres: one drops on the plane with spin, one rolls along it, one falls on the first; then state and dt.
 
     ``scale`` multiplies lengths and times, ``turn`` turns all of it (``quaternion``: the same rotation).
     """
     length, time = scale
     lab = Laboratory(scene, 3, dt=dt)
-    places = RADIUS * np.array([[0.0, 0.0, 1.1], [8.0, 0.0, 0.999], [0.7, 0.3, 3.4]])
+    places = RADIUS * np.array([[0.0, 0.0, 1.1], [8.0, 0.0, 1.001], [0.7, 0.3, 3.4]])
     velocities = np.array([[0.1, 0.05, -0.3], [0.2, 0.0, 0.0], [0.0, 0.0, -0.4]])
     spins = np.array([[3.0, -8.0, 20.0], [0.0, 0.2 / RADIUS, 10.0], [-5.0, 4.0, 9.0]])
     for b in range(3):
@@ -126,4 +132,3 @@ def tumble(scene, dt=None, scale=(1.0, 1.0), turn=np.eye(3), quaternion=(1.0, 0.
         lab.put(b, place, velocity, spins[b] / time, quaternion)
     lab.run(round(seconds * time / lab.dt))
     return lab.state(), lab.dt
-

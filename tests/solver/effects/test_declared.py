@@ -152,7 +152,7 @@ def test_columns_of_kernel_and_tables_agree():
         among = (0.0,) if kind.name == "wall_adhesion" else effect.numbers
         assert mine[0, 0] == pytest.approx(among)
         assert (table[0, :, -1] == 0.6).all()
-    assert COUPLE == MEMORY[-1]
+    assert MEMORY[-1] == COUPLE
     assert KEPT == COUPLE + 4
     assert sum(kind.memory for kind in CONTACT_EFFECTS) == COUPLE
 

@@ -1,4 +1,4 @@
-"""One sphere falls in air: g and the strength of the drag come back from its heights, and a model without drag does not fit.
+"""One sphere falls in air: g and the strength of the drag come back from its heights; without drag nothing fits.
 
 The smallest closed case of a missing effect: what is fitted, what is left over, and that it is left in vain where
 nothing is missing. The model that is fitted is an integration of its own (SciPy), not the solver.

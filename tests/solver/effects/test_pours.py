@@ -69,7 +69,8 @@ def test_a_checkpoint_in_between_changes_no_bit(moist, tmp_path):
 def test_switched_on_while_it_runs():
     """Up to the switch, and in the batch with effects until the change, the pour is the one without; then another."""
     plain = drive(Pour(Batch(ROOM), 0, HEAP, 5), 0.3)
-    state, energies = plain.bodies(), plain.samples[-1]
+    state, energies, steps = plain.bodies(), plain.samples[-1], plain.steps
+    later = drive(plain, 0.4).bodies()
     pour = drive(Pour(Batch(ROOM), 0, HEAP, 5), 0.2)
     drive(Pour(Batch(ROOM_WITH_EFFECTS), 0, MOIST, 1), 0.1)  # leaves its memory behind
     pour.move_to(Batch(ROOM_WITH_EFFECTS))
@@ -77,13 +78,12 @@ def test_switched_on_while_it_runs():
     assert np.array_equal(pour.bodies().position, state.position)
     assert np.array_equal(pour.bodies().velocity, state.velocity)
     assert pour.samples[-1] == energies
-    assert pour.steps == plain.steps
+    assert pour.steps == steps
     sticky = with_effects(HEAP, felt("rolling_resistance"), felt("capillary_bridge"))
     pour.retune(sticky)
     drive(pour, 0.4)
-    drive(plain, 0.4)
     assert pour.time == pytest.approx(plain.time, abs=1e-3)
-    assert np.abs(pour.bodies().position - plain.bodies().position).max() > 1e-5
+    assert np.abs(pour.bodies().position - later.position).max() > 1e-4
     pour.retune(HEAP)
     assert pour.scene == HEAP
     drive(pour, 0.42)

@@ -87,9 +87,7 @@ def test_willetts_number_of_yade():
     Its spheres begin with an overlap of 1e-5 of the distance and part at 1 mm/s; the force is that after 249 moves of
     1 µs. Ours weigh 1 kg, so the pull shows in the velocity alone: to 3e-7 of itself in double precision.
     """
-    effect = felt(
-        "capillary_bridge", surface_tension=0.024, bridge_volume=12e-19, contact_angle=np.radians(10.0)
-    )
+    effect = felt("capillary_bridge", surface_tension=0.024, bridge_volume=12e-19, contact_angle=np.radians(10.0))
     bodies = (heavy(1.0, 19e-6, "small"), heavy(1.0, 32.5e-6, "big"))
     lab = Laboratory(scene_with(effect, bodies=bodies, friction=0.0, restitution=1.0), (0, 1), dt=1e-6, plate=False)
     lab.put(0, (0.0, 0.0, 0.0))

@@ -1,13 +1,13 @@
 """What effects keep of a contact survives lists, snapshots, slots and switching; sleepers feel them."""
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
 
 from solver.effects.columns import COUPLE, HERTZ, MEMORY
 from solver.laboratory import EARTH, RADIUS, ROOM, Laboratory
-from solver.layout import layout
 from solver.time_step import time_step
 from solver.world import Batch
 from tests.solver.effects.cases import (
@@ -16,6 +16,7 @@ from tests.solver.effects.cases import (
     all_felt,
     crowd,
     felt,
+    fill,
     onward,
     scene_with,
     with_effects,
@@ -25,7 +26,9 @@ pytestmark = pytest.mark.usefixtures("taichi")
 
 N, STEPS = 24, 1500
 SCENE = all_felt(scene_with(gravity=EARTH))
-WEAKER = with_effects(SCENE, felt("rolling_resistance", rolling_friction=0.02), felt("adhesion_jkr", work_of_adhesion=0.3))
+WEAKER = with_effects(
+    SCENE, felt("rolling_resistance", rolling_friction=0.02), felt("adhesion_jkr", work_of_adhesion=0.3)
+)
 
 
 @pytest.fixture(scope="module")
@@ -43,24 +46,21 @@ def test_every_memory_is_in_use(whole):
     """Else the tests below would compare zeros."""
     memory = whole[0]["memory.number"]
     assert memory.shape[1] == HERTZ + 1
-    for first, last in zip(MEMORY[:-1], MEMORY[1:], strict=True):
+    for first, last in itertools.pairwise(MEMORY):
         if last > first:
             assert np.abs(memory[:, first:last]).max() > 0.0
     assert np.abs(memory[:, COUPLE:]).max(axis=0).min() > 0.0
 
 
 def test_the_same_bits_in_another_slot_among_other_worlds(whole):
-    """Two threads share three worlds, one of them without effects; the snapshot goes from a batch of one into it."""
-    kept, row, bodies = whole
-    batch = Batch(THREE_WORLDS)
-    for w, scene in enumerate((WEAKER, scene_with(gravity=EARTH), SCENE)):
-        batch.load(w, scene, layout(scene, np.zeros(N, dtype=np.int32)), time_step(SCENE), (True,))
-        batch.put(w, kept)
-    batch.set_effects(0, WEAKER)
-    batch.set_effects(1, scene_with(gravity=EARTH))
+    """Two threads share three worlds, one of them with weaker effects and one with none."""
+    _, row, bodies = whole
+    batch = crowd(THREE_WORLDS, SCENE, w=2)
+    fill(batch, WEAKER, 0)
+    fill(batch, scene_with(gravity=EARTH), 1)
     todo = np.full(3, STEPS, dtype=np.int32)
-    batch.advance(todo)
-    last = batch.advance(todo)
+    for _ in range(4):
+        last = batch.advance(todo)
     assert last[2].tolist() == list(row.values())
     assert np.array_equal(batch.bodies(2, N), bodies)
     for w in (0, 1):
@@ -140,7 +140,8 @@ SLEEPY = {"sleep_speed": 2e-3, "gravity": EARTH, "restitution": 0.3}
 
 
 def test_a_pile_that_sticks_and_does_not_roll_falls_asleep_and_stands():
-    effects = (felt("rolling_resistance"), felt("adhesion_jkr", work_of_adhesion=0.3))
+    # Without resistance to twisting a sphere would spin on about its vertical axis.
+    effects = (felt("rolling_resistance"), felt("adhesion_jkr", work_of_adhesion=0.3), felt("twisting"))
     batch = crowd(ROOM_WITH_EFFECTS, scene_with(*effects, **SLEEPY))
     dt = time_step(scene_with(*effects, **SLEEPY))
     row = onward(batch, round(1.5 / dt))
