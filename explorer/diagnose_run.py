@@ -67,6 +67,7 @@ def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> Diagnosis:
         f"{path}"
     )
     progress = PourProgress(order.out / "progress.jsonl", say, terminal=sys.stdout.isatty())
+    progress.compiling()
     with ExitStack() as stack:
         store = Store(path)
         stack.callback(store.close)

@@ -24,6 +24,10 @@ class PourProgress:
         """Seconds since the start."""
         return time.perf_counter() - self._started
 
+    def compiling(self) -> None:
+        """The diagnosis has begun; the first pour shows itself only after the solver is compiled."""
+        self._tell("compiling the solver", 0, None, None)
+
     def pour(self, part: str, left: int) -> None:
         """A pour of ``part`` has ended; ``left`` are still to come."""
         if part != self._part:

@@ -13,6 +13,8 @@ from explorer.report.findings import Plain
 from explorer.viewer.actions import Post
 from explorer.viewer.process_view import ProcessView, escaped, status_markdown
 
+FIRST = "trefoil_1"
+"""Chosen at first, where it is shipped: the data set of `make diagnose`."""
 OWN = "folder below"
 """Choice of the list that takes the folder in the text field."""
 
@@ -27,7 +29,10 @@ class DiagnosisPanel:
         self._diagnosis = diagnosis
         gui.add_markdown("Which physical effect do measured data ask for that the declared model lacks?")
         self._data = gui.add_dropdown(
-            "Measured data", (*shipped, OWN), hint="Data sets that come with the program, or a folder of your own."
+            "Measured data",
+            (*shipped, OWN),
+            initial_value=FIRST if FIRST in shipped else OWN,
+            hint="Data sets that come with the program, or a folder of your own.",
         )
         self._folder = gui.add_text(
             "Folder", "", hint="Folder with measurement.toml, on the machine that serves this page."

@@ -201,7 +201,7 @@ def test_cautions_say_what_the_numbers_cannot(results):
     assert "range and model do not fit together" not in texts["effect"]
     for text in texts.values():
         assert "Only the 7 effects in the table were considered, 5 of which these data can see" in text
-        assert "Fresh pours that broke off and are left out: 1 of the declared model" in text
+        assert "Fresh pours that broke off or left nothing to be read: 1 of the declared model" in text
 
 
 def test_unseen_effects_are_listed_only_where_nothing_was_found(results):
@@ -292,6 +292,20 @@ def test_data_without_profiles_have_no_picture(results):
     bare = copy.deepcopy(results["effect"])
     bare["piles"] = []
     assert "The pile" not in {section.title for section in sections_of(bare)}
+
+
+def test_pours_that_leave_nothing_to_read_make_dashes(results):
+    bare = copy.deepcopy(results["unexplained"])
+    for rows in bare["error"].values():
+        for row in rows:
+            row |= {key: None for key, value in row.items() if isinstance(value, float)}
+    for row in bare["effects"]:
+        row |= {"status": "not identifiable here", "amplitudes": [], "reach": None, "delta": None}
+    bare["signatures"] |= {"names": [], "vectors": [], "cosines": [], "residual_cosine": []}
+    text = diagnosis_markdown(bare)
+    assert "that no effect that was simulated explains" in text
+    assert not re.search(r"\b(nan|None)\b", text + visible(diagnosis_html(bare)))
+    assert "Pattern of the residual" not in text
 
 
 def test_files_appear_complete_or_not_at_all(results, tmp_path):

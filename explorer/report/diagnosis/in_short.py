@@ -5,6 +5,7 @@ from __future__ import annotations
 from explorer.report.content import Block, Bullets, Caution, Facts, Section, Text
 from explorer.report.diagnosis.findings import (
     NOISE_FALL,
+    OVERALL,
     amplitudes_of,
     confirmation,
     edges,
@@ -18,9 +19,10 @@ from explorer.report.diagnosis.findings import (
     spelled,
     split_label,
     summary_label,
+    summary_value,
 )
 from explorer.report.findings import Plain
-from explorer.report.units_for_people import code, enumeration, fixed, number, p_value, percent
+from explorer.report.units_for_people import code, enumeration, fixed, p_value, percent
 
 
 def in_short(result: Plain) -> Section:
@@ -67,10 +69,9 @@ def verdict_sentence(result: Plain) -> str:
             )
         case "unexplained":
             sits = f" What is left, worst condition first: {'; '.join(result['where'])}." if result["where"] else ""
-            return (
-                f"The declared model lacks something that none of the {len(raced(result))} effects that these data can "
-                f"see explains.{sits}"
-            )
+            seen = len(raced(result))
+            which = f"none of the {seen} effects that these data can see" if seen else "no effect that was simulated"
+            return f"The declared model lacks something that {which} explains.{sits}"
 
 
 def confirmation_sentence(result: Plain) -> str:
@@ -79,8 +80,8 @@ def confirmation_sentence(result: Plain) -> str:
     if row is None:
         return "No condition was held out, so nothing independent confirms it."
     numbers = (
-        f"from {number(row['before'])} σ to {number(row['after'])} σ, where noise alone gives "
-        f"{number(row['noise_floor'])} σ"
+        f"from {summary_value(result, OVERALL, row['before'])} to {summary_value(result, OVERALL, row['after'])}, "
+        f"where noise alone gives {summary_value(result, OVERALL, row['noise_floor'])}"
     )
     return {
         "no holdout": "",
@@ -121,8 +122,8 @@ def cautions(result: Plain) -> list[str]:
     broken = {name: result["confirmation"][name]["broken"] for name in ("before", "after")}
     if max(broken.values()):
         found.append(
-            f"Fresh pours that broke off or left nothing to be read: {broken['before']} of the declared model, {broken['after']} "
-            "of the final one. Means are given that a pour ends."
+            f"Fresh pours that broke off or left nothing to be read: {broken['before']} of the declared model, "
+            f"{broken['after']} of the final one. Means are given that a pour ends."
         )
     if result["floored"]:
         found.append(
@@ -207,14 +208,14 @@ def _facts(result: Plain) -> list[tuple[str, str]]:
 
 
 def _error_words(result: Plain, row: Plain) -> str:
-    floor = f"noise floor {number(row['noise_floor'])} σ"
+    floor = f"noise floor {summary_value(result, OVERALL, row['noise_floor'])}"
     if not named(result):
         inside = f"{percent(row['coverage_before'])} of the pours inside the model's 90 % interval"
-        return f"{number(row['before'])} σ, {floor}; {inside}"
+        return f"{summary_value(result, OVERALL, row['before'])}, {floor}; {inside}"
     inside = f"{percent(row['coverage_before'])} → {percent(row['coverage_after'])}"
     return (
-        f"{number(row['before'])} σ before, {number(row['after'])} σ after, {floor}; {inside} of the pours inside the "
-        "model's 90 % interval"
+        f"{summary_value(result, OVERALL, row['before'])} before, {summary_value(result, OVERALL, row['after'])} "
+        f"after, {floor}; {inside} of the pours inside the model's 90 % interval"
     )
 
 
