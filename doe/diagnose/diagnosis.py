@@ -16,7 +16,7 @@ from doe.diagnose.runs import Condition, Declared, Effect, Observed, Parameter
 from doe.diagnose.screen import Budget, Say, Screened, further, screen
 from doe.diagnose.verdict import Verdict
 from doe.measurement.measurement import Condition as MeasuredCondition
-from doe.measurement.measurement import Measurement
+from doe.measurement.measurement import MeasuredParameter, Measurement
 from doe.measurement.summaries import summaries_of_data, summary_names, summary_uncertainties
 from doe.runner import Pours
 from doe.store import Store
@@ -26,6 +26,8 @@ SURVIVORS = 5
 """Effects that are simulated further: the best of the race so far."""
 SURVIVING_GAP = 12.0
 """Distance in the criterion to the best beyond which an effect is not simulated further."""
+BOX = 3.0
+"""Standard deviations about an independently measured mean."""
 FRESH = 12
 """Pours per model and condition in the confirmation, at least."""
 
@@ -98,10 +100,22 @@ def declare(measurement: Measurement, effects: Sequence[str]) -> Declared:
         low = tuple(max(end.low, -kind.strongest) for end in ends)
         found.append(Effect(name, low, tuple(min(end.high, kind.strongest) for end in ends)))
     return Declared(
-        tuple(Parameter(p.path, p.low, p.high, p.mean, p.sd) for p in measurement.parameters),
+        tuple(box_of(p) for p in measurement.parameters),
         tuple(found),
         tuple(Condition(c.name, summary_names(c)) for c in measurement.fit),
     )
+
+
+def box_of(measured: MeasuredParameter) -> Parameter:
+    """The range over which a parameter is simulated: as stated, and within ``BOX`` standard deviations of its mean.
+
+    Farther off nobody who trusts the measurement would look, and an emulator of a smaller box is a better one.
+    """
+    if measured.mean is None or measured.sd is None:
+        return Parameter(measured.path, measured.low, measured.high)
+    low = max(measured.low, measured.mean - BOX * measured.sd)
+    high = min(measured.high, measured.mean + BOX * measured.sd)
+    return Parameter(measured.path, low, high, measured.mean, measured.sd)
 
 
 def observe(conditions: Sequence[MeasuredCondition]) -> Observed:

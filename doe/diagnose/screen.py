@@ -91,16 +91,15 @@ def screen(declared: Declared, model: ModelPours, budget: Budget, say: Say) -> S
 
 
 def further(screened: Screened, names: Sequence[str], model: ModelPours, budget: Budget, say: Say) -> Screened:
-    """More settings of the effects ``names``, on in their sequences, and as many of the base model."""
+    """More settings of the effects ``names``, on in their sequences."""
     declared = screened.declared
-    have = {point.sequence for point in screened.points}
+    known = {(point.sequence, point.number) for point in screened.points}
     asked: list[Point] = []
     for stream, effect in enumerate(declared.effects):
         if effect.name in names:
             first = screening_number(effect, budget)
             grown = effect_points(declared.parameters, effect, stream, first + budget.further, first)
-            asked += [p for p in grown if (p.sequence, p.number) not in {(q.sequence, q.number) for q in screened.points}]
-    assert have, "a screening comes first"
+            asked += [point for point in grown if (point.sequence, point.number) not in known]
     pours = model.run("survivors", asked)
     say(f"survivors: {len(asked)} more settings of {', '.join(names)}")
     return Screened(declared, (*screened.points, *asked), (*screened.pours, *map(tuple, pours)))
