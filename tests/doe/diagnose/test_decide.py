@@ -28,7 +28,9 @@ def test_a_strong_effect_is_named_with_its_amplitude():
     verdict = verdict_of(lambda toy: toy.listed(5, 10.0))
     assert (verdict.kind, verdict.names) == ("effect:e5", ("e5",))
     (amplitude,) = verdict.amplitudes
-    assert amplitude.low < 0.5 < amplitude.high
+    # One set: four standard errors of 1/20.
+    assert amplitude.value == pytest.approx(0.5, abs=4 / FULL)
+    assert amplitude.low < amplitude.value < amplitude.high
     assert amplitude.standard_error == pytest.approx(1 / FULL, rel=0.25)
     # The bootstrap interval is that of the standard error in a linear world, and a little wider for the estimated
     # covariance.
@@ -55,8 +57,12 @@ def test_an_effect_outside_the_list_stays_unexplained():
 
 
 def test_twins_are_not_told_apart():
-    """Halfway between two signatures at cosine 0.9, at 6 sigma."""
-    verdict = verdict_of(lambda toy: (toy.listed(0, 6.0) + toy.listed(1, 6.0)) / 2)
+    """Halfway between two signatures at cosine 0.9, at 6 sigma, with replicates whose mean is exact."""
+    toy = make_toy(12, 0)
+    data = toy.measured(np.random.default_rng(0), np.zeros(12)).blocks[0]
+    exact = data - data.mean(axis=0) + (toy.listed(0, 6.0) + toy.listed(1, 6.0)) / 2
+    emulator = known_emulator(toy, np.random.default_rng([0, 1]), df=200)
+    verdict = judge(emulator, Observed((exact,), (np.zeros(12),)), bootstrap=500)
     assert verdict.kind.startswith("ambiguous:")
     assert set(verdict.names) == {"e0", "e1"}
 
