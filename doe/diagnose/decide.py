@@ -18,13 +18,14 @@ from doe.diagnose.runs import Declared, Observed, Runs, select_summaries
 from doe.diagnose.signatures import Reach, reach, whitening
 from doe.diagnose.tables import (
     amplitude_estimates,
+    fitted_model,
     listed,
     parameter_changes,
     residual_table,
     signature_table,
     where_the_residual_sits,
 )
-from doe.diagnose.verdict import EffectRow, Signature, Verdict
+from doe.diagnose.verdict import EffectRow, FittedModel, Signature, Verdict
 from doe.errors import StatisticsError
 
 STANDARD_LIMITS = Limits()
@@ -34,7 +35,7 @@ NAN = math.nan
 @dataclass(frozen=True)
 class Conclusion:
     """What the race ended with: kind, named models (best first), sentence, further gates, the final fit and its
-    refits.
+    refits, and the pairs where they were raced.
     """
 
     kind: str
@@ -43,6 +44,7 @@ class Conclusion:
     gates: tuple[Gate, ...]
     final: Fit
     adequacy: Adequacy | None
+    pairs: Race | None = None
 
 
 def diagnose(
@@ -97,6 +99,7 @@ def judge(
         t2_after=final.t2,
         df_after=final.df,
         amplitudes=amplitude_estimates(declared, final, refits),
+        models=_models(declared, base, race, conclusion.pairs),
         gates=(detection.overall, detection.directed, *conclusion.gates),
         effects=_effect_rows(declared, reaches, singles, detection, race, signatures),
         parameters=parameter_changes(declared, base, final),
@@ -149,9 +152,9 @@ def _conclude(
             if both.gate.passed:
                 gate, near = unambiguous(pairs.criteria, limits)
                 final = pairs.fits[pairs.best]
-                return Conclusion(*_named("effects", near), (*gates, gate), final, both)
+                return Conclusion(*_named("effects", near), (*gates, gate), final, both, pairs)
     text = "The data hold more than noise, and none of the effects in the race explains it."
-    return Conclusion("unexplained", (), text, tuple(gates), fit, None)
+    return Conclusion("unexplained", (), text, tuple(gates), fit, None, pairs)
 
 
 def _named(prefix: str, near: tuple[str, ...]) -> tuple[str, tuple[str, ...], str]:
@@ -163,6 +166,15 @@ def _named(prefix: str, near: tuple[str, ...]) -> tuple[str, tuple[str, ...], st
             f"{near[0]} explains what the base model cannot, and nothing else comes near.",
         )
     return f"ambiguous:{','.join(near)}", near, f"{listed(near)}: the data cannot tell which."
+
+
+def _models(declared: Declared, base: Fit, *races: Race | None) -> tuple[FittedModel, ...]:
+    """Return the base model and every raced one, in order of their criterion."""
+    rows = [fitted_model(declared, "base", base, base.t2)]
+    for race in races:
+        if race is not None:
+            rows += [fitted_model(declared, label, fit, race.criteria[label]) for label, fit in race.fits.items()]
+    return tuple(sorted(rows, key=lambda row: row.criterion))
 
 
 def _effect_rows(

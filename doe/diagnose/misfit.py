@@ -25,7 +25,7 @@ MAX_ITERATIONS = 60
 TOLERANCE = 1e-7
 """Relative fall of T^2 below which a set counts as fitted; T^2 itself is of the order of 10."""
 
-LEVELS = {0: 0, 1: 5, 2: 5, 3: 3, 4: 2}
+LEVELS = {0: 0, 1: 5, 2: 3, 3: 2, 4: 2}
 """Amplitudes per axis from which a fit may start, by the number of amplitudes."""
 
 

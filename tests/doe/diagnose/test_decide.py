@@ -35,6 +35,8 @@ def test_a_strong_effect_is_named_with_its_amplitude():
     # The bootstrap interval is that of the standard error in a linear world, and a little wider for the estimated
     # covariance.
     assert (amplitude.high - amplitude.low) / (2 * 1.96 * amplitude.standard_error) == pytest.approx(1.05, abs=0.15)
+    assert verdict.models[0].label == "e5"
+    assert {model.label for model in verdict.models} == {"base", *(f"e{i}" for i in range(8))}
     winner = verdict.effects[5]
     assert (winner.delta, winner.cosine) == (0.0, pytest.approx(1.0))
     assert winner.weight > 0.8
