@@ -15,7 +15,8 @@ from doe.diagnose.emulator import Emulator, fit_emulator
 from doe.diagnose.gates import Adequacy, Detection, Gate, Limits, adequate, detect, evidence_weights, unambiguous
 from doe.diagnose.race import Race, race_pairs, race_singles
 from doe.diagnose.runs import Declared, Observed, Runs, select_summaries
-from doe.diagnose.signatures import Reach, reach, whitening
+from doe.diagnose.signatures import Reach, Whitening, reach, whitening
+from doe.diagnose.specificity import specific
 from doe.diagnose.tables import (
     amplitude_estimates,
     fitted_model,
@@ -87,7 +88,11 @@ def judge(
     detection = detect(emulator, evidence, base, singles, limits, bootstrap, seed)
     signatures = signature_table(emulator, base, singles, reaches, frame)
     race = race_singles(emulator, evidence, base, raced) if detection.passed else None
-    conclusion = _conclude(emulator, evidence, base, race, raced, limits, bootstrap, seed) if race else _nothing(base)
+    conclusion = (
+        _conclude(emulator, evidence, base, race, raced, signatures, frame, limits, bootstrap, seed)
+        if race
+        else _nothing(base)
+    )
     final = conclusion.final
     refits = conclusion.adequacy.refits if conclusion.adequacy else None
     return Verdict(
@@ -126,6 +131,8 @@ def _conclude(
     base: Fit,
     race: Race,
     raced: list[int],
+    signatures: Signature,
+    frame: Whitening,
     limits: Limits,
     bootstrap: int,
     seed: int,
@@ -149,9 +156,10 @@ def _conclude(
         if passed:
             both = adequate(emulator, evidence, pairs.fits[pairs.best], pairs.best, limits, bootstrap, seed + 2)
             gates.append(both.gate)
-            if both.gate.passed:
+            final = pairs.fits[pairs.best]
+            gates.append(specific(emulator, base, final, pairs.best, signatures, frame, limits, seed + 3))
+            if both.gate.passed and gates[-1].passed:
                 gate, near = unambiguous(pairs.criteria, limits)
-                final = pairs.fits[pairs.best]
                 return Conclusion(*_named("effects", near), (*gates, gate), final, both, pairs)
     text = "The data hold more than noise, and none of the effects in the race explains it."
     return Conclusion("unexplained", (), text, tuple(gates), fit, None, pairs)

@@ -33,6 +33,11 @@ TOLERATED = 1.2
 that
 the prediction's standard error does not know of."""
 
+LEAST_SHARE = 0.1
+"""Standard deviation of a pour, at least, as a share of that over all runs: a summary that never varies in the base
+runs
+(nothing left in the funnel) but does with an effect would otherwise have no noise at all."""
+
 
 @dataclass(frozen=True)
 class Block:
@@ -142,7 +147,8 @@ def _fit_block(design: FloatArray, runs: Runs, condition: int, floor: FloatArray
     base = runs.effect[rows] == BASE
     ample = (1 - leverage[base]).sum() >= AMPLE_DF * y.shape[1]
     basis = base if ample else np.ones(len(y), dtype=bool)
-    noise = pour_noise(residuals[basis], leverage[basis], floor)
+    overall = np.sqrt((residuals**2).sum(axis=0) / (1 - leverage).sum())
+    noise = pour_noise(residuals[basis], leverage[basis], np.maximum(floor, LEAST_SHARE * overall))
     left_out = residuals / (1 - leverage)[:, None]
     scatter = ((y - y.mean(axis=0)) ** 2).sum(axis=0)
     expected = np.sqrt(np.diag(noise.covariance))[None, :] / np.sqrt(1 - leverage)[:, None]

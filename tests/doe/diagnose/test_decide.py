@@ -128,6 +128,23 @@ def test_units_do_not_matter():
     assert two.t2_before == pytest.approx(one.t2_before, rel=1e-5)
 
 
+def test_a_summary_that_only_an_effect_moves_is_noise_free_in_neither():
+    """s11 is zero in the base runs and follows effect 6 alone; data without an effect are zero too."""
+    toy = make_toy(12, 4)
+    runs = simulated_runs(toy, np.random.default_rng(0), base=80, per_effect=16)
+    block = runs.blocks[0].copy()
+    own = runs.effect == 6
+    block[:, 11] = np.where(own, runs.amplitude[:, 0] * (5 + np.random.default_rng(1).standard_normal(len(own))), 0.0)
+    data = toy.measured(np.random.default_rng(2), np.zeros(12)).blocks[0]
+    data[:, 11] = 0.0
+    null = diagnose(toy.declared, replace(runs, blocks=(block,)), Observed((data,), (np.zeros(12),)), bootstrap=500)
+    assert null.kind == "no_missing_effect"
+    data[:, :11] += toy.listed(6, 12.0)[:11]
+    data[:, 11] = 3.0
+    found = diagnose(toy.declared, replace(runs, blocks=(block,)), Observed((data,), (np.zeros(12),)), bootstrap=500)
+    assert found.kind == "effect:e6"
+
+
 def test_a_small_bootstrap_is_refused():
     toy = make_toy(8, 0)
     with pytest.raises(StatisticsError, match="at least 500"):
