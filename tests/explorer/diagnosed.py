@@ -109,7 +109,7 @@ def profiles(block):
 
 def simulated(world, declared, draw):
     """Runs of the two fitted conditions: base, and each effect but the last over its range."""
-    effect = np.concatenate([np.full(90, BASE), np.repeat(np.arange(len(NAMES) - 1), 90)])
+    effect = np.concatenate([np.full(90, BASE), np.repeat(np.arange(len(NAMES) - 1), 120)])
     low, high = (np.array([getattr(p, end) for p in declared.parameters]) for end in ("low", "high"))
     theta = draw.uniform(low, high, (len(effect), len(low)))
     amplitude = np.zeros((len(effect), 2))
@@ -118,7 +118,8 @@ def simulated(world, declared, draw):
         acting = []
         if e != BASE:
             chosen = declared.effects[e]
-            amplitude[k, : chosen.amplitudes] = draw.uniform(chosen.low, chosen.high)
+            ends = np.where(draw.random(chosen.amplitudes) < 0.5, chosen.low, chosen.high)
+            amplitude[k, : chosen.amplitudes] = ends * draw.choice([0.5, 1.0])
             acting = [(chosen.name, amplitude[k, : chosen.amplitudes])]
         for c, block in enumerate(blocks):
             block[k] = world.pours(draw, c, 1, world.shift(c, theta[k], acting, declared))[0]
@@ -215,7 +216,7 @@ EXPECTED = {
     "at the edge": "no_missing_effect",
     "hostile": "effect:adhesion_sjkr",
 }
-"""Beginning of the verdict of each case."""
+"""Verdict of each case; the order of rivals is that of chance."""
 
 
 def result_of_case(name):

@@ -64,7 +64,8 @@ def as_number(cell):
 
 @pytest.mark.parametrize("name", CASES)
 def test_the_cases_are_what_they_are_called(results, name):
-    assert results[name]["verdict"] == EXPECTED[name]
+    found, expected = (verdict.partition(":") for verdict in (results[name]["verdict"], EXPECTED[name]))
+    assert (found[0], sorted(found[2].split(","))) == (expected[0], sorted(expected[2].split(",")))
 
 
 def test_every_section_and_chart_is_on_the_page(result):
@@ -153,6 +154,7 @@ def test_every_effect_stands_in_the_table_with_its_lever(result):
 def test_gates_and_parameters_are_complete(result):
     (gates,) = tables(result, "gate")
     assert [row[0] for row in gates] == [gate["name"] for gate in result["gates"]]
+    assert not {"passed", "not passed"} & {row[4] for row in gates}  # every gate is known by name
     (rows,) = tables(result, "parameter", "measured range")
     for printed, row in zip(rows, result["parameters"], strict=True):
         assert as_number(printed[2]) == pytest.approx(row["before"], rel=6e-4)  # four printed digits
@@ -185,7 +187,7 @@ def test_what_each_verdict_says(results):
     assert "The held-out data do not confirm it" in says["not carried over"]
     assert "nothing independent confirms it" in says["no holdout"]
     assert "`adhesion_sjkr` with `density_error` together" in says["pair"]
-    assert "cannot tell whether it is `rolling_resistance` or `twisting`" in says["ambiguous"]
+    assert re.search("cannot tell whether it is `[a-z_]+` or `[a-z_]+`", says["ambiguous"])
     assert "Measure `half the mass` with " in says["ambiguous"]
     assert "none of the 5 effects" in says["unexplained"]
     assert results["unexplained"]["where"][0] in says["unexplained"]

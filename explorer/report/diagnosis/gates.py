@@ -2,9 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from explorer.report.content import Section, Table, Text
 from explorer.report.findings import Plain
 from explorer.report.units_for_people import MISSING, fixed, number, p_value
+
+
+@dataclass(frozen=True)
+class Question:
+    """What a gate asks of p or of its statistic, and the words for both outcomes."""
+
+    asked: str
+    passed: str
+    failed: str
+
+
+QUESTIONS = {
+    "detect": Question("p ≤", "more than noise", "within the noise"),
+    "adequate": Question("p ≥", "fits", "does not fit"),
+    "unambiguous": Question("gap ≥", "stands alone", "others come near"),
+    "pair gain": Question("gain >", "worth a pair", "not worth a pair"),
+    "specific": Question("chance ≤", "not by chance", "a pair fits almost anything"),
+}
+"""By the beginning of a gate's name."""
 
 
 def gates(result: Plain) -> Section:
@@ -16,12 +37,12 @@ def gates(result: Plain) -> Section:
         f"model and fitted anew, so that no p can be below {number(1 / (1 + result['bootstrap']))}. A model is "
         f"adequate if its own misfit has p ≥ {number(limits['adequate'])}, and unambiguous if the next one is at least "
         f"{fixed(limits['gap'], 0)} behind in B. A pair is asked only where no single effect is adequate, and has to "
-        f"gain more than {fixed(limits['pair_gain'], 0)}."
+        f"gain more than {fixed(limits['pair_gain'], 0)}, and be specific: few random shifts may be explained as well."
     )
     rows = tuple(
         (
             gate["name"],
-            fixed(gate["statistic"], 1),
+            number(gate["statistic"]),
             MISSING if gate["p"] is None else p_value(gate["p"]),
             _limit(gate),
             outcome(gate),
@@ -34,25 +55,14 @@ def gates(result: Plain) -> Section:
 
 def outcome(gate: Plain) -> str:
     """What a gate decided."""
-    passed, failed = {
-        "detect": ("more than noise", "within the noise"),
-        "adequate": ("fits", "does not fit"),
-        "unambiguous": ("stands alone", "others come near"),
-        "pair gain": ("worth a pair", "not worth a pair"),
-    }[_question(gate)]
-    return passed if gate["passed"] else failed
+    question = _question(gate)
+    return question.passed if gate["passed"] else question.failed
 
 
 def _limit(gate: Plain) -> str:
-    sign, of = {
-        "detect": ("≤", "p"),
-        "adequate": ("≥", "p"),
-        "unambiguous": ("≥", "gap"),
-        "pair gain": (">", "gain"),
-    }[_question(gate)]
-    return f"{of} {sign} {number(gate['limit'])}"
+    return f"{_question(gate).asked} {number(gate['limit'])}".strip()
 
 
-def _question(gate: Plain) -> str:
-    name: str = gate["name"]
-    return next(start for start in ("detect", "adequate", "unambiguous", "pair gain") if name.startswith(start))
+def _question(gate: Plain) -> Question:
+    found = (question for start, question in QUESTIONS.items() if gate["name"].startswith(start))
+    return next(found, Question("", "passed", "not passed"))
