@@ -127,7 +127,10 @@ def simulated(world, declared, draw):
 
 
 def diagnosed(effects=(), outside=0.0, theta=(0.57, 0.7), holdout=True, carries_over=True, title="Made up", seed=0):
-    """Measurement and diagnosis. effects: what is in the data, as shares of each range; outside: a shift in no list."""
+    """Measurement and diagnosis. effects: what is in the data, as shares of each range; outside: a shift in no list.
+
+    carries_over: False turns the effect round in the held-out condition.
+    """
     draw, world = np.random.default_rng(seed), World()
     roles = ("fit", "fit", "holdout")[: 3 if holdout else 2]
     empty = [
@@ -144,7 +147,8 @@ def diagnosed(effects=(), outside=0.0, theta=(0.57, 0.7), holdout=True, carries_
     ]
     conditions = []
     for c, condition in enumerate(empty):
-        acting = truth if carries_over or condition.role == "fit" else []
+        sign = 1.0 if carries_over or condition.role == "fit" else -1.0
+        acting = [(name, tuple(sign * a for a in amplitudes)) for name, amplitudes in truth]
         shift = world.shift(c, theta, acting, declared) + outside * world.outside[c]
         block = world.pours(draw, c, REPLICATES, shift)
         conditions.append(measured_condition(condition.name, condition.role, condition.scene, block))
