@@ -201,6 +201,10 @@ def test_cautions_say_what_the_numbers_cannot(results):
     assert "does not carry over to the held-out conditions" in texts["not carried over"]
     assert "does not carry over" not in texts["effect"]
     assert "it is smaller than on new ones" in texts["no holdout"]
+    for name, text in texts.items():
+        rows = results[name]["error"]["holdout"]
+        assert ("even the final model is" in text) == bool(rows and rows[-1]["ratio"] > 2.0)
+    assert "even the final model is" in texts["unexplained"]
     assert "range and model do not fit together" in texts["at the edge"]
     assert "range and model do not fit together" not in texts["effect"]
     assert "Only the 7 effects in the table were considered, 5 of which these data can see" in texts["effect"]

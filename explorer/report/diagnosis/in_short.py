@@ -24,6 +24,10 @@ from explorer.report.diagnosis.findings import (
 from explorer.report.findings import Plain
 from explorer.report.units_for_people import code, enumeration, fixed, p_value, percent
 
+FAR = 2.0
+"""Error over noise floor beyond which a model is called off: a true one keeps below 1.4 in 95 of 100 cases with eight
+independent numbers (√(χ²₈/8)), and below 1.8 with two."""
+
 
 def in_short(result: Plain) -> Section:
     """The answer for a reader who reads nothing else."""
@@ -105,6 +109,12 @@ def cautions(result: Plain) -> list[str]:
         found.append(
             "The correction does not carry over to the held-out conditions. The effect may stand in for another one, "
             "or its amplitude may depend on the set-up; do not use the corrected model beyond the fitted conditions."
+        )
+    held_out = overall(result, "holdout")
+    if held_out is not None and (held_out["ratio"] or 0.0) > FAR:
+        found.append(
+            f"On held-out data even the final model is {fixed(held_out['ratio'], 1)} times as far off as noise alone "
+            "makes it: it does not hold for those conditions as it does for the fitted ones."
         )
     found += edges(result, NOISE_FALL)
     found += [
