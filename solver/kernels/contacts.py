@@ -114,6 +114,7 @@ def touch_of(s: ti.template(), w, k, n, overlap, velocity, omega, a, elastic, da
         adhesive=elastic,
         work=0.0,
         damper=damper,
+        shear_damper=law[4] * ti.sqrt(a * s.contact.reduced_mass[w, k]),
         floor=0.0,
         pull=0.0,
         held=0,
