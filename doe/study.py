@@ -4,7 +4,7 @@ format = 1
 material = "name or file"      fallback = ["X4", …]
 dummies = 3                    columns of the screening that stay free of factors, at least
 estimators = [observables]     candidates for the screening's response; those of the targets always belong to them
-[rig] name and dimensions      [insertion] …      [numerics] …
+[rig] name and dimensions      [insertion] …      [numerics] …      [effect.NAME] what is switched on
 [[target]]      observable, mean, n, sd, weight, margin
 [[factor]]      name, path, low, high, reference        screened, then calibrated; numbers
 [[assumption]]  the same keys, or named levels           screened beside them: what nobody published
@@ -91,7 +91,7 @@ ESTIMATORS = (
 )
 KEYS = {
     "format", "title", "material", "dummies", "fallback", "rig", "insertion", "target", "factor", "assumption",
-    "change", "scan", "profile", "estimators", "seed", "numerics",
+    "change", "scan", "profile", "estimators", "seed", "numerics", "effect",
 }  # fmt: skip
 
 

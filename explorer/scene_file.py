@@ -1,8 +1,8 @@
 """From what a person names on the command line to a scene: a rig, a material or a study, and settings on top.
 
-A file with ``material`` but neither targets nor factors is a set-up: its tables ``[rig]``, ``[insertion]`` and
-``[numerics]`` lie over the material (``solver/set_up.py``), as they may in a material file itself. With targets or
-factors it is a study and is read as `explorer calibrate` does.
+A file with ``material`` but neither targets nor factors is a set-up: its tables ``[rig]``, ``[insertion]``,
+``[numerics]`` and ``[effect.<name>]`` lie over the material (``solver/set_up.py``), as they may in a material file
+itself. With targets or factors it is a study and is read as `explorer calibrate` does.
 """
 
 from __future__ import annotations

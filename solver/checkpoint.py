@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from solver.effects.set_up import actual
 from solver.insertion import Pose
 from solver.params import ParameterError
 from solver.pour import Pour
@@ -88,7 +89,7 @@ def resumed(batch: Batch, w: int, scene: Scene, kept: Checkpoint) -> Pour:
 
     Raises ParameterError if ``scene`` or the solver is not the one that was interrupted.
     """
-    if kept.fingerprint != fingerprint(scene):
+    if kept.fingerprint != fingerprint(actual(scene)):
         raise ParameterError("the checkpoint is of another scene or of another version of the solver")
     pour = Pour(batch, w, scene, kept.seed)
     decided = kept.decided

@@ -14,6 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from solver.body import Body, Members
+from solver.effects.columns import kernel_effects
+from solver.effects.set_up import actual
 from solver.layout import layout
 from solver.material import Material, Pair
 from solver.numerics import Numerics
@@ -113,11 +115,11 @@ class Laboratory:
     ) -> None:
         order = np.zeros(kinds, dtype=np.int32) if isinstance(kinds, int) else np.array(kinds, dtype=np.int32)
         numerics = dataclasses.replace(scene.numerics, rayleigh_fraction=fraction)
-        self.scene = dataclasses.replace(scene, numerics=numerics)
+        self.scene = actual(dataclasses.replace(scene, numerics=numerics))
         self.n = len(order)
         self.dt = dt or time_step(self.scene)
         surfaces = self.scene.rig.surfaces()
-        self.batch = Batch(room_for(surfaces))
+        self.batch = Batch(dataclasses.replace(room_for(surfaces), effects=kernel_effects(self.scene)))
         self.batch.load(0, self.scene, layout(self.scene, order), self.dt, active or [plate] * len(surfaces))
 
     def put(

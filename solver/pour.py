@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from solver import insertion
 from solver.clump import scaled
+from solver.effects.set_up import actual
 from solver.layout import layout
 from solver.observables.free_surface import surface_heights
 from solver.record import Bodies, Outcome, Phase, Record
@@ -23,6 +24,7 @@ from solver.record_builder import (
     bodies_of,
     entries_of,
     free_surface_of,
+    measured_from,
     member_spheres,
     pile_of,
     rolling_away,
@@ -47,9 +49,13 @@ Summary = dict[str, float]
 
 
 class Pour:
-    """State of one pour; drive it with :meth:`steps_due`, ``batch.advance`` and :meth:`after`."""
+    """State of one pour; ``scene`` is the one with its set-up effects carried out.
+
+    Drive it with :meth:`steps_due`, ``batch.advance`` and :meth:`after`.
+    """
 
     def __init__(self, batch: Batch, w: int, scene: Scene, seed: int) -> None:
+        scene = actual(scene)
         self.batch, self.w, self.scene, self.seed = batch, w, scene, seed
         self.rig = pour_rig(scene)
         self._rng = np.random.default_rng(seed)
@@ -139,10 +145,13 @@ class Pour:
     def retune(self, scene: Scene) -> None:
         """Let the running pour follow the material of ``scene``; wakes it up if it had come to rest.
 
-        Friction acts at once; stiffness and damping are ramped (see ``solver/retune.py``). Only materials and pairs
-        may differ from the present scene; anything else takes a new pour.
+        Friction and effects act at once; stiffness and damping are ramped (see ``solver/retune.py``). Only materials,
+        pairs and effects of contacts and bodies may differ from the present scene; anything else takes a new pour. For
+        effects the batch needs them compiled in (RuntimeError otherwise): see :meth:`move_to`.
         """
+        scene = actual(scene)
         target = law_table(scene)
+        self.batch.set_effects(self.w, scene)
         self.scene = scene
         self._ramp = Ramp(self._table, target, self.time)
         self._set_time_step(min(self.dt, time_step(scene)))
@@ -151,6 +160,14 @@ class Pour:
         self._quiet_samples = 0
         if self.outcome in (Outcome.AT_REST, Outcome.JAMMED):
             self.outcome, self.message = Outcome.RUNNING, ""
+
+    def move_to(self, batch: Batch) -> None:
+        """Go on in ``batch``, in the same world, with the same bits: for instance in one with effects compiled in."""
+        kept = self.batch.take(self.w)
+        batch.load(self.w, self.scene, self._layout, self.dt, (True,) * len(self.rig.surfaces()))
+        batch.set_law(self.w, self._table)
+        batch.put(self.w, kept)
+        self.batch = batch
 
     def bodies(self) -> Bodies:
         """Present state of all bodies that have entered."""
@@ -165,6 +182,7 @@ class Pour:
         state = self.batch.bodies(self.w, self.entered)
         bodies = bodies_of(self.scene, self.order, self._layout, state)
         spheres = member_spheres(self.scene, bodies)
+        pile = pile_of(self.container, bodies, spheres, rolling_away(self.scene, self.container, state))
         return Record(
             scene=self.scene,
             seed=self.seed,
@@ -172,7 +190,7 @@ class Pour:
             message=self.message,
             bodies=bodies,
             spheres=spheres,
-            pile=pile_of(self.container, bodies, spheres, rolling_away(self.scene, self.container, state)),
+            pile=measured_from(pile, self.scene.axis),
             free_surface=free_surface_of(self.rig.watch, self._free_surface),
             trace=trace_of(self.samples),
             entries=entries_of(self.order, self._entries),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
@@ -59,6 +61,15 @@ def rolling_away(scene: Scene, container: Container, state: Array) -> npt.NDArra
     speed = np.linalg.norm(v, axis=1)
     level = np.abs(v[:, 2]) < ROLLING_SLOPE * speed
     return beyond & outward & level & (speed > scene.numerics.rest_speed) & (touching == 0)
+
+
+def measured_from(pile: Pile, axis: tuple[float, float]) -> Pile:
+    """``pile`` as seen from a point of the plate from which the rig's axis stands at ``axis`` [m]."""
+    if axis == (0.0, 0.0):
+        return pile
+    shift = np.array([*axis, 0.0])
+    spheres = replace(pile.spheres, centre=pile.spheres.centre + shift)
+    return replace(pile, spheres=spheres, position=pile.position + shift)
 
 
 def pile_of(

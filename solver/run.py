@@ -11,6 +11,8 @@ import numpy as np
 
 from solver import backend
 from solver.checkpoint import Checkpoint, resumed
+from solver.effects.columns import kernel_effects
+from solver.effects.set_up import actual
 from solver.pour import Pour
 from solver.record import Record
 from solver.scene import Scene, body_counts
@@ -46,6 +48,7 @@ class Job:
 
 def capacity_for(scenes: Sequence[Scene], worlds: int) -> Capacity:
     """Sizes that hold any of ``scenes``, rounded up so that a small change of the mixture fits as well."""
+    scenes = [actual(scene) for scene in scenes]
     bodies = members = kinds = 0
     for scene in scenes:
         numbers = body_counts(scene)
@@ -65,6 +68,7 @@ def capacity_for(scenes: Sequence[Scene], worlds: int) -> Capacity:
         triangles=max(1, *(len(table.corners) for table in tables)),
         cells=max(1, *(len(table.first) for table in tables)),
         cell_items=max(1, *(len(table.items) for table in tables)),
+        effects=any(kernel_effects(scene) for scene in scenes),
     )
 
 

@@ -8,6 +8,7 @@ Parameter paths (the same grammar in ``--set``, study files, sliders and the sto
     body.<body>.size_distribution | size_spread          (of the linear size about the declared one)
     body.spheres                                         (coarse, standard, fine or a number: for all bodies)
     rig.<name>   insertion.<name>   numerics.<name>
+    effect.<effect>.<name>                               (of ``solver/effects/``; all off at first)
 
 Which rig it is (``rig.name`` in files and ``--set``) is no parameter: another rig has others (:func:`with_rig`).
 """
@@ -19,6 +20,8 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from solver.body import SPHERES, Body, body_parameters, counts, with_body_value, with_densities
+from solver.effects import EFFECTS, Effect
+from solver.effects.set_up import actual
 from solver.insertion import Insertion
 from solver.material import Material, Pair
 from solver.numerics import Numerics
@@ -39,6 +42,27 @@ class Scene:
     numerics: Numerics = Numerics()
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     assumed: tuple[str, ...] = ()
+    effects: tuple[Effect, ...] = ()
+    """Those whose parameters differ from their defaults, in the order of ``EFFECTS``."""
+    axis: tuple[float, float] = (0.0, 0.0)
+    """Where the rig's axis stands on the plate, as measured there [m]."""
+
+    def effect(self, name: str) -> Effect:
+        """The effect of that name; with its default parameters it is off."""
+        for effect in self.effects:
+            if effect.name == name:
+                return effect
+        return EFFECTS[name]()
+
+    def with_effect(self, effect: Effect) -> Scene:
+        """The scene with ``effect`` in place of the one of its name."""
+        others = {other.name: other for other in self.effects} | {effect.name: effect}
+        kept = tuple(others[name] for name in EFFECTS if name in others and others[name] != EFFECTS[name]())
+        return dataclasses.replace(self, effects=kept)
+
+    def without_effect(self, name: str) -> Scene:
+        """The scene with the effect ``name`` at its defaults, off."""
+        return self.with_effect(EFFECTS[name]())
 
     def material(self, name: str) -> Material:
         """The material of that name, or :class:`ParameterError` naming the ones there are."""
@@ -118,6 +142,8 @@ def parameters(scene: Scene) -> dict[str, Parameter]:
         names = tuple(body.name for body in scene.bodies)
         found["rig.body"] = Parameter("rig.body", "1", 0, 0, "The component that is measured.", choices=names)
     found |= declared(scene.numerics, "numerics")
+    for name, kind in EFFECTS.items():
+        found |= declared(kind, f"effect.{name}")
     return found
 
 
@@ -145,6 +171,8 @@ def value(scene: Scene, path: str) -> Any:
         return getattr(scene.pair(rest[0], rest[1]), rest[2])
     if kind == "body":
         return scene.bodies[0].spheres if rest == ["spheres"] else _body(scene, rest[0]).value(rest[1])
+    if kind == "effect":
+        return getattr(scene.effect(rest[0]), rest[1])
     return getattr(getattr(scene, kind), rest[0])
 
 
@@ -162,7 +190,8 @@ def with_values(scene: Scene, values: dict[str, Any]) -> Scene:
 
 
 def check(scene: Scene) -> None:
-    """Raise :class:`ParameterError` where the parts of a scene do not fit together."""
+    """Raise :class:`ParameterError` where the parts of a scene, as it is after its set-up effects, do not fit."""
+    scene = actual(scene)
     for body in scene.bodies:
         scene.material(body.material)
         scene.contact_pair(body, scene.rig.wall)
@@ -199,6 +228,8 @@ def _with_value(scene: Scene, parts: list[str], new: Any) -> Scene:
         return dataclasses.replace(scene, pairs=_swap(scene.pairs, old, {rest[2]: new}))
     if kind == "body":
         return dataclasses.replace(scene, bodies=with_body_value(scene.bodies, rest, new))
+    if kind == "effect":
+        return scene.with_effect(dataclasses.replace(scene.effect(rest[0]), **{rest[1]: new}))
     return dataclasses.replace(scene, **{kind: dataclasses.replace(getattr(scene, kind), **{rest[0]: new})})
 
 

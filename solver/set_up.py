@@ -1,4 +1,4 @@
-"""The tables of a file that lie over a material: ``[rig]``, ``[insertion]`` and ``[numerics]``.
+"""The tables of a file that lie over a material: ``[rig]``, ``[insertion]``, ``[numerics]`` and ``[effect.<name>]``.
 
 Keys are the last parts of parameter paths (``outlet_height`` in ``[rig]`` is ``rig.outlet_height``); ``name`` in
 ``[rig]`` chooses the rig.
@@ -6,13 +6,13 @@ Keys are the last parts of parameter paths (``outlet_height`` in ``[rig]`` is ``
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from solver.params import ParameterError
 from solver.scene import Scene, with_rig, with_values
 
-TABLES = ("rig", "insertion", "numerics")
+TABLES = ("rig", "insertion", "numerics", "effect")
 
 
 def with_set_up(scene: Scene, table: Mapping[str, Any]) -> Scene:
@@ -22,8 +22,16 @@ def with_set_up(scene: Scene, table: Mapping[str, Any]) -> Scene:
         entries = table.get(kind, {})
         if not isinstance(entries, dict):
             raise ParameterError(f"{kind}: a table is needed, not {entries!r}")
-        values |= {f"{kind}.{key}": value for key, value in entries.items()}
+        values |= dict(_by_path(kind, entries))
     return with_settings(scene, values)
+
+
+def _by_path(prefix: str, entries: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    for key, value in entries.items():
+        if isinstance(value, dict):
+            yield from _by_path(f"{prefix}.{key}", value)
+        else:
+            yield f"{prefix}.{key}", value
 
 
 def with_settings(scene: Scene, values: Mapping[str, Any]) -> Scene:

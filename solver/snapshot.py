@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from solver.effects.columns import HERTZ
 from solver.state import BODY, CONTACT, MEMBER, WALL, WORLD
 
 Arrays = dict[str, npt.NDArray[Any]]
@@ -26,6 +27,8 @@ def take(state: Any, w: int) -> Arrays:
         for name in table:
             row = getattr(getattr(state, group), name).to_numpy()[w]
             found[f"{group}.{name}"] = row if group == "world" else row[: used[group]].copy()
+    if state.effects:
+        found["memory.number"] = state.memory.number.to_numpy()[w][: used["contact"]].copy()
     found["candidate.triangle"] = state.candidate.triangle.to_numpy()[w][: used["candidate"]].copy()
     # Surfaces are numbered after the members' capacity; free the numbers of it.
     partner, room = found["contact.j"], state.member.body.shape[1]
@@ -39,8 +42,15 @@ def put(state: Any, w: int, arrays: Arrays) -> None:
     Raises ValueError if the batch has no room for it.
     """
     room = state.member.body.shape[1]
+    if state.effects and "memory.number" not in arrays:
+        # From a batch without effects: they keep nothing of its contacts yet, and contact radii are those of Hertz.
+        memory = np.zeros((len(arrays["contact.radius"]), state.memory.number.shape[2]))
+        memory[:, HERTZ] = arrays["contact.radius"]
+        arrays = arrays | {"memory.number": memory}
     for key, kept in arrays.items():
         group, name = key.split(".")
+        if group == "memory" and not state.effects:
+            continue
         field = getattr(getattr(state, group), name)
         whole = field.to_numpy()
         if group == "world":

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from solver.backend import ti
+from solver.effects.columns import COLUMNS, KEPT
 
 Vec3 = ti.types.vector(3, ti.f64)
 Vec4 = ti.types.vector(4, ti.f64)
@@ -42,6 +43,7 @@ WORLD = {
     "wall_work": ti.f64,  # work of moving walls on the bodies [J]
     "taken_out": ti.f64,  # kinetic and potential energy of bodies that were taken out [J]
     "domain": ti.f64,  # bodies beyond |x| or |y| of this are taken out [m]
+    "grip": ti.f64,  # distance at which effects may still hold surfaces that have touched [m]
     "outlet": ti.f64,  # height of the outlet [m]
     "inlet_radius": ti.f64,  # radius of the feed opening [m]
 }
@@ -61,6 +63,9 @@ BODY = {
     "force": Vec3,  # contact force [N]
     "torque": Vec3,  # contact torque about the centre of mass, world frame [N m]
     "reach": ti.f64,  # radius of the bounding sphere [m]
+    "semi_axes": Vec3,  # half the outer dimensions along the principal axes [m]
+    "diameter": ti.f64,  # of the sphere of the same volume [m]
+    "sphericity": ti.f64,  # surface of that sphere over the body's
     "swing": ti.f64,  # largest distance of a member's centre from the centre of mass [m]
     "travel": ti.f64,  # bound on the motion of any of its members' centres since the list was built [m]
     "first": ti.i32,  # index of the first member sphere
@@ -181,6 +186,8 @@ class Capacity:
     walls: int = 8
     surfaces: int = 8
     triangles: int = 1
+    effects: bool = False
+    """Whether effects are compiled in: the base model is faster without."""
     cells: int = 1
     """Cells of all meshes' grids, and one more."""
     cell_items: int = 1
@@ -229,6 +236,11 @@ class State:
         self.mesh_item = Group({"triangle": ti.i32}, (c.worlds, c.cell_items))
         self.candidate = Group({"triangle": ti.i32}, (c.worlds, c.candidates))
         self.law = Group({"row": Vec5}, (c.worlds, c.kinds * c.kinds))
+        # Parameters of effects by contact class, and what they keep of a contact (``effects/columns.py``).
+        self.effects = c.effects
+        room = (c.worlds, c.contacts, KEPT) if c.effects else (1, 1, 1)
+        self.effect = Group({"row": ti.f64}, (c.worlds, c.kinds * c.kinds, COLUMNS[-1] + 1))
+        self.memory = Group({"number": ti.f64, "kept": ti.f64}, room)
 
 
 def _field(dtype, shape):

@@ -7,7 +7,7 @@ Two limits, the smaller one rules:
                 body shows at its far end, 1/m_eff = 1/m + reach²/I (a rod's tip is lighter than the rod)
 
 f is ``numerics.rayleigh_fraction``. Both limits are proportional to the size of a body, so the smallest that its
-distribution of sizes allows is taken, whatever the seed draws.
+distribution of sizes allows is taken, whatever the seed draws. An effect that stiffens contacts shortens both.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 
 from solver.clump import scaled
+from solver.effects import ContactEffect
 from solver.material import Material, effective_youngs_modulus
 from solver.scene import Scene
 
@@ -43,4 +44,5 @@ def time_step(scene: Scene) -> float:
         stiffness = 2.0 * e_star * math.sqrt(largest * overlap)
         tip = 1.0 / (1.0 / clump.mass + clump.bounding_radius**2 / float(min(clump.inertia[1:])))
         steps.append(BODY_FRACTION * math.sqrt(tip / stiffness))
-    return min(steps)
+    stiffest = max((effect.stiffening for effect in scene.effects if isinstance(effect, ContactEffect)), default=1.0)
+    return min(steps) / math.sqrt(stiffest)

@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from solver import snapshot
 from solver.body import Body
+from solver.effects.columns import effect_table, kernel_effects, reach_of_pulls
 from solver.kernels import exchange
 from solver.kernels.batch import advance, measure, take_out
 from solver.laws.hertz_mindlin import constants
@@ -88,6 +89,7 @@ class Batch:
         self._load_walls(w, scene, wall_tables(rig.surfaces()), active)
         self._scenes[w] = scene
         self.set_law(w, law_table(scene))
+        self.set_effects(w, scene)
 
     @property
     def _s(self) -> State:
@@ -100,6 +102,18 @@ class Batch:
         """Replace the contact constants (see :func:`law_table`); wakes all bodies."""
         kinds = len(table)
         exchange.load_law(self._s, w, np.ascontiguousarray(table.reshape(kinds * kinds, -1)), kinds)
+
+    def set_effects(self, w: int, scene: Scene) -> None:
+        """Replace the parameters of contact and body effects by those of ``scene``; wakes all bodies.
+
+        Raises RuntimeError for effects in a batch whose capacity has none compiled in.
+        """
+        if kernel_effects(scene) and not self.capacity.effects:
+            raise RuntimeError("this batch has no effects compiled in: its capacity needs effects=True")
+        walls = wall_materials(scene)
+        table = effect_table(scene, walls)
+        rows = np.ascontiguousarray(table.reshape(-1, table.shape[-1]))
+        exchange.load_effects(self._s, w, rows, reach_of_pulls(scene, walls))
 
     def set_time_step(self, w: int, dt: float) -> None:
         """Replace the time step [s]."""

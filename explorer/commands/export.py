@@ -25,7 +25,7 @@ def export(
     """
     from explorer.errors import CommandError
     from explorer.export import WRITERS
-    from explorer.export.deck import deck_of
+    from explorer.export.deck import check_exportable, deck_of
     from explorer.run_folder import appearing
     from explorer.scene_file import load_scene, with_settings
     from solver import run_pour, value
@@ -35,6 +35,7 @@ def export(
     scene = with_settings(load_scene(source, material), set_)
     if time is not None and time < float(value(scene, "numerics.max_time")):
         scene = with_settings(scene, [f"numerics.max_time={time!r}"])
+    check_exportable(scene)
     with appearing(folder, "DIR") as temporary:
         deck = deck_of(run_pour(scene, seed), time)
         WRITERS[to](temporary, deck)

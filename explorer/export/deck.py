@@ -10,7 +10,7 @@ import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,7 @@ import numpy.typing as npt
 from explorer.errors import CommandError
 from explorer.export.triangles import revolved_triangles
 from solver import Body, Entries, Record, Scene
+from solver.effects.set_up import actual
 from solver.rigs import Funnel, Plane, Revolved
 from solver.scene import pour_rig
 
@@ -101,6 +102,29 @@ def deck_of(record: Record, time: float | None = None) -> Deck:
         CommandError: the scene has something that no exported deck can hold.
     """
     scene = record.scene
+    check_exportable(scene)
+    steps = record.steps if time is None else math.ceil(time / record.dt)
+    return assembled(
+        scene,
+        record.seed,
+        record.dt,
+        steps,
+        _until(record.entries, steps),
+        plate=_plate(cast(Funnel, scene.rig)),
+        meshes=_meshes(scene, record),
+    )
+
+
+def check_exportable(scene: Scene) -> None:
+    """Raise :class:`CommandError` if ``scene`` has something that no exported deck can hold.
+
+    Effects of material and set-up are carried out in a deck; those of contacts and flight have no equal there.
+    """
+    scene = actual(scene)
+    for effect in scene.effects:
+        if effect.on:
+            amplitude = f"effect.{effect.name}.{effect.amplitudes[0]}"
+            raise CommandError(f"{amplitude}: {effect.numbers[0]:g} cannot be exported; allowed: 0")
     if not isinstance(scene.rig, Funnel):
         raise CommandError(f"rig {getattr(scene.rig, 'name', '?')!r} cannot be exported; allowed: funnel")
     for body in scene.bodies:
@@ -109,16 +133,6 @@ def deck_of(record: Record, time: float | None = None) -> Deck:
                 f"body.{body.name}.size_distribution: {body.sizes.kind!r} cannot be exported, a deck has one clump per "
                 "component; allowed: none"
             )
-    steps = record.steps if time is None else math.ceil(time / record.dt)
-    return assembled(
-        scene,
-        record.seed,
-        record.dt,
-        steps,
-        _until(record.entries, steps),
-        plate=_plate(scene.rig),
-        meshes=_meshes(scene, record),
-    )
 
 
 def assembled(

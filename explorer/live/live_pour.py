@@ -28,6 +28,7 @@ from explorer.live.messages import (
 from explorer.live.pace import Pace
 from explorer.outcomes import outcome_text
 from explorer.scene_changes import changes
+from solver.effects.columns import kernel_effects
 from solver.params import ParameterError
 from solver.pour import Pour
 from solver.record import Outcome
@@ -172,6 +173,10 @@ class LivePour:
             self._event(line)
         if changed == self._scene:
             return
+        if kernel_effects(changed) and not self._batch.capacity.effects:
+            self._event("compiling the effects; the pour goes on when that is done")
+            self._batch = Batch(dataclasses.replace(self._batch.capacity, effects=True))
+            self._pour.move_to(self._batch)
         self._scene = changed
         self._pour.retune(endless(changed))
         self._retuned = True

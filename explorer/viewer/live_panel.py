@@ -13,6 +13,7 @@ from explorer.screen_units import quantity, title
 from explorer.session import Session
 from explorer.viewer.actions import Post
 from explorer.viewer.live_controls import LiveControl
+from solver.effects import EFFECTS, SetUpEffect
 from solver.params import Parameter
 from solver.scene import Scene, parameters, value
 
@@ -27,6 +28,7 @@ class LivePanel:
         self._sections = [
             _Section(server, session, scene, post, "Pair", pair_targets(scene)),
             _Section(server, session, scene, post, "Material", material_targets(scene)),
+            _Section(server, session, scene, post, "Effect", effect_targets()),
         ]
 
     def show(self, status: Status) -> None:
@@ -96,6 +98,12 @@ def pair_targets(scene: Scene) -> Targets:
     """Choices of pairs: all together, then each one."""
     prefixes = {f"{pair.a} – {pair.b}": (f"pair.{pair.a}.{pair.b}",) for pair in scene.pairs}
     return {"all pairs": tuple(one for (one,) in prefixes.values())} | prefixes
+
+
+def effect_targets() -> Targets:
+    """Choices of effects that act on a running pile; all are off until an amplitude is moved from zero."""
+    acting = (kind for kind in EFFECTS.values() if not issubclass(kind, SetUpEffect))
+    return {kind.name: (f"effect.{kind.name}",) for kind in acting}
 
 
 def echo_html(scene: Scene, prefixes: tuple[str, ...]) -> str:

@@ -10,7 +10,8 @@ from explorer.live.messages import Status
 from explorer.screen_units import checked, screen_unit, title
 from explorer.session import Session
 from explorer.viewer.actions import Post
-from solver.params import Parameter
+from solver.effects import SET_UP_EFFECTS
+from solver.params import Parameter, declared
 from solver.scene import Scene, parameters, value, with_values
 
 PATHS = (
@@ -35,6 +36,11 @@ def size_paths(scene: Scene) -> tuple[str, ...]:
     return tuple(f"body.{body.name}.{key}" for body in scene.bodies for key in ("size_distribution", "size_spread"))
 
 
+def effect_paths() -> tuple[str, ...]:
+    """Parameters of the folder of effects of material and set-up."""
+    return tuple(path for kind in SET_UP_EFFECTS for path in declared(kind, f"effect.{kind.name}"))
+
+
 class RestartPanel:
     """Number boxes and choices made from the declarations; a button pours anew with all of them."""
 
@@ -42,11 +48,13 @@ class RestartPanel:
         self._session, self._generation = session, session.status().generation
         known = parameters(scene)
         set_up = [path for path in PATHS if path in known]
-        self._shown = {path: known[path] for path in (*set_up, *size_paths(scene))}
+        self._shown = {path: known[path] for path in (*set_up, *size_paths(scene), *effect_paths())}
         with server.gui.add_folder("Set-up (on restart)"):
             self._inputs = {path: _input(server.gui, known[path], scene) for path in set_up}
             with server.gui.add_folder("Sizes of the bodies", expand_by_default=False):
                 self._inputs |= {path: _input(server.gui, known[path], scene) for path in size_paths(scene)}
+            with server.gui.add_folder("Effects of material and set-up", expand_by_default=False):
+                self._inputs |= {path: _input(server.gui, known[path], scene) for path in effect_paths()}
             self._seed = server.gui.add_number(
                 "Seed", seed, min=0, max=LARGEST_SEED, step=1, hint="Same seed, same pour."
             )
@@ -96,9 +104,11 @@ def options(parameter: Parameter, present: str) -> tuple[str, ...]:
 
 
 def label(parameter: Parameter) -> str:
-    """Title of an input; for a component's own parameter with the component's name."""
+    """Title of an input; for the parameter of a component or an effect with its name."""
     kind, *names = parameter.path.split(".")
-    return f"{names[0].capitalize()}: {title(parameter).lower()}" if kind == "body" and names[1:] else title(parameter)
+    if kind in ("body", "effect") and names[1:]:
+        return f"{names[0].replace('_', ' ').capitalize()}: {title(parameter).lower()}"
+    return title(parameter)
 
 
 def _input(gui: viser.GuiApi, parameter: Parameter, scene: Scene) -> Any:

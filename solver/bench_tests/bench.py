@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from solver.body import Body, Members
+from solver.effects.columns import kernel_effects
 from solver.layout import layout
 from solver.rigs.rig import Rig
 from solver.scene import Scene
@@ -49,7 +50,7 @@ class Bench:
         numerics = dataclasses.replace(scene.numerics, sleep_speed=0.0)
         self.scene = dataclasses.replace(scene, rig=rig, bodies=(specimen,), numerics=numerics)
         self.dt = time_step(self.scene)
-        self.batch = Batch(ROOM)
+        self.batch = Batch(dataclasses.replace(ROOM, effects=kernel_effects(self.scene)))
         order = np.zeros(1, dtype=np.int32)
         self.batch.load(0, self.scene, layout(self.scene, order), self.dt, (True,) * len(rig.surfaces()))
 

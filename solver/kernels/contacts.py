@@ -1,6 +1,10 @@
 """Forces of all contacts of one world, each pair once and in the order of the list (so the bits repeat)."""
 
 from solver.backend import ti
+from solver.effects import Stage
+from solver.effects.columns import COLUMNS
+from solver.effects.touch import Touch
+from solver.kernels.effects import forget, keep, last_couple, pass_stage
 from solver.kernels.walls import from_patch, from_primitive, surface_velocity
 from solver.laws.hertz_mindlin import (
     normal_damper,
@@ -11,6 +15,9 @@ from solver.laws.hertz_mindlin import (
     tangential_force,
 )
 from solver.state import Vec3, Vec4
+
+HELD_OVERLAP = 1e-45
+"""Overlap [m] that stands for surfaces held at a gap: their contact radius, 1e-24 m, bears and damps nothing."""
 
 
 @ti.func
@@ -28,15 +35,27 @@ def meet_surface(s: ti.template(), w, k):
 
 
 @ti.func
+def may_hold(s: ti.template(), w, k):
+    """Whether the surfaces of entry ``k`` have touched and an effect that pulls may hold them at a gap."""
+    return s.contact.radius[w, k] > 0.0 and s.world.grip[w] > 0.0
+
+
+@ti.func
 def meet(s: ti.template(), w, k):
-    """Normal from j to i and overlap [m] of entry ``k``: (nx, ny, nz, overlap); the overlap is ≤ 0 when apart."""
+    """Normal from j to i and overlap [m] of entry ``k``: (nx, ny, nz, overlap); the overlap is ≤ 0 when apart.
+
+    The true distance is found only of surfaces that overlap or may hold each other.
+    """
     i, j = s.contact.i[w, k], s.contact.j[w, k]
     found = Vec4(0.0, 0.0, 0.0, -1.0)
     if j < s.member.body.shape[1]:
         gap = s.member.centre[w, i] - s.member.centre[w, j]
         reach = s.member.radius[w, i] + s.member.radius[w, j]
         distance2 = gap.dot(gap)
-        if distance2 < reach * reach and distance2 > 0.0:
+        near = distance2 < reach * reach
+        if ti.static(s.effects):
+            near = near or may_hold(s, w, k)
+        if near and distance2 > 0.0:
             distance = ti.sqrt(distance2)
             n = (1.0 / distance) * gap
             found = Vec4(n[0], n[1], n[2], reach - distance)
@@ -52,19 +71,134 @@ def lose(s: ti.template(), w, k, law):
     s.contact.radius[w, k] = 0.0
     s.contact.spring[w, k] = Vec3(0.0, 0.0, 0.0)
     s.contact.loss[w, k] = Vec3(0.0, 0.0, 0.0)
+    if ti.static(s.effects):
+        forget(s, w, k)
 
 
 @ti.func
-def push_wall(s: ti.template(), w, k, point, force, held):
-    """Take the reaction to ``force`` [N] on a body at ``point`` into the sums of wall ``k``, and the wall's work."""
-    torque = (point - s.wall.origin[w, k]).cross(force)
+def push_wall(s: ti.template(), w, k, point, force, couple, held):
+    """Take the reaction to ``force`` [N] and ``couple`` [N m] on a body at ``point`` into wall ``k``, and its work."""
+    torque = (point - s.wall.origin[w, k]).cross(force) + couple
     s.wall.force[w, k] -= force
     s.wall.torque[w, k] -= torque
     if held:
         s.wall.held[w, k] -= force
         s.wall.held_torque[w, k] -= torque
     elif s.wall.moving[w, k] == 1:
-        s.world.wall_work[w] += s.world.dt[w] * force.dot(surface_velocity(s, w, k, point))
+        work = force.dot(surface_velocity(s, w, k, point)) + couple.dot(s.wall.omega[w, k])
+        s.world.wall_work[w] += s.world.dt[w] * work
+
+
+@ti.func
+def touch_of(s: ti.template(), w, k, n, overlap, velocity, omega, a, elastic, damper):
+    """What effects see of entry ``k`` before they act."""
+    row = s.contact.law[w, k]
+    law = s.law.row[w, row]
+    v_n = velocity.dot(n)
+    return Touch(
+        normal=n,
+        overlap=overlap,
+        reduced_radius=s.contact.reduced_radius[w, k],
+        mass=s.contact.reduced_mass[w, k],
+        v_n=v_n,
+        v_t=velocity - v_n * n,
+        omega=omega,
+        dt=s.world.dt[w],
+        fresh=ti.cast(s.contact.radius[w, k] == 0.0, ti.i32),
+        e_star=law[0],
+        g_star=law[1],
+        restitution=s.effect.row[w, row, ti.static(COLUMNS[-1])],
+        friction=law[2],
+        radius=a,
+        elastic=elastic,
+        adhesive=elastic,
+        work=0.0,
+        damper=damper,
+        shear_damper=law[4] * ti.sqrt(a * s.contact.reduced_mass[w, k]),
+        floor=0.0,
+        pull=0.0,
+        held=0,
+        force=0.0,
+        limit=0.0,
+        torque=Vec3(0.0, 0.0, 0.0),
+    )
+
+
+@ti.func
+def respond(s: ti.template(), w, k, n, overlap, velocity, omega):
+    """Force [N] and torque [N m] on body a of entry ``k``, energy that it takes and what of it its spring keeps [J].
+
+    ``velocity`` is that of a relative to its partner at the contact, ``omega`` the relative angular velocity (only
+    effects ask for it). A torque comes from effects alone; it acts on both bodies, in opposite directions.
+    """
+    dt, mass = s.world.dt[w], s.contact.reduced_mass[w, k]
+    law = s.law.row[w, s.contact.law[w, k]]
+    before = s.contact.radius[w, k]
+    v_n = velocity.dot(n)
+    v_t = velocity - v_n * n
+    pressed = overlap
+    if ti.static(s.effects):
+        pressed = ti.max(HELD_OVERLAP, overlap)
+    contact_radius = ti.sqrt(s.contact.reduced_radius[w, k] * pressed)
+    hertz_radius = contact_radius
+    hertz = normal_spring_force(law, contact_radius, pressed)
+    damper = normal_damper(law, ti.sqrt(contact_radius * mass), before, pressed, v_n, dt)
+    elastic, floor, pull, released, last_half = hertz, 0.0, 0.0, 0, 0.0
+    touch = Touch(force=0.0)
+    if ti.static(s.effects):
+        touch = touch_of(s, w, k, n, overlap, velocity, omega, contact_radius, hertz, damper)
+        touch = pass_stage(s, w, k, touch, Stage.NORMAL)
+        touch = pass_stage(s, w, k, touch, Stage.ADHESION)
+        contact_radius, elastic, damper = touch.radius, touch.elastic, touch.damper
+        floor, pull = touch.floor, touch.pull
+        if overlap <= 0.0 and touch.held == 0:
+            released = 1
+    inertia = ti.sqrt(contact_radius * mass)
+    expected = v_n
+    if before > 0.0:
+        expected = s.contact.expected[w, k]
+    f_n = normal_force(elastic, damper, v_n, expected, mass, dt, floor)
+    limit = law[2] * f_n
+    if ti.static(s.effects):
+        touch.force = f_n
+        touch.limit = law[2] * ti.max(0.0, f_n + pull)
+        touch = pass_stage(s, w, k, touch, Stage.TANGENTIAL)
+        limit = touch.limit
+    old, last_loss = s.contact.spring[w, k], s.contact.loss[w, k]
+    spring, f_t = tangential_force(law, contact_radius, before, old, n, v_t, inertia, limit, dt)
+    force, torque = f_n * n + f_t, Vec3(0.0, 0.0, 0.0)
+    # Work against the damper and the tangential force, at the mean of the velocities before and after the step: half of
+    # it now, half when the next velocity is known; less what has gone into the spring.
+    loss = (hertz - f_n) * n - f_t
+    taken = 0.5 * dt * (loss + last_loss).dot(velocity)
+    stored = spring_energy_gain(law, old.norm_sqr(), before, spring.norm_sqr(), contact_radius)
+    if ti.static(s.effects):
+        touch = pass_stage(s, w, k, touch, Stage.ROLLING)
+        touch = pass_stage(s, w, k, touch, Stage.TWISTING)
+        torque = touch.torque
+        taken -= 0.5 * dt * (torque + last_couple(s, w, k)).dot(omega)
+        last_half = 0.5 * dt * (last_loss.dot(velocity) - last_couple(s, w, k).dot(omega))
+        keep(s, w, k, torque, hertz_radius)
+    s.contact.spring[w, k] = spring
+    s.contact.radius[w, k] = contact_radius
+    s.contact.expected[w, k] = v_n + dt * f_n / mass
+    s.contact.loss[w, k] = loss
+    if ti.static(s.effects):
+        if released == 1:
+            s.contact.spring[w, k], s.contact.radius[w, k] = old, before
+            lose(s, w, k, law)
+            force, torque = Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0)
+            taken, stored = last_half, 0.0
+    return force, torque, taken, stored
+
+
+@ti.func
+def lasts(s: ti.template(), w, k, overlap):
+    """Whether entry ``k`` may act: its surfaces overlap, or have touched and something may hold them still."""
+    acts = overlap > 0.0
+    if ti.static(s.effects):
+        acts = overlap > 0.0 or may_hold(s, w, k)
+    return acts
 
 
 @ti.func
@@ -74,7 +208,7 @@ def push(s: ti.template(), w):
     The list is ordered by the first body, so its sum stays in registers until the next one comes. After a change of
     who is awake the entries in which nothing moves follow the live ones once: they hold the sleepers.
     """
-    dt, largest, dissipated = s.world.dt[w], s.world.overlap[w], 0.0
+    largest, dissipated = s.world.overlap[w], 0.0
     present = -1
     force_sum, torque_sum = Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0)
     live, entries = s.world.live[w], s.world.live[w]
@@ -84,54 +218,35 @@ def push(s: ti.template(), w):
         k = s.contact.live[w, item]
         hit = meet(s, w, k)
         overlap = hit[3]
-        if overlap > 0.0:
+        if lasts(s, w, k, overlap):
             a, b, i = s.contact.a[w, k], s.contact.b[w, k], s.contact.i[w, k]
-            law = s.law.row[w, s.contact.law[w, k]]
             radius = s.member.radius[w, i]
             if overlap > largest * radius:
                 largest = overlap / radius
             n = Vec3(hit[0], hit[1], hit[2])
             point = s.member.centre[w, i] - n * (radius - 0.5 * overlap)
             arm, other_arm = point - s.body.position[w, a], Vec3(0.0, 0.0, 0.0)
-            velocity = s.body.velocity[w, a] + s.body.omega[w, a].cross(arm)
+            omega = s.body.omega[w, a]
+            velocity = s.body.velocity[w, a] + omega.cross(arm)
             if b >= 0:
                 other_arm = point - s.body.position[w, b]
                 velocity -= s.body.velocity[w, b] + s.body.omega[w, b].cross(other_arm)
+                omega -= s.body.omega[w, b]
             else:
                 velocity -= surface_velocity(s, w, -1 - b, point)
-            v_n = velocity.dot(n)
-            v_t = velocity - v_n * n
-            mass = s.contact.reduced_mass[w, k]
-            contact_radius = ti.sqrt(s.contact.reduced_radius[w, k] * overlap)
-            inertia = ti.sqrt(contact_radius * mass)
-            elastic = normal_spring_force(law, contact_radius, overlap)
-            before = s.contact.radius[w, k]
-            damper = normal_damper(law, inertia, before, overlap, v_n, dt)
-            expected = v_n
-            if before > 0.0:
-                expected = s.contact.expected[w, k]
-            f_n = normal_force(elastic, damper, v_n, expected, mass, dt)
-            old, last_loss = s.contact.spring[w, k], s.contact.loss[w, k]
-            spring, f_t = tangential_force(law, contact_radius, before, old, n, v_t, inertia, f_n, dt)
-            force = f_n * n + f_t
-            # Work against the damper and the tangential force, at the mean of the velocities before and after the
-            # step: half of it now, half when the next velocity is known; less what has gone into the spring.
-            loss = (elastic - f_n) * n - f_t
-            dissipated += 0.5 * dt * (loss + last_loss).dot(velocity)
-            dissipated -= spring_energy_gain(law, old.norm_sqr(), before, spring.norm_sqr(), contact_radius)
-            s.contact.spring[w, k] = spring
-            s.contact.radius[w, k] = contact_radius
-            s.contact.expected[w, k] = v_n + dt * f_n / mass
-            s.contact.loss[w, k] = loss
+                omega -= s.wall.omega[w, -1 - b]
+            force, torque, taken, stored = respond(s, w, k, n, overlap, velocity, omega)
+            dissipated += taken
+            dissipated -= stored
             if b < 0:
-                push_wall(s, w, -1 - b, point, force, item >= live)
+                push_wall(s, w, -1 - b, point, force, torque, item >= live)
             if item >= live:
                 s.body.held[w, a] += force
-                s.body.held_torque[w, a] += arm.cross(force)
+                s.body.held_torque[w, a] += arm.cross(force) + torque
                 if b >= 0:
                     s.body.held[w, b] -= force
-                    s.body.held_torque[w, b] -= other_arm.cross(force)
-                force = Vec3(0.0, 0.0, 0.0)
+                    s.body.held_torque[w, b] -= other_arm.cross(force) + torque
+                force, torque = Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0)
             if a != present:
                 if present >= 0:
                     s.body.force[w, present] += force_sum
@@ -143,6 +258,10 @@ def push(s: ti.template(), w):
             if b >= 0:
                 s.body.force[w, b] -= force
                 s.body.torque[w, b] -= other_arm.cross(force)
+            if ti.static(s.effects):
+                torque_sum += torque
+                if b >= 0:
+                    s.body.torque[w, b] -= torque
         elif s.contact.radius[w, k] > 0.0:
             lose(s, w, k, s.law.row[w, s.contact.law[w, k]])
     if present >= 0:

@@ -36,6 +36,7 @@ def load_world(s: ti.template(), w: ti.i32, settings: Row):
     s.world.outlet[w] = settings[6]
     s.world.inlet_radius[w] = settings[7]
     s.world.gravity[w] = Vec3(settings[8], settings[9], settings[10])
+    s.world.grip[w] = 0.0
     s.world.moved[w] = settings[1]
     s.world.bodies[w] = 0
     s.world.walls[w] = 0
@@ -56,7 +57,7 @@ def load_world(s: ti.template(), w: ti.i32, settings: Row):
 
 @ti.kernel
 def load_bodies(s: ti.template(), w: ti.i32, numbers: Table, places: IntTable, spheres: Table, owner: IntTable):
-    """All bodies that will enter. numbers: mass, inertia (3), reach; places: first, members, kind; spheres: x y z r."""
+    """All bodies that will enter, by the columns of ``layout.Layout``: numbers, places, spheres (x y z r), owner."""
     s.world.loaded[w] = numbers.shape[0]
     for b in range(numbers.shape[0]):
         s.body.mass[w, b] = numbers[b, 0]
@@ -64,6 +65,9 @@ def load_bodies(s: ti.template(), w: ti.i32, numbers: Table, places: IntTable, s
         s.body.inverse_mass[w, b] = 1.0 / numbers[b, 0]
         s.body.inverse_inertia[w, b] = 1.0 / triple(numbers, b, 1)
         s.body.reach[w, b] = numbers[b, 4]
+        s.body.semi_axes[w, b] = triple(numbers, b, 5)
+        s.body.diameter[w, b] = numbers[b, 8]
+        s.body.sphericity[w, b] = numbers[b, 9]
         s.body.swing[w, b] = 0.0
         s.body.first[w, b] = places[b, 0]
         s.body.members[w, b] = places[b, 1]
@@ -142,6 +146,19 @@ def load_law(s: ti.template(), w: ti.i32, table: Table, kinds: ti.i32):
     rouse_all(s, w)
     for k in range(table.shape[0]):
         s.law.row[w, k] = Vec5(table[k, 0], table[k, 1], table[k, 2], table[k, 3], table[k, 4])
+
+
+@ti.kernel
+def load_effects(s: ti.template(), w: ti.i32, table: Table, grip: ti.f64):
+    """Parameters of the effects of every pair of kinds, row a · kinds + b, and how far apart [m] a pull may hold."""
+    rouse_all(s, w)
+    # A cell is as long as the largest body, the skin and the grip.
+    s.world.cell[w] += grip - s.world.grip[w]
+    s.world.grip[w] = grip
+    s.world.moved[w] = s.world.skin[w]
+    for k in range(table.shape[0]):
+        for column in range(table.shape[1]):
+            s.effect.row[w, k, column] = table[k, column]
 
 
 @ti.kernel

@@ -6,6 +6,7 @@ Rotation     Euler's equations in the principal frame, I ω' = τ − ω × I ω
 """
 
 from solver.backend import ti
+from solver.kernels.effects import body_force
 from solver.kernels.geometry import turned
 from solver.kernels.neighbours import place_members
 from solver.state import Vec3
@@ -52,6 +53,10 @@ def move(s: ti.template(), w, b):
         torque = s.body.rotation[w, b].transpose() @ s.body.torque[w, b]
         s.body.force[w, b] = Vec3(0.0, 0.0, 0.0)
         s.body.torque[w, b] = Vec3(0.0, 0.0, 0.0)
+    if ti.static(s.effects):
+        force = body_force(s, w, b)
+        velocity += dt * s.body.inverse_mass[w, b] * force
+        s.world.dissipated[w] -= 0.5 * dt * force.dot(velocity + s.body.velocity[w, b])
     spin = spun(s.body.spin[w, b], s.body.inertia[w, b], s.body.inverse_inertia[w, b], torque, dt)
     s.body.velocity[w, b] = velocity
     s.body.spin[w, b] = spin

@@ -1,8 +1,9 @@
 """The contact list of a world: pairs of member spheres, and spheres near a surface, that may touch soon.
 
 Bodies are found by a hashed grid, then sorted out by bounding boxes, then member against box, then member against
-member, so the cost grows with the number of bodies. The list holds while no two points have approached by more than
-the skin; tangential springs are carried over by merging two ordered lists.
+member, so the cost grows with the number of bodies. The list reaches as far as a pull may hold (``grip``) and the skin
+beyond; it holds while no two points have approached by more than the skin. Tangential springs, and what effects keep
+of a contact, are carried over by merging two ordered lists.
 """
 
 from solver.backend import ti
@@ -23,6 +24,9 @@ def keep_history(s: ti.template(), w):
             s.history.loss[w, kept] = s.contact.loss[w, k]
             s.history.radius[w, kept] = s.contact.radius[w, k]
             s.history.expected[w, kept] = s.contact.expected[w, k]
+            if ti.static(s.effects):
+                for column in ti.static(range(s.memory.number.shape[2])):
+                    s.memory.kept[w, kept, column] = s.memory.number[w, k, column]
             kept += 1
     return kept
 
@@ -74,7 +78,7 @@ def fill_grid(s: ti.template(), w):
 @ti.func
 def find_near(s: ti.template(), w, a):
     """Bodies after ``a`` whose bounding boxes are within the skin of its own, ascending; returns how many."""
-    skin = s.world.skin[w]
+    skin = s.world.skin[w] + s.world.grip[w]
     low, high = s.body.low[w, a] - skin, s.body.high[w, a] + skin
     home = ti.floor(s.body.position[w, a] / s.world.cell[w], ti.i32)
     near = 0
@@ -154,17 +158,23 @@ def carry_over(s: ti.template(), w, n_old):
         s.contact.radius[w, k] = 0.0
         s.contact.spring[w, k] = Vec3(0.0, 0.0, 0.0)
         s.contact.loss[w, k] = Vec3(0.0, 0.0, 0.0)
+        if ti.static(s.effects):
+            for column in ti.static(range(s.memory.number.shape[2])):
+                s.memory.number[w, k, column] = 0.0
         if old < n_old and s.history.i[w, old] == i and s.history.j[w, old] == j:
             s.contact.spring[w, k] = s.history.spring[w, old]
             s.contact.loss[w, k] = s.history.loss[w, old]
             s.contact.radius[w, k] = s.history.radius[w, old]
             s.contact.expected[w, k] = s.history.expected[w, old]
+            if ti.static(s.effects):
+                for column in ti.static(range(s.memory.number.shape[2])):
+                    s.memory.number[w, k, column] = s.memory.kept[w, old, column]
 
 
 @ti.func
 def list_members(s: ti.template(), w, i, near):
     """Entries of member ``i`` with members of the ``near`` bodies."""
-    centre, reach = s.member.centre[w, i], s.member.radius[w, i] + s.world.skin[w]
+    centre, reach = s.member.centre[w, i], s.member.radius[w, i] + s.world.skin[w] + s.world.grip[w]
     for k in range(near):
         b = s.body.near[w, k]
         low, high = s.body.low[w, b], s.body.high[w, b]
@@ -186,14 +196,14 @@ def list_primitives(s: ti.template(), w, i):
     for p in range(s.world.primitives[w]):
         if s.wall.active[w, s.surface.wall[w, p]] == 1:
             distance = from_primitive(s, w, p, s.member.centre[w, i])[3]
-            if distance < s.member.radius[w, i] + s.world.skin[w]:
+            if distance < s.member.radius[w, i] + s.world.skin[w] + s.world.grip[w]:
                 append(s, w, i, s.member.body.shape[1] + p, 0, 0)
 
 
 @ti.func
 def collect_triangles(s: ti.template(), w, k, i):
     """Add the triangles of mesh wall ``k`` near member ``i`` to ``candidate``, ascending; returns how many."""
-    reach = s.member.radius[w, i] + s.world.skin[w]
+    reach = s.member.radius[w, i] + s.world.skin[w] + s.world.grip[w]
     local = into_wall(s, w, k, s.member.centre[w, i])
     cells = s.wall.cells[w, k]
     low = ti.floor((local - reach - s.wall.low[w, k]) / s.wall.cell[w, k], ti.i32)

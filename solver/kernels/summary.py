@@ -1,6 +1,7 @@
 """Sums over a world as it stands: energies, masses, the fastest body. Nothing of the motion is changed."""
 
 from solver.backend import ti
+from solver.effects.columns import HERTZ
 from solver.kernels.motion import energy_per_mass
 from solver.laws.hertz_mindlin import hertz_energy, spring_energy
 from solver.numerics import ROLLING_SLOPE
@@ -10,7 +11,7 @@ from solver.numerics import ROLLING_SLOPE
 def rolls_away(s: ti.template(), w, b):
     """1 for a single body that rolls outward on the plate, beyond the feed opening's radius: no part of the pile.
 
-    There is no rolling resistance, so it may roll for ever; it must not keep the run going.
+    Without rolling resistance it may roll for ever; it must not keep the run going.
     """
     x, v = s.body.position[w, b], s.body.velocity[w, b]
     beyond = x[0] * x[0] + x[1] * x[1] > s.world.inlet_radius[w] ** 2
@@ -40,8 +41,11 @@ def sum_contacts(s: ti.template(), w):
         radius = s.contact.radius[w, k]
         if radius > 0.0:
             law = s.law.row[w, s.contact.law[w, k]]
-            overlap = radius * radius / s.contact.reduced_radius[w, k]
-            energy = hertz_energy(law, radius, overlap) + spring_energy(law, s.contact.spring[w, k].norm_sqr(), radius)
+            hertz = radius
+            if ti.static(s.effects):
+                hertz = s.memory.number[w, k, HERTZ]
+            overlap = hertz * hertz / s.contact.reduced_radius[w, k]
+            energy = hertz_energy(law, hertz, overlap) + spring_energy(law, s.contact.spring[w, k].norm_sqr(), radius)
             s.summary.elastic[w] += energy
             s.summary.touching[w] += 1
             if s.contact.b[w, k] >= 0:

@@ -66,19 +66,20 @@ def normal_damper(law, inertia, a_before, overlap, v_n, dt):
 
 
 @ti.func
-def normal_force(elastic, damper, v_n, v_expected, mass, dt):
-    """Normal force F [N], never tensile; the damper takes the speed in the middle of the step, v_n + dt (F/m* + A)/2.
+def normal_force(elastic, damper, v_n, v_expected, mass, dt, floor):
+    """Normal force F [N], never below ``floor`` (0: never tensile).
 
+    The damper takes the speed in the middle of the step, v_n + dt (F/m* + A)/2.
     A is the acceleration by everything else, known from the last step: dt A = v_n − ``v_expected``, the speed that the
     contact's own force would have led to. A contact at rest, held by others, is thus not damped at all.
     """
     middle = v_n + 0.5 * (v_n - v_expected)
-    return ti.max(0.0, (elastic - damper * middle) / (1.0 + 0.5 * dt * damper / mass))
+    return ti.max(floor, (elastic - damper * middle) / (1.0 + 0.5 * dt * damper / mass))
 
 
 @ti.func
-def tangential_force(law, a, a_before, spring, n, v_t, inertia, f_n, dt):
-    """New tangential spring [N] and the tangential force on i [N]; ``inertia`` is √(a m*)."""
+def tangential_force(law, a, a_before, spring, n, v_t, inertia, limit, dt):
+    """New tangential spring [N] and force on i [N], both within Coulomb's ``limit`` [N]; ``inertia`` is √(a m*)."""
     stiffness = 8.0 * law[1] * a
     length2 = spring.dot(spring)
     if length2 > 0.0:
@@ -92,7 +93,6 @@ def tangential_force(law, a, a_before, spring, n, v_t, inertia, f_n, dt):
                 scale = 1.0 / ti.sqrt(1.0 - share)
         spring = (spring - out_of_plane * n) * (scale * ti.min(1.0, a / a_before))
     spring -= stiffness * dt * v_t
-    limit = law[2] * f_n
     size2 = spring.dot(spring)
     force = Vec3(0.0, 0.0, 0.0)
     if size2 > limit * limit:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from explorer.errors import CommandError
-from explorer.export.deck import deck_of
+from explorer.export.deck import check_exportable, deck_of
+from solver.effects import EFFECTS
 from solver.sizes import SizeDistribution
 from tests.solver.observables.made_up import cone, record_of
 
@@ -17,3 +18,19 @@ def test_bodies_of_unequal_size_are_not_exported():
     scene = dataclasses.replace(record.scene, bodies=(first, *record.scene.bodies[1:]))
     with pytest.raises(CommandError, match=r"body\.a\.size_distribution: 'uniform' cannot be exported"):
         deck_of(dataclasses.replace(record, scene=scene))
+
+
+def test_effects_on_contacts_and_flight_are_not_exported():
+    scene = record_of(cone(20.0, 0.05), np.zeros(1), np.zeros(1), 0.03).scene
+    check_exportable(scene)
+    for name, amplitude in (("rolling_resistance", "rolling_friction"), ("air_drag", "strength")):
+        path = f"effect.{name}.{amplitude}"
+        with pytest.raises(CommandError, match=rf"{path}: 0\.3 cannot be exported; allowed: 0"):
+            check_exportable(scene.with_effect(EFFECTS[name](**{amplitude: 0.3})))
+
+
+def test_effects_of_the_set_up_are_carried_out_first():
+    scene = record_of(cone(20.0, 0.05), np.zeros(1), np.zeros(1), 0.03).scene
+    check_exportable(scene.with_effect(EFFECTS["plate_tilt"](tilt_x=2.0)))
+    with pytest.raises(CommandError, match=r"size_distribution: 'log_normal' cannot be exported"):
+        check_exportable(scene.with_effect(EFFECTS["size_dispersion"](spread=0.1)))

@@ -1,0 +1,102 @@
+"""What an effect is to everything outside it: a name, parameters, an amplitude, and the limit in which it vanishes.
+
+An effect is one frozen dataclass in one file. Its fields are ordinary parameters (``effect.<name>.<field>`` in files,
+``--set``, sliders and study factors). Those named in ``amplitudes`` switch it on: all zero, and it is not there.
+Three kinds:
+
+    ContactEffect   a ``ti.func`` on one contact: changes the normal force, adds a pull, a torque, another Coulomb limit
+    BodyEffect      a ``ti.func`` on one body: a force from what is around it
+    SetUpEffect     a function scene → scene: material or set-up are not what was declared
+
+Contact effects act in stages, in the order of :class:`Stage`; a pull changes the Coulomb limit that later stages read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from enum import IntEnum
+from typing import Any, ClassVar, Protocol
+
+
+class Stage(IntEnum):
+    """When a contact effect acts."""
+
+    NORMAL = 0
+    """Changes the elastic force or the damper of the normal direction."""
+    ADHESION = 1
+    """Adds a pull, which may last after the surfaces have come apart."""
+    TANGENTIAL = 2
+    """Changes the Coulomb limit."""
+    ROLLING = 3
+    """Adds a torque against rolling."""
+    TWISTING = 4
+    """Adds a torque against turning about the normal."""
+
+
+class Declared(Protocol):
+    """What the range of a contact effect may depend on (a :class:`solver.scene.Scene`)."""
+
+
+@dataclass(frozen=True)
+class Effect:
+    """Base of all effects; the class attributes say what a report and a diagnosis need to know."""
+
+    name: ClassVar[str]
+    amplitudes: ClassVar[tuple[str, ...]]
+    """Fields that are zero while the effect is off: one, or two for a direction in the plane of the plate."""
+    strongest: ClassVar[float]
+    """Largest amplitude that the literature supports, the end of the prior [unit of the amplitude]."""
+    literature: ClassVar[str]
+    """Where that bound comes from."""
+    lever: ClassVar[str]
+    """The experiment that reveals it."""
+
+    @property
+    def on(self) -> bool:
+        """False where every amplitude is zero."""
+        return any(getattr(self, amplitude) != 0.0 for amplitude in self.amplitudes)
+
+    @property
+    def numbers(self) -> tuple[float, ...]:
+        """Values of all parameters in order of declaration."""
+        return tuple(float(getattr(self, field.name)) for field in fields(self) if "parameter" in field.metadata)
+
+
+@dataclass(frozen=True)
+class ContactEffect(Effect):
+    """Acts on contacts. ``act(p, m, c) -> (c, m)`` with parameters p, memory m of the contact, contact c."""
+
+    stage: ClassVar[Stage]
+    act: ClassVar[Callable[..., Any]]
+    memory: ClassVar[int] = 0
+    """Numbers that it keeps per contact; they begin at zero when two surfaces meet."""
+
+    def row(self, at_wall: bool) -> tuple[float, ...]:
+        """What ``act`` reads as p for contacts among bodies, or with a wall; all zero: does not act there."""
+        return self.numbers
+
+    def grip(self, e_star: float, reduced_radius: float) -> float:
+        """How far apart [m] surfaces may come before it lets go; 0 for one that needs an overlap."""
+        return 0.0
+
+    @property
+    def stiffening(self) -> float:
+        """Factor by which it raises the contact stiffness; the time step goes with its inverse root."""
+        return 1.0
+
+
+@dataclass(frozen=True)
+class BodyEffect(Effect):
+    """Acts on bodies. ``act(p, b) -> force`` [N] with parameters p and body b."""
+
+    act: ClassVar[Callable[..., Any]]
+
+
+@dataclass(frozen=True)
+class SetUpEffect(Effect):
+    """Changes material or set-up before a run begins."""
+
+    def applied(self, scene: Any) -> Any:
+        """``scene`` as it truly is, where the declared one is ``scene``."""
+        raise NotImplementedError

@@ -1,0 +1,88 @@
+"""Restitution that falls with speed, and plastic contacts: what comes back from an impact beside the closed forms."""
+
+import numpy as np
+import pytest
+
+from solver.backend import ti
+from solver.effects.velocity_dependent_restitution import damping_of
+from solver.laboratory import EARTH, GRAIN, RADIUS, WALL, Laboratory
+from solver.laws.restitution import normal_damping
+from solver.material import effective_youngs_modulus
+from tests.solver.effects.cases import felt, heavy, hertz_rest, scene_with
+
+pytestmark = pytest.mark.usefixtures("taichi")
+
+
+@ti.kernel
+def dampings(restitutions: ti.types.ndarray(dtype=ti.f64, ndim=1), out: ti.types.ndarray(dtype=ti.f64, ndim=1)):
+    for k in range(out.shape[0]):
+        out[k] = damping_of(restitutions[k])
+
+
+def test_the_series_of_the_damping_is_its_inverse():
+    restitutions = np.linspace(0.05, 1.0, 500)
+    out = np.zeros(500)
+    dampings(restitutions, out)
+    assert out == pytest.approx([normal_damping(e) for e in restitutions], abs=1e-6)
+
+
+def rebounds(effect, speeds, restitution):
+    """Restitution of spheres that hit the plane side by side at ``speeds``, without gravity."""
+    lab = Laboratory(scene_with(effect, friction=0.0, restitution=restitution), len(speeds))
+    for b, speed in enumerate(speeds):
+        lab.put(b, (0.05 * b, 0.0, RADIUS + 1e-6), velocity=(0.0, 0.0, -speed))
+    # The slowest takes longest, t ∝ v^(−1/5): 1.3 ms at 0.1 m/s.
+    lab.run(round(0.01 / lab.dt))
+    return lab.state()[:, 9] / np.array(speeds)
+
+
+@pytest.mark.parametrize(("sensitivity", "reference"), [(1.0, 1.0), (0.5, 0.5), (2.0, 1.0)])
+def test_restitution_over_speed(sensitivity, reference):
+    speeds = np.array([0.03, 0.1, 0.3, 1.0, 2.0])
+    effect = felt("velocity_dependent_restitution", speed_sensitivity=sensitivity, reference_speed=reference)
+    expected = 1.0 - 0.5 * (1.0 + sensitivity * ((speeds / reference) ** 0.2 - 1.0))
+    assert expected.min() > 0.05
+    # Time step, as for the constant one (verification/README.md).
+    assert rebounds(effect, speeds, 0.5) == pytest.approx(np.clip(expected, 0.05, 1.0), rel=5e-3)
+
+
+def test_switched_on_a_contact_that_stands_keeps_its_damper():
+    """A sphere that oscillates on the plane when the effect comes must not lose its damping."""
+    lab = Laboratory(scene_with(felt("air_drag", strength=1e-9), gravity=EARTH, restitution=0.3), 1)
+    rest = hertz_rest(lab.scene.bodies[0].mass * 9.81, effective_youngs_modulus(GRAIN, WALL))
+    lab.put(0, (0.0, 0.0, RADIUS - 0.5 * rest))
+    lab.run(10)
+    lab.batch.set_effects(0, scene_with(felt("velocity_dependent_restitution"), gravity=EARTH, restitution=0.3))
+    lab.run(round(0.2 / lab.dt))
+    assert RADIUS - lab.state()[0, 2] == pytest.approx(rest, rel=1e-5)
+
+
+@pytest.mark.parametrize("plasticity", [0.25, 0.5, 0.8])
+def test_a_plastic_contact_gives_back_the_same_share_at_any_speed(plasticity):
+    """e² = (1 − 5/2 λ + 3/2 λ^{5/3})/(1 − λ), from the areas under the two branches."""
+    expected = np.sqrt((1.0 - 2.5 * plasticity + 1.5 * plasticity ** (5.0 / 3.0)) / (1.0 - plasticity))
+    found = rebounds(felt("plastic_contact", plasticity=plasticity), (0.3, 1.0), 1.0)
+    assert found == pytest.approx([expected] * 2, rel=5e-3)  # the peak falls between two steps
+
+
+def test_a_dent_is_reloaded_along_its_unloading_branch():
+    """A heavy sphere goes down, half up, down again and deeper: force over overlap by the formula at every sample."""
+    plasticity, speed = 0.5, 1e-3
+    scene = scene_with(
+        felt("plastic_contact", plasticity=plasticity), bodies=(heavy(1e6),), friction=0.0, restitution=1.0
+    )
+    lab = Laboratory(scene, 1, dt=1e-5)
+    stiffness = 4.0 / 3.0 * effective_youngs_modulus(GRAIN, WALL) * np.sqrt(RADIUS)
+    deepest, compared = 0.0, 0
+    for start, stop in ((-1e-6, 1e-5), (1e-5, 8e-6), (8e-6, 1.4e-5), (1.4e-5, -1e-6)):
+        direction = np.sign(stop - start)
+        lab.put(0, (0.0, 0.0, RADIUS - start), velocity=(0.0, 0.0, -speed * direction))
+        for _ in range(round(abs(stop - start) / (speed * lab.dt))):
+            lab.run(1)
+            overlap = max(0.0, RADIUS - lab.state()[0, 2] - direction * speed * lab.dt)  # when the force acted
+            deepest = max(deepest, overlap)
+            expected = (overlap**1.5 - plasticity * deepest**1.5) / (1.0 - plasticity)
+            force = -lab.batch.surface_state(0)[0, 15]
+            assert force == pytest.approx(max(0.0, stiffness * expected), rel=1e-3, abs=1e-4)  # it gives in a little
+            compared += expected > 0.0
+    assert compared > 1000
