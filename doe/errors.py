@@ -11,6 +11,10 @@ class StudyFileError(ValueError):
     """An entry of a study file that is not allowed; the message is one line naming key, value and what is allowed."""
 
 
+class MeasurementError(ValueError):
+    """Measured data that cannot be read; the message is one line naming file, key, value and what is allowed."""
+
+
 class StudyStopped(RuntimeError):
     """A study that ended before its last stage, because what the runs gave cannot be analysed.
 

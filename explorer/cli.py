@@ -12,7 +12,20 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from explorer.commands import bench, calibrate, export, new, parameters, replay, runs, serve, shape, simulate, verify
+from explorer.commands import (
+    bench,
+    calibrate,
+    export,
+    measurements,
+    new,
+    parameters,
+    replay,
+    runs,
+    serve,
+    shape,
+    simulate,
+    verify,
+)
 
 BAD_INPUT, INTERRUPTED = 2, 130
 OWN_PACKAGES = ("explorer", "doe", "solver")
@@ -103,6 +116,7 @@ app.command()(export.export)
 app.command()(replay.replay)
 app.command()(verify.verify)
 app.command()(bench.bench)
+app.add_typer(measurements.app, name="measurements")
 
 
 def main() -> None:

@@ -7,14 +7,17 @@ second and may not happen in the page's process): the names that need it are fet
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from solver.assets import asset_path
+from solver.assets import AssetNotFoundError, asset_path
 from solver.body import Body
 from solver.material_file import load_material
 from solver.observables import Value, observable_names, observe
+from solver.observables.free_surface import slope_angle_deg
+from solver.observables.named import Named, all_names, named, observe_named, observe_scan
 from solver.params import Parameter, ParameterError, parse_quantity
 from solver.record import Bodies, Entries, Outcome, Phase, Pile, Record, Spheres, Trace
-from solver.scene import Scene, body_counts, canonical, parameters, value, with_values
-from solver.set_up import with_set_up
+from solver.scan import scanned_pile
+from solver.scene import Scene, body_counts, canonical, parameters, pour_rig, value, with_rig, with_values
+from solver.set_up import with_set_up, with_settings
 from solver.toml_table import read_toml
 from solver.version import code_version
 
@@ -38,11 +41,13 @@ def __getattr__(name: str) -> Any:
 
 
 __all__ = [
+    "AssetNotFoundError",
     "Bodies",
     "Body",
     "Crew",
     "Entries",
     "Job",
+    "Named",
     "Outcome",
     "Parameter",
     "ParameterError",
@@ -53,20 +58,29 @@ __all__ = [
     "Spheres",
     "Trace",
     "Value",
+    "all_names",
     "asset_path",
     "body_counts",
     "canonical",
     "code_version",
     "load_material",
+    "named",
     "observable_names",
     "observe",
+    "observe_named",
+    "observe_scan",
     "parameters",
     "parse_quantity",
+    "pour_rig",
     "read_toml",
     "run_pour",
     "run_pours",
     "run_queue",
+    "scanned_pile",
+    "slope_angle_deg",
     "value",
+    "with_rig",
     "with_set_up",
+    "with_settings",
     "with_values",
 ]

@@ -55,6 +55,23 @@ def asset_path(kind: AssetKind, name: str, *, relative_to: Path | None = None) -
     )
 
 
+def measurement_folder(name: str) -> Path:
+    """Folder of a measured data set: the user's own by its path, or a shipped one by its name.
+
+    Raises AssetNotFoundError where neither exists; the message lists the shipped names.
+    """
+    own = Path(name).expanduser()
+    if own.is_dir():
+        return own
+    shipped = tuple(sorted(path.parent.name for path in _folder("measurements").glob("*/measurement.toml")))
+    if name in shipped:
+        return _folder("measurements") / name
+    raise AssetNotFoundError(
+        f"measurement {name!r} is neither a folder (looked for {own.absolute()}) nor shipped; "
+        f"shipped: {', '.join(shipped) or 'none'}"
+    )
+
+
 def shipped_assets(kind: AssetKind) -> tuple[str, ...]:
     """Names of the shipped assets of one kind, without suffix, sorted."""
     return tuple(sorted(path.stem for path in _folder(kind).glob(f"*{_SUFFIX[kind]}")))
@@ -66,7 +83,7 @@ def _shipped_stem(name: str, suffix: str, shipped: tuple[str, ...]) -> str | Non
     return stem if stem in shipped else None
 
 
-def _folder(kind: AssetKind) -> Path:
+def _folder(kind: str) -> Path:
     """Folder of one kind: inside this package in a wheel, in the repository's root in a checkout."""
     packaged = Path(__file__).with_suffix("")
     root = packaged if packaged.is_dir() else Path(__file__).parents[1] / "assets"

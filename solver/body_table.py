@@ -2,6 +2,8 @@
 
 name, material, mass_fraction      which material (by default that of the body's name), its share of the mass
 size_distribution, size_spread     how the sizes scatter (`solver.sizes`)
+size                               instead of these two, measured diameters: { mean, sd } or { quantiles = { p05, … } }
+                                   become log-normal sizes about the declared one (`solver.size_table`)
 
 and one of
 
@@ -25,10 +27,11 @@ from solver.clump_fit import ClumpFit
 from solver.material import Material
 from solver.params import ParameterError, parse_quantity
 from solver.shape import Solid
+from solver.size_table import measured_spread
 from solver.sizes import SizeDistribution
 from solver.toml_table import as_table, list_at, read_toml, refuse_unknown, vector
 
-COMMON = ("name", "material", "mass_fraction", "size_distribution", "size_spread", "file")
+COMMON = ("name", "material", "mass_fraction", "size_distribution", "size_spread", "size", "file")
 SOLID = ("shape", "spheres")
 DECLARED = ("sphere_centres", "sphere_radii", "mass", "inertia", "density", "mesh", "unit", "fit")
 FIT_NUMBERS = ("volume_ratio", "covered_ratio", "surface_rms", "surface_max")
@@ -70,6 +73,13 @@ def _taken_in(entry: dict[str, Any], path: Path) -> tuple[dict[str, Any], Path]:
 
 def _sizes(entry: dict[str, Any], body: Body) -> SizeDistribution:
     known, where = body_parameters(body), f"body.{body.name}"
+    if "size" in entry:
+        if "size_distribution" in entry or "size_spread" in entry:
+            raise ParameterError(
+                f"{where}.size: stands beside size_distribution or size_spread; allowed: one of the two"
+            )
+        spread = measured_spread(as_table(entry["size"], f"{where}.size"), f"{where}.size")
+        return SizeDistribution("log_normal", float(known[f"{where}.size_spread"].check(spread)))
     kind = str(known[f"{where}.size_distribution"].check(entry.get("size_distribution", "none")))
     spread = float(known[f"{where}.size_spread"].check(entry.get("size_spread", 0.0)))
     if spread > 0.0 and "size_distribution" not in entry:

@@ -33,6 +33,13 @@ class Insertion:
         choices=PROTOCOLS,
     )
     rate: float = param(0.020, unit="kg/s", low=1e-4, high=10.0, doc="Mass fed per second.")
+    lead: float = param(
+        0.0,
+        unit="s",
+        low=0.0,
+        high=1.0,
+        doc="Bodies may enter this long before they are due; numerics.sample_interval: a batch holds what comes next.",
+    )
     drop_speed: float = param(0.5, unit="m/s", low=0.0, high=10.0, doc="Downward speed of a body where it enters.")
     region_radius: float = param(0.045, unit="m", low=0.002, high=1.0, doc="Radius of the feed.")
     region_height: float = param(

@@ -36,6 +36,13 @@ class Numerics:
         1.0, low=0.0, high=1e3, doc="Number of bodies that may be left hanging in the funnel without a jam."
     )
     max_time: float = param(8.0, unit="s", low=0.1, high=60.0, doc="Simulated time after which a run is cut off.")
+    duration: float = param(
+        0.0,
+        unit="s",
+        low=0.0,
+        high=60.0,
+        doc="A pour is read this long after its first body entered, at rest or not; 0: when it is at rest.",
+    )
     overlap_limit: float = param(
         0.1, low=0.001, high=0.5, doc="Largest overlap allowed, as a fraction of the member sphere's radius."
     )

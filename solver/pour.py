@@ -64,7 +64,7 @@ class Pour:
         self._layout = layout(scene, self.order, sizes)
         self.dt = time_step(scene)
         batch.load(w, scene, self._layout, self.dt, (True,) * len(self.rig.surfaces()))
-        self._due = insertion.entry_times(self._layout.numbers[:, 0], scene.insertion.rate)
+        self._due = insertion.entry_times(self._layout.numbers[:, 0], scene.insertion.rate) - scene.insertion.lead
         self._table = law_table(scene)
         self._ramp: Ramp | None = None
         self.energy_put_in = 0.0
@@ -182,7 +182,9 @@ class Pour:
         state = self.batch.bodies(self.w, self.entered)
         bodies = bodies_of(self.scene, self.order, self._layout, state)
         spheres = member_spheres(self.scene, bodies)
-        pile = pile_of(self.container, bodies, spheres, rolling_away(self.scene, self.container, state))
+        # What rolls away is no part of a pile at rest; at a given moment it lies where it is, for a camera as well.
+        rolling = None if self.scene.numerics.duration > 0.0 else rolling_away(self.scene, self.container, state)
+        pile = pile_of(self.container, bodies, spheres, rolling)
         return Record(
             scene=self.scene,
             seed=self.seed,
@@ -202,7 +204,12 @@ class Pour:
         )
 
     def _interval_steps(self) -> int:
-        return max(1, round(self.scene.numerics.sample_interval / self.dt))
+        """Steps to the next moment of decision; the moment of the reading is one, wherever it falls."""
+        numerics = self.scene.numerics
+        interval = round(numerics.sample_interval / self.dt)
+        if numerics.duration > self.time:
+            interval = min(interval, math.ceil((numerics.duration - self.time) / self.dt - 1e-6))
+        return max(1, interval)
 
     def _insert(self) -> None:
         if self._began is not None and not self.rig.refills:

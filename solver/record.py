@@ -15,7 +15,8 @@ Ints = npt.NDArray[np.int32]
 
 
 class Outcome(StrEnum):
-    """How a run ended. Only ``AT_REST`` gives a valid pile, and ``MEASURED`` a valid run of a rig that keeps moving."""
+    """How a run ended. Valid are ``AT_REST``, a pile, and ``MEASURED``: a rig that keeps moving has run for its time,
+    or a pour was read after ``numerics.duration``."""
 
     RUNNING = "running"
     AT_REST = "at_rest"

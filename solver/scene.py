@@ -210,7 +210,18 @@ def check(scene: Scene) -> None:
                 f"numerics.max_time: {scene.numerics.max_time:g} s end before the {rig.name} has run for its "
                 f"{rig.running_time:g} s; turn faster, or fewer times"
             )
+        _check_duration(rig, scene.numerics)
         rig.feed().check(scene.insertion.region_radius, longest)
+
+
+def _check_duration(rig: PourRig, numerics: Numerics) -> None:
+    if numerics.duration > 0.0 and rig.running_time is not None:
+        raise ParameterError(f"numerics.duration: {numerics.duration:g} s in a {rig.name}, which runs for its own time")
+    if numerics.duration > numerics.max_time:
+        raise ParameterError(
+            f"numerics.duration: {numerics.duration:g} s is beyond numerics.max_time; "
+            f"allowed: up to {numerics.max_time:g} s"
+        )
 
 
 def _body(scene: Scene, name: str) -> Body:

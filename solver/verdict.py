@@ -76,13 +76,16 @@ def _overfull(rig: PourRig, moment: Moment) -> Verdict:
 
 
 def _ended(rig: PourRig, numerics: Numerics, moment: Moment) -> Verdict:
-    """The rig has run for its time, or all has come to rest."""
-    if rig.running_time is None:
-        return _come_to_rest(rig, numerics, moment)
+    """The rig has run for its time, the moment of the reading has come, or all has come to rest."""
     # Without a limit on time a person at the screen ends the run.
     limited = math.isfinite(numerics.max_time)
-    over = limited and moment.acting is not None and moment.acting >= rig.running_time
-    return (Outcome.MEASURED, "") if over else RUNNING
+    if rig.running_time is not None:
+        over = limited and moment.acting is not None and moment.acting >= rig.running_time
+        return (Outcome.MEASURED, "") if over else RUNNING
+    if numerics.duration > 0.0 and limited:
+        # Less a hair: the sum of many steps must not miss the moment by rounding.
+        return (Outcome.MEASURED, "") if moment.time >= numerics.duration - 1e-9 else RUNNING
+    return _come_to_rest(rig, numerics, moment)
 
 
 def _come_to_rest(rig: PourRig, numerics: Numerics, moment: Moment) -> Verdict:

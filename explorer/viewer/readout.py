@@ -26,7 +26,7 @@ PHASE_WORDS = {
 OUTCOME_WORDS = {
     Outcome.RUNNING: "still running",
     Outcome.AT_REST: "at rest: a valid pile",
-    Outcome.MEASURED: "measured: the rig ran for its time",
+    Outcome.MEASURED: "measured: the run lasted its time",
     Outcome.JAMMED: "jammed: material stays in the rig",
     Outcome.TIME_LIMIT: "cut off: still moving at the time limit",
     Outcome.LOST_BODY: "lost a body through the plate",

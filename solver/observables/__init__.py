@@ -105,6 +105,7 @@ OBSERVABLES: tuple[Observable, ...] = (
     _of_pile("angle_of_repose_mass_cone_deg", "deg", pile.angle_of_repose_mass_cone),
     _of_pile("angle_of_repose_volume_cone_deg", "deg", pile.angle_of_repose_volume_cone),
     _of_pile("apex_height_m", "m", pile.apex_height),
+    _of_pile("centre_height_m", "m", pile.centre_height),
     _of_pile("footprint_r50_m", "m", pile.footprint_r50),
     _of_pile("footprint_r90_m", "m", pile.footprint_r90),
     _of_pile("centroid_x_m", "m", pile.centroid_x),

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 
+ROUNDING = 1e-9
+"""Share of the mass that sums in another order may miss."""
+
+
 def discharge_curve(record: Record) -> tuple[Array, Array]:
     """``discharged_mass_kg``: times on the clock above [s], mass below the outlet [kg]; shape (k,) each."""
     return record.trace.time - record.gate_opened, record.trace.discharged_mass
@@ -28,8 +32,8 @@ def time_of_share(share: float, time: Array, discharged_mass: Array, poured_mass
 
     ``time`` [s] and ``discharged_mass`` [kg], shape (k,) each. NaN if it never has.
     """
-    # A billionth of the mass keeps rounding of the sum from hiding the last body.
-    wanted = (share - 1e-9) * poured_mass
+    # It keeps rounding of the sum from hiding the last body.
+    wanted = (share - ROUNDING) * poured_mass
     reached = np.flatnonzero(discharged_mass >= wanted)
     if reached.size == 0 or not poured_mass > 0.0:
         return float("nan")
@@ -65,7 +69,9 @@ def residual_mass(record: Record) -> Value:
     trace = record.trace
     if trace.time.size == 0:
         return Value(float("nan"), "kg")
-    return Value(float(trace.entered_mass[-1] - trace.discharged_mass[-1]), "kg")
+    entered, left = float(trace.entered_mass[-1]), float(trace.entered_mass[-1] - trace.discharged_mass[-1])
+    # The two sums run over the bodies in another order; below a billionth of the mass nothing is left.
+    return Value(left if abs(left) > ROUNDING * entered else 0.0, "kg")
 
 
 def left_domain_fraction(record: Record) -> Value:

@@ -12,6 +12,7 @@ from solver.observables.value import Value
 
 if TYPE_CHECKING:
     from solver.record import Record
+    from solver.scene import Scene
 
 
 def bulk_density(reading: PileReading) -> Value:
@@ -21,9 +22,14 @@ def bulk_density(reading: PileReading) -> Value:
 
 def solid_fraction(record: Record) -> Value:
     """Solid volume (mass over the body's density) over the volume under the top surface, within r50."""
-    density = {body.name: body.density for body in record.scene.bodies}
-    solid_volume_per_mass = np.array([1.0 / density[name] for name in record.pile.component_names])
-    return Value(_inner_density(PileReading(record.pile), solid_volume_per_mass), "1")
+    return solid_fraction_of(PileReading(record.pile), record.scene)
+
+
+def solid_fraction_of(reading: PileReading, scene: Scene) -> Value:
+    """:func:`solid_fraction` of a pile, simulated or scanned, of bodies of ``scene``."""
+    density = {body.name: body.density for body in scene.bodies}
+    solid_volume_per_mass = np.array([1.0 / density[name] for name in reading.pile.component_names])
+    return Value(_inner_density(reading, solid_volume_per_mass), "1")
 
 
 def _inner_density(reading: PileReading, per_mass: npt.NDArray[np.float64]) -> float:

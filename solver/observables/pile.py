@@ -10,7 +10,6 @@ import numpy.typing as npt
 from solver.observables.cone import fitted_cone_angle_deg, mass_cone_angle_deg, volume_cone_angle_deg
 from solver.observables.footprint import radius_holding
 from solver.observables.reading import PileReading
-from solver.observables.repose import AZIMUTHS_DEG
 from solver.observables.silhouette import PIXEL, column_tops
 from solver.observables.surface import height_map, radial_profile
 from solver.observables.value import Value, mean_value
@@ -45,9 +44,8 @@ def angle_of_repose_right(reading: PileReading) -> Value:
 
 
 def angle_of_repose_at(azimuth_deg: float) -> Callable[[PileReading], Value]:
-    """The observable "one view, mean of both flanks" for an azimuth among ``AZIMUTHS_DEG``."""
-    view = AZIMUTHS_DEG.index(azimuth_deg)
-    return lambda reading: mean_value(reading.flanks_deg[view].tolist(), "deg")
+    """The observable "one view, mean of both flanks" for any azimuth."""
+    return lambda reading: mean_value(list(reading.view_deg(azimuth_deg)), "deg")
 
 
 def angle_of_repose_cone(reading: PileReading) -> Value:
@@ -80,6 +78,11 @@ def apex_height(reading: PileReading) -> Value:
     heights = [float(column_tops(image).max()) * PIXEL for image in reading.silhouettes if image.size]
     over_views = mean_value(heights, "m")
     return Value(float(np.median(heights)), "m", over_views.spread) if heights else over_views
+
+
+def centre_height(reading: PileReading) -> Value:
+    """Height of the pile's centre of mass above the plate; a quarter of the height of a homogeneous cone."""
+    return Value(float(reading.centre[2]), "m")
 
 
 def footprint_r50(reading: PileReading) -> Value:

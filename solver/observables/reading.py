@@ -49,6 +49,15 @@ class PileReading:
         """The same with the floor of the window above a body that lies flat (its thickness and one pixel)."""
         return self._flanks_deg(self.thickness + PIXEL)
 
+    def view_deg(self, azimuth_deg: float) -> tuple[float, float]:
+        """Angles of the left and the right flank [°] from one azimuth [°], among ``AZIMUTHS_DEG`` or not."""
+        if azimuth_deg in AZIMUTHS_DEG:
+            left, right = self.flanks_deg[AZIMUTHS_DEG.index(azimuth_deg)]
+            return float(left), float(right)
+        if not self.is_pile:
+            return float("nan"), float("nan")
+        return flank_angles_deg(largest_part(silhouette(self.pile.spheres, azimuth_deg)), PIXEL)
+
     @cached_property
     def thickness(self) -> float:
         """Thickness of a body [m]."""

@@ -31,6 +31,7 @@ PILE = (
     "angle_of_repose_mass_cone_deg",
     "angle_of_repose_volume_cone_deg",
     "apex_height_m",
+    "centre_height_m",
     "footprint_r50_m",
     "footprint_r90_m",
     "centroid_x_m",

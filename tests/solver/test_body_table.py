@@ -141,3 +141,13 @@ def test_a_number_of_spheres_is_a_parameter():
     for bad in ("0", 2.5, "many", 1000):
         with pytest.raises(ParameterError, match=r"body\.spheres: .* is not one of coarse, standard, fine, nor"):
             with_values(scene, {"body.spheres": bad})
+
+
+def test_measured_diameters_are_log_normal_sizes(tmp_path):
+    scene = scene_with(tmp_path, **declared(), size={"mean": "2mm", "sd": "0.2mm"})
+    assert scene.bodies[1].sizes == SizeDistribution("log_normal", 0.1)
+
+
+def test_sizes_are_stated_once(tmp_path):
+    with pytest.raises(ParameterError, match="size: stands beside size_distribution or size_spread"):
+        scene_with(tmp_path, **declared(), size={"mean": 2e-3, "sd": 2e-4}, size_spread=0.1)

@@ -73,3 +73,9 @@ def test_a_run_without_samples_has_no_values():
     record = record_of(balls(np.zeros((0, 3))), np.zeros(0), np.zeros(0), 0.03)
     for observable in (discharge_t10, discharge_time, residual_mass, left_domain_fraction):
         assert np.isnan(observable(record).value)
+
+
+def test_rounding_of_the_sums_leaves_no_residue():
+    record = record_of(balls(np.zeros((2, 3))), np.array([0.0, 1.0]), np.array([0.0, 0.1 + 0.2]), 0.3)
+    assert record.trace.discharged_mass[-1] != 0.3
+    assert residual_mass(record).value == 0.0

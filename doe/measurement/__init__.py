@@ -1,0 +1,33 @@
+"""Measured data: a folder of conditions, replicates and parameter ranges, and the runs that repeat it.
+
+The format is described in ``README.md`` beside this file. What is read off data and off runs is read by the same
+functions.
+"""
+
+from doe.measurement.load import load_measurement
+from doe.measurement.measurement import Condition, CrossCheck, MeasuredParameter, Measurement, Observation
+from doe.measurement.reach import Reach, reach_of
+from doe.measurement.readings import readings_of_data, readings_of_record
+from doe.measurement.summaries import (
+    summaries_of_data,
+    summaries_of_record,
+    summary_names,
+    summary_uncertainties,
+)
+
+__all__ = [
+    "Condition",
+    "CrossCheck",
+    "MeasuredParameter",
+    "Measurement",
+    "Observation",
+    "Reach",
+    "load_measurement",
+    "reach_of",
+    "readings_of_data",
+    "readings_of_record",
+    "summaries_of_data",
+    "summaries_of_record",
+    "summary_names",
+    "summary_uncertainties",
+]

@@ -1,0 +1,152 @@
+"""A condition's table in long form: replicate,observable,x,value[,unit] → one array per observable.
+
+``#`` starts a comment. Numbers are SI, angles degrees, unless a column ``unit`` names another unit of the value. A
+scalar has an empty x, a curve a place. Missing rows are missing data (NaN).
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.errors import MeasurementError
+from solver import ParameterError, all_names, named, parse_quantity
+
+Array = npt.NDArray[np.float64]
+COLUMNS = ["replicate", "observable", "x", "value"]
+UNIT_SUFFIXES = ("m", "cm", "mm", "um", "s", "ms", "kg", "g", "mg", "deg", "rad")
+"""Endings by which a name is recognised as an observable in another unit."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One number of the table, SI."""
+
+    line: int
+    replicate: int
+    observable: str
+    x: float | None
+    value: float
+
+
+@dataclass(frozen=True, eq=False)
+class LongForm:
+    """A table: number of replicates, and per observable its places (None: scalar) and values, (r,) or (r, k)."""
+
+    replicates: int
+    values: dict[str, tuple[Array | None, Array]]
+    unknown: tuple[str, ...]
+    """Names that are no observable, in order."""
+
+
+def read_long_form(path: Path) -> LongForm:
+    """The table in ``path``; MeasurementError in one line naming file, line and what is allowed."""
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except FileNotFoundError:
+        raise MeasurementError(f"{path}: no such file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise MeasurementError(f"{path}: cannot be read as text: {error}") from None
+    rows, unknown = [], set()
+    for row in _rows(path, lines):
+        if isinstance(row, str):
+            unknown.add(row)
+        else:
+            rows.append(row)
+    if not rows:
+        raise MeasurementError(f"{path}: no row with a known observable")
+    replicates = max(row.replicate for row in rows)
+    missing = sorted(set(range(1, replicates + 1)) - {row.replicate for row in rows})
+    if missing:
+        raise MeasurementError(
+            f"{path}: replicate: {missing[0]} is missing of {replicates}; allowed: numbers from 1 on"
+        )
+    by_name: dict[str, list[Row]] = {}
+    for row in rows:
+        by_name.setdefault(row.observable, []).append(row)
+    values = {name: _array(path, by_name[name], replicates) for name in sorted(by_name)}
+    return LongForm(replicates, values, tuple(sorted(unknown)))
+
+
+def _rows(path: Path, lines: list[str]) -> Iterator[Row | str]:
+    """Rows in order; of a row with an unknown observable its name."""
+    header: list[str] | None = None
+    for line, text in enumerate(lines, start=1):
+        bare = text.partition("#")[0].strip()
+        if not bare:
+            continue
+        cells = [cell.strip() for cell in next(csv.reader([bare]))]
+        if header is None:
+            header = cells
+            if header not in (COLUMNS, [*COLUMNS, "unit"]):
+                raise MeasurementError(
+                    f"{path}:{line}: columns {','.join(header)}; allowed: {','.join(COLUMNS)}, and unit after them"
+                )
+            continue
+        if len(cells) != len(header):
+            raise MeasurementError(f"{path}:{line}: {len(cells)} cells; allowed: {len(header)}, one per column")
+        yield _row(f"{path}:{line}", line, dict(zip(header, cells, strict=True)))
+
+
+def _row(where: str, line: int, cells: dict[str, str]) -> Row | str:
+    name = cells["observable"]
+    known = named(name)
+    if known is None:
+        _refuse_wrong_unit(where, name)
+        return name
+    if not cells["replicate"].isdecimal() or int(cells["replicate"]) < 1:
+        raise MeasurementError(f"{where}: replicate: {cells['replicate']!r}; allowed: whole numbers from 1 on")
+    if (known.x_unit is None) != (cells["x"] == ""):
+        kind = "an empty x (it is a scalar)" if known.x_unit is None else f"a place x in {known.x_unit} (it is a curve)"
+        raise MeasurementError(f"{where}: {name}: x is {cells['x']!r}; allowed: {kind}")
+    x = None if known.x_unit is None else _number(where, "x", cells["x"], known.x_unit)
+    return Row(line, int(cells["replicate"]), name, x, _value(where, cells, known.unit))
+
+
+def _value(where: str, cells: dict[str, str], unit: str) -> float:
+    number = _number(where, "value", cells["value"], unit)
+    if cells.get("unit", unit) in (unit, ""):
+        return number
+    try:
+        return number * parse_quantity(f"1{cells['unit']}", unit, "unit")
+    except ParameterError as error:
+        raise MeasurementError(f"{where}: {error}") from None
+
+
+def _number(where: str, column: str, text: str, unit: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise MeasurementError(f"{where}: {column}: {text!r}; allowed: a finite number in {unit}")
+    return number
+
+
+def _refuse_wrong_unit(where: str, name: str) -> None:
+    """Refuse a name that only its unit keeps from being an observable; another unknown name is let pass."""
+    for right in all_names():
+        known = named(right)
+        if known is None or known.unit == "1":
+            continue
+        stem = right.rpartition("_")[0]
+        if name == stem or name in {f"{stem}_{suffix}" for suffix in UNIT_SUFFIXES}:
+            raise MeasurementError(f"{where}: observable: {name!r} has a wrong or missing unit; allowed: {right}")
+
+
+def _array(path: Path, rows: list[Row], replicates: int) -> tuple[Array | None, Array]:
+    places = sorted({row.x for row in rows if row.x is not None})
+    column = {x: k for k, x in enumerate(places)}
+    values = np.full((replicates, max(1, len(places))), np.nan)
+    for row in rows:
+        place = row.replicate - 1, 0 if row.x is None else column[row.x]
+        if not np.isnan(values[place]):
+            raise MeasurementError(f"{path}:{row.line}: {row.observable}: this value stands twice; allowed: once")
+        values[place] = row.value
+    return (np.array(places), values) if places else (None, values[:, 0])

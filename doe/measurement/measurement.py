@@ -1,0 +1,101 @@
+"""What a measured data set says: parameters with their ranges, and conditions with their observations. Frozen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.record import Record
+from solver import Scene
+
+Array = npt.NDArray[np.float64]
+Role = Literal["fit", "holdout"]
+
+
+@dataclass(frozen=True)
+class MeasuredParameter(Record):
+    """A parameter that calibration may move, SI: within ``low`` … ``high``, and what was measured independently."""
+
+    path: str
+    low: float
+    high: float
+    mean: float | None
+    sd: float | None
+    unit: str = "1"
+
+
+@dataclass(frozen=True, eq=False)
+class Observation(Record):
+    """One observable of one condition, SI."""
+
+    observable: str
+    unit: str
+    x: Array | None
+    """Places of a curve, ascending, shape (k,); None for a scalar."""
+    values: Array
+    """One row per replicate, shape (r,) or (r, k); NaN where nothing was measured."""
+    uncertainty: float | None
+    """Standard deviation of one value where replicates cannot give it."""
+    origin: Literal["table", "piles", "profile"] = "table"
+    """Where the values come from: the file, the scanned piles, or the surface profile beside them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Condition:
+    """One set-up, poured ``replicates`` times. ``scene`` repeats it in a simulation."""
+
+    name: str
+    role: Role
+    scene: Scene
+    replicates: int
+    observations: tuple[Observation, ...]
+
+    @property
+    def offered(self) -> dict[str, Observation]:
+        """Observations by the name of their observable."""
+        return {observation.observable: observation for observation in self.observations}
+
+
+@dataclass(frozen=True)
+class CrossCheck(Record):
+    """An observable that the file states and that was also computed here from raw data."""
+
+    condition: str
+    observable: str
+    unit: str
+    ours: float
+    """Mean over replicates (and places of a curve)."""
+    theirs: float
+    rms: float
+    """Root of the mean squared difference of single values."""
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """A measured data set, read and checked."""
+
+    folder: Path
+    title: str
+    scene: Scene
+    """The declared base model in its own rig; each condition holds its own."""
+    parameters: tuple[MeasuredParameter, ...]
+    conditions: tuple[Condition, ...]
+    ignored: tuple[str, ...]
+    """What the folder holds and nothing here uses, each with the reason."""
+    notes: tuple[str, ...] = ()
+    """What was changed in reading, such as a range that was clipped."""
+    cross_check: tuple[CrossCheck, ...] = ()
+
+    @property
+    def fit(self) -> tuple[Condition, ...]:
+        """Conditions that may be fitted."""
+        return tuple(condition for condition in self.conditions if condition.role == "fit")
+
+    @property
+    def holdout(self) -> tuple[Condition, ...]:
+        """Conditions that are only predicted."""
+        return tuple(condition for condition in self.conditions if condition.role == "holdout")

@@ -1,0 +1,116 @@
+"""Table and scanned piles of one condition → its observations.
+
+What raw data give is computed from them, by the functions that read our runs: pile observables from scanned piles, the
+slopes in a drum from the listed surface profile. The table's values of those only serve as a cross-check.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.errors import MeasurementError
+from doe.measurement.long_form import LongForm, read_long_form
+from doe.measurement.measurement import CrossCheck, Observation
+from doe.measurement.piles import pile_values, read_piles
+from doe.measurement.readings import PROFILE, SLOPES, slope_of_profile
+from solver import Scene, named
+
+Array = npt.NDArray[np.float64]
+Values = dict[str, tuple[Array | None, Array]]
+Origin = Literal["table", "piles", "profile"]
+
+
+def read_observations(
+    name: str, table_path: Path, pile_paths: Mapping[int, Path], scene: Scene, uncertainty: Mapping[str, float]
+) -> tuple[int, tuple[Observation, ...], tuple[CrossCheck, ...], tuple[str, ...]]:
+    """Replicates, observations, cross-checks, and what was ignored, of the condition ``name``."""
+    table = read_long_form(table_path)
+    ignored = [f"{table_path.name}: {unknown}: no such observable" for unknown in table.unknown]
+    replicates = max(table.replicates, *pile_paths, 0)
+    for replicate in range(table.replicates + 1, replicates + 1):
+        if replicate not in pile_paths:
+            raise MeasurementError(
+                f"{pile_paths[replicates]}: replicate {replicate} is missing of {replicates}; allowed: from 1 on"
+            )
+    stated = _padded(table, replicates)
+    piles: Values = {}
+    if pile_paths and len(scene.bodies) == 1:
+        listed = {key: x for key, (x, _) in stated.items()}
+        piles = pile_values(read_piles(pile_paths, scene), scene, replicates, listed)
+    elif pile_paths:
+        ignored.append(f"piles of {name}: a scan does not say which component a body is; one component is read")
+    profile = _slopes(stated)
+    checks = [
+        _cross_check(name, observable, values, stated[observable][1])
+        for observable, (_, values) in (piles | profile).items()
+        if observable in stated
+    ]
+    observations = []
+    raw: tuple[tuple[Origin, Values], ...] = (("piles", piles), ("profile", profile))
+    for origin, values_by_name in raw:
+        for observable, (x, values) in values_by_name.items():
+            observation = _observation(observable, x, values, uncertainty, origin)
+            if _has_spread(observation):
+                observations.append(observation)
+            else:
+                ignored.append(f"{name}: {observable} from {origin}: one replicate and no [uncertainty]")
+    for observable, (x, values) in stated.items():
+        if observable not in piles and observable not in profile:
+            observation = _observation(observable, x, values, uncertainty, "table")
+            if not _has_spread(observation):
+                raise MeasurementError(
+                    f"{table_path}: {observable}: one replicate has no scatter; allowed: two replicates or more, or "
+                    f"{observable} in [uncertainty]"
+                )
+            observations.append(observation)
+    ordered = tuple(sorted(observations, key=lambda observation: observation.observable))
+    return replicates, ordered, tuple(checks), tuple(ignored)
+
+
+def _padded(table: LongForm, replicates: int) -> Values:
+    """Values with rows of NaN for replicates that only have a scan."""
+    missing = replicates - table.replicates
+    return {
+        name: (x, np.pad(values, [(0, missing)] + [(0, 0)] * (values.ndim - 1), constant_values=np.nan))
+        for name, (x, values) in table.values.items()
+    }
+
+
+def _slopes(stated: Values) -> Values:
+    if PROFILE not in stated:
+        return {}
+    x, heights = stated[PROFILE]
+    assert x is not None
+    return {name: (None, np.array([slope_of_profile(name, x, height) for height in heights])) for name in SLOPES}
+
+
+def _observation(
+    observable: str, x: Array | None, values: Array, uncertainty: Mapping[str, float], origin: Origin
+) -> Observation:
+    known = named(observable)
+    assert known is not None
+    return Observation(observable, known.unit, x, values, uncertainty.get(observable), origin)
+
+
+def _has_spread(observation: Observation) -> bool:
+    """True if two replicates or more have a value, or the uncertainty of one is stated."""
+    return observation.uncertainty is not None or sum(_measured(observation.values)) >= 2
+
+
+def _measured(values: Array) -> Iterator[bool]:
+    return (bool(np.isfinite(row).any()) for row in values)
+
+
+def _cross_check(condition: str, observable: str, ours: Array, theirs: Array) -> CrossCheck:
+    both = np.isfinite(ours) & np.isfinite(theirs)
+    known = named(observable)
+    assert known is not None
+    if not both.any():
+        return CrossCheck(condition, observable, known.unit, float("nan"), float("nan"), float("nan"))
+    rms = float(np.sqrt(np.mean((ours[both] - theirs[both]) ** 2)))
+    return CrossCheck(condition, observable, known.unit, float(ours[both].mean()), float(theirs[both].mean()), rms)

@@ -1,0 +1,74 @@
+"""``[parameters]``: path → range and independently measured mean ± standard deviation.
+
+"pair.grain.grain.static_friction" = { mean = 0.57, sd = 0.05, low = 0.47, high = 0.72 }
+
+Without low or high the range is mean ± 3 sd. A range is clipped to what the parameter may be at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from doe.errors import MeasurementError
+from doe.measurement.measurement import MeasuredParameter
+from doe.study_table import Table, only, section
+from solver import Parameter, ParameterError, Scene, canonical, parameters, parse_quantity
+
+RANGE_SDS = 3.0
+"""Half width of a range that is not stated, in standard deviations."""
+KEYS = ("mean", "sd", "low", "high")
+
+
+def read_parameters(table: Table, scenes: Sequence[Scene]) -> tuple[tuple[MeasuredParameter, ...], tuple[str, ...]]:
+    """Parameters of the table, each known in one of ``scenes`` at least, and notes on what was clipped."""
+    found: dict[str, MeasuredParameter] = {}
+    notes: list[str] = []
+    for path in table:
+        parameter = _declared(path, scenes)
+        if parameter.path in found:
+            raise MeasurementError(f"parameters.{path}: stands twice; allowed: each parameter once")
+        found[parameter.path] = _measured(parameter, section(table, path), notes)
+    return tuple(found.values()), tuple(notes)
+
+
+def _declared(path: str, scenes: Sequence[Scene]) -> Parameter:
+    refusal = None
+    for scene in scenes:
+        try:
+            return parameters(scene)[canonical(scene, path)]
+        except ParameterError as error:
+            refusal = error
+    raise MeasurementError(f"parameters.{refusal}")
+
+
+def _measured(parameter: Parameter, entry: Table, notes: list[str]) -> MeasuredParameter:
+    where = f"parameters.{parameter.path}"
+    if parameter.choices:
+        raise MeasurementError(f"{where}: has named values; allowed: parameters that are numbers")
+    only(entry, KEYS, where)
+    mean, sd, low, high = (_number(entry.get(key), parameter, f"{where}.{key}") for key in KEYS)
+    if sd is not None and (mean is None or sd <= 0.0):
+        raise MeasurementError(f"{where}.sd: {sd:g}; allowed: more than 0, beside a mean")
+    if (low is None or high is None) and (mean is None or sd is None):
+        raise MeasurementError(f"{where}: no range; allowed: low and high, or mean and sd")
+    if mean is not None and sd is not None:
+        low = mean - RANGE_SDS * sd if low is None else low
+        high = mean + RANGE_SDS * sd if high is None else high
+    assert low is not None
+    assert high is not None
+    kept = max(low, parameter.low), min(high, parameter.high)
+    if kept != (low, high):
+        notes.append(f"{parameter.path}: range {low:g} … {high:g} clipped to {kept[0]:g} … {kept[1]:g}")
+    if not kept[0] < kept[1]:
+        raise MeasurementError(
+            f"{where}: range {low:g} … {high:g} is empty; allowed: low below high, within "
+            f"{parameter.low:g} … {parameter.high:g}"
+        )
+    if mean is not None and not kept[0] <= mean <= kept[1]:
+        raise MeasurementError(f"{where}.mean: {mean:g} is outside {kept[0]:g} … {kept[1]:g}")
+    return MeasuredParameter(parameter.path, *kept, mean, sd, parameter.unit)
+
+
+def _number(value: Any, parameter: Parameter, where: str) -> float | None:
+    return None if value is None else parse_quantity(value, parameter.unit, where)

@@ -1,0 +1,92 @@
+"""Scanned piles: ``piles/<condition>_<k>.npz`` → the pile observables of replicate k, by the estimators of our runs.
+
+xyz (n, 3) [m], radius (n,) [m], body (n,): the member spheres of the bodies on the plate.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.errors import MeasurementError
+from solver import ParameterError, Pile, Scene, named, observe_scan, scanned_pile
+
+Array = npt.NDArray[np.float64]
+
+SCALARS = (
+    "angle_of_repose_deg",
+    "angle_of_repose_left_deg",
+    "angle_of_repose_right_deg",
+    "angle_of_repose_deg@0",
+    "angle_of_repose_deg@45",
+    "angle_of_repose_deg@90",
+    "angle_of_repose_deg@135",
+    "apex_height_m",
+    "centre_height_m",
+    "footprint_r50_m",
+    "footprint_r90_m",
+    "centroid_x_m",
+    "centroid_y_m",
+    "stray_fraction",
+    "solid_fraction",
+)
+"""What is read off every scan."""
+PROFILE_PLACES = (np.arange(30) + 0.5) * 5e-3
+"""Radii [m] of ``height_profile_m`` where the table lists none."""
+
+
+def pile_files(folder: Path, conditions: Iterable[str]) -> tuple[dict[str, dict[int, Path]], tuple[Path, ...]]:
+    """Files of ``folder/piles`` by condition and replicate, and those that belong to no condition."""
+    found: dict[str, dict[int, Path]] = {name: {} for name in conditions}
+    strangers = []
+    for path in sorted((folder / "piles").glob("*")):
+        name, _, number = path.stem.rpartition("_")
+        if path.suffix == ".npz" and name in found and number.isdecimal() and int(number) >= 1:
+            found[name][int(number)] = path
+        else:
+            strangers.append(path)
+    return found, tuple(strangers)
+
+
+def read_piles(files: Mapping[int, Path], scene: Scene) -> dict[int, Pile]:
+    """Scanned piles by replicate, of the bodies of ``scene``."""
+    return {replicate: read_pile(path, scene) for replicate, path in files.items()}
+
+
+def read_pile(path: Path, scene: Scene) -> Pile:
+    """One scanned pile; MeasurementError in one line naming file and array."""
+    try:
+        with np.load(path, allow_pickle=False) as arrays:
+            missing = [name for name in ("xyz", "radius", "body") if name not in arrays]
+            if missing:
+                raise MeasurementError(f"{path}: {missing[0]}: missing; allowed: arrays xyz, radius, body")
+            xyz, radius, body = (np.asarray(arrays[name]) for name in ("xyz", "radius", "body"))
+    except (OSError, EOFError, zipfile.BadZipFile) as error:
+        raise MeasurementError(f"{path}: cannot be read as .npz: {error}") from None
+    except ValueError as error:
+        if isinstance(error, MeasurementError):
+            raise
+        raise MeasurementError(f"{path}: cannot be read as plain arrays: {error}") from None
+    try:
+        return scanned_pile(scene, xyz.astype(np.float64), radius.astype(np.float64), body)
+    except ParameterError as error:
+        raise MeasurementError(f"{path}: {error}") from None
+
+
+def pile_values(
+    piles: Mapping[int, Pile], scene: Scene, replicates: int, listed: Mapping[str, Array | None]
+) -> dict[str, tuple[Array | None, Array]]:
+    """Name → (places or None, values per replicate): what is read off every scan, and what the table ``listed``."""
+    wanted: dict[str, Array | None] = dict.fromkeys(SCALARS) | {"height_profile_m": PROFILE_PLACES}
+    wanted |= {name: x for name, x in listed.items() if (known := named(name)) is not None and known.of_pile}
+    values: dict[str, tuple[Array | None, Array]] = {
+        name: (x, np.full(replicates if x is None else (replicates, x.size), np.nan)) for name, x in wanted.items()
+    }
+    for replicate, pile in piles.items():
+        for name, reading in observe_scan(pile, scene, wanted).items():
+            values[name][1][replicate - 1] = reading
+    return values

@@ -1,0 +1,164 @@
+"""What a measured data set can and cannot tell, before anything is simulated.
+
+Counting: every summary of a fitted condition is one equation, every free parameter one unknown; with no more equations
+than unknowns the model fits whatever it lacks. Resolution of a summary: standard error s/√n of its mean over n
+replicates and the 95 % half-width t₀.₉₇₅(n − 1) s/√n (Student 1908); for a single value 1.96 times its stated
+uncertainty.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from doe.measurement.measurement import Condition, Measurement
+from doe.measurement.summaries import ASYMMETRY, summaries, summaries_of_data, summary_uncertainties
+from doe.record import Record
+
+DISCHARGE = ("discharge_", "discharged_mass_kg", "residual_mass_kg")
+STRAYS = ("stray_fraction", "footprint_r90_m", "left_domain_fraction")
+ASYMMETRIC = ("centroid_", ASYMMETRY, "angle_of_repose_left_deg", "angle_of_repose_right_deg")
+HEIGHT = ("apex_height_m", "centre_height_m", "height_profile_m", "surface_profile_m")
+SHAPE = ("angle_of_repose", "footprint_", "slope_", "dynamic_angle_deg", "draw_down_angle", *HEIGHT)
+FLOWING = ("surface_profile_m", "slope_", "dynamic_angle_deg")
+"""Read off a bed in motion."""
+FLOW = (*DISCHARGE, *STRAYS, *FLOWING)
+DENSITY = ("solid_fraction", "bulk_density", *HEIGHT, *DISCHARGE)
+
+TELLTALES: dict[str, tuple[str, ...]] = {
+    "rolling_resistance": SHAPE,
+    "twisting": SHAPE,
+    "adhesion_jkr": SHAPE,
+    "adhesion_sjkr": SHAPE,
+    "capillary_bridge": SHAPE,
+    "wall_adhesion": SHAPE,
+    "plastic_contact": SHAPE,
+    "air_drag": FLOW,
+    "kinetic_friction": FLOW,
+    "velocity_dependent_restitution": FLOW,
+    "plate_tilt": ASYMMETRIC,
+    "funnel_offset": ASYMMETRIC,
+    "size_dispersion": DENSITY,
+    "shape_elongation": DENSITY,
+    "density_error": DENSITY,
+}
+"""Effect → beginnings of the names of summaries that could reveal it; without any of them it stays unseen."""
+
+
+@dataclass(frozen=True)
+class Resolution(Record):
+    """How well a condition's replicates fix the mean of one summary."""
+
+    summary: str
+    unit: str
+    replicates: int
+    """With a value."""
+    mean: float
+    sd: float
+    standard_error: float
+    half_width: float
+
+
+@dataclass(frozen=True)
+class ConditionReach(Record):
+    """The summaries of one condition."""
+
+    condition: str
+    role: str
+    replicates: int
+    resolutions: tuple[Resolution, ...]
+
+
+@dataclass(frozen=True)
+class Reach(Record):
+    """What the data can tell."""
+
+    conditions: tuple[ConditionReach, ...]
+    equations: int
+    """Summaries of the fitted conditions that have a spread."""
+    unknowns: int
+    """Free parameters."""
+    has_discharge: bool
+    has_asymmetry: bool
+    has_holdout: bool
+    hidden_effects: tuple[str, ...]
+    """Effects that no summary of a fitted condition could reveal."""
+    warnings: tuple[str, ...]
+
+
+def reach_of(measurement: Measurement) -> Reach:
+    """What ``measurement`` can tell; no simulation, no fit."""
+    conditions = tuple(_condition_reach(condition) for condition in measurement.conditions)
+    fitted = [name for condition in measurement.fit for name in _all_names(condition)]
+    equations = sum(
+        resolution.standard_error > 0.0
+        for condition in conditions
+        if condition.role == "fit"
+        for resolution in condition.resolutions
+    )
+    reach = Reach(
+        conditions=conditions,
+        equations=equations,
+        unknowns=len(measurement.parameters),
+        has_discharge=_any(fitted, DISCHARGE),
+        has_asymmetry=_any(fitted, ASYMMETRIC),
+        has_holdout=bool(measurement.holdout),
+        hidden_effects=tuple(effect for effect, telltales in TELLTALES.items() if not _any(fitted, telltales)),
+        warnings=(),
+    )
+    return Reach(**{**vars(reach), "warnings": _warnings(reach)})
+
+
+def _condition_reach(condition: Condition) -> ConditionReach:
+    values, stated = summaries_of_data(condition), summary_uncertainties(condition)
+    resolutions = tuple(
+        _resolution(summary.name, summary.unit, values[:, k], float(stated[k]))
+        for k, summary in enumerate(summaries(condition))
+    )
+    return ConditionReach(condition.name, condition.role, condition.replicates, resolutions)
+
+
+def _resolution(name: str, unit: str, values: np.typing.NDArray[np.float64], stated: float) -> Resolution:
+    measured = values[np.isfinite(values)]
+    n = measured.size
+    mean = float(measured.mean()) if n else float("nan")
+    if n >= 2:
+        sd = float(measured.std(ddof=1))
+        error = sd / np.sqrt(n)
+        return Resolution(name, unit, n, mean, sd, float(error), float(stats.t.ppf(0.975, n - 1) * error))
+    return Resolution(name, unit, n, mean, stated, stated, float(stats.norm.ppf(0.975)) * stated)
+
+
+def _all_names(condition: Condition) -> list[str]:
+    """Names of the summaries and of what they are made of."""
+    chosen = summaries(condition)
+    return [summary.name for summary in chosen] + [part for summary in chosen for part in summary.parts]
+
+
+def _any(names: list[str], beginnings: tuple[str, ...]) -> bool:
+    return any(name.startswith(beginnings) for name in names)
+
+
+def _warnings(reach: Reach) -> tuple[str, ...]:
+    found = []
+    n, k = reach.equations, reach.unknowns
+    if n <= 1:
+        found.append("one number to fit: any free parameter fits it exactly, so nothing that is missing can show")
+    elif n <= k:
+        found.append(f"{n} summaries against {k} free parameters: the model can fit what it lacks; nothing can show")
+    elif n < 2 * k:
+        found.append(f"{n} summaries against {k} free parameters: little is left to judge the fit by")
+    for condition in reach.conditions:
+        if condition.replicates == 1:
+            found.append(f"{condition.condition}: one replicate: its noise rests on the stated uncertainties alone")
+        elif condition.replicates < 4:
+            found.append(f"{condition.condition}: {condition.replicates} replicates fix no scatter; four or more do")
+    if not reach.has_holdout:
+        found.append("no holdout condition: an error on data that were not fitted cannot be given")
+    if not reach.has_discharge:
+        found.append("no discharge data in a fitted condition: what only shows in the flow stays unseen")
+    if not reach.has_asymmetry:
+        found.append("no left or right, no centroid in a fitted condition: a tilt or an offset stays unseen")
+    return tuple(found)

@@ -1,0 +1,121 @@
+"""The vector by which data and runs are compared: at most twelve numbers per condition, chosen before any is looked at.
+
+The choice depends on the names (and places) that the data offer and on nothing else:
+
+1. the scalars of ``PREFERRED`` that are offered, in that order, up to ``MOST``; ``flank_asymmetry_deg`` is the left
+   angle of repose minus the right one;
+2. other scalars, by name, except those that repeat one of the first (single views and flanks where the mean over all
+   views is there, slopes of a profile that is there);
+3. while there are fewer than ``LEAST``: values of the curves, in the order of ``CURVES``, at up to eight places spread
+   evenly over the listed ones.
+
+The same code computes the vector of a replicate and that of a run, from the readings of `readings`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.measurement.measurement import Condition
+from doe.measurement.readings import PROFILE, SLOPES, Readings, readings_of_data, readings_of_record
+from solver import Record
+
+Array = npt.NDArray[np.float64]
+
+MOST, LEAST = 12, 8
+PLACES = 8
+"""Places of a curve, at most."""
+ASYMMETRY = "flank_asymmetry_deg"
+LEFT, RIGHT, MEAN = "angle_of_repose_left_deg", "angle_of_repose_right_deg", "angle_of_repose_deg"
+PREFERRED = (
+    MEAN,
+    "apex_height_m",
+    "centre_height_m",
+    "footprint_r50_m",
+    "footprint_r90_m",
+    "stray_fraction",
+    "centroid_x_m",
+    "centroid_y_m",
+    "discharge_t10_s",
+    "discharge_t90_s",
+    ASYMMETRY,
+    "residual_mass_kg",
+    "discharge_t50_s",
+    "solid_fraction",
+)
+"""t50 comes late: at a steady rate it lies between t10 and t90."""
+CURVES = (PROFILE, "height_profile_m", "discharged_mass_kg")
+
+
+@dataclass(frozen=True)
+class Summary:
+    """One number of the vector: a scalar, the difference of two, or a curve's value at one of its places."""
+
+    name: str
+    unit: str
+    parts: tuple[str, ...]
+    """Observables that it is made of; the second is subtracted from the first."""
+    place: int | None = None
+    """Index of the place of a curve."""
+
+    def of(self, readings: Readings) -> float:
+        """Its value."""
+        values = [np.asarray(readings[part]) for part in self.parts]
+        numbers = [float(value if self.place is None else value[self.place]) for value in values]
+        return numbers[0] - sum(numbers[1:])
+
+
+def summaries(condition: Condition) -> tuple[Summary, ...]:
+    """The numbers of the vector of ``condition``, in order."""
+    scalars = {name: o.unit for name, o in condition.offered.items() if o.x is None}
+    offered = {name: Summary(name, unit, (name,)) for name, unit in scalars.items()}
+    if LEFT in scalars and RIGHT in scalars:
+        offered[ASYMMETRY] = Summary(ASYMMETRY, "deg", (LEFT, RIGHT))
+    others = [name for name in sorted(offered) if name not in PREFERRED and not _repeats(name, condition)]
+    chosen = [offered[name] for name in (*PREFERRED, *others) if name in offered][:MOST]
+    for name in CURVES:
+        if name in condition.offered and len(chosen) < LEAST:
+            chosen += _of_curve(condition, name, min(PLACES, MOST - len(chosen)))
+    return tuple(chosen)
+
+
+def summary_names(condition: Condition) -> tuple[str, ...]:
+    """Names of the d numbers."""
+    return tuple(summary.name for summary in summaries(condition))
+
+
+def summaries_of_data(condition: Condition) -> Array:
+    """Vectors of the replicates, shape (replicates, d); NaN where something was not measured."""
+    chosen = summaries(condition)
+    rows = [readings_of_data(condition, replicate) for replicate in range(1, condition.replicates + 1)]
+    return np.array([[summary.of(row) for summary in chosen] for row in rows])
+
+
+def summaries_of_record(condition: Condition, record: Record) -> Array:
+    """Vector of a run of the condition's scene, shape (d,); NaN where something cannot be read."""
+    readings = readings_of_record(condition, record)
+    return np.array([summary.of(readings) for summary in summaries(condition)])
+
+
+def summary_uncertainties(condition: Condition) -> Array:
+    """Stated standard deviation of one value of each summary, shape (d,); NaN where none is stated."""
+    stated = {name: o.uncertainty for name, o in condition.offered.items()}
+    rows = [[stated[part] for part in summary.parts] for summary in summaries(condition)]
+    return np.array([np.nan if None in row else float(np.linalg.norm(np.array(row, dtype=float))) for row in rows])
+
+
+def _repeats(name: str, condition: Condition) -> bool:
+    if name in (LEFT, RIGHT) or name.startswith(f"{MEAN}@"):
+        return MEAN in condition.offered
+    return name in SLOPES and PROFILE in condition.offered
+
+
+def _of_curve(condition: Condition, name: str, most: int) -> list[Summary]:
+    observation = condition.offered[name]
+    assert observation.x is not None
+    n = observation.x.size
+    places = np.unique(np.linspace(0, n - 1, min(most, n)).round().astype(int)).tolist()
+    return [Summary(f"{name}({observation.x[k]:g})", observation.unit, (name,), k) for k in places]

@@ -1,0 +1,136 @@
+"""Observables by the names of measured data: scalars and curves, of a run or of a scanned pile, by the same functions.
+
+A scalar is one of ``REGISTRY`` or a view ``angle_of_repose_deg@AZ`` from any azimuth. The curves:
+
+    discharged_mass_kg    over time [s]         0 before the first sample, held after the last
+    height_profile_m      over radius [m]       rings 5 mm wide, linear between their middles
+    surface_profile_m     over x [m]            linear between columns of pixels, NaN beyond the middle 60 % of the drum
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from solver.observables import REGISTRY, Observable, discharge_curve, height_profile, surface_profile
+from solver.observables.packing import solid_fraction_of
+from solver.observables.pile import PROFILE_RING, angle_of_repose_at
+from solver.observables.reading import PileReading
+
+if TYPE_CHECKING:
+    from solver.record import Pile, Record
+    from solver.scene import Scene
+
+Array = npt.NDArray[np.float64]
+Readings = dict[str, float | Array]
+"""Value of a scalar, or values of a curve at the places that were asked for, by name."""
+
+VIEW = re.compile(r"angle_of_repose_deg@(\d+(?:\.\d+)?)")
+
+
+@dataclass(frozen=True)
+class Named:
+    """What a name stands for."""
+
+    name: str
+    unit: str
+    x_unit: str | None
+    """Unit of a curve's places; None: a scalar."""
+    of_pile: bool
+    """True if a scanned pile gives it."""
+
+
+CURVES = (
+    Named("discharged_mass_kg", "kg", "s", of_pile=False),
+    Named("height_profile_m", "m", "m", of_pile=True),
+    Named("surface_profile_m", "m", "m", of_pile=False),
+)
+
+
+def named(name: str) -> Named | None:
+    """What ``name`` stands for; None for one that is not known."""
+    for curve in CURVES:
+        if curve.name == name:
+            return curve
+    scalar = _scalar(name)
+    if scalar is None:
+        return None
+    return Named(name, scalar.unit, None, scalar.needs == "pile" or name == "solid_fraction")
+
+
+def all_names() -> tuple[str, ...]:
+    """Every name but the views from azimuths beside the listed ones."""
+    return (*REGISTRY, *(curve.name for curve in CURVES))
+
+
+def observe_named(record: Record, wanted: Mapping[str, Array | None]) -> Readings:
+    """Observables of a run; ``wanted``: name → places of a curve, None for a scalar. Unknown names raise KeyError."""
+    readings = _of_pile(PileReading(record.pile), record.scene, _pile_part(wanted))
+    for name, x in wanted.items():
+        if name in readings:
+            continue
+        if x is None:
+            readings[name] = REGISTRY[name].function(record).value
+        else:
+            readings[name] = RECORD_CURVES[name](record, x)
+    return readings
+
+
+def observe_scan(scan: Pile, scene: Scene, wanted: Mapping[str, Array | None]) -> Readings:
+    """The same of a scanned pile of the bodies of ``scene``; names that a pile does not give are left out."""
+    return _of_pile(PileReading(scan), scene, _pile_part(wanted))
+
+
+def _pile_part(wanted: Mapping[str, Array | None]) -> dict[str, Array | None]:
+    return {name: x for name, x in wanted.items() if (known := named(name)) is not None and known.of_pile}
+
+
+def _of_pile(reading: PileReading, scene: Scene, wanted: Mapping[str, Array | None]) -> Readings:
+    if not (np.isfinite(reading.pile.position).all() and np.isfinite(reading.pile.spheres.centre).all()):
+        return {name: math.nan if x is None else np.full(x.shape, np.nan) for name, x in wanted.items()}
+    readings: Readings = {}
+    for name, x in wanted.items():
+        if x is not None:
+            rings = math.ceil(float(x.max()) / PROFILE_RING) + 1
+            radius, height = height_profile(reading, rings=rings)
+            readings[name] = np.interp(x, radius, height)
+        elif name == "solid_fraction":
+            readings[name] = solid_fraction_of(reading, scene).value
+        else:
+            scalar = _scalar(name)
+            assert scalar is not None
+            readings[name] = scalar.function(reading).value
+    return readings
+
+
+def _scalar(name: str) -> Observable | None:
+    if name in REGISTRY:
+        return REGISTRY[name]
+    match = VIEW.fullmatch(name)
+    if match is None:
+        return None
+    azimuth = float(match[1]) % 180.0  # the mean of both flanks is the same from behind
+    return Observable(name, "deg", f"View from azimuth {match[1]}°.", angle_of_repose_at(azimuth), "pile")
+
+
+def _discharged(record: Record, x: Array) -> Array:
+    time, mass = discharge_curve(record)
+    return np.interp(x, time, mass, left=0.0) if time.size else np.full(x.shape, np.nan)
+
+
+def _free_surface(record: Record, x: Array) -> Array:
+    place, height = surface_profile(record)
+    return np.interp(x, place, height, left=np.nan, right=np.nan) if place.size else np.full(x.shape, np.nan)
+
+
+RECORD_CURVES: dict[str, Callable[[Record, Array], Array]] = {
+    "discharged_mass_kg": _discharged,
+    "surface_profile_m": _free_surface,
+}
+"""Curves that need a whole run, at given places."""

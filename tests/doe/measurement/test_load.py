@@ -1,0 +1,178 @@
+"""A data set in: scenes, parameters, values; the shipped ones load; names and free text carry no meaning."""
+
+import numpy as np
+import pytest
+
+from doe.errors import MeasurementError
+from doe.measurement import load_measurement, reach_of, summaries_of_data, summary_names
+from doe.record import plain
+from solver import with_values
+from solver.assets import AssetNotFoundError, measurement_folder
+from solver.insertion import Insertion
+from solver.rigs import Funnel
+from tests.doe.measurement.folders import MEASUREMENT, TABLE, changed, write, write_pile
+
+SHIPPED = ("granudrum_mcc", "trefoil_1", "trefoil_2")
+
+
+def test_a_condition_is_a_scene_to_simulate(tmp_path):
+    slow, fast = load_measurement(write(tmp_path)).conditions
+    assert slow.scene.rig == Funnel(outlet_height=0.060, mass=0.014, domain_half_width=0.3, wall="steel")
+    feed = Insertion(rate=0.1, lead=0.02, drop_speed=0.4, region_radius=0.030, region_height=0.240 - 0.190)
+    assert slow.scene.insertion == feed
+    assert (slow.scene.numerics.duration, slow.scene.numerics.sample_interval) == (2.6, 0.02)
+    assert (fast.scene.numerics.duration, fast.scene.rig) == (0.0, Funnel(wall="steel"))
+    assert (slow.role, fast.role, slow.replicates) == ("fit", "holdout", 2)
+
+
+def test_roles_are_kept_apart(tmp_path):
+    measurement = load_measurement(write(tmp_path))
+    assert [c.name for c in measurement.fit] == ["slow"]
+    assert [c.name for c in measurement.holdout] == ["fast"]
+
+
+def test_values_by_replicate_and_place_with_nan_for_missing(tmp_path):
+    slow = load_measurement(write(tmp_path)).conditions[0]
+    angle, mass = (slow.offered[name] for name in ("angle_of_repose_deg", "discharged_mass_kg"))
+    assert (angle.x, angle.unit, angle.origin) == (None, "deg", "table")
+    np.testing.assert_array_equal(angle.values, [20.0, 22.0])
+    np.testing.assert_array_equal(mass.x, [0.5, 1.0])
+    np.testing.assert_array_equal(mass.values, [[0.001, 0.003], [0.002, np.nan]])
+
+
+def test_a_unit_column_converts(tmp_path):
+    table = "replicate,observable,x,value,unit\n1,apex_height_m,,21,mm\n2,apex_height_m,,0.022,\n"
+    slow = load_measurement(write(tmp_path, {"slow.csv": table})).conditions[0]
+    np.testing.assert_allclose(slow.offered["apex_height_m"].values, [0.021, 0.022], rtol=1e-12)
+
+
+def test_a_range_follows_from_mean_and_sd(tmp_path):
+    (parameter,) = load_measurement(write(tmp_path)).parameters
+    assert (parameter.mean, parameter.sd, parameter.unit) == (0.3, 0.05, "1")
+    assert (parameter.low, parameter.high) == pytest.approx((0.15, 0.45), rel=1e-12)  # mean ± 3 sd
+
+
+def test_a_range_is_clipped_to_what_the_parameter_may_be(tmp_path):
+    text = changed(MEASUREMENT, '"pair.glass.glass.static_friction" = { mean = 0.3, sd = 0.05 }',
+                   '"pair.steel.glass.restitution" = { low = 0.0, high = 1.0 }')  # fmt: skip
+    measurement = load_measurement(write(tmp_path, {"measurement.toml": text}))
+    (parameter,) = measurement.parameters
+    assert (parameter.path, parameter.low, parameter.high) == ("pair.glass.steel.restitution", 0.05, 1.0)
+    assert measurement.notes == ("pair.glass.steel.restitution: range 0 … 1 clipped to 0.05 … 1",)
+
+
+def test_means_are_in_the_scene_of_every_condition_that_has_the_parameter(tmp_path):
+    text = changed(MEASUREMENT, "[parameters]", '[parameters]\n"rig.inlet_diameter" = { mean = 0.12, sd = 0.001 }')
+    measurement = load_measurement(write(tmp_path, {"measurement.toml": text}))
+    assert [c.scene.rig.inlet_diameter for c in measurement.conditions] == [0.12, 0.12]
+
+
+def test_unknown_observables_photographs_and_stray_piles_are_listed(tmp_path):
+    text = changed(MEASUREMENT, 'data = "slow.csv"', 'data = "slow.csv"\nimages = [{ file = "a.png" }]')
+    folder = write(tmp_path, {"measurement.toml": text, "slow.csv": TABLE + "1,colour,,3\n"})
+    write_pile(folder / "piles/other_1.npz")
+    assert load_measurement(folder).ignored == (
+        "piles/other_1.npz: of no condition",
+        "slow.csv: colour: no such observable",
+        "condition slow: images: photographs are not read yet",
+    )
+
+
+def test_scanned_piles_come_before_the_table(tmp_path):
+    folder = write(tmp_path)
+    write_pile(folder / "piles/slow_1.npz")
+    write_pile(folder / "piles/slow_3.npz", beads=5)
+    write_pile(folder / "piles/slow_4.npz", beads=4)
+    slow = load_measurement(folder).conditions[0]
+    assert slow.replicates == 4
+    centre = slow.offered["centroid_x_m"]
+    assert centre.origin == "piles"
+    # Beads in a row of 13 mm from the axis on: the middle of 6, 5, 4 of them; replicate 2 was not scanned.
+    np.testing.assert_allclose(centre.values, [0.0325, np.nan, 0.026, 0.0195], rtol=1e-12)
+    assert slow.offered["angle_of_repose_deg"].origin == "piles"
+
+
+def test_a_gap_in_the_replicates_is_refused(tmp_path):
+    folder = write(tmp_path)
+    write_pile(folder / "piles/slow_4.npz")
+    with pytest.raises(MeasurementError, match=r"slow_4\.npz: replicate 3 is missing of 4"):
+        load_measurement(folder)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_shipped_data_load_into_scenes_that_hold(name):
+    measurement = load_measurement(measurement_folder(name))
+    assert len(measurement.fit) == len(measurement.holdout) == 1
+    assert measurement.ignored == ()
+    for condition in measurement.conditions:
+        for parameter in measurement.parameters:
+            for level in (parameter.low, parameter.high):
+                with_values(condition.scene, {parameter.path: level})
+        assert 8 <= len(summary_names(condition)) <= 12
+
+
+def test_an_unknown_data_set_lists_what_is_shipped():
+    with pytest.raises(AssetNotFoundError, match="shipped: granudrum_mcc, trefoil_1, trefoil_2"):
+        measurement_folder("trefoil_9")
+
+
+def without_names(folder):
+    """All that a data set says, without its names."""
+    measurement = load_measurement(folder)
+    conditions = [
+        (c.role, c.scene.rig, c.scene.insertion, c.scene.numerics, c.scene.bodies, c.scene.pairs, c.scene.materials,
+         c.replicates, plain(c.observations), summary_names(c), summaries_of_data(c).tobytes())
+        for c in measurement.conditions
+    ]  # fmt: skip
+    reach = plain(reach_of(measurement))
+    checks = plain(measurement.cross_check)
+    for entry in (*reach["conditions"], *checks):
+        del entry["condition"]
+    return conditions, plain(measurement.parameters), measurement.notes, checks, reach
+
+
+def test_no_meaning_is_read_into_names_and_free_text(tmp_path):
+    """The shipped trefoils under another folder's name, other titles, sources and condition names: equal results."""
+    source = measurement_folder("trefoil_1")
+    other = tmp_path / "cohesive_powder_from_a_tilted_plate"
+    (other / "piles").mkdir(parents=True)
+    names = {"fit": "rolling", "holdout": "fit_of_density"}
+    text = (source / "measurement.toml").read_text()
+    for line in text.splitlines():
+        if line.startswith(("title", "source")):
+            text = text.replace(line, f'{line.split(" =")[0]} = "adhesion_jkr, wet, elongated"')
+    for old, new in names.items():
+        text = text.replace(f'name = "{old}"', f'name = "{new}"').replace(f'"{old}.csv"', f'"{new}.csv"')
+        (other / f"{new}.csv").write_bytes((source / f"{old}.csv").read_bytes())
+        for path in (source / "piles").glob(f"{old}_*.npz"):
+            (other / "piles" / path.name.replace(old, new, 1)).write_bytes(path.read_bytes())
+    (other / "measurement.toml").write_text(text)
+    material = (source / "material.toml").read_text()
+    (other / "material.toml").write_text(material.replace('name = "trefoil"', 'name = "tilt"', 1))
+    assert without_names(other) == without_names(source)
+
+
+def test_the_order_of_rows_does_not_matter(tmp_path):
+    lines = TABLE.splitlines()
+    shuffled = "\n".join([*lines[:2], *reversed(lines[2:])]) + "\n"
+    folder = write(tmp_path / "one")
+    other = write(tmp_path / "two", {"slow.csv": shuffled, "fast.csv": shuffled})
+    assert without_names(folder) == without_names(other)
+
+
+def test_a_range_is_narrowed_to_what_the_rig_takes():
+    """A drum of 84 mm and 20 mm takes up to half of its 110.8 mL; 50 ± 3 · 2 mL would reach beyond."""
+    measurement = load_measurement(measurement_folder("granudrum_mcc"))
+    volume = next(p for p in measurement.parameters if p.path == "rig.filled_volume")
+    # Bisected to a billionth of the range.
+    assert volume.high == pytest.approx(0.5 * np.pi * 0.042**2 * 0.020, rel=1e-8)
+    assert volume.low == pytest.approx(44e-6, rel=1e-12)
+    assert any(note.startswith("rig.filled_volume: range 4.4e-05 … 5.6e-05 narrowed") for note in measurement.notes)
+
+
+def test_without_a_mean_a_run_starts_within_the_range(tmp_path):
+    """The declared friction, 0.3, where the range holds it; the middle where it does not."""
+    for low, high, expected in ((0.1, 0.5, 0.3), (0.4, 0.8, 0.6)):
+        text = changed(MEASUREMENT, "{ mean = 0.3, sd = 0.05 }", f"{{ low = {low}, high = {high} }}")
+        slow = load_measurement(write(tmp_path, {"measurement.toml": text})).conditions[0]
+        assert slow.scene.pair("glass", "glass").static_friction == pytest.approx(expected, rel=1e-12)

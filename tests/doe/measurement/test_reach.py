@@ -1,0 +1,71 @@
+"""What data can tell before anything is simulated: counting, resolution by hand, and effects without a telltale."""
+
+import numpy as np
+import pytest
+
+from doe.measurement import load_measurement, reach_of
+from solver.assets import measurement_folder
+from tests.doe.measurement.folders import MEASUREMENT, changed, write
+
+HEAD = "replicate,observable,x,value\n"
+ANGLE = HEAD + "1,angle_of_repose_deg,,20\n2,angle_of_repose_deg,,22\n"
+
+
+def reach(folder, table=ANGLE, measurement=MEASUREMENT):
+    return reach_of(load_measurement(write(folder, {"slow.csv": table, "measurement.toml": measurement})))
+
+
+def test_resolution_by_hand(tmp_path):
+    (angle,) = reach(tmp_path).conditions[0].resolutions
+    # 20 and 22: mean 21, s = √2, s/√2 = 1; Student's t at 97.5 % with one degree of freedom: 12.706.
+    assert (angle.mean, angle.sd, angle.standard_error) == pytest.approx((21.0, np.sqrt(2.0), 1.0), rel=1e-12)
+    assert angle.half_width == pytest.approx(12.706, rel=1e-4)
+
+
+def test_one_number_fits_exactly(tmp_path):
+    found = reach(tmp_path)
+    assert (found.equations, found.unknowns) == (1, 1)
+    assert found.warnings[0].startswith("one number to fit")
+
+
+def test_no_more_summaries_than_parameters_is_a_warning(tmp_path):
+    table = ANGLE + "1,apex_height_m,,0.02\n2,apex_height_m,,0.021\n"
+    text = changed(MEASUREMENT, "[parameters]", '[parameters]\n"pair.glass.glass.restitution" = {low=0.1, high=0.9}')
+    assert reach(tmp_path, table, text).warnings[0].startswith("2 summaries against 2 free parameters")
+
+
+def test_a_summary_without_scatter_is_no_equation(tmp_path):
+    found = reach(tmp_path, ANGLE + "1,residual_mass_kg,,0\n2,residual_mass_kg,,0\n")
+    assert [r.summary for r in found.conditions[0].resolutions] == ["angle_of_repose_deg", "residual_mass_kg"]
+    assert found.equations == 1
+
+
+@pytest.mark.parametrize(
+    ("observable", "seen", "unseen"),
+    [
+        ("angle_of_repose_deg", {"rolling_resistance", "adhesion_jkr"}, {"air_drag", "plate_tilt", "density_error"}),
+        ("discharge_t50_s", {"air_drag", "kinetic_friction", "density_error"}, {"rolling_resistance", "plate_tilt"}),
+        ("centroid_x_m", {"plate_tilt", "funnel_offset"}, {"rolling_resistance", "air_drag", "size_dispersion"}),
+        ("stray_fraction", {"velocity_dependent_restitution"}, {"shape_elongation", "plate_tilt"}),
+    ],
+)
+def test_effects_without_a_telltale_are_named(tmp_path, observable, seen, unseen):
+    hidden = set(reach(tmp_path, HEAD + f"1,{observable},,0.1\n2,{observable},,0.2\n").hidden_effects)
+    assert unseen <= hidden
+    assert not seen & hidden
+
+
+def test_what_is_only_held_out_reveals_nothing(tmp_path):
+    measurement = load_measurement(
+        write(tmp_path, {"slow.csv": ANGLE, "fast.csv": HEAD + "1,centroid_x_m,,0.1\n2,centroid_x_m,,0.2\n"})
+    )
+    assert "plate_tilt" in reach_of(measurement).hidden_effects
+
+
+def test_shipped_pours_can_show_every_effect_and_the_drum_no_tilt():
+    pour, drum = (reach_of(load_measurement(measurement_folder(name))) for name in ("trefoil_1", "granudrum_mcc"))
+    assert (pour.hidden_effects, pour.warnings) == ((), ())
+    assert (pour.has_discharge, pour.has_asymmetry, pour.has_holdout) == (True, True, True)
+    assert set(drum.hidden_effects) == {"plate_tilt", "funnel_offset"}
+    assert not drum.has_asymmetry
+    assert any("one replicate" in warning for warning in drum.warnings)
