@@ -120,7 +120,7 @@ def fit_with_covariance(
 ) -> Fit:
     """Return the best fit of a model under a given Sigma per condition, from STARTS starting points."""
     k = predictor.parameters
-    inverse = [np.linalg.inv(block)[None] for block in sigma]
+    inverse = [np.asarray(np.linalg.inv(block)[None], dtype=np.float64) for block in sigma]
     starts = _starts(predictor)
     misfit = build_misfit(
         predictor,

@@ -15,16 +15,18 @@ from doe.diagnose.emulator import Emulator, fit_emulator
 from doe.diagnose.gates import Adequacy, Detection, Gate, Limits, adequate, detect, evidence_weights, unambiguous
 from doe.diagnose.race import Race, race_pairs, race_singles
 from doe.diagnose.runs import Declared, Observed, Runs, select_summaries
-from doe.diagnose.signatures import Reach, reach, whitening
+from doe.diagnose.signatures import Reach, Whitening, reach, whitening
+from doe.diagnose.specificity import specific
 from doe.diagnose.tables import (
     amplitude_estimates,
+    fitted_model,
     listed,
     parameter_changes,
     residual_table,
     signature_table,
     where_the_residual_sits,
 )
-from doe.diagnose.verdict import EffectRow, Signature, Verdict
+from doe.diagnose.verdict import EffectRow, FittedModel, Signature, Verdict
 from doe.errors import StatisticsError
 
 STANDARD_LIMITS = Limits()
@@ -34,7 +36,7 @@ NAN = math.nan
 @dataclass(frozen=True)
 class Conclusion:
     """What the race ended with: kind, named models (best first), sentence, further gates, the final fit and its
-    refits.
+    refits, and the pairs where they were raced.
     """
 
     kind: str
@@ -43,6 +45,7 @@ class Conclusion:
     gates: tuple[Gate, ...]
     final: Fit
     adequacy: Adequacy | None
+    pairs: Race | None = None
 
 
 def diagnose(
@@ -85,7 +88,11 @@ def judge(
     detection = detect(emulator, evidence, base, singles, limits, bootstrap, seed)
     signatures = signature_table(emulator, base, singles, reaches, frame)
     race = race_singles(emulator, evidence, base, raced) if detection.passed else None
-    conclusion = _conclude(emulator, evidence, base, race, raced, limits, bootstrap, seed) if race else _nothing(base)
+    conclusion = (
+        _conclude(emulator, evidence, base, race, raced, signatures, frame, limits, bootstrap, seed)
+        if race
+        else _nothing(base)
+    )
     final = conclusion.final
     refits = conclusion.adequacy.refits if conclusion.adequacy else None
     return Verdict(
@@ -97,6 +104,7 @@ def judge(
         t2_after=final.t2,
         df_after=final.df,
         amplitudes=amplitude_estimates(declared, final, refits),
+        models=_models(declared, base, race, conclusion.pairs),
         gates=(detection.overall, detection.directed, *conclusion.gates),
         effects=_effect_rows(declared, reaches, singles, detection, race, signatures),
         parameters=parameter_changes(declared, base, final),
@@ -123,6 +131,8 @@ def _conclude(
     base: Fit,
     race: Race,
     raced: list[int],
+    signatures: Signature,
+    frame: Whitening,
     limits: Limits,
     bootstrap: int,
     seed: int,
@@ -146,12 +156,13 @@ def _conclude(
         if passed:
             both = adequate(emulator, evidence, pairs.fits[pairs.best], pairs.best, limits, bootstrap, seed + 2)
             gates.append(both.gate)
-            if both.gate.passed:
+            final = pairs.fits[pairs.best]
+            gates.append(specific(emulator, base, final, pairs.best, signatures, frame, limits, seed + 3))
+            if both.gate.passed and gates[-1].passed:
                 gate, near = unambiguous(pairs.criteria, limits)
-                final = pairs.fits[pairs.best]
-                return Conclusion(*_named("effects", near), (*gates, gate), final, both)
+                return Conclusion(*_named("effects", near), (*gates, gate), final, both, pairs)
     text = "The data hold more than noise, and none of the effects in the race explains it."
-    return Conclusion("unexplained", (), text, tuple(gates), fit, None)
+    return Conclusion("unexplained", (), text, tuple(gates), fit, None, pairs)
 
 
 def _named(prefix: str, near: tuple[str, ...]) -> tuple[str, tuple[str, ...], str]:
@@ -163,6 +174,15 @@ def _named(prefix: str, near: tuple[str, ...]) -> tuple[str, tuple[str, ...], st
             f"{near[0]} explains what the base model cannot, and nothing else comes near.",
         )
     return f"ambiguous:{','.join(near)}", near, f"{listed(near)}: the data cannot tell which."
+
+
+def _models(declared: Declared, base: Fit, *races: Race | None) -> tuple[FittedModel, ...]:
+    """Return the base model and every raced one, in order of their criterion."""
+    rows = [fitted_model(declared, "base", base, base.t2)]
+    for race in races:
+        if race is not None:
+            rows += [fitted_model(declared, label, fit, race.criteria[label]) for label, fit in race.fits.items()]
+    return tuple(sorted(rows, key=lambda row: row.criterion))
 
 
 def _effect_rows(

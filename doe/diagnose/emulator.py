@@ -28,6 +28,16 @@ BoolArray = npt.NDArray[np.bool_]
 RUNS_PER_TERM = 2.0
 """Own runs asked for per own term of the base or of an effect."""
 
+TOLERATED = 1.2
+"""Leave-one-out error, relative to the least, up to which the richer polynomial is taken: a term left out is a bias
+that
+the prediction's standard error does not know of."""
+
+LEAST_SHARE = 0.1
+"""Standard deviation of a pour, at least, as a share of that over all runs: a summary that never varies in the base
+runs
+(nothing left in the funnel) but does with an effect would otherwise have no noise at all."""
+
 
 @dataclass(frozen=True)
 class Block:
@@ -130,14 +140,15 @@ def _fit_block(design: FloatArray, runs: Runs, condition: int, floor: FloatArray
     """Fit one condition; the noise is that of the base runs where they are ample, else of all runs."""
     rows = runs.simulated(condition) & np.isfinite(design).all(axis=1)
     x, y = design[rows], runs.blocks[condition][rows]
-    inverse = np.linalg.inv(x.T @ x)
+    inverse: FloatArray = np.linalg.inv(x.T @ x).astype(np.float64)
     coefficients = inverse @ (x.T @ y)
     leverage = np.minimum(np.einsum("np,pr,nr->n", x, inverse, x), 1 - 1e-9)
     residuals = y - x @ coefficients
     base = runs.effect[rows] == BASE
     ample = (1 - leverage[base]).sum() >= AMPLE_DF * y.shape[1]
     basis = base if ample else np.ones(len(y), dtype=bool)
-    noise = pour_noise(residuals[basis], leverage[basis], floor)
+    overall = np.sqrt((residuals**2).sum(axis=0) / (1 - leverage).sum())
+    noise = pour_noise(residuals[basis], leverage[basis], np.maximum(floor, LEAST_SHARE * overall))
     left_out = residuals / (1 - leverage)[:, None]
     scatter = ((y - y.mean(axis=0)) ** 2).sum(axis=0)
     expected = np.sqrt(np.diag(noise.covariance))[None, :] / np.sqrt(1 - leverage)[:, None]
@@ -154,7 +165,7 @@ def _fit_block(design: FloatArray, runs: Runs, condition: int, floor: FloatArray
 
 def _choose_base(theta: FloatArray, runs: Runs) -> IntArray:
     base = runs.effect == BASE
-    found = _least_error(
+    found = _choose(
         [(exponents, monomials(theta, exponents)) for exponents in base_candidates(theta.shape[1])], base, base, runs
     )
     if found is None:
@@ -176,35 +187,47 @@ def _choose_effect(
     for exponents in effect_candidates(k, declared.effects[effect].amplitudes):
         terms = np.where(own[:, None], monomials(points, exponents), 0.0)
         candidates.append((exponents, np.concatenate([known, terms], axis=1)))
-    found = _least_error(candidates, own | (runs.effect == BASE), own, runs)
+    found = _choose(candidates, own | (runs.effect == BASE), own, runs)
     return np.empty((0, points.shape[1]), dtype=np.int64) if found is None else found
 
 
-def _least_error(
+def _choose(
     candidates: list[tuple[IntArray, FloatArray]], fitted: BoolArray, judged: BoolArray, runs: Runs
 ) -> IntArray | None:
-    """Return the exponents of least leave-one-out error on the judged rows, over all conditions; None if none fits.
+    """Return the exponents of the richest candidate that is TOLERATED times the least leave-one-out error; None if
+    none.
 
-    Errors are divided by the standard deviation of the summary over the fitted rows. A candidate needs RUNS_PER_TERM
-    judged rows per own term and a design of full rank, in every condition.
+    The error is that of the judged rows, summed over summaries and conditions in units of each summary's own error
+    with the richest candidate. A candidate needs RUNS_PER_TERM judged rows per own term and a design of full rank.
     """
-    best, least = None, np.inf
-    for exponents, design in candidates:
-        total = 0.0
-        for c, block in enumerate(runs.blocks):
-            rows = fitted & runs.simulated(c)
-            x, y, own = design[rows], block[rows], judged[rows]
-            if own.sum() < RUNS_PER_TERM * len(exponents) or np.linalg.matrix_rank(x) < x.shape[1]:
-                total = np.inf
-                break
-            q, _ = np.linalg.qr(x)
-            left = np.maximum(1 - (q**2).sum(axis=1), 1e-9)[:, None]
-            spread = y.std(axis=0)
-            error = (y - q @ (q.T @ y)) / left / np.where(spread > 0, spread, 1.0)
-            total += float((error[own] ** 2).sum())
-        if total < least:
-            best, least = exponents, total
-    return best
+    errors = [
+        (exponents, _left_out_squares(design, fitted, judged, runs, len(exponents))) for exponents, design in candidates
+    ]
+    usable = sorted(
+        ((exponents, error) for exponents, error in errors if error is not None), key=lambda one: len(one[0])
+    )
+    if not usable:
+        return None
+    unit = np.where(usable[-1][1] > 0, usable[-1][1], 1.0)
+    totals = [float((error / unit).sum()) for _, error in usable]
+    good = [exponents for (exponents, _), total in zip(usable, totals, strict=True) if total <= TOLERATED * min(totals)]
+    return good[-1]
+
+
+def _left_out_squares(
+    design: FloatArray, fitted: BoolArray, judged: BoolArray, runs: Runs, own_terms: int
+) -> FloatArray | None:
+    """Return the summed squared leave-one-out errors of the judged rows, (D,); None where the runs cannot carry it."""
+    squares = []
+    for c, block in enumerate(runs.blocks):
+        rows = fitted & runs.simulated(c)
+        x, y, own = design[rows], block[rows], judged[rows]
+        if own.sum() < RUNS_PER_TERM * own_terms or np.linalg.matrix_rank(x) < x.shape[1]:
+            return None
+        q, _ = np.linalg.qr(x)
+        left = np.maximum(1 - (q**2).sum(axis=1), 1e-9)[:, None]
+        squares.append(((((y - q @ (q.T @ y)) / left) ** 2)[own]).sum(axis=0))
+    return np.concatenate(squares)
 
 
 def _design(

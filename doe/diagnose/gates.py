@@ -31,7 +31,8 @@ FloatArray = npt.NDArray[np.float64]
 @dataclass(frozen=True)
 class Limits(Record):
     """Limits of the gates. detect: level of each of the two tests. reach: least shift, in sigma, that an effect must be
-    able to cause to enter the race. pair_gain: BIC by which a pair must beat the best single effect.
+    able to cause to enter the race. pair_gain: BIC by which a pair must beat the best single effect. chance: of
+    specificity.py, for pairs.
     """
 
     detect: float = 0.005
@@ -39,6 +40,7 @@ class Limits(Record):
     gap: float = 4.0
     pair_gain: float = 6.0
     reach: float = 3.0
+    chance: float = 0.01
 
 
 @dataclass(frozen=True)

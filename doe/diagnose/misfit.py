@@ -25,7 +25,7 @@ MAX_ITERATIONS = 60
 TOLERANCE = 1e-7
 """Relative fall of T^2 below which a set counts as fitted; T^2 itself is of the order of 10."""
 
-LEVELS = {0: 0, 1: 5, 2: 5, 3: 3, 4: 2}
+LEVELS = {0: 0, 1: 5, 2: 3, 3: 2, 4: 2}
 """Amplitudes per axis from which a fit may start, by the number of amplitudes."""
 
 
@@ -46,7 +46,7 @@ class Misfit:
     def value(self, x: FloatArray) -> FloatArray:
         """Return T^2 at x (B, q) -> (B,)."""
         terms = monomials(x, self.predictor.exponents)
-        quadratic = np.einsum("bp,bpr,br->b", terms, self.gram, terms, optimize=True)
+        quadratic = (terms * (self.gram @ terms[:, :, None])[:, :, 0]).sum(axis=1)
         prior = (self.prior_weight * (x - self.prior_mean) ** 2).sum(axis=1)
         return np.asarray(self.square - 2 * (terms * self.moment).sum(axis=1) + quadratic + prior)
 
@@ -120,7 +120,8 @@ def minimise(misfit: Misfit, start: FloatArray) -> tuple[FloatArray, FloatArray]
         better = after <= before
         x[open_sets[better]], value[open_sets[better]] = trial[better], after[better]
         damping[open_sets] = np.where(better, np.maximum(strength / 10, 1e-9), strength * 10)
-        settled = better & (before - after <= TOLERANCE * (1 + before)) & (strength <= 1e-2)
+        # At the minimum rounding alone may raise T^2.
+        settled = (np.abs(before - after) <= TOLERANCE * (1 + before)) & (strength <= 1e-2)
         open_sets = open_sets[~(settled | (damping[open_sets] > 1e9))]
         if not len(open_sets):
             break
@@ -160,7 +161,7 @@ def _step(misfit: Misfit, x: FloatArray, damping: FloatArray) -> FloatArray:
     kept = np.where(both, matrix, 0.0)
     q = x.shape[1]
     kept[:, np.arange(q), np.arange(q)] = np.where(free, diagonal * (1 + damping[:, None]), 1.0)
-    return -np.linalg.solve(_regular(kept), np.where(free, gradient, 0.0)[:, :, None])[:, :, 0]
+    return np.asarray(-np.linalg.solve(_regular(kept), np.where(free, gradient, 0.0)[:, :, None])[:, :, 0])
 
 
 def _regular(matrix: FloatArray) -> FloatArray:

@@ -18,6 +18,8 @@ from itertools import combinations, permutations
 import numpy as np
 import numpy.typing as npt
 
+from doe.diagnose.emulator import Emulator
+from doe.diagnose.verdict import FittedModel
 from doe.errors import StatisticsError
 from doe.record import Record
 
@@ -36,6 +38,22 @@ class Prediction:
 
     mean: FloatArray
     covariance: FloatArray
+
+
+def predictions(emulator: Emulator, model: FittedModel) -> tuple[Prediction, ...]:
+    """Return what a fitted model expects in every condition of an emulator of the same parameters and effects.
+
+    Covariance: J Cov(x) J' + that of the emulated mean. The emulator is that of the menu, not of the fitted conditions.
+    """
+    predictor = emulator.predictor(model.members)
+    own = predictor.mean_covariance(model.coded)
+    cuts = np.cumsum([len(covariance) for covariance in own])[:-1]
+    means = np.split(predictor.mean(model.coded), cuts)
+    slopes = np.split(predictor.jacobian(model.coded), cuts)
+    return tuple(
+        Prediction(mean, slope @ model.covariance @ slope.T + covariance)
+        for mean, slope, covariance in zip(means, slopes, own, strict=True)
+    )
 
 
 @dataclass(frozen=True)

@@ -47,7 +47,7 @@ def draw_pseudo_data(emulator: Emulator, evidence: Evidence, truth: Fit, sets: i
         covariance = (
             estimate * (spread[:, :, None] * spread[:, None, :]) / count + factor * estimate + lack + systematic
         )
-        weights.append(np.linalg.inv(covariance))
+        weights.append(np.asarray(np.linalg.inv(covariance), dtype=np.float64))
     measured = evidence.prior_weight > 0
     sd = np.where(measured, 1 / np.sqrt(np.where(measured, evidence.prior_weight, 1.0)), 0.0)
     priors = truth.x[:k] + sd * generator.standard_normal((sets, k))
@@ -56,9 +56,11 @@ def draw_pseudo_data(emulator: Emulator, evidence: Evidence, truth: Fit, sets: i
 
 def gaussian(covariance: FloatArray, sets: int, generator: np.random.Generator) -> FloatArray:
     """Return draws from N(0, covariance), (sets, d); the covariance may be singular."""
-    values, vectors = np.linalg.eigh(covariance)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    return generator.standard_normal((sets, len(values))) @ root.T
+    sd = np.sqrt(np.diag(covariance))
+    # Eigenvalues of the correlations: those of the covariance lose the summaries of small unit.
+    values, vectors = np.linalg.eigh(covariance / np.outer(*(np.where(sd > 0, sd, 1.0),) * 2))
+    root = vectors * np.sqrt(np.maximum(values, 0.0)) * sd[:, None]
+    return np.asarray(generator.standard_normal((sets, len(values))) @ root.T)
 
 
 def wishart(covariance: FloatArray, df: float, sets: int, generator: np.random.Generator) -> FloatArray:

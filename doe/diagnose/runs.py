@@ -197,6 +197,8 @@ def select_summaries(declared: Declared, runs: Runs, observed: Observed) -> Sele
     dropped, floored, kept, floors = [], [], [], []
     for c, condition in enumerate(declared.conditions):
         simulated, measured = runs.blocks[c][runs.simulated(c)], observed.complete(c)
+        if not len(simulated):
+            raise StatisticsError(f"{condition.name}: no complete pour among the runs")
         constant = np.ptp(simulated, axis=0) <= _dust(simulated)
         same = constant & (np.abs(measured - simulated[0]) <= _dust(simulated)).all(axis=0)
         spread = measured.std(axis=0, ddof=1) if len(measured) > 1 else np.zeros(measured.shape[1])
@@ -230,6 +232,4 @@ def select_summaries(declared: Declared, runs: Runs, observed: Observed) -> Sele
 
 def _dust(values: FloatArray) -> FloatArray:
     """Return what rounding alone may add, per column."""
-    if not len(values):
-        raise StatisticsError("runs: a condition has no complete pour")
     return 8 * math.ulp(1.0) * np.abs(values).max(axis=0)

@@ -8,6 +8,7 @@ shift in sigma that the data can see: the square root of the noncentrality of T^
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from itertools import product
 
@@ -77,7 +78,8 @@ def reach(emulator: Emulator, effect: int, frame: Whitening, theta: FloatArray) 
     """Return the largest shift within the sampled bounds of the effect, looked for at half and full bounds."""
     low, high = emulator.low[effect], emulator.high[effect]
     axes = [
-        sorted({share * bound for share in LEVELS for bound in ends} | {0.0}) for ends in zip(low, high, strict=True)
+        sorted({0.0, *(float(share * bound) for share in LEVELS for bound in ends)})
+        for ends in zip(low, high, strict=True)
     ]
     best = Reach(0.0, np.zeros(len(low)), np.zeros(len(frame.projector)))
     for choice in product(*axes):
@@ -85,7 +87,7 @@ def reach(emulator: Emulator, effect: int, frame: Whitening, theta: FloatArray) 
         if not amplitude.any():
             continue
         z = projected(frame, shift_of(emulator, effect, theta, amplitude))
-        shift = float(np.sqrt(max(0.0, z @ z - _noise_square(emulator, effect, frame, theta, amplitude))))
+        shift = math.sqrt(max(0.0, float(z @ z) - _noise_square(emulator, effect, frame, theta, amplitude)))
         if shift > best.shift or not best.amplitude.any():
             best = Reach(shift, amplitude, z)
     return best

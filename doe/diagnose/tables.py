@@ -11,7 +11,7 @@ from doe.diagnose.calibrate import Evidence, Fit
 from doe.diagnose.emulator import Emulator
 from doe.diagnose.runs import Declared
 from doe.diagnose.signatures import Reach, Whitening, cosine, projected, shift_of
-from doe.diagnose.verdict import AmplitudeEstimate, ParameterChange, Residual, Signature
+from doe.diagnose.verdict import AmplitudeEstimate, FittedModel, ParameterChange, Residual, Signature
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -38,6 +38,13 @@ def amplitude_estimates(
             )
             place += 1
     return tuple(estimates)
+
+
+def fitted_model(declared: Declared, label: str, fit: Fit, criterion: float) -> FittedModel:
+    """Return a fit in natural units."""
+    values = tuple(p.natural(float(x)) for p, x in zip(declared.parameters, fit.x, strict=False))
+    amplitudes = amplitude_estimates(declared, fit)
+    return FittedModel(label, fit.members, fit.x, fit.covariance, values, amplitudes, fit.t2, fit.df, criterion)
 
 
 def parameter_changes(declared: Declared, before: Fit, after: Fit) -> tuple[ParameterChange, ...]:

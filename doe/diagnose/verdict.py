@@ -58,6 +58,25 @@ class ParameterChange(Record):
 
 
 @dataclass(frozen=True)
+class FittedModel(Record):
+    """A calibrated model, to be simulated afresh: "base", "a" or "a+b"; parameters in declared order, natural units.
+
+    members: indices of its effects. coded: (q,) parameters and amplitudes, with their covariance (q, q).
+    criterion: B of gates.py.
+    """
+
+    label: str
+    members: tuple[int, ...]
+    coded: FloatArray
+    covariance: FloatArray
+    parameters: tuple[float, ...]
+    amplitudes: tuple[AmplitudeEstimate, ...]
+    t2: float
+    df: int
+    criterion: float
+
+
+@dataclass(frozen=True)
 class EffectRow(Record):
     """One effect in the table. reach: largest shift that the data could see within its bounds, in sigma.
 
@@ -112,7 +131,8 @@ class Signature(Record):
 class Verdict(Record):
     """The answer. names: effects it names, best first ("a+b" for a pair). t2_before, t2_after with df_before, df_after.
 
-    where: per condition its share of T^2 that is left by the final model, and its worst summary. dropped, floored: see
+    models: the base and all that were raced, best first. where: per condition its share of T^2 that is left by the
+    final model, and its worst summary. dropped, floored: see
     runs.py. variances: per condition. seed and bootstrap make it repeatable.
     """
 
@@ -124,6 +144,7 @@ class Verdict(Record):
     t2_after: float
     df_after: int
     amplitudes: tuple[AmplitudeEstimate, ...]
+    models: tuple[FittedModel, ...]
     gates: tuple[Gate, ...]
     effects: tuple[EffectRow, ...]
     parameters: tuple[ParameterChange, ...]

@@ -10,7 +10,7 @@ from doe.diagnose.calibrate import calibrate, fit_with_covariance, gather_eviden
 from doe.diagnose.runs import Observed, Parameter
 from tests.doe.diagnose.toy import REPLICATES, SIGMA, known_emulator, make_toy
 
-D, AMPLE = 8, 100_000
+D, AMPLE, SETS = 8, 100_000, 120
 
 
 def world(seed=0, df=AMPLE):
@@ -19,11 +19,11 @@ def world(seed=0, df=AMPLE):
 
 
 def test_t2_of_the_true_model_is_chi_squared():
-    """Known covariance: chi^2 with d - k degrees of freedom (300 sets, Kolmogorov-Smirnov)."""
+    """Known covariance: chi^2 with d - k degrees of freedom (SETS sets, Kolmogorov-Smirnov)."""
     toy, emulator = world()
     generator = np.random.default_rng(1)
     values = [
-        calibrate(emulator, (), gather_evidence(emulator, toy.measured(generator, np.zeros(D)))).t2 for _ in range(300)
+        calibrate(emulator, (), gather_evidence(emulator, toy.measured(generator, np.zeros(D)))).t2 for _ in range(SETS)
     ]
     assert stats.kstest(values, stats.chi2(D - 3).cdf).pvalue > 0.001
 
@@ -36,7 +36,7 @@ def test_t2_with_an_estimated_covariance_is_hotellings():
     """
     generator = np.random.default_rng(2)
     values = []
-    for seed in range(300):
+    for seed in range(SETS):
         toy, emulator = world(seed, df=40)
         values.append(calibrate(emulator, (), gather_evidence(emulator, toy.measured(generator, np.zeros(D)))).t2)
     m = D - 3
@@ -50,10 +50,10 @@ def test_t2_under_an_effect_is_noncentral():
     generator = np.random.default_rng(3)
     values = [
         calibrate(emulator, (), gather_evidence(emulator, toy.measured(generator, toy.listed(5, 6.0)))).t2
-        for _ in range(200)
+        for _ in range(SETS)
     ]
-    # sd of one value: sqrt(2 (5 + 2 x 36)) = 12.4; four standard errors of the mean of 200.
-    assert np.mean(values) == pytest.approx(D - 3 + 36, abs=4 * 12.4 / np.sqrt(200))
+    # sd of one value: sqrt(2 (5 + 2 x 36)) = 12.4; four standard errors of the mean.
+    assert np.mean(values) == pytest.approx(D - 3 + 36, abs=4 * 12.4 / np.sqrt(SETS))
 
 
 def test_the_true_effect_is_estimated_with_its_standard_error():
@@ -61,12 +61,12 @@ def test_the_true_effect_is_estimated_with_its_standard_error():
     generator = np.random.default_rng(4)
     fits = [
         calibrate(emulator, (5,), gather_evidence(emulator, toy.measured(generator, toy.listed(5, 10.0))))
-        for _ in range(200)
+        for _ in range(SETS)
     ]
     z = [(fit.x[3] - 0.5) / np.sqrt(fit.covariance[3, 3]) for fit in fits]
     assert fits[0].covariance[3, 3] == pytest.approx(1 / 20**2, rel=0.03)
-    assert np.mean(z) == pytest.approx(0, abs=4 / np.sqrt(200))
-    assert np.std(z) == pytest.approx(1, abs=4 / np.sqrt(400))
+    assert np.mean(z) == pytest.approx(0, abs=4 / np.sqrt(SETS))
+    assert np.std(z) == pytest.approx(1, abs=4 / np.sqrt(2 * SETS))
 
 
 def test_a_prior_counts_as_one_more_measurement():

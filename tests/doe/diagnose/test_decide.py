@@ -28,11 +28,15 @@ def test_a_strong_effect_is_named_with_its_amplitude():
     verdict = verdict_of(lambda toy: toy.listed(5, 10.0))
     assert (verdict.kind, verdict.names) == ("effect:e5", ("e5",))
     (amplitude,) = verdict.amplitudes
-    assert amplitude.low < 0.5 < amplitude.high
+    # One set: four standard errors of 1/20.
+    assert amplitude.value == pytest.approx(0.5, abs=4 / FULL)
+    assert amplitude.low < amplitude.value < amplitude.high
     assert amplitude.standard_error == pytest.approx(1 / FULL, rel=0.25)
     # The bootstrap interval is that of the standard error in a linear world, and a little wider for the estimated
     # covariance.
     assert (amplitude.high - amplitude.low) / (2 * 1.96 * amplitude.standard_error) == pytest.approx(1.05, abs=0.15)
+    assert verdict.models[0].label == "e5"
+    assert {model.label for model in verdict.models} == {"base", *(f"e{i}" for i in range(8))}
     winner = verdict.effects[5]
     assert (winner.delta, winner.cosine) == (0.0, pytest.approx(1.0))
     assert winner.weight > 0.8
@@ -55,8 +59,12 @@ def test_an_effect_outside_the_list_stays_unexplained():
 
 
 def test_twins_are_not_told_apart():
-    """Halfway between two signatures at cosine 0.9, at 6 sigma."""
-    verdict = verdict_of(lambda toy: (toy.listed(0, 6.0) + toy.listed(1, 6.0)) / 2)
+    """Halfway between two signatures at cosine 0.9, at 6 sigma, with replicates whose mean is exact."""
+    toy = make_toy(12, 0)
+    data = toy.measured(np.random.default_rng(0), np.zeros(12)).blocks[0]
+    exact = data - data.mean(axis=0) + (toy.listed(0, 6.0) + toy.listed(1, 6.0)) / 2
+    emulator = known_emulator(toy, np.random.default_rng([0, 1]), df=200)
+    verdict = judge(emulator, Observed((exact,), (np.zeros(12),)), bootstrap=500)
     assert verdict.kind.startswith("ambiguous:")
     assert set(verdict.names) == {"e0", "e1"}
 
@@ -118,6 +126,23 @@ def test_units_do_not_matter():
     two = diagnose(toy.declared, scaled, Observed((data.blocks[0] * unit,), data.instrument), bootstrap=500)
     assert one.kind == two.kind
     assert two.t2_before == pytest.approx(one.t2_before, rel=1e-5)
+
+
+def test_a_summary_that_only_an_effect_moves_is_noise_free_in_neither():
+    """s11 is zero in the base runs and follows effect 6 alone; data without an effect are zero too."""
+    toy = make_toy(12, 4)
+    runs = simulated_runs(toy, np.random.default_rng(0), base=80, per_effect=16)
+    block = runs.blocks[0].copy()
+    own = runs.effect == 6
+    block[:, 11] = np.where(own, runs.amplitude[:, 0] * (5 + np.random.default_rng(1).standard_normal(len(own))), 0.0)
+    data = toy.measured(np.random.default_rng(2), np.zeros(12)).blocks[0]
+    data[:, 11] = 0.0
+    null = diagnose(toy.declared, replace(runs, blocks=(block,)), Observed((data,), (np.zeros(12),)), bootstrap=500)
+    assert null.kind == "no_missing_effect"
+    data[:, :11] += toy.listed(6, 12.0)[:11]
+    data[:, 11] = 3.0
+    found = diagnose(toy.declared, replace(runs, blocks=(block,)), Observed((data,), (np.zeros(12),)), bootstrap=500)
+    assert found.kind == "effect:e6"
 
 
 def test_a_small_bootstrap_is_refused():

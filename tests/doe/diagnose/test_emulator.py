@@ -6,6 +6,7 @@ import pytest
 from doe.diagnose.emulator import fit_emulator
 from doe.diagnose.lack_of_fit import lack_of_fit_variance
 from doe.diagnose.runs import BASE, Condition, Declared, Effect, Parameter, Runs
+from doe.diagnose.terms import monomials
 from doe.errors import StatisticsError
 
 DECLARED = Declared(
@@ -89,8 +90,6 @@ def test_leave_one_out_is_that_of_refits():
     runs = make_runs(noise=0.5, base=30, own=0)
     emulator = fit_emulator(DECLARED, runs, NO_FLOORS)
     values, errors = runs.blocks[0], []
-    from doe.diagnose.terms import monomials
-
     design = monomials(np.column_stack([runs.theta[:, 0] - 1, runs.theta[:, 1]]), emulator.base_exponents)
     for i in range(len(values)):
         keep = np.arange(len(values)) != i

@@ -10,10 +10,13 @@ from doe.diagnose.next_experiment import (
     Prediction,
     discrimination,
     gaussian_divergence,
+    predictions,
     rank_experiments,
     replicates_for_odds,
 )
+from doe.diagnose.verdict import FittedModel
 from doe.errors import StatisticsError
+from tests.doe.diagnose.toy import known_emulator, make_toy
 
 WEIGHTS = {"a": 0.5, "b": 0.5}
 
@@ -48,14 +51,15 @@ def test_score_by_hand():
     assert discrimination(item(2.0), WEIGHTS, 6) == pytest.approx(pair + rival)
 
 
-def test_the_menu_is_ranked_and_uninformative_set_ups_come_last():
+def test_the_menu_is_ranked_and_set_ups_that_say_nothing_come_last():
     menu = [item(0.0, name="same"), item(3.0, name="apart"), item(3.0, own=9.0, name="vague"), item(1.0, name="near")]
     found = rank_experiments(menu, WEIGHTS, replicates=6)
-    assert [row.name for row in found] == ["apart", "near", "vague", "same"]
+    assert [row.name for row in found] == ["apart", "near", "same", "vague"]
     assert found[0].replicates == 1
     assert found[0].separation == pytest.approx(3.0)
-    assert found[-1].replicates is None
-    assert found[-1].score <= 0
+    # What no model can predict (own variance 9 against a gap of 3) is worse than repeating what all agree on.
+    assert found[2].replicates is None
+    assert found[2].score <= 0
 
 
 def test_idle_summaries_do_not_raise_the_score():
@@ -72,3 +76,14 @@ def test_bad_menus_are_refused():
         rank_experiments([item(1.0)], {"a": 1.0}, 6)
     with pytest.raises(StatisticsError, match="no prediction by c"):
         rank_experiments([item(1.0)], {"a": 1.0, "c": 1.0}, 6)
+
+
+def test_a_prediction_carries_the_uncertainty_of_its_parameters():
+    """Known linear emulator: mean J theta + a s, covariance (J, s) Cov (J, s)'."""
+    toy = make_toy(8, 0)
+    coded, covariance = np.array([0.1, -0.2, 0.3, 0.5]), np.diag([0.01, 0.04, 0.09, 0.16])
+    model = FittedModel("e5", (5,), coded, covariance, (), (), 0.0, 0, 0.0)
+    (found,) = predictions(known_emulator(toy, np.random.default_rng(0)), model)
+    slopes = np.column_stack([toy.jacobian, toy.signatures[5]])
+    assert found.mean == pytest.approx(slopes @ coded)
+    assert found.covariance == pytest.approx(slopes @ covariance @ slopes.T)
