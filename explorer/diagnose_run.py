@@ -58,15 +58,15 @@ def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> Diagnosis:
     if order.budget is not None:
         budget = budget.scaled(order.budget, len(names), len(measurement.fit))
     order.out.mkdir(parents=True, exist_ok=True)
-    say(f"{order.folder}: {len(measurement.fit)} fitted and {len(measurement.holdout)} held-out conditions; store {path}")
+    say(
+        f"{order.folder}: {len(measurement.fit)} fitted and {len(measurement.holdout)} held-out conditions; store {path}"
+    )
     progress = PourProgress(order.out / "progress.jsonl", say, terminal=sys.stdout.isatty())
     with ExitStack() as stack:
         store = Store(path)
         stack.callback(store.close)
         crew = stack.enter_context(Crew(order.threads))
-        found = run_diagnosis(
-            measurement, store, crew.run_queue, names, budget, progress.stage, progress.pour
-        )
+        found = run_diagnosis(measurement, store, crew.run_queue, names, budget, progress.stage, progress.pour)
     result = result_of(measurement, order, found, progress.elapsed)
     write_whole(order.out / "diagnosis.json", json.dumps(result, ensure_ascii=False, allow_nan=False, indent=1) + "\n")
     write_diagnosis_report(result, order.out)
@@ -153,7 +153,12 @@ def _confirmed(measurement: Measurement, found: Confirmed) -> dict[str, Any]:
         "effects": found.model.effects,
         "broken": found.broken,
         "conditions": [
-            {"condition": condition.name, "pours": len(block), "mean": block.mean(axis=0), "sd": block.std(axis=0, ddof=1)}
+            {
+                "condition": condition.name,
+                "pours": len(block),
+                "mean": block.mean(axis=0),
+                "sd": block.std(axis=0, ddof=1),
+            }
             for condition, block in zip(measurement.conditions, found.blocks, strict=True)
         ],
     }

@@ -28,7 +28,7 @@ class Model(Record):
 
     @property
     def name(self) -> str:
-        """"base", or the effects' names."""
+        """ "base", or the effects' names."""
         return "+".join(name for name, _ in self.effects) or "base"
 
 

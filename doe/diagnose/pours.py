@@ -95,7 +95,9 @@ class ModelPours:
         """Whether the pour is known, here or in the store."""
         place = self._place(point, condition)
         if place not in self._known:
-            stored = self._store.find(run_key(self.scene(point, condition), self.seed(point, condition), code_version()))
+            stored = self._store.find(
+                run_key(self.scene(point, condition), self.seed(point, condition), code_version())
+            )
             found = None if stored is None else self._stored(stored, condition)
             if found is not None:
                 self._known[place] = found
