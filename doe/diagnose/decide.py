@@ -1,0 +1,231 @@
+"""From runs and data to a verdict: emulate, calibrate, detect, race, and only then name.
+
+Source of the decision rule: the three gates of gates.py; effects that the data could not see are not in the race.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from doe.diagnose.calibrate import Evidence, Fit, calibrate, fit_with_covariance, gather_evidence
+from doe.diagnose.emulator import Emulator, fit_emulator
+from doe.diagnose.gates import Adequacy, Detection, Gate, Limits, adequate, detect, evidence_weights, unambiguous
+from doe.diagnose.race import Race, race_pairs, race_singles
+from doe.diagnose.runs import Declared, Observed, Runs, select_summaries
+from doe.diagnose.signatures import Reach, Whitening, reach, whitening
+from doe.diagnose.specificity import specific
+from doe.diagnose.tables import (
+    amplitude_estimates,
+    fitted_model,
+    listed,
+    parameter_changes,
+    residual_table,
+    signature_table,
+    where_the_residual_sits,
+)
+from doe.diagnose.verdict import EffectRow, FittedModel, Signature, Verdict
+from doe.errors import StatisticsError
+
+STANDARD_LIMITS = Limits()
+NAN = math.nan
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """What the race ended with: kind, named models (best first), sentence, further gates, the final fit and its
+    refits, and the pairs where they were raced.
+    """
+
+    kind: str
+    names: tuple[str, ...]
+    statement: str
+    gates: tuple[Gate, ...]
+    final: Fit
+    adequacy: Adequacy | None
+    pairs: Race | None = None
+
+
+def diagnose(
+    declared: Declared,
+    runs: Runs,
+    observed: Observed,
+    bootstrap: int = 1000,
+    seed: int = 0,
+    limits: Limits = STANDARD_LIMITS,
+) -> Verdict:
+    """Return the verdict on measured data from simulated runs of the declared model.
+
+    observed: the conditions to be fitted only, in the order of declared.conditions; a holdout is judged in holdout.py.
+    Raises StatisticsError for shapes that disagree, too few runs or bootstrap < 500.
+    """
+    selected = select_summaries(declared, runs, observed)
+    emulator = fit_emulator(selected.declared, selected.runs, selected.floors)
+    return judge(emulator, selected.observed, bootstrap, seed, limits, selected.dropped, selected.floored)
+
+
+def judge(
+    emulator: Emulator,
+    observed: Observed,
+    bootstrap: int = 1000,
+    seed: int = 0,
+    limits: Limits = STANDARD_LIMITS,
+    dropped: tuple[str, ...] = (),
+    floored: tuple[str, ...] = (),
+) -> Verdict:
+    """Return the verdict from a fitted emulator, which serves any number of data sets of the same conditions."""
+    if bootstrap < 500:
+        raise StatisticsError(f"bootstrap = {bootstrap}; p values near 0.005 need at least 500 sets")
+    declared, evidence = emulator.declared, gather_evidence(emulator, observed)
+    base = calibrate(emulator, (), evidence)
+    frame = whitening(base, evidence)
+    theta = base.x
+    reaches = {e: reach(emulator, e, frame, theta) for e in emulator.simulated_effects}
+    raced = [e for e, found in reaches.items() if found.shift >= limits.reach]
+    singles = {e: fit_with_covariance(emulator.predictor((e,)), (e,), evidence, base.sigma) for e in raced}
+    detection = detect(emulator, evidence, base, singles, limits, bootstrap, seed)
+    signatures = signature_table(emulator, base, singles, reaches, frame)
+    race = race_singles(emulator, evidence, base, raced) if detection.passed else None
+    conclusion = (
+        _conclude(emulator, evidence, base, race, raced, signatures, frame, limits, bootstrap, seed)
+        if race
+        else _nothing(base)
+    )
+    final = conclusion.final
+    refits = conclusion.adequacy.refits if conclusion.adequacy else None
+    return Verdict(
+        kind=conclusion.kind,
+        names=conclusion.names,
+        statement=conclusion.statement,
+        t2_before=base.t2,
+        df_before=base.df,
+        t2_after=final.t2,
+        df_after=final.df,
+        amplitudes=amplitude_estimates(declared, final, refits),
+        models=_models(declared, base, race, conclusion.pairs),
+        gates=(detection.overall, detection.directed, *conclusion.gates),
+        effects=_effect_rows(declared, reaches, singles, detection, race, signatures),
+        parameters=parameter_changes(declared, base, final),
+        residuals=residual_table(declared, evidence, base, final),
+        where=where_the_residual_sits(declared, final),
+        signatures=signatures,
+        variances=evidence.variances,
+        dropped=dropped,
+        floored=floored,
+        limits=limits,
+        bootstrap=bootstrap,
+        seed=seed,
+    )
+
+
+def _nothing(base: Fit) -> Conclusion:
+    text = "The calibrated base model explains the data within their noise."
+    return Conclusion("no_missing_effect", (), text, (), base, None)
+
+
+def _conclude(
+    emulator: Emulator,
+    evidence: Evidence,
+    base: Fit,
+    race: Race,
+    raced: list[int],
+    signatures: Signature,
+    frame: Whitening,
+    limits: Limits,
+    bootstrap: int,
+    seed: int,
+) -> Conclusion:
+    """Return what gates 2 and 3 say of the single effects, and of pairs where no single one is adequate."""
+    if not race.fits:
+        text = "The data hold more than noise, and no simulated effect could be seen by them."
+        return Conclusion("unexplained", (), text, (), base, None)
+    fit = race.fits[race.best]
+    adequacy = adequate(emulator, evidence, fit, race.best, limits, bootstrap, seed + 1)
+    if adequacy.gate.passed:
+        gate, near = unambiguous(race.criteria, limits)
+        return Conclusion(*_named("effect", near), (adequacy.gate, gate), fit, adequacy)
+    pairs = race_pairs(emulator, evidence, base, fit, raced)
+    gates = [adequacy.gate]
+    if pairs.fits:
+        gain = race.criteria[race.best] - pairs.criteria[pairs.best]
+        label = f"pair gain of {pairs.best} over {race.best}"
+        passed = gain > limits.pair_gain
+        gates.append(Gate(label, gain, None, limits.pair_gain, passed, f"{pairs.best} is {gain:.1f} better"))
+        if passed:
+            both = adequate(emulator, evidence, pairs.fits[pairs.best], pairs.best, limits, bootstrap, seed + 2)
+            gates.append(both.gate)
+            final = pairs.fits[pairs.best]
+            gates.append(specific(emulator, base, final, pairs.best, signatures, frame, limits, seed + 3))
+            if both.gate.passed and gates[-1].passed:
+                gate, near = unambiguous(pairs.criteria, limits)
+                return Conclusion(*_named("effects", near), (*gates, gate), final, both, pairs)
+    text = "The data hold more than noise, and none of the effects in the race explains it."
+    return Conclusion("unexplained", (), text, tuple(gates), fit, None, pairs)
+
+
+def _named(prefix: str, near: tuple[str, ...]) -> tuple[str, tuple[str, ...], str]:
+    """Return kind, names and sentence for the models within the gap."""
+    if len(near) == 1:
+        return (
+            f"{prefix}:{near[0]}",
+            near,
+            f"{near[0]} explains what the base model cannot, and nothing else comes near.",
+        )
+    return f"ambiguous:{','.join(near)}", near, f"{listed(near)}: the data cannot tell which."
+
+
+def _models(declared: Declared, base: Fit, *races: Race | None) -> tuple[FittedModel, ...]:
+    """Return the base model and every raced one, in order of their criterion."""
+    rows = [fitted_model(declared, "base", base, base.t2)]
+    for race in races:
+        if race is not None:
+            rows += [fitted_model(declared, label, fit, race.criteria[label]) for label, fit in race.fits.items()]
+    return tuple(sorted(rows, key=lambda row: row.criterion))
+
+
+def _effect_rows(
+    declared: Declared,
+    reaches: dict[int, Reach],
+    singles: dict[int, Fit],
+    detection: Detection,
+    race: Race | None,
+    signatures: Signature,
+) -> tuple[EffectRow, ...]:
+    """Return the table of effects in their declared order."""
+    weights = evidence_weights(list(race.criteria.values())) if race and race.criteria else np.array([])
+    weight_of = dict(zip(race.criteria, weights, strict=True)) if race else {}
+    best = race.best if race and race.fits else None
+    rows = []
+    for e, effect in enumerate(declared.effects):
+        if e not in singles:
+            found = reaches.get(e)
+            status = "not simulated" if found is None else "not identifiable here"
+            shift = NAN if found is None else found.shift
+            rows.append(EffectRow(effect.name, status, shift, (), *(NAN,) * 7))  # type: ignore[arg-type]
+            continue
+        fit = race.fits[effect.name] if race else singles[e]
+        criterion = race.criteria[effect.name] if race else NAN
+        rows.append(
+            EffectRow(
+                name=effect.name,
+                status="raced",
+                reach=reaches[e].shift,
+                amplitudes=amplitude_estimates(declared, fit),
+                t2=fit.t2,
+                drop=detection.drops[e],
+                p_drop=detection.drop_p[e],
+                criterion=criterion,
+                delta=criterion - race.criteria[best] if race and best else NAN,
+                weight=float(weight_of.get(effect.name, NAN)),
+                cosine=_cosine_to(signatures, effect.name, best),
+            )
+        )
+    return tuple(rows)
+
+
+def _cosine_to(signatures: Signature, name: str, best: str | None) -> float:
+    if best is None:
+        return NAN
+    return float(signatures.cosines[signatures.names.index(name), signatures.names.index(best)])

@@ -1,0 +1,175 @@
+"""Error before and after on conditions that were not fitted, beside the noise floor.
+
+Per observable over its holdout conditions: RMSE = root mean square of (mean simulated - mean measured);
+noise floor = root mean square of sqrt(s_meas^2/n_meas + s_sim^2/n_sim), what a perfect model would show;
+skill = 1 - (after^2 - noise^2)/(before^2 - noise^2). Overall, every observable is divided by its measured standard
+deviation first. Predictions are fresh simulations, never the emulator.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from doe.errors import StatisticsError
+from doe.record import Record
+
+FloatArray = npt.NDArray[np.float64]
+
+OVERALL = "overall"
+
+
+@dataclass(frozen=True)
+class HoldoutCondition:
+    """Replicates of one condition: measured (r, d), simulated by the base model (m, d) and by the final one (m', d)."""
+
+    name: str
+    summaries: tuple[str, ...]
+    measured: FloatArray
+    before: FloatArray
+    after: FloatArray
+
+
+@dataclass(frozen=True)
+class HoldoutError(Record):
+    """Errors of one observable (its own unit) or overall (measured standard deviations).
+
+    skill with its 95 % bootstrap interval is NaN where the base model is within the noise already. ratio = after/noise.
+    coverage_before, coverage_after: share of measured pours inside the models' 90 % predictive intervals.
+    """
+
+    observable: str
+    before: float
+    after: float
+    noise_floor: float
+    ratio: float
+    skill: float
+    skill_low: float
+    skill_high: float
+    coverage_before: float
+    coverage_after: float
+
+
+def holdout_errors(
+    conditions: Sequence[HoldoutCondition], samples: int = 2000, seed: int = 0
+) -> tuple[HoldoutError, ...]:
+    """Return the errors per observable, in order of first appearance, and overall last.
+
+    Raises StatisticsError without a condition, or where measured, before or after has fewer than two replicates.
+    """
+    _require(conditions)
+    generator = np.random.default_rng(seed)
+    entries = [_Entry.of(c, i, samples, generator) for c in conditions for i in range(len(c.summaries))]
+    names = list(dict.fromkeys(entry.observable for entry in entries))
+    groups = [[entry for entry in entries if entry.observable == name] for name in names]
+    rows = [_error(name, group, np.ones(len(group))) for name, group in zip(names, groups, strict=True)]
+    return (*rows, _error(OVERALL, entries, np.array([entry.unit for entry in entries])))
+
+
+@dataclass(frozen=True)
+class _Entry:
+    """One observable in one condition: mean errors, squared noise floor, unit, bootstrap errors (samples,),
+    coverage.
+    """
+
+    observable: str
+    before: float
+    after: float
+    noise_before: float
+    noise_after: float
+    unit: float
+    before_draws: FloatArray
+    after_draws: FloatArray
+    inside_before: FloatArray
+    inside_after: FloatArray
+
+    @staticmethod
+    def of(condition: HoldoutCondition, column: int, samples: int, generator: np.random.Generator) -> _Entry:
+        measured, before, after = (
+            values[:, column] for values in (condition.measured, condition.before, condition.after)
+        )
+        unit = float(measured.std(ddof=1)) or float(after.std(ddof=1)) or 1.0
+        draws = [
+            values[generator.integers(0, len(values), size=(samples, len(values)))].mean(axis=1)
+            for values in (measured, before, after)
+        ]
+        return _Entry(
+            observable=condition.summaries[column],
+            before=float(before.mean() - measured.mean()),
+            after=float(after.mean() - measured.mean()),
+            noise_before=_square_error(measured) + _square_error(before),
+            noise_after=_square_error(measured) + _square_error(after),
+            unit=unit,
+            before_draws=draws[1] - draws[0],
+            after_draws=draws[2] - draws[0],
+            inside_before=_inside(before, measured),
+            inside_after=_inside(after, measured),
+        )
+
+
+def _error(observable: str, entries: Sequence[_Entry], unit: FloatArray) -> HoldoutError:
+    """Return the errors of some entries, each divided by its unit, shape (entries,)."""
+
+    def mean_square(values: FloatArray) -> FloatArray:
+        return np.asarray((values**2).mean(axis=0))
+
+    def noise(values: list[float]) -> float:
+        return float((np.array(values) / unit**2).mean())
+
+    before = float(mean_square(np.array([e.before for e in entries]) / unit))
+    after = float(mean_square(np.array([e.after for e in entries]) / unit))
+    floor_before, floor_after = noise([e.noise_before for e in entries]), noise([e.noise_after for e in entries])
+    skill = _skill(before - floor_before, after - floor_after)
+    # A resample carries the noise of the data and its own, hence twice the floor.
+    gained = [
+        mean_square(np.stack([getattr(e, field) for e in entries]) / unit[:, None]) - 2 * floor
+        for field, floor in (("before_draws", floor_before), ("after_draws", floor_after))
+    ]
+    skills = np.where(gained[0] > 0, 1 - gained[1] / np.where(gained[0] > 0, gained[0], 1.0), np.nan)
+    usable = skills[np.isfinite(skills)] if math.isfinite(skill) else np.array([])
+    low, high = np.percentile(usable, [2.5, 97.5]) if usable.size else (math.nan, math.nan)
+    return HoldoutError(
+        observable=observable,
+        before=math.sqrt(before),
+        after=math.sqrt(after),
+        noise_floor=math.sqrt(floor_after),
+        ratio=math.sqrt(after / floor_after) if floor_after > 0 else math.nan,
+        skill=skill,
+        skill_low=float(low),
+        skill_high=float(high),
+        coverage_before=float(np.concatenate([e.inside_before for e in entries]).mean()),
+        coverage_after=float(np.concatenate([e.inside_after for e in entries]).mean()),
+    )
+
+
+def _skill(before: float, after: float) -> float:
+    """Return 1 - after/before of squared errors freed from noise; NaN where nothing is left before."""
+    return 1 - after / before if before > 0 else math.nan
+
+
+def _square_error(values: FloatArray) -> float:
+    """Return the squared standard error of the mean."""
+    return float(values.var(ddof=1) / len(values))
+
+
+def _inside(predicted: FloatArray, measured: FloatArray, level: float = 0.9) -> FloatArray:
+    """Return 1 where a measured pour lies within mean ± t s sqrt(1 + 1/m) of m simulated ones."""
+    m = len(predicted)
+    half = stats.t.ppf((1 + level) / 2, m - 1) * predicted.std(ddof=1) * math.sqrt(1 + 1 / m)
+    return (np.abs(measured - predicted.mean()) <= half).astype(np.float64)
+
+
+def _require(conditions: Sequence[HoldoutCondition]) -> None:
+    if not conditions:
+        raise StatisticsError("holdout: no condition")
+    for condition in conditions:
+        counts = [len(condition.measured), len(condition.before), len(condition.after)]
+        if min(counts) < 2:
+            raise StatisticsError(
+                f"{condition.name}: replicates measured, before, after = {counts}; at least 2 are needed"
+            )

@@ -1,0 +1,67 @@
+"""One model of the race: the emulator's polynomial in its parameters and the amplitudes of the effects that are on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.diagnose.terms import monomials, slopes
+from doe.errors import StatisticsError
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Predictor:
+    """y_c(x) = terms(x) @ coefficients_c; x: (..., q) coded parameters, then coded amplitudes.
+
+    Per condition c: coefficients (p, d_c), information_inverse (p, p), pour_covariance (d_c, d_c), lack_of_fit (d_c,).
+    low, high: (q,) the sampled box, in which alone it predicts.
+    """
+
+    parameters: int
+    exponents: IntArray
+    coefficients: tuple[FloatArray, ...]
+    information_inverse: tuple[FloatArray, ...]
+    pour_covariance: tuple[FloatArray, ...]
+    lack_of_fit: tuple[FloatArray, ...]
+    low: FloatArray
+    high: FloatArray
+
+    def mean(self, x: FloatArray) -> FloatArray:
+        """Return the predicted means of all conditions side by side, (..., q) -> (..., D).
+
+        Raises StatisticsError outside the sampled box.
+        """
+        self.require_inside(x)
+        terms = monomials(x, self.exponents)
+        return np.concatenate([terms @ c for c in self.coefficients], axis=-1)
+
+    def jacobian(self, x: FloatArray) -> FloatArray:
+        """Return d mean/d x, (q,) -> (D, q)."""
+        self.require_inside(x)
+        rows = slopes(x, self.exponents)
+        return np.concatenate([rows @ c for c in self.coefficients], axis=-1).T
+
+    def mean_covariance(self, x: FloatArray) -> tuple[FloatArray, ...]:
+        """Return per condition the covariance of the predicted mean at x (q,): terms' (X'X)^-1 terms S + lack of
+        fit.
+        """
+        terms = monomials(x, self.exponents)
+        return tuple(
+            float(terms @ inverse @ terms) * noise + np.diag(lack)
+            for inverse, noise, lack in zip(
+                self.information_inverse, self.pour_covariance, self.lack_of_fit, strict=True
+            )
+        )
+
+    def require_inside(self, x: FloatArray) -> None:
+        """Raise StatisticsError unless every point lies in the sampled box (rounding aside)."""
+        if (x < self.low - 1e-9).any() or (x > self.high + 1e-9).any():
+            raise StatisticsError(
+                f"point {np.round(np.atleast_2d(x)[0], 4).tolist()} (coded) lies outside the simulated box "
+                f"{np.round(self.low, 4).tolist()} to {np.round(self.high, 4).tolist()}; allowed is inside"
+            )
