@@ -20,7 +20,7 @@ from doe.measurement.measurement import MeasuredParameter, Measurement
 from doe.measurement.summaries import summaries_of_data, summary_names, summary_uncertainties
 from doe.runner import Pours
 from doe.store import Store
-from solver import EFFECTS, parameters
+from solver import EFFECTS, ParameterError, Scene, parameters, with_values
 
 SURVIVORS = 5
 """Effects that are simulated further: the best of the race so far."""
@@ -28,6 +28,7 @@ SURVIVING_GAP = 12.0
 """Distance in the criterion to the best beyond which an effect is not simulated further."""
 BOX = 3.0
 """Standard deviations about an independently measured mean."""
+DRAWN_IN = 0.8
 FRESH = 12
 """Pours per model and condition in the confirmation, at least."""
 
@@ -92,18 +93,31 @@ def run_diagnosis(
 
 def declare(measurement: Measurement, effects: Sequence[str]) -> Declared:
     """The declared model in the terms of the decision: parameters, effects with their widest ranges, conditions."""
-    known = parameters(measurement.fit[0].scene)
-    found = []
-    for name in effects:
-        kind = EFFECTS[name]
-        ends = [known[f"effect.{name}.{field}"] for field in kind.amplitudes]
-        low = tuple(max(end.low, -kind.strongest) for end in ends)
-        found.append(Effect(name, low, tuple(min(end.high, kind.strongest) for end in ends)))
+    scenes = [condition.scene for condition in measurement.conditions]
     return Declared(
         tuple(box_of(p) for p in measurement.parameters),
-        tuple(found),
+        tuple(widest(name, scenes) for name in effects),
         tuple(Condition(c.name, summary_names(c)) for c in measurement.fit),
     )
+
+
+def widest(name: str, scenes: Sequence[Scene]) -> Effect:
+    """The effect from end to end of what the literature supports, drawn in until every scene can be set up with it."""
+    kind, known = EFFECTS[name], parameters(scenes[0])
+    ends = [known[f"effect.{name}.{field}"] for field in kind.amplitudes]
+    low = tuple(max(end.low, -kind.strongest) for end in ends)
+    high = tuple(min(end.high, kind.strongest) for end in ends)
+    while not all(_possible(scene, name, bounds) for scene in scenes for bounds in (low, high)):
+        low, high = tuple(DRAWN_IN * x for x in low), tuple(DRAWN_IN * x for x in high)
+    return Effect(name, low, high)
+
+
+def _possible(scene: Scene, name: str, amplitude: tuple[float, ...]) -> bool:
+    try:
+        with_values(scene, {f"effect.{name}.{f}": a for f, a in zip(EFFECTS[name].amplitudes, amplitude, strict=True)})
+    except ParameterError:
+        return False
+    return True
 
 
 def box_of(measured: MeasuredParameter) -> Parameter:

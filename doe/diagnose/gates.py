@@ -40,7 +40,7 @@ class Limits(Record):
     gap: float = 4.0
     pair_gain: float = 6.0
     reach: float = 3.0
-    chance: float = 0.05
+    chance: float = 0.01
 
 
 @dataclass(frozen=True)

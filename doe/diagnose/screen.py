@@ -43,7 +43,9 @@ class Budget:
 
     def scaled(self, runs: int, effects: int, conditions: int) -> Budget:
         """The same shares in about ``runs`` pours."""
-        total = conditions * (self.base + self.middle + effects * (1.5 * self.scaling + self.screening) + 3 * self.further)
+        total = conditions * (
+            self.base + self.middle + effects * (1.5 * self.scaling + self.screening) + 3 * self.further
+        )
         share = runs / total
         return Budget(
             base=max(24, round(share * self.base)),

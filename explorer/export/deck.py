@@ -10,7 +10,7 @@ import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -110,7 +110,7 @@ def deck_of(record: Record, time: float | None = None) -> Deck:
         record.dt,
         steps,
         _until(record.entries, steps),
-        plate=_plate(scene.rig),
+        plate=_plate(cast(Funnel, scene.rig)),
         meshes=_meshes(scene, record),
     )
 

@@ -43,7 +43,9 @@ class CapillaryBridge(ContactEffect):
     surface_tension: float = param(
         0.0, unit="N/m", low=0.0, high=1.0, doc="Surface tension γ; water 0.072 N/m.", live=True
     )
-    bridge_volume: float = param(1e-9, unit="m3", low=1e-15, high=1e-6, doc="Liquid in one bridge.", live=True)
+    bridge_volume: float = param(
+        1e-9, unit="m3", low=1e-15, high=1e-6, doc="Liquid in one bridge.", live=True, scale="log"
+    )
     contact_angle: float = param(0.0, unit="rad", low=0.0, high=1.5, doc="Contact angle θ.", live=True)
 
     name = "capillary_bridge"

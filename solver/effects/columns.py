@@ -14,6 +14,7 @@ from solver.material import effective_youngs_modulus
 from solver.params import declared
 
 if TYPE_CHECKING:
+    from solver.body import Body
     from solver.scene import Scene
 
 Array = npt.NDArray[np.float64]
@@ -57,7 +58,8 @@ def effect_table(scene: Scene, walls: tuple[str, ...]) -> Array:
         else:
             table[:, :, columns] = effect.numbers
     for a, one in enumerate(scene.bodies):
-        for b, other in enumerate((*scene.bodies, *walls)):
+        others: tuple[Body | str, ...] = (*scene.bodies, *walls)
+        for b, other in enumerate(others):
             table[a, b, -1] = table[b, a, -1] = scene.contact_pair(one, other).restitution
     return table
 

@@ -15,37 +15,45 @@ from solver.effects.kernel import kernel_function, ti
 
 
 @kernel_function
-def contact_radius(w, e_star, reduced_radius, overlap):
-    """Contact radius a [m] on the stable branch, for overlaps above −:func:`grip`.
+def parting_radius(w, e_star, reduced_radius):
+    """a_c [m], the contact radius at which the surfaces part: (2π w R*²/(16 E*))^⅓."""
+    return (math.pi * w * reduced_radius * reduced_radius / (8.0 * e_star)) ** (1.0 / 3.0)
 
-    With y² = a/a_c the overlap is d = y⁴ − 4 y in units of a_c²/R*. Ferrari: y⁴ − 4 y − d = 0 has the resolvent
-    m³ + d m − 2 = 0 and y = ½ (√(2m) + √(4 √(2/m) − 2m)). Cardano's root cancels for large d; two Newton steps mend it.
+
+@kernel_function
+def root(d):
+    """y = √(a/a_c) on the stable branch for the overlap d ≥ −3 in units of a_c²/R*: y⁴ − 4 y = d.
+
+    Ferrari: the resolvent is m³ + d m − 2 = 0, and y = ½ (√(2m) + √(4 √(2/m) − 2m)). Cardano's root m cancels for
+    large d; two Newton steps mend it.
     """
-    least = (2.0 * math.pi * w * reduced_radius**2 / (16.0 * e_star)) ** (1.0 / 3.0)
-    d = ti.max(-3.0, overlap * reduced_radius / (least * least))
     u = (1.0 + ti.sqrt(ti.max(0.0, 1.0 + d * d * d / 27.0))) ** (1.0 / 3.0)
     m = u - d / (3.0 * u)
     for _ in ti.static(range(2)):
         m = (2.0 * m * m * m + 2.0) / (3.0 * m * m + d)
-    y = 0.5 * (ti.sqrt(2.0 * m) + ti.sqrt(ti.max(0.0, 4.0 * ti.sqrt(2.0 / m) - 2.0 * m)))
-    return least * y * y
+    return 0.5 * (ti.sqrt(2.0 * m) + ti.sqrt(ti.max(0.0, 4.0 * ti.sqrt(2.0 / m) - 2.0 * m)))
 
 
 @kernel_function
 def adhere(w, c):
-    """Let contact ``c`` be adhesive with the work of adhesion ``w`` [J/m²], in addition to what it has already."""
+    """Let contact ``c`` be adhesive with the work of adhesion ``w`` [J/m²], in addition to what it has already.
+
+    In terms of y the force is π w R* y³ (y³/6 − 1).
+    """
     c.work += w
-    least = (2.0 * math.pi * c.work * c.reduced_radius**2 / (16.0 * c.e_star)) ** (1.0 / 3.0)
-    if c.overlap > -3.0 * least * least / c.reduced_radius:
-        a = contact_radius(c.work, c.e_star, c.reduced_radius, c.overlap)
-        force = 4.0 * c.e_star * a**3 / (3.0 * c.reduced_radius) - ti.sqrt(8.0 * math.pi * c.work * c.e_star * a**3)
+    least = parting_radius(c.work, c.e_star, c.reduced_radius)
+    d = c.overlap * c.reduced_radius / (least * least)
+    if d > -3.0:
+        y = root(d)
+        cube = y * y * y
+        force = math.pi * c.work * c.reduced_radius * cube * (cube / 6.0 - 1.0)
         # What earlier stages have made of the Hertzian force stays beside the adhesive one.
         c.elastic += force - c.adhesive
         c.adhesive = force
         pull_off = 1.5 * math.pi * w * c.reduced_radius
         c.pull += 2.0 * pull_off
         c.floor -= pull_off
-        c.radius = a
+        c.radius = least * y * y
         c.held = 1
     return c
 

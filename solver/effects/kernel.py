@@ -34,7 +34,7 @@ class KernelFunction:
     @cached_property
     def compiled(self) -> Callable[..., Any]:
         """The same as ``ti.func`` makes it."""
-        return ti.func(self.body)  # type: ignore[no-any-return]
+        return ti.func(self.body)
 
     @property
     def func(self) -> Any:

@@ -27,7 +27,7 @@ class KineticFriction(ContactEffect):
 
     friction_drop: float = param(0.0, low=0.0, high=0.9, doc="Drop d = 1 − μ_k/μ_s.", live=True)
     transition_speed: float = param(
-        0.01, unit="m/s", low=1e-4, high=1.0, doc="Sliding speed v_c of the transition.", live=True
+        0.01, unit="m/s", low=1e-4, high=1.0, doc="Sliding speed v_c of the transition.", live=True, scale="log"
     )
 
     name = "kinetic_friction"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from solver.effects import SET_UP_EFFECTS
+from solver.effects import SET_UP_EFFECTS, SetUpEffect
 
 if TYPE_CHECKING:
     from solver.scene import Scene
@@ -14,6 +14,6 @@ def actual(scene: Scene) -> Scene:
     """``scene`` after its set-up effects; they are off in the result, so doing it again changes nothing."""
     for kind in SET_UP_EFFECTS:
         effect = scene.effect(kind.name)
-        if effect.on:
+        if isinstance(effect, SetUpEffect) and effect.on:
             scene = effect.applied(scene).without_effect(kind.name)
     return scene

@@ -61,9 +61,10 @@ def _stretched_members(members: Members, along: float, across: float) -> Members
     scale[longest] = along
     squares = squares * scale**2
     centres = np.array(members.centres) * scale
+    x, y, z = (float(moment) for moment in squares.sum() - squares)
     return replace(
         members,
-        centres=tuple((float(x), float(y), float(z)) for x, y, z in centres),
-        inertia=tuple(float(x) for x in squares.sum() - squares),
+        centres=tuple((float(a), float(b), float(c)) for a, b, c in centres),
+        inertia=(x, y, z),
         drawn=None,
     )

@@ -25,6 +25,7 @@ Touch = ti.types.struct(
     adhesive=ti.f64,  # the part of it that JKR sets: Hertz's force, with adhesion JKR's [N]
     work=ti.f64,  # ADHESION: work of adhesion so far [J/m²]; those of several effects add up
     damper=ti.f64,  # NORMAL: damping force over speed [kg/s]
+    shear_damper=ti.f64,  # of the tangential direction while it sticks [kg/s]
     floor=ti.f64,  # ADHESION: the normal force never falls below this [N], ≤ 0
     pull=ti.f64,  # ADHESION: what the Coulomb limit takes in addition to the normal force [N], ≥ 0
     held=ti.i32,  # ADHESION: 1: the contact lasts although the surfaces are apart

@@ -1,9 +1,10 @@
 """Twisting resistance: a torque against turning about the contact normal (Marshall).
 
-    spring   T ← T − k_w (ω·n) dt,  k_w = ½ k_t a² = 4 G* a³,  capped at s ⅔ a μ F_n        [N m]
+    spring   T ← T − k_w (ω·n) dt,  k_w = ½ k_t a² = 4 G* a³,  capped at ⅔ a μ F_n          [N m]
+    torque   T − ½ η_t a² (ω·n),  within the same cap        η_t: the tangential dashpot of the contact law [kg/s]
 
 The cap is the torque of Coulomb friction over a Hertzian contact area, for s = 1; the model has no free parameter, so
-its ``strength`` s scales stiffness and cap together. Vanishes for s → 0.
+its ``strength`` s scales stiffness, damping and cap together. Vanishes for s → 0.
 Source: Marshall 2009, Journal of Computational Physics 228:1541; LAMMPS `pair granular`, twisting "marshall".
 """
 
@@ -19,9 +20,10 @@ def twisting_torque(p, m, c):
     """p: s; m: the torque spring about the normal."""
     stiffness = p[0] * 4.0 * c.g_star * c.radius**3
     cap = p[0] * 2.0 / 3.0 * c.radius * c.limit
-    torque = m[0] - stiffness * c.dt * c.omega.dot(c.normal)
-    m[0] = ti.max(-cap, ti.min(cap, torque))
-    c.torque += m[0] * c.normal
+    rate = c.omega.dot(c.normal)
+    m[0] = ti.max(-cap, ti.min(cap, m[0] - stiffness * c.dt * rate))
+    torque = m[0] - 0.5 * p[0] * c.shear_damper * c.radius**2 * rate
+    c.torque += ti.max(-cap, ti.min(cap, torque)) * c.normal
     return c, m
 
 

@@ -114,6 +114,7 @@ def touch_of(s: ti.template(), w, k, n, overlap, velocity, omega, a, elastic, da
         adhesive=elastic,
         work=0.0,
         damper=damper,
+        shear_damper=law[4] * ti.sqrt(a * s.contact.reduced_mass[w, k]),
         floor=0.0,
         pull=0.0,
         held=0,
@@ -125,7 +126,7 @@ def touch_of(s: ti.template(), w, k, n, overlap, velocity, omega, a, elastic, da
 
 @ti.func
 def respond(s: ti.template(), w, k, n, overlap, velocity, omega):
-    """Force [N] and torque [N m] on body a of entry ``k``, and the energy it dissipates [J]; keeps spring and radius.
+    """Force [N] and torque [N m] on body a of entry ``k``, energy that it takes and what of it its spring keeps [J].
 
     ``velocity`` is that of a relative to its partner at the contact, ``omega`` the relative angular velocity (only
     effects ask for it). A torque comes from effects alone; it acts on both bodies, in opposite directions.
@@ -169,13 +170,13 @@ def respond(s: ti.template(), w, k, n, overlap, velocity, omega):
     # Work against the damper and the tangential force, at the mean of the velocities before and after the step: half of
     # it now, half when the next velocity is known; less what has gone into the spring.
     loss = (hertz - f_n) * n - f_t
-    lost = 0.5 * dt * (loss + last_loss).dot(velocity)
-    lost -= spring_energy_gain(law, old.norm_sqr(), before, spring.norm_sqr(), contact_radius)
+    taken = 0.5 * dt * (loss + last_loss).dot(velocity)
+    stored = spring_energy_gain(law, old.norm_sqr(), before, spring.norm_sqr(), contact_radius)
     if ti.static(s.effects):
         touch = pass_stage(s, w, k, touch, Stage.ROLLING)
         touch = pass_stage(s, w, k, touch, Stage.TWISTING)
         torque = touch.torque
-        lost -= 0.5 * dt * (torque + last_couple(s, w, k)).dot(omega)
+        taken -= 0.5 * dt * (torque + last_couple(s, w, k)).dot(omega)
         last_half = 0.5 * dt * (last_loss.dot(velocity) - last_couple(s, w, k).dot(omega))
         keep(s, w, k, torque, hertz_radius)
     s.contact.spring[w, k] = spring
@@ -186,8 +187,9 @@ def respond(s: ti.template(), w, k, n, overlap, velocity, omega):
         if released == 1:
             s.contact.spring[w, k], s.contact.radius[w, k] = old, before
             lose(s, w, k, law)
-            force, torque, lost = Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0), last_half
-    return force, torque, lost
+            force, torque = Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0)
+            taken, stored = last_half, 0.0
+    return force, torque, taken, stored
 
 
 @ti.func
@@ -233,8 +235,9 @@ def push(s: ti.template(), w):
             else:
                 velocity -= surface_velocity(s, w, -1 - b, point)
                 omega -= s.wall.omega[w, -1 - b]
-            force, torque, lost = respond(s, w, k, n, overlap, velocity, omega)
-            dissipated += lost
+            force, torque, taken, stored = respond(s, w, k, n, overlap, velocity, omega)
+            dissipated += taken
+            dissipated -= stored
             if b < 0:
                 push_wall(s, w, -1 - b, point, force, torque, item >= live)
             if item >= live:

@@ -9,7 +9,7 @@ from explorer.screen_units import InputError, checked, quantity, screen_unit, ti
 from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.live_controls import LiveControl, decade_mark, decades_around, mean_value
-from explorer.viewer.live_panel import echo_html, live_parameters, material_targets, pair_targets
+from explorer.viewer.live_panel import echo_html, effect_targets, live_parameters, material_targets, pair_targets
 from explorer.viewer.restart_panel import PATHS, RestartPanel, entered, size_paths
 from solver import load_material, parameters, with_values
 from solver.scene import value
@@ -65,8 +65,10 @@ def test_units_are_those_that_a_person_reads():
 
 
 def test_sliders_are_made_from_what_is_declared_live():
-    shown = [p.path for targets in (material_targets(SCENE), pair_targets(SCENE)) for prefixes in targets.values()
-             for p, _ in live_parameters(SCENE, prefixes)]  # fmt: skip
+    choices = (material_targets(SCENE), pair_targets(SCENE), effect_targets())
+    shown = [
+        p.path for targets in choices for prefixes in targets.values() for p, _ in live_parameters(SCENE, prefixes)
+    ]
     assert set(shown) == {path for path, parameter in KNOWN.items() if parameter.live}
 
 

@@ -34,7 +34,7 @@ def test_damping_constants():
 
 @ti.kernel
 def shear(inputs: ti.types.ndarray(dtype=ti.f64, ndim=1), out: ti.types.ndarray(dtype=ti.f64, ndim=1)):
-    """tangential_force on: law (5), a, a_before, spring (3), n (3), v_t (3), inertia, f_n, dt."""
+    """tangential_force on: law (5), a, a_before, spring (3), n (3), v_t (3), inertia, limit, dt."""
     for _ in range(1):
         law = Vec5(inputs[0], inputs[1], inputs[2], inputs[3], inputs[4])
         old = Vec3(inputs[7], inputs[8], inputs[9])
@@ -48,7 +48,7 @@ def shear(inputs: ti.types.ndarray(dtype=ti.f64, ndim=1), out: ti.types.ndarray(
 
 def sheared(spring, n, v_t=(0, 0, 0), a=2e-4, a_before=2e-4, friction=1e3, damping=0.0):
     """New spring and force with G* = 1 MPa, √(a m*) = 1, F_n = 1 N, dt = 1 µs."""
-    inputs = [0.0, 1e6, friction, 0.0, damping, a, a_before, *spring, *n, *v_t, 1.0, 1.0, 1e-6]
+    inputs = [0.0, 1e6, friction, 0.0, damping, a, a_before, *spring, *n, *v_t, 1.0, friction, 1e-6]
     out = np.zeros(6)
     shear(np.array(inputs, dtype=float), out)
     return out[:3], out[3:]

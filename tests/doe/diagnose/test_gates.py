@@ -9,7 +9,7 @@ from doe.diagnose.gates import Limits, adequate, bootstrap_p, criterion, detect,
 from doe.diagnose.pseudo_data import draw_pseudo_data
 from tests.doe.diagnose.toy import known_emulator, make_toy
 
-D, SETS = 8, 60
+D, SETS = 8, 40
 
 
 def detection(seed, shift, df=40, sets=500):

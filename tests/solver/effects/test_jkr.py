@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import brentq
 
 from solver.backend import ti
-from solver.effects.jkr import contact_radius, grip
+from solver.effects.jkr import grip, parting_radius, root
 from solver.laboratory import GRAIN, RADIUS, WALL, Laboratory, sphere
 from solver.material import effective_youngs_modulus
 from tests.solver.effects.cases import felt, heavy, scene_with
@@ -36,9 +36,10 @@ def force_at(overlap):
 
 @ti.kernel
 def radii(inputs: ti.types.ndarray(dtype=ti.f64, ndim=2), out: ti.types.ndarray(dtype=ti.f64, ndim=1)):
-    """contact_radius on rows of w, E*, R*, overlap."""
+    """Contact radius for rows of w, E*, R*, overlap."""
     for k in range(out.shape[0]):
-        out[k] = contact_radius(inputs[k, 0], inputs[k, 1], inputs[k, 2], inputs[k, 3])
+        least = parting_radius(inputs[k, 0], inputs[k, 1], inputs[k, 2])
+        out[k] = least * root(inputs[k, 3] * inputs[k, 2] / least**2) ** 2
 
 
 def test_contact_radius_against_root_finding():
@@ -57,8 +58,8 @@ def test_contact_radius_against_root_finding():
             return x**2 - 4.0 * np.sqrt(x) - share[k]
 
         # Towards parting the root is a double one: rounding 1e-16 moves it by up to 1e-8/√(3 + d).
-        root = brentq(excess, 1.0, 2.0 * np.sqrt(abs(share[k])) + 4.0, xtol=1e-15, rtol=1e-15)
-        assert out[k] / least == pytest.approx(root, rel=1e-9)
+        expected = brentq(excess, 1.0, 2.0 * np.sqrt(abs(share[k])) + 4.0, xtol=1e-15, rtol=1e-15)
+        assert out[k] / least == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,8 @@ from solver.effects.rolling_resistance import rolling_torque
 from solver.effects.touch import Touch
 from solver.effects.twisting import twisting_torque
 from solver.laboratory import EARTH, GRAIN, RADIUS, WALL, Laboratory, sphere
-from solver.material import effective_youngs_modulus
+from solver.laws.hertz_mindlin import tangential_damping
+from solver.material import effective_shear_modulus, effective_youngs_modulus
 from solver.state import Vec3
 from tests.solver.effects.cases import felt, hertz_rest, scene_with
 
@@ -106,6 +107,27 @@ def test_a_spinning_sphere_slows_by_two_thirds_of_the_contact_radius(strength):
     a = np.sqrt(RADIUS * REST)
     assert torque == pytest.approx(strength * 2.0 / 3.0 * a * 0.4 * MASS * 9.81, rel=1e-3)
     assert lab.state()[0, 7:9] == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
+def test_a_small_twist_swings_and_dies_down():
+    """A damped oscillator: ω² = 4 G* a³ s/I, decay ½ · ½ η_t a² s/I with the tangential dashpot η_t."""
+    strength, first = 5.0, 0.05
+    scene = scene_with(felt("twisting", strength=strength), gravity=EARTH, restitution=0.3)
+    lab = Laboratory(scene, 1)
+    lab.put(0, (0.0, 0.0, RADIUS - REST), spin=(0.0, 0.0, first))
+    a, inertia = np.sqrt(RADIUS * REST), 0.4 * MASS * RADIUS**2
+    g_star = effective_shear_modulus(GRAIN, WALL)
+    dashpot = tangential_damping(0.3) * np.sqrt(8.0 * g_star * a * MASS)
+    decay = strength * 0.5 * dashpot * a**2 / (2.0 * inertia)
+    frequency = np.sqrt(strength * 4.0 * g_star * a**3 / inertia)
+    chunk, found = 5, []
+    for _ in range(round(3.0 / decay / lab.dt / chunk)):
+        lab.run(chunk)
+        found.append(lab.state()[0, 12])
+    times = chunk * lab.dt * np.arange(1, len(found) + 1)
+    swing = np.sqrt(frequency**2 - decay**2) * times
+    expected = first * np.exp(-decay * times) * (np.cos(swing) - decay / frequency * np.sin(swing))
+    assert np.array(found) == pytest.approx(expected, abs=0.02 * first)
 
 
 @ti.kernel

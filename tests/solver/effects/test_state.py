@@ -9,7 +9,6 @@ import pytest
 from solver.effects.columns import COUPLE, HERTZ, MEMORY
 from solver.laboratory import EARTH, RADIUS, ROOM, Laboratory
 from solver.time_step import time_step
-from solver.world import Batch
 from tests.solver.effects.cases import (
     ROOM_WITH_EFFECTS,
     THREE_WORLDS,
@@ -141,7 +140,7 @@ SLEEPY = {"sleep_speed": 2e-3, "gravity": EARTH, "restitution": 0.3}
 
 def test_a_pile_that_sticks_and_does_not_roll_falls_asleep_and_stands():
     # Without resistance to twisting a sphere would spin on about its vertical axis.
-    effects = (felt("rolling_resistance"), felt("adhesion_jkr", work_of_adhesion=0.3), felt("twisting"))
+    effects = (felt("rolling_resistance"), felt("adhesion_jkr", work_of_adhesion=0.3), felt("twisting", strength=10.0))
     batch = crowd(ROOM_WITH_EFFECTS, scene_with(*effects, **SLEEPY))
     dt = time_step(scene_with(*effects, **SLEEPY))
     row = onward(batch, round(1.5 / dt))
