@@ -13,7 +13,7 @@ from doe.diagnose.holdout import HoldoutCondition, HoldoutError, holdout_errors
 from doe.diagnose.menu import Suggestion, next_experiment
 from doe.diagnose.pours import ModelPours, OnPour
 from doe.diagnose.runs import Condition, Declared, Effect, Observed, Parameter
-from doe.diagnose.screen import Budget, Say, Screened, further, screen
+from doe.diagnose.screen import Budget, Say, further, screen, widened
 from doe.diagnose.verdict import Verdict
 from doe.measurement.measurement import Condition as MeasuredCondition
 from doe.measurement.measurement import MeasuredParameter, Measurement
@@ -29,6 +29,8 @@ SURVIVING_GAP = 12.0
 BOX = 3.0
 """Standard deviations about an independently measured mean."""
 DRAWN_IN = 0.8
+ROUNDS = 3
+"""Times that survivors are simulated further, beyond once only while one of them needs a wider range."""
 FRESH = 12
 """Pours per model and condition in the confirmation, at least."""
 
@@ -67,10 +69,16 @@ def run_diagnosis(
     screened = screen(declared, model, budget, say)
     verdict = diagnose(screened.declared, screened.runs, observed)
     say(f"after screening: {verdict.kind}")
-    names = survivors(verdict)
-    if names:
-        screened = further(screened, names, model, budget, say)
+    for _ in range(ROUNDS):
+        names = survivors(verdict)
+        if not names:
+            break
+        cramped = at_edge(verdict, screened.declared, declared)
+        screened = further(widened(screened, cramped, declared), names, model, budget, say)
         verdict = diagnose(screened.declared, screened.runs, observed)
+        if not cramped:
+            break
+        say(f"wider range of {', '.join(cramped)}: {verdict.kind}")
     say(f"verdict: {verdict.kind}")
     before, after = models(verdict)
     fresh = max(FRESH, *(2 * condition.replicates for condition in measurement.conditions))
@@ -83,8 +91,8 @@ def run_diagnosis(
         verdict=verdict,
         before=one,
         after=other,
-        fit_error=_errors(measurement, "fit", one, other),
-        holdout_error=_errors(measurement, "holdout", one, other),
+        fit_error=errors_of(measurement, "fit", one, other),
+        holdout_error=errors_of(measurement, "holdout", one, other),
         suggestions=suggestions,
         pours=model.run_now + everywhere.run_now,
         settings=len(screened.points),
@@ -145,6 +153,14 @@ def survivors(verdict: Verdict) -> tuple[str, ...]:
     return tuple(row.name for row in near[:SURVIVORS])
 
 
+def at_edge(verdict: Verdict, now: Declared, widest: Declared) -> tuple[str, ...]:
+    """Survivors that are driven to an end of the range simulated so far, where the literature supports more."""
+    ends = {effect.name: effect for effect in widest.effects}
+    cramped = {row.name for row in verdict.effects if any(a.at_edge for a in row.amplitudes)}
+    room = {effect.name for effect in now.effects if max(effect.high) < max(ends[effect.name].high)}
+    return tuple(name for name in survivors(verdict) if name in cramped & room)
+
+
 def models(verdict: Verdict) -> tuple[Model, Model]:
     """The calibrated base model, and the best one that the verdict names (the base model where it names none)."""
     before = Model(tuple(p.before for p in verdict.parameters))
@@ -158,16 +174,12 @@ def models(verdict: Verdict) -> tuple[Model, Model]:
     return before, Model(tuple(p.after for p in verdict.parameters), tuple(amplitudes.items()))
 
 
-def _errors(measurement: Measurement, role: str, before: Confirmed, after: Confirmed) -> tuple[HoldoutError, ...]:
-    chosen = [c for c, condition in enumerate(measurement.conditions) if condition.role == role]
-    if not chosen:
-        return ()
+def errors_of(measurement: Measurement, role: str, before: Confirmed, after: Confirmed) -> tuple[HoldoutError, ...]:
+    """Errors over the conditions of ``role``; those with fewer than two readable pours on any side are left out."""
     conditions = []
-    for c in chosen:
-        data = summaries_of_data(measurement.conditions[c])
-        complete = data[np.isfinite(data).all(axis=1)]
-        names = summary_names(measurement.conditions[c])
-        conditions.append(
-            HoldoutCondition(measurement.conditions[c].name, names, complete, before.blocks[c], after.blocks[c])
-        )
-    return holdout_errors(conditions)
+    for c, condition in enumerate(measurement.conditions):
+        data = summaries_of_data(condition)
+        rows = data[np.isfinite(data).all(axis=1)], before.blocks[c], after.blocks[c]
+        if condition.role == role and min(map(len, rows)) >= 2:
+            conditions.append(HoldoutCondition(condition.name, summary_names(condition), *rows))
+    return holdout_errors(conditions) if conditions else ()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -17,7 +18,19 @@ from doe.measurement.measurement import Condition
 from doe.measurement.summaries import summaries_of_record, summary_names
 from doe.runner import Pours, seed_of
 from doe.store import Store, StoredRun, run_key
-from solver import EFFECTS, Job, Outcome, Record, Scene, SetUpEffect, code_version, parameters, value, with_values
+from solver import (
+    EFFECTS,
+    Job,
+    Outcome,
+    ParameterError,
+    Record,
+    Scene,
+    SetUpEffect,
+    code_version,
+    parameters,
+    value,
+    with_values,
+)
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -73,7 +86,8 @@ class ModelPours:
                 for tag, (point, c) in enumerate(wanted)
                 if any(acts(name) for name, _ in point.effects) == acting
             )
-            for job, record in self._pours(queue, self._room(acting)) if queue else ():
+            room = self._room(acting) + [job.scene for job in queue]
+            for job, record in self._pours(queue, room) if queue else ():
                 point, c = wanted[job.tag]
                 self._known[self._place(point, c)] = self._keep(what, point, c, job, record)
                 self.run_now += 1
@@ -107,17 +121,16 @@ class ModelPours:
         return place in self._known
 
     def _room(self, acting: bool) -> list[Scene]:
-        """Scenes that need as much room as any point: every condition, as declared and at the ends of each effect."""
-        room = []
+        """Scenes that need as much room as most points: every condition at the ends of each effect, where it can be."""
+        room: list[Scene] = []
         for condition in self._conditions:
             for name, kind in EFFECTS.items():
                 if acts(name) != acting:
                     continue
                 for share in (-1.0, 1.0):
                     ends = {f"effect.{name}.{field}": share * kind.strongest for field in kind.amplitudes}
-                    known = parameters(condition.scene)
-                    inside = {path: max(known[path].low, x) for path, x in ends.items()}
-                    room.append(with_values(condition.scene, inside))
+                    with contextlib.suppress(ParameterError):
+                        room.append(with_values(condition.scene, ends))
         return room
 
     def _place(self, point: Point, condition: int) -> tuple[str, int, int]:

@@ -1,8 +1,9 @@
 """What is simulated, in order: the base model, how far each effect may go, all effects, then the survivors again.
 
-An effect's amplitude is scaled before it is screened: its range ends where, with the parameters in the middle, it shifts
-the summaries by ``WANTED`` standard errors of a data set of ``REPLICATES`` pours, or at the end of what the literature
-supports if that comes first. Nothing here looks at measured values: all of it belongs to the declared model.
+An effect's amplitude is scaled before it is screened: its range ends where, with the parameters in the middle, it
+shifts the summaries by ``WANTED`` standard errors of a data set of ``REPLICATES`` pours, or at the end of what the
+literature supports if that comes first. Measured values come in only to choose the survivors, and whose range has to
+be wider; all the pours belong to the declared model.
 """
 
 from __future__ import annotations
@@ -33,12 +34,12 @@ ROUNDS = 4
 class Budget:
     """Numbers of points; each is poured once in every condition."""
 
-    base: int = 64
-    middle: int = 24
-    scaling: int = 3
+    base: int = 48
+    middle: int = 16
+    scaling: int = 2
     screening: int = 16
     """Per effect with one amplitude; half as many again with two."""
-    further: int = 32
+    further: int = 16
     """More for each survivor."""
 
     def scaled(self, runs: int, effects: int, conditions: int) -> Budget:
@@ -99,12 +100,27 @@ def further(screened: Screened, names: Sequence[str], model: ModelPours, budget:
     asked: list[Point] = []
     for stream, effect in enumerate(declared.effects):
         if effect.name in names:
-            first = screening_number(effect, budget)
-            grown = effect_points(declared.parameters, effect, stream, first + budget.further, first)
+            number = screening_number(effect, budget) + budget.further
+            grown = effect_points(declared.parameters, effect, stream, number)
             asked += [point for point in grown if (point.sequence, point.number) not in known]
     pours = model.run("survivors", asked)
     say(f"survivors: {len(asked)} more settings of {', '.join(names)}")
     return Screened(declared, (*screened.points, *asked), (*screened.pours, *map(tuple, pours)))
+
+
+def widened(screened: Screened, names: Sequence[str], widest: Declared) -> Screened:
+    """The ranges of the effects ``names`` twice as wide, up to those of ``widest``; their runs so far still count."""
+    effects = tuple(
+        replace(
+            effect,
+            low=tuple(max(2.0 * low, end) for low, end in zip(effect.low, limit.low, strict=True)),
+            high=tuple(min(2.0 * high, end) for high, end in zip(effect.high, limit.high, strict=True)),
+        )
+        if effect.name in names
+        else effect
+        for effect, limit in zip(screened.declared.effects, widest.effects, strict=True)
+    )
+    return replace(screened, declared=replace(screened.declared, effects=effects))
 
 
 def scaled_range(

@@ -1,10 +1,10 @@
 """Effects that no library holds, so that a diagnosis has to say "unexplained".
 
-    vibrating_plate    the plate goes up and down by a square wave, 50 Hz
-    plate_attraction   bodies near the plate are drawn to it, q g exp(−z/λ)
-    misread_scale      every length that is read off the pile is too large by one factor
-    breaking_bodies    a share of the mass is single lobes instead of trefoils
-    sticky_funnel      a share of the mass stays in the funnel for good, whatever the rest does
+vibrating_plate    the plate goes up and down by a square wave, 50 Hz
+plate_attraction   bodies near the plate are drawn to it, q g exp(−z/λ)
+misread_scale      every length that is read off the pile is too large by one factor
+breaking_bodies    a share of the mass is single lobes instead of trefoils
+sticky_funnel      a share of the mass stays in the funnel for good, whatever the rest does
 """
 
 import dataclasses
@@ -52,7 +52,9 @@ def outside_pour(name: str, condition: Condition, scene, seed: int):
         return summaries_of_record(condition, driven(broken(scene, amount), seed))
     if name == "sticky_funnel":
         stuck = amount * poured_mass(scene)
-        found = summaries_of_record(condition, driven(with_values(scene, {"rig.mass": poured_mass(scene) - stuck}), seed))
+        found = summaries_of_record(
+            condition, driven(with_values(scene, {"rig.mass": poured_mass(scene) - stuck}), seed)
+        )
         return found, stuck
     if name == "vibrating_plate":
         return summaries_of_record(condition, driven(scene, seed, vibrate))

@@ -15,7 +15,7 @@ import numpy as np
 
 from doe.diagnose.confirm import Confirmed
 from doe.diagnose.decide import diagnose
-from doe.diagnose.diagnosis import Diagnosis, _errors, declare, models, observe
+from doe.diagnose.diagnosis import Diagnosis, declare, errors_of, models, observe
 from doe.diagnose.menu import Suggestion
 from doe.diagnose.next_experiment import MenuItem, Prediction, rank_experiments
 from doe.diagnose.runs import BASE, Runs
@@ -170,8 +170,8 @@ def diagnosed(effects=(), outside=0.0, theta=(0.57, 0.7), holdout=True, carries_
         verdict,
         one,
         other,
-        _errors(measurement, "fit", one, other),
-        _errors(measurement, "holdout", one, other),
+        errors_of(measurement, "fit", one, other),
+        errors_of(measurement, "holdout", one, other),
         suggestions(verdict),
         321,
         240,

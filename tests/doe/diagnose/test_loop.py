@@ -1,0 +1,179 @@
+"""The whole loop with a formula in place of the pours: it must find what was planted, and nothing where nothing was."""
+
+import hashlib
+
+import numpy as np
+import pytest
+
+from doe.diagnose import diagnosis, menu
+from doe.diagnose.pours import Pour
+from doe.diagnose.runs import Effect, Observed
+from doe.diagnose.screen import REPLICATES, TOO_FAR, Budget, scaled_range, whitened_shift
+from doe.measurement.load import load_measurement
+from doe.measurement.summaries import summaries_of_data, summary_names
+from solver import EFFECTS
+from solver.assets import measurement_folder
+
+NAMES = ("rolling_resistance", "air_drag", "plate_tilt", "density_error")
+BUDGET = Budget(base=48, middle=16, scaling=2, screening=16, further=16)
+
+
+def direction(name, size):
+    """A unit vector that belongs to ``name``."""
+    seed = int.from_bytes(hashlib.sha256(name.encode()).digest()[:4])
+    vector = np.random.default_rng(seed).normal(size=size)
+    return vector / np.linalg.norm(vector)
+
+
+class FormulaPours:
+    """Stands for ``ModelPours``: summaries linear in parameters and amplitudes, with unit noise per pour."""
+
+    def __init__(self, conditions, paths, store, pours, on_pour=None, root=0):
+        self.conditions, self.paths, self.run_now = conditions, paths, 0
+
+    def run(self, what, points):
+        self.run_now += len(points) * len(self.conditions)
+        return [[self.pour(point, condition) for condition in self.conditions] for point in points]
+
+    def pour(self, point, condition):
+        width = len(summary_names(condition))
+        text = f"{point} {condition.name}"
+        noise = np.random.default_rng(int.from_bytes(hashlib.sha256(text.encode()).digest()[:8])).normal(size=width)
+        return Pour(tuple(expected(point.theta, point.effects, condition.name, width) + noise), "measured")
+
+
+def expected(theta, effects, condition, width):
+    mean = np.zeros(width)
+    for k, value in enumerate(theta):
+        mean += 4.0 * value * direction(f"{condition} θ{k}", width)
+    for name, amplitude in effects:
+        for k, value in enumerate(amplitude):
+            mean += 9.0 * value / EFFECTS[name].strongest * direction(f"{condition} {name} {k}", width)
+    return mean
+
+
+@pytest.fixture
+def measurement(monkeypatch):
+    for module in (diagnosis, menu):
+        monkeypatch.setattr(module, "ModelPours", FormulaPours)
+    return load_measurement(measurement_folder("trefoil_1"))
+
+
+def data_of(measurement, effects, seed):
+    """Replicates of the formula at the declared means, with ``effects``."""
+    rng = np.random.default_rng(seed)
+    theta = [p.mean for p in measurement.parameters]
+    blocks = []
+    for condition in measurement.fit:
+        width = len(summary_names(condition))
+        blocks.append(expected(theta, effects, condition.name, width) + rng.normal(size=(REPLICATES, width)))
+    return Observed(tuple(blocks), tuple(np.zeros(block.shape[1]) for block in blocks))
+
+
+def run(measurement, monkeypatch, effects, seed=1):
+    monkeypatch.setattr(diagnosis, "observe", lambda conditions: data_of(measurement, effects, seed))
+    said = []
+    found = diagnosis.run_diagnosis(measurement, None, None, NAMES, BUDGET, said.append)
+    return found, said
+
+
+def test_a_planted_effect_is_named_with_its_amplitude(measurement, monkeypatch):
+    planted = 0.4 * EFFECTS["rolling_resistance"].strongest
+    found, said = run(measurement, monkeypatch, (("rolling_resistance", (planted,)),))
+    assert found.verdict.kind == "effect:rolling_resistance", said
+    (amplitude,) = found.verdict.amplitudes
+    assert amplitude.low <= planted <= amplitude.high + 1e-12
+    assert found.after.model.effects[0][0] == "rolling_resistance"
+    # Fresh pours of the named model are nearer to the fitted data than those of the base model.
+    overall = next(row for row in found.fit_error if row.observable == "overall")
+    assert np.isfinite(overall.after)
+
+
+def test_an_effect_beyond_the_first_range_is_followed(measurement, monkeypatch):
+    """At its strongest it shifts by 22 standard errors, and the range is first drawn in to 16."""
+    planted = EFFECTS["rolling_resistance"].strongest
+    found, said = run(measurement, monkeypatch, (("rolling_resistance", (planted,)),))
+    assert found.verdict.kind == "effect:rolling_resistance", said
+    assert found.verdict.amplitudes[0].value > 0.9 * planted
+    assert any("wider range of" in line and "rolling_resistance" in line for line in said)
+
+
+def test_nothing_planted_is_nothing_found(measurement, monkeypatch):
+    found, said = run(measurement, monkeypatch, ())
+    assert found.verdict.kind == "no_missing_effect", said
+    assert found.after is found.before
+    assert found.suggestions == ()
+
+
+def test_the_same_model_asks_for_the_same_pours(measurement, monkeypatch):
+    """What is simulated before the verdict must not depend on measured values."""
+    asked = []
+
+    class Recording(FormulaPours):
+        def run(self, what, points):
+            if what in ("base model", "screening") or what.startswith("range"):
+                asked[-1].extend((point.sequence, point.number, point.theta, point.effects) for point in points)
+            return super().run(what, points)
+
+    monkeypatch.setattr(diagnosis, "ModelPours", Recording)
+    for effects in ((), (("air_drag", (2.0,)),)):
+        asked.append([])
+        run(measurement, monkeypatch, effects)
+    assert asked[0] == asked[1]
+
+
+def test_whitened_shift_is_the_distance_in_standard_errors(measurement):
+    declared = diagnosis.declare(measurement, NAMES)
+    rng, width = np.random.default_rng(2), len(declared.conditions[0].summaries)
+    step = 3.0 * direction("step", width)
+
+    def pours(number, mean):
+        return [[Pour(tuple(mean + row), "measured")] for row in rng.normal(size=(number, width))]
+
+    found = whitened_shift(declared, pours(4000, 0.0), pours(4000, step))
+    # Sampling error of 4000 pours: 2 %; the covariance is the unit matrix, shrunk or not.
+    assert found == pytest.approx(3.0 * np.sqrt(REPLICATES), rel=0.05)
+    assert whitened_shift(declared, pours(4000, 0.0), pours(4000, 0.0)) < 1.0
+
+
+def test_a_range_that_goes_too_far_is_drawn_in(measurement):
+    declared = diagnosis.declare(measurement, NAMES)
+    condition, width = measurement.fit[0], len(declared.conditions[0].summaries)
+
+    class Strong(FormulaPours):
+        def pour(self, point, condition):
+            base = super().pour(point, condition)
+            shift = sum(100.0 * a[0] for _, a in point.effects) * direction("strong", width)
+            return Pour(tuple(np.array(base.summaries) + shift), "measured")
+
+    model = Strong([condition], [], None, None)
+    centre = model.run("middle", diagnosis_middle(declared))
+    effect, shift = scaled_range(declared, Effect("rolling_resistance", (0.0,), (1.0,)), model, 4, centre)
+    assert 0.0 < effect.high[0] < 0.5
+    assert shift <= TOO_FAR
+
+
+def diagnosis_middle(declared):
+    from doe.diagnose.plan import middle_points
+
+    return middle_points(declared.parameters, 40)
+
+
+def test_ranges_fit_the_set_up(measurement):
+    declared = diagnosis.declare(measurement, tuple(EFFECTS))
+    for effect in declared.effects:
+        assert all(low <= 0.0 <= high for low, high in zip(effect.low, effect.high, strict=True))
+        assert max(effect.high) <= EFFECTS[effect.name].strongest
+
+
+def test_the_box_is_three_deviations_about_a_measured_mean(measurement):
+    friction = diagnosis.declare(measurement, NAMES).parameters[2]
+    assert (friction.low, friction.high) == (pytest.approx(0.73 - 0.12), pytest.approx(0.73 + 0.12))
+
+
+def test_data_without_a_readable_replicate_have_no_error_row(measurement):
+    block = summaries_of_data(measurement.conditions[0])
+    model = diagnosis.Model((0.5,) * 3)
+    nothing = tuple(np.zeros((0, block.shape[1])) for _ in measurement.conditions)
+    confirmed = diagnosis.Confirmed(model, nothing, 12)
+    assert diagnosis.errors_of(measurement, "holdout", confirmed, confirmed) == ()
