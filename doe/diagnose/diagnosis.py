@@ -13,7 +13,7 @@ from doe.diagnose.holdout import HoldoutCondition, HoldoutError, holdout_errors
 from doe.diagnose.menu import Suggestion, next_experiment
 from doe.diagnose.pours import ModelPours, OnPour
 from doe.diagnose.runs import Condition, Declared, Effect, Observed, Parameter
-from doe.diagnose.screen import Budget, Say, Screened, further, screen
+from doe.diagnose.screen import Budget, Say, further, screen
 from doe.diagnose.verdict import Verdict
 from doe.measurement.measurement import Condition as MeasuredCondition
 from doe.measurement.measurement import MeasuredParameter, Measurement

@@ -1,8 +1,8 @@
 """What is simulated, in order: the base model, how far each effect may go, all effects, then the survivors again.
 
-An effect's amplitude is scaled before it is screened: its range ends where, with the parameters in the middle, it shifts
-the summaries by ``WANTED`` standard errors of a data set of ``REPLICATES`` pours, or at the end of what the literature
-supports if that comes first. Nothing here looks at measured values: all of it belongs to the declared model.
+An effect's amplitude is scaled before it is screened: its range ends where, with the parameters in the middle, it
+shifts the summaries by ``WANTED`` standard errors of a data set of ``REPLICATES`` pours, or at the end of what the
+literature supports if that comes first. Nothing here looks at measured values: all of it belongs to the declared model.
 """
 
 from __future__ import annotations
@@ -154,5 +154,5 @@ def screening_number(effect: Effect, budget: Budget) -> int:
 
 def _valid(pours: Sequence[Sequence[Pour]], condition: int) -> FloatArray:
     rows = [row[condition].summaries for row in pours if row[condition].valid]
-    found = np.array([row for row in rows if np.isfinite(row).all()])
-    return found.reshape(len(found), -1)
+    complete = [row for row in rows if np.isfinite(row).all()]
+    return np.array(complete) if complete else np.empty((0, 0))
