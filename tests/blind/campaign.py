@@ -33,6 +33,8 @@ __all__ = ["CampaignOrder", "campaign_text", "run_campaign"]
 SETS = "sets.csv"
 CHUNK = 6
 """Data sets that are poured, judged and written together."""
+SAID_EVERY = 100
+"""Pours of the emulator between two lines of progress."""
 
 Say = Callable[[str], None]
 
@@ -73,7 +75,7 @@ def run_campaign(order: CampaignOrder, say: Say) -> list[Row]:
             try:
                 _answer(order, todo, place, path, say)
             except OutOfTimeError:
-                say(f"{order.minutes:g} min are over; the same command goes on")
+                say(f"{order.minutes:g} min are over; all pours are kept, and the same command goes on")
     asked = {case.number for case in order.asked}
     return [row for row in read_rows(path) if row.number in asked]
 
@@ -81,7 +83,13 @@ def run_campaign(order: CampaignOrder, say: Say) -> list[Row]:
 def emulated(order: CampaignOrder, measurement: Measurement, place: WorkPlace, say: Say) -> Screened:
     """The declared model with every effect screened as far as survivors are; from the store where it is there."""
     paths = [parameter.path for parameter in measurement.parameters]
-    model = ModelPours(measurement.fit, paths, place.store, place.crew.run_queue, place.look_at_the_clock)
+
+    def on_pour(what: str, left: int) -> None:
+        place.look_at_the_clock()
+        if left % SAID_EVERY == 0:
+            say(f"{what}: {left} pours to come")
+
+    model = ModelPours(measurement.fit, paths, place.store, place.crew.run_queue, on_pour)
     screened = screen(declare(measurement, order.effects), model, order.budget, say)
     return further(screened, order.effects, model, order.budget, say)
 

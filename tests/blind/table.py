@@ -38,6 +38,8 @@ class Rate:
         return wilson(self.hits, self.sets)
 
     def __str__(self) -> str:
+        if not self.sets:
+            return "no set"
         low, high = self.interval
         return f"{self.hits}/{self.sets} = {100 * self.share:.1f} % (95 % {100 * low:.1f} … {100 * high:.1f} %)"
 
@@ -112,6 +114,8 @@ def effects_text(rows: Sequence[Row]) -> str:
             sets = [row for row in own if row.answer != "out of reach"]
             cells.append(f"{sum(row.answer == 'right' for row in sets)} of {len(sets)}" if sets else "-")
         body.append([label, *cells])
+    if not body:
+        return "no set with a library effect"
     return text_table(["right name", *(f"{strength:g} σ" for strength in strengths)], body)
 
 
@@ -139,7 +143,7 @@ def targets(rows: Sequence[Row]) -> list[Target]:
         Target(
             "holdout error ÷ noise floor, right names",
             "median ≤ 1.1",
-            f"{median:.2f} over {len(after)} sets",
+            f"{median:.2f} over {len(after)} sets" if after else "no set",
             median <= 1.1 if after else None,
         ),
         _target(f"holdout error ÷ noise floor ≤ {HOLDOUT_GOOD:g}, right names", good, 0.80, at_most=False),

@@ -1,7 +1,7 @@
 """The campaign in the small: 26 bodies a pour, one parameter, two effects, one set of each kind, from an empty store.
 
 It proves that the machinery works on real pours from end to end. How often the diagnosis is right it cannot prove;
-that takes the whole campaign.
+that takes the whole campaign. 115 s of processor time: slow, a minute on two idle cores.
 """
 
 import dataclasses
@@ -105,7 +105,7 @@ def test_a_row_that_is_lost_comes_out_the_same_without_a_new_pour(order, rows):
     assert numbers(again) == numbers(rows)
 
 
-def test_time_that_is_over_stops_it_cleanly(order, rows, tmp_path):
+def test_time_that_is_over_stops_it_cleanly(order, tmp_path):
     said = []
     late = dataclasses.replace(order, out=tmp_path, store=tmp_path / "empty.sqlite", minutes=0.0)
     assert run_campaign(late, said.append) == []
