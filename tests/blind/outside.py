@@ -22,11 +22,11 @@ from solver.scene import poured_mass
 from solver.world import Batch
 
 AMPLITUDE = {
-    "vibrating_plate": 0.04,
-    "plate_attraction": 3.0,
-    "misread_scale": 0.12,
-    "breaking_bodies": 0.10,
-    "sticky_funnel": 0.05,
+    "vibrating_plate": 0.05,
+    "plate_attraction": 4.0,
+    "misread_scale": 0.10,
+    "breaking_bodies": 0.18,
+    "sticky_funnel": 0.07,
 }
 """Speed [m/s], q, factor − 1, shares: chosen once so that each moves the summaries by more than 10 standard errors."""
 PLATE = 0
