@@ -25,6 +25,7 @@ from explorer.commands import (
     serve,
     shape,
     simulate,
+    validate_diagnosis,
     verify,
 )
 
@@ -118,6 +119,7 @@ app.command()(export.export)
 app.command()(replay.replay)
 app.command()(verify.verify)
 app.command()(bench.bench)
+app.command()(validate_diagnosis.validate_diagnosis)
 app.add_typer(measurements.app, name="measurements")
 
 

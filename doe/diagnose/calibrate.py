@@ -80,7 +80,7 @@ def gather_evidence(emulator: Emulator, observed: Observed) -> Evidence:
     compared = [
         compare_variances(block.noise, values, total) for block, values in zip(emulator.blocks, replicates, strict=True)
     ]
-    mean, weight = _priors(emulator.declared)
+    mean, weight = priors(emulator.declared)
     return Evidence(
         means=tuple(values.mean(axis=0) for values in replicates),
         counts=tuple(len(values) for values in replicates),
@@ -176,7 +176,8 @@ def _nowhere(predictor: Predictor) -> FloatArray:
     return x
 
 
-def _priors(declared: Declared) -> tuple[FloatArray, FloatArray]:
+def priors(declared: Declared) -> tuple[FloatArray, FloatArray]:
+    """Return coded mean (k,) and weight (k,) of the independently measured parameters; weight zero for the others."""
     mean, weight = np.zeros(len(declared.parameters)), np.zeros(len(declared.parameters))
     for i, parameter in enumerate(declared.parameters):
         if parameter.mean is not None and parameter.sd is not None:

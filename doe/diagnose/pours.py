@@ -70,7 +70,7 @@ class ModelPours:
     ) -> None:
         self._conditions, self._paths, self._store = tuple(conditions), tuple(paths), store
         self._pours, self._on_pour, self._root = pours, on_pour, root
-        self._known: dict[tuple[str, int, int], Pour] = {}
+        self._known: dict[tuple[Point, int], Pour] = {}
         self.run_now = 0
         """Pours that were really run, not found in the store."""
 
@@ -86,15 +86,15 @@ class ModelPours:
                 for tag, (point, c) in enumerate(wanted)
                 if any(acts(name) for name, _ in point.effects) == acting
             )
-            room = self._room(acting) + [job.scene for job in queue]
+            room = self.room(acting) + [job.scene for job in queue]
             for job, record in self._pours(queue, room) if queue else ():
                 point, c = wanted[job.tag]
-                self._known[self._place(point, c)] = self._keep(what, point, c, job, record)
+                self._known[point, c] = self._keep(what, point, c, job, record)
                 self.run_now += 1
                 left -= 1
                 if self._on_pour is not None:
                     self._on_pour(what, left)
-        return [[self._known[self._place(point, c)] for c in range(len(self._conditions))] for point in points]
+        return [[self._known[point, c] for c in range(len(self._conditions))] for point in points]
 
     def scene(self, point: Point, condition: int) -> Scene:
         """The scene of ``point`` in a condition."""
@@ -108,19 +108,7 @@ class ModelPours:
         """Seed of the pour of ``point`` in a condition."""
         return seed_of(self._root, point.sequence, point.number, condition, 0)
 
-    def _find(self, point: Point, condition: int) -> bool:
-        """Whether the pour is known, here or in the store."""
-        place = self._place(point, condition)
-        if place not in self._known:
-            stored = self._store.find(
-                run_key(self.scene(point, condition), self.seed(point, condition), code_version())
-            )
-            found = None if stored is None else self._stored(stored, condition)
-            if found is not None:
-                self._known[place] = found
-        return place in self._known
-
-    def _room(self, acting: bool) -> list[Scene]:
+    def room(self, acting: bool) -> list[Scene]:
         """Scenes that need as much room as most points: every condition at the ends of each effect, where it can be."""
         room: list[Scene] = []
         for condition in self._conditions:
@@ -133,8 +121,17 @@ class ModelPours:
                         room.append(with_values(condition.scene, ends))
         return room
 
-    def _place(self, point: Point, condition: int) -> tuple[str, int, int]:
-        return point.sequence, point.number, condition
+    def _find(self, point: Point, condition: int) -> bool:
+        """Whether the pour is known, here or in the store."""
+        place = point, condition
+        if place not in self._known:
+            stored = self._store.find(
+                run_key(self.scene(point, condition), self.seed(point, condition), code_version())
+            )
+            found = None if stored is None else self._stored(stored, condition)
+            if found is not None:
+                self._known[place] = found
+        return place in self._known
 
     def _stored(self, stored: StoredRun, condition: int) -> Pour | None:
         names = summary_names(self._conditions[condition])

@@ -170,5 +170,5 @@ def screening_number(effect: Effect, budget: Budget) -> int:
 
 def _valid(pours: Sequence[Sequence[Pour]], condition: int) -> FloatArray:
     rows = [row[condition].summaries for row in pours if row[condition].valid]
-    found = np.array([row for row in rows if np.isfinite(row).all()])
-    return found.reshape(len(found), -1 if len(found) else 0)
+    complete = [row for row in rows if np.isfinite(row).all()]
+    return np.array(complete) if complete else np.empty((0, 0))

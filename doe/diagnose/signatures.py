@@ -9,6 +9,7 @@ shift in sigma that the data can see: the square root of the noncentrality of T^
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -17,6 +18,7 @@ import numpy.typing as npt
 
 from doe.diagnose.calibrate import Evidence, Fit
 from doe.diagnose.emulator import Emulator
+from doe.diagnose.predictor import Predictor
 from doe.diagnose.terms import monomials
 
 FloatArray = npt.NDArray[np.float64]
@@ -53,11 +55,18 @@ class Reach:
 
 def whitening(base: Fit, evidence: Evidence) -> Whitening:
     """Return the whitening and projection about a fit of the base model."""
-    factors = tuple(np.linalg.inv(np.linalg.cholesky(sigma)) for sigma in base.sigma)
-    slopes = base.predictor.jacobian(base.x)
+    return whitening_at(base.predictor, base.x, base.sigma, evidence.prior_weight)
+
+
+def whitening_at(
+    predictor: Predictor, x: FloatArray, sigma: Sequence[FloatArray], prior_weight: FloatArray
+) -> Whitening:
+    """Return the whitening by `sigma` (per condition) and the projection about parameters x (k,) of the base model."""
+    factors = tuple(np.linalg.inv(np.linalg.cholesky(block)) for block in sigma)
+    slopes = predictor.jacobian(x)
     parts = np.split(slopes, np.cumsum([len(f) for f in factors])[:-1])
     rows = [*(factor @ part for factor, part in zip(factors, parts, strict=True))]
-    jacobian = np.concatenate([*rows, np.diag(np.sqrt(evidence.prior_weight))])
+    jacobian = np.concatenate([*rows, np.diag(np.sqrt(prior_weight))])
     return Whitening(factors, np.eye(len(jacobian)) - jacobian @ np.linalg.pinv(jacobian))
 
 
@@ -87,7 +96,7 @@ def reach(emulator: Emulator, effect: int, frame: Whitening, theta: FloatArray) 
         if not amplitude.any():
             continue
         z = projected(frame, shift_of(emulator, effect, theta, amplitude))
-        shift = math.sqrt(max(0.0, float(z @ z) - _noise_square(emulator, effect, frame, theta, amplitude)))
+        shift = math.sqrt(max(0.0, float(z @ z) - noise_square(emulator, effect, frame, theta, amplitude)))
         if shift > best.shift or not best.amplitude.any():
             best = Reach(shift, amplitude, z)
     return best
@@ -99,7 +108,7 @@ def cosine(one: FloatArray, other: FloatArray) -> float:
     return float(one @ other) / size if size > 0 else float("nan")
 
 
-def _noise_square(emulator: Emulator, effect: int, frame: Whitening, theta: FloatArray, amplitude: FloatArray) -> float:
+def noise_square(emulator: Emulator, effect: int, frame: Whitening, theta: FloatArray, amplitude: FloatArray) -> float:
     """Return the mean of |z|^2 that errors of the effect's coefficients cause alone: tr(P W v S W' P)."""
     predictor = emulator.predictor((effect,))
     own = len(emulator.base_exponents)

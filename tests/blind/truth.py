@@ -1,67 +1,159 @@
-"""What is true of one made-up laboratory, drawn by its seed: parameters within their measured uncertainty, and what
-acts that the declared model lacks."""
+"""What is true of one made-up laboratory, drawn by its number: parameters within their measured uncertainty, and what
+acts that the declared model lacks.
 
+A truth's strength is the length of its projected, whitened shift of the summaries (`doe.diagnose.signatures`), in
+standard errors of a data set of ``REPLICATES`` pours. The emulator's own error is no part of that standard error, so
+that a strength means the same however much was simulated.
+"""
+
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
-from doe.diagnose.emulator import Emulator
+from doe.diagnose.calibrate import priors
+from doe.diagnose.emulator import Emulator, fit_emulator
 from doe.diagnose.plan import amplitudes
-from doe.diagnose.signatures import projected, shift_of
+from doe.diagnose.runs import BASE, Declared, Effect, Observed, Runs, select_summaries
+from doe.diagnose.signatures import Whitening, cosine, noise_square, projected, shift_of, whitening_at
+from tests.blind.schedule import Case
+
+FloatArray = npt.NDArray[np.float64]
 
 REPLICATES = 6
-STRENGTHS = (4.0, 6.0, 10.0)
-"""Projected, whitened shift of the summaries in standard errors of a data set."""
+ROOT = 1
+"""Root of every random number of the laboratories; that of the emulator's pours is 0."""
+DISTINCT = 0.9
+"""Cosine of their signatures up to which two effects are made a pair: two that look alike are one to any data."""
 
 
 @dataclass(frozen=True)
 class Truth:
-    """``kind``: null, effect, pair or outside. ``effects``: library effects with amplitudes in natural units.
+    """``case``: what was asked for. ``theta`` and the amplitudes of ``effects`` in natural units.
 
-    ``outside``: name of an effect of ``tests/blind/outside.py``. ``strength`` is NaN where it is not defined.
+    ``missing``: why there is no such truth (``effects`` is empty then), else "".
     """
 
-    seed: int
-    kind: str
+    case: Case
     theta: tuple[float, ...]
     effects: tuple[tuple[str, tuple[float, ...]], ...] = ()
-    outside: str = ""
-    strength: float = float("nan")
-
-    @property
-    def label(self) -> str:
-        """The name a right answer gives, or that of the outside effect."""
-        return "+".join(name for name, _ in self.effects) or self.outside or "none"
+    missing: str = ""
 
 
-def draw_theta(declared, rng):
-    """Parameters drawn from their independent measurement, within their ranges."""
+@dataclass(frozen=True)
+class Ruler:
+    """Measures shifts in standard errors of a data set. ``declared``: with the ranges that were simulated.
+
+    ``widest``: the effects as far as the literature goes.
+    """
+
+    emulator: Emulator
+    declared: Declared
+    widest: tuple[Effect, ...]
+
+    def frame(self, theta: FloatArray) -> Whitening:
+        """Whitening by the noise of ``REPLICATES`` pours, and projection, at coded parameters (k,)."""
+        noise = [block.noise.covariance / REPLICATES for block in self.emulator.blocks]
+        return whitening_at(self.emulator.predictor(()), theta, noise, priors(self.declared)[1])
+
+    def coded(self, theta: Sequence[float]) -> FloatArray:
+        """Parameters in natural units → coded, within the sampled box."""
+        coded = [float(p.coded(x)) for p, x in zip(self.declared.parameters, theta, strict=True)]
+        return np.clip(coded, self.emulator.theta_low, self.emulator.theta_high)
+
+    def shift(self, effect: int, frame: Whitening, theta: FloatArray, amplitude: FloatArray) -> float:
+        """Shift [σ] by an effect at coded amplitudes (m,), freed from what the emulator's error adds on average."""
+        z = projected(frame, shift_of(self.emulator, effect, theta, amplitude))
+        return float(np.sqrt(max(0.0, z @ z - noise_square(self.emulator, effect, frame, theta, amplitude))))
+
+    def seen(self, theta: Sequence[float], means: FloatArray) -> float:
+        """Shift [σ] of the measured means (D,) off the base model at the true parameters, freed from noise."""
+        x = self.coded(theta)
+        frame, predictor = self.frame(x), self.emulator.predictor(())
+        z = projected(frame, means - predictor.mean(x))
+        size, first = len(frame.projector), 0
+        covariance = np.zeros((size, size))
+        for factor, error in zip(frame.factors, predictor.mean_covariance(x), strict=True):
+            last = first + len(factor)
+            covariance[first:last, first:last] = np.eye(len(factor)) + factor @ error @ factor.T
+            first = last
+        return float(np.sqrt(max(0.0, z @ z - np.trace(frame.projector @ covariance))))
+
+
+def ruler(declared: Declared, runs: Runs, widest: tuple[Effect, ...]) -> Ruler:
+    """The ruler of the emulator's runs. Summaries that never vary in the base model are left out."""
+    base = [block[(runs.effect == BASE) & runs.simulated(c)][:REPLICATES] for c, block in enumerate(runs.blocks)]
+    chosen = select_summaries(declared, runs, Observed(tuple(base), tuple(np.zeros(b.shape[1]) for b in base)))
+    return Ruler(fit_emulator(chosen.declared, chosen.runs, chosen.floors), declared, widest)
+
+
+def truth_of(case: Case, ruler: Ruler) -> Truth:
+    """The truth of a case; with ``missing`` where an effect's range does not reach its strength."""
+    rng = np.random.default_rng([ROOT, case.number])
+    theta = drawn_theta(ruler.declared, rng)
+    if case.kind in ("null", "outside"):
+        return Truth(case, theta)
+    coded = ruler.coded(theta)
+    frame = ruler.frame(coded)
+    names = [effect.name for effect in ruler.declared.effects]
+    if case.kind == "effect":
+        found = amplitude_for(ruler, frame, names.index(case.label), coded, case.strength, rng)
+        if isinstance(found, str):
+            return Truth(case, theta, missing=found)
+        return Truth(case, theta, ((case.label, found),))
+    return drawn_pair(case, theta, ruler, frame, rng)
+
+
+def drawn_theta(declared: Declared, rng: np.random.Generator) -> tuple[float, ...]:
+    """Parameters drawn from their independent measurement, or over their range, within what is simulated."""
     return tuple(
         float(np.clip(rng.normal(p.mean, p.sd), p.low, p.high)) if p.mean is not None else rng.uniform(p.low, p.high)
         for p in declared.parameters
     )
 
 
-def amplitude_for(emulator: Emulator, frame, effect: int, theta, strength: float, direction):
-    """Coded amplitudes along ``direction`` at which effect ``effect`` shifts by ``strength`` σ, None if out of bounds.
+def amplitude_for(
+    ruler: Ruler, frame: Whitening, e: int, theta: FloatArray, strength: float, rng: np.random.Generator
+) -> tuple[float, ...] | str:
+    """Amplitudes [natural units] at which effect ``e`` shifts by ``strength`` σ, in a direction drawn at random.
 
-    Bisection on the share of the bound; the shift is taken to grow along it.
+    The first crossing along the direction, by steps of a fiftieth and then by bisection. Where no direction reaches
+    the strength, the reason: the literature's bounds, or the range that was simulated.
     """
+    effect = ruler.declared.effects[e]
+    if e not in ruler.emulator.simulated_effects:
+        return "not simulated"
+    choices = {
+        tuple(np.round(np.array(a) / effect.scale / np.abs(np.array(a) / effect.scale).max(), 9))
+        for a in amplitudes(effect)
+    }
+    for k in rng.permutation(len(choices)):
+        direction = np.clip(sorted(choices)[k], ruler.emulator.low[e], ruler.emulator.high[e])
+        shares = np.linspace(0.0, 1.0, 51)[1:]
+        reached = [s for s in shares if ruler.shift(e, frame, theta, s * direction) >= strength]
+        if reached:
+            low, high = reached[0] - shares[0], reached[0]
+            for _ in range(30):
+                middle = 0.5 * (low + high)
+                enough = ruler.shift(e, frame, theta, middle * direction) >= strength
+                low, high = (low, middle) if enough else (middle, high)
+            return tuple(float(x) for x in high * direction * effect.scale)
+    return "bounds" if np.allclose(effect.high, ruler.widest[e].high) else "range"
 
-    def shift(share):
-        return float(np.linalg.norm(projected(frame, shift_of(emulator, effect, theta, share * direction))))
 
-    if shift(1.0) < strength:
-        return None
-    low, high = 0.0, 1.0
-    for _ in range(40):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if shift(middle) < strength else (low, middle)
-    return high * direction
-
-
-def direction_of(effect, rng):
-    """Coded direction in which an effect's amplitudes are let grow: a sign, or an angle in the plane."""
-    choices = [np.array(one) / effect.scale for one in amplitudes(effect)]
-    one = choices[int(rng.integers(len(choices)))]
-    return one / np.abs(one).max()
+def drawn_pair(case: Case, theta: tuple[float, ...], ruler: Ruler, frame: Whitening, rng: np.random.Generator) -> Truth:
+    """Two effects of ``case.strength`` each, whose signatures differ."""
+    coded = ruler.coded(theta)
+    found: list[tuple[str, tuple[float, ...], FloatArray]] = []
+    for e in rng.permutation(len(ruler.declared.effects)):
+        effect = ruler.declared.effects[e]
+        amplitude = amplitude_for(ruler, frame, int(e), coded, case.strength, rng)
+        if isinstance(amplitude, str):
+            continue
+        z = projected(frame, shift_of(ruler.emulator, int(e), coded, np.array(amplitude) / effect.scale))
+        if not found or abs(cosine(found[0][2], z)) <= DISTINCT:
+            found.append((effect.name, amplitude, z))
+        if len(found) == 2:
+            return Truth(case, theta, tuple((name, a) for name, a, _ in found))
+    return Truth(case, theta, missing="bounds")

@@ -11,7 +11,7 @@ from explorer.cli import app
 from tests.explorer.command_line import explorer, refused
 
 ROOT = Path(__file__).parents[2]
-COMMANDS = [command.callback.__name__ for command in app.registered_commands if command.callback]
+COMMANDS = [command.callback.__name__.replace("_", "-") for command in app.registered_commands if command.callback]
 
 
 def test_help_answers_without_the_solver():

@@ -1,0 +1,35 @@
+"""``explorer validate-diagnosis``: how often the diagnosis finds what made-up laboratories hide from it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+CAMPAIGN = "tests.blind.campaign"
+"""The laboratories belong to the tests, so that nothing of a truth is within reach of the diagnosis."""
+
+
+def validate_diagnosis(
+    n: int = typer.Option(327, "--n", min=1, help="Data sets; 327 are three rounds of all cases."),
+    out: Path = typer.Option(Path("validation"), help="Folder for sets.csv, one row per data set."),
+    minutes: float | None = typer.Option(None, min=0.1, help="Stop after so long; the same command goes on."),
+    store: Path | None = typer.Option(None, help="SQLite file that keeps every pour."),
+    threads: int | None = typer.Option(None, min=1, help="Worker processes; one per core if not given."),
+) -> None:
+    """Diagnose made-up data with known truths and print how often the answer is right. Needs the source checkout."""
+    import importlib
+    import math
+    import sys
+
+    from explorer.errors import CommandError
+
+    root = Path(__file__).parents[2]
+    if not root.joinpath(*CAMPAIGN.split(".")).with_suffix(".py").is_file():
+        raise CommandError(f"validate-diagnosis: {root} has no tests/blind; run it from a source checkout")
+    # Worker processes take this path over.
+    if str(root) not in sys.path:
+        sys.path.insert(0, str(root))
+    campaign = importlib.import_module(CAMPAIGN)
+    order = campaign.CampaignOrder(out, n, store, minutes if minutes is not None else math.inf, threads)
+    typer.echo(campaign.campaign_text(campaign.run_campaign(order, typer.echo)))

@@ -1,0 +1,150 @@
+"""From cases to rows: truths are drawn, poured, judged, and right names are tried on what was held out."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.diagnose.confirm import confirm
+from doe.diagnose.diagnosis import FRESH, models
+from doe.diagnose.holdout import HoldoutCondition, holdout_errors
+from doe.diagnose.plan import Point
+from doe.diagnose.pours import ModelPours
+from doe.diagnose.screen import Screened
+from doe.diagnose.verdict import Verdict
+from doe.measurement import Condition, Measurement, summary_names
+from doe.measurement.summaries import summaries
+from tests.blind.judging import Question, judged, least_cosine
+from tests.blind.laboratory import Reading
+from tests.blind.schedule import Case
+from tests.blind.sets import OUT_OF_REACH, Row, answer_to
+from tests.blind.truth import REPLICATES, ROOT, Ruler, Truth, truth_of
+from tests.blind.work_place import Order, WorkPlace, complete
+
+FloatArray = npt.NDArray[np.float64]
+
+TRIES = 3
+"""Times that a laboratory pours ``REPLICATES`` more to replace pours that jammed."""
+NAN = float("nan")
+
+Data = dict[str, list[Reading]]
+"""Readings per condition."""
+
+
+@dataclass(frozen=True, eq=False)
+class Answers:
+    """The declared model with its emulator's runs, and where the work is done."""
+
+    model: Path
+    measurement: Measurement
+    screened: Screened
+    ruler: Ruler
+    place: WorkPlace
+
+    def rows(self, cases: Sequence[Case]) -> list[Row]:
+        """Rows of ``cases``, in order."""
+        began = time.monotonic()
+        truths = [truth_of(case, self.ruler) for case in cases]
+        data = self.measured(truths, self.measurement.fit)
+        told = [k for k, found in enumerate(data) if found is not None]
+        runs = self.screened.runs
+        questions = [Question(self.screened.declared, runs, self.model, found) for found in data if found is not None]
+        verdicts = dict(zip(told, self.place.map(judged, questions), strict=True))
+        cosines = {k: least_cosine(verdict, label_of(truths[k])) for k, verdict in verdicts.items()}
+        right = [k for k in told if answer_to(verdicts[k].kind, label_of(truths[k]), cosines[k]) == "right"]
+        errors = dict(zip(right, self.holdout([truths[k] for k in right], [verdicts[k] for k in right]), strict=True))
+        seconds = (time.monotonic() - began) / len(cases)
+        rows = []
+        for k, truth in enumerate(truths):
+            verdict, found = verdicts.get(k), data[k]
+            before, after = errors.get(k, (NAN, NAN))
+            pours = 0 if found is None else REPLICATES * len(self.measurement.fit)
+            pours += (REPLICATES + 2 * FRESH) * len(self.measurement.holdout) if k in errors else 0
+            rows.append(
+                Row(
+                    number=truth.case.number,
+                    kind=truth.case.kind,
+                    label=label_of(truth),
+                    strength=truth.case.strength,
+                    amplitude=" ".join(f"{name}={'/'.join(f'{x:.4g}' for x in a)}" for name, a in truth.effects),
+                    shift=NAN if found is None else self.ruler.seen(truth.theta, self.means(found)),
+                    verdict=verdict.kind if verdict else OUT_OF_REACH + (truth.missing or "pours break off"),
+                    p_detect=min(g.p for g in verdict.gates[:2] if g.p is not None) if verdict else NAN,
+                    cosine=cosines.get(k, NAN),
+                    before=before,
+                    after=after,
+                    pours=pours,
+                    seconds=seconds,
+                )
+            )
+        return rows
+
+    def measured(self, truths: Sequence[Truth], conditions: Sequence[Condition]) -> list[Data | None]:
+        """Readings of the laboratories' pours; None where there is no such truth, or pours keep breaking off."""
+        data: list[Data | None] = [None if truth.missing else {} for truth in truths]
+        short = [k for k, found in enumerate(data) if found is not None]
+        for attempt in range(TRIES):
+            numbers = range(REPLICATES * (attempt + 1))
+            orders = [order for k in short for c in conditions for order in self.orders(truths[k], c, numbers)]
+            readings = iter(self.place.pour(orders, self.laboratory(conditions).room))
+            for k in short:
+                data[k] = {c.name: complete(next(readings) for _ in numbers)[:REPLICATES] for c in conditions}
+            short = [k for k in short if any(len(one) < REPLICATES for one in (data[k] or {}).values())]
+        return [None if k in short else found for k, found in enumerate(data)]
+
+    def orders(self, truth: Truth, condition: Condition, numbers: Sequence[int]) -> list[Order]:
+        """Pours ``numbers`` of a laboratory in a condition; their seeds follow from the number of the set."""
+        laboratory = self.laboratory(self.measurement.conditions)
+        c = self.measurement.conditions.index(condition)
+        points = [Point(f"set {truth.case.number}", k, truth.theta, truth.effects) for k in numbers]
+        outside = truth.case.label if truth.case.kind == "outside" else ""
+        return [Order(laboratory.scene(p, c), laboratory.seed(p, c), condition, outside) for p in points]
+
+    def laboratory(self, conditions: Sequence[Condition]) -> ModelPours:
+        """Scenes, seeds and room of the laboratories' pours: other seeds than the emulator's and the confirmation's."""
+        paths = [parameter.path for parameter in self.measurement.parameters]
+        return ModelPours(conditions, paths, self.place.store, self.place.crew.run_queue, root=ROOT)
+
+    def means(self, data: Data) -> FloatArray:
+        """Means of the summaries that the ruler knows, (D,)."""
+        found = []
+        for condition, kept in zip(self.measurement.fit, self.ruler.emulator.declared.conditions, strict=True):
+            values = dict(
+                zip(summary_names(condition), vectors(condition, data[condition.name]).mean(axis=0), strict=True)
+            )
+            found += [values[name] for name in kept.summaries]
+        return np.array(found)
+
+    def holdout(self, truths: Sequence[Truth], verdicts: Sequence[Verdict]) -> list[tuple[float, float]]:
+        """Error ÷ noise floor on the held-out conditions, of the calibrated base model and of the named one."""
+        conditions = self.measurement.holdout
+        paths = [parameter.path for parameter in self.measurement.parameters]
+        pours = ModelPours(conditions, paths, self.place.store, self.place.crew.run_queue, self.place.look_at_the_clock)
+        widths = [len(summary_names(condition)) for condition in conditions]
+        ratios = []
+        for data, verdict in zip(self.measured(truths, conditions), verdicts, strict=True):
+            blocks = [confirm(model, pours, FRESH, widths).blocks for model in models(verdict)]
+            if data is None or min(len(block) for model in blocks for block in model) < REPLICATES:
+                ratios.append((NAN, NAN))
+                continue
+            error = holdout_errors(
+                [
+                    HoldoutCondition(c.name, summary_names(c), vectors(c, data[c.name]), before, after)
+                    for c, before, after in zip(conditions, *blocks, strict=True)
+                ]
+            )[-1]
+            ratios.append((error.before / error.noise_floor, error.ratio))
+        return ratios
+
+
+def label_of(truth: Truth) -> str:
+    """The name that a right answer gives, that of the outside effect, or "none"."""
+    return "+".join(name for name, _ in truth.effects) or truth.case.label or "none"
+
+
+def vectors(condition: Condition, readings: Sequence[Reading]) -> FloatArray:
+    """Summaries of some pours, (pours, d)."""
+    return np.array([[summary.of(dict(reading)) for summary in summaries(condition)] for reading in readings])

@@ -1,0 +1,106 @@
+"""The blind campaign: laboratories pour, the diagnosis answers, and the answers are kept.
+
+The declared model is screened once, every effect as far as survivors are; each data set is judged from those runs. A
+set takes ``REPLICATES`` pours per fitted condition. Where the name is right, the held-out condition is measured too,
+and predicted by fresh pours of the calibrated base model and of the named one.
+"""
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from doe.diagnose.diagnosis import declare
+from doe.diagnose.pours import ModelPours
+from doe.diagnose.screen import Budget, Screened, further, screen
+from doe.measurement import Measurement
+from doe.store import Store, default_store
+from solver import EFFECTS
+from tests.blind.answers import Answers
+from tests.blind.laboratory import MODEL, declared_model
+from tests.blind.outside import AMPLITUDE
+from tests.blind.schedule import Case, cases
+from tests.blind.sets import Row, append_row, read_rows
+from tests.blind.table import campaign_text
+from tests.blind.truth import ruler
+from tests.blind.work_place import OutOfTimeError, WorkPlace
+
+__all__ = ["CampaignOrder", "campaign_text", "run_campaign"]
+
+SETS = "sets.csv"
+CHUNK = 6
+"""Data sets that are poured, judged and written together."""
+SAID_EVERY = 100
+"""Pours of the emulator between two lines of progress."""
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class CampaignOrder:
+    """What is asked for. ``minutes``: stop after so long, infinite by default. ``cases``: instead of the schedule's."""
+
+    out: Path
+    number: int
+    store: Path | None = None
+    minutes: float = float("inf")
+    workers: int | None = None
+    model: Path = MODEL
+    effects: tuple[str, ...] = tuple(EFFECTS)
+    budget: Budget = Budget()
+    cases: tuple[Case, ...] = ()
+
+    @cached_property
+    def asked(self) -> tuple[Case, ...]:
+        """The data sets."""
+        return self.cases or tuple(cases(self.number, self.effects, tuple(AMPLITUDE)))
+
+
+def run_campaign(order: CampaignOrder, say: Say) -> list[Row]:
+    """Answer the data sets that ``sets.csv`` does not hold yet, until all are there or the time is over."""
+    order.out.mkdir(parents=True, exist_ok=True)
+    path = order.out / SETS
+    known = {row.number for row in read_rows(path)}
+    todo = [case for case in order.asked if case.number not in known]
+    say(f"{path}: {len(known)} data sets are there, {len(todo)} to come")
+    deadline = time.monotonic() + 60.0 * order.minutes
+    if todo:
+        with ExitStack() as stack:
+            store = Store(order.store or default_store())
+            stack.callback(store.close)
+            place = stack.enter_context(WorkPlace(store, order.workers or os.cpu_count() or 1, deadline))
+            try:
+                _answer(order, todo, place, path, say)
+            except OutOfTimeError:
+                say(f"{order.minutes:g} min are over; all pours are kept, and the same command goes on")
+    asked = {case.number for case in order.asked}
+    return [row for row in read_rows(path) if row.number in asked]
+
+
+def emulated(order: CampaignOrder, measurement: Measurement, place: WorkPlace, say: Say) -> Screened:
+    """The declared model with every effect screened as far as survivors are; from the store where it is there."""
+    paths = [parameter.path for parameter in measurement.parameters]
+
+    def on_pour(what: str, left: int) -> None:
+        place.look_at_the_clock()
+        if left % SAID_EVERY == 0:
+            say(f"{what}: {left} pours to come")
+
+    model = ModelPours(measurement.fit, paths, place.store, place.crew.run_queue, on_pour)
+    screened = screen(declare(measurement, order.effects), model, order.budget, say)
+    return further(screened, order.effects, model, order.budget, say)
+
+
+def _answer(order: CampaignOrder, todo: Sequence[Case], place: WorkPlace, path: Path, say: Say) -> None:
+    measurement = declared_model(order.model)
+    screened = emulated(order, measurement, place, say)
+    widest = declare(measurement, order.effects).effects
+    answers = Answers(order.model, measurement, screened, ruler(screened.declared, screened.runs, widest), place)
+    for first in range(0, len(todo), CHUNK):
+        for row in answers.rows(todo[first : first + CHUNK]):
+            append_row(path, row)
+            say(f"{row.number}: {row.kind} {row.label} {row.strength:g}: {row.verdict} ({row.answer})")
+        place.look_at_the_clock()

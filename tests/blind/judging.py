@@ -1,0 +1,52 @@
+"""One data set on the way that anybody's data go: a folder, the reader, the verdict."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from doe.diagnose.decide import diagnose
+from doe.diagnose.diagnosis import observe
+from doe.diagnose.runs import Declared, Runs
+from doe.diagnose.verdict import Verdict
+from doe.measurement import load_measurement
+from tests.blind.laboratory import Reading, write_folder
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is asked of the diagnosis: the emulator's runs, and the readings of the fitted conditions."""
+
+    declared: Declared
+    runs: Runs
+    model: Path
+    measured: Mapping[str, Sequence[Reading]]
+
+
+def judged(question: Question) -> Verdict:
+    """The verdict on a data set that is written to a folder and read like any other."""
+    with TemporaryDirectory() as folder:
+        write_folder(Path(folder), question.model, question.measured)
+        return judged_folder(Path(folder), question.declared, question.runs)
+
+
+def judged_folder(folder: Path, declared: Declared, runs: Runs) -> Verdict:
+    """The verdict on the data set in ``folder``."""
+    return diagnose(declared, runs, observe(load_measurement(folder).fit))
+
+
+def cosine_between(verdict: Verdict, one: str, other: str) -> float:
+    """Cosine of the signatures of two effects in this data set; NaN where one was not in the race."""
+    names = verdict.signatures.names
+    if one not in names or other not in names:
+        return float("nan")
+    return float(verdict.signatures.cosines[names.index(one), names.index(other)])
+
+
+def least_cosine(verdict: Verdict, truth: str) -> float:
+    """Least cosine of the truth's signature and those of the effects that the verdict names; NaN where it has none."""
+    named = [name for label in verdict.names for name in label.split("+")]
+    found = [cosine_between(verdict, truth, name) for name in named]
+    return float(np.min(found)) if found else float("nan")

@@ -1,0 +1,146 @@
+"""The campaign in the small: 26 bodies a pour, one parameter, two effects, one set of each kind, from an empty store.
+
+It proves that the machinery works on real pours from end to end. How often the diagnosis is right it cannot prove;
+that takes the whole campaign. 115 s of processor time: slow, a minute on two idle cores.
+"""
+
+import dataclasses
+import re
+import shutil
+from contextlib import closing
+
+import numpy as np
+import pytest
+
+from doe.diagnose.screen import Budget
+from doe.store import Store
+from tests.blind.answers import Answers
+from tests.blind.campaign import CampaignOrder, emulated, run_campaign
+from tests.blind.judging import judged_folder
+from tests.blind.laboratory import MODEL, declared_model, write_folder
+from tests.blind.schedule import Case
+from tests.blind.truth import ruler, truth_of
+from tests.blind.work_place import WorkPlace
+
+pytestmark = pytest.mark.slow
+
+STRONG = 10.0
+CASES = (
+    Case(0, "null"),
+    Case(1, "effect", "rolling_resistance", STRONG),
+    Case(2, "outside", "sticky_funnel"),
+)
+SMALL = {r"mass = 0\.0\d+": "mass = 0.003", r"duration = [\d.]+": "duration = 0.6"}
+ONE_PARAMETER = r'"pair\.grain\.(grain\.restitution|steel\.static_friction)".*\n'
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory):
+    """The campaign's model, smaller."""
+    folder = tmp_path_factory.mktemp("small") / "model"
+    shutil.copytree(MODEL, folder)
+    for path in folder.glob("*.toml"):
+        text = path.read_text()
+        if path.stem not in ("head", "material"):
+            for old, new in SMALL.items():
+                text = re.sub(old, new, text)
+        path.write_text(re.sub(ONE_PARAMETER, "", text))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def order(model, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("campaign")
+    return CampaignOrder(
+        out=folder / "out",
+        number=len(CASES),
+        store=folder / "runs.sqlite",
+        workers=2,
+        model=model,
+        effects=("rolling_resistance", "plate_tilt"),
+        budget=Budget(base=16, middle=8, scaling=2, screening=8, further=0),
+        cases=CASES,
+    )
+
+
+@pytest.fixture(scope="module")
+def rows(order):
+    return run_campaign(order, print)
+
+
+def numbers(rows):
+    """What a set comes to, without the time that it took; as text, where NaN is NaN."""
+    return [str(dataclasses.replace(row, seconds=0.0)) for row in rows]
+
+
+def test_each_kind_of_truth_gets_its_answer(rows):
+    assert [row.number for row in rows] == [0, 1, 2]
+    null, effect, outside = rows
+    assert null.answer == "nothing"
+    assert (effect.answer, effect.verdict) == ("right", "effect:rolling_resistance")
+    assert outside.answer == "unexplained"
+
+
+def test_a_right_name_is_tried_on_held_out_data(rows):
+    _, effect, _ = rows
+    assert effect.after < effect.before
+    assert [row.after == row.after for row in rows] == [False, True, False]
+
+
+def test_a_campaign_goes_on_where_it_stopped(order, rows):
+    path = order.out / "sets.csv"
+    kept = path.read_text()
+    assert numbers(run_campaign(order, print)) == numbers(rows)
+    assert path.read_text() == kept
+
+
+def test_a_row_that_is_lost_comes_out_the_same_without_a_new_pour(order, rows):
+    path = order.out / "sets.csv"
+    kept = path.read_text().splitlines()
+    path.write_text("\n".join(kept[:2]) + "\n")
+    with closing(Store(order.store)) as store:
+        before = len(list(store.runs()))
+        again = run_campaign(order, print)
+        assert len(list(store.runs())) == before
+    assert numbers(again) == numbers(rows)
+
+
+def test_time_that_is_over_stops_it_cleanly(order, tmp_path):
+    said = []
+    late = dataclasses.replace(order, out=tmp_path, store=tmp_path / "empty.sqlite", minutes=0.0)
+    assert run_campaign(late, said.append) == []
+    assert "goes on" in said[-1]
+
+
+def test_the_verdict_depends_on_numbers_only(order, rows, tmp_path):
+    """Another name of the folder, other free text, other comments, rows in another order: the same verdict."""
+    with closing(Store(order.store)) as store, WorkPlace(store, 1) as place:
+        measurement = declared_model(order.model)
+        screened = emulated(order, measurement, place, print)
+        declared, runs = screened.declared, screened.runs
+        answers = Answers(order.model, measurement, screened, ruler(declared, runs, declared.effects), place)
+        (data,) = answers.measured([truth_of(CASES[1], answers.ruler)], measurement.fit)
+        assert place.poured == 0
+    first, second = tmp_path / "rolling_resistance", tmp_path / "plate_tilt"
+    for folder in (first, second):
+        folder.mkdir()
+        write_folder(folder, order.model, data)
+    disguise(second, np.random.default_rng(0))
+    one, other = (judged_folder(folder, declared, runs) for folder in (first, second))
+    assert one.kind == "effect:rolling_resistance"
+    assert other.to_dict() == one.to_dict()
+
+
+def disguise(folder, rng):
+    """Change everything in a data set that is no number."""
+    toml = folder / "measurement.toml"
+    text = toml.read_text()
+    for key in ("title", "source"):
+        text = re.sub(rf'^{key} = ".*"', f'{key} = "plate_tilt, surely"', text, flags=re.MULTILINE)
+    text = re.sub(r"^#.*$", "# no_missing_effect", text, flags=re.MULTILINE)
+    assert text != toml.read_text()
+    toml.write_text(text)
+    for path in folder.glob("*.csv"):
+        header, *lines = path.read_text().splitlines()
+        shuffled = [lines[k] for k in rng.permutation(len(lines))]
+        path.write_text("\n".join(["# tilted by 3 degrees", header, *shuffled]) + "\n")
