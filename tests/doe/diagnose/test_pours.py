@@ -28,8 +28,11 @@ def poured(monkeypatch, tmp_path):
     def run(queue, room):
         while queue:
             jobs.append(queue.popleft())
-            yield jobs[-1], SimpleNamespace(
-                scene=jobs[-1].scene, outcome=Outcome.MEASURED, message="", dt=1e-6, steps=1, wall_s=0.0
+            yield (
+                jobs[-1],
+                SimpleNamespace(
+                    scene=jobs[-1].scene, outcome=Outcome.MEASURED, message="", dt=1e-6, steps=1, wall_s=0.0
+                ),
             )
 
     def summaries(asked, record):
