@@ -8,6 +8,7 @@ be wider; all the pours belong to the declared model.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -24,10 +25,11 @@ Say = Callable[[str], None]
 REPLICATES = 6
 WANTED = 16.0
 """Shift [standard errors] at the end of a range: beyond the 10 at which an effect has to be told for certain."""
-TOO_FAR = 24.0
+TOO_LITTLE, TOO_FAR = 12.0, 24.0
+"""Shifts [standard errors] that will do; less only where the literature's bounds allow no more."""
 LEAST_STEP = 0.05
 """A range shrinks by no more than this factor at once: the answer to a strong effect may saturate."""
-ROUNDS = 4
+ROUNDS = 6
 
 
 @dataclass(frozen=True)
@@ -126,18 +128,31 @@ def widened(screened: Screened, names: Sequence[str], widest: Declared) -> Scree
 def scaled_range(
     declared: Declared, effect: Effect, model: ModelPours, number: int, centre: Sequence[Sequence[Pour]]
 ) -> tuple[Effect, float]:
-    """``effect`` with its bounds drawn in to where the summaries shift by about ``WANTED``, and the shift [σ]."""
-    shift = 0.0
+    """``effect`` with its bounds drawn in to where the summaries shift by about ``WANTED``, and the shift [σ].
+
+    From the whole range inward; back out, halfway on a logarithmic scale, where a step inward went too far.
+    """
+    found, share, inside, beyond = (effect, 0.0), 1.0, 0.0, math.inf
     for _ in range(ROUNDS):
-        points = scaling_points(declared.parameters, effect, number)
+        trial = _drawn_in(effect, share)
+        points = scaling_points(declared.parameters, trial, number)
         shift = whitened_shift(declared, centre, model.run(f"range of {effect.name}", points))
-        if shift <= TOO_FAR:
+        if shift > TOO_FAR:
+            beyond = share
+            share = max(share * max(LEAST_STEP, WANTED / shift), math.sqrt(inside * beyond))
+            if inside == 0.0:
+                found = _drawn_in(effect, share), shift
+            continue
+        inside, found = share, (trial, shift)
+        if shift >= TOO_LITTLE or math.isinf(beyond):
             break
-        factor = max(LEAST_STEP, WANTED / shift)
-        effect = replace(
-            effect, low=tuple(factor * low for low in effect.low), high=tuple(factor * high for high in effect.high)
-        )
-    return effect, shift
+        share = math.sqrt(inside * beyond)
+    return found
+
+
+def _drawn_in(effect: Effect, share: float) -> Effect:
+    low, high = (tuple(share * bound for bound in bounds) for bounds in (effect.low, effect.high))
+    return replace(effect, low=low, high=high)
 
 
 def whitened_shift(declared: Declared, centre: Sequence[Sequence[Pour]], moved: Sequence[Sequence[Pour]]) -> float:

@@ -86,7 +86,7 @@ def emulated(order: CampaignOrder, measurement: Measurement, place: WorkPlace, s
 
     def on_pour(what: str, left: int) -> None:
         place.look_at_the_clock()
-        if left % SAID_EVERY == 0:
+        if left > 0 and left % SAID_EVERY == 0:
             say(f"{what}: {left} pours to come")
 
     model = ModelPours(measurement.fit, paths, place.store, place.crew.run_queue, on_pour)

@@ -11,7 +11,7 @@ from scipy.stats import norm
 from solver.body import counts
 from solver.clump import fit_clump, scaled
 from solver.insertion import shuffled_components
-from solver.layout import layout
+from solver.layout import layout, outline
 from solver.material_file import load_material
 from solver.params import ParameterError
 from solver.record import Outcome
@@ -180,7 +180,9 @@ def test_a_body_of_another_size_is_the_solid_of_that_size():
     assert ours.fit.surface_rms == pytest.approx(fitted.fit.surface_rms, rel=1e-6)
     tables = layout(COARSE, np.zeros(2, dtype=np.int32), np.array([1.0, 2.0]))
     seed = COARSE.bodies[0].clump
-    assert tables.numbers[1] == pytest.approx([8 * seed.mass, *(32 * seed.inertia), 2 * seed.bounding_radius])
+    *lengths, sphericity = outline(COARSE.bodies[0])
+    dynamics = [8 * seed.mass, *(32 * seed.inertia), 2 * seed.bounding_radius]
+    assert tables.numbers[1] == pytest.approx([*dynamics, *(2 * length for length in lengths), sphericity])
     assert tables.spheres[len(seed.radii) :, 3] == pytest.approx(2 * seed.radii)
 
 

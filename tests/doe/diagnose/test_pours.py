@@ -1,60 +1,60 @@
-"""Points and pours: what is asked for is run once, and two models are never taken for each other."""
+"""Which pours are the same: model, number and condition, not the number alone."""
 
+import math
+from contextlib import closing
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
-from doe.diagnose.plan import Point
+from doe.diagnose import pours as module
+from doe.diagnose.confirm import Model, confirm
 from doe.diagnose.pours import ModelPours, Pour
-from doe.measurement.load import load_measurement
-from solver.assets import measurement_folder
+from doe.diagnose.runs import Condition, Declared
+from doe.diagnose.screen import whitened_shift
+from doe.store import Store
+from solver import Outcome, value
+from tests.blind.laboratory import OBSERVABLES, declared_model
 
-THETA = (0.57, 0.57, 0.73)
-
-
-class NothingStored:
-    def find(self, key):
-        return None
-
-
-class Counted(ModelPours):
-    """Answers a pour by the number of its job; nothing is simulated."""
-
-    def __init__(self, measurement):
-        self.jobs = []
-        paths = [parameter.path for parameter in measurement.parameters]
-        super().__init__(measurement.conditions, paths, NothingStored(), self.answer)
-
-    def answer(self, queue, room):
-        for job in queue:
-            self.jobs.append(job)
-            yield job, None
-
-    def _keep(self, what, point, condition, job, record):
-        return Pour((float(len(self.jobs)),), "measured")
+FRICTION = "pair.grain.grain.static_friction"
 
 
 @pytest.fixture
-def model():
-    return Counted(load_measurement(measurement_folder("trefoil_1")))
+def poured(monkeypatch, tmp_path):
+    """A model of one parameter whose every summary is that parameter, and the jobs that were run."""
+    condition = declared_model().fit[0]
+    jobs = []
+
+    def run(queue, room):
+        while queue:
+            jobs.append(queue.popleft())
+            yield (
+                jobs[-1],
+                SimpleNamespace(
+                    scene=jobs[-1].scene, outcome=Outcome.MEASURED, message="", dt=1e-6, steps=1, wall_s=0.0
+                ),
+            )
+
+    def summaries(asked, record):
+        return np.full(len(module.summary_names(asked)), float(value(record.scene, FRICTION)))
+
+    monkeypatch.setattr(module, "summaries_of_record", summaries)
+    with closing(Store(tmp_path / "runs.sqlite")) as store:
+        yield ModelPours([condition], [FRICTION], store, run), jobs
 
 
-def test_two_models_in_one_sequence_are_two_pours(model):
-    """The confirmation pours the base model and the winner with the same numbers, so that they begin alike."""
-    base = Point("confirm 12", 0, THETA)
-    rolling = Point("confirm 12", 0, THETA, (("rolling_resistance", (0.1,)),))
-    (one,), (other,) = model.run("confirmation", [base]), model.run("confirmation", [rolling])
-    assert one != other
-    assert len(model.jobs) == 4
-    assert [job.seed for job in model.jobs[:2]] == [job.seed for job in model.jobs[2:]]
-    assert model.jobs[2].scene.effect("rolling_resistance").rolling_friction == 0.1
+def test_two_models_are_confirmed_by_pours_of_their_own(poured):
+    pours, jobs = poured
+    width = len(OBSERVABLES) - 1
+    for friction in (0.5, 0.6, 0.5):
+        (block,) = confirm(Model((friction,)), pours, 3, [width]).blocks
+        assert block.tolist() == [[friction] * width] * 3
+    # The third asks for what the first has poured.
+    assert len(jobs) == 6
 
 
-def test_a_point_is_run_once(model):
-    point = Point("base", 0, THETA)
-    first, again = model.run("base", [point]), model.run("base", [point])
-    assert first == again
-    assert len(model.jobs) == model.run_now == 2
-
-
-def test_conditions_and_numbers_have_seeds_of_their_own(model):
-    model.run("base", [Point("base", k, THETA) for k in range(3)])
-    assert len({job.seed for job in model.jobs}) == 6
+def test_an_effect_under_which_no_pour_ends_is_infinitely_far():
+    declared = Declared((), (), (Condition("one", ("a", "b")),))
+    centre = [(Pour(tuple(row), "measured"),) for row in np.random.default_rng(0).normal(size=(8, 2))]
+    for moved in (Pour((math.nan, 1.0), "measured"), Pour((1.0, 1.0), "jammed")):
+        assert whitened_shift(declared, centre, [(moved,)]) == math.inf
