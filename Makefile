@@ -32,7 +32,7 @@ calibrate-quick: .venv/.ready ## the same chain with coarse shapes and less mass
 	$(EXPLORER) calibrate --headless --profile quick --out results/quick $(if $(wildcard results/quick),--resume)
 
 diagnose: .venv/.ready ## find the effect that a shipped measurement asks for, into results/diagnosis (resumes)
-	$(EXPLORER) diagnose trefoil_1 --out results/diagnosis --apply $(if $(wildcard results/diagnosis),--resume)
+	$(EXPLORER) diagnose trefoil_2 --out results/diagnosis --apply $(if $(wildcard results/diagnosis),--resume)
 
 test: .venv/.ready ## format check, lint, types, fast tests
 	$(BIN)/ruff format --check .
