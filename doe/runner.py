@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -104,6 +104,27 @@ Pours = Callable[[deque[Job], Sequence[Scene]], Iterable[tuple[Job, PourRecord]]
 """Runs the jobs of a queue, to which more may be added meanwhile, with room for the scenes named."""
 
 
+def stored_run(
+    job: Job, record: PourRecord, study: str, stage: str, label: str, seen: Mapping[str, float]
+) -> StoredRun:
+    """A finished job as the store keeps it; ``seen`` is what was read off it, NaN where nothing could be."""
+    return StoredRun(
+        key=run_key(job.scene, job.seed, code_version()),
+        study=study,
+        stage=stage,
+        label=label,
+        seed=job.seed,
+        code_version=code_version(),
+        outcome=str(record.outcome),
+        message=record.message,
+        parameters={path: value(job.scene, path) for path in parameters(job.scene)},
+        observables={name: number if math.isfinite(number) else None for name, number in seen.items()},
+        dt=record.dt,
+        steps=record.steps,
+        wall_s=record.wall_s,
+    )
+
+
 class PourRunner:
     """Runs settings as pours and keeps every run in the store.
 
@@ -172,27 +193,19 @@ class PourRunner:
 
     def _keep(self, stage: str, setting: Setting, replicate: int, attempt: int, job: Job, record: PourRecord) -> Run:
         seen = {name: found.value for name, found in observe(record).items()}
-        observables = {name: number if math.isfinite(number) else None for name, number in seen.items()}
-        key = run_key(job.scene, job.seed, code_version())
-        self._store.add(
-            StoredRun(
-                key=key,
-                study=self._study,
-                stage=stage,
-                label=setting.label,
-                seed=job.seed,
-                code_version=code_version(),
-                outcome=str(record.outcome),
-                message=record.message,
-                parameters={path: value(job.scene, path) for path in parameters(job.scene)},
-                observables=observables,
-                dt=record.dt,
-                steps=record.steps,
-                wall_s=record.wall_s,
-            )
+        stored = stored_run(job, record, self._study, stage, setting.label, seen)
+        self._store.add(stored)
+        return Run(
+            setting.label,
+            replicate,
+            attempt,
+            job.seed,
+            stored.outcome,
+            stored.message,
+            stored.observables,
+            stored.wall_s,
+            stored.key,
         )
-        outcome, message = str(record.outcome), record.message
-        return Run(setting.label, replicate, attempt, job.seed, outcome, message, observables, record.wall_s, key)
 
 
 def _reused(stored: StoredRun, setting: Setting, replicate: int, attempt: int) -> Run:

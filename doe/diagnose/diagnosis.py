@@ -11,7 +11,7 @@ from doe.diagnose.confirm import Confirmed, Model, confirm
 from doe.diagnose.decide import diagnose
 from doe.diagnose.holdout import HoldoutCondition, HoldoutError, holdout_errors
 from doe.diagnose.menu import Suggestion, next_experiment
-from doe.diagnose.pours import ModelPours, OnPour
+from doe.diagnose.pours import ModelPours, OnPour, effect_values
 from doe.diagnose.runs import Condition, Declared, Effect, Observed, Parameter
 from doe.diagnose.screen import Budget, Say, further, screen, widened
 from doe.diagnose.verdict import Verdict
@@ -122,7 +122,7 @@ def widest(name: str, scenes: Sequence[Scene]) -> Effect:
 
 def _possible(scene: Scene, name: str, amplitude: tuple[float, ...]) -> bool:
     try:
-        with_values(scene, {f"effect.{name}.{f}": a for f, a in zip(EFFECTS[name].amplitudes, amplitude, strict=True)})
+        with_values(scene, effect_values(name, amplitude))
     except ParameterError:
         return False
     return True

@@ -16,7 +16,7 @@ from doe.diagnose.profiles import profile_names, profile_of_record
 from doe.diagnose.runs import BASE, Declared, Runs
 from doe.measurement.measurement import Condition
 from doe.measurement.summaries import summaries_of_record, summary_names
-from doe.runner import Pours, seed_of
+from doe.runner import Pours, seed_of, stored_run
 from doe.store import Store, StoredRun, run_key
 from solver import (
     EFFECTS,
@@ -27,8 +27,6 @@ from solver import (
     Scene,
     SetUpEffect,
     code_version,
-    parameters,
-    value,
     with_values,
 )
 
@@ -100,8 +98,7 @@ class ModelPours:
         """The scene of ``point`` in a condition."""
         values: dict[str, float | str] = dict(zip(self._paths, point.theta, strict=True))
         for effect, amplitude in point.effects:
-            names = EFFECTS[effect].amplitudes
-            values |= {f"effect.{effect}.{n}": a for n, a in zip(names, amplitude, strict=True)}
+            values |= effect_values(effect, amplitude)
         return with_values(self._conditions[condition].scene, values)
 
     def seed(self, point: Point, condition: int) -> int:
@@ -116,7 +113,7 @@ class ModelPours:
                 if acts(name) != acting:
                     continue
                 for share in (-1.0, 1.0):
-                    ends = {f"effect.{name}.{field}": share * kind.strongest for field in kind.amplitudes}
+                    ends = effect_values(name, [share * kind.strongest for _ in kind.amplitudes])
                     with contextlib.suppress(ParameterError):
                         room.append(with_values(condition.scene, ends))
         return room
@@ -146,24 +143,8 @@ class ModelPours:
         numbers = tuple(float(x) for x in summaries_of_record(asked, record))
         heights = profile_of_record(asked, record)
         pour = Pour(numbers, str(record.outcome), heights)
-        kept = zip((*profile_names(asked), *summary_names(asked)), (*heights, *numbers), strict=True)
-        self._store.add(
-            StoredRun(
-                key=run_key(job.scene, job.seed, code_version()),
-                study="diagnose",
-                stage=what,
-                label=f"{point.sequence} {point.number}",
-                seed=job.seed,
-                code_version=code_version(),
-                outcome=str(record.outcome),
-                message=record.message,
-                parameters={path: value(job.scene, path) for path in parameters(job.scene)},
-                observables={name: x if math.isfinite(x) else None for name, x in kept},
-                dt=record.dt,
-                steps=record.steps,
-                wall_s=record.wall_s,
-            )
-        )
+        seen = dict(zip((*profile_names(asked), *summary_names(asked)), (*heights, *numbers), strict=True))
+        self._store.add(stored_run(job, record, "diagnose", what, f"{point.sequence} {point.number}", seen))
         return pour
 
 
@@ -171,6 +152,12 @@ def _numbers(stored: StoredRun, names: Sequence[str]) -> tuple[float, ...]:
     """What a stored run holds under ``names``; NaN for what it could not read, or does not hold."""
     found = (stored.observables.get(name) for name in names)
     return tuple(math.nan if x is None else x for x in found)
+
+
+def effect_values(effect: str, amplitude: Sequence[float]) -> dict[str, float]:
+    """Parameter path → value of an effect's amplitudes."""
+    names = EFFECTS[effect].amplitudes
+    return {f"effect.{effect}.{name}": one for name, one in zip(names, amplitude, strict=True)}
 
 
 def acts(effect: str) -> bool:

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from enum import IntEnum
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 
 class Stage(IntEnum):
@@ -32,10 +32,6 @@ class Stage(IntEnum):
     """Adds a torque against rolling."""
     TWISTING = 4
     """Adds a torque against turning about the normal."""
-
-
-class Declared(Protocol):
-    """What the range of a contact effect may depend on (a :class:`solver.scene.Scene`)."""
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 import json
 import os
 import sys
-import time
 
 import pytest
 
@@ -14,6 +13,7 @@ from explorer.viewer.diagnosis_panel import OWN, DiagnosisPanel, answer_markdown
 from explorer.viewer.guarded_server import guarded_server
 from solver import AssetNotFoundError
 from solver.assets import measurement_folder, shipped_measurements
+from tests.explorer.background import only_folder, wait_for
 from tests.explorer.diagnosed import result_of_case
 
 PROGRAM = """
@@ -38,18 +38,6 @@ def diagnosis(tmp_path, behaviour=""):
     program = tmp_path / "program.py"
     program.write_text(PROGRAM.replace("BEHAVIOUR", behaviour))
     return DiagnoseProcess(tmp_path / "out", tmp_path / "runs.sqlite", (sys.executable, str(program)))
-
-
-def wait_for(condition, patience=20.0):
-    end = time.monotonic() + patience
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.02)
-
-
-def only_folder(tmp_path):
-    (folder,) = [entry for entry in (tmp_path / "out").iterdir() if entry.is_dir()]
-    return folder
 
 
 def test_a_diagnosis_runs_to_its_end_at_lower_priority(tmp_path):

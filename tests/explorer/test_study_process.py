@@ -3,12 +3,12 @@
 import json
 import os
 import sys
-import time
 
 import pytest
 
 from explorer.command_process import BackgroundError, CommandStatus, advanced
 from explorer.study_process import CalibrationProcess
+from tests.explorer.background import only_folder, wait_for
 
 PROGRAM = """
 import json, pathlib, sys, time
@@ -33,18 +33,6 @@ def study(tmp_path, behaviour=""):
     return CalibrationProcess(
         tmp_path / "my study.toml", tmp_path / "out", tmp_path / "runs.sqlite", (sys.executable, str(program))
     )
-
-
-def wait_for(condition, patience=20.0):
-    end = time.monotonic() + patience
-    while not condition():
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.02)
-
-
-def only_folder(tmp_path):
-    (folder,) = [entry for entry in (tmp_path / "out").iterdir() if entry.is_dir()]
-    return folder
 
 
 def test_a_study_runs_to_its_end_at_lower_priority(tmp_path):
