@@ -18,8 +18,9 @@ def serve(
     record: Path | None = typer.Option(
         None, metavar="FILE.rrd", help="Record the session: the first pour here, the k-th in FILE_k.rrd."
     ),
+    replay: Path | None = typer.Option(None, metavar="FILE.rrd", help="Play a recording on the page instead."),
 ) -> None:
-    """Open the page: watch a pour, turn its parameters, calibrate."""
+    """Open the page: watch a pour, turn its parameters, calibrate; or play a recording."""
     from explorer.errors import CommandError
     from explorer.scene_file import (
         DEFAULT_MATERIAL,
@@ -29,8 +30,14 @@ def serve(
         study_scene,
         with_settings,
     )
+    from explorer.viewer.app import replay as replay_page
     from explorer.viewer.app import serve as serve_page
 
+    if replay and (study or material or set_ or record):
+        raise CommandError(f"--replay {replay}: a recording has its own material and parameters; leave the others out")
+    if replay:
+        replay_page(replay, host=host, port=port)
+        return
     if study and material:
         raise CommandError(f"--material {material}: the study {study} has a material of its own; name one of the two")
     file = None if material else study_path(study or DEFAULT_STUDY)

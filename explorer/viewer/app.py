@@ -75,6 +75,28 @@ def serve(
         page.run(stop)
 
 
+def replay(
+    recording: Path, *, host: str = "127.0.0.1", port: int = 8080, ready: Callable[[str], None] = print_address
+) -> None:
+    """Serve a page that plays ``recording``; blocks until SIGINT or SIGTERM (main thread only).
+
+    Raises:
+        CommandError: it is no recording of a pour.
+        PortError: the port is busy or the host is not of this machine.
+    """
+    # Imported here: rerun takes a second to load, and a live page needs none of it.
+    from explorer.logs.recording import read_recording
+    from explorer.viewer.replay_page import ReplayPage
+
+    read = read_recording(recording)
+    with stopped_by_signals() as stop, ExitStack() as ending:
+        server = guarded_server(host, port, LABEL)
+        ending.callback(server.stop)
+        page = ReplayPage(server, read, recording.name)
+        ready(f"http://{address(host)}:{server.get_port()}")
+        page.run(stop)
+
+
 def _recorder(path: Path) -> SessionRecorder:
     # Imported here: rerun takes a second to load, and most sessions are not recorded.
     from explorer.logs.session_recorder import SessionRecorder

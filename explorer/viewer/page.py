@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 from collections import deque
 from typing import Protocol
 
-import numpy as np
 import viser
 
 from explorer.diagnosis_process import DiagnosisProcess
@@ -27,6 +25,7 @@ from explorer.viewer.restart_panel import RestartPanel
 from explorer.viewer.run_panel import RunPanel
 from explorer.viewer.scene_nodes import SceneNodes
 from explorer.viewer.study_panel import StudyPanel
+from explorer.viewer.view import light, look_at_height
 from solver.assets import shipped_measurements
 from solver.scene import Scene
 
@@ -44,13 +43,6 @@ FRAME_INTERVAL = 1.0 / 30.0
 PANEL_INTERVAL = 0.2
 BACKGROUND_INTERVAL = 0.5
 """Seconds between two looks at studies and diagnoses."""
-
-VIEW_DIRECTION = (0.62, -0.75, 0.24)
-"""From the pile to the camera."""
-VIEW_FIELD = 0.6
-"""Vertical field of view [rad]."""
-FILL = 0.68
-"""Share of the height of the window that rig and feed take."""
 
 
 class Page:
@@ -74,7 +66,7 @@ class Page:
         self._frame_number = 0
         self._generation = status.generation
         light(server)
-        look(server, status.scene)
+        look_at_height(server, scene_height(status.scene))
         self._build_panels(status, study, study_name, diagnosis)
 
     def _build_panels(
@@ -139,7 +131,7 @@ class Page:
         if (scene.bodies, scene.rig) != (self._drawn.bodies, self._drawn.rig):
             self._nodes.remove()
             self._nodes, self._drawn = SceneNodes(self._server, scene), scene
-            look(self._server, scene)
+            look_at_height(self._server, scene_height(scene))
 
     def _show_panels(self, status: Status) -> None:
         readout = readout_html(status, self._events, self._notice)
@@ -153,21 +145,3 @@ class Page:
         if self._study is not None:
             self._study.show(self._notice)
         self._diagnosis.show(self._notice)
-
-
-def light(server: viser.ViserServer) -> None:
-    """viser's lamps with shadows, and a sky so weak that the colours of the components stay what they are."""
-    server.scene.configure_default_lights(enabled=True, cast_shadow=True)
-    server.scene.configure_environment_map("studio", environment_intensity=0.15)
-
-
-def look(server: viser.ViserServer, scene: Scene) -> None:
-    """Camera that new clients start with: pile, funnel and feed in one picture."""
-    height = scene_height(scene)
-    distance = height / FILL / (2.0 * math.tan(VIEW_FIELD / 2.0))
-    middle = (0.0, 0.0, 0.42 * height)
-    camera = server.initial_camera
-    camera.position = np.array(middle) + distance * np.array(VIEW_DIRECTION)
-    camera.look_at = middle
-    camera.fov = VIEW_FIELD
-    camera.near = 0.01

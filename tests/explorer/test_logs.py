@@ -15,6 +15,7 @@ from explorer.live.frames import Frame
 from explorer.live.messages import SessionState, Status
 from explorer.logs.pour_log import PourLog
 from explorer.logs.pour_recorder import recorder_of
+from explorer.logs.recording import read_recording
 from explorer.logs.session_recorder import SessionRecorder
 from explorer.scene_file import load_scene, with_settings
 from explorer.scene_meshes import rig_poses
@@ -210,6 +211,7 @@ def test_a_killed_writer_leaves_a_readable_file(tmp_path):
     done = subprocess.run([sys.executable, "-c", KILLED, str(path)], cwd=ROOT, timeout=60)
     assert done.returncode == -signal.SIGKILL
     assert len(rows(path, "/world/bodies/seed", "InstancePoses3D:translations")) == 20
+    assert len(read_recording(path).times) == 20
 
 
 def frame(number: int, generation: int, time: float) -> Frame:

@@ -1,0 +1,161 @@
+"""``explorer serve --replay``: a recording on the page, with a time slider, keys, curves and the log."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time as clock
+from functools import partial
+from html import escape
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import viser
+import viser.uplot
+
+from explorer.logs.recording import Recording
+from explorer.screen_units import checked
+from explorer.viewer.actions import Action, Actions
+from explorer.viewer.chart import LEAST_TOP_DEG
+from explorer.viewer.palette import ANGLE_LINE, AXIS_TEXT, BRAND, GRID_LINE, MASS_LINE
+from explorer.viewer.replay_nodes import ReplayNodes, highest
+from explorer.viewer.run_panel import FASTEST, SLOWEST
+from explorer.viewer.timeline import Timeline
+from explorer.viewer.view import light, look_at_height
+
+FRAME_INTERVAL = 1.0 / 30.0
+EVENTS_SHOWN = 6
+SLIDER_STEP = 1e-3
+"""[s]; about as fine as frames lie."""
+CURVES = (("angle_of_repose_deg", "angle [°]", ANGLE_LINE), ("discharged_mass_g", "mass below [g]", MASS_LINE))
+"""Recorded curve, label, colour."""
+
+Array = npt.NDArray[np.float64]
+
+
+class ReplayPage:
+    """What a browser sees of ``recording``."""
+
+    def __init__(self, server: viser.ViserServer, recording: Recording, name: str) -> None:
+        self._server, self._recording = server, recording
+        self._timeline, self._actions = Timeline(recording.times), Actions()
+        light(server)
+        look_at_height(server, highest(recording))
+        self._nodes = ReplayNodes(server, recording)
+        self._shown = math.nan
+        server.gui.configure_theme(
+            dark_mode=True, show_share_button=False, show_logo=False, brand_color=BRAND, control_width="large"
+        )
+        server.gui.main_panel.dock_right()
+        server.gui.add_markdown(f"**Replay** of `{name.replace('`', '')}`")
+        self._controls()
+        self._text = server.gui.add_html("")
+        self._plots = [_plot(server, recording, *curve) for curve in CURVES if curve[0] in recording.curves]
+        with server.gui.add_folder("Parameters", expand_by_default=False):
+            server.gui.add_markdown(recording.parameters)
+        if recording.outcome:
+            with server.gui.add_folder("Outcome", expand_by_default=False):
+                server.gui.add_markdown(recording.outcome)
+
+    def _controls(self) -> None:
+        gui, timeline = self._server.gui, self._timeline
+        acts: dict[str, Action] = {
+            "Play / pause": timeline.toggle,
+            "◀ frame": partial(timeline.step, -1),
+            "frame ▶": partial(timeline.step, 1),
+            "To start": partial(timeline.go_to, timeline.first),
+        }
+        keys: dict[str, Any] = dict(zip(acts, ("space", "arrowleft", "arrowright", "R"), strict=True))
+        buttons = gui.add_button_group(
+            "Time", tuple(acts), hint="Keys: space plays and pauses, arrows step a frame, R goes to the start."
+        )
+
+        @buttons.on_click
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None and event.target.value in acts:
+                self._actions.post(acts[event.target.value])
+
+        for label, key in keys.items():
+            gui.add_command(label, hotkey=key).on_trigger(partial(self._trigger, acts[label]))
+        last = max(timeline.last, timeline.first + SLIDER_STEP)
+        self._slider = gui.add_slider("Time [s]", timeline.first, last, SLIDER_STEP, timeline.first)
+
+        @self._slider.on_update
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None:
+                value = event.target.value
+                self._actions.post(lambda: timeline.go_to(checked(value, timeline.first, last, "time")))
+
+        speed = gui.add_slider("Speed", SLOWEST, FASTEST, SLOWEST, 1.0, hint="Recorded seconds per second.")
+
+        @speed.on_update
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None:
+                value = event.target.value
+                self._actions.post(lambda: setattr(timeline, "speed", checked(value, SLOWEST, FASTEST, "speed")))
+
+    def _trigger(self, act: Action, event: object) -> None:
+        self._actions.post(act)
+
+    def run(self, stop: threading.Event) -> None:
+        """Keep the page up to date until ``stop`` is set."""
+        before = clock.monotonic()
+        while not stop.is_set():
+            now = clock.monotonic()
+            self._actions.carry_out()
+            self._timeline.pass_by(now - before)
+            before = now
+            self.show()
+            stop.wait(max(0.0, FRAME_INTERVAL - (clock.monotonic() - now)))
+
+    def show(self) -> None:
+        """Draw the present moment, if it is another than the one that is drawn."""
+        time = self._timeline.time
+        if time != self._shown:
+            self._shown = time
+            with self._server.atomic():
+                self._nodes.show(time)
+                self._slider.value = round(time, 6)  # type: ignore[misc]
+                for name, plot in self._plots:
+                    plot.data = columns(*self._recording.curves[name], time)
+        text = moment_html(self._recording, time, self._timeline.playing)
+        if self._text.content != text:
+            self._text.content = text
+
+
+def _plot(server: viser.ViserServer, recording: Recording, name: str, label: str, colour: str) -> tuple[str, Any]:
+    data = columns(*recording.curves[name], recording.times[0])
+    top = LEAST_TOP_DEG if name == "angle_of_repose_deg" else float(np.nanmax(data[1], initial=1.0))
+    axis: Any = {"stroke": AXIS_TEXT, "grid": {"stroke": GRID_LINE}, "size": 38}
+    plot = server.gui.add_uplot(
+        data,
+        (
+            viser.uplot.Series(label="time [s]"),
+            viser.uplot.Series(label=label, stroke=colour, width=2, points={"show": False}),
+            viser.uplot.Series(label="now", stroke=colour, width=0, points={"show": True, "size": 9, "fill": colour}),
+        ),
+        scales={"x": viser.uplot.Scale(time=False), "y": viser.uplot.Scale(range=(0.0, 1.05 * top))},
+        axes=(axis, axis | {"label": label, "labelSize": 18}),
+        aspect=3.0,
+        padding=(8, 8, 0, 0),
+    )
+    return name, plot
+
+
+def columns(times: Array, values: Array, now: float) -> tuple[Array, Array, Array]:
+    """Times, values, and the value at ``now`` [s] alone, NaN elsewhere."""
+    marked = np.full(len(times), np.nan)
+    k = int(np.searchsorted(times, now, side="right")) - 1
+    if k >= 0:
+        marked[k] = values[k]
+    return times, values, marked
+
+
+def moment_html(recording: Recording, time: float, playing: bool) -> str:
+    """The moment in words and numbers, and what has happened last. Texts of the file are escaped."""
+    bodies = sum(0 if (there := c.at(time)) is None else len(there.scale) for c in recording.components)
+    lines = [f"{'playing' if playing else 'paused'} · {time:.3f} of {recording.times[-1]:.3f} s · {bodies} bodies"]
+    happened = [f"{when:.3f} s  {text}" for when, text in recording.events if when <= time + 1e-9]
+    lines += happened[: -EVENTS_SHOWN - 1 : -1]
+    return "<div style='padding:0 0.75em; font-size:0.82em'>" + "<br>".join(map(escape, lines)) + "</div>"

@@ -1,0 +1,106 @@
+"""The page of a recording: what is drawn at a moment is what was recorded, whoever moves the slider."""
+
+import threading
+import time
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from explorer.logs.pour_log import PourLog
+from explorer.logs.recording import read_recording
+from explorer.scene_file import load_scene
+from explorer.viewer.guarded_server import guarded_server
+from explorer.viewer.replay_page import ReplayPage, columns, moment_html
+from tests.explorer.test_logs import poses
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    path = tmp_path_factory.mktemp("replay") / "pour.rrd"
+    with PourLog(path, load_scene("funnel"), seed=1) as log:
+        log.event(0.0, "phase: fill")
+        for k in range(4):
+            curves = {"angle_of_repose_deg": 20.0 + k, "discharged_mass_g": float(k)}
+            log.frame(0.02 * k, poses(*[0] * (k + 1)), curves, gate_shut=k < 2)
+        log.event(0.05, "<b>friction</b>: 0.5 → 0.6")
+    return read_recording(path)
+
+
+@pytest.fixture
+def page(recording):
+    server = guarded_server("127.0.0.1", 0, "test")
+    yield ReplayPage(server, recording, "pour.rrd")
+    server.stop()
+
+
+def drawn(page):
+    """Positions of the seeds that are not hidden."""
+    ((_, node),) = page._nodes._components
+    return node.batched_positions[node.batched_scales > 0]
+
+
+def gate(page):
+    return next(node for surface, node in page._nodes._surfaces if surface.shape.name == "gate")
+
+
+def test_a_moment_is_drawn_as_it_was_recorded(page, recording):
+    page._timeline.go_to(0.03)
+    page.show()
+    assert np.array_equal(drawn(page), recording.components[0].at(0.02).position)
+    assert page._nodes._surfaces
+    assert gate(page).visible
+    page._timeline.go_to(0.06)
+    page.show()
+    assert len(drawn(page)) == 4
+    assert not gate(page).visible
+    assert page._slider.value == pytest.approx(0.06)
+
+
+def entered(slider, value):
+    """What viser does when a browser moves a slider."""
+    for callback in slider._impl.update_cb:
+        callback(SimpleNamespace(client_id=0, client=None, target=SimpleNamespace(value=value)))
+
+
+def test_the_slider_moves_the_recording_and_bad_input_does_not(page):
+    page._timeline.playing = False
+    entered(page._slider, 0.04)
+    page._actions.carry_out()
+    page.show()
+    assert len(drawn(page)) == 3
+    for bad in (float("nan"), None, "text"):
+        entered(page._slider, bad)
+        assert "is not a finite number" in page._actions.carry_out()
+        assert page._timeline.time == pytest.approx(0.04)
+    entered(page._slider, 1e9)
+    page._actions.carry_out()
+    assert page._timeline.time == pytest.approx(0.06)
+
+
+def test_it_plays_by_itself_to_the_end(page):
+    stop = threading.Event()
+    loop = threading.Thread(target=page.run, args=(stop,))
+    loop.start()
+    deadline = time.monotonic() + 20.0
+    while page._timeline.playing and time.monotonic() < deadline:
+        time.sleep(0.02)
+    time.sleep(0.1)
+    stop.set()
+    loop.join()
+    assert page._timeline.time == pytest.approx(0.06)
+    assert len(drawn(page)) == 4
+
+
+def test_the_moment_is_told_and_texts_of_the_file_are_escaped(recording):
+    early, late = (moment_html(recording, time, playing=False) for time in (0.03, 0.06))
+    assert "paused · 0.030 of 0.060 s · 2 bodies" in early
+    assert "friction" not in early
+    assert "&lt;b&gt;friction&lt;/b&gt;" in late
+
+
+def test_the_curve_is_marked_where_time_stands():
+    times, values, marked = columns(np.array([0.0, 0.1, 0.2]), np.array([1.0, 2.0, 3.0]), 0.15)
+    assert (len(times), values.tolist()) == (3, [1.0, 2.0, 3.0])
+    assert np.nansum(marked) == 2.0
+    assert np.isnan(columns(times, values, -1.0)[2]).all()
