@@ -25,6 +25,7 @@ from explorer.viewer.restart_panel import RestartPanel
 from explorer.viewer.run_panel import RunPanel
 from explorer.viewer.scene_nodes import SceneNodes
 from explorer.viewer.study_panel import StudyPanel
+from explorer.viewer.tour import Tour
 from explorer.viewer.view import light, look_at_height
 from solver.assets import shipped_measurements
 from solver.scene import Scene
@@ -77,6 +78,7 @@ class Page:
             dark_mode=True, show_share_button=False, show_logo=False, brand_color=BRAND, control_width="large"
         )
         server.gui.main_panel.dock_right()
+        Tour(server)
         tabs = server.gui.add_tab_group()
         with tabs.add_tab("Pour", viser.Icon.PLAYER_PLAY):
             RunPanel(server, session, post)
