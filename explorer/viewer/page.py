@@ -102,19 +102,18 @@ class Page:
             self._notice = self._notice if notice is None else notice
             frame = self._session.frame()
             status = self._session.status()
-            self._take_events()
+            happened = self._session.new_events()
+            self._events.extend(happened)
             with self._server.atomic():
                 self._show_bodies(status, frame)
-                if began >= panels_due or notice is not None:
+                # A change that the solver has taken over is told at once: somebody's hand is on the slider.
+                if began >= panels_due or notice is not None or happened:
                     panels_due = began + PANEL_INTERVAL
                     self._show_panels(status)
                 if began >= background_due:
                     background_due = began + BACKGROUND_INTERVAL
                     self._show_background()
             stop.wait(max(0.0, FRAME_INTERVAL - (time.monotonic() - began)))
-
-    def _take_events(self) -> None:
-        self._events.extend(self._session.new_events())
 
     def _show_bodies(self, status: Status, frame: Frame | None) -> None:
         if status.generation != self._generation:

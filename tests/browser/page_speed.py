@@ -1,0 +1,150 @@
+"""How fast the page is, measured over its socket, without a browser: `make page-speed`.
+
+    frames/s         windows that move bodies, sent while the coarse pour runs
+    real time        simulated seconds per second, as the readout tells it, median over the pour
+    echo             from a slider's new value to the line "In the solver", median and 95th percentile [ms]
+
+each alone, and while a study of the quick profile runs at low priority on the same machine.
+"""
+
+import asyncio
+import re
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import msgspec
+import viser
+import websockets
+import zstandard
+
+POUR = ("body.spheres=coarse", "rig.mass=30g")
+ECHOES = 40
+POUR_SECONDS = 8.0
+CAMERA = {
+    "type": "ViewerCameraMessage",
+    "wxyz": (1.0, 0.0, 0.0, 0.0),
+    "position": (1.0, 0.0, 0.0),
+    "fov": 0.6,
+    "near": 0.01,
+    "far": 100.0,
+    "image_height": 600,
+    "image_width": 800,
+    "look_at": (0.0, 0.0, 0.0),
+    "up_direction": (0.0, 0.0, 1.0),
+}
+
+
+class Socket:
+    """A client of the page. Keeps the labels of the inputs and the texts that it was sent last."""
+
+    def __init__(self, socket):
+        self._socket, self.labels, self.texts = socket, {}, {}
+
+    async def send(self, message):
+        await self._socket.send(msgspec.msgpack.encode(message))
+
+    async def window(self):
+        """The messages of the next window."""
+        raw = await self._socket.recv()
+        size, packed = int.from_bytes(raw[:8], "little"), int.from_bytes(raw[8:16], "little")
+        text = zstandard.ZstdDecompressor().decompress(raw[16 : 16 + packed], size)
+        messages = msgspec.msgpack.decode(text)["messages"]
+        for message in messages:
+            props = message.get("props") or {}
+            if isinstance(props, dict) and "label" in props:
+                self.labels.setdefault(props["label"], message["uuid"])
+            if isinstance(props, dict) and "content" in props:
+                self.texts[message["uuid"]] = props["content"]
+            if message["type"] == "GuiUpdateMessage" and "content" in message["updates"]:
+                self.texts[message["uuid"]] = message["updates"]["content"]
+        return messages
+
+
+def moves_bodies(messages):
+    return any(m["type"] == "SceneNodeUpdateMessage" and "batched_positions" in m["updates"] for m in messages)
+
+
+async def until(page, told, patience=120.0):
+    """Take in windows until ``told`` holds for some text of the page."""
+    end = time.perf_counter() + patience
+    while not any(told(text) for text in page.texts.values()):
+        assert time.perf_counter() < end, "waited in vain"
+        await asyncio.wait_for(page.window(), patience)
+
+
+async def echo_ms(page, slider, value):
+    """Milliseconds until the solver's own line tells ``value``."""
+    began = time.perf_counter()
+    await page.send({"type": "GuiUpdateMessage", "uuid": slider, "updates": {"value": value}})
+    await until(page, lambda text: f"Static friction</span> {value:g} " in text, 20.0)
+    return 1e3 * (time.perf_counter() - began)
+
+
+async def measure(port):
+    async with websockets.connect(
+        f"ws://127.0.0.1:{port}",
+        subprotocols=[f"viser-v{viser.__version__}"],
+        origin=f"http://127.0.0.1:{port}",
+        max_size=None,
+        compression=None,
+    ) as socket:
+        page = Socket(socket)
+        await page.send(CAMERA)
+        await until(page, lambda text: re.search(r"Real-time factor</span><span>[0-9.]", text))
+        factors, frames, began = [], 0, time.perf_counter()
+        while time.perf_counter() < began + POUR_SECONDS:
+            frames += moves_bodies(await page.window())
+            factors += [
+                float(found[1])
+                for text in page.texts.values()
+                if (found := re.search(r"Real-time factor</span><span>([0-9.]+)", text))
+            ]
+        wall = time.perf_counter() - began
+        slider = page.labels["Static friction"]
+        echoes = [await echo_ms(page, slider, round(0.3 + 0.01 * k, 2)) for k in range(ECHOES)]
+        return frames / wall, statistics.median(factors), echoes
+
+
+def tell(name, frames, factor, echoes):
+    ordered = sorted(echoes)
+    print(
+        f"{name:18} {frames:5.1f} frames/s   real time {factor:4.2f}   echo {statistics.median(echoes):5.0f} ms, "
+        f"95 % {ordered[int(0.95 * len(ordered))]:5.0f} ms ({len(echoes)} changes)"
+    )
+
+
+def serve():
+    settings = [part for one in POUR for part in ("--set", one)]
+    server = subprocess.Popen(
+        [sys.executable, "-m", "explorer", "serve", "--port", "0", *settings], stdout=subprocess.PIPE, text=True
+    )
+    return server, int(re.search(r":(\d+) ", server.stdout.readline())[1])
+
+
+def main():
+    for name, study in (("alone", False), ("beside a study", True)):
+        with tempfile.TemporaryDirectory() as folder:
+            command = ["nice", "-n", "10", sys.executable, "-m", "explorer", "calibrate", "--headless"]
+            command += ["--profile", "quick", "--out", f"{folder}/out", "--store", f"{folder}/runs.sqlite"]
+            running = subprocess.Popen(command, stdout=subprocess.DEVNULL) if study else None
+            if running:
+                while not list(Path(folder).glob("out/progress.jsonl")):
+                    time.sleep(0.5)
+                time.sleep(15.0)  # its workers have compiled
+            server, port = serve()
+            try:
+                tell(name, *asyncio.run(measure(port)))
+            finally:
+                server.terminate()
+                server.wait(20)
+                if running:
+                    running.terminate()
+                    running.wait(30)
+
+
+if __name__ == "__main__":
+    main()
