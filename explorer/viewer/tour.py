@@ -20,9 +20,9 @@ STOPS = (
     Stop(
         "The pour",
         "Bodies fall through the funnel and pile up, computed while you watch. **Space** pauses and plays, the **right "
-        "arrow** goes on by 10 ms, **R** pours anew. Drag to turn the view, scroll to come closer.\n\nThe big number is "
-        "the angle of repose of the pile as it lies, ± its spread over the flanks. The lines below it say what the "
-        "solver is doing, and how fast compared with real time.",
+        "arrow** goes on by 10 ms, **R** pours anew. Drag to turn the view, scroll to come closer.\n\n"
+        "The big number is the angle of repose of the pile as it lies, ± its spread over the flanks. The lines below "
+        "it say what the solver is doing, and how fast compared with real time.",
     ),
     Stop(
         "Turn a parameter",
@@ -59,7 +59,7 @@ class Tour:
                 open_stop(event.client.gui, 0)
 
 
-def open_stop(gui: viser.GuiApi, k: int) -> viser.GuiModalHandle:
+def open_stop(gui: viser.GuiApi, k: int) -> Any:
     """Open window ``k``; its buttons lead to the next one, back, or out."""
     stop = STOPS[k]
     modal = gui.add_modal(f"{stop.title}   ({k + 1} of {len(STOPS)})")
@@ -79,7 +79,7 @@ def ways(k: int) -> tuple[tuple[str, int | None], ...]:
     return forward + back + leave
 
 
-def _way(gui: viser.GuiApi, modal: viser.GuiModalHandle, label: str, target: int | None) -> None:
+def _way(gui: viser.GuiApi, modal: Any, label: str, target: int | None) -> None:
     @gui.add_button(label).on_click
     def _(event: viser.GuiEvent[Any]) -> None:
         modal.close()
