@@ -24,6 +24,7 @@ from explorer.viewer.readout import readout_html
 from explorer.viewer.restart_panel import RestartPanel
 from explorer.viewer.run_panel import RunPanel
 from explorer.viewer.scene_nodes import SceneNodes
+from explorer.viewer.second_pile import SecondPile
 from explorer.viewer.study_panel import StudyPanel
 from explorer.viewer.tour import Tour
 from explorer.viewer.view import light, look_at_height
@@ -86,12 +87,17 @@ class Page:
             self._chart = Chart(server)
             self._live = LivePanel(server, session, status.scene, post)
             self._restart = RestartPanel(server, session, status.scene, status.seed, post)
+            self._second = SecondPile(server, session, post)
         self._study: StudyPanel | None = None
         if study is not None:
             with tabs.add_tab("Calibrate", viser.Icon.TARGET):
                 self._study = StudyPanel(server, study, study_name, post)
         with tabs.add_tab("Diagnose", viser.Icon.STETHOSCOPE):
             self._diagnosis = DiagnosisPanel(server, diagnosis, shipped_measurements(), post)
+
+    def close(self) -> None:
+        """End what the page itself has started."""
+        self._second.close()
 
     def run(self, stop: threading.Event) -> None:
         """Keep the page up to date until ``stop`` is set."""
@@ -106,6 +112,7 @@ class Page:
             self._events.extend(happened)
             with self._server.atomic():
                 self._show_bodies(status, frame)
+                self._second.show_bodies()
                 # A change that the solver has taken over is told at once: somebody's hand is on the slider.
                 if began >= panels_due or notice is not None or happened:
                     panels_due = began + PANEL_INTERVAL
@@ -141,6 +148,7 @@ class Page:
         self._chart.show(status)
         self._live.show(status)
         self._restart.show(status)
+        self._second.show(status)
 
     def _show_background(self) -> None:
         if self._study is not None:

@@ -41,16 +41,16 @@ class Poses:
 
 
 class SceneNodes:
-    """Nodes of one scene; :meth:`show` moves the bodies and the surfaces of the rig."""
+    """Nodes of one scene, below the node ``root``; :meth:`show` moves the bodies and the surfaces of the rig."""
 
-    def __init__(self, server: viser.ViserServer, scene: Scene) -> None:
+    def __init__(self, server: viser.ViserServer, scene: Scene, root: str = "") -> None:
         self._numbers = body_counts(scene)
         self._bodies: list[Any] = []
         for k, (body, n) in enumerate(zip(scene.bodies, self._numbers, strict=True)):
             mesh, none = body_triangles(body), nowhere(n)
             self._bodies.append(
                 server.scene.add_batched_meshes_simple(
-                    f"/bodies/{k}",
+                    f"{root}/bodies/{k}",
                     mesh.vertices,
                     mesh.faces,
                     batched_wxyzs=none.quaternion,
@@ -62,7 +62,7 @@ class SceneNodes:
                 if n > 0
                 else None
             )
-        self._rig = rig_nodes(server, scene)
+        self._rig = rig_nodes(server, scene, root)
         self._surface_names, self._at_first = scene.rig.surface_names, rig_poses(scene.rig)
         self._surfaces = self._at_first
 
@@ -129,7 +129,7 @@ def component_colour(k: int) -> Colour:
     return BODY_COLOURS[k % len(BODY_COLOURS)]
 
 
-def rig_nodes(server: viser.ViserServer, scene: Scene) -> dict[str, Any]:
+def rig_nodes(server: viser.ViserServer, scene: Scene, root: str = "") -> dict[str, Any]:
     """Nodes of the rig by name: its surfaces with the rims of shells, and circles on the plate as a scale."""
     nodes: dict[str, Any] = {}
     poses, rims = rig_poses(scene.rig), rim_circles(scene.rig)
@@ -137,7 +137,7 @@ def rig_nodes(server: viser.ViserServer, scene: Scene) -> dict[str, Any]:
         clear = name != PLATE_NAME
         widened = 1.0 if clear else PLATE_RADIUS / float(np.hypot(*mesh.vertices[:, :2].T).max())
         nodes[name] = server.scene.add_mesh_simple(
-            f"/rig/{name}",
+            f"{root}/rig/{name}",
             mesh.vertices,
             mesh.faces,
             scale=(widened, widened, 1.0),
@@ -153,15 +153,15 @@ def rig_nodes(server: viser.ViserServer, scene: Scene) -> dict[str, Any]:
         if name in rims:
             ends = np.concatenate([circle(radius, height) for radius, height in rims[name]])
             # Below the surface's node: it moves, and goes, with that.
-            server.scene.add_line_segments(f"/rig/{name}/rims", ends, RIM, thickness=LINE)
-    return nodes | (_scale(server) if PLATE_NAME in nodes else {})
+            server.scene.add_line_segments(f"{root}/rig/{name}/rims", ends, RIM, thickness=LINE)
+    return nodes | (_scale(server, root) if PLATE_NAME in nodes else {})
 
 
-def _scale(server: viser.ViserServer) -> dict[str, Any]:
+def _scale(server: viser.ViserServer, root: str) -> dict[str, Any]:
     radii = np.arange(RING_SPACING, PLATE_RADIUS + 1e-9, RING_SPACING)
     # Above the plate by the lines' thickness, so that they are not lost in it.
     rings = np.concatenate([circle(radius, LINE) for radius in radii])
-    return {"scale": server.scene.add_line_segments("/rig/scale", rings, RING, thickness=LINE)}
+    return {"scale": server.scene.add_line_segments(f"{root}/rig/scale", rings, RING, thickness=LINE)}
 
 
 def circle(radius: float, height: float) -> Array:
