@@ -91,16 +91,20 @@ def campaign_text(rows: Sequence[Row]) -> str:
 
 
 def matrix_text(rows: Sequence[Row]) -> str:
-    """Truth by answer: number of sets."""
+    """Truth by answer: number of sets; and the root mean square of the shift that was seen [σ].
+
+    A strength is set by the emulator, whose own error makes what is poured weaker than what was asked for.
+    """
     groups = sorted(
         {group_of(row) for row in rows}, key=lambda name: (name[:2] != "no", name[:3] == "out", len(name), name)
     )
     counted = Counter((group_of(row), row.answer) for row in rows)
-    body = [
-        [group, str(sum(group_of(row) == group for row in rows)), *(str(counted[group, answer]) for answer in ANSWERS)]
-        for group in groups
-    ]
-    return text_table(["truth", "sets", *ANSWERS], body)
+    body = []
+    for group in groups:
+        own = [row for row in rows if group_of(row) == group]
+        seen = math.sqrt(sum(row.shift**2 for row in own) / len(own))
+        body.append([group, str(len(own)), f"{seen:.1f}", *(str(counted[group, answer]) for answer in ANSWERS)])
+    return text_table(["truth", "sets", "seen σ", *ANSWERS], body)
 
 
 def effects_text(rows: Sequence[Row]) -> str:

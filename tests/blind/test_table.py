@@ -1,6 +1,7 @@
 """Counting: intervals against statsmodels, answers and targets of made-up rows by hand."""
 
 import math
+import re
 
 import pytest
 from statsmodels.stats.proportion import proportion_confint
@@ -67,5 +68,7 @@ def test_targets_by_hand():
     assert [target.met for target in found.values()] == [True, False, True, None, False, False, True, False]
     text = campaign_text(rows)
     assert "57 data sets judged, 1 out of reach" in text
+    # Seen shifts of 9.5 σ each, and the answers of the five sets.
+    assert re.search(r"effect, 10 σ +5 +9\.5 +0 +4 +0 +0 +1\n", text)
     assert "wrong, set 54: a at 10 σ → effect:b" in text
     assert "out of reach: bounds, not counted: a at 6 σ" in text
