@@ -1,6 +1,7 @@
 """From runs and data to a verdict: emulate, calibrate, detect, race, and only then name.
 
-Source of the decision rule: the three gates of gates.py; effects that the data could not see are not in the race.
+Source of the decision rule: the gates of gates.py and rivals.py; effects that the data could not see are not in the
+race.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from doe.diagnose.emulator import Emulator, fit_emulator
 from doe.diagnose.freed import freed_parameters
 from doe.diagnose.gates import Adequacy, Detection, Gate, Limits, adequate, detect, evidence_weights, unambiguous
 from doe.diagnose.race import Race, race_pairs, race_singles
+from doe.diagnose.rivals import told_apart
 from doe.diagnose.runs import Declared, Observed, Runs, select_summaries
 from doe.diagnose.signatures import Reach, Whitening, reach, whitening
 from doe.diagnose.specificity import specific
@@ -146,25 +148,35 @@ def _conclude(
     fit = race.fits[race.best]
     adequacy = adequate(emulator, evidence, fit, race.best, limits, bootstrap, seed + 1)
     if adequacy.gate.passed:
-        gate, near = unambiguous(race.criteria, limits)
-        return Conclusion(*_named("effect", near), (adequacy.gate, gate), fit, adequacy)
+        near, gates = _near(emulator, evidence, race, limits, seed + 4)
+        return Conclusion(*_named("effect", near), (adequacy.gate, *gates), fit, adequacy)
     pairs = race_pairs(emulator, evidence, base, fit, raced)
-    gates = [adequacy.gate]
+    asked = [adequacy.gate]
     if pairs.fits:
         gain = race.criteria[race.best] - pairs.criteria[pairs.best]
         label = f"pair gain of {pairs.best} over {race.best}"
         passed = gain > limits.pair_gain
-        gates.append(Gate(label, gain, None, limits.pair_gain, passed, f"{pairs.best} is {gain:.1f} better"))
+        asked.append(Gate(label, gain, None, limits.pair_gain, passed, f"{pairs.best} is {gain:.1f} better"))
         if passed:
             both = adequate(emulator, evidence, pairs.fits[pairs.best], pairs.best, limits, bootstrap, seed + 2)
-            gates.append(both.gate)
+            asked.append(both.gate)
             final = pairs.fits[pairs.best]
-            gates.append(specific(emulator, base, final, pairs.best, signatures, frame, limits, seed + 3))
-            if both.gate.passed and gates[-1].passed:
-                gate, near = unambiguous(pairs.criteria, limits)
-                return Conclusion(*_named("effects", near), (*gates, gate), final, both, pairs)
+            asked.append(specific(emulator, base, final, pairs.best, signatures, frame, limits, seed + 3))
+            if both.gate.passed and asked[-1].passed:
+                near, gates = _near(emulator, evidence, pairs, limits, seed + 4)
+                return Conclusion(*_named("effects", near), (*asked, *gates), final, both, pairs)
     text = "The data hold more than noise, and none of the effects in the race explains it."
-    return Conclusion("unexplained", (), text, tuple(gates), fit, None, pairs)
+    return Conclusion("unexplained", (), text, tuple(asked), fit, None, pairs)
+
+
+def _near(
+    emulator: Emulator, evidence: Evidence, race: Race, limits: Limits, seed: int
+) -> tuple[tuple[str, ...], tuple[Gate, Gate]]:
+    """Return the best model with those that come too near or cannot be rejected, best first, and gates 3 and 4."""
+    gap, near = unambiguous(race.criteria, limits)
+    apart, staying = told_apart(emulator, evidence, race.fits, race.criteria, limits, seed)
+    names = sorted({*near, *staying}, key=lambda name: race.criteria[name])
+    return tuple(names), (gap, apart)
 
 
 def _named(prefix: str, near: tuple[str, ...]) -> tuple[str, tuple[str, ...], str]:

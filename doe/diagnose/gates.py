@@ -6,6 +6,8 @@
 3 unambiguous. The runner-up is at least 4 behind in B = T^2 + ln|Sigma| - ln|Sigma_base| + m ln d, with m amplitudes
   and d summaries: between effects with one amplitude each this is the gap of T^2; a second amplitude pays ln d (BIC).
 
+4 told apart. Every rival that the data cannot reject stays in the answer (rivals.py).
+
 Every set is fitted with the full emulator within its bounds, not with a linearised one. p = (1 + #{T_b >= T})/(1 + B).
 """
 
@@ -32,7 +34,7 @@ FloatArray = npt.NDArray[np.float64]
 class Limits(Record):
     """Limits of the gates. detect: level of each of the two tests. reach: least shift, in sigma, that an effect must be
     able to cause to enter the race. pair_gain: BIC by which a pair must beat the best single effect. chance: of
-    specificity.py, for pairs.
+    specificity.py, for pairs. rival: of rivals.py.
     """
 
     detect: float = 0.005
@@ -41,6 +43,7 @@ class Limits(Record):
     pair_gain: float = 6.0
     reach: float = 3.0
     chance: float = 0.01
+    rival: float = 0.05
 
 
 @dataclass(frozen=True)
@@ -90,7 +93,7 @@ def detect(
     """Return gate 1. singles: effect -> its fit under the Sigma of the base fit, the same for all."""
     pseudo = draw_pseudo_data(emulator, evidence, base, sets, seed)
     k, size = base.predictor.parameters, sum(m.size for m in evidence.means)
-    null = _refit(base.predictor, pseudo, evidence, base.x)[1]
+    null = refit(base.predictor, pseudo, evidence, base.x)[1]
     p_overall = bootstrap_p(base.t2, null)
     overall = Gate(
         "detect: T2 of the base model",
@@ -102,7 +105,7 @@ def detect(
     )
     drops = {e: base.t2 - fit.t2 for e, fit in singles.items()}
     charge = {e: (emulator.declared.effects[e].amplitudes - 1) * math.log(size) for e in singles}
-    null_drops = {e: null - _refit(fit.predictor, pseudo, evidence, base.x[:k])[1] for e, fit in singles.items()}
+    null_drops = {e: null - refit(fit.predictor, pseudo, evidence, base.x[:k])[1] for e, fit in singles.items()}
     best = max(drops, key=lambda e: drops[e] - charge[e], default=None)
     if best is None:
         directed = Gate("detect: largest drop by an effect", 0.0, 1.0, limits.detect, False, "no effect to ask")
@@ -126,7 +129,7 @@ def adequate(
 ) -> Adequacy:
     """Return gate 2 for a fitted model."""
     pseudo = draw_pseudo_data(emulator, evidence, fit, sets, seed)
-    refits, null = _refit(fit.predictor, pseudo, evidence, fit.x)
+    refits, null = refit(fit.predictor, pseudo, evidence, fit.x)
     p = bootstrap_p(fit.t2, null)
     return Adequacy(
         Gate(
@@ -169,7 +172,7 @@ def evidence_weights(criteria: Sequence[float]) -> FloatArray:
     return np.asarray(raw / raw.sum())
 
 
-def _refit(
+def refit(
     predictor: Predictor, pseudo: PseudoData, evidence: Evidence, start: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return x and T^2 of every pseudo-data set.

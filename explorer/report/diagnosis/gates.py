@@ -22,6 +22,7 @@ QUESTIONS = {
     "detect": Question("p ≤", "more than noise", "within the noise"),
     "adequate": Question("p ≥", "fits", "does not fit"),
     "unambiguous": Question("gap ≥", "stands alone", "others come near"),
+    "told apart": Question("p ≤", "every rival rejected", "a rival may be the truth"),
     "pair gain": Question("gain >", "worth a pair", "not worth a pair"),
     "specific": Question("chance ≤", "not by chance", "a pair fits almost anything"),
 }
@@ -36,8 +37,10 @@ def gates(result: Plain) -> Section:
         f"{number(limits['detect'])}; both are calibrated by {result['bootstrap']} data sets made up from the declared "
         f"model and fitted anew, so that no p can be below {number(1 / (1 + result['bootstrap']))}. A model is "
         f"adequate if its own misfit has p ≥ {number(limits['adequate'])}, and unambiguous if the next one is at least "
-        f"{fixed(limits['gap'], 0)} behind in B. A pair is asked only where no single effect is adequate, and has to "
-        f"gain more than {fixed(limits['pair_gain'], 0)}, and be specific: few random shifts may be explained as well."
+        f"{fixed(limits['gap'], 0)} behind in B and every rival, taken as the truth, would let the best one lead by as "
+        f"much in no more than {100 * limits['rival']:.0f} % of made-up data sets. A pair is asked only where no "
+        f"single effect is adequate, and has to gain more than {fixed(limits['pair_gain'], 0)}, and be specific: "
+        "few random shifts may be explained as well."
     )
     rows = tuple(
         (
