@@ -30,6 +30,7 @@ from explorer.live.messages import (
     Start,
     Status,
     Step,
+    StepBack,
 )
 from explorer.live.process import run
 from solver.params import ParameterError
@@ -103,6 +104,13 @@ class Session:
     def step(self) -> None:
         """Go on by one sample interval of the scene (``numerics.sample_interval``), then stand still."""
         self._send(Step(self._present().scene.numerics.sample_interval))
+
+    def step_back(self) -> None:
+        """Go back by one sample interval, with everything as it was then, parameters too, and stand still.
+
+        From there the pour repeats the same bits until something is changed.
+        """
+        self._send(StepBack(self._present().scene.numerics.sample_interval))
 
     def set_speed(self, factor: float) -> None:
         """Aim at ``factor`` seconds of simulated time per second."""

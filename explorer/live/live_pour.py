@@ -12,6 +12,7 @@ import numpy as np
 
 from explorer.live.angle_reader import AngleReader
 from explorer.live.frames import FrameWriter
+from explorer.live.history import History, Moment
 from explorer.live.messages import (
     Command,
     Event,
@@ -24,6 +25,7 @@ from explorer.live.messages import (
     Start,
     Status,
     Step,
+    StepBack,
 )
 from explorer.live.pace import Pace
 from explorer.outcomes import outcome_text
@@ -32,8 +34,10 @@ from solver.effects.columns import kernel_effects
 from solver.params import ParameterError
 from solver.pour import Pour
 from solver.record import Outcome
+from solver.rewind import keep, put_back
 from solver.run import capacity_for
 from solver.scene import Scene, with_values
+from solver.time_step import stability_limit
 from solver.world import Batch
 
 FRAME_INTERVAL = 1.0 / 60.0
@@ -63,10 +67,13 @@ class LivePour:
                 self._pace.restart(clock.perf_counter(), self._pour.time)
             case Pause():
                 self._paused, self._run_until = True, -math.inf
+                self._keep()
             case Step(duration=duration):
                 # Steps that are asked for while one runs are added to it.
                 self._paused, self._run_until = True, max(self._run_until, self._pour.time) + duration
                 self._pace.restart(clock.perf_counter(), self._pour.time)
+            case StepBack(duration=duration):
+                self._go_back(self._pour.time - duration)
             case SetSpeed(factor=factor):
                 self._pace.speed = factor
                 self._pace.restart(clock.perf_counter(), self._pour.time)
@@ -84,7 +91,9 @@ class LivePour:
         """Run one short launch, then publish and report what is due."""
         steps = self._pour.steps_due(min(self._pace.steps(self._pour.dt), self._steps_to_stop()))
         before = clock.perf_counter()
-        self._launch(steps)
+        decided = self._launch(steps)
+        if decided or (self._paused and self._pour.time >= self._run_until):
+            self._keep()
         now = clock.perf_counter()
         self._pace.launched(steps, now - before, now, self._pour.time)
         over = self._pour.outcome != Outcome.RUNNING
@@ -115,11 +124,14 @@ class LivePour:
             seed=pour.seed,
             generation=self._generation,
             speed=self._pace.speed,
+            capped=state == SessionState.RUNNING and self._pace.capped,
             real_time_factor=self._pace.real_time_factor if state == SessionState.RUNNING else 0.0,
             phase=pour.phase,
             outcome=pour.outcome,
             time=pour.time,
             dt=pour.dt,
+            dt_limit=self._dt_limit,
+            earliest=self._history.earliest,
             bodies=pour.entered,
             bodies_planned=len(pour.order),
             entered_mass=sample["entered"],
@@ -134,6 +146,7 @@ class LivePour:
 
     def _begin(self, start: Start) -> None:
         self._scene, self._generation = start.scene, start.generation
+        self._dt_limit, self._history = stability_limit(start.scene), History()
         self._announce(start, "fitting member spheres to the shapes")
         for body in start.scene.bodies:
             _ = body.clump  # fitted once per process and shape; the pour below takes it from the cache
@@ -143,6 +156,7 @@ class LivePour:
         self._warm_up()
         self._angles = AngleReader()
         self._paused, self._run_until, self._retuned = False, -math.inf, False
+        self._keep()
         self._publish()
         self._pace.restart(clock.perf_counter(), self._pour.time)
         self._report(self.status())
@@ -159,9 +173,34 @@ class LivePour:
             Status(SessionState.STARTING, message, start.scene, start.seed, start.generation, self._pace.speed)
         )
 
-    def _launch(self, steps: int) -> None:
+    def _launch(self, steps: int) -> bool:
         row = self._batch.advance(np.array([steps], dtype=np.int32))
-        self._pour.after(steps, row[0])
+        return self._pour.after(steps, row[0])
+
+    def _keep(self) -> None:
+        """Keep the present moment, so that the person at the screen can come back to it."""
+        if self._pour.outcome != Outcome.NON_FINITE:
+            self._history.add(Moment(keep(self._pour), self._scene, self._angles.observables, self._retuned))
+
+    def _go_back(self, time: float) -> None:
+        """Bring everything back to how it was at ``time`` [s], or as early as is kept, and pause."""
+        self._paused, self._run_until = True, -math.inf
+        found = self._history.back_to(time, self._pour.time)
+        if found is None:
+            self._event("this is the earliest moment that is kept")
+            return
+        moment, until = found
+        before, self._scene = self._scene, moment.scene
+        put_back(self._pour, moment.kept)
+        self._angles, self._retuned = AngleReader(moment.observables), moment.retuned
+        self._dt_limit = stability_limit(self._scene)
+        # What was thinned out of the history is run again: the same bits, up to the next change that a person made.
+        while (left := self._whole_steps(until)) > 0 and (steps := self._pour.steps_due(left)) > 0:
+            self._launch(steps)
+        self._keep()
+        for line in changes(before, self._scene):
+            self._event(line)
+        self._publish()
 
     def _set_parameters(self, values: Mapping[str, float | str]) -> None:
         try:
@@ -179,7 +218,10 @@ class LivePour:
             self._pour.move_to(self._batch)
         self._scene = changed
         self._pour.retune(endless(changed))
+        self._dt_limit = stability_limit(changed)
         self._retuned = True
+        self._history.changed(self._pour.time)
+        self._keep()
         self._pace.restart(clock.perf_counter(), self._pour.time)
 
     def _publish(self) -> None:
@@ -203,6 +245,10 @@ class LivePour:
             return sys.maxsize
         # Less a hair: a sum of steps must not miss its end by rounding and take one more.
         return max(1, math.ceil((self._run_until - self._pour.time) / self._pour.dt - 1e-6))
+
+    def _whole_steps(self, time: float) -> int:
+        """Steps that end at or before ``time`` [s], but for rounding."""
+        return math.floor((time - self._pour.time) / self._pour.dt + 1e-6)
 
     def _event(self, text: str) -> None:
         self._report(Event(self._generation, self._pour.time, text))

@@ -22,7 +22,7 @@ from explorer.viewer.chart import Chart
 from explorer.viewer.diagnosis_panel import DiagnosisPanel
 from explorer.viewer.live_panel import LivePanel
 from explorer.viewer.palette import BRAND
-from explorer.viewer.readout import readout_html
+from explorer.viewer.readout import not_later, readout_html
 from explorer.viewer.restart_panel import RestartPanel
 from explorer.viewer.run_panel import RunPanel
 from explorer.viewer.scene_nodes import SceneNodes
@@ -71,7 +71,7 @@ class Page:
         self._notice = ""
         status = session.status()
         self._nodes, self._drawn = SceneNodes(server, status.scene), status.scene
-        self._frame_number = 0
+        self._frame_number, self._time = 0, status.time
         self._generation = status.generation
         light(server)
         look(server, status.scene)
@@ -108,7 +108,7 @@ class Page:
             self._notice = self._notice if notice is None else notice
             frame = self._session.frame()
             status = self._session.status()
-            self._take_events()
+            self._take_events(status)
             with self._server.atomic():
                 self._show_bodies(status, frame)
                 if began >= panels_due or notice is not None:
@@ -119,8 +119,11 @@ class Page:
                     self._show_background()
             stop.wait(max(0.0, FRAME_INTERVAL - (time.monotonic() - began)))
 
-    def _take_events(self) -> None:
+    def _take_events(self, status: Status) -> None:
         self._events.extend(self._session.new_events())
+        if status.time < self._time:  # brought back, or another pour
+            self._events = deque(not_later(self._events, status), maxlen=EVENTS_REMEMBERED)
+        self._time = status.time
 
     def _show_bodies(self, status: Status, frame: Frame | None) -> None:
         if status.generation != self._generation:
