@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from solver import insertion
 from solver.clump import scaled
+from solver.contacts import Contacts, contacts_from
 from solver.effects.set_up import actual
 from solver.layout import layout
 from solver.observables.free_surface import surface_heights
@@ -181,6 +182,15 @@ class Pour:
     def surface_poses(self) -> npt.NDArray[np.float64]:
         """Where the rig's surfaces are: origin [m] and orientation wxyz, shape (k, 7)."""
         return self.batch.surface_state(self.w)[:, :7]
+
+    def contacts(self) -> Contacts:
+        """Present contacts of the bodies, with each other and with the rig."""
+        return contacts_from(self.batch.contacts(self.w))
+
+    @property
+    def entry_times(self) -> npt.NDArray[np.float64]:
+        """When the bodies entered [s], in order of entry."""
+        return np.array([time for time, *_ in self._entries], dtype=float)
 
     def record(self) -> Record:
         """What the run leaves behind."""

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from solver import moving_state, snapshot
 from solver.body import Body
 from solver.effects.columns import effect_table, kernel_effects, reach_of_pulls
-from solver.kernels import exchange
+from solver.kernels import exchange, touching
 from solver.kernels.batch import advance, measure, take_out
 from solver.laws.hertz_mindlin import constants
 from solver.layout import Layout
@@ -179,6 +179,14 @@ class Batch:
         if n:
             exchange.read_bodies(self._s, w, out)
         return out
+
+    def contacts(self, w: int) -> Array:
+        """Contacts as of the last step, one row each: see ``kernels/touching.py`` and ``solver/contacts.py``."""
+        room, count = int(self.summary()[w, SUMMARY_COLUMNS.index("contacts")]), np.zeros(1, dtype=np.int32)
+        out = np.zeros((room, 11))
+        if room:
+            touching.read_contacts(self._s, w, out, count)
+        return out[: count[0]]
 
     def surface_state(self, w: int) -> Array:
         """Per surface: origin 0:3, quaternion 3:7, velocity 7:10, angular velocity 10:13, force 13:16, torque 16:19.
