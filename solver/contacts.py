@@ -28,7 +28,7 @@ class Contacts:
 
     @property
     def normal_force(self) -> Array:
-        """Part of the force along the normal [N], shape (m,): positive where the two press, negative where they pull."""
+        """Part of the force along the normal [N], shape (m,); negative where the two pull."""
         return np.einsum("ij,ij->i", self.force, self.normal)
 
     @property
@@ -46,12 +46,12 @@ def loads(contacts: Contacts, bodies: int) -> Array:
     """Σ |F_n| over the contacts of each of ``bodies`` bodies, surfaces of the rig included [N], shape (bodies,)."""
     size = np.abs(contacts.normal_force)
     among = contacts.partner >= 0
-    total = np.bincount(contacts.body, size, minlength=bodies)
+    total: Array = np.bincount(contacts.body, size, minlength=bodies).astype(np.float64)
     return total + np.bincount(contacts.partner[among], size[among], minlength=bodies)
 
 
 def coordination_numbers(contacts: Contacts, bodies: int) -> Ints:
-    """How many other bodies each of ``bodies`` bodies touches, however many spheres they do it with, shape (bodies,)."""
+    """How many other bodies each of ``bodies`` bodies touches, with however many spheres, shape (bodies,)."""
     among = contacts.partner >= 0
     pairs = np.unique(np.column_stack([contacts.body[among], contacts.partner[among]]), axis=0)
     return np.bincount(pairs.ravel(), minlength=bodies)

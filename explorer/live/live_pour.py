@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from explorer.live.angle_reader import AngleReader
+from explorer.live.details import DetailWriter
 from explorer.live.frames import FrameWriter
 from explorer.live.history import History, Moment
 from explorer.live.messages import (
@@ -26,6 +27,7 @@ from explorer.live.messages import (
     Status,
     Step,
     StepBack,
+    Watch,
 )
 from explorer.live.pace import Pace
 from explorer.outcomes import outcome_text
@@ -44,6 +46,8 @@ FRAME_INTERVAL = 1.0 / 60.0
 """Wall time [s] between published frames."""
 STATUS_INTERVAL = 0.1
 """Wall time [s] between reports."""
+DETAIL_INTERVAL = 0.1
+"""Wall time [s] between details, while they are looked at."""
 BEFORE_FIRST_SAMPLE = {"entered": 0.0, "discharged": 0.0, "kinetic": 0.0, "touching": 0.0}
 """Sums over all bodies while none has been sampled yet."""
 
@@ -51,8 +55,11 @@ BEFORE_FIRST_SAMPLE = {"entered": 0.0, "discharged": 0.0, "kinetic": 0.0, "touch
 class LivePour:
     """A pour with play and pause, live parameters, frames and reports. One thread only (the one with Taichi)."""
 
-    def __init__(self, start: Start, frames: FrameWriter, report: Callable[[Report], None]) -> None:
-        self._frames, self._report = frames, report
+    def __init__(
+        self, start: Start, frames: FrameWriter, report: Callable[[Report], None], details: DetailWriter
+    ) -> None:
+        self._frames, self._report, self._details = frames, report, details
+        self._watch, self._detailed = Watch(wanted=False), 0.0
         self._pace = Pace(speed=1.0)
         self._published = self._reported = 0.0
         self._begin(start)
@@ -79,6 +86,9 @@ class LivePour:
                 self._pace.restart(clock.perf_counter(), self._pour.time)
             case SetParameters(values=values):
                 self._set_parameters(values)
+            case Watch():
+                self._watch = command
+                self._publish_details()
         self._report(self.status())
 
     def seconds_to_wait(self) -> float | None:
@@ -107,6 +117,8 @@ class LivePour:
             self._report(self.status())
         if over or self._paused or now - self._published >= FRAME_INTERVAL:
             self._publish()
+        if over or self._paused or now - self._detailed >= DETAIL_INTERVAL:
+            self._publish_details()
 
     def status(self) -> Status:
         """What the page is told."""
@@ -201,6 +213,7 @@ class LivePour:
         for line in changes(before, self._scene):
             self._event(line)
         self._publish()
+        self._publish_details()
 
     def _set_parameters(self, values: Mapping[str, float | str]) -> None:
         try:
@@ -229,6 +242,12 @@ class LivePour:
         if self._pour.outcome != Outcome.NON_FINITE:
             self._frames.publish(self._pour.bodies(), self._generation, self._pour.time, self._pour.surface_poses())
         self._published = clock.perf_counter()
+
+    def _publish_details(self) -> None:
+        pour, self._detailed = self._pour, clock.perf_counter()
+        if self._watch.wanted and pour.outcome != Outcome.NON_FINITE:
+            bodies, contacts = pour.bodies(), pour.contacts()
+            self._details.publish(self._generation, pour.time, bodies, pour.entry_times, contacts, self._watch.body)
 
     def _observe(self) -> None:
         pour = self._pour

@@ -79,11 +79,20 @@ class SetSpeed:
 
 
 @dataclass(frozen=True)
+class Watch:
+    """Whether velocities, loads and contacts are looked at: nothing is read of them otherwise."""
+
+    wanted: bool
+    body: int | None = None
+    """A body, by its order of entry, all of whose contacts are wanted."""
+
+
+@dataclass(frozen=True)
 class Close:
     """End the process."""
 
 
-Command = Start | Play | Pause | Step | StepBack | SetParameters | SetSpeed | Close
+Command = Start | Play | Pause | Step | StepBack | SetParameters | SetSpeed | Watch | Close
 
 
 @dataclass(frozen=True)

@@ -27,8 +27,8 @@ class RunPanel:
         buttons = server.gui.add_button_group(
             "Pour",
             tuple(acts),
-            hint="Keys: space plays and pauses; left arrow goes back by a sample interval (10 ms), to the parameters of "
-            "that time as well; right arrow goes on by one; R restarts with the same seed.",
+            hint="Keys: space plays and pauses; left arrow goes back by a sample interval (10 ms), to the parameters "
+            "of that time as well; right arrow goes on by one; R restarts with the same seed.",
         )
 
         @buttons.on_click

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from explorer.live.details import DetailWriter, detail_reader, shared_details
 from explorer.live.frames import FrameReader, FrameWriter, shared_block
 from explorer.live.history import History, thinnest
 from explorer.live.messages import Event, SessionState, SetParameters, Start, Status, Step, StepBack
@@ -90,9 +91,10 @@ def live(taichi):
     from explorer.live.messages import Pause
 
     block, reports = shared_block(multiprocessing.get_context("spawn")), []
-    pour = LivePour(Start(bead_scene(), 1, 1), FrameWriter(block), reports.append)
+    details = shared_details(multiprocessing.get_context("spawn"))
+    pour = LivePour(Start(bead_scene(), 1, 1), FrameWriter(block), reports.append, DetailWriter(details))
     pour.obey(Pause())
-    return SimpleNamespace(pour=pour, reports=reports, reader=FrameReader(block))
+    return SimpleNamespace(pour=pour, reports=reports, reader=FrameReader(block), details=detail_reader(details))
 
 
 def run(live, seconds):
