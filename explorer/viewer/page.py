@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 from collections import deque
 from typing import Protocol
 
-import numpy as np
 import viser
 
 from explorer.diagnosis_process import DiagnosisProcess
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, Status
-from explorer.scene_meshes import scene_height
 from explorer.session import Session
 from explorer.study_process import StudyProcess
 from explorer.viewer.actions import Actions
+from explorer.viewer.camera import FIELD, view_of
 from explorer.viewer.chart import Chart
 from explorer.viewer.diagnosis_panel import DiagnosisPanel
 from explorer.viewer.live_panel import LivePanel
+from explorer.viewer.look_tab import LookTab
 from explorer.viewer.palette import BRAND
 from explorer.viewer.readout import not_later, readout_html
 from explorer.viewer.restart_panel import RestartPanel
@@ -44,13 +43,6 @@ FRAME_INTERVAL = 1.0 / 30.0
 PANEL_INTERVAL = 0.2
 BACKGROUND_INTERVAL = 0.5
 """Seconds between two looks at studies and diagnoses."""
-
-VIEW_DIRECTION = (0.62, -0.75, 0.24)
-"""From the pile to the camera."""
-VIEW_FIELD = 0.6
-"""Vertical field of view [rad]."""
-FILL = 0.68
-"""Share of the height of the window that rig and feed take."""
 
 
 class Page:
@@ -92,6 +84,8 @@ class Page:
             self._chart = Chart(server)
             self._live = LivePanel(server, session, status.scene, post)
             self._restart = RestartPanel(server, session, status.scene, status.seed, post)
+        with tabs.add_tab("Look", viser.Icon.EYE):
+            self._look = LookTab(server, session, post)
         self._study: StudyPanel | None = None
         if study is not None:
             with tabs.add_tab("Calibrate", viser.Icon.TARGET):
@@ -132,11 +126,12 @@ class Page:
             self._nodes.clear()
         if frame is not None and self._recorder is not None:
             self._recorder.take(frame, status)
-        if frame is None or frame.number == self._frame_number:
+        if frame is None:
             return
-        self._frame_number = frame.number
-        self._nodes.show(frame)
-        self._nodes.show_gate(status.gate_shut)
+        self._look.show(self._nodes, frame, status.scene)
+        if frame.number != self._frame_number:
+            self._frame_number = frame.number
+            self._nodes.show_gate(status.gate_shut)
 
     def _redraw(self, scene: Scene) -> None:
         if (scene.bodies, scene.rig) != (self._drawn.bodies, self._drawn.rig):
@@ -166,11 +161,6 @@ def light(server: viser.ViserServer) -> None:
 
 def look(server: viser.ViserServer, scene: Scene) -> None:
     """Camera that new clients start with: pile, funnel and feed in one picture."""
-    height = scene_height(scene)
-    distance = height / FILL / (2.0 * math.tan(VIEW_FIELD / 2.0))
-    middle = (0.0, 0.0, 0.42 * height)
-    camera = server.initial_camera
-    camera.position = np.array(middle) + distance * np.array(VIEW_DIRECTION)
-    camera.look_at = middle
-    camera.fov = VIEW_FIELD
+    view, camera = view_of(scene, "Whole"), server.initial_camera
+    camera.position, camera.look_at, camera.fov = view.position, view.look_at, FIELD
     camera.near = 0.01
