@@ -27,8 +27,8 @@ ANGLES: Mapping[str, Callable[[PileReading], Value]] = {
 class AngleReader:
     """Reads the angles of one pour. Times in seconds; ``wall`` is the present moment on the caller's clock."""
 
-    def __init__(self, observables: Mapping[str, Value] | None = None) -> None:
-        self.observables: Mapping[str, Value] = observables or {}
+    def __init__(self) -> None:
+        self.observables: Mapping[str, Value] = {}
         """The angles that were read last, by name; empty before there was a pile."""
         self._read_at = -math.inf
         self._wall_due = self._wall_earliest = -math.inf

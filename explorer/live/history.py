@@ -8,15 +8,14 @@ from the one before it, as long as no parameter was changed in between.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
-from solver.observables.value import Value
+from explorer.live.angle_reader import AngleReader
 from solver.rewind import Kept
 from solver.scene import Scene
 
 ROOM = 128 * 2**20
-"""Memory [B] for all moments; one takes 70 kB with 29 bodies of 30 spheres, 2 MB with 2000 beads in a heap."""
+"""Memory [B] for all moments; one takes 72 kB with 29 bodies of 30 spheres, 1.8 MB with 2000 spheres in a bed."""
 MOST = 500
 """Moments at most, however small."""
 LEAST = 3
@@ -32,7 +31,8 @@ class Moment:
     kept: Kept
     scene: Scene
     """As the person sees it, with the parameters in force."""
-    observables: Mapping[str, Value]
+    angles: AngleReader
+    """What was read last; nothing changes it any more."""
     retuned: bool
     """Parameters had been changed since the pour began."""
 

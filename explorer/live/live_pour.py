@@ -7,6 +7,7 @@ import math
 import sys
 import time as clock
 from collections.abc import Callable, Mapping
+from copy import copy
 
 import numpy as np
 
@@ -192,7 +193,7 @@ class LivePour:
     def _keep(self) -> None:
         """Keep the present moment, so that the person at the screen can come back to it."""
         if self._pour.outcome != Outcome.NON_FINITE:
-            self._history.add(Moment(keep(self._pour), self._scene, self._angles.observables, self._retuned))
+            self._history.add(Moment(keep(self._pour), self._scene, copy(self._angles), self._retuned))
 
     def _go_back(self, time: float) -> None:
         """Bring everything back to how it was at ``time`` [s], or as early as is kept, and pause."""
@@ -204,7 +205,7 @@ class LivePour:
         moment, until = found
         before, self._scene = self._scene, moment.scene
         put_back(self._pour, moment.kept)
-        self._angles, self._retuned = AngleReader(moment.observables), moment.retuned
+        self._angles, self._retuned = copy(moment.angles), moment.retuned
         self._dt_limit = stability_limit(self._scene)
         # What was thinned out of the history is run again: the same bits, up to the next change that a person made.
         while (left := self._whole_steps(until)) > 0 and (steps := self._pour.steps_due(left)) > 0:
