@@ -98,6 +98,7 @@ def result_of(measurement: Measurement, order: DiagnoseOrder, found: Diagnosis, 
             "amplitudes": verdict.amplitudes,
             "gates": verdict.gates,
             "parameters": verdict.parameters,
+            "freed": verdict.freed,
             "error": {
                 role: [_error(row, units) for row in rows]
                 for role, rows in (("fit", found.fit_error), ("holdout", found.holdout_error))
@@ -126,7 +127,7 @@ def result_of(measurement: Measurement, order: DiagnoseOrder, found: Diagnosis, 
                     "condition": condition.name,
                     "role": condition.role,
                     "rig": condition.scene.rig.name,
-                    "replicates": condition.replicates,
+                    "replicates": condition.replicates * condition.mean_of,
                     "summaries": [s.name for s in summaries(condition)],
                 }
                 for condition in measurement.conditions

@@ -44,6 +44,8 @@ def check_result(measurement: Measurement) -> dict[str, Any]:
 
 def _condition_text(condition: Condition) -> str:
     head = f"{condition.name}: {condition.role}, {condition.scene.rig.name}, replicates: {condition.replicates}"
+    if condition.mean_of > 1:
+        head += f", each the mean of {condition.mean_of} pours"
     rows = [
         (o.observable, o.unit, str(_number_of_values(o)), *_mean_and_sd(o), o.origin) for o in condition.observations
     ]

@@ -33,7 +33,7 @@ REWEIGHTINGS = 3
 
 @dataclass(frozen=True)
 class Evidence:
-    """The measured side of the comparison, per condition: mean (d_c,), number of replicates, covariance of one measured
+    """The measured side of the comparison, per condition: mean (d_c,), number of pours, covariance of one measured
     pour (d_c, d_c), systematic variance (d_c,), and how the variances compare. prior_mean, prior_weight: (k,) in coded
     units, weight zero where a parameter was not measured independently.
     """
@@ -77,13 +77,16 @@ def gather_evidence(emulator: Emulator, observed: Observed) -> Evidence:
     """Return the measured means with their noise (noise.py)."""
     total = len(emulator.declared.labels)
     replicates = [observed.complete(c) for c in range(len(emulator.blocks))]
+    pours = [observed.pours(c) for c in range(len(emulator.blocks))]
     compared = [
-        compare_variances(block.noise, values, total) for block, values in zip(emulator.blocks, replicates, strict=True)
+        # About its mean, a mean of n pours scatters √n times less than a pour.
+        compare_variances(block.noise, values.mean(axis=0) + np.sqrt(n) * (values - values.mean(axis=0)), total)
+        for block, values, n in zip(emulator.blocks, replicates, pours, strict=True)
     ]
     mean, weight = priors(emulator.declared)
     return Evidence(
         means=tuple(values.mean(axis=0) for values in replicates),
-        counts=tuple(len(values) for values in replicates),
+        counts=tuple(len(values) * n for values, n in zip(replicates, pours, strict=True)),
         pour=tuple(covariance for covariance, _ in compared),
         systematic=tuple(sd**2 for sd in observed.instrument),
         variances=tuple(comparison for _, comparison in compared),

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from doe.diagnose.plan import Point
 from doe.diagnose.pours import ModelPours
+from doe.diagnose.verdict import Verdict
 from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
@@ -30,6 +31,15 @@ class Model(Record):
     def name(self) -> str:
         """ "base", or the effects' names."""
         return "+".join(name for name, _ in self.effects) or "base"
+
+
+def fitted(verdict: Verdict, label: str) -> Model:
+    """The model ``label`` of the race ("base", "a" or "a+b") as it was fitted to the data."""
+    found = next(model for model in verdict.models if model.label == label)
+    amplitudes: dict[str, tuple[float, ...]] = {}
+    for one in sorted(found.amplitudes, key=lambda one: one.index):
+        amplitudes[one.effect] = (*amplitudes.get(one.effect, ()), one.value)
+    return Model(found.parameters, tuple((name, amplitudes[name]) for name in label.split("+") if name in amplitudes))
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import numpy as np
 
 from doe.diagnose.calibrate import Evidence, Fit, calibrate, fit_with_covariance, gather_evidence
 from doe.diagnose.emulator import Emulator, fit_emulator
+from doe.diagnose.freed import freed_parameters
 from doe.diagnose.gates import Adequacy, Detection, Gate, Limits, adequate, detect, evidence_weights, unambiguous
 from doe.diagnose.race import Race, race_pairs, race_singles
 from doe.diagnose.runs import Declared, Observed, Runs, select_summaries
@@ -108,6 +109,7 @@ def judge(
         gates=(detection.overall, detection.directed, *conclusion.gates),
         effects=_effect_rows(declared, reaches, singles, detection, race, signatures),
         parameters=parameter_changes(declared, base, final),
+        freed=freed_parameters(declared, base, evidence),
         residuals=residual_table(declared, evidence, base, final),
         where=where_the_residual_sits(declared, final),
         signatures=signatures,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from doe.diagnose.confirm import Confirmed, Model, confirm
+from doe.diagnose.confirm import Confirmed, Model, confirm, fitted
 from doe.diagnose.decide import diagnose
 from doe.diagnose.holdout import HoldoutCondition, HoldoutError, holdout_errors
 from doe.diagnose.menu import Suggestion, next_experiment
@@ -85,7 +85,7 @@ def run_diagnosis(
     widths = [len(summary_names(condition)) for condition in measurement.conditions]
     one = confirm(before, everywhere, fresh, widths)
     other = one if after == before else confirm(after, everywhere, fresh, widths)
-    suggestions = next_experiment(verdict, screened, measurement.fit[0], paths, store, pours, on_pour)
+    menu = next_experiment(verdict, measurement.fit[0], paths, store, pours, on_pour)
     return Diagnosis(
         declared=screened.declared,
         verdict=verdict,
@@ -93,8 +93,8 @@ def run_diagnosis(
         after=other,
         fit_error=errors_of(measurement, "fit", one, other),
         holdout_error=errors_of(measurement, "holdout", one, other),
-        suggestions=suggestions,
-        pours=model.run_now + everywhere.run_now,
+        suggestions=menu.suggestions,
+        pours=model.run_now + everywhere.run_now + menu.run_now,
         settings=len(screened.points),
     )
 
@@ -143,7 +143,8 @@ def box_of(measured: MeasuredParameter) -> Parameter:
 def observe(conditions: Sequence[MeasuredCondition]) -> Observed:
     """The measured side of ``conditions``; what states no uncertainty of its own has none beside its replicates."""
     stated = [np.nan_to_num(summary_uncertainties(condition)) for condition in conditions]
-    return Observed(tuple(summaries_of_data(condition) for condition in conditions), tuple(stated))
+    blocks = tuple(summaries_of_data(condition) for condition in conditions)
+    return Observed(blocks, tuple(stated), tuple(condition.mean_of for condition in conditions))
 
 
 def survivors(verdict: Verdict) -> tuple[str, ...]:
@@ -163,15 +164,8 @@ def at_edge(verdict: Verdict, now: Declared, widest: Declared) -> tuple[str, ...
 
 def models(verdict: Verdict) -> tuple[Model, Model]:
     """The calibrated base model, and the best one that the verdict names (the base model where it names none)."""
-    before = Model(tuple(p.before for p in verdict.parameters))
-    if not verdict.names:
-        return before, before
-    members = verdict.names[0].split("+")
-    amplitudes = {
-        name: tuple(a.value for a in sorted(verdict.amplitudes, key=lambda a: a.index) if a.effect == name)
-        for name in members
-    }
-    return before, Model(tuple(p.after for p in verdict.parameters), tuple(amplitudes.items()))
+    before = fitted(verdict, "base")
+    return before, fitted(verdict, verdict.names[0]) if verdict.names else before
 
 
 def errors_of(measurement: Measurement, role: str, before: Confirmed, after: Confirmed) -> tuple[HoldoutError, ...]:

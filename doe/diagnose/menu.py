@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from doe.diagnose.confirm import Model, confirm
+from doe.diagnose.confirm import confirm, fitted
 from doe.diagnose.next_experiment import MenuItem, Prediction, RankedExperiment, rank_experiments
 from doe.diagnose.pours import ModelPours, OnPour
-from doe.diagnose.screen import Screened
 from doe.diagnose.verdict import Verdict
 from doe.measurement.measurement import Condition
 from doe.measurement.summaries import summary_names
@@ -43,24 +43,32 @@ class Suggestion(Record):
     levers: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Menu:
+    """Set-ups in order, and how many pours had to be run for them."""
+
+    suggestions: tuple[Suggestion, ...]
+    run_now: int
+
+
 def next_experiment(
     verdict: Verdict,
-    screened: Screened,
     condition: Condition,
     paths: Sequence[str],
     store: Store,
     pours: Pours,
     on_pour: OnPour | None,
-) -> tuple[Suggestion, ...]:
+) -> Menu:
     """The menu, most discriminating first; empty unless the verdict is ambiguous."""
     if not verdict.kind.startswith("ambiguous"):
-        return ()
-    rivals = {name: rival(verdict, name) for name in verdict.names if "+" not in name}
-    items = []
+        return Menu((), 0)
+    rivals = {name: fitted(verdict, name) for name in verdict.names}
+    items, run_now = [], 0
     width = len(summary_names(condition))
     for name, scene in feasible(condition.scene).items():
         model = ModelPours([replace(condition, name=name, scene=scene)], paths, store, pours, on_pour)
         found = {label: confirm(one, model, POURS, [width]).blocks[0] for label, one in rivals.items()}
+        run_now += model.run_now
         if min(len(block) for block in found.values()) < POURS // 2:
             continue  # a set-up that jams tells nothing
         spread = np.mean([np.cov(block, rowvar=False) for block in found.values()], axis=0)
@@ -75,17 +83,12 @@ def next_experiment(
             )
         )
     if not items or len(rivals) < 2:
-        return ()
-    weights = {row.name: max(row.weight, 1e-3) for row in verdict.effects if row.name in rivals}
-    levers = tuple(f"{name}: {EFFECTS[name].lever}" for name in rivals)
-    return tuple(Suggestion(one, levers) for one in rank_experiments(items, weights, PLANNED))
-
-
-def rival(verdict: Verdict, name: str) -> Model:
-    """The model with effect ``name`` at its own best amplitudes and the parameters of the final fit."""
-    row = next(row for row in verdict.effects if row.name == name)
-    amplitude = tuple(a.value for a in sorted(row.amplitudes, key=lambda a: a.index))
-    return Model(tuple(p.after for p in verdict.parameters), ((name, amplitude),))
+        return Menu((), run_now)
+    best = min(model.criterion for model in verdict.models)
+    weights = {m.label: math.exp((best - m.criterion) / 2.0) for m in verdict.models if m.label in rivals}
+    asked = dict.fromkeys(name for rival in rivals for name in rival.split("+"))
+    levers = tuple(f"{name}: {EFFECTS[name].lever}" for name in asked)
+    return Menu(tuple(Suggestion(one, levers) for one in rank_experiments(items, weights, PLANNED)), run_now)
 
 
 def feasible(scene: Scene) -> dict[str, Scene]:

@@ -138,16 +138,22 @@ class Runs:
 class Observed:
     """Measured replicates per condition, (r_c, d_c), and the instrument's systematic sd per summary, (d_c,).
 
-    A replicate with a missing summary is left out; systematic error is not reduced by averaging.
+    A replicate with a missing summary is left out; systematic error is not reduced by averaging. mean_of: per condition
+    the pours behind each replicate, where only their mean is known; empty stands for one.
     """
 
     blocks: tuple[FloatArray, ...]
     instrument: tuple[FloatArray, ...]
+    mean_of: tuple[int, ...] = ()
 
     def complete(self, condition: int) -> FloatArray:
         """Return the complete replicates of a condition, shape (r, d_c)."""
         block = self.blocks[condition]
         return np.asarray(block[np.isfinite(block).all(axis=1)])
+
+    def pours(self, condition: int) -> int:
+        """Return the number of pours behind each replicate of a condition."""
+        return self.mean_of[condition] if self.mean_of else 1
 
 
 @dataclass(frozen=True)
@@ -223,6 +229,7 @@ def select_summaries(declared: Declared, runs: Runs, observed: Observed) -> Sele
         observed=Observed(
             tuple(b[:, keep] for b, keep in zip(observed.blocks, kept, strict=True)),
             tuple(i[keep] for i, keep in zip(observed.instrument, kept, strict=True)),
+            observed.mean_of,
         ),
         dropped=tuple(dropped),
         floored=tuple(floored),

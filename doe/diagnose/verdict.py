@@ -58,6 +58,22 @@ class ParameterChange(Record):
 
 
 @dataclass(frozen=True)
+class FreedParameter(Record):
+    """Where the data alone would put a parameter in the base model, natural units (freed.py), and the T^2 left.
+
+    sds: distance from its measured mean in standard deviations of that, NaN without one. outside: beyond the range that
+    was simulated, so extrapolated along the slope. value NaN: the data do not see it.
+    """
+
+    name: str
+    value: float
+    standard_error: float
+    sds: float
+    outside: bool
+    t2: float
+
+
+@dataclass(frozen=True)
 class FittedModel(Record):
     """A calibrated model, to be simulated afresh: "base", "a" or "a+b"; parameters in declared order, natural units.
 
@@ -148,6 +164,7 @@ class Verdict(Record):
     gates: tuple[Gate, ...]
     effects: tuple[EffectRow, ...]
     parameters: tuple[ParameterChange, ...]
+    freed: tuple[FreedParameter, ...]
     residuals: tuple[Residual, ...]
     where: tuple[str, ...]
     signatures: Signature

@@ -1,6 +1,7 @@
 """A ``[[condition]]`` → the scene that repeats it.
 
 name, role, rig, data              role: fit (calibrated against) or holdout (only predicted)
+mean_of                            every value of the table is the mean of so many pours (1 where it is not stated)
 [condition.rig_parameters]         last parts of the rig's parameter paths
 [condition.insertion]              protocol, rate, region_radius, region_z, velocity, batch_interval, duration;
                                    region = "cylinder", orientation = "random": the only ones there are
@@ -22,7 +23,7 @@ from doe.measurement.measurement import MeasuredParameter
 from doe.study_table import Table, number, one_of, only, section
 from solver import Scene, canonical, parameters, parse_quantity, pour_rig, value, with_rig, with_settings
 
-KEYS = ("name", "role", "rig", "data", "rig_parameters", "insertion", "domain", "duration", "images")
+KEYS = ("name", "role", "rig", "data", "rig_parameters", "insertion", "domain", "duration", "images", "mean_of")
 INSERTION = (
     "protocol",
     "rate",

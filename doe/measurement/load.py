@@ -22,7 +22,7 @@ from doe.measurement.measurement import Condition, CrossCheck, MeasuredParameter
 from doe.measurement.observations import read_observations
 from doe.measurement.parameter_table import read_parameters
 from doe.measurement.piles import pile_files
-from doe.study_table import Table, entries, one_of, only, required, section
+from doe.study_table import Table, entries, one_of, only, required, section, whole
 from solver import AssetNotFoundError, ParameterError, Scene, all_names, load_material, named, parse_quantity, read_toml
 
 FILE = "measurement.toml"
@@ -65,10 +65,11 @@ def _read(folder: Path, table: Table) -> Measurement:
         name = str(entry["name"])
         with _within(entry):
             scene = condition_scene(base, entry, measured)
+            mean_of = whole(entry.get("mean_of", 1), "mean_of", 1)
         replicates, observations, checked, unused = read_observations(
             name, folder / str(entry["data"]), piles[name], scene, uncertainty
         )
-        conditions.append(Condition(name, entry["role"], scene, replicates, observations))
+        conditions.append(Condition(name, entry["role"], scene, replicates, observations, mean_of))
         checks += checked
         ignored += unused
         if "images" in entry:

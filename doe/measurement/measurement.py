@@ -53,6 +53,8 @@ class Condition:
     scene: Scene
     replicates: int
     observations: tuple[Observation, ...]
+    mean_of: int = 1
+    """Pours behind each listed value: more than one where only their mean was published."""
 
     @property
     def offered(self) -> dict[str, Observation]:

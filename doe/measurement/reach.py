@@ -68,6 +68,8 @@ class ConditionReach(Record):
     condition: str
     role: str
     replicates: int
+    mean_of: int
+    """Pours behind each replicate."""
     resolutions: tuple[Resolution, ...]
 
 
@@ -80,6 +82,8 @@ class Reach(Record):
     """Summaries of the fitted conditions that have a spread."""
     unknowns: int
     """Free parameters."""
+    measured: int
+    """Of these, those that were measured independently."""
     has_discharge: bool
     has_asymmetry: bool
     has_holdout: bool
@@ -102,6 +106,7 @@ def reach_of(measurement: Measurement) -> Reach:
         conditions=conditions,
         equations=equations,
         unknowns=len(measurement.parameters),
+        measured=sum(parameter.mean is not None for parameter in measurement.parameters),
         has_discharge=_any(fitted, DISCHARGE),
         has_asymmetry=_any(fitted, ASYMMETRIC),
         has_holdout=bool(measurement.holdout),
@@ -117,7 +122,7 @@ def _condition_reach(condition: Condition) -> ConditionReach:
         _resolution(summary.name, summary.unit, values[:, k], float(stated[k]))
         for k, summary in enumerate(summaries(condition))
     )
-    return ConditionReach(condition.name, condition.role, condition.replicates, resolutions)
+    return ConditionReach(condition.name, condition.role, condition.replicates, condition.mean_of, resolutions)
 
 
 def _resolution(name: str, unit: str, values: np.typing.NDArray[np.float64], stated: float) -> Resolution:
@@ -144,14 +149,20 @@ def _any(names: list[str], beginnings: tuple[str, ...]) -> bool:
 def _warnings(reach: Reach) -> tuple[str, ...]:
     found = []
     n, k = reach.equations, reach.unknowns
-    if n <= 1:
+    if n <= 1 and k == reach.measured:
+        found.append(
+            "one number to fit: it can show that something is missing beside the measured parameters, not what"
+        )
+    elif n <= 1:
         found.append("one number to fit: any free parameter fits it exactly, so nothing that is missing can show")
     elif n <= k:
         found.append(f"{n} summaries against {k} free parameters: the model can fit what it lacks; nothing can show")
     elif n < 2 * k:
         found.append(f"{n} summaries against {k} free parameters: little is left to judge the fit by")
     for condition in reach.conditions:
-        if condition.replicates == 1:
+        if condition.mean_of > 1:
+            found.append(f"{condition.condition}: only means of pours: their scatter is taken from simulated pours")
+        elif condition.replicates == 1:
             found.append(f"{condition.condition}: one replicate: its noise rests on the stated uncertainties alone")
         elif condition.replicates < 4:
             found.append(f"{condition.condition}: {condition.replicates} replicates fix no scatter; four or more do")

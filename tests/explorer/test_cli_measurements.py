@@ -47,4 +47,6 @@ def test_bad_data_is_one_line_and_exit_code_2(tmp_path, option):
 
 
 def test_a_folder_that_is_not_there():
-    assert "shipped: granudrum_mcc, trefoil_1, trefoil_2" in refused(explorer("measurements", "check", "nowhere"))
+    assert "shipped: granudrum_mcc, sunflower_extract, trefoil_1, trefoil_2" in refused(
+        explorer("measurements", "check", "nowhere")
+    )

@@ -41,7 +41,26 @@ def parameters(result: Plain) -> Section:
         ),
     ]
     blocks += [Caution(text) for text in edges(result)]
+    blocks.append(_freed(result))
     return Section("Parameters", tuple(blocks))
+
+
+def _freed(result: Plain) -> Table:
+    """What each parameter would have to be if its own measurement were wrong and nothing else were missing."""
+    rows = []
+    for row in result["freed"]:
+        name, seen = row["name"], row["value"] is not None
+        place = f"{parameter_value(name, row['value'])} ± {parameter_value(name, row['standard_error'])}"
+        away = MISSING if row["sds"] is None else f"{fixed(row['sds'], 1)} SD"
+        where = "outside, extrapolated" if row["outside"] else "inside"
+        t2 = fixed(row["t2"], 1) if seen else MISSING
+        rows.append((parameter_label(name), *((place, away, where) if seen else ("not seen",) + (MISSING,) * 2), t2))
+    return Table(
+        ("parameter", "the data alone put it at", "from its measured mean", "simulated range", "T² left"),
+        tuple(rows),
+        "If one measurement were wrong: the base model with that parameter freed, the others held to theirs. "
+        f"T² of the calibrated base model: {fixed(result['t2']['before'][0], 1)}.",
+    )
 
 
 def _held(end: str, pull: float) -> str:

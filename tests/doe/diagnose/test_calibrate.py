@@ -99,3 +99,22 @@ def test_instrument_error_is_not_averaged_away():
     blunt = Observed(sharp.blocks, (np.full(D, 2.0),))
     sigma = [calibrate(emulator, (), gather_evidence(emulator, data)).sigma[0] for data in (sharp, blunt)]
     assert np.diag(sigma[1] - sigma[0]) == pytest.approx(np.full(D, 4.0))
+
+
+def test_a_published_mean_of_n_pours_weighs_as_the_n_pours_do():
+    """The simulated covariance is taken for both; only the comparison of variances needs the single pours."""
+    toy, emulator = world()
+    pours = toy.measured(np.random.default_rng(6), np.zeros(D))
+    mean = Observed((pours.blocks[0].mean(axis=0)[None],), (np.zeros(D),), (REPLICATES,))
+    fits = [calibrate(emulator, (), gather_evidence(emulator, data)) for data in (pours, mean)]
+    assert fits[1].t2 == pytest.approx(fits[0].t2)
+    assert fits[1].sigma[0] == pytest.approx(fits[0].sigma[0])
+
+
+def test_means_of_n_pours_are_compared_with_the_scatter_of_such_means():
+    _, emulator = world()
+    generator = np.random.default_rng(7)
+    means = generator.standard_normal((200, D)) / np.sqrt(5)
+    (comparison,) = gather_evidence(emulator, Observed((means,), (np.zeros(D),), (5,))).variances
+    assert comparison.ratio == pytest.approx(np.ones(D), abs=0.35)
+    assert not comparison.differs.any()

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from doe.diagnose.confirm import fitted
 from doe.diagnose.decide import diagnose, judge
 from doe.diagnose.runs import Condition, Effect, Observed
 from doe.errors import StatisticsError
@@ -67,6 +68,11 @@ def test_twins_are_not_told_apart():
     verdict = judge(emulator, Observed((exact,), (np.zeros(12),)), bootstrap=500)
     assert verdict.kind.startswith("ambiguous:")
     assert set(verdict.names) == {"e0", "e1"}
+    # Each rival goes into the next experiment as it fits the data by itself, not with the parameters of the other.
+    one, other = (fitted(verdict, name) for name in verdict.names)
+    assert [name for name, _ in (*one.effects, *other.effects)] == list(verdict.names)
+    assert np.abs(np.subtract(one.theta, other.theta)).max() > 1e-3
+    assert one.theta == tuple(p.after for p in verdict.parameters)
 
 
 def test_two_strong_effects_are_named_as_a_pair():

@@ -1,5 +1,7 @@
 """A data set in: scenes, parameters, values; the shipped ones load; names and free text carry no meaning."""
 
+import csv
+
 import numpy as np
 import pytest
 
@@ -7,12 +9,14 @@ from doe.errors import MeasurementError
 from doe.measurement import load_measurement, reach_of, summaries_of_data, summary_names
 from doe.record import plain
 from solver import with_values
-from solver.assets import AssetNotFoundError, measurement_folder
+from solver.assets import AssetNotFoundError, asset_path, measurement_folder
 from solver.insertion import Insertion
 from solver.rigs import Funnel
 from tests.doe.measurement.folders import MEASUREMENT, TABLE, changed, write, write_pile
 
+FACTORS = "table4_plackett_burman_factors"
 SHIPPED = ("granudrum_mcc", "trefoil_1", "trefoil_2")
+"""Those with a condition held out; the other one is a single published mean."""
 
 
 def test_a_condition_is_a_scene_to_simulate(tmp_path):
@@ -112,7 +116,7 @@ def test_shipped_data_load_into_scenes_that_hold(name):
 
 
 def test_an_unknown_data_set_lists_what_is_shipped():
-    with pytest.raises(AssetNotFoundError, match="shipped: granudrum_mcc, trefoil_1, trefoil_2"):
+    with pytest.raises(AssetNotFoundError, match="shipped: granudrum_mcc, sunflower_extract, trefoil_1, trefoil_2"):
         measurement_folder("trefoil_9")
 
 
@@ -176,3 +180,29 @@ def test_without_a_mean_a_run_starts_within_the_range(tmp_path):
         text = changed(MEASUREMENT, "{ mean = 0.3, sd = 0.05 }", f"{{ low = {low}, high = {high} }}")
         slow = load_measurement(write(tmp_path, {"measurement.toml": text})).conditions[0]
         assert slow.scene.pair("glass", "glass").static_friction == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_published_mean_says_of_how_many_pours(tmp_path):
+    folder = write(tmp_path, {"measurement.toml": changed(MEASUREMENT, 'role = "fit"', 'role = "fit"\nmean_of = 10')})
+    slow, fast = load_measurement(folder).conditions
+    assert (slow.mean_of, fast.mean_of) == (10, 1)
+
+
+def test_means_of_no_pours_are_refused(tmp_path):
+    folder = write(tmp_path, {"measurement.toml": changed(MEASUREMENT, 'role = "fit"', 'role = "fit"\nmean_of = 0')})
+    with pytest.raises(MeasurementError, match="condition 'slow': mean_of: 0 is not a whole number of at least 1"):
+        load_measurement(folder)
+
+
+def test_the_article_s_one_angle_loads_with_its_parameters_as_published():
+    """Tables 2 to 4 of the article: means, and ranges of ten values over 3.078 (Tippett 1925)."""
+    measurement = load_measurement(measurement_folder("sunflower_extract"))
+    (condition,) = measurement.conditions
+    assert summary_names(condition) == ("angle_of_repose_deg",)
+    assert summaries_of_data(condition).tolist() == [[24.68]]
+    published = {row["factor"]: row for row in csv.DictReader(asset_path("source_tables", FACTORS).open())}
+    for parameter, factor in zip(measurement.parameters, ("X4", "X7", "X16", "X13"), strict=True):
+        low, high = (1e6 ** (factor == "X4") * float(published[factor][end]) for end in ("low", "high"))
+        assert parameter.sd == pytest.approx((high - low) / 3.078, rel=5e-3)
+        assert low < parameter.mean < high
+    assert measurement.fit[0].mean_of == 10
