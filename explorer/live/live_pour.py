@@ -159,7 +159,6 @@ class LivePour:
 
     def _begin(self, start: Start) -> None:
         self._scene, self._generation = start.scene, start.generation
-        self._dt_limit, self._history = stability_limit(start.scene), History()
         self._announce(start, "fitting member spheres to the shapes")
         for body in start.scene.bodies:
             _ = body.clump  # fitted once per process and shape; the pour below takes it from the cache
@@ -167,7 +166,8 @@ class LivePour:
         self._batch = Batch(capacity_for([start.scene], 1))
         self._pour = Pour(self._batch, 0, endless(start.scene), start.seed)
         self._warm_up()
-        self._angles = AngleReader()
+        self._angles, self._history = AngleReader(), History()
+        self._dt_limit = stability_limit(self._pour.scene)
         self._paused, self._run_until, self._retuned = False, -math.inf, False
         self._keep()
         self._publish()
@@ -206,7 +206,7 @@ class LivePour:
         before, self._scene = self._scene, moment.scene
         put_back(self._pour, moment.kept)
         self._angles, self._retuned = copy(moment.angles), moment.retuned
-        self._dt_limit = stability_limit(self._scene)
+        self._dt_limit = stability_limit(self._pour.scene)
         # What was thinned out of the history is run again: the same bits, up to the next change that a person made.
         while (left := self._whole_steps(until)) > 0 and (steps := self._pour.steps_due(left)) > 0:
             self._launch(steps)
@@ -232,7 +232,7 @@ class LivePour:
             self._pour.move_to(self._batch)
         self._scene = changed
         self._pour.retune(endless(changed))
-        self._dt_limit = stability_limit(changed)
+        self._dt_limit = stability_limit(self._pour.scene)
         self._retuned = True
         self._history.changed(self._pour.time)
         self._keep()

@@ -68,10 +68,10 @@ class SceneNodes:
         self._surface_names, self._at_first = scene.rig.surface_names, rig_poses(scene.rig)
         self._surfaces = self._at_first
 
-    def show(self, frame: Frame, seen: npt.NDArray[np.bool_]) -> None:
-        """Move bodies and surfaces to where ``frame`` has them, and hide the bodies that are not ``seen``, shape (n,).
+    def show(self, frame: Frame, seen: npt.NDArray[np.bool_] | None = None) -> None:
+        """Move bodies and surfaces to where ``frame`` has them; call it inside ``server.atomic()``.
 
-        Call it inside ``server.atomic()``.
+        ``seen`` says which bodies are drawn, shape (n,); by default all that are in the domain.
         """
         self._show_surfaces(frame.surfaces)
         for k, (node, n) in enumerate(zip(self._bodies, self._numbers, strict=True)):
@@ -130,8 +130,12 @@ def _place(node: Any, poses: Poses) -> None:
     node.batched_scales = poses.scale
 
 
-def component_poses(frame: Frame, component: int, n: int, seen: npt.NDArray[np.bool_]) -> Poses:
-    """Poses of the bodies of one component, ``n`` of which will enter in all, in order of entry; the rest is hidden."""
+def component_poses(frame: Frame, component: int, n: int, seen: npt.NDArray[np.bool_] | None = None) -> Poses:
+    """Poses of the bodies of one component, ``n`` of which will enter in all, in order of entry.
+
+    Those that are not ``seen``, shape (bodies of the frame,), are hidden; by default those that have left the domain.
+    """
+    seen = frame.inside if seen is None else seen
     poses = nowhere(n)
     chosen = np.flatnonzero(frame.component == component)[:n]
     poses.position[: len(chosen)] = frame.position[chosen]

@@ -197,7 +197,7 @@ def test_bodies_that_have_not_entered_or_have_left_are_hidden():
         inside=np.array([True, True, False, True]),
         scale=np.float32([0.5, 1.0, 1.0, 2.0]),
     )
-    poses = component_poses(frame, 1, 5, frame.inside)
+    poses = component_poses(frame, 1, 5)
     assert poses.scale.tolist() == [0.5, 0, 2, 0, 0]
     assert poses.position[:3].tolist() == [[0, 1, 2], [6, 7, 8], [9, 10, 11]]
     assert poses.quaternion.tolist() == [[0, 1, 0, 0]] * 3 + [[1, 0, 0, 0]] * 2
