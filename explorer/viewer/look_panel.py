@@ -27,11 +27,11 @@ REACH_MM = 200.0
 
 
 class LookPanel:
-    """Holds the settings; what they do is up to who reads :attr:`look`."""
+    """Holds the settings; what they do is up to who reads :attr:`look`. ``bar`` is where the colours are explained."""
 
-    def __init__(self, server: viser.ViserServer, post: Post) -> None:
+    def __init__(self, server: viser.ViserServer, bar: viser.GuiHtmlHandle, post: Post) -> None:
         self.look = Look()
-        self._post, gui = post, server.gui
+        self._bar, self._post, gui = bar, post, server.gui
         with gui.add_folder("Colour"):
             self._colour = gui.add_dropdown(
                 "Colour by", COLOURS, hint=f"What the colour of a body says. Key {COLOUR_KEY}: the next one."
@@ -41,7 +41,6 @@ class LookPanel:
             )
             self._low = gui.add_number("From", self.look.low, min=-LARGEST, max=LARGEST, hint="In the unit of the bar.")
             self._high = gui.add_number("To", self.look.high, min=-LARGEST, max=LARGEST, hint="In the unit of the bar.")
-            self._bar = gui.add_html("")
         with gui.add_folder("Forces"):
             self._chains = gui.add_checkbox(
                 "Force chains", False, hint=f"Lines through the contacts that press hardest. Key {CHAINS_KEY}."
@@ -90,7 +89,7 @@ class LookPanel:
         """Draw the bar and say what the lines mean; call it inside ``server.atomic()``."""
         bar, lines = bar_html(self.look, details), chain_text(details, self.look)
         if self._bar.content != bar:
-            self._bar.content = bar
+            self._bar.content, self._bar.visible = bar, bool(bar)
         if self._chain_text.content != lines:
             self._chain_text.content = lines
         quantity = QUANTITIES.get(self.look.colour_by)

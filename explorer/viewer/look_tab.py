@@ -32,11 +32,14 @@ VIEW_KEYS: dict[str, Any] = dict(zip(DIRECTIONS, ("1", "2", "3", "4"), strict=Tr
 
 
 class LookTab:
-    """Draws the newest frame as the person wants to see it. Call :meth:`show` in the page's loop."""
+    """Draws the newest frame as the person wants to see it. Call :meth:`show` in the page's loop.
 
-    def __init__(self, server: viser.ViserServer, session: Session, post: Post) -> None:
+    ``bar`` explains the colours; it stands where it is seen beside every tab.
+    """
+
+    def __init__(self, server: viser.ViserServer, session: Session, bar: viser.GuiHtmlHandle, post: Post) -> None:
         self._server, self._session = server, session
-        self._panel, self._chains = LookPanel(server, post), ForceChains(server)
+        self._panel, self._chains = LookPanel(server, bar, post), ForceChains(server)
         self._selected: int | None = None
         self._followers: set[int] = set()
         self._drawn: tuple[SceneNodes, Frame] | None = None

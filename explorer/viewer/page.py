@@ -77,6 +77,7 @@ class Page:
             dark_mode=True, show_share_button=False, show_logo=False, brand_color=BRAND, control_width="large"
         )
         server.gui.main_panel.dock_right()
+        colour_bar = server.gui.add_html("", visible=False)
         tabs = server.gui.add_tab_group()
         with tabs.add_tab("Pour", viser.Icon.PLAYER_PLAY):
             RunPanel(server, session, post)
@@ -85,7 +86,7 @@ class Page:
             self._live = LivePanel(server, session, status.scene, post)
             self._restart = RestartPanel(server, session, status.scene, status.seed, post)
         with tabs.add_tab("Look", viser.Icon.EYE):
-            self._look = LookTab(server, session, post)
+            self._look = LookTab(server, session, colour_bar, post)
         self._study: StudyPanel | None = None
         if study is not None:
             with tabs.add_tab("Calibrate", viser.Icon.TARGET):

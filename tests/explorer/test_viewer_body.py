@@ -183,7 +183,7 @@ class FakeSession:
 def tab(server):
     session, actions = FakeSession(), Actions()
     nodes = SceneNodes(server, SCENE)
-    tab = LookTab(server, session, actions.post)
+    tab = LookTab(server, session, server.gui.add_html(""), actions.post)
     tab.show(nodes, BEADS, SCENE)
     yield SimpleNamespace(tab=tab, session=session, actions=actions, nodes=nodes)
     nodes.remove()

@@ -59,7 +59,7 @@ def server():
 @pytest.fixture
 def panel(server):
     actions = Actions()
-    panel = LookPanel(server, actions.post)
+    panel = LookPanel(server, server.gui.add_html(""), actions.post)
     return SimpleNamespace(panel=panel, actions=actions)
 
 
