@@ -13,22 +13,19 @@ import viser
 
 from explorer.scene_meshes import scene_height
 from explorer.viewer.guarded_server import address
+from explorer.viewer.view import FILL, VIEW_DIRECTION, VIEW_FIELD
 from solver.scene import Scene
 
 Array = npt.NDArray[np.float64]
 
 DIRECTIONS: Mapping[str, tuple[float, float, float]] = {
-    "Whole": (0.62, -0.75, 0.24),
+    "Whole": VIEW_DIRECTION,
     "Front": (0.0, -1.0, 0.0),
     "Side": (1.0, 0.0, 0.0),
     # Not quite from above: straight down, the camera would not know which way is up.
     "Top": (0.0, -1e-3, 1.0),
 }
 """From the pile to the camera."""
-FIELD = 0.6
-"""Vertical field of view [rad]."""
-FILL = 0.68
-"""Share of the height of the window that rig and feed take."""
 MIDDLE = 0.42
 """Height that the camera looks at, as a share of the height of rig and feed."""
 STILL = 1e-5
@@ -46,18 +43,15 @@ class View:
 def view_of(scene: Scene, name: str) -> View:
     """The preset ``name``: rig, pile and feed in one picture."""
     height = scene_height(scene)
-    distance = height / FILL / (2.0 * math.tan(FIELD / 2.0))
+    distance = height / FILL / (2.0 * math.tan(VIEW_FIELD / 2.0))
     middle = np.array([0.0, 0.0, MIDDLE * height])
     return View(middle + distance * np.array(DIRECTIONS[name]), middle)
 
 
 def go_to(client: Any, view: View) -> None:
-    """Put the camera of a browser to ``view``."""
-    with client.atomic():
-        # In this order: a new position takes the point that is looked at along.
-        client.camera.position = view.position
-        client.camera.look_at = view.look_at
-        client.camera.fov = FIELD
+    """Put the camera of a browser to ``view``, and its field of view to that of new clients."""
+    go_to_place(client, view)
+    client.camera.fov = VIEW_FIELD
 
 
 def go_along(clients: Iterable[Any], target: Array) -> None:
@@ -72,6 +66,7 @@ def go_along(clients: Iterable[Any], target: Array) -> None:
 def go_to_place(client: Any, view: View) -> None:
     """Put the camera of a browser to ``view`` and leave its field of view alone."""
     with client.atomic():
+        # In this order: a new position takes the point that is looked at along.
         client.camera.position = view.position
         client.camera.look_at = view.look_at
 

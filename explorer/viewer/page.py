@@ -12,10 +12,10 @@ import viser
 from explorer.diagnosis_process import DiagnosisProcess
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, Status
+from explorer.scene_meshes import scene_height
 from explorer.session import Session
 from explorer.study_process import StudyProcess
 from explorer.viewer.actions import Actions
-from explorer.viewer.camera import FIELD, view_of
 from explorer.viewer.chart import Chart
 from explorer.viewer.diagnosis_panel import DiagnosisPanel
 from explorer.viewer.live_panel import LivePanel
@@ -26,6 +26,7 @@ from explorer.viewer.restart_panel import RestartPanel
 from explorer.viewer.run_panel import RunPanel
 from explorer.viewer.scene_nodes import SceneNodes
 from explorer.viewer.study_panel import StudyPanel
+from explorer.viewer.view import light, look_at_height
 from solver.assets import shipped_measurements
 from solver.scene import Scene
 
@@ -66,7 +67,7 @@ class Page:
         self._frame_number, self._time = 0, status.time
         self._generation = status.generation
         light(server)
-        look(server, status.scene)
+        look_at_height(server, scene_height(status.scene))
         self._build_panels(status, study, study_name, diagnosis)
 
     def _build_panels(
@@ -103,7 +104,9 @@ class Page:
             self._notice = self._notice if notice is None else notice
             frame = self._session.frame()
             status = self._session.status()
-            self._take_events(status)
+            happened = self._session.new_events()
+            self._events.extend(happened)
+            self._forget_what_comes_later(status)
             with self._server.atomic():
                 self._show_bodies(status, frame)
                 if began >= panels_due or notice is not None:
@@ -114,8 +117,7 @@ class Page:
                     self._show_background()
             stop.wait(max(0.0, FRAME_INTERVAL - (time.monotonic() - began)))
 
-    def _take_events(self, status: Status) -> None:
-        self._events.extend(self._session.new_events())
+    def _forget_what_comes_later(self, status: Status) -> None:
         if status.time < self._time:  # brought back, or another pour
             self._events = deque(not_later(self._events, status), maxlen=EVENTS_REMEMBERED)
         self._time = status.time
@@ -138,7 +140,7 @@ class Page:
         if (scene.bodies, scene.rig) != (self._drawn.bodies, self._drawn.rig):
             self._nodes.remove()
             self._nodes, self._drawn = SceneNodes(self._server, scene), scene
-            look(self._server, scene)
+            look_at_height(self._server, scene_height(scene))
 
     def _show_panels(self, status: Status) -> None:
         readout = readout_html(status, self._events, self._notice)
@@ -152,16 +154,3 @@ class Page:
         if self._study is not None:
             self._study.show(self._notice)
         self._diagnosis.show(self._notice)
-
-
-def light(server: viser.ViserServer) -> None:
-    """viser's lamps with shadows, and a sky so weak that the colours of the components stay what they are."""
-    server.scene.configure_default_lights(enabled=True, cast_shadow=True)
-    server.scene.configure_environment_map("studio", environment_intensity=0.15)
-
-
-def look(server: viser.ViserServer, scene: Scene) -> None:
-    """Camera that new clients start with: pile, funnel and feed in one picture."""
-    view, camera = view_of(scene, "Whole"), server.initial_camera
-    camera.position, camera.look_at, camera.fov = view.position, view.look_at, FIELD
-    camera.near = 0.01

@@ -13,13 +13,14 @@ from explorer.live.messages import SessionState, Status
 from explorer.scene_meshes import body_triangles, scene_height
 from explorer.screen_units import InputError
 from explorer.viewer.actions import Actions
-from explorer.viewer.camera import DIRECTIONS, FIELD, go_along, go_to, link_to, view_of
+from explorer.viewer.camera import DIRECTIONS, go_along, go_to, link_to, view_of
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.inspector import NOBODY, body_html
 from explorer.viewer.look_tab import LookTab
 from explorer.viewer.palette import SELECTED, linear
 from explorer.viewer.picking import first_crossing, nearest_hit
 from explorer.viewer.scene_nodes import SceneNodes
+from explorer.viewer.view import VIEW_FIELD
 from tests.explorer.beads import RADIUS, bead_scene
 from tests.explorer.test_viewer_look import DETAILS, FRAME
 
@@ -98,7 +99,7 @@ def test_presets_have_rig_and_feed_in_the_picture(name):
     away = view.position - view.look_at
     assert away / np.linalg.norm(away) == pytest.approx(np.array(DIRECTIONS[name]) / np.linalg.norm(DIRECTIONS[name]))
     # Half the picture at that distance is more than the part of the height above the middle.
-    assert np.linalg.norm(away) * math.tan(FIELD / 2) > 0.58 * height
+    assert np.linalg.norm(away) * math.tan(VIEW_FIELD / 2) > 0.58 * height
 
 
 class FakeCamera:

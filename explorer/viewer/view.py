@@ -1,0 +1,32 @@
+"""Lamps and the camera that new clients start with; the same for the live page and a replay."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import viser
+
+VIEW_DIRECTION = (0.62, -0.75, 0.24)
+"""From the pile to the camera."""
+VIEW_FIELD = 0.6
+"""Vertical field of view [rad]."""
+FILL = 0.68
+"""Share of the height of the window that rig and feed take."""
+
+
+def light(server: viser.ViserServer) -> None:
+    """viser's lamps with shadows, and a sky so weak that the colours of the components stay what they are."""
+    server.scene.configure_default_lights(enabled=True, cast_shadow=True)
+    server.scene.configure_environment_map("studio", environment_intensity=0.15)
+
+
+def look_at_height(server: viser.ViserServer, height: float) -> None:
+    """Camera that new clients start with: everything up to ``height`` [m] in one picture."""
+    distance = height / FILL / (2.0 * math.tan(VIEW_FIELD / 2.0))
+    middle = (0.0, 0.0, 0.42 * height)
+    camera = server.initial_camera
+    camera.position = np.array(middle) + distance * np.array(VIEW_DIRECTION)
+    camera.look_at = middle
+    camera.fov = VIEW_FIELD
+    camera.near = 0.01
