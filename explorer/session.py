@@ -16,6 +16,7 @@ from dataclasses import replace
 from typing import Any
 
 from explorer.errors import CommandError
+from explorer.live.details import Details, detail_reader, shared_details
 from explorer.live.frames import MAX_BODIES, Frame, FrameReader, shared_block
 from explorer.live.messages import (
     Close,
@@ -30,8 +31,11 @@ from explorer.live.messages import (
     Start,
     Status,
     Step,
+    StepBack,
+    Watch,
 )
 from explorer.live.process import run
+from explorer.live.slots import SlotReader
 from solver.params import ParameterError
 from solver.scene import Scene, body_counts, canonical, parameters, poured_mass, with_values
 
@@ -55,6 +59,8 @@ class Session:
         self._commands: Any = None
         self._reports: Any = None
         self._frames: FrameReader | None = None
+        self._details: SlotReader[Details] | None = None
+        self._watch = Watch(wanted=False)
         self._status: Status | None = None
         self._events: deque[Event] = deque(maxlen=EVENTS_KEPT)
         self._generation = 0
@@ -86,6 +92,7 @@ class Session:
         )
         self._commands.put(Start(scene, seed, self._generation))
         self._commands.put(SetSpeed(self._speed))
+        self._commands.put(self._watch)
 
     def restart(self, scene: Scene | None = None, seed: int | None = None) -> None:
         """Start again, by default with the scene as it is now and the same seed."""
@@ -103,6 +110,13 @@ class Session:
     def step(self) -> None:
         """Go on by one sample interval of the scene (``numerics.sample_interval``), then stand still."""
         self._send(Step(self._present().scene.numerics.sample_interval))
+
+    def step_back(self) -> None:
+        """Go back by one sample interval, with everything as it was then, parameters too, and stand still.
+
+        From there the pour repeats the same bits until something is changed.
+        """
+        self._send(StepBack(self._present().scene.numerics.sample_interval))
 
     def set_speed(self, factor: float) -> None:
         """Aim at ``factor`` seconds of simulated time per second."""
@@ -125,6 +139,19 @@ class Session:
                 raise ParameterError(f"{path}: acts on restart only, not on a running pour")
         with_values(scene, dict(values))
         self._send(SetParameters(dict(values)))
+
+    def watch(self, wanted: bool, body: int | None = None) -> None:
+        """Say whether :meth:`details` are looked at, and of which body (by order of entry) all contacts are wanted."""
+        if self._watch == Watch(wanted, body):
+            return
+        self._watch = Watch(wanted, body)
+        if self._alive():
+            self._commands.put(self._watch)
+
+    def details(self) -> Details | None:
+        """Velocities, loads and contacts of the present pour, as they were read last; None before they were."""
+        details = self._details.newest() if self._details is not None else None
+        return details if details is not None and details.generation == self._generation else None
 
     def frame(self) -> Frame | None:
         """The newest frame of the present pour; None before its first one."""
@@ -169,10 +196,10 @@ class Session:
         # New queues: a process that was killed may have left the old ones locked.
         self._forget_process()
         self._commands, self._reports = self._context.Queue(), self._context.Queue()
-        block = shared_block(self._context)
-        self._frames = FrameReader(block)
+        frames, details = shared_block(self._context), shared_details(self._context)
+        self._frames, self._details = FrameReader(frames), detail_reader(details)
         self._process = self._context.Process(
-            target=run, args=(self._commands, self._reports, block), name="explorer-solver", daemon=True
+            target=run, args=(self._commands, self._reports, frames, details), name="explorer-solver", daemon=True
         )
         self._process.start()
 

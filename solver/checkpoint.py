@@ -42,6 +42,7 @@ PLAIN = (
     "_last_entry",
     "_began",
     "_left",
+    "_ramp_left",
 )
 """Parts of a pour that are numbers, text, or lists of them."""
 HEAD = "pour.json"

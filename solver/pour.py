@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from solver import insertion
 from solver.clump import scaled
+from solver.contacts import Contacts, contacts_from
 from solver.effects.set_up import actual
 from solver.layout import layout
 from solver.observables.free_surface import surface_heights
@@ -67,6 +68,7 @@ class Pour:
         self._due = insertion.entry_times(self._layout.numbers[:, 0], scene.insertion.rate) - scene.insertion.lead
         self._table = law_table(scene)
         self._ramp: Ramp | None = None
+        self._ramp_left = 0
         self.energy_put_in = 0.0
         self._supplied = 0.0
         self.entered = 0
@@ -127,7 +129,7 @@ class Pour:
             return 0
         limit = self._left
         if self._ramp is not None:
-            limit = min(limit, max(1, math.ceil(RAMP_TIME / RAMP_STEPS / self.dt)))
+            limit = min(limit, self._ramp_left)
         return limit if at_most is None else min(limit, at_most)
 
     def after(self, steps: int, row: npt.NDArray[np.float64]) -> bool:
@@ -135,7 +137,10 @@ class Pour:
         self.steps += steps
         self._left -= steps
         if self._ramp is not None:
-            self._follow_ramp(self._ramp)
+            # At moments of its own: a launch that was cut short must not change the bits of what follows.
+            self._ramp_left -= steps
+            if self._ramp_left <= 0:
+                self._follow_ramp(self._ramp)
         if self._left > 0:
             return False
         self._left = self._interval_steps()
@@ -157,6 +162,7 @@ class Pour:
         self._set_time_step(min(self.dt, time_step(scene)))
         self.energy_put_in = 0.0
         self._set_table(self._ramp.table(self.time))
+        self._ramp_left = self._ramp_steps()
         self._quiet_samples = 0
         if self.outcome in (Outcome.AT_REST, Outcome.JAMMED):
             self.outcome, self.message = Outcome.RUNNING, ""
@@ -176,6 +182,15 @@ class Pour:
     def surface_poses(self) -> npt.NDArray[np.float64]:
         """Where the rig's surfaces are: origin [m] and orientation wxyz, shape (k, 7)."""
         return self.batch.surface_state(self.w)[:, :7]
+
+    def contacts(self) -> Contacts:
+        """Present contacts of the bodies, with each other and with the rig."""
+        return contacts_from(self.batch.contacts(self.w))
+
+    @property
+    def entry_times(self) -> npt.NDArray[np.float64]:
+        """When the bodies entered [s], in order of entry."""
+        return np.array([time for time, *_ in self._entries], dtype=float)
 
     def record(self) -> Record:
         """What the run leaves behind."""
@@ -310,7 +325,12 @@ class Pour:
             room=self.batch.capacity.contacts,
         )
 
+    def _ramp_steps(self) -> int:
+        """Steps between two changes of the constants."""
+        return max(1, math.ceil(RAMP_TIME / RAMP_STEPS / self.dt))
+
     def _follow_ramp(self, ramp: Ramp) -> None:
+        self._ramp_left = self._ramp_steps()
         self._set_table(ramp.table(self.time))
         if ramp.over(self.time):
             self._ramp = None

@@ -6,7 +6,8 @@ Two limits, the smaller one rules:
     body        dt = 0.35 √(m_eff / k),  k = 2 E* √(R δ) at the overlap that a 2 m/s impact makes, with the mass that a
                 body shows at its far end, 1/m_eff = 1/m + reach²/I (a rod's tip is lighter than the rod)
 
-f is ``numerics.rayleigh_fraction``. Both limits are proportional to the size of a body, so the smallest that its
+f is ``numerics.rayleigh_fraction``. With f = 1, and 2 in place of 0.35 (leapfrog: ω dt < 2), the same two are the limit
+of stability. Both limits are proportional to the size of a body, so the smallest that its
 distribution of sizes allows is taken, whatever the seed draws. An effect that stiffens contacts shortens both.
 """
 
@@ -22,6 +23,8 @@ from solver.scene import Scene
 IMPACT_SPEED = 2.0
 """Speed [m/s] at which the body limit is taken; a fall of 0.2 m."""
 BODY_FRACTION = 0.35
+LEAPFROG = 2.0
+"""Largest ω dt of a stable leapfrog step."""
 
 
 def rayleigh_time(radius: float, material: Material) -> float:
@@ -32,17 +35,26 @@ def rayleigh_time(radius: float, material: Material) -> float:
 
 def time_step(scene: Scene) -> float:
     """Time step [s] of ``scene``: the smaller of the Rayleigh and the body limit over all components."""
+    return _smallest(scene, scene.numerics.rayleigh_fraction, BODY_FRACTION)
+
+
+def stability_limit(scene: Scene) -> float:
+    """Time step [s] beyond which ``scene`` is unstable: T_R of the smallest sphere, or 2 √(m_eff / k) of a body."""
+    return _smallest(scene, 1.0, LEAPFROG)
+
+
+def _smallest(scene: Scene, of_rayleigh: float, of_body: float) -> float:
     wall = scene.material(scene.rig.wall)
     steps = []
     for body in scene.bodies:
         clump, material = scaled(body.clump, body.sizes.low), scene.material(body.material)
         smallest = float(clump.radii.min())
-        steps.append(scene.numerics.rayleigh_fraction * rayleigh_time(smallest, material))
+        steps.append(of_rayleigh * rayleigh_time(smallest, material))
         e_star = max(effective_youngs_modulus(material, other) for other in (*scene.materials, wall))
         largest = float(clump.radii.max())
         overlap = (15.0 * clump.mass * IMPACT_SPEED**2 / (16.0 * e_star * math.sqrt(largest))) ** 0.4
         stiffness = 2.0 * e_star * math.sqrt(largest * overlap)
         tip = 1.0 / (1.0 / clump.mass + clump.bounding_radius**2 / float(min(clump.inertia[1:])))
-        steps.append(BODY_FRACTION * math.sqrt(tip / stiffness))
+        steps.append(of_body * math.sqrt(tip / stiffness))
     stiffest = max((effect.stiffening for effect in scene.effects if isinstance(effect, ContactEffect)), default=1.0)
     return min(steps) / math.sqrt(stiffest)

@@ -5,13 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from solver import snapshot
+from solver import moving_state, snapshot
 from solver.body import Body
 from solver.effects.columns import effect_table, kernel_effects, reach_of_pulls
-from solver.kernels import exchange
+from solver.kernels import exchange, touching
 from solver.kernels.batch import advance, measure, take_out
 from solver.laws.hertz_mindlin import constants
 from solver.layout import Layout
+from solver.moving_state import Moving
 from solver.rigs.rig import Container
 from solver.scene import Scene
 from solver.snapshot import Arrays
@@ -179,6 +180,14 @@ class Batch:
             exchange.read_bodies(self._s, w, out)
         return out
 
+    def contacts(self, w: int) -> Array:
+        """Contacts as of the last step, one row each: see ``kernels/touching.py`` and ``solver/contacts.py``."""
+        room, count = int(self.summary()[w, SUMMARY_COLUMNS.index("contacts")]), np.zeros(1, dtype=np.int32)
+        out = np.zeros((room, 11))
+        if room:
+            touching.read_contacts(self._s, w, out, count)
+        return out[: count[0]]
+
     def surface_state(self, w: int) -> Array:
         """Per surface: origin 0:3, quaternion 3:7, velocity 7:10, angular velocity 10:13, force 13:16, torque 16:19.
 
@@ -195,6 +204,14 @@ class Batch:
     def put(self, w: int, arrays: Arrays) -> None:
         """Put a world back that :meth:`take` gave, after :meth:`load` with the same scene."""
         snapshot.put(self._s, w, arrays)
+
+    def take_moving(self, w: int, bodies: int, members: int) -> Moving:
+        """What moves in world ``w``, of which ``bodies`` with ``members`` spheres are loaded: for this slot only."""
+        return moving_state.take(self._s, w, bodies, members)
+
+    def put_moving(self, w: int, kept: Moving) -> None:
+        """Put back what :meth:`take_moving` gave; law and effects have to be those of that moment."""
+        moving_state.put(self._s, w, kept)
 
     def _load_walls(self, w: int, scene: Scene, tables: WallTables, active: Sequence[bool]) -> None:
         s, walls = self._s, wall_materials(scene)

@@ -1,14 +1,7 @@
-"""Frames in shared memory: the solver process writes the newest state of all bodies, the page's process reads
-it.
-
-Two slots and a counter. The writer fills the slot that was not published last and then raises the counter; a
-reader copies the published slot and looks at the counter again: while it has not moved, the writer was at
-work on the other slot, so the copy is whole. No lock is involved that a dying process could keep.
-"""
+"""Frames in shared memory: the solver process writes the newest state of all bodies, the page's process reads it."""
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -16,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from explorer.live.slots import SlotReader, SlotWriter, shared_slots
 from solver.record import Bodies
 
 MAX_BODIES = 8192
@@ -41,11 +35,6 @@ SLOT = np.dtype(
     align=True,
 )
 """One frame in memory; the first ``bodies`` rows of the arrays, and the first ``surfaces`` poses, are filled."""
-
-BUFFER = np.dtype([("counter", np.int64), ("slots", SLOT, (2,))], align=True)
-"""The shared block. ``counter`` is the number of frames published so far; frame k lies in slot k mod 2."""
-
-READ_ATTEMPTS = 5
 
 
 @dataclass(frozen=True)
@@ -73,58 +62,44 @@ class Frame:
 
 
 def shared_block(context: Any) -> Any:
-    """Zeroed shared memory for ``BUFFER``, to be handed to a process that ``context`` (multiprocessing) starts."""
-    return context.RawArray(ctypes.c_byte, BUFFER.itemsize)
+    """Shared memory for frames, to be handed to a process that ``context`` (multiprocessing) starts."""
+    return shared_slots(context, SLOT)
 
 
 class FrameWriter:
     """The solver's end of the block."""
 
     def __init__(self, block: Any) -> None:
-        self._buffer = np.frombuffer(block, dtype=BUFFER)[0:1]
+        self._writer = SlotWriter(block, SLOT)
 
     def publish(
         self, bodies: Bodies, generation: int, time: float, surfaces: npt.NDArray[np.float64] = NO_SURFACES
     ) -> None:
         """Write a frame; there must not be more than ``MAX_BODIES`` bodies and ``MAX_SURFACES`` poses (k, 7)."""
         n = len(bodies.mass)
-        following = int(self._buffer["counter"][0]) + 1
-        slot = self._buffer["slots"][0, following % 2 : following % 2 + 1]
-        slot["generation"], slot["time"], slot["bodies"] = generation, time, n
-        slot["position"][0, :n] = bodies.position
-        slot["quaternion"][0, :n] = bodies.quaternion
-        slot["component"][0, :n] = bodies.component
-        slot["inside"][0, :n] = bodies.inside
-        slot["scale"][0, :n] = bodies.scale
-        slot["surfaces"], slot["pose"][0, : len(surfaces)] = len(surfaces), surfaces
-        self._buffer["counter"] = following
+
+        def fill(slot: Any) -> None:
+            slot["generation"], slot["time"], slot["bodies"] = generation, time, n
+            slot["position"][0, :n] = bodies.position
+            slot["quaternion"][0, :n] = bodies.quaternion
+            slot["component"][0, :n] = bodies.component
+            slot["inside"][0, :n] = bodies.inside
+            slot["scale"][0, :n] = bodies.scale
+            slot["surfaces"], slot["pose"][0, : len(surfaces)] = len(surfaces), surfaces
+
+        self._writer.publish(fill)
 
 
 class FrameReader:
     """The page's end of the block."""
 
     def __init__(self, block: Any, between: Callable[[], None] = lambda: None) -> None:
-        """``between`` is called after each copy, before it is checked (tests put a writer there)."""
-        self._buffer = np.frombuffer(block, dtype=BUFFER)[0:1]
-        self._between = between
-        self._last: Frame | None = None
+        """``between``: see :class:`SlotReader`."""
+        self._reader = SlotReader(block, SLOT, _copy, between)
 
     def newest(self) -> Frame | None:
-        """The newest frame, or None before the first one.
-
-        The same object as long as nothing new was published, and also where the writer overtook every attempt
-        to copy (it would have to publish two frames within a copy of some 10 µs, five times in a row).
-        """
-        for _ in range(READ_ATTEMPTS):
-            counter = int(self._buffer["counter"][0])
-            if counter == 0 or (self._last is not None and self._last.number == counter):
-                return self._last
-            frame = _copy(self._buffer["slots"][0, counter % 2], counter)
-            self._between()
-            if int(self._buffer["counter"][0]) == counter:
-                self._last = frame
-                break
-        return self._last
+        """The newest frame, or None before the first one; the same object as long as nothing new was published."""
+        return self._reader.newest()
 
 
 def _copy(slot: Any, number: int) -> Frame:

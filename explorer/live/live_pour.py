@@ -7,11 +7,14 @@ import math
 import sys
 import time as clock
 from collections.abc import Callable, Mapping
+from copy import copy
 
 import numpy as np
 
 from explorer.live.angle_reader import AngleReader
+from explorer.live.details import DetailWriter
 from explorer.live.frames import FrameWriter
+from explorer.live.history import History, Moment
 from explorer.live.messages import (
     Command,
     Event,
@@ -24,6 +27,8 @@ from explorer.live.messages import (
     Start,
     Status,
     Step,
+    StepBack,
+    Watch,
 )
 from explorer.live.pace import Pace
 from explorer.outcomes import outcome_text
@@ -32,14 +37,18 @@ from solver.effects.columns import kernel_effects
 from solver.params import ParameterError
 from solver.pour import Pour
 from solver.record import Outcome
+from solver.rewind import keep, put_back
 from solver.run import capacity_for
 from solver.scene import Scene, with_values
+from solver.time_step import stability_limit
 from solver.world import Batch
 
 FRAME_INTERVAL = 1.0 / 60.0
 """Wall time [s] between published frames."""
 STATUS_INTERVAL = 0.1
 """Wall time [s] between reports."""
+DETAIL_INTERVAL = 0.1
+"""Wall time [s] between details, while they are looked at."""
 BEFORE_FIRST_SAMPLE = {"entered": 0.0, "discharged": 0.0, "kinetic": 0.0, "touching": 0.0}
 """Sums over all bodies while none has been sampled yet."""
 
@@ -47,8 +56,11 @@ BEFORE_FIRST_SAMPLE = {"entered": 0.0, "discharged": 0.0, "kinetic": 0.0, "touch
 class LivePour:
     """A pour with play and pause, live parameters, frames and reports. One thread only (the one with Taichi)."""
 
-    def __init__(self, start: Start, frames: FrameWriter, report: Callable[[Report], None]) -> None:
-        self._frames, self._report = frames, report
+    def __init__(
+        self, start: Start, frames: FrameWriter, report: Callable[[Report], None], details: DetailWriter
+    ) -> None:
+        self._frames, self._report, self._details = frames, report, details
+        self._watch, self._detailed = Watch(wanted=False), 0.0
         self._pace = Pace(speed=1.0)
         self._published = self._reported = 0.0
         self._begin(start)
@@ -63,15 +75,21 @@ class LivePour:
                 self._pace.restart(clock.perf_counter(), self._pour.time)
             case Pause():
                 self._paused, self._run_until = True, -math.inf
+                self._keep()
             case Step(duration=duration):
                 # Steps that are asked for while one runs are added to it.
                 self._paused, self._run_until = True, max(self._run_until, self._pour.time) + duration
                 self._pace.restart(clock.perf_counter(), self._pour.time)
+            case StepBack(duration=duration):
+                self._go_back(self._pour.time - duration)
             case SetSpeed(factor=factor):
                 self._pace.speed = factor
                 self._pace.restart(clock.perf_counter(), self._pour.time)
             case SetParameters(values=values):
                 self._set_parameters(values)
+            case Watch():
+                self._watch = command
+                self._publish_details()
         self._report(self.status())
 
     def seconds_to_wait(self) -> float | None:
@@ -84,7 +102,9 @@ class LivePour:
         """Run one short launch, then publish and report what is due."""
         steps = self._pour.steps_due(min(self._pace.steps(self._pour.dt), self._steps_to_stop()))
         before = clock.perf_counter()
-        self._launch(steps)
+        decided = self._launch(steps)
+        if decided or (self._paused and self._pour.time >= self._run_until):
+            self._keep()
         now = clock.perf_counter()
         self._pace.launched(steps, now - before, now, self._pour.time)
         over = self._pour.outcome != Outcome.RUNNING
@@ -98,6 +118,8 @@ class LivePour:
             self._report(self.status())
         if over or self._paused or now - self._published >= FRAME_INTERVAL:
             self._publish()
+        if over or self._paused or now - self._detailed >= DETAIL_INTERVAL:
+            self._publish_details()
 
     def status(self) -> Status:
         """What the page is told."""
@@ -115,11 +137,14 @@ class LivePour:
             seed=pour.seed,
             generation=self._generation,
             speed=self._pace.speed,
+            capped=state == SessionState.RUNNING and self._pace.capped,
             real_time_factor=self._pace.real_time_factor if state == SessionState.RUNNING else 0.0,
             phase=pour.phase,
             outcome=pour.outcome,
             time=pour.time,
             dt=pour.dt,
+            dt_limit=self._dt_limit,
+            earliest=self._history.earliest,
             bodies=pour.entered,
             bodies_planned=len(pour.order),
             entered_mass=sample["entered"],
@@ -141,8 +166,10 @@ class LivePour:
         self._batch = Batch(capacity_for([start.scene], 1))
         self._pour = Pour(self._batch, 0, endless(start.scene), start.seed)
         self._warm_up()
-        self._angles = AngleReader()
+        self._angles, self._history = AngleReader(), History()
+        self._dt_limit = stability_limit(self._pour.scene)
         self._paused, self._run_until, self._retuned = False, -math.inf, False
+        self._keep()
         self._publish()
         self._pace.restart(clock.perf_counter(), self._pour.time)
         self._report(self.status())
@@ -159,9 +186,35 @@ class LivePour:
             Status(SessionState.STARTING, message, start.scene, start.seed, start.generation, self._pace.speed)
         )
 
-    def _launch(self, steps: int) -> None:
+    def _launch(self, steps: int) -> bool:
         row = self._batch.advance(np.array([steps], dtype=np.int32))
-        self._pour.after(steps, row[0])
+        return self._pour.after(steps, row[0])
+
+    def _keep(self) -> None:
+        """Keep the present moment, so that the person at the screen can come back to it."""
+        if self._pour.outcome != Outcome.NON_FINITE:
+            self._history.add(Moment(keep(self._pour), self._scene, copy(self._angles), self._retuned))
+
+    def _go_back(self, time: float) -> None:
+        """Bring everything back to how it was at ``time`` [s], or as early as is kept, and pause."""
+        self._paused, self._run_until = True, -math.inf
+        found = self._history.back_to(time, self._pour.time)
+        if found is None:
+            self._event("this is the earliest moment that is kept")
+            return
+        moment, until = found
+        before, self._scene = self._scene, moment.scene
+        put_back(self._pour, moment.kept)
+        self._angles, self._retuned = copy(moment.angles), moment.retuned
+        self._dt_limit = stability_limit(self._pour.scene)
+        # What was thinned out of the history is run again: the same bits, up to the next change that a person made.
+        while (left := self._whole_steps(until)) > 0 and (steps := self._pour.steps_due(left)) > 0:
+            self._launch(steps)
+        self._keep()
+        for line in changes(before, self._scene):
+            self._event(line)
+        self._publish()
+        self._publish_details()
 
     def _set_parameters(self, values: Mapping[str, float | str]) -> None:
         try:
@@ -179,7 +232,10 @@ class LivePour:
             self._pour.move_to(self._batch)
         self._scene = changed
         self._pour.retune(endless(changed))
+        self._dt_limit = stability_limit(self._pour.scene)
         self._retuned = True
+        self._history.changed(self._pour.time)
+        self._keep()
         self._pace.restart(clock.perf_counter(), self._pour.time)
 
     def _publish(self) -> None:
@@ -187,6 +243,12 @@ class LivePour:
         if self._pour.outcome != Outcome.NON_FINITE:
             self._frames.publish(self._pour.bodies(), self._generation, self._pour.time, self._pour.surface_poses())
         self._published = clock.perf_counter()
+
+    def _publish_details(self) -> None:
+        pour, self._detailed = self._pour, clock.perf_counter()
+        if self._watch.wanted and pour.outcome != Outcome.NON_FINITE:
+            bodies, contacts = pour.bodies(), pour.contacts()
+            self._details.publish(self._generation, pour.time, bodies, pour.entry_times, contacts, self._watch.body)
 
     def _observe(self) -> None:
         pour = self._pour
@@ -203,6 +265,10 @@ class LivePour:
             return sys.maxsize
         # Less a hair: a sum of steps must not miss its end by rounding and take one more.
         return max(1, math.ceil((self._run_until - self._pour.time) / self._pour.dt - 1e-6))
+
+    def _whole_steps(self, time: float) -> int:
+        """Steps that end at or before ``time`` [s], but for rounding."""
+        return math.floor((time - self._pour.time) / self._pour.dt + 1e-6)
 
     def _event(self, text: str) -> None:
         self._report(Event(self._generation, self._pour.time, text))

@@ -6,6 +6,7 @@ scene.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -57,6 +58,13 @@ class Step:
 
 
 @dataclass(frozen=True)
+class StepBack:
+    """Go back by ``duration`` [s] of simulated time, or to the earliest moment that is kept, and pause there."""
+
+    duration: float
+
+
+@dataclass(frozen=True)
 class SetParameters:
     """New values (SI, or text with a unit) of live parameters by path, taken over together."""
 
@@ -71,11 +79,20 @@ class SetSpeed:
 
 
 @dataclass(frozen=True)
+class Watch:
+    """Whether velocities, loads and contacts are looked at: nothing is read of them otherwise."""
+
+    wanted: bool
+    body: int | None = None
+    """A body, by its order of entry, all of whose contacts are wanted."""
+
+
+@dataclass(frozen=True)
 class Close:
     """End the process."""
 
 
-Command = Start | Play | Pause | Step | SetParameters | SetSpeed | Close
+Command = Start | Play | Pause | Step | StepBack | SetParameters | SetSpeed | Watch | Close
 
 
 @dataclass(frozen=True)
@@ -92,10 +109,17 @@ class Status:
     """Wanted ratio of simulated to wall time."""
     real_time_factor: float = 0.0
     """Measured ratio of simulated to wall time over the last second; 0 while time stands."""
+    capped: bool = False
+    """The solver cannot keep the wanted speed."""
     phase: Phase = Phase.FILL
     outcome: Outcome = Outcome.RUNNING
     time: float = 0.0
     dt: float = 0.0
+    """Time step [s]."""
+    dt_limit: float = math.nan
+    """Time step from which on the motion is unstable [s] (``solver.time_step.stability_limit``)."""
+    earliest: float = math.nan
+    """Simulated time [s] to which the pour can be brought back."""
     bodies: int = 0
     """Bodies that have entered."""
     bodies_planned: int = 0

@@ -15,6 +15,10 @@ MEMORY = 0.7
 """Weight of the past in the running mean of the cost of a step."""
 FORGET_DEBT = 0.1
 """A pour that is further behind the clock than this [s] does not try to catch up."""
+CAPPED = 0.9
+"""A pour that stays below this share of the wanted speed cannot keep it."""
+CAPPED_WINDOW = 0.5
+"""Wall time [s] before which nothing is said about that."""
 WINDOW = 1.0
 """Wall time [s] over which the real-time factor is measured."""
 
@@ -53,6 +57,12 @@ class Pace:
     def wait(self, wall: float, time: float) -> float:
         """Seconds until simulated ``time`` is due; negative when the pour is behind."""
         return self._start_wall + (time - self._start_time) / self.speed - wall
+
+    @property
+    def capped(self) -> bool:
+        """Whether the wanted speed cannot be kept."""
+        (wall, _), (last_wall, _) = self._history[0], self._history[-1]
+        return last_wall - wall >= CAPPED_WINDOW and self.real_time_factor < CAPPED * self.speed
 
     @property
     def real_time_factor(self) -> float:

@@ -20,18 +20,19 @@ IDLE_WAIT = 0.5
 """Longest wait [s] for a command before the process looks whether its parent still lives."""
 
 
-def run(commands: Any, reports: Any, block: Any) -> None:
-    """Main function of the process: queue of commands in, queue of reports out, shared memory for frames."""
+def run(commands: Any, reports: Any, frames: Any, details: Any) -> None:
+    """Main function of the process: commands in, reports out by queues; frames and details by shared memory."""
     # Ctrl-C in a terminal reaches the whole group; the parent decides when this process ends.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        _work(commands, reports, block)
+        _work(commands, reports, frames, details)
     except Exception as error:  # whatever it is, the person at the screen has to hear of it
         traceback.print_exc()
         reports.put(Failure(f"{type(error).__name__}: {' '.join(str(error).split())[:300]}"))
 
 
-def _work(commands: Any, reports: Any, block: Any) -> None:
+def _work(commands: Any, reports: Any, frames: Any, details: Any) -> None:
+    from explorer.live.details import DetailWriter
     from explorer.live.frames import FrameWriter
     from explorer.live.live_pour import LivePour
     from solver import backend
@@ -45,7 +46,7 @@ def _work(commands: Any, reports: Any, block: Any) -> None:
             if pour is not None:
                 pour.obey(command)
             elif isinstance(command, Start):
-                pour = LivePour(command, FrameWriter(block), _sender(reports))
+                pour = LivePour(command, FrameWriter(frames), _sender(reports), DetailWriter(details))
         if not _parent_lives():
             return
         if pour is not None and pour.seconds_to_wait() == 0.0:

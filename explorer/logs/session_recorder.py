@@ -13,6 +13,7 @@ from explorer.logs.pour_log import PourLog
 from explorer.new_file import check_new_file
 from explorer.outcomes import outcome_text
 from explorer.scene_changes import changes
+from solver.scene import Scene
 
 FRAME_INTERVAL = 0.02
 """Simulated time [s] between frames that are kept."""
@@ -20,6 +21,9 @@ FRAME_INTERVAL = 0.02
 
 class SessionRecorder:
     """Records into ``path``; the k-th pour of the session (a restart begins one) into ``<stem>_<k>.rrd``.
+
+    A pour that is brought back repeats what has been recorded, so nothing is added until it is past that. Where it has
+    other parameters than were recorded for its time, it is another pour, with a file of its own from there on.
 
     Raises :class:`explorer.errors.CommandError` at once if ``path`` cannot be a new recording.
     """
@@ -30,7 +34,8 @@ class SessionRecorder:
         self._pours = 0
         self._log: PourLog | None = None
         self._last: Status | None = None
-        self._frame_due = -math.inf
+        self._frame_due = self._until = -math.inf
+        self._scenes: list[tuple[float, Scene]] = []
 
     def take(self, frame: Frame, status: Status) -> None:
         """Log what is new in ``frame`` and ``status``; two of different pours are left for the next call."""
@@ -39,6 +44,17 @@ class SessionRecorder:
         if self._last is None or self._log is None or self._last.generation != status.generation:
             self._log, self._last = self._begin(status), status
             self._log.event(frame.time, f"phase: {status.phase}")
+        if frame.time < self._until:
+            if status.scene == self._recorded_scene(status.time):
+                return
+            back_at = f"brought back to {frame.time:.3f} s, and on with other parameters"
+            self._log, self._last = self._begin(status), status
+            self._log.event(frame.time, back_at)
+        elif status.time < self._last.time:
+            return  # of a pour that was brought back a moment ago, unlike the frame
+        self._until = frame.time
+        if status.scene != self._scenes[-1][1]:
+            self._scenes.append((status.time, status.scene))
         log, last = self._log, self._last
         for text in news(last, status):
             log.event(frame.time, text)
@@ -59,10 +75,16 @@ class SessionRecorder:
             self._log.close()
             self._log = None
 
+    def _recorded_scene(self, time: float) -> Scene:
+        """The scene that was in force at ``time`` [s] of what has been recorded."""
+        before = [scene for since, scene in self._scenes if since <= time]
+        return before[-1] if before else self._scenes[0][1]
+
     def _begin(self, status: Status) -> PourLog:
         self.close()
         self._pours += 1
-        self._frame_due = -math.inf
+        self._frame_due = self._until = -math.inf
+        self._scenes = [(status.time, status.scene)]
         name = self._path.stem if self._pours == 1 else f"{self._path.stem}_{self._pours}"
         return PourLog(self._path.with_name(f"{name}.rrd"), status.scene, status.seed)
 

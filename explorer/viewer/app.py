@@ -15,7 +15,7 @@ from platformdirs import user_data_path
 from explorer.diagnosis_process import DiagnoseProcess
 from explorer.session import Session
 from explorer.study_process import CalibrationProcess
-from explorer.viewer.guarded_server import guarded_server
+from explorer.viewer.guarded_server import address, guarded_server
 from explorer.viewer.page import Page
 from solver.scene import Scene
 
@@ -117,13 +117,6 @@ def studies_folder() -> Path:
 def diagnoses_folder() -> Path:
     """Where diagnoses that the page starts put their results."""
     return user_data_path("repose-explorer") / "diagnoses"
-
-
-def address(host: str) -> str:
-    """Name under which a browser on this machine finds ``host``."""
-    if host in ("0.0.0.0", "::", ""):
-        return "127.0.0.1"
-    return f"[{host}]" if ":" in host else host
 
 
 @contextmanager

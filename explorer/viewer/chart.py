@@ -39,6 +39,10 @@ class Curve:
             self._points = self._points[::2]
         return True
 
+    def cut(self, time: float) -> None:
+        """Forget what is later than ``time``."""
+        self._points = [point for point in self._points if point[0] <= time]
+
     def columns(self) -> tuple[Array, Array]:
         """Times and values, shape (n,) each."""
         points = np.array(self._points, dtype=np.float64).reshape(-1, 2)
@@ -49,7 +53,7 @@ class History:
     """Angle of repose and mass below the outlet of one pour. The angle is read less often, and begins later."""
 
     def __init__(self) -> None:
-        self._generation = 0
+        self._generation, self._time = 0, 0.0
         self._angle, self._mass = Curve(), Curve()
         self._observed: Mapping[str, Value] = {}
 
@@ -59,12 +63,19 @@ class History:
         if fresh:
             self._generation, self._observed = status.generation, {}
             self._angle, self._mass = Curve(), Curve()
+        back = not fresh and status.time < self._time
+        self._time = status.time
+        if back:
+            # What the status tells of the angle was read before, and is on the curve already.
+            self._observed = status.observables
+            self._angle.cut(status.time)
+            self._mass.cut(status.time)
         angle_deg = angle_of_repose_deg(status)
         # What was not read anew is no point: the chart would draw steps.
         if status.observables != self._observed and math.isfinite(angle_deg):
             self._observed = status.observables
             self._angle.add(status.time, angle_deg)
-        return self._mass.add(status.time, 1e3 * status.discharged_mass) or fresh
+        return self._mass.add(status.time, 1e3 * status.discharged_mass) or fresh or back
 
     def columns(self) -> tuple[Array, Array, Array]:
         """Time [s], angle [°], mass [g]; shape (n,) each.

@@ -76,6 +76,13 @@ def free_port(host: str, port: int) -> int:
         return int(probe.getsockname()[1])
 
 
+def address(host: str) -> str:
+    """Name under which a browser on this machine finds ``host``."""
+    if host in ANY_ADDRESS:
+        return "127.0.0.1"
+    return f"[{host}]" if ":" in host else host
+
+
 def _for_hosts(hosts: Sequence[str], answer: Any) -> Any:
     """``answer`` (viser's, to an HTTP request or the opening of a WebSocket) for ``hosts``; 421 for others."""
 

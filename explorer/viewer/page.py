@@ -19,8 +19,9 @@ from explorer.viewer.actions import Actions
 from explorer.viewer.chart import Chart
 from explorer.viewer.diagnosis_panel import DiagnosisPanel
 from explorer.viewer.live_panel import LivePanel
+from explorer.viewer.look_tab import LookTab
 from explorer.viewer.palette import BRAND
-from explorer.viewer.readout import readout_html
+from explorer.viewer.readout import not_later, readout_html
 from explorer.viewer.restart_panel import RestartPanel
 from explorer.viewer.run_panel import RunPanel
 from explorer.viewer.scene_nodes import SceneNodes
@@ -65,7 +66,7 @@ class Page:
         self._notice = ""
         status = session.status()
         self._nodes, self._drawn = SceneNodes(server, status.scene), status.scene
-        self._frame_number = 0
+        self._frame_number, self._time = 0, status.time
         self._generation = status.generation
         light(server)
         look_at_height(server, scene_height(status.scene))
@@ -80,6 +81,7 @@ class Page:
         )
         server.gui.main_panel.dock_right()
         Tour(server)
+        colour_bar = server.gui.add_html("", visible=False)
         tabs = server.gui.add_tab_group()
         with tabs.add_tab("Pour", viser.Icon.PLAYER_PLAY):
             RunPanel(server, session, post)
@@ -88,6 +90,8 @@ class Page:
             self._live = LivePanel(server, session, status.scene, post)
             self._restart = RestartPanel(server, session, status.scene, status.seed, post)
             self._second = SecondPile(server, session, post)
+        with tabs.add_tab("Look", viser.Icon.EYE):
+            self._look = LookTab(server, session, colour_bar, post)
         self._study: StudyPanel | None = None
         if study is not None:
             with tabs.add_tab("Calibrate", viser.Icon.TARGET):
@@ -110,6 +114,7 @@ class Page:
             status = self._session.status()
             happened = self._session.new_events()
             self._events.extend(happened)
+            self._forget_what_comes_later(status)
             with self._server.atomic():
                 self._show_bodies(status, frame)
                 self._second.show_bodies()
@@ -122,6 +127,11 @@ class Page:
                     self._show_background()
             stop.wait(max(0.0, FRAME_INTERVAL - (time.monotonic() - began)))
 
+    def _forget_what_comes_later(self, status: Status) -> None:
+        if status.time < self._time:  # brought back, or another pour
+            self._events = deque(not_later(self._events, status), maxlen=EVENTS_REMEMBERED)
+        self._time = status.time
+
     def _show_bodies(self, status: Status, frame: Frame | None) -> None:
         if status.generation != self._generation:
             self._generation = status.generation
@@ -129,11 +139,12 @@ class Page:
             self._nodes.clear()
         if frame is not None and self._recorder is not None:
             self._recorder.take(frame, status)
-        if frame is None or frame.number == self._frame_number:
+        if frame is None:
             return
-        self._frame_number = frame.number
-        self._nodes.show(frame)
-        self._nodes.show_gate(status.gate_shut)
+        self._look.show(self._nodes, frame, status.scene)
+        if frame.number != self._frame_number:
+            self._frame_number = frame.number
+            self._nodes.show_gate(status.gate_shut)
 
     def _redraw(self, scene: Scene) -> None:
         if (scene.bodies, scene.rig) != (self._drawn.bodies, self._drawn.rig):

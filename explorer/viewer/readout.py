@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from html import escape
 from itertools import groupby
 
@@ -43,11 +43,18 @@ STATE_WORDS = {
     SessionState.DIED: "solver gone",
     SessionState.CLOSED: "closed",
 }
+CONDITIONS = {
+    Outcome.AT_REST: "at rest",
+    Outcome.JAMMED: "jammed",
+    Outcome.NON_FINITE: "unstable",
+    Outcome.OVERLAP_LIMIT: "unstable",
+}
+"""One word for how a pour stands, beside what the solver does."""
 TROUBLE = (SessionState.FAILED, SessionState.DIED)
 
 STYLE = """<style>
 .pour {padding: 0.2em 1.1em 0.4em 0.75em; font-size: 0.82em; line-height: 1.45;}
-.pour .state {padding: 0.1em 0.7em; border-radius: 0.8em; background: rgba(128,150,170,0.22);}
+.pour .state, .pour .condition {padding: 0.1em 0.7em; border-radius: 0.8em; background: rgba(128,150,170,0.22);}
 .pour .trouble {background: rgba(213,94,0,0.55);}
 .pour .big {font-size: 2.4em; font-weight: 600; line-height: 1.2; font-variant-numeric: tabular-nums;}
 .pour .dim {opacity: 0.65;}
@@ -73,11 +80,12 @@ def readout_html(status: Status, events: Sequence[Event], notice: str) -> str:
 
 def readings(status: Status) -> list[tuple[str, str]]:
     """Names and texts of the short readings, two to a line."""
-    names = ("Phase", "Simulated time", "Bodies", "Time step")
+    names = ("Phase", "Simulated time", "Bodies", "Back to")
     if status.state == SessionState.STARTING:
         return [(name, "–") for name in names]
     bodies = f"{status.bodies} of {status.bodies_planned}"
-    texts = (PHASE_WORDS[status.phase], f"{status.time:.3f} s", bodies, f"{1e6 * status.dt:.2f} µs")
+    earliest = f"{status.earliest:.3f} s" if math.isfinite(status.earliest) else "–"
+    texts = (PHASE_WORDS[status.phase], f"{status.time:.3f} s", bodies, earliest)
     return list(zip(names, texts, strict=True))
 
 
@@ -88,12 +96,31 @@ def long_readings(status: Status) -> list[tuple[str, str]]:
     mass = f"{1e3 * status.discharged_mass:.1f} of {1e3 * status.poured_mass:.1f} g"
     found = [
         ("Real-time factor", pace),
+        ("Time step", "–" if starting else time_step_text(status)),
         ("Outcome", "–" if starting else OUTCOME_WORDS[status.outcome]),
         ("Mass below the outlet", "–" if starting else mass),
     ]
     if status.energy_put_in is not None:
         found.append(("Energy put in by the last change", f"{1e6 * status.energy_put_in:.3g} µJ"))
     return found
+
+
+def time_step_text(status: Status) -> str:
+    """Time step, and what part it is of the largest stable one."""
+    text = f"{1e6 * status.dt:.2f} µs"
+    if math.isfinite(status.dt_limit):
+        text += f", {status.dt / status.dt_limit:.0%} of the stability limit"
+    return text
+
+
+def condition(status: Status) -> str:
+    """How the pour stands in a word: at rest, jammed, unstable, capped (slower than wanted), or nothing special."""
+    return CONDITIONS.get(status.outcome, "capped" if status.capped else "")
+
+
+def not_later(events: Iterable[Event], status: Status) -> list[Event]:
+    """Events without those of the present pour that, since it was brought back, have not happened yet."""
+    return [event for event in events if event.generation != status.generation or event.time <= status.time]
 
 
 def notes(status: Status, events: Sequence[Event], notice: str) -> list[str]:
@@ -135,7 +162,11 @@ def _cell(name: str, text: str, kind: str = "") -> str:
 
 def _state(status: Status) -> str:
     kind = "state trouble" if status.state in TROUBLE else "state"
-    return f"<span class='{kind}'>{STATE_WORDS[status.state]}</span>"
+    pills = f"<span class='{kind}'>{STATE_WORDS[status.state]}</span>"
+    if word := condition(status):
+        kind = "condition trouble" if word in ("jammed", "unstable") else "condition"
+        pills += f" <span class='{kind}'>{word}</span>"
+    return f"<span>{pills}</span>"
 
 
 def _angle(status: Status) -> str:

@@ -1,4 +1,4 @@
-"""Play, pause, step, restart, speed; by mouse and by key."""
+"""Play, pause, step, step back, restart, speed; by mouse and by key."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from explorer.screen_units import checked
 from explorer.session import Session
 from explorer.viewer.actions import Action, Post
 
-PLAY_PAUSE, STEP, RESTART = "Play / pause", "Step", "Restart"
-KEYS: dict[str, Any] = {PLAY_PAUSE: "space", STEP: "arrowright", RESTART: "R"}
+PLAY_PAUSE, BACK, STEP, RESTART = "Play / pause", "◀ Back", "Step ▶", "Restart"
+KEYS: dict[str, Any] = {PLAY_PAUSE: "space", BACK: "arrowleft", STEP: "arrowright", RESTART: "R"}
 SLOWEST, FASTEST = 0.05, 2.0
 """Range of the speed slider: simulated seconds per second."""
 
@@ -23,11 +23,12 @@ class RunPanel:
 
     def __init__(self, server: viser.ViserServer, session: Session, post: Post) -> None:
         self._session = session
-        acts = {PLAY_PAUSE: self._toggle, STEP: session.step, RESTART: session.restart}
+        acts = {PLAY_PAUSE: self._toggle, BACK: session.step_back, STEP: session.step, RESTART: session.restart}
         buttons = server.gui.add_button_group(
             "Pour",
             tuple(acts),
-            hint="Keys: space plays and pauses, right arrow steps 10 ms, R restarts with the same seed.",
+            hint="Keys: space plays and pauses; left arrow goes back by a sample interval (10 ms), to the parameters "
+            "of that time as well; right arrow goes on by one; R restarts with the same seed.",
         )
 
         @buttons.on_click

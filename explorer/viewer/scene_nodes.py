@@ -46,8 +46,10 @@ class SceneNodes:
     def __init__(self, server: viser.ViserServer, scene: Scene, root: str = "") -> None:
         self._numbers = body_counts(scene)
         self._bodies: list[Any] = []
-        for k, (body, n) in enumerate(zip(scene.bodies, self._numbers, strict=True)):
-            mesh, none = body_triangles(body), nowhere(n)
+        self.meshes = [body_triangles(body) for body in scene.bodies]
+        """Surface of a body of each component, in its own frame."""
+        for k, (mesh, n) in enumerate(zip(self.meshes, self._numbers, strict=True)):
+            none = nowhere(n)
             self._bodies.append(
                 server.scene.add_batched_meshes_simple(
                     f"{root}/bodies/{k}",
@@ -56,7 +58,7 @@ class SceneNodes:
                     batched_wxyzs=none.quaternion,
                     batched_positions=none.position,
                     batched_scales=none.scale,
-                    batched_colors=linear(component_colour(k)),
+                    batched_colors=plain_colours(k, n),
                     lod="off",
                 )
                 if n > 0
@@ -66,12 +68,33 @@ class SceneNodes:
         self._surface_names, self._at_first = scene.rig.surface_names, rig_poses(scene.rig)
         self._surfaces = self._at_first
 
-    def show(self, frame: Frame) -> None:
-        """Move bodies and surfaces to where ``frame`` has them; call it inside ``server.atomic()``."""
+    def show(self, frame: Frame, seen: npt.NDArray[np.bool_] | None = None) -> None:
+        """Move bodies and surfaces to where ``frame`` has them; call it inside ``server.atomic()``.
+
+        ``seen`` says which bodies are drawn, shape (n,); by default all that are in the domain.
+        """
         self._show_surfaces(frame.surfaces)
         for k, (node, n) in enumerate(zip(self._bodies, self._numbers, strict=True)):
             if node is not None:
-                _place(node, component_poses(frame, k, n))
+                _place(node, component_poses(frame, k, n, seen))
+
+    def paint(self, frame: Frame, colours: npt.NDArray[np.uint8]) -> None:
+        """Give the bodies of ``frame`` their ``colours`` (n, 3), those of batched meshes (``palette.linear``)."""
+        for k, (node, n) in enumerate(zip(self._bodies, self._numbers, strict=True)):
+            if node is not None:
+                chosen = np.flatnonzero(frame.component == k)[:n]
+                painted = plain_colours(k, n)
+                painted[: len(chosen)] = colours[chosen]
+                node.batched_colors = painted
+
+    def fade(self, bodies: float | None, rig: float) -> None:
+        """Opacity of the bodies (None: opaque), and of the surfaces of the rig that one has to look through."""
+        for node in self._bodies:
+            if node is not None:
+                node.opacity = bodies
+        for name in self._surface_names:
+            if name != PLATE_NAME and name not in OPACITY:
+                self._rig[name].opacity = rig
 
     def clear(self) -> None:
         """Hide all bodies, surfaces where they were: a new pour has not begun to fall yet."""
@@ -107,13 +130,17 @@ def _place(node: Any, poses: Poses) -> None:
     node.batched_scales = poses.scale
 
 
-def component_poses(frame: Frame, component: int, n: int) -> Poses:
-    """Poses of the bodies of one component, ``n`` of which will enter in all, in order of entry."""
+def component_poses(frame: Frame, component: int, n: int, seen: npt.NDArray[np.bool_] | None = None) -> Poses:
+    """Poses of the bodies of one component, ``n`` of which will enter in all, in order of entry.
+
+    Those that are not ``seen``, shape (bodies of the frame,), are hidden; by default those that have left the domain.
+    """
+    seen = frame.inside if seen is None else seen
     poses = nowhere(n)
     chosen = np.flatnonzero(frame.component == component)[:n]
     poses.position[: len(chosen)] = frame.position[chosen]
     poses.quaternion[: len(chosen)] = frame.quaternion[chosen]
-    poses.scale[: len(chosen)] = np.where(frame.inside[chosen], frame.scale[chosen], 0.0)
+    poses.scale[: len(chosen)] = np.where(seen[chosen], frame.scale[chosen], 0.0)
     return poses
 
 
@@ -122,6 +149,11 @@ def nowhere(n: int) -> Poses:
     quaternion = np.zeros((n, 4), dtype=np.float32)
     quaternion[:, 0] = 1.0
     return Poses(np.zeros((n, 3), dtype=np.float32), quaternion, np.zeros(n, dtype=np.float32))
+
+
+def plain_colours(k: int, n: int) -> npt.NDArray[np.uint8]:
+    """Colours of ``n`` bodies of component ``k`` as batched meshes want them, shape (n, 3)."""
+    return np.tile(np.array(linear(component_colour(k)), dtype=np.uint8), (n, 1))
 
 
 def component_colour(k: int) -> Colour:

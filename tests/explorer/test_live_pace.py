@@ -27,6 +27,13 @@ def test_a_fast_pour_keeps_to_the_wanted_speed():
     assert pace.real_time_factor == pytest.approx(0.5, rel=2 * FRAME_WALL)
 
 
+@pytest.mark.parametrize(
+    ("cost", "seconds", "capped"), [(1e-6, 4.0, False), (4e-5, 4.0, True), (4e-5, 0.2, False), (1e-6, 0.2, False)]
+)
+def test_a_pour_that_cannot_keep_the_wanted_speed_says_so_but_not_in_its_first_moments(cost, seconds, capped):
+    assert driven(speed=0.5, dt=1e-5, cost=cost, seconds=seconds)[0].capped == capped
+
+
 def test_a_slow_pour_runs_without_a_break_and_says_how_fast():
     pace, wall, time, _ = driven(speed=1.0, dt=5e-6, cost=20e-6, seconds=4.0)
     assert time / wall == pytest.approx(0.25, rel=1e-6)

@@ -259,6 +259,34 @@ def test_a_session_is_recorded_pour_by_pour(scene, tmp_path):
     assert texts(second) == ["phase: fill"]
 
 
+def test_what_repeats_itself_after_going_back_is_recorded_once(scene, tmp_path):
+    recorder = SessionRecorder(tmp_path / "live.rrd")
+    for time in (0.0, 0.1, 0.2, 0.1, 0.15, 0.2, 0.3):
+        recorder.take(frame(1, 1, time), status(scene, 1, time=time))
+    recorder.close()
+    (path,) = tmp_path.iterdir()
+    found = rows(path, "/world/bodies/seed", "InstancePoses3D:translations")
+    assert len(found) == 4
+    assert texts(path) == ["phase: fill"]
+
+
+def test_a_pour_that_goes_on_with_other_parameters_after_going_back_has_a_file_of_its_own(scene, tmp_path):
+    harder = with_values(scene, {"pair.seed.seed.static_friction": 0.7})
+    recorder = SessionRecorder(tmp_path / "live.rrd")
+    for time, now in ((0.0, scene), (0.1, scene), (0.2, harder), (0.3, harder)):
+        recorder.take(frame(1, 1, time), status(now, 1, time=time))
+    # Back to before the change, which does not come again by itself: the same until there, and another pour after it.
+    recorder.take(frame(2, 1, 0.1), status(scene, 1, time=0.1))
+    recorder.take(frame(2, 1, 0.15), status(scene, 1, time=0.15))
+    assert len(list(tmp_path.iterdir())) == 1
+    recorder.take(frame(2, 1, 0.25), status(scene, 1, time=0.25))
+    recorder.take(frame(2, 1, 0.35), status(scene, 1, time=0.35))
+    recorder.close()
+    assert len(rows(tmp_path / "live.rrd", "/world/bodies/seed", "InstancePoses3D:translations")) == 4
+    assert len(rows(tmp_path / "live_2.rrd", "/world/bodies/seed", "InstancePoses3D:translations")) == 2
+    assert texts(tmp_path / "live_2.rrd") == ["brought back to 0.250 s, and on with other parameters"]
+
+
 def test_a_session_s_outcome_is_recorded_once(scene, tmp_path):
     import dataclasses
 

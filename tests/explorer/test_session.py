@@ -110,6 +110,19 @@ def test_pausing_stops_time_and_a_step_is_one_sample_interval(session):
     assert first + 0.01 - 1e-5 * status.dt <= status.time < first + 0.01 + status.dt
 
 
+def test_a_step_back_leads_to_where_the_step_began(session):
+    session.set_speed(10.0)
+    session.step()
+    first = wait_for(lambda: session.status().time >= 0.01 and session.status())
+    session.step()
+    wait_for(lambda: session.status().time >= first.time + 0.01)
+    session.step_back()
+    status = wait_for(lambda: session.status().time < first.time + 0.01 and session.status())
+    assert (status.state, status.time) == (SessionState.PAUSED, first.time)
+    assert status.earliest < 0.01
+    wait_for(lambda: session.frame().time == first.time)
+
+
 def test_steps_asked_for_in_a_row_are_all_taken(session):
     first = session.status().time
     session.set_speed(0.1)  # slow enough that the second and third come while the first runs

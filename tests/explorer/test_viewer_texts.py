@@ -14,7 +14,17 @@ from explorer.viewer.chart import MOST_POINTS, History
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.palette import BODY_COLOURS, linear
 from explorer.viewer.process_view import escaped, progress, status_markdown, time_left
-from explorer.viewer.readout import OUTCOME_WORDS, PHASE_WORDS, STATE_WORDS, notes, readout_html, recent
+from explorer.viewer.readout import (
+    OUTCOME_WORDS,
+    PHASE_WORDS,
+    STATE_WORDS,
+    condition,
+    not_later,
+    notes,
+    readout_html,
+    recent,
+    time_step_text,
+)
 from explorer.viewer.scene_nodes import component_poses
 from explorer.viewer.study_panel import StudyPanel
 from solver.observables.value import Value
@@ -53,6 +63,34 @@ def test_the_readout_tells_what_the_solver_said():
     assert "± 3.2°" in text
     assert "left 21.0°" in text
     assert "right –" in text
+
+
+def test_the_time_step_is_told_against_its_limit():
+    assert time_step_text(STATUS) == "6.19 µs"
+    assert time_step_text(replace(STATUS, dt_limit=4 * STATUS.dt)) == "6.19 µs, 25% of the stability limit"
+
+
+@pytest.mark.parametrize(
+    ("now", "word"),
+    [
+        ({}, ""),
+        ({"capped": True}, "capped"),
+        ({"state": SessionState.ENDED, "outcome": Outcome.AT_REST}, "at rest"),
+        ({"state": SessionState.ENDED, "outcome": Outcome.JAMMED}, "jammed"),
+        ({"state": SessionState.ENDED, "outcome": Outcome.NON_FINITE}, "unstable"),
+        ({"state": SessionState.ENDED, "outcome": Outcome.OVERLAP_LIMIT}, "unstable"),
+    ],
+)
+def test_how_the_pour_stands_is_said_in_a_word(now, word):
+    status = replace(STATUS, **now)
+    assert condition(status) == word
+    pill = f">{word}</span>" if word else "class='condition"
+    assert (pill in readout_html(status, [], "")) == bool(word)
+
+
+def test_what_has_not_happened_yet_is_not_told():
+    events = [Event(1, 1.0, "a"), Event(1, 2.0, "b"), Event(2, 9.0, "c")]
+    assert [event.text for event in not_later(events, replace(STATUS, time=1.0))] == ["a", "c"]
 
 
 def test_every_state_phase_and_outcome_has_words():
@@ -116,6 +154,23 @@ def test_the_chart_begins_again_with_a_new_pour():
     time, angle, _ = history.columns()
     assert time.tolist() == [0.2]
     assert np.isnan(angle).all()
+
+
+def test_the_chart_goes_back_with_the_pour():
+    history = History()
+    readings = [{"angle_of_repose_deg": Value(20.0 + k, "deg")} for k in range(5)]
+    for k, read in enumerate(readings):
+        history.add(replace(STATUS, time=1.0 + k, observables=read, discharged_mass=1e-3 * k))
+    back = replace(STATUS, time=3.5, observables=readings[2], discharged_mass=2.4e-3)
+    assert history.add(back)
+    time, angle, mass = history.columns()
+    assert time.tolist() == [1.0, 2.0, 3.0, 3.5]
+    assert angle[:3].tolist() == [20.0, 21.0, 22.0]
+    assert mass[-1] == pytest.approx(2.4)
+    # Standing still draws nothing new; going on does, and takes the angle up again.
+    assert not history.add(back)
+    assert history.add(replace(back, time=4.0, observables={"angle_of_repose_deg": Value(30.0, "deg")}))
+    assert history.columns()[1][-1] == 30.0
 
 
 def test_a_long_chart_is_thinned_out():

@@ -1,0 +1,86 @@
+"""Where the camera of a browser stands: presets, a link that leads back to a view, and going along with a body."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import viser
+
+from explorer.scene_meshes import scene_height
+from explorer.viewer.guarded_server import address
+from explorer.viewer.view import FILL, VIEW_DIRECTION, VIEW_FIELD
+from solver.scene import Scene
+
+Array = npt.NDArray[np.float64]
+
+DIRECTIONS: Mapping[str, tuple[float, float, float]] = {
+    "Whole": VIEW_DIRECTION,
+    "Front": (0.0, -1.0, 0.0),
+    "Side": (1.0, 0.0, 0.0),
+    # Not quite from above: straight down, the camera would not know which way is up.
+    "Top": (0.0, -1e-3, 1.0),
+}
+"""From the pile to the camera."""
+MIDDLE = 0.42
+"""Height that the camera looks at, as a share of the height of rig and feed."""
+STILL = 1e-5
+"""A body that has moved by less than this [m] does not move the camera."""
+
+
+@dataclass(frozen=True)
+class View:
+    """A place of the camera [m] and what it looks at [m]."""
+
+    position: Array
+    look_at: Array
+
+
+def view_of(scene: Scene, name: str) -> View:
+    """The preset ``name``: rig, pile and feed in one picture."""
+    height = scene_height(scene)
+    distance = height / FILL / (2.0 * math.tan(VIEW_FIELD / 2.0))
+    middle = np.array([0.0, 0.0, MIDDLE * height])
+    return View(middle + distance * np.array(DIRECTIONS[name]), middle)
+
+
+def go_to(client: Any, view: View) -> None:
+    """Put the camera of a browser to ``view``, and its field of view to that of new clients."""
+    go_to_place(client, view)
+    client.camera.fov = VIEW_FIELD
+
+
+def go_along(clients: Iterable[Any], target: Array) -> None:
+    """Let the cameras of browsers look at ``target`` [m] from the side and distance from which they look now."""
+    for client in clients:
+        camera = client.camera
+        offset = camera.position - camera.look_at
+        if np.linalg.norm(camera.look_at - target) > STILL:
+            go_to_place(client, View(target + offset, target))
+
+
+def go_to_place(client: Any, view: View) -> None:
+    """Put the camera of a browser to ``view`` and leave its field of view alone."""
+    with client.atomic():
+        # In this order: a new position takes the point that is looked at along.
+        client.camera.position = view.position
+        client.camera.look_at = view.look_at
+
+
+def link_to(server: viser.ViserServer, camera: Any) -> str:
+    """Address of the page that opens with the view of ``camera``."""
+    numbers = {
+        "initialCameraPosition": camera.position,
+        "initialCameraLookAt": camera.look_at,
+        "initialCameraUp": camera.up_direction,
+        "initialCameraFov": [camera.fov],
+    }
+    # Rounded to a tenth of a millimetre; + 0.0 takes the sign from a zero.
+    query = "&".join(
+        f"{name}={','.join(f'{round(float(x), 4) + 0.0:g}' for x in values)}" for name, values in numbers.items()
+    )
+    return f"http://{address(server.get_host())}:{server.get_port()}/?{query}"

@@ -1,0 +1,69 @@
+"""A pour brought back to an earlier moment of its own, in the same batch: from there it repeats the same bits.
+
+Quicker than a checkpoint (``solver/checkpoint.py``), which can be kept in a file and go on elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from solver.checkpoint import PLAIN
+from solver.moving_state import Moving
+from solver.pour import Pour
+from solver.scene import Scene
+
+GROWING = ("samples", "_entries", "_free_surface")
+"""Lists that only grow, so that their length is enough to have them as they were."""
+DECIDED = (*(name for name in PLAIN if name not in GROWING), "outcome", "_table", "_ramp", "_inside")
+"""What a pour has decided, in values that it replaces and never changes."""
+
+
+@dataclass(frozen=True)
+class Kept:
+    """One moment of a pour."""
+
+    time: float
+    """[s]"""
+    scene: Scene
+    """With the parameters that were in force."""
+    decided: Mapping[str, Any]
+    lengths: Mapping[str, int]
+    to_do: tuple[Any, ...]
+    random: Mapping[str, Any]
+    world: Moving
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that it takes [B], but for a few hundred."""
+        return self.world.nbytes
+
+
+def keep(pour: Pour) -> Kept:
+    """The present moment of ``pour``, between two launches."""
+    places = pour._layout
+    return Kept(
+        time=pour.time,
+        scene=pour.scene,
+        decided={name: getattr(pour, name) for name in DECIDED},
+        lengths={name: len(getattr(pour, name)) for name in GROWING},
+        to_do=tuple(pour._to_do),
+        random=pour._rng.bit_generator.state,
+        world=pour.batch.take_moving(pour.w, len(places.numbers), len(places.spheres)),
+    )
+
+
+def put_back(pour: Pour, kept: Kept) -> None:
+    """Bring ``pour`` back to ``kept``, one of its earlier moments; what came after is forgotten."""
+    for name, found in kept.decided.items():
+        setattr(pour, name, found)
+    for name, length in kept.lengths.items():
+        del getattr(pour, name)[length:]
+    pour.scene = kept.scene
+    pour._to_do = list(kept.to_do)
+    pour._rng.bit_generator.state = kept.random
+    # These two wake every body; what follows puts the sleepers back to sleep.
+    pour.batch.set_law(pour.w, pour._table)
+    pour.batch.set_effects(pour.w, kept.scene)
+    pour.batch.put_moving(pour.w, kept.world)

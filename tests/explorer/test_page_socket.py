@@ -1,0 +1,178 @@
+"""The page with a real solver behind it, driven over the socket as a browser drives it: clicks, keys, cameras."""
+
+import asyncio
+import threading
+import time
+from types import SimpleNamespace
+
+import msgspec
+import numpy as np
+import pytest
+import viser
+import websockets
+from viser import _messages
+
+from explorer.command_process import CommandStatus
+from explorer.live.messages import SessionState
+from explorer.session import Session
+from explorer.viewer.camera import view_of
+from explorer.viewer.guarded_server import guarded_server
+from explorer.viewer.page import Page
+from tests.explorer.beads import bead_scene
+from tests.explorer.test_session import wait_for
+
+IDLE = SimpleNamespace(status=lambda: CommandStatus("idle"), result=lambda: None, cancel=lambda: None)
+"""A diagnosis that nobody has started."""
+
+
+@pytest.fixture(scope="module")
+def page():
+    """A page in a thread of its own, and the session behind it; no one else uses that while the thread runs."""
+    server, session, stop = guarded_server("127.0.0.1", 0, "test"), Session(), threading.Event()
+    session.start(bead_scene(), 1)
+    page = Page(server, session, None, "", IDLE)
+    thread = threading.Thread(target=page.run, args=(stop,))
+    thread.start()
+    yield SimpleNamespace(server=server, page=page, look=page._look)
+    stop.set()
+    thread.join()
+    session.close()
+    server.stop()
+
+
+class Browser:
+    """As much of a browser as the server needs: a camera, and messages of one's own; what it is told it throws away."""
+
+    def __init__(self, server):
+        self._server, self._loop, self._ready = server, asyncio.new_event_loop(), threading.Event()
+        self._thread = threading.Thread(target=self._loop.run_until_complete, args=(self._talk(),), daemon=True)
+        self._thread.start()
+        assert self._ready.wait(10)
+        wait_for(server.get_clients)
+
+    async def _talk(self):
+        port = self._server.get_port()
+        async with websockets.connect(
+            f"ws://127.0.0.1:{port}",
+            subprotocols=[f"viser-v{viser.__version__}"],
+            origin=f"http://127.0.0.1:{port}",
+            max_size=None,
+        ) as self._socket:
+            await self._socket.send(
+                encoded(
+                    "ViewerCameraMessage",
+                    wxyz=(1, 0, 0, 0),
+                    position=(1.0, 0.0, 0.0),
+                    fov=0.5,
+                    near=0.01,
+                    far=100.0,
+                    image_height=600,
+                    image_width=800,
+                    look_at=(0.0, 0.0, 0.0),
+                    up_direction=(0.0, 0.0, 1.0),
+                )
+            )
+            self._ready.set()
+            async for _ in self._socket:
+                pass
+
+    def send(self, kind, **fields):
+        asyncio.run_coroutine_threadsafe(self._socket.send(encoded(kind, **fields)), self._loop).result(10)
+
+    def press(self, label):
+        """Trigger the command that the key of ``label`` triggers."""
+        commands = self._server.gui._command_handle_from_uuid
+        (uuid,) = [uuid for uuid, handle in commands.items() if handle._impl.props.label == label]
+        self.send("CommandTriggerMessage", uuid=uuid)
+
+    def click(self, origin, direction):
+        self.send(
+            "ScenePointerMessage",
+            event_type="click",
+            ray_origin=tuple(map(float, origin)),
+            ray_direction=tuple(map(float, direction)),
+            screen_pos=((0.5, 0.5),),
+            modifier=None,
+        )
+
+    @property
+    def camera(self):
+        (client,) = self._server.get_clients().values()
+        return client.camera
+
+
+def encoded(kind, **fields):
+    assert hasattr(_messages, kind)
+    return msgspec.msgpack.encode({"type": kind, **fields})
+
+
+@pytest.fixture(scope="module")
+def browser(page):
+    return Browser(page.server)
+
+
+def readout(page):
+    return page.page._readout.content
+
+
+def status(page):
+    """The last status that the page has taken in."""
+    return page.page._session._status
+
+
+def test_left_arrow_goes_back_and_space_goes_on(page, browser):
+    wait_for(lambda: status(page).state in (SessionState.RUNNING, SessionState.ENDED))
+    wait_for(lambda: status(page).time > 0.3)
+    if status(page).state == SessionState.RUNNING:
+        browser.press("Play / pause")
+    wait_for(lambda: status(page).state in (SessionState.PAUSED, SessionState.ENDED))
+    time.sleep(0.3)
+    before = status(page).time
+    browser.press("◀ Back")
+    wait_for(lambda: status(page).time < before)
+    back = status(page)
+    assert (back.state, back.earliest < 1e-3) == (SessionState.PAUSED, True)
+    assert back.time == pytest.approx(before - 0.01, abs=0.002)
+    wait_for(lambda: page.look._drawn[1].time == back.time)
+    wait_for(lambda: f"{back.time:.3f} s" in readout(page))
+    browser.press("Step ▶")
+    wait_for(lambda: status(page).time > back.time)
+
+
+def test_keys_colour_the_bodies_and_the_solver_sends_what_that_takes(page, browser):
+    browser.press("Colour by the next quantity")
+    wait_for(lambda: page.look._panel.look.colour_by == "speed")
+    wait_for(lambda: "speed [m/s]" in page.look._panel._bar.content)
+    wait_for(lambda: page.page._session._details.newest() is not None)
+    details = page.page._session._details.newest()
+    assert len(details.load) == status(page).bodies
+    (node,) = page.page._nodes._bodies
+    wait_for(lambda: len(np.unique(node.batched_colors[: status(page).bodies], axis=0)) > 1)
+
+
+def test_a_click_into_the_scene_finds_a_body_and_one_beside_lets_it_go(page, browser):
+    frame = page.look._drawn[1]
+    top = int(np.argmax(frame.position[:, 2]))
+    browser.click(frame.position[top] + [0, 0, 1.0], (0, 0, -1))
+    wait_for(lambda: page.look._selected == top)
+    wait_for(lambda: f"bead no. {top + 1} of" in page.look._text.content)
+    wait_for(lambda: "Coordination number" in page.look._text.content)
+    browser.press("Follow the body that was clicked")
+    wait_for(lambda: np.allclose(browser.camera.look_at, frame.position[top], atol=1e-3))
+    browser.press("Let the body go")
+    wait_for(lambda: page.look._selected is None)
+    browser.click((1.0, 1.0, 1.0), (0, 0, -1))
+    time.sleep(0.2)
+    assert page.look._selected is None
+
+
+def test_keys_move_the_camera_of_the_browser_that_pressed_them(page, browser):
+    browser.press("View: side")
+    expected = view_of(bead_scene(), "Side")
+    wait_for(lambda: np.allclose(browser.camera.position, expected.position))
+    assert browser.camera.look_at == pytest.approx(expected.look_at)
+
+
+def test_following_nobody_is_told_in_a_line(page, browser):
+    browser.press("Follow the body that was clicked")
+    wait_for(lambda: "click a body first" in readout(page))
