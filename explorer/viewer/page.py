@@ -21,6 +21,7 @@ from explorer.viewer.actions import Actions
 from explorer.viewer.chart import Chart
 from explorer.viewer.diagnosis_panel import DiagnosisPanel
 from explorer.viewer.live_panel import LivePanel
+from explorer.viewer.motion_chart import MotionChart
 from explorer.viewer.palette import BRAND
 from explorer.viewer.readout import readout_html
 from explorer.viewer.restart_panel import RestartPanel
@@ -38,7 +39,7 @@ class Recorder(Protocol):
         """Called about 30 times a second with the newest frame and the newest status."""
 
 
-EVENTS_REMEMBERED = 50
+EVENTS_REMEMBERED = 1000
 
 FRAME_INTERVAL = 1.0 / 30.0
 PANEL_INTERVAL = 0.2
@@ -90,6 +91,7 @@ class Page:
             RunPanel(server, session, post)
             self._readout = server.gui.add_html("")
             self._chart = Chart(server)
+            self._motion = MotionChart(server)
             self._live = LivePanel(server, session, status.scene, post)
             self._restart = RestartPanel(server, session, status.scene, status.seed, post)
         self._study: StudyPanel | None = None
@@ -145,7 +147,8 @@ class Page:
         readout = readout_html(status, self._events, self._notice)
         if self._readout.content != readout:
             self._readout.content = readout
-        self._chart.show(status)
+        self._chart.show(status, self._events)
+        self._motion.show(status, self._events)
         self._live.show(status)
         self._restart.show(status)
 
