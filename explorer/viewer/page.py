@@ -18,10 +18,12 @@ from explorer.scene_meshes import scene_height
 from explorer.session import Session
 from explorer.study_process import StudyProcess
 from explorer.viewer.actions import Actions
+from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.chart import Chart
 from explorer.viewer.diagnosis_panel import DiagnosisPanel
 from explorer.viewer.live_panel import LivePanel
 from explorer.viewer.motion_chart import MotionChart
+from explorer.viewer.outline_panel import OutlinePanel
 from explorer.viewer.palette import BRAND
 from explorer.viewer.readout import readout_html
 from explorer.viewer.restart_panel import RestartPanel
@@ -92,6 +94,7 @@ class Page:
             self._readout = server.gui.add_html("")
             self._chart = Chart(server)
             self._motion = MotionChart(server)
+            self._outline = OutlinePanel(server, shipped_measurements(), post, BackgroundWork(post))
             self._live = LivePanel(server, session, status.scene, post)
             self._restart = RestartPanel(server, session, status.scene, status.seed, post)
         self._study: StudyPanel | None = None
@@ -149,6 +152,7 @@ class Page:
             self._readout.content = readout
         self._chart.show(status, self._events)
         self._motion.show(status, self._events)
+        self._outline.show(status)
         self._live.show(status)
         self._restart.show(status)
 

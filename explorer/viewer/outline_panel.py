@@ -1,0 +1,93 @@
+"""The pile from the side with its flank fit, in the panel and in 3-D, and measured data laid over it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import viser
+
+from explorer.live.messages import Status
+from explorer.measured_curves import MeasuredCurve, measured_curves
+from explorer.viewer.actions import Post
+from explorer.viewer.background_work import BackgroundWork
+from explorer.viewer.outline_nodes import OutlineNodes
+from explorer.viewer.outline_svg import outline_html
+from solver.observables.outline import Outline
+
+NONE, OWN = "none", "folder below"
+
+
+class OutlinePanel:
+    """Drawing, and the choice of what is laid over it; ``shipped`` are the names of the measured data sets."""
+
+    def __init__(
+        self, server: viser.ViserServer, shipped: Sequence[str], post: Post, background: BackgroundWork
+    ) -> None:
+        self._background, self._nodes = background, OutlineNodes(server)
+        self._drawn: tuple[Outline | None, MeasuredCurve | None, bool] = (None, None, False)
+        self._curves: Mapping[str, MeasuredCurve] = {}
+        self._measured: MeasuredCurve | None = None
+        with server.gui.add_folder("Silhouette and flank fit"):
+            self._html = server.gui.add_html(outline_html(None, None))
+            self._in_scene = server.gui.add_checkbox(
+                "Lines in 3-D", True, hint="Draw the lines of the flanks, and what was measured, in the scene too."
+            )
+            self._data = server.gui.add_dropdown(
+                "Measured", (NONE, *shipped, OWN), hint="Lay a measured silhouette or profile over the pile."
+            )
+            self._folder = server.gui.add_text(
+                "Folder", "", hint="Folder with measurement.toml, on the machine that serves this page."
+            )
+            self._curve = server.gui.add_dropdown("Curve", (NONE,), disabled=True, hint="Which of its curves.")
+
+        @self._data.on_update
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None:
+                chosen = str(event.target.value)
+                post(lambda: self._choose_data(chosen))
+
+        @self._folder.on_update
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None:
+                post(lambda: self._choose_data(OWN))
+
+        @self._curve.on_update
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None:
+                chosen = str(event.target.value)
+                post(lambda: self._choose_curve(chosen))
+
+    def show(self, status: Status) -> None:
+        """Draw what is new; call it inside ``server.atomic()``."""
+        now = (status.outline, self._measured, bool(self._in_scene.value))
+        if all(new is old for new, old in zip(now, self._drawn, strict=True)):
+            return
+        self._drawn = now
+        self._nodes.show(*now)
+        html = outline_html(status.outline, self._measured)
+        if self._html.content != html:
+            self._html.content = html
+
+    def load(self, folder: str) -> None:
+        """Lay the data set in ``folder`` over the pile, as if it had been typed in."""
+        self._folder.value, self._data.value = folder, OWN  # type: ignore[misc]
+        self._choose_data(OWN)
+
+    def _choose_data(self, chosen: str) -> None:
+        name = str(self._folder.value).strip() if chosen == OWN else chosen
+        if chosen == NONE or not name:
+            self._offer({})
+            return
+        self._background.start(f"reading {name}", lambda: measured_curves(name), self._offer)
+
+    def _offer(self, curves: Mapping[str, MeasuredCurve]) -> None:
+        self._curves = curves
+        names = tuple(curves) or (NONE,)
+        self._curve.options = names
+        self._curve.value = names[0]  # type: ignore[misc]
+        self._curve.disabled = not curves
+        self._measured = curves.get(names[0])
+
+    def _choose_curve(self, chosen: str) -> None:
+        self._measured = self._curves.get(chosen)
