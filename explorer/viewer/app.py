@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from platformdirs import user_data_path
 
 from explorer.diagnosis_process import DiagnoseProcess
+from explorer.scene_source import SceneSource
 from explorer.session import Session
 from explorer.study_process import CalibrationProcess
 from explorer.viewer.guarded_server import guarded_server
@@ -39,6 +40,7 @@ def serve(
     study_file: Path | None = None,
     store: Path | None = None,
     record_path: Path | None = None,
+    source: SceneSource | None = None,
     ready: Callable[[str], None] = print_address,
 ) -> None:
     """Serve the page of a live pour of ``scene``; blocks until SIGINT or SIGTERM (main thread only).
@@ -51,7 +53,8 @@ def serve(
         study_file: the study that the page can run, None for a page without.
         store: file of the runs of study and diagnosis; None for the default store.
         record_path: new file (``.rrd``) that the session is recorded into; a restart begins another beside
-        it. ready: called with the address once the page can be opened.
+        it. source: where ``scene`` came from, for the command line that repeats it.
+        ready: called with the address once the page can be opened.
 
     Raises:
         PortError: the port is busy or the host is not of this machine.
@@ -69,7 +72,7 @@ def serve(
         diagnosis = DiagnoseProcess(diagnoses_folder(), store)
         ending.callback(diagnosis.close)
         session = ending.enter_context(closing(Session()))
-        session.start(scene, seed)
+        session.start(scene, seed, source)
         page = Page(server, session, study, study_file.stem if study_file else "", diagnosis, recorder)
         ready(f"http://{address(host)}:{server.get_port()}")
         page.run(stop)
