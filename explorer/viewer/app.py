@@ -10,12 +10,11 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
-from platformdirs import user_data_path
-
 from explorer.diagnosis_process import DiagnoseProcess
 from explorer.scene_source import SceneSource
 from explorer.session import Session
 from explorer.study_process import CalibrationProcess
+from explorer.user_data import data_folder
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.page import Page
 from solver.scene import Scene
@@ -91,12 +90,12 @@ def _study(file: Path | None, store: Path | None) -> CalibrationProcess | None:
 
 def studies_folder() -> Path:
     """Where studies that the page starts put their results."""
-    return user_data_path("repose-explorer") / "studies"
+    return data_folder() / "studies"
 
 
 def diagnoses_folder() -> Path:
     """Where diagnoses that the page starts put their results."""
-    return user_data_path("repose-explorer") / "diagnoses"
+    return data_folder() / "diagnoses"
 
 
 def address(host: str) -> str:

@@ -17,8 +17,10 @@ from explorer.live.messages import Event, Status
 from explorer.scene_meshes import scene_height
 from explorer.session import Session
 from explorer.study_process import StudyProcess
+from explorer.user_data import data_folder
 from explorer.viewer.actions import Actions
 from explorer.viewer.background_work import BackgroundWork
+from explorer.viewer.changes_panel import ChangesPanel
 from explorer.viewer.chart import Chart
 from explorer.viewer.diagnosis_panel import DiagnosisPanel
 from explorer.viewer.live_panel import LivePanel
@@ -96,6 +98,7 @@ class Page:
             self._motion = MotionChart(server)
             self._outline = OutlinePanel(server, shipped_measurements(), post, BackgroundWork(post))
             self._live = LivePanel(server, session, status.scene, post)
+            self._changes = ChangesPanel(server, session, data_folder() / "presets", post)
             self._restart = RestartPanel(server, session, status.scene, status.seed, post)
         self._study: StudyPanel | None = None
         if study is not None:
@@ -114,6 +117,7 @@ class Page:
             frame = self._session.frame()
             status = self._session.status()
             self._take_events()
+            self._changes.take(status)
             with self._server.atomic():
                 self._show_bodies(status, frame)
                 if began >= panels_due or notice is not None:
@@ -154,6 +158,7 @@ class Page:
         self._motion.show(status, self._events)
         self._outline.show(status)
         self._live.show(status)
+        self._changes.show(status)
         self._restart.show(status)
 
     def _show_background(self) -> None:
