@@ -30,6 +30,7 @@ from explorer.viewer.palette import BRAND
 from explorer.viewer.readout import readout_html
 from explorer.viewer.restart_panel import RestartPanel
 from explorer.viewer.run_panel import RunPanel
+from explorer.viewer.scene_bound import SceneBound
 from explorer.viewer.scene_nodes import SceneNodes
 from explorer.viewer.study_panel import StudyPanel
 from solver.assets import shipped_measurements
@@ -97,9 +98,11 @@ class Page:
             self._chart = Chart(server)
             self._motion = MotionChart(server)
             self._outline = OutlinePanel(server, shipped_measurements(), post, BackgroundWork(post))
-            self._live = LivePanel(server, session, status.scene, post)
+            self._live = SceneBound(server, lambda scene: LivePanel(server, session, scene, post), status.scene)
             self._changes = ChangesPanel(server, session, data_folder() / "presets", post)
-            self._restart = RestartPanel(server, session, status.scene, status.seed, post)
+            self._restart = SceneBound(
+                server, lambda scene: RestartPanel(server, session, scene, session.status().seed, post), status.scene
+            )
         self._study: StudyPanel | None = None
         if study is not None:
             with tabs.add_tab("Calibrate", viser.Icon.TARGET):
@@ -157,9 +160,9 @@ class Page:
         self._chart.show(status, self._events)
         self._motion.show(status, self._events)
         self._outline.show(status)
-        self._live.show(status)
+        self._live.panel(status.scene).show(status)
         self._changes.show(status)
-        self._restart.show(status)
+        self._restart.panel(status.scene).show(status)
 
     def _show_background(self) -> None:
         if self._study is not None:
