@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import viser
 
 from explorer.live.messages import Status
 from explorer.measured_curves import MeasuredCurve, measured_curves
+from explorer.uploads import unpacked_measurement
 from explorer.viewer.actions import Post
 from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.outline_nodes import OutlineNodes
@@ -19,12 +21,17 @@ NONE, OWN = "none", "folder below"
 
 
 class OutlinePanel:
-    """Drawing, and the choice of what is laid over it; ``shipped`` are the names of the measured data sets."""
+    """Drawing, and the choice of what is laid over it; ``shipped`` are names of data sets, ``uploads`` keeps others."""
 
     def __init__(
-        self, server: viser.ViserServer, shipped: Sequence[str], post: Post, background: BackgroundWork
+        self,
+        server: viser.ViserServer,
+        shipped: Sequence[str],
+        uploads: Path,
+        post: Post,
+        background: BackgroundWork,
     ) -> None:
-        self._background, self._nodes = background, OutlineNodes(server)
+        self._background, self._uploads, self._nodes = background, uploads, OutlineNodes(server)
         self._drawn: tuple[Outline | None, MeasuredCurve | None, bool] = (None, None, False)
         self._curves: Mapping[str, MeasuredCurve] = {}
         self._measured: MeasuredCurve | None = None
@@ -38,6 +45,12 @@ class OutlinePanel:
             )
             self._folder = server.gui.add_text(
                 "Folder", "", hint="Folder with measurement.toml, on the machine that serves this page."
+            )
+            self._upload = server.gui.add_upload_button(
+                "Upload measured data",
+                mime_type=".zip",
+                hint="A folder with measurement.toml and its files, as .zip; it is kept, and can be diagnosed by its "
+                "folder.",
             )
             self._curve = server.gui.add_dropdown("Curve", (NONE,), disabled=True, hint="Which of its curves.")
 
@@ -58,6 +71,12 @@ class OutlinePanel:
                 chosen = str(event.target.value)
                 post(lambda: self._choose_curve(chosen))
 
+        @self._upload.on_upload
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None:
+                sent = event.target.value
+                post(lambda: self._take(str(sent.name), bytes(sent.content)))
+
     def show(self, status: Status) -> None:
         """Draw what is new; call it inside ``server.atomic()``."""
         now = (status.outline, self._measured, bool(self._in_scene.value))
@@ -69,10 +88,19 @@ class OutlinePanel:
         if self._html.content != html:
             self._html.content = html
 
-    def load(self, folder: str) -> None:
-        """Lay the data set in ``folder`` over the pile, as if it had been typed in."""
-        self._folder.value, self._data.value = folder, OWN  # type: ignore[misc]
-        self._choose_data(OWN)
+    def _take(self, name: str, content: bytes) -> None:
+        """Keep measured data that were sent, and lay them over the pile."""
+
+        def read() -> tuple[Path, Mapping[str, MeasuredCurve]]:
+            folder = unpacked_measurement(name, content, self._uploads)
+            return folder, measured_curves(str(folder))
+
+        def offer(found: tuple[Path, Mapping[str, MeasuredCurve]]) -> None:
+            folder, curves = found
+            self._folder.value, self._data.value = str(folder), OWN  # type: ignore[misc]
+            self._offer(curves)
+
+        self._background.start("reading the measured data", read, offer)
 
     def _choose_data(self, chosen: str) -> None:
         name = str(self._folder.value).strip() if chosen == OWN else chosen

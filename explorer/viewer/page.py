@@ -32,6 +32,7 @@ from explorer.viewer.restart_panel import RestartPanel
 from explorer.viewer.run_panel import RunPanel
 from explorer.viewer.scene_bound import SceneBound
 from explorer.viewer.scene_nodes import SceneNodes
+from explorer.viewer.scene_panel import ScenePanel
 from explorer.viewer.study_panel import StudyPanel
 from solver.assets import shipped_measurements
 from solver.scene import Scene
@@ -87,6 +88,7 @@ class Page:
         self, status: Status, study: StudyProcess | None, study_name: str, diagnosis: DiagnosisProcess
     ) -> None:
         server, session, post = self._server, self._session, self._actions.post
+        background = BackgroundWork(post)
         server.gui.configure_theme(
             dark_mode=True, show_share_button=False, show_logo=False, brand_color=BRAND, control_width="large"
         )
@@ -97,9 +99,10 @@ class Page:
             self._readout = server.gui.add_html("")
             self._chart = Chart(server)
             self._motion = MotionChart(server)
-            self._outline = OutlinePanel(server, shipped_measurements(), post, BackgroundWork(post))
+            self._outline = OutlinePanel(server, shipped_measurements(), data_folder() / "uploads", post, background)
             self._live = SceneBound(server, lambda scene: LivePanel(server, session, scene, post), status.scene)
             self._changes = ChangesPanel(server, session, data_folder() / "presets", post)
+            self._scene = ScenePanel(server, session, data_folder() / "uploads", post, background)
             self._restart = SceneBound(
                 server, lambda scene: RestartPanel(server, session, scene, session.status().seed, post), status.scene
             )
@@ -162,6 +165,7 @@ class Page:
         self._outline.show(status)
         self._live.panel(status.scene).show(status)
         self._changes.show(status)
+        self._scene.show(status)
         self._restart.panel(status.scene).show(status)
 
     def _show_background(self) -> None:

@@ -1,5 +1,6 @@
 """A session without a solver process: takes over at once what it is asked for, for tests of panels."""
 
+import time
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -9,6 +10,8 @@ from explorer.live.frames import Frame
 from explorer.live.messages import Event, SessionState, Status
 from explorer.scene_changes import changes
 from explorer.scene_source import SceneSource
+from explorer.viewer.actions import Actions
+from explorer.viewer.background_work import BackgroundWork
 from solver.scene import Scene, with_values
 
 
@@ -44,6 +47,17 @@ class PageSession:
 
     def restart(self, scene: Scene | None = None, seed: int | None = None) -> None:
         self.start(scene or self.now.scene, self.now.seed if seed is None else seed)
+
+
+def finished(actions: Actions, background: BackgroundWork, patience: float = 30.0) -> str:
+    """Carry out what waits, what is done in the background, and what comes of it; the line of a refusal, or ""."""
+    end, notice = time.monotonic() + patience, ""
+    while True:
+        notice = actions.carry_out() or notice
+        if not background.busy_with:
+            return notice
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.005)
 
 
 def frame_of(component: list[int], position: object, inside: list[bool] | None = None, generation: int = 1) -> Frame:

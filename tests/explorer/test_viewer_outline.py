@@ -3,9 +3,11 @@
 import re
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from viser import UploadedFile
 
 from doe.measurement.load import load_measurement
 from explorer.errors import CommandError
@@ -18,6 +20,8 @@ from explorer.viewer.outline_panel import NONE, OWN, OutlinePanel
 from explorer.viewer.outline_svg import WAITING, corners_of, outline_html, outline_svg
 from solver.assets import measurement_folder
 from solver.observables.reading import PileReading
+from tests.explorer.page_session import finished
+from tests.explorer.test_uploads import archive, drum_files
 from tests.explorer.test_viewer_controls import event
 from tests.explorer.test_viewer_texts import STATUS
 from tests.solver.observables.made_up import cone, joined, moved
@@ -30,15 +34,6 @@ def server():
     server = guarded_server("127.0.0.1", 0, "test")
     yield server
     server.stop()
-
-
-def carried_out(actions, patience=30.0):
-    """The notice of the next action, which may come from a thread."""
-    end = time.monotonic() + patience
-    while (notice := actions.carry_out()) is None:
-        assert time.monotonic() < end, "waited in vain"
-        time.sleep(0.01)
-    return notice
 
 
 def test_the_lines_that_are_drawn_have_the_angles_that_are_told():
@@ -110,38 +105,56 @@ def test_a_free_surface_is_drawn_about_the_axis_of_its_drum():
     assert surface.z - observed.scene.rig.radius == pytest.approx(observed.offered["surface_profile_m"].values[0])
 
 
-def test_measured_data_are_laid_over_the_pile_and_taken_off(server):
-    actions = Actions()
-    panel = OutlinePanel(server, ("granudrum_mcc",), actions.post, BackgroundWork(actions.post))
+@pytest.fixture
+def bench(server, tmp_path):
+    return Bench(server, tmp_path / "uploads")
+
+
+class Bench:
+    def __init__(self, server, uploads):
+        self.actions = Actions()
+        self.background = BackgroundWork(self.actions.post)
+        self.panel = OutlinePanel(server, ("granudrum_mcc",), uploads, self.actions.post, self.background)
+
+    def sent(self, handle, value):
+        """What came of a browser's input: the line of a refusal, or ""."""
+        event(handle, value)
+        return finished(self.actions, self.background)
+
+
+def test_measured_data_are_laid_over_the_pile_and_taken_off(bench):
+    panel = bench.panel
     panel.show(replace(STATUS, outline=FRONT))
-    event(panel._data, "granudrum_mcc")
-    carried_out(actions)
-    assert carried_out(actions) == ""
+    assert bench.sent(panel._data, "granudrum_mcc") == ""
     assert panel._curve.options == ("drum_15rpm: free surface", "drum_45rpm: free surface")
-    event(panel._curve, "drum_45rpm: free surface")
-    carried_out(actions)
+    bench.sent(panel._curve, "drum_45rpm: free surface")
     panel.show(replace(STATUS, outline=FRONT))
     assert "drum_45rpm: free surface" in panel._html.content
     assert panel._nodes._measured.visible
     assert panel._nodes._flanks.visible
-    event(panel._data, NONE)
-    carried_out(actions)
+    bench.sent(panel._data, NONE)
     panel.show(replace(STATUS, outline=None))
     assert "measured" not in panel._html.content
     assert not panel._nodes._measured.visible
     assert not panel._nodes._flanks.visible
 
 
-def test_a_folder_without_data_is_refused_in_one_line_and_changes_nothing(server, tmp_path):
-    actions = Actions()
-    panel = OutlinePanel(server, (), actions.post, BackgroundWork(actions.post))
-    panel._folder.value = str(tmp_path)
-    event(panel._data, OWN)
-    carried_out(actions)
-    notice = carried_out(actions)
+def test_a_folder_without_data_is_refused_in_one_line_and_changes_nothing(bench, tmp_path):
+    bench.panel._folder.value = str(tmp_path)
+    notice = bench.sent(bench.panel._data, OWN)
     assert "measurement.toml" in notice
     assert "\n" not in notice
-    assert panel._measured is None
+    assert bench.panel._measured is None
+
+
+def test_uploaded_data_are_laid_over_the_pile_and_a_bad_archive_changes_nothing(bench):
+    panel = bench.panel
+    assert bench.sent(panel._upload, UploadedFile("drum.zip", archive(drum_files()))) == ""
+    assert panel._curve.value == "drum_15rpm: free surface"
+    folder = panel._folder.value
+    assert load_measurement(Path(folder)).conditions
+    assert "cannot be unpacked" in bench.sent(panel._upload, UploadedFile("drum.zip", b"no archive"))
+    assert (panel._folder.value, panel._measured.name) == (folder, "drum_15rpm: free surface")
 
 
 def test_one_thing_is_done_at_a_time_and_a_mistake_is_no_refusal():
@@ -150,10 +163,10 @@ def test_one_thing_is_done_at_a_time_and_a_mistake_is_no_refusal():
     background.start("waiting", lambda: time.sleep(0.2) or 7, done.append)
     with pytest.raises(CommandError, match="another: wait until this is done: waiting"):
         background.start("another", lambda: 1, done.append)
-    assert carried_out(actions) == ""
+    assert finished(actions, background) == ""
     assert done == [7]
     background.start("another", lambda: 1 / 0, done.append)
     with pytest.raises(ZeroDivisionError):
-        carried_out(actions)
+        finished(actions, background)
     background.start("reading", lambda: open("/nowhere/at/all"), done.append)  # noqa: PTH123, SIM115
-    assert carried_out(actions) == "reading: No such file or directory"
+    assert finished(actions, background) == "reading: No such file or directory"
