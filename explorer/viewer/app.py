@@ -72,7 +72,8 @@ def serve(
         ending.callback(diagnosis.close)
         session = ending.enter_context(closing(Session()))
         session.start(scene, seed, source)
-        page = Page(server, session, study, study_file.stem if study_file else "", diagnosis, recorder)
+        name = study_file.stem if study_file else ""
+        page = ending.enter_context(closing(Page(server, session, study, name, diagnosis, _recorder, recorder)))
         ready(f"http://{address(host)}:{server.get_port()}")
         page.run(stop)
 

@@ -6,7 +6,8 @@ import math
 import threading
 import time
 from collections import deque
-from typing import Protocol
+from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import viser
@@ -26,8 +27,10 @@ from explorer.viewer.diagnosis_panel import DiagnosisPanel
 from explorer.viewer.live_panel import LivePanel
 from explorer.viewer.motion_chart import MotionChart
 from explorer.viewer.outline_panel import OutlinePanel
+from explorer.viewer.output_panel import OutputPanel
 from explorer.viewer.palette import BRAND
 from explorer.viewer.readout import readout_html
+from explorer.viewer.recording_switch import Recorder, RecordingSwitch
 from explorer.viewer.restart_panel import RestartPanel
 from explorer.viewer.run_panel import RunPanel
 from explorer.viewer.scene_bound import SceneBound
@@ -36,14 +39,6 @@ from explorer.viewer.scene_panel import ScenePanel
 from explorer.viewer.study_panel import StudyPanel
 from solver.assets import shipped_measurements
 from solver.scene import Scene
-
-
-class Recorder(Protocol):
-    """Something that keeps what the page shows."""
-
-    def take(self, frame: Frame, status: Status) -> None:
-        """Called about 30 times a second with the newest frame and the newest status."""
-
 
 EVENTS_REMEMBERED = 1000
 
@@ -70,6 +65,7 @@ class Page:
         study: StudyProcess | None,
         study_name: str,
         diagnosis: DiagnosisProcess,
+        open_recorder: Callable[[Path], Recorder],
         recorder: Recorder | None = None,
     ) -> None:
         self._server, self._session, self._recorder = server, session, recorder
@@ -82,10 +78,15 @@ class Page:
         self._generation = status.generation
         light(server)
         look(server, status.scene)
-        self._build_panels(status, study, study_name, diagnosis)
+        self._build_panels(status, study, study_name, diagnosis, open_recorder)
 
     def _build_panels(
-        self, status: Status, study: StudyProcess | None, study_name: str, diagnosis: DiagnosisProcess
+        self,
+        status: Status,
+        study: StudyProcess | None,
+        study_name: str,
+        diagnosis: DiagnosisProcess,
+        open_recorder: Callable[[Path], Recorder],
     ) -> None:
         server, session, post = self._server, self._session, self._actions.post
         background = BackgroundWork(post)
@@ -106,12 +107,19 @@ class Page:
             self._restart = SceneBound(
                 server, lambda scene: RestartPanel(server, session, scene, session.status().seed, post), status.scene
             )
+        self._recording = RecordingSwitch(server, data_folder() / "recordings", open_recorder, background)
+        with tabs.add_tab("Take along", viser.Icon.DOWNLOAD):
+            self._output = OutputPanel(server, session, self._recording, post, background)
         self._study: StudyPanel | None = None
         if study is not None:
             with tabs.add_tab("Calibrate", viser.Icon.TARGET):
                 self._study = StudyPanel(server, study, study_name, post)
         with tabs.add_tab("Diagnose", viser.Icon.STETHOSCOPE):
             self._diagnosis = DiagnosisPanel(server, diagnosis, shipped_measurements(), post)
+
+    def close(self) -> None:
+        """End a recording that was begun on the page."""
+        self._recording.close()
 
     def run(self, stop: threading.Event) -> None:
         """Keep the page up to date until ``stop`` is set."""
@@ -142,8 +150,10 @@ class Page:
             self._generation = status.generation
             self._redraw(status.scene)
             self._nodes.clear()
-        if frame is not None and self._recorder is not None:
-            self._recorder.take(frame, status)
+        if frame is not None:
+            self._recording.take(frame, status)
+            if self._recorder is not None:
+                self._recorder.take(frame, status)
         if frame is None or frame.number == self._frame_number:
             return
         self._frame_number = frame.number
@@ -166,6 +176,7 @@ class Page:
         self._live.panel(status.scene).show(status)
         self._changes.show(status)
         self._scene.show(status)
+        self._output.show(status, self._notice)
         self._restart.panel(status.scene).show(status)
 
     def _show_background(self) -> None:

@@ -46,7 +46,7 @@ def drum_files(prefix=""):
     }
 
 
-SCENE = with_values(bead_scene(), {"pair.bead.bead.static_friction": 0.123})
+SCENE = with_values(bead_scene(), {"pair.bead.bead.static_friction": 0.123, "body.spheres": "coarse"})
 
 
 def test_a_mesh_becomes_the_shape_of_a_body_and_a_material_that_every_command_takes(tmp_path):

@@ -26,13 +26,13 @@ def server():
     server.stop()
 
 
-def event(handle, number, client_id=0):
+def event(handle, number, client_id=0, client=None):
     """What viser hands to a callback when a browser has sent ``number``."""
 
     class Event:
         target = type("Handle", (), {"value": number})
 
-    Event.client_id = client_id
+    Event.client_id, Event.client = client_id, client
     for callback in handle._impl.update_cb:
         callback(Event)
 

@@ -94,7 +94,7 @@ def test_bodies_that_do_not_fit_into_the_rig_are_refused(bench, tmp_path):
 
 
 def test_a_mesh_becomes_the_shape_of_the_chosen_body(bench):
-    bench.session.start(bead_scene(), 5)
+    bench.session.start(with_values(bead_scene(), {"body.spheres": "coarse"}), 5)
     bench.panel.show(bench.session.status())
     assert bench.panel._body.options == ("bead",)
     assert bench.upload("box.stl", stl()) == ""
