@@ -14,6 +14,7 @@ from explorer.screen_units import SCREEN_UNIT
 from solver.params import UNITS, ParameterError, parse_quantity
 from solver.scene import Scene, with_rig
 from solver.set_up import with_settings
+from solver.toml_table import read_toml
 
 PROGRAM = ("explorer", "simulate")
 
@@ -26,32 +27,41 @@ class SceneSource:
     """Before any setting; empty: the scene came from no file."""
     scene: Scene
     """As loaded: the default that changes are counted from."""
+    material: str = ""
+    """Its material, by shipped name or path; empty where nothing named one."""
 
 
 def rig_source(rig: str, material: str) -> SceneSource:
     """The source "``material`` in ``rig``"; raises as :func:`explorer.scene_file.load_scene`."""
-    own = Path(material).expanduser()
-    named = str(own.absolute()) if own.is_file() else material
-    return SceneSource((rig, "--material", named), load_scene(rig, named))
+    named = _named(material)
+    return SceneSource((rig, "--material", named), load_scene(rig, named), named)
 
 
 def material_source(material: str) -> SceneSource:
     """The source of a material in the rig of its own file; raises as :func:`explorer.scene_file.material_scene`."""
-    own = Path(material).expanduser()
-    named = str(own.absolute()) if own.is_file() else material
-    return SceneSource((named,), material_scene(named))
+    named = _named(material)
+    return SceneSource((named,), material_scene(named), named)
 
 
 def study_source(file: Path) -> SceneSource:
     """The source of a study: its shipped name where that says the same, otherwise its path."""
     scene = study_scene(file)
+    material = str(read_toml(file).get("material", ""))
+    # As the study file sees it: beside itself, before what is shipped.
+    material = _named(str(file.parent / material)) if (file.parent / material).is_file() else material
     for name in (file.stem, str(file.absolute())):
         try:
             if load_scene(name) == scene:
-                return SceneSource((name,), scene)
+                return SceneSource((name,), scene, material)
         except ValueError:  # the short name is taken by nothing, or by a file that is no scene
             continue
-    return SceneSource((), scene)
+    return SceneSource((), scene, material)
+
+
+def _named(material: str) -> str:
+    """A file by its full path, a shipped material by its name."""
+    own = Path(material).expanduser()
+    return str(own.absolute()) if own.is_file() else material.removesuffix(".toml")
 
 
 def command_line(source: SceneSource, scene: Scene, seed: int) -> str:

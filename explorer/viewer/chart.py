@@ -41,7 +41,7 @@ class Curve:
         return True
 
     def cut(self, time: float) -> None:
-        """Drop what is later than ``time``."""
+        """Forget what is later than ``time``."""
         self._points = [point for point in self._points if point[0] <= time]
 
     def columns(self) -> tuple[Array, Array]:

@@ -40,19 +40,19 @@ class OutlinePanel:
             self._in_scene = server.gui.add_checkbox(
                 "Lines in 3-D", True, hint="Draw the lines of the flanks, and what was measured, in the scene too."
             )
-            self._data = server.gui.add_dropdown(
-                "Measured", (NONE, *shipped, OWN), hint="Lay a measured silhouette or profile over the pile."
-            )
-            self._folder = server.gui.add_text(
-                "Folder", "", hint="Folder with measurement.toml, on the machine that serves this page."
-            )
-            self._upload = server.gui.add_upload_button(
-                "Upload measured data",
-                mime_type=".zip",
-                hint="A folder with measurement.toml and its files, as .zip; it is kept, and can be diagnosed by its "
-                "folder.",
-            )
-            self._curve = server.gui.add_dropdown("Curve", (NONE,), disabled=True, hint="Which of its curves.")
+            with server.gui.add_folder("Measured data over it", expand_by_default=False):
+                self._data = server.gui.add_dropdown(
+                    "Measured", (NONE, *shipped, OWN), hint="Lay a measured silhouette or profile over the pile."
+                )
+                self._folder = server.gui.add_text(
+                    "Folder", "", hint="Folder with measurement.toml, on the machine that serves this page."
+                )
+                self._upload = server.gui.add_upload_button(
+                    "Upload measured data",
+                    mime_type=".zip",
+                    hint="A folder with measurement.toml as .zip. It is kept, and can be diagnosed too.",
+                )
+                self._curve = server.gui.add_dropdown("Curve", (NONE,), disabled=True, hint="Which of its curves.")
 
         @self._data.on_update
         def _(event: viser.GuiEvent[Any]) -> None:

@@ -37,12 +37,12 @@ class ScenePanel:
         self._session, self._folder, self._background = session, folder, background
         scene = session.status().scene
         self._generation = 0
-        shipped = shipped_assets("materials")
+        self._shipped = shipped_assets("materials")
         gui = server.gui
         with gui.add_folder("Rig and material", expand_by_default=False):
             self._rig = gui.add_dropdown("Rig", tuple(RIGS), hint="What the bodies are poured into.")
             self._material = gui.add_dropdown(
-                "Material", (*shipped, OWN), hint="Materials that come with the program, or a file of your own."
+                "Material", (*self._shipped, OWN), hint="Materials that come with the program, or a file of your own."
             )
             self._file = gui.add_text("File", "", hint="Material file (TOML), on the machine that serves this page.")
             pour = gui.add_button("Pour this", hint="A new pour; changes are then counted from this material and rig.")
@@ -75,9 +75,17 @@ class ScenePanel:
                 self._rig.value = status.scene.rig.name  # type: ignore[misc]
             if self._body.options != _names(status.scene):
                 self._body.options = _names(status.scene)
+            self._show_material(self._session.source.material)
         doing = f"<div style='padding:0 0.75em; font-size:0.8em'>{WORKING if self._background.busy_with else ''}</div>"
         if self._doing.content != doing:
             self._doing.content = doing
+
+    def _show_material(self, material: str) -> None:
+        """Choose the material that is being poured, where its source names one."""
+        if material in self._shipped:
+            self._material.value = material  # type: ignore[misc]
+        elif material:
+            self._material.value, self._file.value = OWN, material  # type: ignore[misc]
 
     def _pour(self) -> None:
         rig = str(self._rig.value)

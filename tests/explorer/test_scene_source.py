@@ -94,6 +94,7 @@ def test_the_shipped_study_is_named_as_briefly_as_it_can_be(asked):
     source = study_source(study_path("sunflower_extract"))
     assert repeated(command_line(source, source.scene, 1), asked).scene == source.scene
     assert len(source.arguments) == 1
+    assert source.material == "sunflower_extract"
 
 
 def test_a_study_of_ones_own_is_named_by_its_path(asked, tmp_path):

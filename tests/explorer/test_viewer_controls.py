@@ -12,7 +12,8 @@ from explorer.viewer.live_controls import LiveControl, decade_mark, decades_arou
 from explorer.viewer.live_panel import echo_html, effect_targets, live_parameters, material_targets, pair_targets
 from explorer.viewer.restart_panel import PATHS, RestartPanel, entered, size_paths
 from solver import load_material, parameters, with_values
-from solver.scene import value
+from solver.rigs import RIGS
+from solver.scene import value, with_rig
 from solver.sizes import SizeDistribution
 
 SCENE = load_material("sunflower_extract")
@@ -107,6 +108,19 @@ def test_sizes_of_every_component_are_in_the_set_up(server):
     other = with_values(SCENE, {"body.spheres": 12})
     panel.show(Status(SessionState.RUNNING, "", other, seed=1, generation=2, speed=1.0))
     assert panel._inputs["body.spheres"].value == "12"
+
+
+@pytest.mark.parametrize("rig", RIGS)
+def test_all_of_rig_and_feed_is_in_the_set_up(server, rig):
+    scene, started = with_rig(SCENE, rig), []
+    first = Status(SessionState.RUNNING, "", scene, seed=1, generation=1, speed=1.0)
+    session = type("Session", (), {"status": lambda _: first, "restart": lambda _, made, seed: started.append(made)})()
+    panel = RestartPanel(server, session, scene, 1, lambda action: action())
+    declared = {path for path in parameters(scene) if path.startswith(("rig.", "insertion."))}
+    assert declared <= set(panel._inputs)
+    # What nobody touched stays as it is, to the last bit.
+    panel._restart()
+    assert started == [scene]
 
 
 def test_settings_of_the_next_pour_are_clamped_and_choices_checked():

@@ -55,8 +55,10 @@ def test_every_rig_and_shipped_material_can_be_poured(bench, rig, material):
     assert bench.pour() == ""
     assert bench.session.now.scene == load_scene(rig, material)
     assert bench.session.source.scene == bench.session.now.scene
+    # As another browser sees it.
+    bench.panel._rig.value, bench.panel._material.value = "funnel", OWN
     bench.panel.show(bench.session.status())
-    assert bench.panel._rig.value == rig
+    assert (bench.panel._rig.value, bench.panel._material.value) == (rig, material)
 
 
 def test_a_file_of_ones_own_is_poured(bench, tmp_path):
@@ -100,6 +102,10 @@ def test_a_mesh_becomes_the_shape_of_the_chosen_body(bench):
     assert bench.upload("box.stl", stl()) == ""
     assert bench.session.now.seed == 5
     assert bench.session.now.scene.bodies[0].shape.kind == "mesh"
+    # It is a material of one's own now, and can be poured in another rig.
+    bench.panel.show(bench.session.status())
+    assert bench.panel._material.value == OWN
+    assert material_source(bench.panel._file.value).scene == bench.session.now.scene
     assert bench.session.source.scene == bench.session.now.scene
 
 
