@@ -64,6 +64,10 @@ class ParameterHistory:
             raise CommandError("nothing to redo")
         return self._towards(self._goal + 1)
 
+    def stay(self) -> None:
+        """The solver was not asked after all: where undo and redo stand is where the parameters are."""
+        self._goal = self._at
+
     def _towards(self, goal: int) -> LiveValues:
         now, self._goal = self._entries[self._goal], goal
         self._changed = frozenset()  # what comes next is a change of its own

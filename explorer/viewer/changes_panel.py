@@ -12,7 +12,7 @@ from typing import Any
 import viser
 
 from explorer.live.messages import Status
-from explorer.parameter_history import ParameterHistory
+from explorer.parameter_history import LiveValues, ParameterHistory
 from explorer.presets import Preset, preset_names, preset_path, preset_values, read_preset, save_preset
 from explorer.scene_changes import Difference, differences, shown
 from explorer.session import Session
@@ -78,10 +78,17 @@ class ChangesPanel:
             self._list.content = html
 
     def _undo(self) -> None:
-        self._session.set_parameters(self._history.undo())
+        self._go(self._history.undo())
 
     def _redo(self) -> None:
-        self._session.set_parameters(self._history.redo())
+        self._go(self._history.redo())
+
+    def _go(self, values: LiveValues) -> None:
+        try:
+            self._session.set_parameters(values)
+        except ValueError:
+            self._history.stay()
+            raise
 
     def _back(self) -> None:
         self._session.set_parameters(defaults(self._session))

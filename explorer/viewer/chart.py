@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,7 +13,7 @@ import viser
 import viser.uplot
 
 from explorer.live.messages import Event, Status
-from explorer.viewer.marks import NO_MARKS, change_label, change_times, with_marks
+from explorer.viewer.marks import NO_MARKS, Marks, with_marks
 from explorer.viewer.palette import ANGLE_LINE, ANGLE_SPREAD_LINE, AXIS_TEXT, GRID_LINE, MARK_LINE, MASS_LINE
 from explorer.viewer.readout import angle_of_repose_deg
 from solver.observables.value import Value
@@ -87,10 +88,10 @@ class History:
 
     def drawn(self, marks: Sequence[float]) -> tuple[Array, ...]:
         """Time [s], angle ∓ spread and angle [°], mass [g], and 1 at the ``marks`` [s]; shape (n,) each."""
-        time, angle, mass = self.columns()
+        moments, angle, mass = self.columns()
         spread_time, spread = self._spread.columns()
-        around = np.interp(time, spread_time, spread) if len(spread_time) else np.zeros_like(time)
-        return with_marks((time, np.maximum(angle - around, 0.0), angle + around, angle, mass), marks)
+        around = np.interp(moments, spread_time, spread) if len(spread_time) else np.zeros_like(moments)
+        return with_marks((moments, np.maximum(angle - around, 0.0), angle + around, angle, mass), marks)
 
 
 class Chart:
@@ -98,8 +99,7 @@ class Chart:
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._history, self._top_deg = History(), LEAST_TOP_DEG
-        self._marks: tuple[float, ...] = ()
-        self._label = NO_MARKS
+        self._marks = Marks()
         self._plot = server.gui.add_uplot(
             self._history.drawn(()),
             _series(NO_MARKS),
@@ -111,14 +111,13 @@ class Chart:
 
     def show(self, status: Status, events: Sequence[Event] = ()) -> None:
         """Draw what is new, and mark the changes among ``events``; call it inside ``server.atomic()``."""
-        marks, label = change_times(events, status.generation), change_label(events, status.generation)
-        if self._history.add(status) or marks != self._marks:
-            self._marks = marks
-            columns = self._history.drawn(marks)
+        marked = self._marks.take(events, status.generation)
+        if self._history.add(status) or marked:
+            columns = self._history.drawn(self._marks.times)
             self._plot.data = columns
             self._reach(columns[2])
-        if label != self._label:
-            self._label = label
+        label = self._marks.new_label(events, status.generation, time.monotonic())
+        if label is not None:
             self._plot.series = _series(label)
 
     def _reach(self, angle_deg: Array) -> None:

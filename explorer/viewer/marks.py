@@ -24,6 +24,34 @@ MOST_LETTERS = 64
 NO_MARKS = "no change yet"
 
 
+LEGEND_INTERVAL = 1.0
+"""Wall time [s] between two texts of a legend: with every one of them the browser makes the chart anew."""
+
+
+class Marks:
+    """The marks of one chart, and the text of their legend."""
+
+    def __init__(self) -> None:
+        self.times: tuple[float, ...] = ()
+        """Moments that are marked [s]."""
+        self._label, self._label_due = NO_MARKS, -math.inf
+
+    def take(self, events: Sequence[Event], generation: int) -> bool:
+        """Take the changes among ``events`` of the pour ``generation``; True if other moments are marked now."""
+        times = change_times(events, generation)
+        new = times != self.times
+        self.times = times
+        return new
+
+    def new_label(self, events: Sequence[Event], generation: int, wall: float) -> str | None:
+        """Another text for the legend, not too soon after the last one; None where it stays. ``wall``: a clock [s]."""
+        label = change_label(events, generation)
+        if label == self._label or wall < self._label_due:
+            return None
+        self._label, self._label_due = label, wall + LEGEND_INTERVAL
+        return label
+
+
 def change_times(events: Sequence[Event], generation: int) -> tuple[float, ...]:
     """Moments [s] of the pour ``generation`` at which parameters were changed, ascending."""
     times = sorted({event.time for event in events if event.is_change and event.generation == generation})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,7 +13,7 @@ import viser.uplot
 
 from explorer.live.messages import Event, SessionState, Status
 from explorer.viewer.chart import Curve, axis, line
-from explorer.viewer.marks import NO_MARKS, change_label, change_times, with_marks
+from explorer.viewer.marks import NO_MARKS, Marks, with_marks
 from explorer.viewer.palette import CONTACTS_LINE, ENERGY_LINE, MARK_LINE
 
 Array = npt.NDArray[np.float64]
@@ -43,10 +44,10 @@ class MotionHistory:
 
     def drawn(self, marks: Sequence[float]) -> tuple[Array, ...]:
         """Time [s], energy [mJ], contacts, and 1 at the ``marks`` [s]; shape (n,) each."""
-        time, energy = self._energy.columns()
-        if not len(time):
+        moments, energy = self._energy.columns()
+        if not len(moments):
             return with_marks((np.zeros(1), np.zeros(1), np.zeros(1)), marks)
-        return with_marks((time, energy, self._contacts.columns()[1]), marks)
+        return with_marks((moments, energy, self._contacts.columns()[1]), marks)
 
 
 class MotionChart:
@@ -54,8 +55,7 @@ class MotionChart:
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._history = MotionHistory()
-        self._marks: tuple[float, ...] = ()
-        self._label = NO_MARKS
+        self._marks = Marks()
         self._plot = server.gui.add_uplot(
             self._history.drawn(()),
             _series(NO_MARKS),
@@ -67,12 +67,11 @@ class MotionChart:
 
     def show(self, status: Status, events: Sequence[Event]) -> None:
         """Draw what is new, and mark the changes among ``events``; call it inside ``server.atomic()``."""
-        marks, label = change_times(events, status.generation), change_label(events, status.generation)
-        if self._history.add(status) or marks != self._marks:
-            self._marks = marks
-            self._plot.data = self._history.drawn(marks)
-        if label != self._label:
-            self._label = label
+        marked = self._marks.take(events, status.generation)
+        if self._history.add(status) or marked:
+            self._plot.data = self._history.drawn(self._marks.times)
+        label = self._marks.new_label(events, status.generation, time.monotonic())
+        if label is not None:
             self._plot.series = _series(label)
 
 

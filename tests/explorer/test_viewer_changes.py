@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from explorer.errors import CommandError
 from explorer.scene_changes import differences
 from explorer.scene_source import material_source
 from explorer.viewer.actions import Actions
@@ -71,6 +72,19 @@ def test_undo_takes_back_what_anybody_changed_and_redo_brings_it_again(bench):
     assert bench.press(REDO) == ""
     assert bench.friction() == 0.1
     assert bench.press(REDO) == "nothing to redo"
+
+
+def test_an_undo_that_the_session_refuses_can_be_asked_again(bench, monkeypatch):
+    bench.change(friction=0.1)
+
+    def refuse(values):
+        raise CommandError("the solver process does not run")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(bench.session, "set_parameters", refuse)
+        assert bench.press(UNDO) == "the solver process does not run"
+    assert bench.press(UNDO) == ""
+    assert bench.friction() == 0.57
 
 
 def test_a_preset_is_one_step_of_the_history(bench):

@@ -9,7 +9,16 @@ import pytest
 from explorer.live.messages import Event, SessionState
 from explorer.viewer.chart import Chart, History
 from explorer.viewer.guarded_server import guarded_server
-from explorer.viewer.marks import MOST_LETTERS, MOST_MARKS, NO_MARKS, change_label, change_times, with_marks
+from explorer.viewer.marks import (
+    LEGEND_INTERVAL,
+    MOST_LETTERS,
+    MOST_MARKS,
+    NO_MARKS,
+    Marks,
+    change_label,
+    change_times,
+    with_marks,
+)
 from explorer.viewer.motion_chart import MotionChart, MotionHistory
 from solver.observables.value import Value
 from tests.explorer.test_viewer_texts import STATUS
@@ -43,6 +52,19 @@ def test_the_legend_tells_the_last_change_old_and_new():
     long = change_label([change(1.0, "x" * 200 + ": 1 → 2")], 1)
     assert long.endswith("x: 1 → 2")
     assert len(long) == len("1.00 s ") + MOST_LETTERS
+
+
+def test_the_legend_is_not_renewed_with_every_step_of_a_drag():
+    marks, drag = Marks(), [change(0.1 * k, f"a: 1 → {k}") for k in range(5)]
+    assert marks.new_label([], 1, 0.0) is None
+    assert marks.new_label(drag[:1], 1, 0.0) == "0.00 s a: 1 → 0"
+    assert marks.new_label(drag[:3], 1, 0.3) is None
+    assert marks.new_label(drag, 1, LEGEND_INTERVAL) == "0.40 s a: 1 → 4"
+    assert marks.new_label(drag, 1, 9.0) is None
+    # The moments are marked at once.
+    assert marks.take(drag[:3], 1)
+    assert not marks.take(drag[:3], 1)
+    assert marks.times == pytest.approx((0.0, 0.1, 0.2))
 
 
 def test_a_mark_is_a_spike_and_bends_no_curve():

@@ -226,6 +226,12 @@ def test_actions_run_in_order_and_a_refusal_becomes_the_notice():
     assert actions.carry_out() == ""
 
 
+def test_a_file_that_cannot_be_written_is_told_too(tmp_path):
+    actions = Actions()
+    actions.post(lambda: (tmp_path / "none" / "file").write_text(""))
+    assert actions.carry_out() == f"{tmp_path / 'none' / 'file'}: No such file or directory"
+
+
 def test_a_mistake_in_the_program_is_not_taken_for_bad_input():
     actions = Actions()
     actions.post(lambda: 1 / 0)
