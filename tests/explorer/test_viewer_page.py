@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from explorer.command_process import CommandStatus
+from explorer.diagnosis_process import DiagnoseProcess
 from explorer.live.messages import Event
 from explorer.scene_source import material_source, rig_source
 from explorer.viewer.guarded_server import guarded_server
@@ -18,19 +18,6 @@ SOURCE = material_source("sunflower_extract")
 FRICTION = "pair.seed.seed.static_friction"
 
 
-class Idle:
-    """A diagnosis that nobody has started."""
-
-    def status(self):
-        return CommandStatus("idle")
-
-    def result(self):
-        return None
-
-    def cancel(self):
-        pass
-
-
 class Session(PageSession):
     """With the rest of what the page's loop asks."""
 
@@ -39,6 +26,15 @@ class Session(PageSession):
         return events
 
     def step(self):
+        pass
+
+    def step_back(self):
+        pass
+
+    def details(self):
+        return None
+
+    def watch(self, wanted, body=None):
         pass
 
     def set_speed(self, factor):
@@ -58,13 +54,15 @@ def running(tmp_path, monkeypatch):
         opened.append(path)
         return SessionRecorder(path)
 
-    page = Page(server, session, None, "", Idle(), open_recorder)
+    diagnosis = DiagnoseProcess(tmp_path / "diagnoses", tmp_path / "runs.sqlite")
+    page = Page(server, session, None, "", diagnosis, open_recorder)
     loop = threading.Thread(target=page.run, args=(stop,))
     loop.start()
     yield page, session, opened
     stop.set()
     loop.join(10)
     page.close()
+    diagnosis.close()
     server.stop()
 
 
