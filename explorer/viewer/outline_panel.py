@@ -10,6 +10,7 @@ import viser
 
 from explorer.live.messages import Status
 from explorer.measured_curves import MeasuredCurve, measured_curves
+from explorer.measured_file import SUFFIXES, measured_file
 from explorer.uploads import unpacked_measurement
 from explorer.viewer.actions import Post
 from explorer.viewer.background_work import BackgroundWork
@@ -49,8 +50,9 @@ class OutlinePanel:
                 )
                 self._upload = server.gui.add_upload_button(
                     "Upload measured data",
-                    mime_type=".zip",
-                    hint="A folder with measurement.toml as .zip. It is kept, and can be diagnosed too.",
+                    mime_type=",".join((".zip", *SUFFIXES)),
+                    hint="A folder with measurement.toml as .zip, which is kept and can be diagnosed too; a scanned "
+                    "pile (.npz: xyz, radius) or the points of an outline (.csv: u_m,z_m), which are drawn only.",
                 )
                 self._curve = server.gui.add_dropdown("Curve", (NONE,), disabled=True, hint="Which of its curves.")
 
@@ -89,18 +91,24 @@ class OutlinePanel:
             self._html.content = html
 
     def _take(self, name: str, content: bytes) -> None:
-        """Keep measured data that were sent, and lay them over the pile."""
+        """Lay what was sent over the pile: a data set, which is kept, or a single curve."""
+        if Path(name).suffix.lower() in SUFFIXES:
+            self._background.start("reading the file", lambda: measured_file(name, content), self._offer_one)
+        else:
+            self._background.start("reading the measured data", lambda: self._kept(name, content), self._offer_kept)
 
-        def read() -> tuple[Path, Mapping[str, MeasuredCurve]]:
-            folder = unpacked_measurement(name, content, self._uploads)
-            return folder, measured_curves(str(folder))
+    def _kept(self, name: str, content: bytes) -> tuple[Path, Mapping[str, MeasuredCurve]]:
+        folder = unpacked_measurement(name, content, self._uploads)
+        return folder, measured_curves(str(folder))
 
-        def offer(found: tuple[Path, Mapping[str, MeasuredCurve]]) -> None:
-            folder, curves = found
-            self._folder.value, self._data.value = str(folder), OWN  # type: ignore[misc]
-            self._offer(curves)
+    def _offer_kept(self, found: tuple[Path, Mapping[str, MeasuredCurve]]) -> None:
+        folder, curves = found
+        self._folder.value, self._data.value = str(folder), OWN  # type: ignore[misc]
+        self._offer(curves)
 
-        self._background.start("reading the measured data", read, offer)
+    def _offer_one(self, curve: MeasuredCurve) -> None:
+        self._data.value = NONE  # type: ignore[misc]
+        self._offer({curve.name: curve})
 
     def _choose_data(self, chosen: str) -> None:
         name = str(self._folder.value).strip() if chosen == OWN else chosen

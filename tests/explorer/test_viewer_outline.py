@@ -157,6 +157,15 @@ def test_uploaded_data_are_laid_over_the_pile_and_a_bad_archive_changes_nothing(
     assert (panel._folder.value, panel._measured.name) == (folder, "drum_15rpm: free surface")
 
 
+def test_a_single_curve_is_drawn_and_a_bad_file_leaves_it(bench):
+    panel = bench.panel
+    assert bench.sent(panel._upload, UploadedFile("photo.csv", b"u_m,z_m\n-0.02,0\n0,0.01\n0.02,0\n")) == ""
+    assert (panel._curve.options, panel._data.value) == (("photo.csv",), NONE)
+    assert "photo.csv: not a text file" in bench.sent(panel._upload, UploadedFile("photo.csv", b"\xff"))
+    panel.show(replace(STATUS, outline=FRONT))
+    assert "measured, photo.csv" in panel._html.content
+
+
 def test_one_thing_is_done_at_a_time_and_a_mistake_is_no_refusal():
     actions, done = Actions(), []
     background = BackgroundWork(actions.post)
