@@ -14,6 +14,8 @@ LEAST_EXTENT, LARGEST_EXTENT = 2e-4, 0.5
 FIXED_UNIT = {".glb": "m"}
 """Unit of a format that fixes one (glTF 2.0, §3.4: metres). The others leave it open."""
 USUAL_UNIT = "mm"
+MOST_FACES_DRAWN = 20_000
+"""A mesh of more faces is not drawn on the page: 80 bodies of it are more than a browser turns smoothly."""
 
 
 def mesh_solid(file: Path, unit: str | None, unit_input: str) -> Solid:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from explorer.body_text import body_text
 from explorer.errors import CommandError
-from explorer.mesh_solid import USUAL_UNIT, mesh_solid
+from explorer.mesh_solid import MOST_FACES_DRAWN, USUAL_UNIT, mesh_solid
 from explorer.new_file import check_new_file
 from explorer.shape_choice import Fitted, fewest, fits, shown_numbers, standard_limit
 from explorer.shape_table import error_line, heading, mm, solid_line
@@ -19,8 +19,6 @@ from solver.clump import MOST_SPHERES
 from solver.shape import Solid, mass_properties, surface_mesh
 
 USUAL_DENSITY = 1000.0
-MOST_FACES_DRAWN = 20_000
-"""A mesh of more faces is not drawn on the page: 80 bodies of it are more than a browser turns smoothly."""
 NAME = re.compile(r"[^\s.\"\\]+")
 
 Echo = Callable[[str], None]

@@ -20,12 +20,13 @@ from pathlib import Path, PurePosixPath
 from doe.measurement.load import FILE as MEASUREMENT_FILE
 from doe.measurement.load import load_measurement
 from explorer.errors import CommandError
-from explorer.mesh_solid import mesh_solid
+from explorer.mesh_solid import MOST_FACES_DRAWN, mesh_solid
 from explorer.scene_source import SceneSource, material_source
 from explorer.scene_text import material_toml
 from explorer.whole_file import write_whole, write_whole_bytes
 from solver.mesh_file import SUFFIXES
 from solver.scene import Scene, check
+from solver.shape import Solid, surface_mesh
 
 MOST_MESH_BYTES = 30_000_000
 MOST_ZIP_BYTES, MOST_UNPACKED_BYTES, MOST_MEMBERS = 50_000_000, 200_000_000, 1000
@@ -63,6 +64,7 @@ def shaped_source(present: Scene, body: str, name: str, content: bytes, unit: st
         try:
             write_whole_bytes(mesh, content)
             solid = mesh_solid(mesh, unit, unit_input="unit")
+            _check_faces(solid)
             shaped = [dataclasses.replace(one, shape=solid) if one.name == body else one for one in present.bodies]
             scene = dataclasses.replace(present, bodies=tuple(shaped))
             check(scene)
@@ -74,6 +76,15 @@ def shaped_source(present: Scene, body: str, name: str, content: bytes, unit: st
             raise
     write_whole(material, material_toml(scene, f"{present.title}, with {mesh.name} as its {body}. SI."))
     return material_source(str(material))
+
+
+def _check_faces(solid: Solid) -> None:
+    faces = len(surface_mesh(solid).faces)
+    if faces > MOST_FACES_DRAWN:
+        raise CommandError(
+            f"{faces} faces; the page draws up to {MOST_FACES_DRAWN}: reduce the mesh, or make a body file of it with "
+            "`explorer shape`"
+        )
 
 
 def unpacked_measurement(name: str, content: bytes, folder: Path) -> Path:

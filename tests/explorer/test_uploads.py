@@ -74,6 +74,7 @@ def test_the_unit_is_taken_as_told(tmp_path):
         ("noise.stl", bytes(range(256)) * 9, None, "noise.stl"),
         ("far.stl", stl(), "m", "is it in another unit"),
         ("huge.stl", stl((400.0, 400.0, 400.0)), None, r"huge.stl: rig\."),
+        ("fine.stl", trimesh.creation.icosphere(5, 6.0).export(file_type="stl"), None, "20480 faces; the page draws"),
         ("evil.exe", stl(), None, "ending in .stl"),
         ("../../x<script>.stl", stl(holes=2), None, "not watertight"),
     ],
