@@ -72,7 +72,8 @@ class ChangesPanel:
             self._differences = tuple(differences(default, status.scene))
             live = tuple(one.path for one in self._differences if one.live)
             self._one.options = (ONE, *live)
-        self._one.value = ONE  # type: ignore[misc]
+        if self._one.value != ONE:
+            self._one.value = ONE  # type: ignore[misc]
         html = changes_html(self._differences, self._history.undoable, self._history.redoable)
         if self._list.content != html:
             self._list.content = html
