@@ -81,9 +81,12 @@ class RecordingSwitch:
             recorder.close()
 
     def take(self, frame: Frame, status: Status) -> None:
-        """Hand on what the page shows, if it is being recorded."""
-        if self._recorder is not None:
-            self._recorder.take(frame, status)
+        """Hand on what the page shows, if it is being recorded; a web page that is full is ended."""
+        if self._recorder is None:
+            return
+        self._recorder.take(frame, status)
+        if isinstance(self._recorder, ScenePlayback) and self._recorder.full and not self._background.busy_with:
+            self.end()
 
     def files(self) -> tuple[Path, ...]:
         """Files of the last recording; CommandError where there is none, or while it is being written."""

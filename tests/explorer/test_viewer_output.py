@@ -14,6 +14,7 @@ from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.output_panel import DOWNLOAD, START, STOP, OutputPanel, command_html, picture
 from explorer.viewer.recording_switch import HTML, RRD, RecordingSwitch
+from explorer.viewer.scene_playback import BYTES_PER_BODY
 from tests.explorer.page_session import PageSession, finished, frame_of
 from tests.explorer.test_viewer_controls import event
 
@@ -160,6 +161,18 @@ def test_the_scene_as_a_web_page_holds_what_moved(server, bench):
     assert bench.record(START) == ""
     bench.recording.close()
     assert len(list(bench.recording.path.parent.iterdir())) == 2
+
+
+def test_a_web_page_that_is_full_is_ended_and_written(bench, monkeypatch):
+    monkeypatch.setattr("explorer.viewer.scene_playback.MOST_BYTES", 2.5 * BYTES_PER_BODY)
+    bench.panel._kind.value = HTML
+    assert bench.record(START) == ""
+    bench.take(2)
+    assert bench.recording.running
+    bench.take(4)
+    assert not bench.recording.running
+    assert finished(bench.actions, bench.background) == ""
+    assert "__VISER_EMBED_DATA__" in bench.recording.files()[0].read_text()
 
 
 def test_a_kind_that_is_not_offered_is_refused(bench):
