@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING
 
 from explorer.diagnosis_process import DiagnoseProcess
 from explorer.scene_source import SceneSource
@@ -17,10 +16,8 @@ from explorer.study_process import CalibrationProcess
 from explorer.user_data import data_folder
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.page import Page
+from explorer.viewer.recording_switch import session_recorder
 from solver.scene import Scene
-
-if TYPE_CHECKING:
-    from explorer.logs.session_recorder import SessionRecorder
 
 LABEL = "Granular material explorer"
 
@@ -52,7 +49,8 @@ def serve(
         study_file: the study that the page can run, None for a page without.
         store: file of the runs of study and diagnosis; None for the default store.
         record_path: new file (``.rrd``) that the session is recorded into; a restart begins another beside
-        it. source: where ``scene`` came from, for the command line that repeats it.
+            it.
+        source: where ``scene`` came from, for the command line that repeats it.
         ready: called with the address once the page can be opened.
 
     Raises:
@@ -62,7 +60,7 @@ def serve(
     """
     with stopped_by_signals() as stop, ExitStack() as ending:
         # Ended in reverse order, with the signals still caught: a second one must not leave processes behind.
-        recorder = ending.enter_context(closing(_recorder(record_path))) if record_path else None
+        recorder = ending.enter_context(closing(session_recorder(record_path))) if record_path else None
         server = guarded_server(host, port, LABEL)
         ending.callback(server.stop)
         study = _study(study_file, store)
@@ -73,16 +71,9 @@ def serve(
         session = ending.enter_context(closing(Session()))
         session.start(scene, seed, source)
         name = study_file.stem if study_file else ""
-        page = ending.enter_context(closing(Page(server, session, study, name, diagnosis, _recorder, recorder)))
+        page = ending.enter_context(closing(Page(server, session, study, name, diagnosis, recorder)))
         ready(f"http://{address(host)}:{server.get_port()}")
         page.run(stop)
-
-
-def _recorder(path: Path) -> SessionRecorder:
-    # Imported here: rerun takes a second to load, and most sessions are not recorded.
-    from explorer.logs.session_recorder import SessionRecorder
-
-    return SessionRecorder(path)
 
 
 def _study(file: Path | None, store: Path | None) -> CalibrationProcess | None:

@@ -6,8 +6,6 @@ import math
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 import viser
@@ -65,7 +63,6 @@ class Page:
         study: StudyProcess | None,
         study_name: str,
         diagnosis: DiagnosisProcess,
-        open_recorder: Callable[[Path], Recorder],
         recorder: Recorder | None = None,
     ) -> None:
         self._server, self._session, self._recorder = server, session, recorder
@@ -78,15 +75,10 @@ class Page:
         self._generation = status.generation
         light(server)
         look(server, status.scene)
-        self._build_panels(status, study, study_name, diagnosis, open_recorder)
+        self._build_panels(status, study, study_name, diagnosis)
 
     def _build_panels(
-        self,
-        status: Status,
-        study: StudyProcess | None,
-        study_name: str,
-        diagnosis: DiagnosisProcess,
-        open_recorder: Callable[[Path], Recorder],
+        self, status: Status, study: StudyProcess | None, study_name: str, diagnosis: DiagnosisProcess
     ) -> None:
         server, session, post = self._server, self._session, self._actions.post
         background = BackgroundWork(post)
@@ -107,7 +99,7 @@ class Page:
             self._restart = SceneBound(
                 server, lambda scene: RestartPanel(server, session, scene, session.status().seed, post), status.scene
             )
-        self._recording = RecordingSwitch(server, data_folder() / "recordings", open_recorder, background)
+        self._recording = RecordingSwitch(server, data_folder() / "recordings", background)
         with tabs.add_tab("Take along", viser.Icon.DOWNLOAD):
             self._output = OutputPanel(server, session, self._recording, post, background)
         self._study: StudyPanel | None = None

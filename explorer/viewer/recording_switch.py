@@ -29,6 +29,14 @@ class Recorder(Protocol):
         """End the recording; its file is then whole."""
 
 
+def session_recorder(path: Path) -> Recorder:
+    """A recording of rerun's into the new file ``path``."""
+    # Imported here: rerun takes a second to load, and most sessions are not recorded.
+    from explorer.logs.session_recorder import SessionRecorder
+
+    return SessionRecorder(path)
+
+
 class RecordingSwitch:
     """A recording at a time, into ``folder``; ``open_rrd`` begins one of rerun's."""
 
@@ -36,8 +44,8 @@ class RecordingSwitch:
         self,
         server: viser.ViserServer,
         folder: Path,
-        open_rrd: Callable[[Path], Recorder],
         background: BackgroundWork,
+        open_rrd: Callable[[Path], Recorder] = session_recorder,
     ) -> None:
         self._server, self._folder, self._open_rrd, self._background = server, folder, open_rrd, background
         self._recorder: Recorder | None = None

@@ -57,7 +57,7 @@ class Bench:
         self.session, self.actions, self.browser = PageSession(SOURCE), Actions(), Browser()
         self.session.newest = frame_of([0, 1, 2], [[0.0, 0.0, 0.01 * k] for k in range(3)])
         self.background = BackgroundWork(self.actions.post)
-        self.recording = RecordingSwitch(server, folder, FileRecorder, self.background)
+        self.recording = RecordingSwitch(server, folder, self.background, FileRecorder)
         self.panel = OutputPanel(server, self.session, self.recording, self.actions.post, self.background)
 
     def press(self, label):

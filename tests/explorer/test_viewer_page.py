@@ -46,19 +46,11 @@ def running(tmp_path, monkeypatch):
     """A page whose loop runs in a thread, and its session."""
     monkeypatch.setattr("explorer.viewer.page.data_folder", lambda: tmp_path)
     server, session, stop = guarded_server("127.0.0.1", 0, "test"), Session(SOURCE), threading.Event()
-    opened = []
-
-    def open_recorder(path):
-        from explorer.logs.session_recorder import SessionRecorder
-
-        opened.append(path)
-        return SessionRecorder(path)
-
     diagnosis = DiagnoseProcess(tmp_path / "diagnoses", tmp_path / "runs.sqlite")
-    page = Page(server, session, None, "", diagnosis, open_recorder)
+    page = Page(server, session, None, "", diagnosis)
     loop = threading.Thread(target=page.run, args=(stop,))
     loop.start()
-    yield page, session, opened
+    yield page, session
     stop.set()
     loop.join(10)
     page.close()
@@ -74,7 +66,7 @@ def wait_for(condition):
 
 
 def test_a_change_reaches_list_chart_and_command_line_and_is_undone(running):
-    page, session, _ = running
+    page, session = running
     page._actions.post(lambda: session.set_parameters({FRICTION: 0.2}))
     wait_for(lambda: "0.57 → <b>0.2</b>" in page._changes._list.content)
     wait_for(lambda: page._chart._plot.series[-1]["label"].endswith("0.57 → 0.2"))
@@ -85,7 +77,7 @@ def test_a_change_reaches_list_chart_and_command_line_and_is_undone(running):
 
 
 def test_all_panels_follow_another_rig(running):
-    page, session, _ = running
+    page, session = running
     drum = rig_source("rotating_drum", "nine_sphere_seed")
     page._actions.post(lambda: session.start(drum.scene, 3, drum))
     wait_for(lambda: "rotating_drum --material nine_sphere_seed --seed 3" in page._output._command.content)
@@ -96,7 +88,7 @@ def test_all_panels_follow_another_rig(running):
 
 def test_a_recording_of_the_page_holds_the_changes(running, tmp_path):
     rerun_chunk = pytest.importorskip("rerun.chunk")
-    page, session, opened = running
+    page, session = running
     session.newest = frame_of([0, 1], [[0.0, 0.0, 0.01], [0.0, 0.02, 0.01]])
     page._actions.post(lambda: page._recording.begin("rerun (.rrd)"))
     wait_for(lambda: page._recording.running)
@@ -106,7 +98,8 @@ def test_a_recording_of_the_page_holds_the_changes(running, tmp_path):
     time.sleep(0.2)
     page._actions.post(page._recording.end)
     wait_for(lambda: not page._recording.running)
-    (path,) = opened
+    path = page._recording.path
+    assert path.parent == tmp_path / "recordings"
     texts = []
     for chunk in rerun_chunk.RrdReader(path).stream():
         batch = chunk.to_record_batch()
@@ -116,7 +109,7 @@ def test_a_recording_of_the_page_holds_the_changes(running, tmp_path):
 
 
 def test_an_event_that_is_no_change_is_no_mark(running):
-    page, session, _ = running
+    page, session = running
     session.events.append(Event(1, 0.4, "refused: nothing"))
     session.now = replace(session.now, time=0.5)
     wait_for(lambda: len(page._events) == 1)
