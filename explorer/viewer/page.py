@@ -16,24 +16,15 @@ from explorer.live.messages import Event, Status
 from explorer.scene_meshes import scene_height
 from explorer.session import Session
 from explorer.study_process import StudyProcess
-from explorer.user_data import data_folder
 from explorer.viewer.actions import Actions
-from explorer.viewer.background_work import BackgroundWork
-from explorer.viewer.changes_panel import ChangesPanel
 from explorer.viewer.chart import Chart
 from explorer.viewer.diagnosis_panel import DiagnosisPanel
-from explorer.viewer.live_panel import LivePanel
-from explorer.viewer.motion_chart import MotionChart
-from explorer.viewer.outline_panel import OutlinePanel
-from explorer.viewer.output_panel import OutputPanel
 from explorer.viewer.palette import BRAND
+from explorer.viewer.pour_panels import PourPanels
 from explorer.viewer.readout import readout_html
-from explorer.viewer.recording_switch import Recorder, RecordingSwitch
-from explorer.viewer.restart_panel import RestartPanel
+from explorer.viewer.recording_switch import Recorder
 from explorer.viewer.run_panel import RunPanel
-from explorer.viewer.scene_bound import SceneBound
 from explorer.viewer.scene_nodes import SceneNodes
-from explorer.viewer.scene_panel import ScenePanel
 from explorer.viewer.study_panel import StudyPanel
 from solver.assets import shipped_measurements
 from solver.scene import Scene
@@ -81,7 +72,6 @@ class Page:
         self, status: Status, study: StudyProcess | None, study_name: str, diagnosis: DiagnosisProcess
     ) -> None:
         server, session, post = self._server, self._session, self._actions.post
-        background = BackgroundWork(post)
         server.gui.configure_theme(
             dark_mode=True, show_share_button=False, show_logo=False, brand_color=BRAND, control_width="large"
         )
@@ -91,17 +81,9 @@ class Page:
             RunPanel(server, session, post)
             self._readout = server.gui.add_html("")
             self._chart = Chart(server)
-            self._motion = MotionChart(server)
-            self._outline = OutlinePanel(server, shipped_measurements(), data_folder() / "uploads", post, background)
-            self._live = SceneBound(server, lambda scene: LivePanel(server, session, scene, post), status.scene)
-            self._changes = ChangesPanel(server, session, data_folder() / "presets", post)
-            self._scene = ScenePanel(server, session, data_folder() / "uploads", post, background)
-            self._restart = SceneBound(
-                server, lambda scene: RestartPanel(server, session, scene, session.status().seed, post), status.scene
-            )
-        self._recording = RecordingSwitch(server, data_folder() / "recordings", background)
+            self._panels = PourPanels(server, session, post)
         with tabs.add_tab("Take along", viser.Icon.DOWNLOAD):
-            self._output = OutputPanel(server, session, self._recording, post, background)
+            self._panels.add_output()
         self._study: StudyPanel | None = None
         if study is not None:
             with tabs.add_tab("Calibrate", viser.Icon.TARGET):
@@ -111,7 +93,7 @@ class Page:
 
     def close(self) -> None:
         """End a recording that was begun on the page."""
-        self._recording.close()
+        self._panels.close()
 
     def run(self, stop: threading.Event) -> None:
         """Keep the page up to date until ``stop`` is set."""
@@ -123,7 +105,7 @@ class Page:
             frame = self._session.frame()
             status = self._session.status()
             self._take_events()
-            self._changes.take(status)
+            self._panels.take(status, frame)
             with self._server.atomic():
                 self._show_bodies(status, frame)
                 if began >= panels_due or notice is not None:
@@ -142,10 +124,8 @@ class Page:
             self._generation = status.generation
             self._redraw(status.scene)
             self._nodes.clear()
-        if frame is not None:
-            self._recording.take(frame, status)
-            if self._recorder is not None:
-                self._recorder.take(frame, status)
+        if frame is not None and self._recorder is not None:
+            self._recorder.take(frame, status)
         if frame is None or frame.number == self._frame_number:
             return
         self._frame_number = frame.number
@@ -163,13 +143,7 @@ class Page:
         if self._readout.content != readout:
             self._readout.content = readout
         self._chart.show(status, self._events)
-        self._motion.show(status, self._events)
-        self._outline.show(status)
-        self._live.panel(status.scene).show(status)
-        self._changes.show(status)
-        self._scene.show(status)
-        self._output.show(status, self._notice)
-        self._restart.panel(status.scene).show(status)
+        self._panels.show(status, self._events, self._notice)
 
     def _show_background(self) -> None:
         if self._study is not None:
