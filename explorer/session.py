@@ -36,6 +36,7 @@ from explorer.live.messages import (
 )
 from explorer.live.process import run
 from explorer.live.slots import SlotReader
+from explorer.scene_source import SceneSource
 from solver.params import ParameterError
 from solver.scene import Scene, body_counts, canonical, parameters, poured_mass, with_values
 
@@ -65,9 +66,12 @@ class Session:
         self._events: deque[Event] = deque(maxlen=EVENTS_KEPT)
         self._generation = 0
         self._speed = 1.0
+        self._source: SceneSource | None = None
 
-    def start(self, scene: Scene, seed: int) -> None:
+    def start(self, scene: Scene, seed: int, source: SceneSource | None = None) -> None:
         """Pour ``scene`` with ``seed``, in a new process if there is none. Returns at once.
+
+        ``source``: what changes of the scene are counted from; None: as before, at first the scene itself.
 
         Raises ParameterError for a scene with more bodies than a frame holds.
         """
@@ -77,6 +81,7 @@ class Session:
             raise ParameterError(
                 f"{path}: {poured_mass(scene):g} kg are {bodies} bodies; the live view holds at most {MAX_BODIES}"
             )
+        self._source = source or self._source or SceneSource((), scene)
         self._generation += 1
         # A process that has failed may live on for a moment, but takes no commands any more.
         failed = self._status is not None and self._status.state == SessionState.FAILED
@@ -178,6 +183,13 @@ class Session:
         self._forget_process()
         if self._status is not None:
             self._status = replace(self._status, state=SessionState.CLOSED, message="", real_time_factor=0.0)
+
+    @property
+    def source(self) -> SceneSource:
+        """Where the scene came from: the default that its changes are counted from."""
+        if self._source is None:
+            raise SessionError("no pour has been started")
+        return self._source
 
     @property
     def process_id(self) -> int | None:

@@ -10,22 +10,15 @@ from pathlib import Path
 
 from explorer.body_text import body_text
 from explorer.errors import CommandError
+from explorer.mesh_solid import MOST_FACES_DRAWN, USUAL_UNIT, mesh_solid
 from explorer.new_file import check_new_file
 from explorer.shape_choice import Fitted, fewest, fits, shown_numbers, standard_limit
 from explorer.shape_table import error_line, heading, mm, solid_line
 from explorer.whole_file import write_whole
 from solver.clump import MOST_SPHERES
-from solver.mesh_file import LENGTH_UNITS
 from solver.shape import Solid, mass_properties, surface_mesh
 
-LEAST_EXTENT, LARGEST_EXTENT = 2e-4, 0.5
-"""Longest outer dimension of a body [m], the range of a declared one; outside it the unit is probably another."""
-FIXED_UNIT = {".glb": "m"}
-"""Unit of a format that fixes one (glTF 2.0, §3.4: metres). The others leave it open."""
-USUAL_UNIT = "mm"
 USUAL_DENSITY = 1000.0
-MOST_FACES_DRAWN = 20_000
-"""A mesh of more faces is not drawn on the page: 80 bodies of it are more than a browser turns smoothly."""
 NAME = re.compile(r"[^\s.\"\\]+")
 
 Echo = Callable[[str], None]
@@ -53,7 +46,7 @@ def run_shape(order: ShapeOrder, echo: Echo) -> None:
     limit that no number reaches.
     """
     _check(order)
-    solid = _solid(order)
+    solid = mesh_solid(order.file, order.unit, unit_input="--unit")
     density = USUAL_DENSITY if order.density is None else order.density
     true = mass_properties(solid, density)
     faces = len(surface_mesh(solid).faces)
@@ -89,18 +82,6 @@ def _check(order: ShapeOrder) -> None:
         raise CommandError(f"--name {order.name!r}: no blank, dot, quote or backslash is allowed, nor nothing at all")
     if order.out is not None:
         check_new_file(order.out, suffix=".toml")
-
-
-def _solid(order: ShapeOrder) -> Solid:
-    unit = order.unit or FIXED_UNIT.get(order.file.suffix.lower(), USUAL_UNIT)
-    solid = Solid("mesh", file=str(order.file), unit=unit)
-    longest = float(surface_mesh(solid).extents.max())
-    if not LEAST_EXTENT <= longest <= LARGEST_EXTENT:
-        raise CommandError(
-            f"{order.file}: {mm(longest)} mm long with coordinates in {unit}; allowed are {mm(LEAST_EXTENT)} … "
-            f"{mm(LARGEST_EXTENT)} mm: is it in another --unit ({', '.join(LENGTH_UNITS)})?"
-        )
-    return solid
 
 
 def _taken(

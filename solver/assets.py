@@ -3,12 +3,13 @@
 from pathlib import Path
 from typing import Literal, get_args
 
-AssetKind = Literal["materials", "studies", "benchmarks", "meshes", "source_tables"]
+AssetKind = Literal["materials", "studies", "benchmarks", "presets", "meshes", "source_tables"]
 
 _SUFFIX: dict[AssetKind, str] = {
     "materials": ".toml",
     "studies": ".toml",
     "benchmarks": ".toml",
+    "presets": ".toml",
     "meshes": ".stl",
     "source_tables": ".csv",
 }
@@ -18,6 +19,7 @@ _SINGULAR: dict[AssetKind, str] = {
     "materials": "material",
     "studies": "study",
     "benchmarks": "benchmark",
+    "presets": "preset",
     "meshes": "mesh",
     "source_tables": "source table",
 }

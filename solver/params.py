@@ -10,6 +10,7 @@ import dataclasses
 import math
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 UNITS: dict[str, dict[str, float]] = {
@@ -96,6 +97,12 @@ def param(
 
 def declared(kind: Any, prefix: str) -> dict[str, Parameter]:
     """Parameters declared in dataclass ``kind``: path ``prefix.field`` → :class:`Parameter`."""
+    return dict(_declared(kind if isinstance(kind, type) else type(kind), prefix))
+
+
+@lru_cache(maxsize=10_000)
+def _declared(kind: Any, prefix: str) -> dict[str, Parameter]:
+    # Asked for with every value that is looked up, and the same for the life of the program.
     found = {}
     for field in dataclasses.fields(kind):
         if "parameter" in field.metadata:

@@ -164,7 +164,16 @@ def canonical(scene: Scene, path: str) -> str:
 
 def value(scene: Scene, path: str) -> Any:
     """Value of a parameter in SI (or the name of a choice)."""
-    kind, *rest = canonical(scene, path).split(".")
+    return _value(scene, canonical(scene, path))
+
+
+def values(scene: Scene) -> dict[str, Any]:
+    """Values of all parameters in SI (or the names of choices), by path."""
+    return {path: _value(scene, path) for path in parameters(scene)}
+
+
+def _value(scene: Scene, path: str) -> Any:
+    kind, *rest = path.split(".")
     if kind == "material":
         return getattr(scene.material(rest[0]), rest[1])
     if kind == "pair":

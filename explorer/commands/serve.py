@@ -25,11 +25,10 @@ def serve(
     from explorer.scene_file import (
         DEFAULT_MATERIAL,
         DEFAULT_STUDY,
-        material_scene,
         study_path,
-        study_scene,
         with_settings,
     )
+    from explorer.scene_source import material_source, study_source
     from explorer.viewer.app import replay as replay_page
     from explorer.viewer.app import serve as serve_page
 
@@ -41,5 +40,6 @@ def serve(
     if study and material:
         raise CommandError(f"--material {material}: the study {study} has a material of its own; name one of the two")
     file = None if material else study_path(study or DEFAULT_STUDY)
-    scene = with_settings(study_scene(file) if file else material_scene(material or DEFAULT_MATERIAL), set_)
-    serve_page(scene, host=host, port=port, seed=seed, study_file=file, store=store, record_path=record)
+    source = study_source(file) if file else material_source(material or DEFAULT_MATERIAL)
+    scene = with_settings(source.scene, set_)
+    serve_page(scene, host=host, port=port, seed=seed, study_file=file, store=store, record_path=record, source=source)

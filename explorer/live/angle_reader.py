@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
+from solver.observables.outline import Outline
 from solver.observables.pile import angle_of_repose, angle_of_repose_left, angle_of_repose_right
 from solver.observables.reading import PileReading
 from solver.observables.value import Value
@@ -30,6 +31,8 @@ class AngleReader:
     def __init__(self) -> None:
         self.observables: Mapping[str, Value] = {}
         """The angles that were read last, by name; empty before there was a pile."""
+        self.outline: Outline | None = None
+        """The view that the left and the right angle were read from, with the lines of its flanks."""
         self._read_at = -math.inf
         self._wall_due = self._wall_earliest = -math.inf
 
@@ -44,6 +47,7 @@ class AngleReader:
         if share_below >= LEAST_SHARE_BELOW:
             reading = PileReading(pile)
             self.observables = {name: angle(reading) for name, angle in ANGLES.items()}
+            self.outline = reading.front if reading.is_pile else None
         now = clock()
         self._read_at, self._wall_due = time, now + WALL_INTERVAL
         self._wall_earliest = now + (now - before) / WALL_SHARE

@@ -155,6 +155,7 @@ class LivePour:
             gate_shut=pour.gate_shut,
             energy_put_in=pour.energy_put_in if self._retuned else None,
             observables=self._angles.observables,
+            outline=self._angles.outline,
         )
 
     def _begin(self, start: Start) -> None:
@@ -223,7 +224,7 @@ class LivePour:
             self._event(f"refused: {error}")
             return
         for line in changes(self._scene, changed):
-            self._event(line)
+            self._report(Event(self._generation, self._pour.time, line, is_change=True))
         if changed == self._scene:
             return
         if kernel_effects(changed) and not self._batch.capacity.effects:

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from solver.observables.outline import Outline
 from solver.observables.value import Value
 from solver.record import Outcome, Phase
 from solver.scene import Scene
@@ -138,6 +139,8 @@ class Status:
     """Elastic energy that the last change of parameters put into the contacts [J]; None before the first change."""
     observables: Mapping[str, Value] = field(default_factory=dict)
     """Angles of the pile as it is now, renewed about every 0.1 s of simulated time; empty until there is a pile."""
+    outline: Outline | None = None
+    """Silhouette of the first view with the lines that the left and the right angle are those of, read with them."""
 
 
 @dataclass(frozen=True)
@@ -147,6 +150,8 @@ class Event:
     generation: int
     time: float
     text: str
+    is_change: bool = False
+    """Whether it is a parameter that was changed, ``text`` then being ``path: old → new``."""
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,7 @@
 """From callbacks to the page's loop.
 
 viser calls back on many threads. A callback only leaves an action here; the one thread that owns session and
-page carries it out, and shows the one line of whatever was refused.
+page carries it out, and shows the one line of whatever was refused, by us or by the machine.
 """
 
 from __future__ import annotations
@@ -36,3 +36,5 @@ class Actions:
                 notice = notice or ""
             except ValueError as error:
                 notice = str(error)
+            except OSError as error:  # a full disk, a folder that may not be written to
+                notice = f"{error.filename or 'file'}: {error.strerror or error}"

@@ -8,19 +8,16 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING
-
-from platformdirs import user_data_path
 
 from explorer.diagnosis_process import DiagnoseProcess
+from explorer.scene_source import SceneSource
 from explorer.session import Session
 from explorer.study_process import CalibrationProcess
+from explorer.user_data import data_folder
 from explorer.viewer.guarded_server import address, guarded_server
 from explorer.viewer.page import Page
+from explorer.viewer.recording_switch import session_recorder
 from solver.scene import Scene
-
-if TYPE_CHECKING:
-    from explorer.logs.session_recorder import SessionRecorder
 
 LABEL = "Granular material explorer"
 
@@ -39,6 +36,7 @@ def serve(
     study_file: Path | None = None,
     store: Path | None = None,
     record_path: Path | None = None,
+    source: SceneSource | None = None,
     ready: Callable[[str], None] = print_address,
 ) -> None:
     """Serve the page of a live pour of ``scene``; blocks until SIGINT or SIGTERM (main thread only).
@@ -51,7 +49,9 @@ def serve(
         study_file: the study that the page can run, None for a page without.
         store: file of the runs of study and diagnosis; None for the default store.
         record_path: new file (``.rrd``) that the session is recorded into; a restart begins another beside
-        it. ready: called with the address once the page can be opened.
+            it.
+        source: where ``scene`` came from, for the command line that repeats it.
+        ready: called with the address once the page can be opened.
 
     Raises:
         PortError: the port is busy or the host is not of this machine.
@@ -60,7 +60,7 @@ def serve(
     """
     with stopped_by_signals() as stop, ExitStack() as ending:
         # Ended in reverse order, with the signals still caught: a second one must not leave processes behind.
-        recorder = ending.enter_context(closing(_recorder(record_path))) if record_path else None
+        recorder = ending.enter_context(closing(session_recorder(record_path))) if record_path else None
         server = guarded_server(host, port, LABEL)
         ending.callback(server.stop)
         study = _study(study_file, store)
@@ -69,7 +69,7 @@ def serve(
         diagnosis = DiagnoseProcess(diagnoses_folder(), store)
         ending.callback(diagnosis.close)
         session = ending.enter_context(closing(Session()))
-        session.start(scene, seed)
+        session.start(scene, seed, source)
         name = study_file.stem if study_file else ""
         page = ending.enter_context(closing(Page(server, session, study, name, diagnosis, recorder)))
         ready(f"http://{address(host)}:{server.get_port()}")
@@ -98,25 +98,18 @@ def replay(
         page.run(stop)
 
 
-def _recorder(path: Path) -> SessionRecorder:
-    # Imported here: rerun takes a second to load, and most sessions are not recorded.
-    from explorer.logs.session_recorder import SessionRecorder
-
-    return SessionRecorder(path)
-
-
 def _study(file: Path | None, store: Path | None) -> CalibrationProcess | None:
     return None if file is None else CalibrationProcess(file, studies_folder(), store)
 
 
 def studies_folder() -> Path:
     """Where studies that the page starts put their results."""
-    return user_data_path("repose-explorer") / "studies"
+    return data_folder() / "studies"
 
 
 def diagnoses_folder() -> Path:
     """Where diagnoses that the page starts put their results."""
-    return user_data_path("repose-explorer") / "diagnoses"
+    return data_folder() / "diagnoses"
 
 
 @contextmanager

@@ -1,9 +1,10 @@
-"""Angle of repose and discharged mass over simulated time, as they come in."""
+"""Angle of repose with its spread over the flanks, and discharged mass, over simulated time, as they come in."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import time
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,9 @@ import numpy.typing as npt
 import viser
 import viser.uplot
 
-from explorer.live.messages import Status
-from explorer.viewer.palette import ANGLE_LINE, AXIS_TEXT, GRID_LINE, MASS_LINE
+from explorer.live.messages import Event, Status
+from explorer.viewer.marks import NO_MARKS, Marks, with_marks
+from explorer.viewer.palette import ANGLE_LINE, ANGLE_SPREAD_LINE, AXIS_TEXT, GRID_LINE, MARK_LINE, MASS_LINE
 from explorer.viewer.readout import angle_of_repose_deg
 from solver.observables.value import Value
 
@@ -54,7 +56,7 @@ class History:
 
     def __init__(self) -> None:
         self._generation, self._time = 0, 0.0
-        self._angle, self._mass = Curve(), Curve()
+        self._angle, self._spread, self._mass = Curve(), Curve(), Curve()
         self._observed: Mapping[str, Value] = {}
 
     def add(self, status: Status) -> bool:
@@ -62,19 +64,21 @@ class History:
         fresh = status.generation != self._generation
         if fresh:
             self._generation, self._observed = status.generation, {}
-            self._angle, self._mass = Curve(), Curve()
+            self._angle, self._spread, self._mass = Curve(), Curve(), Curve()
         back = not fresh and status.time < self._time
         self._time = status.time
         if back:
             # What the status tells of the angle was read before, and is on the curve already.
             self._observed = status.observables
             self._angle.cut(status.time)
+            self._spread.cut(status.time)
             self._mass.cut(status.time)
         angle_deg = angle_of_repose_deg(status)
         # What was not read anew is no point: the chart would draw steps.
         if status.observables != self._observed and math.isfinite(angle_deg):
             self._observed = status.observables
             self._angle.add(status.time, angle_deg)
+            self._spread.add(status.time, status.observables["angle_of_repose_deg"].spread or 0.0)
         return self._mass.add(status.time, 1e3 * status.discharged_mass) or fresh or back
 
     def columns(self) -> tuple[Array, Array, Array]:
@@ -90,35 +94,39 @@ class History:
         inside = np.interp(time, angle_time, angle, math.nan, math.nan) if len(angle_time) else time * math.nan
         return time, inside, np.interp(time, mass_time, mass)
 
+    def drawn(self, marks: Sequence[float]) -> tuple[Array, ...]:
+        """Time [s], angle ∓ spread and angle [°], mass [g], and 1 at the ``marks`` [s]; shape (n,) each."""
+        moments, angle, mass = self.columns()
+        spread_time, spread = self._spread.columns()
+        around = np.interp(moments, spread_time, spread) if len(spread_time) else np.zeros_like(moments)
+        return with_marks((moments, np.maximum(angle - around, 0.0), angle + around, angle, mass), marks)
+
 
 class Chart:
     """The chart on the page."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._history, self._top_deg = History(), LEAST_TOP_DEG
+        self._marks = Marks()
         self._plot = server.gui.add_uplot(
-            self._history.columns(),
-            (
-                viser.uplot.Series(label="time [s]"),
-                viser.uplot.Series(
-                    label="angle [°]", stroke=ANGLE_LINE, width=2, points={"show": False}, scale="angle"
-                ),
-                viser.uplot.Series(
-                    label="mass below [g]", stroke=MASS_LINE, width=2, points={"show": False}, scale="mass"
-                ),
-            ),
+            self._history.drawn(()),
+            _series(NO_MARKS),
             scales=_scales(LEAST_TOP_DEG),
-            axes=(_axis("x", 2), _axis("angle", 3, "angle [°]"), _axis("mass", 1, "mass below [g]")),
+            axes=(axis("x", 2), axis("angle", 3, "angle [°]"), axis("mass", 1, "mass below [g]")),
             aspect=2.5,
             padding=(12, 8, 0, 0),
         )
 
-    def show(self, status: Status) -> None:
-        """Draw what is new; call it inside ``server.atomic()``."""
-        if self._history.add(status):
-            columns = self._history.columns()
+    def show(self, status: Status, events: Sequence[Event] = ()) -> None:
+        """Draw what is new, and mark the changes among ``events``; call it inside ``server.atomic()``."""
+        marked = self._marks.take(events, status.generation)
+        if self._history.add(status) or marked:
+            columns = self._history.drawn(self._marks.times)
             self._plot.data = columns
-            self._reach(columns[1])
+            self._reach(columns[2])
+        label = self._marks.new_label(events, status.generation, time.monotonic())
+        if label is not None:
+            self._plot.series = _series(label)
 
     def _reach(self, angle_deg: Array) -> None:
         """Let the axis reach the greatest angle."""
@@ -128,13 +136,33 @@ class Chart:
             self._plot.scales = _scales(top)
 
 
+def _series(mark: str) -> tuple[viser.uplot.Series, ...]:
+    return (
+        viser.uplot.Series(label="time [s]"),
+        line("− spread over flanks", ANGLE_SPREAD_LINE, "angle", width=1),
+        line("+ spread", ANGLE_SPREAD_LINE, "angle", width=1),
+        line("angle [°]", ANGLE_LINE, "angle"),
+        line("mass below [g]", MASS_LINE, "mass"),
+        line(mark, MARK_LINE, "mark", width=1),
+    )
+
+
+def line(label: str, colour: str, scale: str, width: float = 2) -> viser.uplot.Series:
+    """A series without points."""
+    return viser.uplot.Series(label=label, stroke=colour, width=width, points={"show": False}, scale=scale)
+
+
 def _scales(top_deg: float) -> dict[str, viser.uplot.Scale]:
     # The range of the angle is set, since uPlot finds none among numbers that include NaN.
-    return {"x": viser.uplot.Scale(time=False), "angle": viser.uplot.Scale(range=(0.0, top_deg))}
+    return {
+        "x": viser.uplot.Scale(time=False),
+        "angle": viser.uplot.Scale(range=(0.0, top_deg)),
+        "mark": viser.uplot.Scale(range=(0.0, 1.0)),
+    }
 
 
-def _axis(scale: str, side: Any, label: str = "") -> viser.uplot.Axis:
+def axis(scale: str, side: Any, label: str = "") -> viser.uplot.Axis:
     """An axis; ``side`` is uPlot's: 1 right, 2 bottom, 3 left."""
     grid = {"show": side != 1, "stroke": GRID_LINE}
-    axis: Any = {"scale": scale, "side": side, "stroke": AXIS_TEXT, "grid": grid, "size": 38}
-    return axis if not label else axis | {"label": label, "labelSize": 18}
+    made: Any = {"scale": scale, "side": side, "stroke": AXIS_TEXT, "grid": grid, "size": 38}
+    return made if not label else made | {"label": label, "labelSize": 18}

@@ -13,6 +13,7 @@ from explorer.screen_units import quantity, title
 from explorer.session import Session
 from explorer.viewer.actions import Post
 from explorer.viewer.live_controls import LiveControl
+from explorer.viewer.pair_matrix import PairMatrix, pair_parameters
 from solver.effects import EFFECTS, SetUpEffect
 from solver.params import Parameter
 from solver.scene import Scene, parameters, value
@@ -30,11 +31,16 @@ class LivePanel:
             _Section(server, session, scene, post, "Material", material_targets(scene)),
             _Section(server, session, scene, post, "Effect", effect_targets()),
         ]
+        self._matrices = [
+            PairMatrix(server.gui, scene, name, post, session.set_parameters) for name in pair_parameters()
+        ]
 
     def show(self, status: Status) -> None:
         """Follow the solver's values; call it inside ``server.atomic()``."""
         for section in self._sections:
             section.show(status.scene)
+        for matrix in self._matrices:
+            matrix.follow(status.scene)
 
 
 class _Section:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
-from typing import Protocol
 
 import viser
 
@@ -18,11 +17,11 @@ from explorer.study_process import StudyProcess
 from explorer.viewer.actions import Actions
 from explorer.viewer.chart import Chart
 from explorer.viewer.diagnosis_panel import DiagnosisPanel
-from explorer.viewer.live_panel import LivePanel
 from explorer.viewer.look_tab import LookTab
 from explorer.viewer.palette import BRAND
+from explorer.viewer.pour_panels import PourPanels
 from explorer.viewer.readout import not_later, readout_html
-from explorer.viewer.restart_panel import RestartPanel
+from explorer.viewer.recording_switch import Recorder
 from explorer.viewer.run_panel import RunPanel
 from explorer.viewer.scene_nodes import SceneNodes
 from explorer.viewer.second_pile import SecondPile
@@ -32,15 +31,7 @@ from explorer.viewer.view import light, look_at_height
 from solver.assets import shipped_measurements
 from solver.scene import Scene
 
-
-class Recorder(Protocol):
-    """Something that keeps what the page shows."""
-
-    def take(self, frame: Frame, status: Status) -> None:
-        """Called about 30 times a second with the newest frame and the newest status."""
-
-
-EVENTS_REMEMBERED = 50
+EVENTS_REMEMBERED = 1000
 
 FRAME_INTERVAL = 1.0 / 30.0
 PANEL_INTERVAL = 0.2
@@ -70,11 +61,9 @@ class Page:
         self._generation = status.generation
         light(server)
         look_at_height(server, scene_height(status.scene))
-        self._build_panels(status, study, study_name, diagnosis)
+        self._build_panels(study, study_name, diagnosis)
 
-    def _build_panels(
-        self, status: Status, study: StudyProcess | None, study_name: str, diagnosis: DiagnosisProcess
-    ) -> None:
+    def _build_panels(self, study: StudyProcess | None, study_name: str, diagnosis: DiagnosisProcess) -> None:
         server, session, post = self._server, self._session, self._actions.post
         server.gui.configure_theme(
             dark_mode=True, show_share_button=False, show_logo=False, brand_color=BRAND, control_width="large"
@@ -87,11 +76,12 @@ class Page:
             RunPanel(server, session, post)
             self._readout = server.gui.add_html("")
             self._chart = Chart(server)
-            self._live = LivePanel(server, session, status.scene, post)
-            self._restart = RestartPanel(server, session, status.scene, status.seed, post)
+            self._panels = PourPanels(server, session, post)
             self._second = SecondPile(server, session, post)
         with tabs.add_tab("Look", viser.Icon.EYE):
             self._look = LookTab(server, session, colour_bar, post)
+        with tabs.add_tab("Take along", viser.Icon.DOWNLOAD):
+            self._panels.add_output()
         self._study: StudyPanel | None = None
         if study is not None:
             with tabs.add_tab("Calibrate", viser.Icon.TARGET):
@@ -100,8 +90,9 @@ class Page:
             self._diagnosis = DiagnosisPanel(server, diagnosis, shipped_measurements(), post)
 
     def close(self) -> None:
-        """End what the page itself has started."""
+        """End what the page itself has started: a second pour, and a recording, with its file whole."""
         self._second.close()
+        self._panels.close()
 
     def run(self, stop: threading.Event) -> None:
         """Keep the page up to date until ``stop`` is set."""
@@ -115,6 +106,7 @@ class Page:
             happened = self._session.new_events()
             self._events.extend(happened)
             self._forget_what_comes_later(status)
+            self._panels.take(status, frame)
             with self._server.atomic():
                 self._show_bodies(status, frame)
                 self._second.show_bodies()
@@ -156,9 +148,8 @@ class Page:
         readout = readout_html(status, self._events, self._notice)
         if self._readout.content != readout:
             self._readout.content = readout
-        self._chart.show(status)
-        self._live.show(status)
-        self._restart.show(status)
+        self._chart.show(status, self._events)
+        self._panels.show(status, self._events, self._notice)
         self._second.show(status)
 
     def _show_background(self) -> None:

@@ -42,7 +42,13 @@ CHAINS: tuple[Colour, ...] = ((150, 190, 230), (240, 228, 66), (213, 94, 0))
 SRGB_GAMMA = 2.2
 
 ANGLE_LINE = "rgb(230, 159, 0)"
+ANGLE_SPREAD_LINE = "rgba(230, 159, 0, 0.45)"
 MASS_LINE = "rgb(86, 180, 233)"
+ENERGY_LINE = "rgb(204, 121, 167)"
+CONTACTS_LINE = "rgb(0, 158, 115)"
+MARK_LINE = "rgb(213, 94, 0)"
+FLANK: Colour = (230, 159, 0)
+MEASURED: Colour = (204, 121, 167)
 AXIS_TEXT = "#9aa4ae"
 GRID_LINE = "rgba(160, 170, 180, 0.15)"
 

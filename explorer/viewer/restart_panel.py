@@ -36,6 +36,11 @@ def size_paths(scene: Scene) -> tuple[str, ...]:
     return tuple(f"body.{body.name}.{key}" for body in scene.bodies for key in ("size_distribution", "size_spread"))
 
 
+def rest_paths(scene: Scene) -> tuple[str, ...]:
+    """Parameters of the folder of rig and feed: all that are not in the panel itself."""
+    return tuple(path for path in parameters(scene) if path.split(".")[0] in ("rig", "insertion") and path not in PATHS)
+
+
 def effect_paths() -> tuple[str, ...]:
     """Parameters of the folder of effects of material and set-up."""
     return tuple(path for kind in SET_UP_EFFECTS for path in declared(kind, f"effect.{kind.name}"))
@@ -48,9 +53,11 @@ class RestartPanel:
         self._session, self._generation = session, session.status().generation
         known = parameters(scene)
         set_up = [path for path in PATHS if path in known]
-        self._shown = {path: known[path] for path in (*set_up, *size_paths(scene), *effect_paths())}
+        self._shown = {path: known[path] for path in (*set_up, *rest_paths(scene), *size_paths(scene), *effect_paths())}
         with server.gui.add_folder("Set-up (on restart)"):
             self._inputs = {path: _input(server.gui, known[path], scene) for path in set_up}
+            with server.gui.add_folder("More of rig and feed", expand_by_default=False):
+                self._inputs |= {path: _input(server.gui, known[path], scene) for path in rest_paths(scene)}
             with server.gui.add_folder("Sizes of the bodies", expand_by_default=False):
                 self._inputs |= {path: _input(server.gui, known[path], scene) for path in size_paths(scene)}
             with server.gui.add_folder("Effects of material and set-up", expand_by_default=False):

@@ -10,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from solver.observables import footprint
+from solver.observables.outline import Outline, outline_of
 from solver.observables.repose import AZIMUTHS_DEG, flank_angles_deg
-from solver.observables.silhouette import PIXEL, Image, largest_part, silhouette
+from solver.observables.silhouette import PIXEL, Image, largest_part, left_edge, silhouette
 from solver.observables.surface import HeightMap, height_map
 
 if TYPE_CHECKING:
@@ -38,6 +39,12 @@ class PileReading:
     def silhouettes(self) -> tuple[Image, ...]:
         """Largest part of the silhouette from each of ``AZIMUTHS_DEG``."""
         return tuple(largest_part(silhouette(self.pile.spheres, azimuth)) for azimuth in AZIMUTHS_DEG)
+
+    @cached_property
+    def front(self) -> Outline:
+        """Outline and flank lines of the first view, along +y: what the left and the right angle are read from."""
+        azimuth = AZIMUTHS_DEG[0]
+        return outline_of(self.silhouettes[0], left_edge(self.pile.spheres, azimuth), azimuth)
 
     @cached_property
     def flanks_deg(self) -> Array:

@@ -11,6 +11,9 @@ height).
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+
 import numpy as np
 import numpy.typing as npt
 
@@ -23,32 +26,60 @@ FLOOR = 0.20
 CEILING = 0.80
 
 
-def flank_angles_deg(image: Image, pixel: float, lowest: float = 0.0) -> tuple[float, float]:
-    """Angles of the left and the right flank of a silhouette [°]; NaN for a flank that cannot be fitted.
+@dataclass(frozen=True)
+class FlankLine:
+    """The line of one flank, from the innermost to the outermost column of its window."""
+
+    u: tuple[float, float]
+    """Middles of these two columns, from the left edge of the image [m]."""
+    z: tuple[float, float]
+    """Heights of the line there [m]."""
+    slope: float
+    """Drop per length outward."""
+
+    @property
+    def angle_deg(self) -> float:
+        """Angle of the flank [°]."""
+        return float(np.degrees(np.arctan(self.slope)))
+
+
+def flank_lines(image: Image, pixel: float, lowest: float = 0.0) -> tuple[FlankLine | None, FlankLine | None]:
+    """The lines of the left and the right flank of a silhouette; None for a flank that cannot be fitted.
 
     ``image``: the pile alone (see :func:`~solver.observables.silhouette.largest_part`), row 0 on the plate;
     ``pixel`` [m]; ``lowest`` [m] raises the floor of the window to max(20 % of the height, ``lowest``), so
     that a skirt one body thick stays out of the fit.
     """
     tops = (column_tops(image) * pixel).astype(np.float64)
-    return _right_flank_deg(tops[::-1], pixel, lowest), _right_flank_deg(tops, pixel, lowest)
+    mirrored, right = _right_flank(tops[::-1], pixel, lowest), _right_flank(tops, pixel, lowest)
+    width = tops.size * pixel
+    left = mirrored and FlankLine((width - mirrored.u[0], width - mirrored.u[1]), mirrored.z, mirrored.slope)
+    return left, right
 
 
-def _right_flank_deg(tops: Array, pixel: float, lowest: float) -> float:
-    """Angle of the flank on the right of an outline ``tops`` [m], shape (columns,)."""
+def flank_angles_deg(image: Image, pixel: float, lowest: float = 0.0) -> tuple[float, float]:
+    """Angles of :func:`flank_lines` [°]; NaN for a flank that cannot be fitted."""
+    left, right = (math.nan if line is None else line.angle_deg for line in flank_lines(image, pixel, lowest))
+    return left, right
+
+
+def _right_flank(tops: Array, pixel: float, lowest: float) -> FlankLine | None:
+    """The line of the flank on the right of an outline ``tops`` [m], shape (columns,)."""
     if tops.size == 0:
-        return float("nan")
+        return None
     height = tops.max()
     # Tops are whole pixels: a billionth of the height keeps rounding from deciding whether a column is in.
     slack = 1e-9 * height
     floor, ceiling = max(FLOOR * height, lowest) - slack, CEILING * height - slack
     if not floor < ceiling:
-        return float("nan")
+        return None
     outer = int(np.flatnonzero(tops >= floor)[-1])
     inner = int(np.flatnonzero(tops >= ceiling)[-1])
     if outer - inner < 2:  # fewer than three columns: no line
-        return float("nan")
+        return None
     z = tops[inner : outer + 1]
     x = pixel * np.arange(z.size)
     x -= x.mean()
-    return float(np.degrees(np.arctan(-(x @ z) / (x @ x))))
+    slope = float(-(x @ z) / (x @ x))
+    ends = tuple(float(z.mean() - slope * end) for end in (x[0], x[-1]))
+    return FlankLine(((inner + 0.5) * pixel, (outer + 0.5) * pixel), (ends[0], ends[1]), slope)

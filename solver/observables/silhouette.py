@@ -34,11 +34,10 @@ def silhouette(spheres: Spheres, azimuth_deg: float, pixel: float = PIXEL) -> Im
     """
     if spheres.radius.size == 0:
         return np.zeros((0, 0), dtype=bool)
-    angle = np.radians(azimuth_deg)
-    u = (spheres.centre[:, 0] * np.cos(angle) + spheres.centre[:, 1] * np.sin(angle)) / pixel
+    u = _across(spheres, azimuth_deg) / pixel
     z = spheres.centre[:, 2] / pixel
     radius = spheres.radius / pixel
-    u -= np.floor((u - radius).min())
+    u -= _left_column(u, radius)
 
     columns = int(np.ceil((u + radius).max()))
     rows = max(int(np.ceil((z + radius).max())), 1)
@@ -55,6 +54,25 @@ def silhouette(spheres: Spheres, azimuth_deg: float, pixel: float = PIXEL) -> Im
     edges = np.bincount(strip + first, minlength=size) - np.bincount(strip + past, minlength=size)
     covered: Image = np.cumsum(edges.reshape(columns, rows + 1), axis=1)[:, :rows] > 0
     return covered.T
+
+
+def left_edge(spheres: Spheres, azimuth_deg: float, pixel: float = PIXEL) -> float:
+    """Where on its horizontal axis u the left edge of :func:`silhouette` is [m]; 0 without spheres."""
+    if spheres.radius.size == 0:
+        return 0.0
+    return pixel * float(_left_column(_across(spheres, azimuth_deg) / pixel, spheres.radius / pixel))
+
+
+def _across(spheres: Spheres, azimuth_deg: float) -> Array:
+    """u of the spheres' centres [m], shape (m,)."""
+    angle = np.radians(azimuth_deg)
+    across: Array = spheres.centre[:, 0] * np.cos(angle) + spheres.centre[:, 1] * np.sin(angle)
+    return across
+
+
+def _left_column(u: Array, radius: Array) -> float:
+    """Left edge of the image of spheres at ``u`` with ``radius``, all in pixels."""
+    return float(np.floor((u - radius).min()))
 
 
 def largest_part(image: Image) -> Image:

@@ -78,8 +78,9 @@ def test_a_slider_reaches_the_pour_and_is_told_old_and_new(session):
     session.set_parameters({FRICTION: 0.05, SHEAR_MODULUS: "20MPa"})
     status = wait_for(lambda: value(session.status().scene, FRICTION) == 0.05 and session.status())
     assert value(status.scene, SHEAR_MODULUS) == 20e6
-    texts = [event.text for event in session.new_events()]
-    assert texts == [f"{SHEAR_MODULUS}: 10 MPa → 20 MPa", f"{FRICTION}: 0.3 → 0.05"]
+    events = session.new_events()
+    assert [event.text for event in events] == [f"{SHEAR_MODULUS}: 10 MPa → 20 MPa", f"{FRICTION}: 0.3 → 0.05"]
+    assert all(event.is_change for event in events)
 
 
 def test_a_stiffer_material_takes_shorter_steps(session):

@@ -12,7 +12,8 @@ from explorer.viewer.live_controls import LiveControl, decade_mark, decades_arou
 from explorer.viewer.live_panel import echo_html, effect_targets, live_parameters, material_targets, pair_targets
 from explorer.viewer.restart_panel import PATHS, RestartPanel, entered, size_paths
 from solver import load_material, parameters, with_values
-from solver.scene import value
+from solver.rigs import RIGS
+from solver.scene import value, with_rig
 from solver.sizes import SizeDistribution
 
 SCENE = load_material("sunflower_extract")
@@ -26,13 +27,13 @@ def server():
     server.stop()
 
 
-def event(handle, number, client_id=0):
+def event(handle, number, client_id=0, client=None):
     """What viser hands to a callback when a browser has sent ``number``."""
 
     class Event:
         target = type("Handle", (), {"value": number})
 
-    Event.client_id = client_id
+    Event.client_id, Event.client = client_id, client
     for callback in handle._impl.update_cb:
         callback(Event)
 
@@ -107,6 +108,19 @@ def test_sizes_of_every_component_are_in_the_set_up(server):
     other = with_values(SCENE, {"body.spheres": 12})
     panel.show(Status(SessionState.RUNNING, "", other, seed=1, generation=2, speed=1.0))
     assert panel._inputs["body.spheres"].value == "12"
+
+
+@pytest.mark.parametrize("rig", RIGS)
+def test_all_of_rig_and_feed_is_in_the_set_up(server, rig):
+    scene, started = with_rig(SCENE, rig), []
+    first = Status(SessionState.RUNNING, "", scene, seed=1, generation=1, speed=1.0)
+    session = type("Session", (), {"status": lambda _: first, "restart": lambda _, made, seed: started.append(made)})()
+    panel = RestartPanel(server, session, scene, 1, lambda action: action())
+    declared = {path for path in parameters(scene) if path.startswith(("rig.", "insertion."))}
+    assert declared <= set(panel._inputs)
+    # What nobody touched stays as it is, to the last bit.
+    panel._restart()
+    assert started == [scene]
 
 
 def test_settings_of_the_next_pour_are_clamped_and_choices_checked():
@@ -210,6 +224,12 @@ def test_actions_run_in_order_and_a_refusal_becomes_the_notice():
     assert done == [1, 2]
     actions.post(lambda: done.append(3))
     assert actions.carry_out() == ""
+
+
+def test_a_file_that_cannot_be_written_is_told_too(tmp_path):
+    actions = Actions()
+    actions.post(lambda: (tmp_path / "none" / "file").write_text(""))
+    assert actions.carry_out() == f"{tmp_path / 'none' / 'file'}: No such file or directory"
 
 
 def test_a_mistake_in_the_program_is_not_taken_for_bad_input():

@@ -1,0 +1,93 @@
+"""One measured file as a curve in the picture of a pile: a scan (.npz) or the points of an outline (.csv).
+
+.npz   xyz (n, 3) [m], radius (n,) [m]: spheres of the bodies on the plate, as in a measured data set
+.csv   a line u_m,z_m, then one point per line: to the right and above the plate [m]; # starts a comment
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from explorer.errors import CommandError
+from explorer.measured_curves import MeasuredCurve
+from solver.observables.outline import outline
+from solver.observables.repose import AZIMUTHS_DEG
+from solver.record import Spheres
+
+Array = npt.NDArray[np.float64]
+
+SUFFIXES = (".npz", ".csv")
+MOST_BYTES = 50_000_000
+MOST_SPHERES, MOST_POINTS = 1_000_000, 100_000
+FARTHEST = 2.0
+"""No coordinate of a pile is further from the axis than this [m]: the image of a silhouette has pixels of 0.25 mm."""
+COLUMNS = ["u_m", "z_m"]
+
+
+def measured_file(name: str, content: bytes) -> MeasuredCurve:
+    """The curve in the file ``content`` that is called ``name``; CommandError in one line for a bad file."""
+    if not 0 < len(content) <= MOST_BYTES:
+        raise CommandError(f"{name[:80]}: {len(content)} bytes; allowed: up to {MOST_BYTES}")
+    readers = {".npz": _scan, ".csv": _points}
+    read = readers.get(Path(name).suffix.lower())
+    if read is None:
+        raise CommandError(f"{name[:80]}: allowed are files ending in {', '.join(SUFFIXES)}")
+    try:
+        return read(name[:80], content)
+    except CommandError as error:
+        raise CommandError(f"{name[:80]}: {error}") from None
+
+
+def _scan(name: str, content: bytes) -> MeasuredCurve:
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            size = sum(member.file_size for member in archive.infolist())
+        if size > MOST_BYTES:
+            raise CommandError(f"{size} bytes unpacked; allowed: up to {MOST_BYTES}")
+        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+            centre, radius = (np.asarray(arrays[key], dtype=np.float64) for key in ("xyz", "radius"))
+    except KeyError:
+        raise CommandError("allowed are the arrays xyz and radius; one of them is missing") from None
+    except (OSError, EOFError, zipfile.BadZipFile, NotImplementedError) as error:
+        raise CommandError(f"cannot be read as .npz: {' '.join(str(error).split())[:120]}") from None
+    except ValueError as error:
+        if isinstance(error, CommandError):
+            raise
+        raise CommandError("cannot be read as plain arrays of numbers") from None
+    if radius.ndim != 1 or centre.shape != (len(radius), 3) or not 1 <= len(radius) <= MOST_SPHERES:
+        raise CommandError(f"xyz and radius have shapes {centre.shape} and {radius.shape}; allowed: (n, 3) and (n,)")
+    _check_places(centre, "xyz")
+    _check_places(radius, "radius")
+    if (radius <= 0.0).any():
+        raise CommandError("radius: one is not positive")
+    seen = outline(Spheres(centre, radius, np.zeros(len(radius), dtype=np.int32)), AZIMUTHS_DEG[0])
+    return MeasuredCurve(name, seen.u, seen.top, seen.flanks)
+
+
+def _points(name: str, content: bytes) -> MeasuredCurve:
+    try:
+        lines = [line for line in content.decode().splitlines() if line.strip() and not line.startswith("#")]
+        head, *rows = csv.reader(lines)
+        points = np.array([[float(entry) for entry in row] for row in rows])
+    except UnicodeDecodeError:
+        raise CommandError("not a text file in UTF-8") from None
+    except (ValueError, csv.Error) as error:
+        raise CommandError(f"allowed are a line u_m,z_m and numbers below it: {str(error)[:120]}") from None
+    if [entry.strip() for entry in head] != COLUMNS or points.ndim != 2 or points.shape[1] != 2:
+        raise CommandError(f"allowed is a line u_m,z_m and two numbers per line below it, not {','.join(head)[:40]!r}")
+    if not 2 <= len(points) <= MOST_POINTS:
+        raise CommandError(f"{len(points)} points; allowed: 2 … {MOST_POINTS}")
+    _check_places(points, "u_m, z_m")
+    ordered = points[np.argsort(points[:, 0], kind="stable")]
+    return MeasuredCurve(name, ordered[:, 0], ordered[:, 1])
+
+
+def _check_places(numbers: Array, what: str) -> None:
+    if not (np.abs(numbers) <= FARTHEST).all():  # neither does NaN pass
+        raise CommandError(f"{what}: a number is not finite or beyond {FARTHEST:g} m")

@@ -1,0 +1,120 @@
+"""Named sets of parameter values: shipped ones, and those that a user has saved.
+
+A preset is a TOML file:
+
+    format = 1
+    title = "Frictionless"
+    about = "What it is for, in a sentence."
+    [values]
+    "pair.*.*.static_friction" = 0.0        # * stands for any one name; values in SI or with a unit
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from explorer.errors import CommandError
+from explorer.scene_changes import Difference
+from explorer.whole_file import write_whole
+from solver.assets import asset_path, shipped_assets
+from solver.params import ParameterError
+from solver.scene import Scene, canonical, parameters
+from solver.toml_table import as_table, read_toml, refuse_unknown, table_at
+
+KEYS = ("format", "title", "about", "values")
+NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _-]{0,39}")
+OWN_MARK = " (own)"
+"""Behind the name of a user's preset in a list."""
+MOST_BYTES = 100_000
+
+
+@dataclass(frozen=True)
+class Preset:
+    """Values by path; ``*`` in a path stands for any one name."""
+
+    title: str
+    about: str
+    values: Mapping[str, Any]
+
+
+def preset_names(folder: Path) -> tuple[str, ...]:
+    """What can be chosen: the shipped presets, then those in ``folder``, marked as the user's own."""
+    own = sorted(path.stem for path in folder.glob("*.toml")) if folder.is_dir() else []
+    return (*shipped_assets("presets"), *(f"{name}{OWN_MARK}" for name in own))
+
+
+def preset_path(name: str, folder: Path) -> Path:
+    """The file of one of :func:`preset_names`; CommandError for a name that is not among them."""
+    if name not in preset_names(folder):
+        raise CommandError(f"preset {name[:60]!r}: there is none of that name")
+    own = name.removesuffix(OWN_MARK)
+    return asset_path("presets", name) if own == name else folder / f"{own}.toml"
+
+
+def read_preset(path: Path) -> Preset:
+    """The preset in ``path``; ParameterError in one line naming file, key and what is allowed."""
+    if path.is_file() and path.stat().st_size > MOST_BYTES:
+        raise ParameterError(f"{path}: {path.stat().st_size} bytes; allowed: up to {MOST_BYTES}")
+    table = read_toml(path)
+    try:
+        refuse_unknown(table, KEYS, "")
+        if table.get("format") != 1:
+            raise ParameterError(f"format: {table.get('format')!r} is not 1")
+        return Preset(str(table.get("title", path.stem)), str(table.get("about", "")), _flat(table_at(table, "values")))
+    except ParameterError as error:
+        raise ParameterError(f"{path}: {error}") from None
+
+
+def preset_values(preset: Preset, scene: Scene) -> dict[str, float | str]:
+    """Values for ``scene`` by path, each checked; later lines of the file count over earlier ones.
+
+    Raises ParameterError for a path that the scene does not have and for a value that is not allowed.
+    """
+    found: dict[str, float | str] = {}
+    known = parameters(scene)
+    for pattern, raw in preset.values.items():
+        paths = _matching(pattern, known) if "*" in pattern else [canonical(scene, pattern)]
+        if not paths:
+            raise ParameterError(f"{preset.title}: {pattern}: no parameter of this scene is called so")
+        found |= {path: known[path].check(raw) for path in paths}
+    return found
+
+
+def save_preset(name: str, folder: Path, changed: Iterable[Difference]) -> Path:
+    """Write what differs from the default as the preset ``name``; one of that name is replaced.
+
+    Raises CommandError for a name that is not allowed, and where nothing differs.
+    """
+    if not NAME.fullmatch(name):
+        raise CommandError(f"preset {name[:60]!r}: up to 40 letters, digits, blanks, - and _ are allowed")
+    rows = [f"{json.dumps(one.path)} = {_toml(one.now)}" for one in changed]
+    if not rows:
+        raise CommandError("preset: nothing differs from the default, there is nothing to save")
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{name}.toml"
+    heading = f'# Preset; values in SI.\nformat = 1\ntitle = {json.dumps(name)}\nabout = "saved from the page"\n'
+    write_whole(path, "\n".join((heading, "[values]", *rows, "")))
+    return path
+
+
+def _flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Entries by path, whether a path is one quoted key or tables within tables."""
+    found: dict[str, Any] = {}
+    for key, entry in as_table(table, prefix or "values").items():
+        path = f"{prefix}{key}"
+        found |= _flat(entry, f"{path}.") if isinstance(entry, dict) else {path: entry}
+    return found
+
+
+def _matching(pattern: str, paths: Iterable[str]) -> list[str]:
+    form = re.compile(re.escape(pattern).replace(r"\*", r"[^.]+"))
+    return [path for path in paths if form.fullmatch(path)]
+
+
+def _toml(value: float | str) -> str:
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(float(value))

@@ -1,0 +1,116 @@
+"""Where a scene came from, and the command line that repeats what it has become since."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from explorer.errors import CommandError
+from explorer.scene_changes import Difference, differences
+from explorer.scene_file import load_scene, material_scene, study_scene
+from explorer.screen_units import SCREEN_UNIT
+from solver.params import UNITS, ParameterError, parse_quantity
+from solver.scene import Scene, with_rig
+from solver.set_up import with_settings
+from solver.toml_table import read_toml
+
+PROGRAM = ("explorer", "simulate")
+
+
+@dataclass(frozen=True)
+class SceneSource:
+    """What ``explorer simulate`` is told to load a scene."""
+
+    arguments: tuple[str, ...]
+    """Before any setting; empty: the scene came from no file."""
+    scene: Scene
+    """As loaded: the default that changes are counted from."""
+    material: str = ""
+    """Its material, by shipped name or path; empty where nothing named one."""
+
+
+def rig_source(rig: str, material: str) -> SceneSource:
+    """The source "``material`` in ``rig``"; raises as :func:`explorer.scene_file.load_scene`."""
+    named = _named(material)
+    return SceneSource((rig, "--material", named), load_scene(rig, named), named)
+
+
+def material_source(material: str) -> SceneSource:
+    """The source of a material in the rig of its own file; raises as :func:`explorer.scene_file.material_scene`."""
+    named = _named(material)
+    return SceneSource((named,), material_scene(named), named)
+
+
+def study_source(file: Path) -> SceneSource:
+    """The source of a study: its shipped name where that says the same, otherwise its path."""
+    scene = study_scene(file)
+    material = str(read_toml(file).get("material", ""))
+    # As the study file sees it: beside itself, before what is shipped.
+    material = _named(str(file.parent / material)) if (file.parent / material).is_file() else material
+    for name in (file.stem, str(file.absolute())):
+        try:
+            if load_scene(name) == scene:
+                return SceneSource((name,), scene, material)
+        except ValueError:  # the short name is taken by nothing, or by a file that is no scene
+            continue
+    return SceneSource((), scene, material)
+
+
+def _named(material: str) -> str:
+    """A file by its full path, a shipped material by its name."""
+    own = Path(material).expanduser()
+    return str(own.absolute()) if own.is_file() else material.removesuffix(".toml")
+
+
+def command_line(source: SceneSource, scene: Scene, seed: int) -> str:
+    """``explorer simulate …`` that pours ``scene`` with ``seed``, quoted for a shell.
+
+    Raises CommandError where no settings lead from the source to ``scene``, such as other bodies or materials.
+    """
+    words = [*PROGRAM, *source.arguments]
+    for setting in settings(source, scene):
+        words += ["--set", setting]
+    return shlex.join([*words, "--seed", str(seed)])
+
+
+def settings(source: SceneSource, scene: Scene) -> tuple[str, ...]:
+    """Texts ``path=value`` that make the source's scene into exactly ``scene``; CommandError where there are none."""
+    if not source.arguments:
+        raise CommandError("this scene came from no file that a command line could name; save the scene file instead")
+    base = source.scene
+    first: list[str] = []
+    if scene.rig.name != base.rig.name:
+        first, base = [f"rig.name={scene.rig.name}"], with_rig(base, scene.rig.name)
+    found = list(differences(base, scene))
+    for chosen in _selections(found):
+        texts = [*first, *(setting_text(one) for one in chosen)]
+        if _applied(source.scene, texts) == scene:
+            return tuple(texts)
+    raise CommandError("this scene has other bodies, materials or texts than its source; save the scene file instead")
+
+
+def setting_text(change: Difference) -> str:
+    """``path=value``, in the unit of the screen where that gives back every bit, otherwise in SI with all digits."""
+    if isinstance(change.now, str):
+        return f"{change.path}={change.now}"
+    number, unit = float(change.now), SCREEN_UNIT.get(change.unit, "" if change.unit == "1" else change.unit)
+    short = f"{number / UNITS.get(change.unit, {}).get(unit, 1.0):.6g}{unit}"
+    exact = parse_quantity(short, change.unit, change.path) == number
+    return f"{change.path}={short if exact else repr(number)}"
+
+
+def _selections(found: Sequence[Difference]) -> list[list[Difference]]:
+    """All of them; or all but shares of the mass, of which setting one scales the others, with each one of these."""
+    shares = [one for one in found if one.path.endswith(".mass_fraction")]
+    rest = [one for one in found if one not in shares]
+    return [list(found), *([*rest, share] for share in shares)]
+
+
+def _applied(base: Scene, texts: Sequence[str]) -> Scene | None:
+    """``base`` with settings; None where they are not allowed."""
+    try:
+        return with_settings(base, dict(text.split("=", 1) for text in texts))
+    except ParameterError:
+        return None

@@ -1,0 +1,169 @@
+"""Files that a browser sent: checked, kept in a folder under a name of our own, or refused in one line.
+
+A name from a browser is only ever a label; where a file is put is decided here, by its contents.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import io
+import re
+import shutil
+import stat
+import tempfile
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path, PurePosixPath
+
+from doe.measurement.load import FILE as MEASUREMENT_FILE
+from doe.measurement.load import load_measurement
+from explorer.errors import CommandError
+from explorer.mesh_solid import MOST_FACES_DRAWN, mesh_solid
+from explorer.scene_source import SceneSource, material_source
+from explorer.scene_text import material_toml
+from explorer.whole_file import write_whole, write_whole_bytes
+from solver.mesh_file import SUFFIXES
+from solver.scene import Scene, check
+from solver.shape import Solid, surface_mesh
+
+MOST_MESH_BYTES = 30_000_000
+MOST_ZIP_BYTES, MOST_UNPACKED_BYTES, MOST_MEMBERS = 50_000_000, 200_000_000, 1000
+LABEL = re.compile(r"[^A-Za-z0-9_-]+")
+PART = re.compile(r"[A-Za-z0-9_. -]+")
+"""What a part of a path in an archive may consist of."""
+
+
+def shaped_source(present: Scene, body: str, name: str, content: bytes, unit: str | None, folder: Path) -> SceneSource:
+    """``present`` with the mesh ``content`` as the shape of its component ``body``, kept in ``folder`` as a material.
+
+    Args:
+        present: the scene whose other components, set-up and parameters stay.
+        body: name of the component.
+        name: name of the file in the browser.
+        content: the file.
+        unit: unit of its coordinates; None: that of the format, or millimetres.
+        folder: where mesh and material file are kept.
+
+    The member spheres are fitted here, which takes seconds: a mesh that no spheres can stand for is refused before the
+    pour is given up. Raises CommandError in one line, with nothing left behind.
+    """
+    if body not in [one.name for one in present.bodies]:
+        raise CommandError(f"body {body[:60]!r}: there is none of that name")
+    suffix = Path(name).suffix.lower()
+    if suffix not in SUFFIXES:
+        raise CommandError(f"{label(name)}: allowed are files ending in {', '.join(SUFFIXES)}")
+    if not 0 < len(content) <= MOST_MESH_BYTES:
+        raise CommandError(f"{name[:80]}: {len(content)} bytes; allowed: up to {MOST_MESH_BYTES}")
+    folder.mkdir(parents=True, exist_ok=True)
+    stem = f"{label(Path(name).stem)}-{_digest(content)}"
+    mesh, material = folder / f"{stem}{suffix}", folder / f"{stem}-{label(body)}.toml"
+    new = not mesh.exists()
+    with _named(name, mesh):
+        try:
+            write_whole_bytes(mesh, content)
+            solid = mesh_solid(mesh, unit, unit_input="unit")
+            _check_faces(solid)
+            shaped = [dataclasses.replace(one, shape=solid) if one.name == body else one for one in present.bodies]
+            scene = dataclasses.replace(present, bodies=tuple(shaped))
+            check(scene)
+            for one in scene.bodies:
+                _ = one.clump
+        except ValueError:
+            if new:
+                mesh.unlink(missing_ok=True)
+            raise
+    write_whole(material, material_toml(scene, f"{present.title}, with {mesh.name} as its {body}. SI."))
+    return material_source(str(material))
+
+
+def _check_faces(solid: Solid) -> None:
+    faces = len(surface_mesh(solid).faces)
+    if faces > MOST_FACES_DRAWN:
+        raise CommandError(
+            f"{faces} faces; the page draws up to {MOST_FACES_DRAWN}: reduce the mesh, or make a body file of it with "
+            "`explorer shape`"
+        )
+
+
+def unpacked_measurement(name: str, content: bytes, folder: Path) -> Path:
+    """The measured data set in the archive ``content``, unpacked into a folder within ``folder`` and read once.
+
+    Raises CommandError in one line, with nothing left behind.
+    """
+    if not 0 < len(content) <= MOST_ZIP_BYTES:
+        raise CommandError(f"{name[:80]}: {len(content)} bytes; allowed: up to {MOST_ZIP_BYTES}")
+    folder.mkdir(parents=True, exist_ok=True)
+    kept = folder / f"{label(Path(name).stem)}-{_digest(content)}"
+    if kept.is_dir():
+        return kept
+    apart = Path(tempfile.mkdtemp(prefix=".unpacking-", dir=folder))
+    try:
+        with _named(name, apart):
+            _unpack(content, apart)
+            load_measurement(apart)
+        apart.replace(kept)
+    finally:
+        shutil.rmtree(apart, ignore_errors=True)
+    return kept
+
+
+def label(text: str) -> str:
+    """``text`` from outside as a part of a file's name."""
+    return LABEL.sub("_", text)[:40].strip("_") or "unnamed"
+
+
+def _unpack(content: bytes, folder: Path) -> None:
+    """All files of the archive below the folder that holds ``measurement.toml``."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            members = [member for member in archive.infolist() if not member.is_dir()]
+            _check_members(members)
+            top = _top(members)
+            for member in members:
+                path = PurePosixPath(member.filename)
+                if not path.is_relative_to(top):
+                    continue
+                target = folder / path.relative_to(top)
+                target.parent.mkdir(parents=True, exist_ok=True)
+                with archive.open(member) as packed, target.open("wb") as file:
+                    shutil.copyfileobj(packed, file)
+    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError) as error:
+        raise CommandError(f"cannot be unpacked as .zip: {' '.join(str(error).split())[:120]}") from None
+
+
+def _check_members(members: list[zipfile.ZipInfo]) -> None:
+    if len(members) > MOST_MEMBERS:
+        raise CommandError(f"holds {len(members)} files; allowed: up to {MOST_MEMBERS}")
+    size = sum(member.file_size for member in members)
+    if size > MOST_UNPACKED_BYTES:
+        raise CommandError(f"holds {size} bytes; allowed: up to {MOST_UNPACKED_BYTES}")
+    for member in members:
+        parts = PurePosixPath(member.filename).parts
+        # A part of dots alone leads out of the folder; a link could as well.
+        plain = all(PART.fullmatch(part) and part.strip(". ") for part in parts)
+        if not parts or not plain or stat.S_ISLNK(member.external_attr >> 16):
+            raise CommandError(f"{member.filename[:80]!r}: allowed are plain files in folders below the archive's top")
+
+
+def _top(members: list[zipfile.ZipInfo]) -> PurePosixPath:
+    """The folder with ``measurement.toml``: the archive's top, or one within it."""
+    found = [path for member in members if (path := PurePosixPath(member.filename)).name == MEASUREMENT_FILE]
+    if len(found) != 1:
+        raise CommandError(f"holds {len(found)} files {MEASUREMENT_FILE}; allowed: one (see doe/measurement/README.md)")
+    return found[0].parent
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()[:12]
+
+
+@contextmanager
+def _named(name: str, path: Path) -> Iterator[None]:
+    """Errors with the name that the person knows in place of ``path``."""
+    try:
+        yield
+    except ValueError as error:
+        text = " ".join(str(error).split()).replace(f"{path}/", "").replace(str(path), "").lstrip(": ")
+        raise CommandError(f"{name[:80]}: {text}") from None

@@ -1,0 +1,129 @@
+"""The pile from the side with its flank fit, in the panel and in 3-D, and measured data laid over it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import viser
+
+from explorer.live.messages import Status
+from explorer.measured_curves import MeasuredCurve, measured_curves
+from explorer.measured_file import SUFFIXES, measured_file
+from explorer.uploads import unpacked_measurement
+from explorer.viewer.actions import Post
+from explorer.viewer.background_work import BackgroundWork
+from explorer.viewer.outline_nodes import OutlineNodes
+from explorer.viewer.outline_svg import outline_html
+from solver.observables.outline import Outline
+
+NONE, OWN = "none", "folder below"
+
+
+class OutlinePanel:
+    """Drawing, and the choice of what is laid over it; ``shipped`` are names of data sets, ``uploads`` keeps others."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        shipped: Sequence[str],
+        uploads: Path,
+        post: Post,
+        background: BackgroundWork,
+    ) -> None:
+        self._background, self._uploads, self._nodes = background, uploads, OutlineNodes(server)
+        self._drawn: tuple[Outline | None, MeasuredCurve | None, bool] = (None, None, False)
+        self._curves: Mapping[str, MeasuredCurve] = {}
+        self._measured: MeasuredCurve | None = None
+        with server.gui.add_folder("Silhouette and flank fit"):
+            self._html = server.gui.add_html(outline_html(None, None))
+            self._in_scene = server.gui.add_checkbox(
+                "Lines in 3-D", True, hint="Draw the lines of the flanks, and what was measured, in the scene too."
+            )
+            with server.gui.add_folder("Measured data over it", expand_by_default=False):
+                self._data = server.gui.add_dropdown(
+                    "Measured", (NONE, *shipped, OWN), hint="Lay a measured silhouette or profile over the pile."
+                )
+                self._folder = server.gui.add_text(
+                    "Folder", "", hint="Folder with measurement.toml, on the machine that serves this page."
+                )
+                self._upload = server.gui.add_upload_button(
+                    "Upload measured data",
+                    mime_type=",".join((".zip", *SUFFIXES)),
+                    hint="A folder with measurement.toml as .zip, which is kept and can be diagnosed too; a scanned "
+                    "pile (.npz: xyz, radius) or the points of an outline (.csv: u_m,z_m), which are drawn only.",
+                )
+                self._curve = server.gui.add_dropdown("Curve", (NONE,), disabled=True, hint="Which of its curves.")
+
+        @self._data.on_update
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None:
+                chosen = str(event.target.value)
+                post(lambda: self._choose_data(chosen))
+
+        @self._folder.on_update
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None:
+                post(lambda: self._choose_data(OWN))
+
+        @self._curve.on_update
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None:
+                chosen = str(event.target.value)
+                post(lambda: self._choose_curve(chosen))
+
+        @self._upload.on_upload
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None:
+                sent = event.target.value
+                post(lambda: self._take(str(sent.name), bytes(sent.content)))
+
+    def show(self, status: Status) -> None:
+        """Draw what is new; call it inside ``server.atomic()``."""
+        now = (status.outline, self._measured, bool(self._in_scene.value))
+        if all(new is old for new, old in zip(now, self._drawn, strict=True)):
+            return
+        self._drawn = now
+        self._nodes.show(*now)
+        html = outline_html(status.outline, self._measured)
+        if self._html.content != html:
+            self._html.content = html
+
+    def _take(self, name: str, content: bytes) -> None:
+        """Lay what was sent over the pile: a data set, which is kept, or a single curve."""
+        if Path(name).suffix.lower() in SUFFIXES:
+            self._background.start("reading the file", lambda: measured_file(name, content), self._offer_one)
+        else:
+            self._background.start("reading the measured data", lambda: self._kept(name, content), self._offer_kept)
+
+    def _kept(self, name: str, content: bytes) -> tuple[Path, Mapping[str, MeasuredCurve]]:
+        folder = unpacked_measurement(name, content, self._uploads)
+        return folder, measured_curves(str(folder))
+
+    def _offer_kept(self, found: tuple[Path, Mapping[str, MeasuredCurve]]) -> None:
+        folder, curves = found
+        self._folder.value, self._data.value = str(folder), OWN  # type: ignore[misc]
+        self._offer(curves)
+
+    def _offer_one(self, curve: MeasuredCurve) -> None:
+        self._data.value = NONE  # type: ignore[misc]
+        self._offer({curve.name: curve})
+
+    def _choose_data(self, chosen: str) -> None:
+        name = str(self._folder.value).strip() if chosen == OWN else chosen
+        if chosen == NONE or not name:
+            self._offer({})
+            return
+        self._background.start(f"reading {name}", lambda: measured_curves(name), self._offer)
+
+    def _offer(self, curves: Mapping[str, MeasuredCurve]) -> None:
+        self._curves = curves
+        names = tuple(curves) or (NONE,)
+        self._curve.options = names
+        self._curve.value = names[0]  # type: ignore[misc]
+        self._curve.disabled = not curves
+        self._measured = curves.get(names[0])
+
+    def _choose_curve(self, chosen: str) -> None:
+        self._measured = self._curves.get(chosen)

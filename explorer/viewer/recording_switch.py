@@ -1,0 +1,117 @@
+"""Recordings that are begun and ended on the page, beside the one of the command line."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+from typing import Protocol
+
+import viser
+
+from explorer.errors import CommandError
+from explorer.live.frames import Frame
+from explorer.live.messages import Status
+from explorer.viewer.background_work import BackgroundWork
+from explorer.viewer.scene_playback import ScenePlayback
+from explorer.whole_file import write_whole
+
+RRD, HTML = "rerun (.rrd)", "web page (.html)"
+
+
+class Recorder(Protocol):
+    """Something that keeps what the page shows."""
+
+    def take(self, frame: Frame, status: Status) -> None:
+        """Called about 30 times a second with the newest frame and the newest status."""
+
+    def close(self) -> None:
+        """End the recording; its file is then whole."""
+
+
+def session_recorder(path: Path) -> Recorder:
+    """A recording of rerun's into the new file ``path``."""
+    # Imported here: rerun takes a second to load, and most sessions are not recorded.
+    from explorer.logs.session_recorder import SessionRecorder
+
+    return SessionRecorder(path)
+
+
+class RecordingSwitch:
+    """A recording at a time, into ``folder``; ``open_rrd`` begins one of rerun's."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        folder: Path,
+        background: BackgroundWork,
+        open_rrd: Callable[[Path], Recorder] = session_recorder,
+    ) -> None:
+        self._server, self._folder, self._open_rrd, self._background = server, folder, open_rrd, background
+        self._recorder: Recorder | None = None
+        self._path: Path | None = None
+
+    @property
+    def running(self) -> bool:
+        """Whether something is being recorded."""
+        return self._recorder is not None
+
+    @property
+    def path(self) -> Path | None:
+        """First file of the present or last recording; a new pour continues in another beside it (rerun only)."""
+        return self._path
+
+    def begin(self, kind: str) -> None:
+        """Begin a recording of one of the two kinds; CommandError while one is running, or for another kind."""
+        if self.running:
+            raise CommandError(f"recording: one is running, into {self._path}; stop it first")
+        if kind not in (RRD, HTML):
+            raise CommandError(f"recording: {kind[:40]!r} is none; allowed: {RRD}, {HTML}")
+        self._folder.mkdir(parents=True, exist_ok=True)
+        path = self._folder / f"pour-{datetime.now():%Y%m%d-%H%M%S-%f}{'.rrd' if kind == RRD else '.html'}"
+        if kind == HTML:
+            self._take_up(path, ScenePlayback(self._server))
+        else:
+            # Off the loop: rerun takes a second to load.
+            self._background.start(
+                "beginning the recording", lambda: self._open_rrd(path), lambda made: self._take_up(path, made)
+            )
+
+    def end(self) -> None:
+        """End the recording; CommandError where there is none."""
+        recorder, path = self._recorder, self._path
+        if recorder is None or path is None:
+            raise CommandError("recording: none is running")
+        self._recorder = None
+        if isinstance(recorder, ScenePlayback):
+            self._background.start("packing the recording", lambda: write_whole(path, recorder.html()), lambda _: None)
+        else:
+            recorder.close()
+
+    def take(self, frame: Frame, status: Status) -> None:
+        """Hand on what the page shows, if it is being recorded; a web page that is full is ended."""
+        if self._recorder is None:
+            return
+        self._recorder.take(frame, status)
+        if isinstance(self._recorder, ScenePlayback) and self._recorder.full and not self._background.busy_with:
+            self.end()
+
+    def files(self) -> tuple[Path, ...]:
+        """Files of the last recording; CommandError where there is none, or while it is being written."""
+        if self.running or self._background.busy_with:
+            raise CommandError("recording: stop it first, and wait until it is written")
+        found = [] if self._path is None else sorted(self._folder.glob(f"{self._path.stem}*{self._path.suffix}"))
+        if not found:
+            raise CommandError("recording: nothing was recorded yet")
+        return tuple(found)
+
+    def close(self) -> None:
+        """End what is running, with its file whole."""
+        recorder, self._recorder = self._recorder, None
+        if isinstance(recorder, ScenePlayback) and self._path is not None:
+            write_whole(self._path, recorder.html())
+        elif recorder is not None:
+            recorder.close()
+
+    def _take_up(self, path: Path, recorder: Recorder) -> None:
+        self._path, self._recorder = path, recorder

@@ -1,0 +1,120 @@
+"""Another rig, another material, another shape: each pours anew, and becomes the default that changes count from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import viser
+
+from explorer.errors import CommandError
+from explorer.live.messages import Status
+from explorer.scene_source import SceneSource, rig_source
+from explorer.session import Session
+from explorer.uploads import shaped_source
+from explorer.viewer.actions import Post
+from explorer.viewer.background_work import BackgroundWork
+from solver.assets import shipped_assets
+from solver.mesh_file import LENGTH_UNITS, SUFFIXES
+from solver.rigs import RIGS
+from solver.scene import Scene, check
+
+OWN = "file below"
+"""Choice of the list that takes the file in the text field."""
+UNIT_OF_FILE = "as usual"
+"""Choice of the unit of a mesh: that of its format, or millimetres."""
+
+WORKING = "Reading what was asked for; the pour goes on until that is done."
+
+
+class ScenePanel:
+    """Choices of rig and material with a button, and the upload of a body's shape; ``folder`` keeps uploads."""
+
+    def __init__(
+        self, server: viser.ViserServer, session: Session, folder: Path, post: Post, background: BackgroundWork
+    ) -> None:
+        self._session, self._folder, self._background = session, folder, background
+        scene = session.status().scene
+        self._generation = 0
+        self._shipped = shipped_assets("materials")
+        gui = server.gui
+        with gui.add_folder("Rig and material", expand_by_default=False):
+            self._rig = gui.add_dropdown("Rig", tuple(RIGS), hint="What the bodies are poured into.")
+            self._material = gui.add_dropdown(
+                "Material", (*self._shipped, OWN), hint="Materials that come with the program, or a file of your own."
+            )
+            self._file = gui.add_text("File", "", hint="Material file (TOML), on the machine that serves this page.")
+            pour = gui.add_button("Pour this", hint="A new pour; changes are then counted from this material and rig.")
+            with gui.add_folder("Shape from a mesh", expand_by_default=False):
+                self._body = gui.add_dropdown("Body", _names(scene), hint="The component that gets the shape.")
+                self._unit = gui.add_dropdown(
+                    "Unit",
+                    (UNIT_OF_FILE, *LENGTH_UNITS),
+                    hint="Unit of the coordinates in the file; as usual: metres in .glb, millimetres in the others.",
+                )
+                self._upload = gui.add_upload_button(
+                    "Upload a mesh and pour",
+                    mime_type=",".join(SUFFIXES),
+                    hint="A closed surface (STL, OBJ, PLY, GLB). Its member spheres are fitted first.",
+                )
+            self._doing = gui.add_html("")
+        pour.on_click(lambda _: post(self._pour))
+
+        @self._upload.on_upload
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None:
+                sent = event.target.value
+                post(lambda: self._take_shape(str(sent.name), bytes(sent.content)))
+
+    def show(self, status: Status) -> None:
+        """Follow a pour that somebody else started; call it inside ``server.atomic()``."""
+        if status.generation != self._generation:
+            self._generation = status.generation
+            if status.scene.rig.name in RIGS:
+                self._rig.value = status.scene.rig.name  # type: ignore[misc]
+            if self._body.options != _names(status.scene):
+                self._body.options = _names(status.scene)
+            self._show_material(self._session.source.material)
+        doing = f"<div style='padding:0 0.75em; font-size:0.8em'>{WORKING if self._background.busy_with else ''}</div>"
+        if self._doing.content != doing:
+            self._doing.content = doing
+
+    def _show_material(self, material: str) -> None:
+        """Choose the material that is being poured, where its source names one."""
+        if material in self._shipped:
+            self._material.value = material  # type: ignore[misc]
+        elif material:
+            self._material.value, self._file.value = OWN, material  # type: ignore[misc]
+
+    def _pour(self) -> None:
+        rig = str(self._rig.value)
+        material = str(self._file.value).strip() if self._material.value == OWN else str(self._material.value)
+        if rig not in RIGS:
+            raise CommandError(f"rig {rig[:60]!r}: allowed are {', '.join(RIGS)}")
+        if not material:
+            raise CommandError("material: name a file, or choose one from the list")
+        self._begin("reading the material", lambda: _checked(rig_source(rig, material)))
+
+    def _take_shape(self, name: str, content: bytes) -> None:
+        present, body, unit = self._session.status().scene, str(self._body.value), str(self._unit.value)
+        if unit not in (UNIT_OF_FILE, *LENGTH_UNITS):
+            raise CommandError(f"unit {unit[:60]!r}: allowed are {', '.join(LENGTH_UNITS)}")
+        given = None if unit == UNIT_OF_FILE else unit
+        self._begin("fitting member spheres", lambda: shaped_source(present, body, name, content, given, self._folder))
+
+    def _begin(self, what: str, find: Callable[[], SceneSource]) -> None:
+        self._background.start(what, find, self._start)
+
+    def _start(self, source: SceneSource) -> None:
+        self._session.start(source.scene, self._session.status().seed, source)
+
+
+def _names(scene: Scene) -> tuple[str, ...]:
+    return tuple(body.name for body in scene.bodies)
+
+
+def _checked(source: SceneSource) -> SceneSource:
+    """``source``, unless its bodies do not fit into the rig: ParameterError."""
+    check(source.scene)
+    return source

@@ -1,0 +1,101 @@
+"""Changing, undoing and taking along in headless Chromium: what only a browser can show."""
+
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+import trimesh
+
+from tests.browser import test_page as shared
+from tests.browser.test_page import SMALL_POUR, simulated_time, slider, state, wait_for
+
+pytestmark = pytest.mark.browser
+
+page = shared.page
+DECLARED = re.compile(r"In the solver: Static friction 0\.54 … 0\.83")
+NONE = re.compile(r"In the solver: Static friction 0\s")
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory):
+    """Address of a page that keeps presets and uploads in a folder of the test."""
+    settings = [part for one in SMALL_POUR for part in ("--set", one)]
+    server = subprocess.Popen(
+        [sys.executable, "-m", "explorer", "serve", "--port", "0", *settings],
+        stdout=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"XDG_DATA_HOME": str(tmp_path_factory.mktemp("data"))},
+    )
+    found = re.search(r"http://\S+", server.stdout.readline())
+    assert found, "the server did not tell its address"
+    yield found[0]
+    server.terminate()
+    assert server.wait(20) == 0
+
+
+def choose(page, label, option):
+    """Choose an option of a list by its label."""
+    field = page.locator("label", has_text=re.compile(f"^{label}$")).first.get_attribute("for")
+    page.locator(f'[id="{field}"]').click()
+    page.get_by_role("option", name=option, exact=True).click()
+
+
+def press(page, key):
+    """Press a key with nothing in focus, as a person who looks at the pile."""
+    page.evaluate("document.activeElement?.blur()")
+    page.keyboard.press(key)
+
+
+def test_a_slider_moved_by_key_is_undone_and_made_again(page):
+    wait_for(lambda: state(page) in ("running", "ended"))
+    page.get_by_text(DECLARED).wait_for()
+    thumb = slider(page, "Static friction")
+    thumb.scroll_into_view_if_needed()
+    thumb.focus()
+    page.keyboard.press("Home")
+    page.get_by_text(NONE).wait_for()
+    press(page, "z")
+    page.get_by_text(DECLARED).wait_for()
+    press(page, "y")
+    page.get_by_text(NONE).wait_for()
+    press(page, "z")
+    page.get_by_text(DECLARED).wait_for()
+
+
+def test_a_preset_acts_and_is_undone(page):
+    choose(page, "Preset", "frictionless")
+    page.get_by_text(NONE).wait_for()
+    page.get_by_text("No contact holds by friction").wait_for()
+    press(page, "z")
+    page.get_by_text(DECLARED).wait_for()
+
+
+def test_a_mesh_with_a_hole_is_refused_in_words_and_the_pour_goes_on(page, tmp_path):
+    box = trimesh.creation.box((12.0, 10.0, 8.0))
+    box.update_faces([k > 1 for k in range(len(box.faces))])
+    box.export(tmp_path / "open.stl")
+    press(page, "r")
+    wait_for(lambda: state(page) == "running")
+    page.get_by_text("Rig and material").click()
+    page.get_by_text("Shape from a mesh").click()
+    with page.expect_file_chooser() as chooser:
+        page.get_by_role("button", name="Upload a mesh and pour").click()
+    chooser.value.set_files(tmp_path / "open.stl")
+    page.get_by_text("open.stl: ").first.wait_for()
+    assert "not watertight" in page.locator(".pour").inner_text()
+    before = simulated_time(page)
+    wait_for(lambda: simulated_time(page) > before or state(page) == "ended")
+
+
+def test_the_scene_file_is_downloaded(page):
+    page.get_by_role("tab", name="Take along").click()
+    page.get_by_text("explorer simulate sunflower_extract").wait_for()
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Scene (TOML)").click()
+    assert download.value.suggested_filename == "scene.toml"
+
+
+def test_the_console_has_nothing_to_complain_about(page):
+    assert page.complaints == []

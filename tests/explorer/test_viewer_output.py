@@ -1,0 +1,198 @@
+"""The tab of what is taken along: command line, downloads, recordings."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from explorer.errors import CommandError
+from explorer.scene_file import load_scene
+from explorer.scene_source import SceneSource, material_source
+from explorer.viewer.actions import Actions
+from explorer.viewer.background_work import BackgroundWork
+from explorer.viewer.guarded_server import guarded_server
+from explorer.viewer.output_panel import DOWNLOAD, START, STOP, OutputPanel, command_html, picture
+from explorer.viewer.recording_switch import HTML, RRD, RecordingSwitch
+from explorer.viewer.scene_playback import BYTES_PER_BODY
+from tests.explorer.page_session import PageSession, finished, frame_of
+from tests.explorer.test_viewer_controls import event
+
+SOURCE = material_source("sunflower_extract")
+
+
+class Browser:
+    """What is asked of a client: its size, its picture, and files for it."""
+
+    def __init__(self, error=None):
+        self.sent, self.error = {}, error
+        self.camera = type("Camera", (), {"image_height": 90, "image_width": 5120})
+
+    def send_file_download(self, name, content, save_immediately):
+        assert save_immediately
+        self.sent[name] = content
+
+    def get_render(self, height, width, timeout):
+        if self.error:
+            raise self.error
+        return np.full((height, width, 3), 7, dtype=np.uint8)
+
+
+class FileRecorder:
+    """Counts what it is handed."""
+
+    def __init__(self, path):
+        self.path, self.frames = path, 0
+
+    def take(self, frame, status):
+        self.frames += 1
+
+    def close(self):
+        self.path.write_text(f"{self.frames} frames")
+        self.path.with_name(f"{self.path.stem}_2{self.path.suffix}").write_text("second pour")
+
+
+class Bench:
+    def __init__(self, server, folder):
+        self.session, self.actions, self.browser = PageSession(SOURCE), Actions(), Browser()
+        self.session.newest = frame_of([0, 1, 2], [[0.0, 0.0, 0.01 * k] for k in range(3)])
+        self.background = BackgroundWork(self.actions.post)
+        self.recording = RecordingSwitch(server, folder, self.background, FileRecorder)
+        self.panel = OutputPanel(server, self.session, self.recording, self.actions.post, self.background)
+
+    def press(self, label):
+        event(self.panel._exports[label], True, client=self.browser)
+        return finished(self.actions, self.background)
+
+    def record(self, chosen):
+        event(self.panel._switch, chosen, client=self.browser)
+        return finished(self.actions, self.background)
+
+    def take(self, times):
+        for number in range(times):
+            frame = replace(frame_of([0], [[0.0, 0.0, 0.01 * number]]), number=number)
+            self.recording.take(frame, self.session.now)
+
+
+@pytest.fixture(scope="module")
+def server():
+    server = guarded_server("127.0.0.1", 0, "test")
+    yield server
+    server.stop()
+
+
+@pytest.fixture
+def bench(server, tmp_path):
+    return Bench(server, tmp_path / "recordings")
+
+
+def test_the_command_line_follows_what_is_on_the_screen(bench):
+    bench.panel.show(bench.session.status(), "")
+    assert "explorer simulate sunflower_extract --seed 1<" in bench.panel._command.content
+    bench.session.set_parameters({"pair.seed.seed.static_friction": 0.2})
+    bench.panel.show(bench.session.status(), "")
+    assert "--set pair.seed.seed.static_friction=0.2" in bench.panel._command.content
+
+
+def test_the_command_line_is_escaped_and_its_absence_explained():
+    evil = SceneSource(("<img src=x>",), SOURCE.scene)
+    assert "<img" not in command_html(evil, SOURCE.scene, 1)
+    assert "save the scene file instead" in command_html(SceneSource((), SOURCE.scene), SOURCE.scene, 1)
+
+
+def test_the_scene_file_is_the_scene_on_the_screen(bench, tmp_path):
+    bench.session.set_parameters({"pair.seed.seed.static_friction": 1 / 3})
+    assert bench.press("Scene (TOML)") == ""
+    (tmp_path / "scene.toml").write_bytes(bench.browser.sent["scene.toml"])
+    assert load_scene(str(tmp_path / "scene.toml")) == bench.session.now.scene
+
+
+def test_bodies_are_sent_as_table_and_mesh(bench):
+    assert bench.press("Bodies (CSV)") == bench.press("Bodies (STL)") == ""
+    assert len(bench.browser.sent["bodies_1.250s.csv"].splitlines()) == 4
+    assert len(bench.browser.sent["bodies_1.250s_mm.stl"]) > 1000
+    bench.session.newest = None
+    assert bench.press("Bodies (CSV)") == "no body has entered yet"
+
+
+def test_a_picture_is_as_large_as_the_browser_up_to_a_limit(bench):
+    assert bench.press("Picture (PNG)") == ""
+    (content,) = bench.browser.sent.values()
+    # Width and height of a PNG stand at byte 16.
+    assert [int.from_bytes(content[k : k + 4], "big") for k in (16, 20)] == [2560, 45]
+
+
+@pytest.mark.parametrize("error", [TimeoutError("too slow"), RuntimeError("gone")])
+def test_a_browser_that_draws_no_picture_is_one_line(error):
+    with pytest.raises(CommandError, match=f"picture: the browser did not draw it: {error}"):
+        picture(Browser(error))
+
+
+def test_a_recording_is_begun_ended_and_sent(bench):
+    assert bench.record(STOP) == "recording: none is running"
+    assert bench.record(DOWNLOAD) == "recording: nothing was recorded yet"
+    assert bench.record(START) == ""
+    assert "one is running" in bench.record(START)
+    bench.take(3)
+    bench.panel.show(bench.session.status(), "")
+    assert f"Recording into {bench.recording.path}" in bench.panel._state.content
+    assert "stop it first" in bench.record(DOWNLOAD)
+    assert bench.record(STOP) == ""
+    bench.take(2)
+    assert bench.record(DOWNLOAD) == ""
+    path = bench.recording.path
+    assert bench.browser.sent == {path.name: b"3 frames", f"{path.stem}_2.rrd": b"second pour"}
+    bench.panel.show(bench.session.status(), "")
+    assert f"Recorded: {path}" in bench.panel._state.content
+
+
+def test_the_scene_as_a_web_page_holds_what_moved(server, bench):
+    bench.panel._kind.value = HTML
+    node = server.scene.add_frame("/moving")
+    assert bench.record(START) == ""
+    for k in range(3):
+        node.position = (0.125 * k, 0.0, 0.0)
+        bench.take(k + 1)
+    assert bench.record(STOP) == ""
+    text = bench.recording.path.read_text()
+    assert text.count("__VISER_EMBED_DATA__=") == 1
+    assert bench.recording.files() == (bench.recording.path,)
+    # Another one can be made after it.
+    assert bench.record(START) == ""
+    bench.recording.close()
+    assert len(list(bench.recording.path.parent.iterdir())) == 2
+
+
+def test_a_web_page_that_is_full_is_ended_and_written(bench, monkeypatch):
+    monkeypatch.setattr("explorer.viewer.scene_playback.MOST_BYTES", 2.5 * BYTES_PER_BODY)
+    bench.panel._kind.value = HTML
+    assert bench.record(START) == ""
+    bench.take(2)
+    assert bench.recording.running
+    bench.take(4)
+    assert not bench.recording.running
+    assert finished(bench.actions, bench.background) == ""
+    assert "__VISER_EMBED_DATA__" in bench.recording.files()[0].read_text()
+
+
+def test_a_kind_that_is_not_offered_is_refused(bench):
+    bench.panel._kind.value = "<script>"
+    assert "allowed: " in bench.record(START)
+    assert not bench.recording.running
+
+
+def test_the_end_of_the_page_leaves_a_whole_file(bench):
+    bench.panel._kind.value = RRD
+    assert bench.record(START) == ""
+    bench.take(4)
+    bench.recording.close()
+    assert Path(bench.recording.path).read_text() == "4 frames"
+    assert not bench.recording.running
+
+
+def test_texts_of_the_state_are_escaped(bench):
+    bench.panel.show(bench.session.status(), "<img src=x>")
+    assert "<img" not in bench.panel._state.content
+    assert bench.actions.carry_out() is None
+    assert bench.record("Delete everything") == ""
+    assert not bench.recording.running

@@ -1,0 +1,117 @@
+"""The page as a whole below the browser: one loop, all panels, another scene, a real recording."""
+
+import threading
+import time
+from dataclasses import replace
+
+import pytest
+
+from explorer.diagnosis_process import DiagnoseProcess
+from explorer.live.messages import Event
+from explorer.scene_source import material_source, rig_source
+from explorer.viewer.guarded_server import guarded_server
+from explorer.viewer.page import Page
+from solver.scene import value
+from tests.explorer.page_session import PageSession, frame_of
+
+SOURCE = material_source("sunflower_extract")
+FRICTION = "pair.seed.seed.static_friction"
+
+
+class Session(PageSession):
+    """With the rest of what the page's loop asks."""
+
+    def new_events(self):
+        events, self.events = tuple(self.events), []
+        return events
+
+    def step(self):
+        pass
+
+    def step_back(self):
+        pass
+
+    def details(self):
+        return None
+
+    def watch(self, wanted, body=None):
+        pass
+
+    def set_speed(self, factor):
+        pass
+
+
+@pytest.fixture
+def running(tmp_path, monkeypatch):
+    """A page whose loop runs in a thread, and its session."""
+    monkeypatch.setattr("explorer.viewer.pour_panels.data_folder", lambda: tmp_path)
+    server, session, stop = guarded_server("127.0.0.1", 0, "test"), Session(SOURCE), threading.Event()
+    diagnosis = DiagnoseProcess(tmp_path / "diagnoses", tmp_path / "runs.sqlite")
+    page = Page(server, session, None, "", diagnosis)
+    loop = threading.Thread(target=page.run, args=(stop,))
+    loop.start()
+    yield page, session
+    stop.set()
+    loop.join(10)
+    page.close()
+    diagnosis.close()
+    server.stop()
+
+
+def wait_for(condition):
+    end = time.monotonic() + 20.0
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.02)
+
+
+def test_a_change_reaches_list_chart_and_command_line_and_is_undone(running):
+    page, session = running
+    page._actions.post(lambda: session.set_parameters({FRICTION: 0.2}))
+    wait_for(lambda: "0.57 → <b>0.2</b>" in page._panels.changes._list.content)
+    wait_for(lambda: page._chart._plot.series[-1]["label"].endswith("0.57 → 0.2"))
+    wait_for(lambda: f"{FRICTION}=0.2" in page._panels.output._command.content)
+    page._actions.post(page._panels.changes._undo)
+    wait_for(lambda: "Everything is at its default" in page._panels.changes._list.content)
+    assert value(session.now.scene, FRICTION) == 0.57
+
+
+def test_all_panels_follow_another_rig(running):
+    page, session = running
+    drum = rig_source("rotating_drum", "nine_sphere_seed")
+    page._actions.post(lambda: session.start(drum.scene, 3, drum))
+    wait_for(lambda: "rotating_drum --material nine_sphere_seed --seed 3" in page._panels.output._command.content)
+    wait_for(lambda: "rig.speed_rpm" in page._panels.set_up._panel._inputs)
+    assert page._panels.scene._rig.value == "rotating_drum"
+    assert page._drawn == drum.scene
+
+
+def test_a_recording_of_the_page_holds_the_changes(running, tmp_path):
+    rerun_chunk = pytest.importorskip("rerun.chunk")
+    page, session = running
+    session.newest = frame_of([0, 1], [[0.0, 0.0, 0.01], [0.0, 0.02, 0.01]])
+    page._actions.post(lambda: page._panels.recording.begin("rerun (.rrd)"))
+    wait_for(lambda: page._panels.recording.running)
+    time.sleep(0.2)
+    page._actions.post(lambda: session.set_parameters({FRICTION: 0.2}))
+    wait_for(lambda: f"{FRICTION}=0.2" in page._panels.output._command.content)
+    time.sleep(0.2)
+    page._actions.post(page._panels.recording.end)
+    wait_for(lambda: not page._panels.recording.running)
+    path = page._panels.recording.path
+    assert path.parent == tmp_path / "recordings"
+    texts = []
+    for chunk in rerun_chunk.RrdReader(path).stream():
+        batch = chunk.to_record_batch()
+        if "TextLog:text" in batch.schema.names:
+            texts += [text for row in batch["TextLog:text"].to_pylist() for text in row or ()]
+    assert f"{FRICTION}: 0.57 → 0.2" in texts
+
+
+def test_an_event_that_is_no_change_is_no_mark(running):
+    page, session = running
+    session.events.append(Event(1, 0.4, "refused: nothing"))
+    session.now = replace(session.now, time=0.5)
+    wait_for(lambda: len(page._events) == 1)
+    time.sleep(0.3)
+    assert page._chart._plot.data[-1].sum() == 0

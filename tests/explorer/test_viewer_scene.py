@@ -1,0 +1,119 @@
+"""Choosers of rig and material, and a shape from the browser: a new pour, or one line and nothing changed."""
+
+import pytest
+from viser import UploadedFile
+
+from explorer.scene_file import load_scene
+from explorer.scene_source import material_source
+from explorer.scene_text import material_toml
+from explorer.viewer.actions import Actions
+from explorer.viewer.background_work import BackgroundWork
+from explorer.viewer.guarded_server import guarded_server
+from explorer.viewer.scene_panel import OWN, ScenePanel
+from solver.rigs import RIGS
+from solver.scene import with_values
+from tests.explorer.beads import bead_scene
+from tests.explorer.page_session import PageSession, finished
+from tests.explorer.test_uploads import stl
+from tests.explorer.test_viewer_controls import event
+
+SOURCE = material_source("sunflower_extract")
+
+
+@pytest.fixture(scope="module")
+def server():
+    server = guarded_server("127.0.0.1", 0, "test")
+    yield server
+    server.stop()
+
+
+class Bench:
+    def __init__(self, server, folder):
+        self.session, self.actions = PageSession(SOURCE), Actions()
+        self.background = BackgroundWork(self.actions.post)
+        self.panel = ScenePanel(server, self.session, folder, self.actions.post, self.background)
+
+    def pour(self):
+        self.actions.post(self.panel._pour)
+        return finished(self.actions, self.background)
+
+    def upload(self, name, content):
+        event(self.panel._upload, UploadedFile(name, content))
+        return finished(self.actions, self.background)
+
+
+@pytest.fixture
+def bench(server, tmp_path, monkeypatch):
+    monkeypatch.setenv("REPOSE_CACHE", str(tmp_path / "cache"))
+    return Bench(server, tmp_path / "uploads")
+
+
+@pytest.mark.parametrize("rig", RIGS)
+@pytest.mark.parametrize("material", ["sunflower_extract", "nine_sphere_seed"])
+def test_every_rig_and_shipped_material_can_be_poured(bench, rig, material):
+    bench.panel._rig.value, bench.panel._material.value = rig, material
+    assert bench.pour() == ""
+    assert bench.session.now.scene == load_scene(rig, material)
+    assert bench.session.source.scene == bench.session.now.scene
+    # As another browser sees it.
+    bench.panel._rig.value, bench.panel._material.value = "funnel", OWN
+    bench.panel.show(bench.session.status())
+    assert (bench.panel._rig.value, bench.panel._material.value) == (rig, material)
+
+
+def test_a_file_of_ones_own_is_poured(bench, tmp_path):
+    scene = with_values(SOURCE.scene, {"pair.seed.seed.static_friction": 0.2})
+    (tmp_path / "own.toml").write_text(material_toml(scene))
+    bench.panel._material.value, bench.panel._file.value = OWN, f" {tmp_path / 'own.toml'} "
+    assert bench.pour() == ""
+    assert bench.session.now.scene == scene
+
+
+@pytest.mark.parametrize(
+    ("rig", "file", "words"),
+    [
+        ("funnel", "", "name a file"),
+        ("funnel", "/nowhere/own.toml", "neither a file"),
+        ("<script>", "x", "allowed are funnel"),
+        ("inclined_plane", "x", "allowed are funnel"),
+    ],
+)
+def test_what_cannot_be_poured_is_one_line_and_changes_nothing(bench, rig, file, words):
+    bench.panel._rig.value, bench.panel._material.value, bench.panel._file.value = rig, OWN, file
+    notice = bench.pour()
+    assert words in notice
+    assert "\n" not in notice
+    assert bench.session.asked == []
+
+
+def test_bodies_that_do_not_fit_into_the_rig_are_refused(bench, tmp_path):
+    big = with_values(SOURCE.scene, {"rig.outlet_diameter": "60mm"})
+    text = material_toml(big).replace("diameter = 0.06", "diameter = 0.004")
+    (tmp_path / "narrow.toml").write_text(text)
+    bench.panel._material.value, bench.panel._file.value = OWN, str(tmp_path / "narrow.toml")
+    assert "narrow.toml" in bench.pour()
+    assert bench.session.asked == []
+
+
+def test_a_mesh_becomes_the_shape_of_the_chosen_body(bench):
+    bench.session.start(with_values(bead_scene(), {"body.spheres": "coarse"}), 5)
+    bench.panel.show(bench.session.status())
+    assert bench.panel._body.options == ("bead",)
+    assert bench.upload("box.stl", stl()) == ""
+    assert bench.session.now.seed == 5
+    assert bench.session.now.scene.bodies[0].shape.kind == "mesh"
+    # It is a material of one's own now, and can be poured in another rig.
+    bench.panel.show(bench.session.status())
+    assert bench.panel._material.value == OWN
+    assert material_source(bench.panel._file.value).scene == bench.session.now.scene
+    assert bench.session.source.scene == bench.session.now.scene
+
+
+def test_a_bad_mesh_changes_nothing(bench):
+    bench.session.start(bead_scene(), 1)
+    bench.panel.show(bench.session.status())
+    before = (list(bench.session.asked), bench.session.now)
+    assert "not watertight" in bench.upload("open.stl", stl(holes=2))
+    bench.panel._unit.value = "league"
+    assert "allowed are" in bench.upload("box.stl", stl())
+    assert (bench.session.asked, bench.session.now) == before
