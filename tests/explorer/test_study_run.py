@@ -15,7 +15,7 @@ from tests.explorer.command_line import explorer
 class Formula(FormulaRunner):
     """Takes the arguments of a PourRunner and tells its progress in the same way."""
 
-    def __init__(self, scene, store, study, seed, threads, on_run, observer, pours):
+    def __init__(self, scene, store, study, seed, threads, on_run, observer, pours, tries):
         super().__init__(planted, sigma=0.5)
         self._on_run = on_run
 
