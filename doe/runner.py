@@ -128,7 +128,8 @@ def stored_run(
 class PourRunner:
     """Runs settings as pours and keeps every run in the store.
 
-    ``tries`` seeds are tried for one replicate. Pours run in this process, where ``observer`` can watch them, or as ``pours`` says (``solver.Crew.run_queue``).
+    ``tries`` seeds are tried for one replicate. Pours run in this process, where ``observer`` can watch them, or as
+    ``pours`` says (``solver.Crew.run_queue``).
     """
 
     def __init__(

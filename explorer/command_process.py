@@ -3,6 +3,8 @@
 The command writes ``progress.jsonl`` into its output folder, one object per event, which is all that is read here:
 
     {"time": seconds, "stage": text, "done": runs, "planned": runs, "eta_s": seconds or null, "line": text or null}
+
+and, where the command tells it, "stages": {name: [done, planned]} and "run", one run that ended (`explorer.progress`).
 """
 
 from __future__ import annotations
@@ -22,8 +24,9 @@ from pathlib import Path
 from typing import IO, Any, Literal
 
 from explorer.errors import CommandError
+from explorer.stage_progress import StageProgress, TriedRun, with_event, with_run
 
-CommandState = Literal["idle", "running", "cancelled", "finished", "failed"]
+CommandState = Literal["idle", "running", "paused", "cancelled", "finished", "failed"]
 
 NICENESS = 10
 CANCEL_WAIT = 5.0
@@ -36,7 +39,7 @@ PROGRAM = (sys.executable, "-m", "explorer")
 
 @dataclass(frozen=True)
 class CommandStatus:
-    """How far a command is. ``lines`` are partial results, one per finished stage."""
+    """How far a command is. ``lines`` are partial results, one per finished stage; ``tried`` as in `with_run`."""
 
     state: CommandState
     stage: str = ""
@@ -45,6 +48,13 @@ class CommandStatus:
     eta_s: float | None = None
     lines: tuple[str, ...] = ()
     message: str = ""
+    stages: tuple[StageProgress, ...] = ()
+    tried: tuple[TriedRun, ...] = ()
+
+    @property
+    def alive(self) -> bool:
+        """True while the command's process is there, at work or paused."""
+        return self.state in ("running", "paused")
 
 
 class BackgroundError(CommandError):
@@ -87,14 +97,27 @@ class CommandProcess:
     def cancel(self) -> None:
         """Ask the command to stop; :meth:`status` ends it for good if it has not after ``CANCEL_WAIT``."""
         if self._process is not None and self._process.poll() is None:
+            self.go_on()
             self._process.terminate()
             self._cancelled_at = time.monotonic()
             self._status = replace(self._status, message="stopping")
 
+    def pause(self) -> None:
+        """Let the command stand still, workers and all; it keeps its memory and gives the cores free."""
+        if self.status().state == "running" and self._process is not None:
+            os.killpg(self._process.pid, signal.SIGSTOP)
+            self._status = replace(self._status, state="paused")
+
+    def go_on(self) -> None:
+        """Let a paused command go on."""
+        if self._status.state == "paused" and self._process is not None:
+            os.killpg(self._process.pid, signal.SIGCONT)
+            self._status = replace(self._status, state="running")
+
     def close(self) -> None:
         """Cancel what runs and wait for its end."""
         self.cancel()
-        while self.status().state == "running":
+        while self.status().alive:
             time.sleep(0.05)
 
     def status(self) -> CommandStatus:
@@ -113,7 +136,7 @@ class CommandProcess:
 
     def refuse_while_running(self) -> None:
         """Raise BackgroundError while a command runs."""
-        if self.status().state == "running":
+        if self.status().alive:
             raise BackgroundError(f"a {self._what} is running already; cancel it first")
 
     def _launch(self, out: Path, arguments: Sequence[str]) -> None:
@@ -172,6 +195,12 @@ def new_folder(folder: Path, stem: str) -> Path:
     return next(folder / name for name in names if not (folder / name).exists())
 
 
+def finished(folder: Path, result: str) -> tuple[Path, ...]:
+    """Folders in ``folder`` that hold the file ``result``, newest first."""
+    found = [(file.stat().st_mtime, one) for one in folder.glob("*/") if (file := one / result).is_file()]
+    return tuple(one for _, one in sorted(found, reverse=True))
+
+
 def newest_unfinished(folder: Path, stems: Sequence[str], result: str) -> tuple[Path, str] | None:
     """The newest of the folders ``<stem>-<date>-<time>`` that holds no file ``result``, and its stem."""
     name = re.compile(rf"({'|'.join(map(re.escape, stems))})-({STAMP})")
@@ -191,10 +220,13 @@ def advanced(status: CommandStatus, line: bytes) -> CommandStatus:
         stage, done, planned = str(event["stage"]), int(event["done"]), int(event["planned"])
         eta_s = None if eta is None else float(eta)
         result = event["line"]
+        stages, tried = with_event(status.stages, event), with_run(status.tried, event)
     except (ValueError, KeyError, TypeError):
         return status
     lines = status.lines if result is None else (*status.lines, str(result))
-    return replace(status, stage=stage, done=done, planned=planned, eta_s=eta_s, lines=lines)
+    return replace(
+        status, stage=stage, done=done, planned=planned, eta_s=eta_s, lines=lines, stages=stages, tried=tried
+    )
 
 
 def _whole_lines(stream: IO[bytes]) -> list[bytes]:

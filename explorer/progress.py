@@ -1,8 +1,8 @@
 """Progress of a study: one line per event for a person, one JSON object per event for the page.
 
 ``progress.jsonl``: {"time", "stage", "done", "planned", "eta_s", "line", "stages", "run"}; done and planned count runs
-of the whole study, ``line`` is what a stage found, once it has ended, ``stages`` maps every stage to its [done, planned],
-and ``run`` is the run that ended (`told_run`), null for any other event.
+of the whole study, ``line`` is what a stage found, once it has ended, ``stages`` maps every stage to its [done,
+planned], and ``run`` is the run that ended (`told_run`), null for any other event.
 """
 
 from __future__ import annotations

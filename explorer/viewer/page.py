@@ -95,7 +95,7 @@ class Page:
         self._study: StudyPanel | None = None
         if study is not None:
             with tabs.add_tab("Calibrate", viser.Icon.TARGET):
-                self._study = StudyPanel(server, study, study_name, post)
+                self._study = StudyPanel(server, study, study_name, post, session)
         with tabs.add_tab("Diagnose", viser.Icon.STETHOSCOPE):
             self._diagnosis = DiagnosisPanel(server, diagnosis, shipped_measurements(), post)
 

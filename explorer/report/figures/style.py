@@ -1,4 +1,8 @@
-"""Colours and parts that the charts share. Every colour reads on a light and on a dark page."""
+"""Colours and parts that the charts share.
+
+Every colour reads on a light and on a dark page, and any two are told apart also by people with the common forms of
+colour blindness (a test holds both).
+"""
 
 from __future__ import annotations
 
@@ -9,16 +13,17 @@ from explorer.report.content import Spec
 
 Json = dict[str, Any]
 
-FACTOR = "#3d7fb8"
-ASSUMPTION = "#d07a2c"
+FACTOR = "#4c5dd1"
+ASSUMPTION = "#d47e2c"
 DUMMY = "#8d949c"
-TARGET = "#2b9a81"
-CHOSEN = "#c2455a"
+TARGET = "#4dad70"
+CHOSEN = "#b5292d"
 INK = "#2b2f34"
 """Lines on a filled ground that is light on every page."""
-MARGIN_BAND = "rgba(43, 154, 129, 0.08)"
-CLOUD = "rgba(61, 127, 184, 0.4)"
-BELOW_TO_ABOVE = [[0.0, "#3d7fb8"], [0.5, "#efece6"], [1.0, "#d07a2c"]]
+MARGIN_BAND = "rgba(77, 173, 112, 0.08)"
+INTERVAL_BAND = "rgba(76, 93, 209, 0.22)"
+CLOUD = "rgba(76, 93, 209, 0.4)"
+BELOW_TO_ABOVE = [[0.0, FACTOR], [0.5, "#efece6"], [1.0, ASSUMPTION]]
 """Colour scale of a surface: below, at and above the target."""
 
 
@@ -47,6 +52,18 @@ def side_by_side(panels: int, gap: float = 0.06) -> list[list[float]]:
     """Domains of ``panels`` charts in a row."""
     width = (1.0 - gap * (panels - 1)) / panels
     return [[k * (width + gap), k * (width + gap) + width] for k in range(panels)]
+
+
+def stacked(spec: Spec, gap: float = 0.16) -> Spec:
+    """A chart of panels in a row as panels one below the other, for a narrow place."""
+    layout = dict(spec["layout"])
+    panels = sum(1 for key in layout if key.startswith("xaxis"))
+    height = (1.0 - gap * (panels - 1)) / panels
+    for k in range(panels):
+        top = 1.0 - k * (height + gap)
+        layout[f"xaxis{suffix(k)}"] = layout[f"xaxis{suffix(k)}"] | {"domain": [0.0, 1.0]}
+        layout[f"yaxis{suffix(k)}"] = layout[f"yaxis{suffix(k)}"] | {"domain": [max(0.0, top - height), top]}
+    return {"data": spec["data"], "layout": layout | {"height": panels * layout["height"]}}
 
 
 def suffix(panel: int) -> str:
