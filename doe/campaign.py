@@ -14,15 +14,7 @@ from doe.profile import Profile
 from doe.record import Record, plain
 from doe.runner import Run, Runner, Setting
 from doe.stages.ascent import AscentResult, ascent
-from doe.stages.lines import (
-    ascent_line,
-    optimum_line,
-    pilot_line,
-    scan_line,
-    screening_line,
-    surface_line,
-    verification_line,
-)
+from doe.stages.lines import LINES
 from doe.stages.pilot import Bias, PilotResult, pilot
 from doe.stages.scan import ScanResult, scan
 from doe.stages.screening import ScreeningResult, assumptions, screening
@@ -78,7 +70,7 @@ def run_campaign(
     seconds: dict[str, float] = {}
     counted = CountingRunner(runner)
 
-    def timed(stage: str, work: Analysis, line: Callable[[Any], str]) -> Any:
+    def timed(stage: str, work: Analysis) -> Any:
         started = time.perf_counter()
         on_begin(stage, work)
         try:
@@ -88,20 +80,20 @@ def run_campaign(
             raise StudyStopped(stage, f"{error} (the last runs: {seen})", counted.runs) from error
         seconds[stage] = time.perf_counter() - started
         on_result(stage, result)
-        on_stage(stage, line(result) if result is not None else "not declared in this study")
+        on_stage(stage, LINES[stage](result) if result is not None else "not declared in this study")
         return result
 
-    piloted: PilotResult = timed("pilot", lambda by: pilot(study, profile, by, estimator_bias), pilot_line)
+    piloted: PilotResult = timed("pilot", lambda by: pilot(study, profile, by, estimator_bias))
     sized = piloted.profile
     response = piloted.estimator
-    screened = timed("screening", lambda by: screening(study, sized, by, response), screening_line)
-    assumed = timed("assumptions", lambda by: assumptions(study, sized, by, response), screening_line)
+    screened = timed("screening", lambda by: screening(study, sized, by, response))
+    assumed = timed("assumptions", lambda by: assumptions(study, sized, by, response))
     noise = piloted.noise[study.targets[0].observable]
-    scanned = timed("scan", lambda by: scan(study, sized, by, noise), scan_line)
-    walked = timed("ascent", lambda by: ascent(study, sized, by, screened, noise), ascent_line)
-    fitted = timed("surface", lambda by: surface(study, sized, by, walked.factors, walked.region), surface_line)
-    chosen = timed("optimum", lambda _: optimum(study, fitted), optimum_line)
-    verified = timed("verification", lambda by: verification(study, sized, by, chosen.values), verification_line)
+    scanned = timed("scan", lambda by: scan(study, sized, by, noise))
+    walked = timed("ascent", lambda by: ascent(study, sized, by, screened, noise))
+    fitted = timed("surface", lambda by: surface(study, sized, by, walked.factors, walked.region))
+    chosen = timed("optimum", lambda _: optimum(study, fitted))
+    verified = timed("verification", lambda by: verification(study, sized, by, chosen.values))
     return CampaignResult(piloted, screened, assumed, scanned, walked, fitted, chosen, verified, stage_seconds=seconds)
 
 

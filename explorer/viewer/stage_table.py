@@ -10,7 +10,7 @@ FAILURES_SHOWN = 6
 DONE, AT_WORK, TO_COME = "done", "▶", "–"
 
 
-def stages_markdown(status: CommandStatus, what: str, runs: str, notice: str = "") -> str:
+def stages_markdown(status: CommandStatus, what: str, runs: str, notice: str = "", so_far: str = "") -> str:
     """State, a row per stage, and failed runs; texts of the command are escaped.
 
     Args:
@@ -18,6 +18,7 @@ def stages_markdown(status: CommandStatus, what: str, runs: str, notice: str = "
         what: what a run of the command is called, such as "study".
         runs: heading of what is counted, such as "Runs".
         notice: the page's own last message, such as a refused click.
+        so_far: what the stage at work would find if it ended now.
     """
     state = STATE_WORDS.get(status.state, f"No {what} runs.")
     if status.alive and status.planned:
@@ -27,7 +28,7 @@ def stages_markdown(status: CommandStatus, what: str, runs: str, notice: str = "
     parts = [state]
     parts += [escaped(text) for text in dict.fromkeys((notice, status.message)) if text]
     if status.stages:
-        parts.append(_table(status, runs))
+        parts.append(_table(status, runs, so_far))
     lost = failures(status.tried)
     if lost:
         parts.append(failures_markdown(lost))
@@ -46,17 +47,18 @@ def failures_markdown(lost: tuple[Failure, ...]) -> str:
     return f"{head}\n\n| Stage | Setting | Outcome | Seed | Next seed |\n|:--|:--|:--|--:|:--|\n{rows}"
 
 
-def _table(status: CommandStatus, runs: str) -> str:
-    rows = "\n".join(_row(stage, status) for stage in status.stages)
+def _table(status: CommandStatus, runs: str, so_far: str) -> str:
+    rows = "\n".join(_row(stage, status, so_far) for stage in status.stages)
     return f"| Stage | {runs} | | Found |\n|:--|--:|:-:|:--|\n{rows}"
 
 
-def _row(stage: StageProgress, status: CommandStatus) -> str:
+def _row(stage: StageProgress, status: CommandStatus, so_far: str) -> str:
     over = stage.finding is not None or 0 < stage.planned <= stage.done
     at_work = status.alive and not over and stage.name == status.stage
     mark = DONE if over else AT_WORK if at_work else TO_COME
     count = f"{stage.done} of {stage.planned}" if stage.planned else TO_COME
-    return f"| {escaped(stage.name)} | {count} | {mark} | {escaped(stage.finding or '')} |"
+    found = stage.finding or (f"so far: {so_far}" if at_work and so_far else "")
+    return f"| {escaped(stage.name)} | {count} | {mark} | {escaped(found)} |"
 
 
 def _outcome(one: Failure) -> str:

@@ -49,6 +49,7 @@ class StudyPanel:
         self._alive, self._over = ResultFile(PARTIAL, RESULT), ResultFile(RESULT, PARTIAL)
         self._shown: Hashable = None
         self._trouble = ""
+        self._so_far = ("", "")
         gui.add_markdown(f"**{escaped(name)}** — screening, steepest ascent, response surface, optimum, verification.")
         self._profile = gui.add_dropdown(
             "Profile",
@@ -84,7 +85,8 @@ class StudyPanel:
         Call it inside ``server.atomic()``, about twice a second.
         """
         status = self._study.status()
-        text = stages_markdown(status, "study", "Runs", notice)
+        stage, line = self._so_far
+        text = stages_markdown(status, "study", "Runs", notice, line if stage == status.stage else "")
         waiting = self._study.waiting()
         if waiting:
             text += f"\n\nWaiting: {escaped('; '.join(waiting))}."
@@ -115,6 +117,8 @@ class StudyPanel:
         file = self._alive if present and self._study.status().alive else self._over
         folder = self._present() if folder is None else folder
         result = file.read(folder)
+        if present:
+            self._so_far = (str((result or {}).get("partial")), str((result or {}).get("line")))
         now = (folder, file.version)
         if now == self._shown:
             return

@@ -184,6 +184,8 @@ def test_a_study_that_still_runs_has_plots_of_what_it_has(tmp_path, monkeypatch)
             spec = plot.make()
             assert spec is not None, title
             json.dumps(spec, allow_nan=False)
+    assert "over 3 seeds" in next(version["line"] for version in versions)
+    assert not any("nan" in version["line"] for version in versions)
     in_surface = next(v for v in versions if v["partial"] == "surface")
     assert "optimum" not in in_surface
     assert "Contours" in study_plots(in_surface)

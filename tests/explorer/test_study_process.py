@@ -146,11 +146,12 @@ def ticks(folder):
     return len((folder / "ticks").read_text())
 
 
+# A worker of the command writes: what stands still has to be all of it.
 TICKING = """
-while True:
-    with (out / "ticks").open("a") as file:
-        file.write(".")
-    time.sleep(0.01)
+import os, subprocess
+worker = "import os, sys, time; parent = os.getppid()\\nwhile os.getppid() == parent:\\n"
+worker += " open(sys.argv[1], 'a').write('.'); time.sleep(0.01)"
+subprocess.Popen([sys.executable, "-c", worker, str(out / "ticks")]).wait()
 """
 
 

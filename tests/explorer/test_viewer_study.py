@@ -4,6 +4,7 @@ import json
 import math
 from pathlib import Path
 
+import plotly.io
 import pytest
 
 from explorer.command_process import CommandStatus
@@ -203,6 +204,7 @@ def test_dark_and_light(table, result, tmp_path):
     # plotly_dark writes light text, plotly_white dark text
     assert (dark["font"]["color"], light["font"]["color"]) == ("#f2f5fa", "#2a3f5f")
     assert table.panel.dark is False
+    assert set(light) == set(plotly.io.templates["plotly_white"].to_plotly_json()["layout"])
 
 
 def test_zoom_belongs_to_one_chart():
@@ -229,10 +231,15 @@ def test_what_a_browser_sends_for_the_list_may_be_anything(server):
 
 
 def test_a_study_that_runs_shows_what_it_has(table, result, tmp_path):
-    partial = {key: result[key] for key in ("study", "pilot", "screening")} | {"partial": "screening"}
+    partial = {key: result[key] for key in ("study", "pilot", "screening")} | {
+        "partial": "screening",
+        "line": "X7 *acts*",
+    }
     table.study.out = written(tmp_path / "study-1", partial, "partial.json")
-    table.study.now = CommandStatus("running", "screening", 40, 100)
+    table.study.now = CommandStatus("running", "screening", 40, 100, stages=(StageProgress("screening", 20, 84),))
     table.panel.show("")
+    table.panel.show("")
+    assert r"| screening | 20 of 84 | ▶ | so far: X7 \*acts\* |" in table.panel._view._text.content
     assert "Half-normal" in table.panel._plots._choice.options
     assert "Ascent path" not in table.panel._plots._choice.options
     assert table.panel._runs._stage.options == ("pilot", "screening")
