@@ -51,7 +51,8 @@ class PartialStages:
             return
         self._runs.append(run)
         began = self._clock()
-        if began < self._due:
+        # Runs from the store come all at once; the next one that is really made finds them all.
+        if run.reused or began < self._due:
             return
         try:
             result = self._analysis(KnownRuns(self._runs))
@@ -60,4 +61,4 @@ class PartialStages:
         if result is not None:
             self._on_partial(stage, result)
         now = self._clock()
-        self._due = now + max(LEAST_INTERVAL, (now - began) / SHARE)
+        self._due = now + max(LEAST_INTERVAL if result is not None else 0.0, (now - began) / SHARE)

@@ -31,6 +31,8 @@ CommandState = Literal["idle", "running", "paused", "cancelled", "finished", "fa
 NICENESS = 10
 CANCEL_WAIT = 5.0
 """Seconds that a cancelled command has to write what it has, before it is ended for good."""
+LOCK_WAIT = 1.0
+"""Seconds that the folder of a command of our own, which has ended, may stay locked by its workers."""
 STAMP = r"\d{8}-\d{6}(?:-\d+)?"
 """Date, time and perhaps a number: the end of an output folder's name."""
 PROGRAM = (sys.executable, "-m", "explorer")
@@ -140,15 +142,15 @@ class CommandProcess:
             raise BackgroundError(f"a {self._what} is running already; cancel it first")
 
     def _launch(self, out: Path, arguments: Sequence[str]) -> None:
+        # Workers of a command of our own that has just ended may hold the lock for a moment longer.
+        patience = LOCK_WAIT if out == self.out else 0.0
         self.out, self._command = out, arguments[0]
         nice = shutil.which("nice")
         lower = [nice, "-n", str(NICENESS)] if nice else []
         with self._log().open("ab") as log:
             # The child inherits the lock with the open file, and holds it to its end, whatever becomes of the page.
-            try:
-                fcntl.flock(log, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                raise BackgroundError(f"{out}: runs already, started from another page") from None
+            if not _locked(log, patience):
+                raise BackgroundError(f"{out}: runs already, started from another page")
             # A session of its own: Ctrl-C for the page must not cut a run in two, cancel() ends it in order.
             self._process = subprocess.Popen(
                 [*lower, *self._program, *arguments],
@@ -227,6 +229,20 @@ def advanced(status: CommandStatus, line: bytes) -> CommandStatus:
     return replace(
         status, stage=stage, done=done, planned=planned, eta_s=eta_s, lines=lines, stages=stages, tried=tried
     )
+
+
+def _locked(file: IO[bytes], patience: float) -> bool:
+    """Lock ``file`` for this process and its children, waiting for at most ``patience`` seconds; True if it is."""
+    end = time.monotonic() + patience
+    while True:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() >= end:
+                return False
+            time.sleep(0.02)
+        else:
+            return True
 
 
 def _whole_lines(stream: IO[bytes]) -> list[bytes]:

@@ -1,8 +1,11 @@
 """A stage analysed over the runs that have ended so far."""
 
+import dataclasses
+
 import pytest
 
 from doe.campaign import run_campaign
+from doe.errors import StatisticsError
 from doe.partial import LEAST_INTERVAL, KnownRuns, PartialStages
 from doe.runner import Setting
 from tests.doe.formula_runner import FormulaRunner
@@ -94,3 +97,33 @@ def test_analyses_wait_and_runs_of_another_stage_are_left_out():
     now[0] = LEAST_INTERVAL
     follower.add("scan", run[2])
     assert seen[1] == [run]
+
+
+def test_runs_from_the_store_are_analysed_with_the_next_one_that_is_made():
+    seen = []
+    follower = PartialStages(lambda stage, result: seen.append(result), clock=lambda: 0.0)
+    follower.begin("scan", lambda runner: runner.run("scan", [Setting("a", {}, 9)])[0])
+    made = FormulaRunner(planted).run("scan", [Setting("a", {}, 3)])[0]
+    stored = [dataclasses.replace(run, reused=True) for run in made[:2]]
+    for run in stored:
+        follower.add("scan", run)
+    assert seen == []
+    follower.add("scan", made[2])
+    assert seen == [[*stored, made[2]]]
+
+
+def test_too_few_runs_are_no_reason_to_wait():
+    seen = []
+
+    def analysis(runner):
+        runs = runner.run("scan", [Setting("a", {}, 9)])[0]
+        if len(runs) < 3:
+            raise StatisticsError("too few")
+        return runs
+
+    follower = PartialStages(lambda stage, result: seen.append(result), clock=lambda: 0.0)
+    follower.begin("scan", analysis)
+    made = FormulaRunner(planted).run("scan", [Setting("a", {}, 5)])[0]
+    for run in made:
+        follower.add("scan", run)
+    assert seen == [made[:3]]

@@ -187,6 +187,16 @@ def test_a_page_that_closes_ends_a_paused_study(tmp_path):
     assert process.status().state == "cancelled"
 
 
+def test_a_worker_that_lingers_does_not_stand_in_the_way_of_going_on(tmp_path):
+    lingering = "import subprocess; subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(0.5)'])"
+    process = study(tmp_path, lingering)
+    process.start("quick")
+    wait_for(lambda: not process.status().alive)
+    process._process.resume(process.out, process._arguments(process.out))
+    wait_for(lambda: not process.status().alive)
+    assert process.status().state == "finished"
+
+
 def test_a_queued_study_starts_after_the_one_before(tmp_path):
     process = study(tmp_path, "time.sleep(60 if 'quick' in arguments else 0)")
     process.queue("quick")  # nothing runs: at once
