@@ -60,9 +60,9 @@ def test_every_stage_that_makes_runs_shows_itself_before_its_end(followed):
 def test_a_screening_has_intervals_from_the_first_replicate_of_all_rows_on(followed):
     seen, result = followed
     sizes = [found.analysis.runs for stage, found in seen if stage == "screening"]
-    # 24 factors and a mean ask for 25 rows at least; 84 runs in all.
+    # A mean and 24 factors, 10 of which act on too few bodies and are given up where rows are missing: 15 rows at least.
     assert sizes == sorted(sizes)
-    assert 25 <= sizes[0] <= 34
+    assert 15 <= sizes[0] <= 28
     early = next(found for stage, found in seen if stage == "screening" and found.analysis.runs >= 28)
     assert early.analysis.dummy_error is not None
     late = [found for stage, found in seen if stage == "screening"][-1]
