@@ -13,13 +13,11 @@ import numpy.typing as npt
 
 from doe.record import Record
 from doe.store import Store, StoredRun, run_key
+from doe.study import TRIES
 from solver import Job, Outcome, Scene, code_version, observe, parameters, run_queue, value, with_values
 from solver import Record as PourRecord
 
 FloatArray = npt.NDArray[np.float64]
-
-TRIES = 3
-"""Seeds that are tried for one replicate; a run that jammed or broke is kept with its outcome and replaced."""
 
 
 @dataclass(frozen=True)

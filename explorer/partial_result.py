@@ -14,16 +14,15 @@ from typing import Any
 
 from doe.record import plain
 from doe.stages.lines import LINES
+from explorer.study_process import PARTIAL
 from explorer.whole_file import write_whole
-
-NAME = "partial.json"
 
 
 class PartialResult:
     """The file in the output folder of one study; ``study`` is the key of that name."""
 
     def __init__(self, folder: Path, study: Mapping[str, Any]) -> None:
-        self._file, self._found = folder / NAME, {"study": plain(study)}
+        self._file, self._found = folder / PARTIAL, {"study": plain(study)}
         self.remove()
 
     def show(self, stage: str, result: Any) -> None:

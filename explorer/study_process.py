@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from doe.study import with_profile
+from doe.study import TRIES, with_profile
 from explorer.command_process import (
     PROGRAM,
     BackgroundError,
@@ -29,10 +29,8 @@ from explorer.whole_file import write_whole
 PROFILES = ("quick", "standard", "full")
 ENDINGS = {0: "report", 3: "above the error limit; report"}
 """Exit codes of ``calibrate`` after a complete chain."""
-RESULT = "result.json"
+RESULT, PARTIAL = "result.json", "partial.json"
 NO_EDITS = StudyEdits()
-TRIES = 3
-"""Seeds per replicate of a study that nobody asked to try again, and how many a retry adds."""
 MOST_WAITING = 5
 
 

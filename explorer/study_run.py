@@ -14,9 +14,9 @@ from doe.campaign import SCHEMA, STAGES, CampaignResult, planned_runs, run_campa
 from doe.partial import PartialStages
 from doe.profile import Profile
 from doe.record import plain
-from doe.runner import TRIES, PourRunner, Run
+from doe.runner import PourRunner, Run
 from doe.store import Store, default_store
-from doe.study import Study, load_study, with_profile
+from doe.study import TRIES, Study, load_study, with_profile
 from explorer.errors import CommandError
 from explorer.partial_result import PartialResult
 from explorer.progress import Progress, told_of_pauses
@@ -61,7 +61,7 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> float:
     say(f"{study.name}, profile {profile.name}: {sum(planned.values())} runs of {1e3 * profile.mass:g} g; store {path}")
     progress = Progress(order.out / "progress.jsonl", planned, say, terminal=sys.stdout.isatty())
     progress.compiling()
-    partial = PartialResult(order.out, described(study, profile))
+    partial = PartialResult(order.out, described(study, profile, order.tries))
     follower = PartialStages(partial.show)
 
     def ended(stage: str, run: Run, remaining: int) -> None:
@@ -87,7 +87,7 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> float:
         )
         bias = estimator_bias(study.estimators)
         found = run_campaign(study, profile, runner, bias, progress.stage, follower.begin, partial.keep)
-    result = result_of(study, profile, found, progress.elapsed)
+    result = result_of(study, profile, found, progress.elapsed, order.tries)
     write_whole(order.out / "result.json", json.dumps(result, ensure_ascii=False, allow_nan=False, indent=1) + "\n")
     write_report(result, order.out)
     partial.remove()
@@ -100,7 +100,7 @@ def holds_more_than(folder: Path, study_file: Path) -> bool:
     return folder.is_dir() and any(entry.resolve() != study_file.resolve() for entry in folder.iterdir())
 
 
-def described(study: Study, profile: Profile) -> dict[str, Any]:
+def described(study: Study, profile: Profile, tries: int = TRIES) -> dict[str, Any]:
     """What was asked: the key ``study`` of ``result.json``."""
     return {
         "name": study.name,
@@ -113,16 +113,19 @@ def described(study: Study, profile: Profile) -> dict[str, Any]:
         "assumed": study.scene.assumed,
         "changes": study.changes,
         "seed": study.seed,
+        "tries": tries,
     }
 
 
-def result_of(study: Study, profile: Profile, found: CampaignResult, total_s: float) -> dict[str, Any]:
+def result_of(
+    study: Study, profile: Profile, found: CampaignResult, total_s: float, tries: int = TRIES
+) -> dict[str, Any]:
     """The content of ``result.json``: study, one key per stage, runs, timing, versions, shapes."""
     runs = summary_of_runs(found)
     return plain(
         {
             "schema": SCHEMA,
-            "study": described(study, profile),
+            "study": described(study, profile, tries),
             **found.to_dict(),
             "runs": runs,
             "timing": {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from typing import Any
 
 import viser
@@ -60,13 +60,12 @@ class PlotView:
             self._choice.options = titles
         self._draw()
 
-    def show_anew(self, title: str) -> None:
-        """Choose ``title``, whose chart shows something else now."""
-        if title in self._plots:
-            if self._choice.value != title:
-                self._choice.value = title  # type: ignore[misc]
-            self._shown = None
-            self._draw()
+    def show_anew(self, titles: Sequence[str]) -> None:
+        """Draw again what shows something else now: the chosen chart if it is one of ``titles``, else the first."""
+        if self._choice.value not in titles:
+            self._choice.value = titles[0]  # type: ignore[misc]
+        self._shown = None
+        self._draw()
 
     def _draw(self) -> None:
         title = str(self._choice.value)  # what a browser sent may be anything

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import viser
 
+from explorer.report.content import Spec
 from explorer.report.figures.model import chosen_point, section_point
 from explorer.report.figures.profiler import prediction, profiler
 from explorer.report.findings import Plain
-from explorer.report.plot import Plot
+from explorer.report.plot import Plot, Plots
 from explorer.report.units_for_people import (
     axis_title,
     fixed,
@@ -35,7 +37,7 @@ class ProfilerPanel:
     Args:
         server: the page.
         post: how a callback leaves its action.
-        moved: called after a slider was moved; the chart is to be drawn anew.
+        moved: called with the titles of the charts after a slider was moved; one of them is to be drawn anew.
         apply: takes path → value [SI], for the live pour.
     """
 
@@ -43,7 +45,7 @@ class ProfilerPanel:
         self,
         server: viser.ViserServer,
         post: Post,
-        moved: Callable[[], None],
+        moved: Callable[[Sequence[str]], None],
         apply: Callable[[Mapping[str, float | str]], None],
     ) -> None:
         self._gui, self._post, self._moved, self._apply = server.gui, post, moved, apply
@@ -69,12 +71,10 @@ class ProfilerPanel:
             self._build()
         self._tell()
 
-    def plot(self) -> dict[str, Plot]:
-        """The chart at the present values, under its title; none before there is a surface."""
-        if self._result is None:
-            return {}
+    def plots(self) -> Plots:
+        """The chart of every target at the present values; none before there is a surface."""
         caption = "Each row: the model along one factor, the others where the sliders are; band 95 %; dashed: target."
-        return {TITLE: Plot(self._draw, caption, 1.35)}
+        return {title: Plot(partial(self._draw, k), caption, 1.35) for k, title in enumerate(self._titles())}
 
     def values(self) -> list[float]:
         """Values of the factors [SI] where the sliders are, within the region; raises InputError."""
@@ -87,8 +87,14 @@ class ProfilerPanel:
             found.append(min(max(checked(slider.value, low / size, high / size, factor["name"]) * size, low), high))
         return found
 
-    def _draw(self) -> dict[str, Any] | None:
-        return None if self._result is None else profiler(self._result, 0, self.values())
+    def _titles(self) -> list[str]:
+        targets = [] if self._result is None else self._result["study"]["targets"]
+        if len(targets) == 1:
+            return [TITLE]
+        return [f"{TITLE}: {observable_label(target['observable'])}" for target in targets]
+
+    def _draw(self, index: int) -> Spec | None:
+        return None if self._result is None else profiler(self._result, index, self.values())
 
     def _paths(self) -> list[str]:
         assert self._result is not None
@@ -124,7 +130,7 @@ class ProfilerPanel:
     def _follow(self) -> None:
         if self._result is not None:
             self._tell()
-            self._moved()
+            self._moved(self._titles())
 
     def _to_optimum(self) -> None:
         if self._result is None:

@@ -7,18 +7,16 @@ from pathlib import Path
 
 import viser
 
-from explorer.partial_result import NAME as PARTIAL
 from explorer.report.findings import Plain
 from explorer.report.study_plots import study_plots
 from explorer.result_file import ResultFile
 from explorer.session import Session
-from explorer.study_process import PROFILES, RESULT, StudyProcess
+from explorer.study_process import PARTIAL, PROFILES, RESULT, StudyProcess
 from explorer.viewer.actions import Post
 from explorer.viewer.comparison_panel import ComparisonPanel
 from explorer.viewer.order_panel import OrderPanel
 from explorer.viewer.plot_view import PlotView
 from explorer.viewer.process_view import ProcessView, escaped
-from explorer.viewer.profiler_panel import TITLE as PROFILER
 from explorer.viewer.profiler_panel import ProfilerPanel
 from explorer.viewer.result_chooser import ResultChooser, title
 from explorer.viewer.run_chooser import RunChooser
@@ -64,7 +62,7 @@ class StudyPanel:
         self._plots = PlotView(server, "Chart", EMPTY, post, dark)
         self._chooser = ResultChooser(server, "Result", PRESENT, RESULT, post, self._follow)
         with gui.add_folder("Profiler", expand_by_default=False):
-            self._profiler = ProfilerPanel(server, post, lambda: self._plots.show_anew(PROFILER), self._set_live)
+            self._profiler = ProfilerPanel(server, post, self._plots.show_anew, self._set_live)
         with gui.add_folder("Runs, poured again", expand_by_default=False):
             self._runs = RunChooser(server, session, post)
         with gui.add_folder("Compare two studies", expand_by_default=False):
@@ -132,7 +130,7 @@ class StudyPanel:
 
     def _show_result(self, result: Plain | None, name: str, version: Hashable) -> None:
         self._profiler.show(result)
-        plots = {} if result is None else {**study_plots(result), **self._profiler.plot()}
+        plots = {} if result is None else {**study_plots(result), **self._profiler.plots()}
         self._plots.offer(plots, version)
         self._runs.show(result)
         self._comparison.show(result, name, version)

@@ -60,7 +60,7 @@ def test_every_stage_that_makes_runs_shows_itself_before_its_end(followed):
 def test_a_screening_has_intervals_from_the_first_replicate_of_all_rows_on(followed):
     seen, result = followed
     sizes = [found.analysis.runs for stage, found in seen if stage == "screening"]
-    # A mean and 24 factors, 10 of which act on too few bodies and are given up where rows are missing: 15 rows at least.
+    # A mean and 24 factors, of which 10 act on too few bodies and are given up while rows are missing: 15 at least.
     assert sizes == sorted(sizes)
     assert 15 <= sizes[0] <= 28
     early = next(found for stage, found in seen if stage == "screening" and found.analysis.runs >= 28)

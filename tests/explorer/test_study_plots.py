@@ -10,7 +10,7 @@ from scipy import stats
 
 from doe.campaign import run_campaign
 from doe.partial import PartialStages
-from explorer.partial_result import NAME, PartialResult
+from explorer.partial_result import PartialResult
 from explorer.report.diagnosis_plots import diagnosis_plots
 from explorer.report.figures.effects import errors_at_hand, pareto_against
 from explorer.report.figures.main_effects import main_effects
@@ -19,6 +19,7 @@ from explorer.report.figures.profiler import prediction, profiler
 from explorer.report.figures.surface import residual_quantiles
 from explorer.report.figures.surface_3d import height_over, solutions
 from explorer.report.study_plots import study_plots
+from explorer.study_process import PARTIAL
 from explorer.study_run import described
 from tests.doe.formula_runner import FormulaRunner
 from tests.explorer import diagnosed, reported_studies
@@ -173,7 +174,7 @@ def test_a_study_that_still_runs_has_plots_of_what_it_has(tmp_path, monkeypatch)
 
     def show(stage, found):
         partial.show(stage, found)
-        versions.append(json.loads((tmp_path / NAME).read_text()))
+        versions.append(json.loads((tmp_path / PARTIAL).read_text()))
 
     ticks = iter(range(10**6))
     follower = PartialStages(show, clock=lambda: 2.0 * next(ticks))
@@ -190,8 +191,8 @@ def test_a_study_that_still_runs_has_plots_of_what_it_has(tmp_path, monkeypatch)
     assert "optimum" not in in_surface
     assert "Contours" in study_plots(in_surface)
     assert "Verification" not in study_plots(in_surface)
-    whole = json.loads((tmp_path / NAME).read_text())
+    whole = json.loads((tmp_path / PARTIAL).read_text())
     assert whole["partial"] is None
     assert math.isfinite(whole["verification"]["tests"][0]["simulated"]["mean"])
     partial.remove()
-    assert not (tmp_path / NAME).exists()
+    assert not (tmp_path / PARTIAL).exists()

@@ -281,6 +281,27 @@ def test_the_profiler_follows_its_sliders_and_sets_the_live_pour(table, result, 
     assert profiler.values() == pytest.approx([result["optimum"]["values"][path] for path in paths], rel=1e-5)
 
 
+def test_every_target_has_a_profiler(table, tmp_path):
+    table.study.out = written(tmp_path / "study-1", reported_studies.result_of_case("two targets"))
+    table.panel.show("")
+    profiler, plots = table.panel._profiler, table.panel._plots
+    titles = [title for title in plots._choice.options if title.startswith(PROFILER)]
+    assert len(titles) == 2
+    slider = profiler._sliders[0]
+    for title, unit in zip(titles, ("°", "kg/m³"), strict=True):
+        table.enter(plots._choice, title)
+        table.enter(slider, slider.min)
+        before = drawn(plots)
+        table.enter(slider, slider.max)
+        assert plots._choice.value == title
+        assert drawn(plots)["data"] != before["data"]
+        assert f"[{unit}]" in drawn(plots)["layout"]["yaxis"]["title"]["text"]
+        assert unit in profiler._words.content
+    table.enter(plots._choice, "Half-normal")
+    table.enter(slider, slider.min)
+    assert plots._choice.value == titles[0]
+
+
 def test_values_that_act_on_restart_begin_the_pour_anew():
     session = FakeSession()
     set_live(session, {"rig.outlet_height": 0.07, "pair.seed.seed.static_friction": 0.5})
