@@ -11,12 +11,12 @@ from explorer.report.figures.effects import all_effects, errors_at_hand, half_no
 from explorer.report.figures.main_effects import main_effects
 from explorer.report.figures.noise import noise_of_estimators
 from explorer.report.figures.optimum import cloud, ranges
-from explorer.report.figures.style import stacked
+from explorer.report.figures.style import short_rows, stacked
 from explorer.report.figures.surface import contours, fit, residual_quantiles
 from explorer.report.figures.surface_3d import height_over, solutions
 from explorer.report.figures.verification import verification
 from explorer.report.figures.walks import ascent_path, scan
-from explorer.report.findings import Plain
+from explorer.report.findings import ErrorName, Plain
 from explorer.report.plot import Plot, Plots
 from explorer.report.units_for_people import observable_label
 
@@ -30,14 +30,17 @@ def study_plots(result: Plain) -> Plots:
 
 def _pilot(result: Plain) -> Named:
     caption = "Whiskers: 95 % intervals; bias: its range over the ways to fill a cone with bodies."
-    yield "Noise of the estimators", Plot(partial(noise_of_estimators, result["pilot"]), caption, 0.8)
+    yield (
+        "Noise of the estimators",
+        Plot(lambda: short_rows(stacked(noise_of_estimators(result["pilot"]))), caption, 1.7),
+    )
 
 
 def _screening(result: Plain) -> Named:
     part = result["screening"]
     for error in errors_at_hand(part):
         caption = "Dashed: limit for one factor (t, 95 %); solid: for all factors at once (Bonferroni). Grey: dummies."
-        yield f"Pareto of effects, by {error}", Plot(partial(pareto_against, part, [error]), caption, 1.5)
+        yield f"Pareto of effects, by {error}", Plot(partial(_pareto, part, error), caption, 1.5)
     if any(effect["effect"] is not None for effect in part["analysis"]["effects"]):
         caption = "Effects of pure noise lie on a line through zero; Lenth's margins, 95 %."
         yield "Half-normal", Plot(partial(half_normal, part), caption)
@@ -45,7 +48,7 @@ def _screening(result: Plain) -> Named:
         # The chart of all effects shows the assumptions beside them once they are there.
         beside = result if "assumptions" in result else result | {"assumptions": None}
         caption = "Low → high, each over its own range, 95 % intervals; hollow: too few bodies to be tested."
-        yield "Effects with intervals", Plot(partial(all_effects, beside), caption, 1.5)
+        yield "Effects with intervals", Plot(lambda: short_rows(all_effects(beside)), caption, 1.6)
 
 
 def _scan(result: Plain) -> Named:
@@ -80,13 +83,17 @@ def _optimum(result: Plain) -> Named:
         "Optimum and its refits",
         Plot(lambda: stacked(cloud(result)), "Each dot: the optimum of one resampling.", 2.0),
     )
-    yield "Ranges of the optimum", Plot(partial(ranges, result), "Shares of the screened ranges.", 0.9)
+    yield "Ranges of the optimum", Plot(lambda: short_rows(ranges(result)), "Shares of the screened ranges.", 0.9)
 
 
 def _verification(result: Plain) -> Named:
     for index, of in _targets(result, "verification"):
         caption = "Band: the margin of equivalence around the measured mean."
         yield f"Verification{of}", Plot(partial(verification, result, index), caption)
+
+
+def _pareto(screening: Plain, error: ErrorName) -> Spec:
+    return short_rows(pareto_against(screening, [error]))
 
 
 def _one_below_the_other(make: Callable[[Plain, int], Spec], result: Plain, index: int) -> Spec:

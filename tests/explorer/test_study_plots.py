@@ -1,5 +1,6 @@
 """Charts of the page: from every kind of result, whole or in part, and from every kind of diagnosis."""
 
+import itertools
 import json
 import math
 
@@ -15,7 +16,9 @@ from explorer.report.diagnosis_plots import diagnosis_plots
 from explorer.report.figures.effects import errors_at_hand, pareto_against
 from explorer.report.figures.main_effects import main_effects
 from explorer.report.figures.model import chosen_point, model_of
+from explorer.report.figures.noise import noise_of_estimators
 from explorer.report.figures.profiler import prediction, profiler
+from explorer.report.figures.style import short_rows, stacked
 from explorer.report.figures.surface import residual_quantiles
 from explorer.report.figures.surface_3d import height_over, solutions
 from explorer.report.study_plots import study_plots
@@ -78,6 +81,30 @@ def test_the_pareto_of_one_error_has_its_limits(result):
     assert drawn == [error["t_limit"], error["t_limit_bonferroni"]]
     # Student's t, 95 %, two-sided; Bonferroni over the 24 factors.
     assert drawn == pytest.approx([stats.t.ppf(0.975, error["df"]), stats.t.ppf(1 - 0.025 / 24, error["df"])])
+
+
+def test_panels_in_a_row_become_panels_below_each_other(result):
+    before = noise_of_estimators(result["pilot"])
+    after = stacked(before)
+    panels = [key for key in before["layout"] if key.startswith("xaxis")]
+    assert len(panels) == 3  # σ, d′ and bias, which share the axis of the estimators
+    ends = [after["layout"][key.replace("x", "y", 1)]["domain"] for key in panels]
+    assert all(low > following_high for (low, _), (_, following_high) in itertools.pairwise(ends))
+    for trace, old in zip(after["data"], before["data"], strict=True):
+        assert trace["x"] == old["x"]
+        assert trace.get("yaxis", "y") == trace.get("xaxis", "x").replace("x", "y")
+    (zero,) = after["layout"]["shapes"]  # the line of no bias, in the last panel
+    assert (zero["xref"], zero["yref"]) == ("x3", "y3 domain")
+    assert len(before["layout"]) < len(after["layout"])
+
+
+def test_short_names_of_rows_keep_the_long_ones_for_the_hover(result):
+    error = errors_at_hand(result["screening"])[0]
+    long = pareto_against(result["screening"], [error])
+    axis = short_rows(long)["layout"]["yaxis"]
+    names = dict(zip(axis["tickvals"], axis["ticktext"], strict=True))
+    assert names["X7 · static friction seed–seed"] == "X7"
+    assert set(names) == set(long["data"][0]["y"])
 
 
 def test_main_effects_differ_by_the_effect(result):
@@ -185,7 +212,7 @@ def test_a_study_that_still_runs_has_plots_of_what_it_has(tmp_path, monkeypatch)
             spec = plot.make()
             assert spec is not None, title
             json.dumps(spec, allow_nan=False)
-    assert "over 3 seeds" in next(version["line"] for version in versions)
+    assert "over 2 seeds" in next(version["line"] for version in versions)
     assert not any("nan" in version["line"] for version in versions)
     in_surface = next(v for v in versions if v["partial"] == "surface")
     assert "optimum" not in in_surface

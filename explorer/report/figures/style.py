@@ -55,15 +55,33 @@ def side_by_side(panels: int, gap: float = 0.06) -> list[list[float]]:
 
 
 def stacked(spec: Spec, gap: float = 0.16) -> Spec:
-    """A chart of panels in a row as panels one below the other, for a narrow place."""
+    """A chart of panels in a row as panels one below the other, for a narrow place; a shared y axis is repeated."""
     layout = dict(spec["layout"])
     panels = sum(1 for key in layout if key.startswith("xaxis"))
     height = (1.0 - gap * (panels - 1)) / panels
+    shared = [k for k in range(1, panels) if f"yaxis{suffix(k)}" not in layout]
     for k in range(panels):
         top = 1.0 - k * (height + gap)
-        layout[f"xaxis{suffix(k)}"] = layout[f"xaxis{suffix(k)}"] | {"domain": [0.0, 1.0]}
-        layout[f"yaxis{suffix(k)}"] = layout[f"yaxis{suffix(k)}"] | {"domain": [max(0.0, top - height), top]}
-    return {"data": spec["data"], "layout": layout | {"height": panels * layout["height"]}}
+        y = layout["yaxis"] | {"title": {"text": ""}} if k in shared else layout[f"yaxis{suffix(k)}"]
+        layout[f"xaxis{suffix(k)}"] = layout[f"xaxis{suffix(k)}"] | {"domain": [0.0, 1.0], "anchor": f"y{suffix(k)}"}
+        domain = [max(0.0, top - height), top]
+        layout[f"yaxis{suffix(k)}"] = y | {"domain": domain, "anchor": f"x{suffix(k)}"}
+    own = {f"x{suffix(k)}": f"y{suffix(k)}" for k in shared}
+    traces = [t | {"yaxis": own[t["xaxis"]]} if t.get("xaxis") in own else t for t in spec["data"]]
+    for key in ("shapes", "annotations"):
+        if key in layout:
+            layout[key] = [
+                one | {"yref": f"{own[one['xref']]} domain"} if one.get("xref") in own else one for one in layout[key]
+            ]
+    return {"data": traces, "layout": layout | {"height": panels * layout["height"]}}
+
+
+def short_rows(spec: Spec) -> Spec:
+    """The same with the names of the rows cut at " · ", for a narrow place; hovering still tells all."""
+    rows = dict.fromkeys(row for trace in spec["data"] for row in trace["y"] if isinstance(row, str))
+    ticks = {"tickvals": list(rows), "ticktext": [row.split(" · ")[0].replace(", ", ",<br>") for row in rows]}
+    axes = {key: one | ticks for key, one in spec["layout"].items() if key.startswith("yaxis")}
+    return {"data": spec["data"], "layout": spec["layout"] | axes}
 
 
 def suffix(panel: int) -> str:
