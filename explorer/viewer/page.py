@@ -21,12 +21,12 @@ from explorer.viewer.actions import Actions
 from explorer.viewer.chart import Chart
 from explorer.viewer.diagnosis_panel import DiagnosisPanel
 from explorer.viewer.live_panel import LivePanel
-from explorer.viewer.palette import BRAND
 from explorer.viewer.readout import readout_html
 from explorer.viewer.restart_panel import RestartPanel
 from explorer.viewer.run_panel import RunPanel
 from explorer.viewer.scene_nodes import SceneNodes
 from explorer.viewer.study_panel import StudyPanel
+from explorer.viewer.theme import DARK, ThemeSwitch, apply_theme
 from solver.assets import shipped_measurements
 from solver.scene import Scene
 
@@ -81,9 +81,7 @@ class Page:
         self, status: Status, study: StudyProcess | None, study_name: str, diagnosis: DiagnosisProcess
     ) -> None:
         server, session, post = self._server, self._session, self._actions.post
-        server.gui.configure_theme(
-            dark_mode=True, show_share_button=False, show_logo=False, brand_color=BRAND, control_width="large"
-        )
+        apply_theme(server, DARK)
         server.gui.main_panel.dock_right()
         tabs = server.gui.add_tab_group()
         with tabs.add_tab("Pour", viser.Icon.PLAYER_PLAY):
@@ -98,6 +96,12 @@ class Page:
                 self._study = StudyPanel(server, study, study_name, post, session)
         with tabs.add_tab("Diagnose", viser.Icon.STETHOSCOPE):
             self._diagnosis = DiagnosisPanel(server, diagnosis, shipped_measurements(), post)
+        ThemeSwitch(server, post, self._follow_theme)
+
+    def _follow_theme(self, dark: bool) -> None:
+        for panel in (self._study, self._diagnosis):
+            if panel is not None:
+                panel.dark = dark
 
     def run(self, stop: threading.Event) -> None:
         """Keep the page up to date until ``stop`` is set."""

@@ -20,6 +20,7 @@ from explorer.viewer.plot_view import NOTHING, PlotView
 from explorer.viewer.profiler_panel import TITLE as PROFILER
 from explorer.viewer.stage_table import stages_markdown
 from explorer.viewer.study_panel import PRESENT, StudyPanel, set_live
+from explorer.viewer.theme import ThemeSwitch
 from solver import asset_path, load_material
 from solver.scene import value
 from tests.explorer import reported_studies
@@ -205,6 +206,18 @@ def test_dark_and_light(table, result, tmp_path):
     assert (dark["font"]["color"], light["font"]["color"]) == ("#f2f5fa", "#2a3f5f")
     assert table.panel.dark is False
     assert set(light) == set(plotly.io.templates["plotly_white"].to_plotly_json()["layout"])
+
+
+def test_the_switch_of_the_page_turns_viser_and_the_charts(server, monkeypatch):
+    themes, told, actions = [], [], Actions()
+    monkeypatch.setattr(server.gui, "configure_theme", lambda **theme: themes.append(theme["dark_mode"]))
+    switch = ThemeSwitch(server, actions.post, told.append)
+    for sent in (False, True):
+        switch._dark.value = sent
+        for callback in switch._dark._impl.update_cb:
+            callback(type("Event", (), {"client_id": 0}))
+        assert actions.carry_out() == ""
+    assert themes == told == [False, True]
 
 
 def test_zoom_belongs_to_one_chart():
