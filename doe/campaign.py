@@ -9,19 +9,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from doe.errors import StatisticsError, StudyStopped
+from doe.partial import Analysis
 from doe.profile import Profile
 from doe.record import Record, plain
 from doe.runner import Run, Runner, Setting
 from doe.stages.ascent import AscentResult, ascent
-from doe.stages.lines import (
-    ascent_line,
-    optimum_line,
-    pilot_line,
-    scan_line,
-    screening_line,
-    surface_line,
-    verification_line,
-)
+from doe.stages.lines import LINES
 from doe.stages.pilot import Bias, PilotResult, pilot
 from doe.stages.scan import ScanResult, scan
 from doe.stages.screening import ScreeningResult, assumptions, screening
@@ -64,36 +57,43 @@ def run_campaign(
     runner: Runner,
     estimator_bias: Bias,
     on_stage: Callable[[str, str], None] = lambda stage, line: None,
+    on_begin: Callable[[str, Analysis], None] = lambda stage, analysis: None,
+    on_result: Callable[[str, Any], None] = lambda stage, result: None,
 ) -> CampaignResult:
     """Run every stage; ``on_stage`` is called with (stage, one line of what it found) as each ends.
+
+    ``on_begin`` is called with (stage, its analysis as a function of a runner) before a stage, ``on_result`` with
+    (stage, its result or None) after it.
 
     Raises StudyStopped where what the runs of a stage gave cannot be analysed.
     """
     seconds: dict[str, float] = {}
     counted = CountingRunner(runner)
 
-    def timed(stage: str, work: Callable[[], Any], line: Callable[[Any], str]) -> Any:
+    def timed(stage: str, work: Analysis) -> Any:
         started = time.perf_counter()
+        on_begin(stage, work)
         try:
-            result = work()
+            result = work(counted)
         except StatisticsError as error:
             seen = ", ".join(f"{number} {outcome}" for outcome, number in counted.outcomes.items())
             raise StudyStopped(stage, f"{error} (the last runs: {seen})", counted.runs) from error
         seconds[stage] = time.perf_counter() - started
-        on_stage(stage, line(result) if result is not None else "not declared in this study")
+        on_result(stage, result)
+        on_stage(stage, LINES[stage](result) if result is not None else "not declared in this study")
         return result
 
-    piloted: PilotResult = timed("pilot", lambda: pilot(study, profile, counted, estimator_bias), pilot_line)
+    piloted: PilotResult = timed("pilot", lambda by: pilot(study, profile, by, estimator_bias))
     sized = piloted.profile
     response = piloted.estimator
-    screened = timed("screening", lambda: screening(study, sized, counted, response), screening_line)
-    assumed = timed("assumptions", lambda: assumptions(study, sized, counted, response), screening_line)
+    screened = timed("screening", lambda by: screening(study, sized, by, response))
+    assumed = timed("assumptions", lambda by: assumptions(study, sized, by, response))
     noise = piloted.noise[study.targets[0].observable]
-    scanned = timed("scan", lambda: scan(study, sized, counted, noise), scan_line)
-    walked = timed("ascent", lambda: ascent(study, sized, counted, screened, noise), ascent_line)
-    fitted = timed("surface", lambda: surface(study, sized, counted, walked.factors, walked.region), surface_line)
-    chosen = timed("optimum", lambda: optimum(study, fitted), optimum_line)
-    verified = timed("verification", lambda: verification(study, sized, counted, chosen.values), verification_line)
+    scanned = timed("scan", lambda by: scan(study, sized, by, noise))
+    walked = timed("ascent", lambda by: ascent(study, sized, by, screened, noise))
+    fitted = timed("surface", lambda by: surface(study, sized, by, walked.factors, walked.region))
+    chosen = timed("optimum", lambda _: optimum(study, fitted))
+    verified = timed("verification", lambda by: verification(study, sized, by, chosen.values))
     return CampaignResult(piloted, screened, assumed, scanned, walked, fitted, chosen, verified, stage_seconds=seconds)
 
 

@@ -13,13 +13,11 @@ import numpy.typing as npt
 
 from doe.record import Record
 from doe.store import Store, StoredRun, run_key
+from doe.study import TRIES
 from solver import Job, Outcome, Scene, code_version, observe, parameters, run_queue, value, with_values
 from solver import Record as PourRecord
 
 FloatArray = npt.NDArray[np.float64]
-
-TRIES = 3
-"""Seeds that are tried for one replicate; a run that jammed or broke is kept with its outcome and replaced."""
 
 
 @dataclass(frozen=True)
@@ -128,7 +126,8 @@ def stored_run(
 class PourRunner:
     """Runs settings as pours and keeps every run in the store.
 
-    Pours run in this process, where ``observer`` can watch them, or as ``pours`` says (``solver.Crew.run_queue``).
+    ``tries`` seeds are tried for one replicate. Pours run in this process, where ``observer`` can watch them, or as
+    ``pours`` says (``solver.Crew.run_queue``).
     """
 
     def __init__(
@@ -141,10 +140,11 @@ class PourRunner:
         on_run: OnRun | None = None,
         observer: PourObserver | None = None,
         pours: Pours | None = None,
+        tries: int = TRIES,
     ) -> None:
         self._scene, self._store, self._study, self._seed = scene, store, study, study_seed
         self._threads, self._on_run, self._observer = threads, on_run, observer
-        self._pours = pours
+        self._pours, self._tries = pours, tries
 
     def run(self, stage: str, settings: Sequence[Setting]) -> list[list[Run]]:
         """See :class:`Runner`. Runs found in the store are taken from there."""
@@ -156,7 +156,7 @@ class PourRunner:
 
         def settle(run: Run, row: int) -> None:
             found[row].append(run)
-            again = not run.valid and run.attempt + 1 < TRIES
+            again = not run.valid and run.attempt + 1 < self._tries
             waiting[0] -= 0 if again else 1
             if self._on_run is not None:
                 self._on_run(stage, run, waiting[0])
@@ -172,9 +172,11 @@ class PourRunner:
                 places.append((row, replicate, attempt))
                 queue.append(Job(scenes[row], seed, tag=len(places) - 1))
 
-        for row, setting in enumerate(settings):
-            for replicate in range(setting.replicates):
-                request(row, replicate, 0)
+        # The whole design once, then again: what is there so far can be analysed long before the last run.
+        for replicate in range(max((setting.replicates for setting in settings), default=0)):
+            for row, setting in enumerate(settings):
+                if replicate < setting.replicates:
+                    request(row, replicate, 0)
 
         def sample(job: Job, pour: Any) -> None:
             if self._observer is not None:

@@ -43,6 +43,9 @@ CALIBRATED = 3
 COLUMNS = 27
 """Columns of the 28-run design; those without a factor are its dummies."""
 
+TRIES = 3
+"""Seeds that are tried for one replicate; a run that jammed or broke is kept with its outcome and replaced."""
+
 Values = dict[str, float | str]
 
 

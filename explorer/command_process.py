@@ -3,6 +3,8 @@
 The command writes ``progress.jsonl`` into its output folder, one object per event, which is all that is read here:
 
     {"time": seconds, "stage": text, "done": runs, "planned": runs, "eta_s": seconds or null, "line": text or null}
+
+and, where the command tells it, "stages": {name: [done, planned]} and "run", one run that ended (`explorer.progress`).
 """
 
 from __future__ import annotations
@@ -22,12 +24,15 @@ from pathlib import Path
 from typing import IO, Any, Literal
 
 from explorer.errors import CommandError
+from explorer.stage_progress import StageProgress, TriedRun, with_event, with_run
 
-CommandState = Literal["idle", "running", "cancelled", "finished", "failed"]
+CommandState = Literal["idle", "running", "paused", "cancelled", "finished", "failed"]
 
 NICENESS = 10
 CANCEL_WAIT = 5.0
 """Seconds that a cancelled command has to write what it has, before it is ended for good."""
+LOCK_WAIT = 1.0
+"""Seconds that the folder of a command of our own, which has ended, may stay locked by its workers."""
 STAMP = r"\d{8}-\d{6}(?:-\d+)?"
 """Date, time and perhaps a number: the end of an output folder's name."""
 PROGRAM = (sys.executable, "-m", "explorer")
@@ -36,7 +41,7 @@ PROGRAM = (sys.executable, "-m", "explorer")
 
 @dataclass(frozen=True)
 class CommandStatus:
-    """How far a command is. ``lines`` are partial results, one per finished stage."""
+    """How far a command is. ``lines`` are partial results, one per finished stage; ``tried`` as in `with_run`."""
 
     state: CommandState
     stage: str = ""
@@ -45,6 +50,13 @@ class CommandStatus:
     eta_s: float | None = None
     lines: tuple[str, ...] = ()
     message: str = ""
+    stages: tuple[StageProgress, ...] = ()
+    tried: tuple[TriedRun, ...] = ()
+
+    @property
+    def alive(self) -> bool:
+        """True while the command's process is there, at work or paused."""
+        return self.state in ("running", "paused")
 
 
 class BackgroundError(CommandError):
@@ -87,14 +99,27 @@ class CommandProcess:
     def cancel(self) -> None:
         """Ask the command to stop; :meth:`status` ends it for good if it has not after ``CANCEL_WAIT``."""
         if self._process is not None and self._process.poll() is None:
+            self.go_on()
             self._process.terminate()
             self._cancelled_at = time.monotonic()
             self._status = replace(self._status, message="stopping")
 
+    def pause(self) -> None:
+        """Let the command stand still, workers and all; it keeps its memory and gives the cores free."""
+        if self.status().state == "running" and self._process is not None:
+            os.killpg(self._process.pid, signal.SIGSTOP)
+            self._status = replace(self._status, state="paused")
+
+    def go_on(self) -> None:
+        """Let a paused command go on."""
+        if self._status.state == "paused" and self._process is not None:
+            os.killpg(self._process.pid, signal.SIGCONT)
+            self._status = replace(self._status, state="running")
+
     def close(self) -> None:
         """Cancel what runs and wait for its end."""
         self.cancel()
-        while self.status().state == "running":
+        while self.status().alive:
             time.sleep(0.05)
 
     def status(self) -> CommandStatus:
@@ -113,19 +138,19 @@ class CommandProcess:
 
     def refuse_while_running(self) -> None:
         """Raise BackgroundError while a command runs."""
-        if self.status().state == "running":
+        if self.status().alive:
             raise BackgroundError(f"a {self._what} is running already; cancel it first")
 
     def _launch(self, out: Path, arguments: Sequence[str]) -> None:
+        # Workers of a command of our own that has just ended may hold the lock for a moment longer.
+        patience = LOCK_WAIT if out == self.out else 0.0
         self.out, self._command = out, arguments[0]
         nice = shutil.which("nice")
         lower = [nice, "-n", str(NICENESS)] if nice else []
         with self._log().open("ab") as log:
             # The child inherits the lock with the open file, and holds it to its end, whatever becomes of the page.
-            try:
-                fcntl.flock(log, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                raise BackgroundError(f"{out}: runs already, started from another page") from None
+            if not _locked(log, patience):
+                raise BackgroundError(f"{out}: runs already, started from another page")
             # A session of its own: Ctrl-C for the page must not cut a run in two, cancel() ends it in order.
             self._process = subprocess.Popen(
                 [*lower, *self._program, *arguments],
@@ -172,6 +197,12 @@ def new_folder(folder: Path, stem: str) -> Path:
     return next(folder / name for name in names if not (folder / name).exists())
 
 
+def finished(folder: Path, result: str) -> tuple[Path, ...]:
+    """Folders in ``folder`` that hold the file ``result``, newest first."""
+    found = [(file.stat().st_mtime, one) for one in folder.glob("*/") if (file := one / result).is_file()]
+    return tuple(one for _, one in sorted(found, reverse=True))
+
+
 def newest_unfinished(folder: Path, stems: Sequence[str], result: str) -> tuple[Path, str] | None:
     """The newest of the folders ``<stem>-<date>-<time>`` that holds no file ``result``, and its stem."""
     name = re.compile(rf"({'|'.join(map(re.escape, stems))})-({STAMP})")
@@ -191,10 +222,27 @@ def advanced(status: CommandStatus, line: bytes) -> CommandStatus:
         stage, done, planned = str(event["stage"]), int(event["done"]), int(event["planned"])
         eta_s = None if eta is None else float(eta)
         result = event["line"]
+        stages, tried = with_event(status.stages, event), with_run(status.tried, event)
     except (ValueError, KeyError, TypeError):
         return status
     lines = status.lines if result is None else (*status.lines, str(result))
-    return replace(status, stage=stage, done=done, planned=planned, eta_s=eta_s, lines=lines)
+    return replace(
+        status, stage=stage, done=done, planned=planned, eta_s=eta_s, lines=lines, stages=stages, tried=tried
+    )
+
+
+def _locked(file: IO[bytes], patience: float) -> bool:
+    """Lock ``file`` for this process and its children, waiting for at most ``patience`` seconds; True if it is."""
+    end = time.monotonic() + patience
+    while True:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() >= end:
+                return False
+            time.sleep(0.02)
+        else:
+            return True
 
 
 def _whole_lines(stream: IO[bytes]) -> list[bytes]:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 from explorer.command_process import (
     PROGRAM,
     BackgroundError,
     CommandProcess,
     CommandStatus,
+    finished,
     new_folder,
     newest_unfinished,
 )
@@ -29,14 +29,24 @@ class DiagnosisProcess(Protocol):
     def cancel(self) -> None:
         """Stop the diagnosis that runs; finished pours are kept."""
 
+    def pause(self) -> None:
+        """Let the diagnosis that runs stand still."""
+
+    def go_on(self) -> None:
+        """Let it go on."""
+
     def resume(self, data: str) -> None:
         """Go on with the newest one of ``data`` that was stopped. Raises a ValueError where there is none."""
 
     def status(self) -> CommandStatus:
         """State, progress and what the parts have found."""
 
-    def result(self) -> dict[str, Any] | None:
-        """Content of ``diagnosis.json`` once it is finished."""
+    @property
+    def out(self) -> Path | None:
+        """Output folder of the diagnosis started last, None before the first."""
+
+    def finished(self) -> tuple[Path, ...]:
+        """Output folders of finished diagnoses, newest first."""
 
 
 class DiagnoseProcess:
@@ -51,8 +61,8 @@ class DiagnoseProcess:
     def __init__(self, folder: Path, store: Path | None = None, program: Sequence[str] = PROGRAM) -> None:
         self._folder, self._store = folder, store
         self._process = CommandProcess("diagnosis", {0: "report"}, program)
-        self._result: tuple[Path, dict[str, Any]] | None = None
         self.cancel, self.close, self.status = self._process.cancel, self._process.close, self._process.status
+        self.pause, self.go_on = self._process.pause, self._process.go_on
 
     def start(self, data: str) -> None:
         """Start a new diagnosis of ``data``."""
@@ -70,14 +80,14 @@ class DiagnoseProcess:
             raise BackgroundError(f"no diagnosis of {measured.name} has been stopped before its end")
         self._process.resume(found[0], self._arguments(measured, found[0]))
 
-    def result(self) -> dict[str, Any] | None:
-        """Content of ``diagnosis.json`` once it is finished; it is read once."""
-        out = self._process.out
-        if out is None or self.status().state != "finished":
-            return None
-        if self._result is None or self._result[0] != out:
-            self._result = out, json.loads((out / RESULT).read_text(encoding="utf-8"))
-        return self._result[1]
+    @property
+    def out(self) -> Path | None:
+        """Output folder of the diagnosis started last."""
+        return self._process.out
+
+    def finished(self) -> tuple[Path, ...]:
+        """Output folders of finished diagnoses, of any data, newest first."""
+        return finished(self._folder, RESULT)
 
     def _arguments(self, measured: Path, out: Path) -> list[str]:
         """The command line that is run, as a person would type it."""

@@ -21,10 +21,10 @@ SET_UP = ("rig", "insertion", "numerics")
 def material_toml(scene: Scene, heading: str = "") -> str:
     """The file; ``heading`` becomes comment lines at its top."""
     parts = ["".join(f"# {line}".rstrip() + "\n" for line in heading.splitlines()), _head(scene)]
-    parts += [_table(f"materials.{_key(m.name)}", _fields(m, ("density", "shear_modulus", "poisson_ratio")))
+    parts += [_table(f"materials.{toml_key(m.name)}", _fields(m, ("density", "shear_modulus", "poisson_ratio")))
               for m in scene.materials]  # fmt: skip
     parts += ["[[body]]\n" + _lines(dict(_body(body))) for body in scene.bodies]
-    parts += [_table(f"pair.{_key(p.a)}.{_key(p.b)}", _fields(p, ("static_friction", "restitution")))
+    parts += [_table(f"pair.{toml_key(p.a)}.{toml_key(p.b)}", _fields(p, ("static_friction", "restitution")))
               for p in scene.pairs]  # fmt: skip
     parts += [_table(kind, _set_up(scene, kind)) for kind in SET_UP]
     parts += [_table(f"effect.{effect.name}", _of_effect(scene, effect.name)) for effect in scene.effects]
@@ -94,21 +94,24 @@ def _table(name: str, entries: Mapping[str, Any]) -> str:
 
 
 def _lines(entries: Mapping[str, Any]) -> str:
-    return "".join(f"{_key(key)} = {_toml(entry)}\n" for key, entry in entries.items())
+    return "".join(f"{toml_key(key)} = {toml_value(entry)}\n" for key, entry in entries.items())
 
 
-def _key(name: str) -> str:
+def toml_key(name: str) -> str:
+    """``name`` as a key, quoted where it has to be."""
     return name if name.replace("_", "").replace("-", "").isalnum() and name.isascii() else json.dumps(name)
 
 
-def _toml(entry: Any) -> str:
+def toml_value(entry: Any) -> str:
     """A value of a plain type; every float in the digits that give it back."""
     if isinstance(entry, Mapping):
-        return "{ " + ", ".join(f"{_key(key)} = {_toml(item)}" for key, item in entry.items()) + " }"
+        return "{ " + ", ".join(f"{toml_key(key)} = {toml_value(item)}" for key, item in entry.items()) + " }"
     if isinstance(entry, list | tuple):
-        return "[" + ", ".join(_toml(item) for item in entry) + "]"
+        return "[" + ", ".join(toml_value(item) for item in entry) + "]"
     if isinstance(entry, str):
         return json.dumps(entry, ensure_ascii=False)
+    if isinstance(entry, bool):
+        return "true" if entry else "false"
     if isinstance(entry, int):
         return str(entry)
     return repr(float(entry))

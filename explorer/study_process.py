@@ -1,30 +1,67 @@
-"""A calibration in the background: the command line's ``calibrate --headless`` (see `explorer.command_process`)."""
+"""Calibrations in the background: the command line's ``calibrate --headless`` (see `explorer.command_process`).
+
+One runs at a time. Others wait in a queue: the next one starts when the one before has come to its end, be that a
+report or a failure; a study that was cancelled leaves the queue waiting for the next start.
+"""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from doe.study import TRIES, with_profile
 from explorer.command_process import (
     PROGRAM,
     BackgroundError,
     CommandProcess,
     CommandStatus,
+    finished,
     new_folder,
     newest_unfinished,
 )
+from explorer.stage_progress import given_up
+from explorer.study_edit import StudyEdits, edited_study
+from explorer.whole_file import write_whole
 
 PROFILES = ("quick", "standard", "full")
 ENDINGS = {0: "report", 3: "above the error limit; report"}
 """Exit codes of ``calibrate`` after a complete chain."""
+RESULT, PARTIAL = "result.json", "partial.json"
+NO_EDITS = StudyEdits()
+MOST_WAITING = 5
 
 
 class StudyProcess(Protocol):
-    """What the page needs of a study that runs somewhere."""
+    """What the page needs of studies that run somewhere."""
 
-    def start(self, profile: str) -> None:
-        """Start a new study. Raises BackgroundError where one runs already or the profile is unknown."""
+    @property
+    def study_file(self) -> Path:
+        """The study as it is without changes."""
+
+    @property
+    def out(self) -> Path | None:
+        """Output folder of the study started last, None before the first."""
+
+    def start(self, profile: str, edits: StudyEdits = NO_EDITS) -> None:
+        """Start a new study. Raises a ValueError where one runs already or the order cannot be carried out."""
+
+    def queue(self, profile: str, edits: StudyEdits = NO_EDITS) -> None:
+        """Start it after those before it; at once if none runs and none waits."""
+
+    def clear_queue(self) -> None:
+        """Forget the studies that wait."""
+
+    def waiting(self) -> tuple[str, ...]:
+        """The studies that wait, next one first, in words."""
+
+    def pause(self) -> None:
+        """Let the study that runs stand still."""
+
+    def go_on(self) -> None:
+        """Let it go on."""
 
     def cancel(self) -> None:
         """Stop the study that runs; finished runs are kept."""
@@ -32,8 +69,24 @@ class StudyProcess(Protocol):
     def resume(self) -> None:
         """Go on with the study started last, also before this page. Raises BackgroundError where there is none."""
 
+    def retry(self) -> None:
+        """Run it again with more seeds for replicates without a valid run. Raises BackgroundError where none is."""
+
     def status(self) -> CommandStatus:
         """State, progress and partial results."""
+
+    def finished(self) -> tuple[Path, ...]:
+        """Output folders of finished studies, newest first."""
+
+
+@dataclass(frozen=True)
+class Order:
+    """One study that was asked for."""
+
+    profile: str
+    edits: StudyEdits
+    text: str
+    """Content of its own study file; empty for the file as it is."""
 
 
 class CalibrationProcess:
@@ -49,19 +102,39 @@ class CalibrationProcess:
     def __init__(
         self, study_file: Path, folder: Path, store: Path | None = None, program: Sequence[str] = PROGRAM
     ) -> None:
-        self._study_file, self._folder, self._store = study_file, folder, store
+        self.study_file, self._folder, self._store = study_file, folder, store
         self._process = CommandProcess("study", ENDINGS, program)
-        self._profile = ""
-        self.cancel, self.close, self.status = self._process.cancel, self._process.close, self._process.status
+        self._profile, self._tries = "", TRIES
+        self._waiting: deque[Order] = deque()
+        self._follow_up = False
+        self.cancel, self.pause, self.go_on = self._process.cancel, self._process.pause, self._process.go_on
 
-    def start(self, profile: str) -> None:
+    @property
+    def out(self) -> Path | None:
+        """Output folder of the study started last."""
+        return self._process.out
+
+    def start(self, profile: str, edits: StudyEdits = NO_EDITS) -> None:
         """Start a new calibration with ``profile``."""
-        if profile not in PROFILES:
-            raise BackgroundError(f"profile: {profile!r} is not one of {', '.join(PROFILES)}")
+        order = self._order(profile, edits)
         self._process.refuse_while_running()
-        self._profile = profile
-        out = new_folder(self._folder, self._stem(profile))
-        self._process.start(out, self._arguments(out))
+        self._begin(order)
+
+    def queue(self, profile: str, edits: StudyEdits = NO_EDITS) -> None:
+        """Start it when those before it have ended."""
+        if len(self._waiting) >= MOST_WAITING:
+            raise BackgroundError(f"{MOST_WAITING} studies wait already; more are not kept")
+        self._waiting.append(self._order(profile, edits))
+        if not self.status().alive:
+            self._begin(self._waiting.popleft())
+
+    def clear_queue(self) -> None:
+        """Forget the studies that wait."""
+        self._waiting.clear()
+
+    def waiting(self) -> tuple[str, ...]:
+        """Profile of every study that waits, and whether it was changed."""
+        return tuple(f"{order.profile}{', changed' if order.text else ''}" for order in self._waiting)
 
     def resume(self) -> None:
         """Go on where the last calibration was stopped, be it one of an earlier session of the page.
@@ -69,20 +142,82 @@ class CalibrationProcess:
         Runs that are in the store are not repeated.
         """
         self._process.refuse_while_running()
+        self._resume(self._last())
+
+    def retry(self) -> None:
+        """Run the last calibration again, with more seeds for replicates that are left without a valid run."""
+        self._process.refuse_while_running()
+        lost = given_up(self.status().tried, self._tries)
+        if not lost and self.status().state != "failed":
+            raise BackgroundError("nothing to try again: every replicate of the last study has a valid run")
+        out = self._last()
+        self._tries += TRIES
+        self._resume(out)
+
+    def status(self) -> CommandStatus:
+        """State, progress and partial results; starts the next study of the queue when one has ended."""
+        status = self._process.status()
+        if status.alive:
+            self._follow_up = True
+        elif self._follow_up:
+            self._follow_up = False
+            if self._waiting and status.state in ("finished", "failed"):
+                self._begin(self._waiting.popleft())
+                return self._process.status()
+        return status
+
+    def close(self) -> None:
+        """Cancel what runs and wait for its end."""
+        self.clear_queue()
+        self._process.close()
+
+    def finished(self) -> tuple[Path, ...]:
+        """Output folders of finished studies, of any study file, newest first."""
+        return finished(self._folder, RESULT)
+
+    def _order(self, profile: str, edits: StudyEdits) -> Order:
+        if profile not in PROFILES:
+            raise BackgroundError(f"profile: {profile!r} is not one of {', '.join(PROFILES)}")
+        if not edits:
+            return Order(profile, edits, "")
+        text, study = edited_study(self.study_file, edits)
+        with_profile(study, profile)
+        return Order(profile, edits, text)
+
+    def _begin(self, order: Order) -> None:
+        self._profile, self._tries = order.profile, TRIES
+        out = new_folder(self._folder, self._stem(order.profile))
+        if order.text:
+            out.mkdir()
+            write_whole(out / self._edited_name, order.text)
+        self._process.start(out, self._arguments(out))
+        self._follow_up = True
+
+    def _last(self) -> Path:
         out = self._process.out
         if out is None:
             stems = {self._stem(profile): profile for profile in PROFILES}
-            found = newest_unfinished(self._folder, tuple(stems), "result.json")
+            found = newest_unfinished(self._folder, tuple(stems), RESULT)
             if found is None:
                 raise BackgroundError("no study has been stopped before its end; there is nothing to resume")
             out, self._profile = found[0], stems[found[1]]
+        return out
+
+    def _resume(self, out: Path) -> None:
         self._process.resume(out, self._arguments(out))
+        self._follow_up = True
+
+    @property
+    def _edited_name(self) -> str:
+        return f"{self.study_file.stem}_changed.toml"
 
     def _stem(self, profile: str) -> str:
-        return f"{self._study_file.stem}-{profile}"
+        return f"{self.study_file.stem}-{profile}"
 
     def _arguments(self, out: Path) -> list[str]:
         """The command line that is run, as a person would type it."""
         store = () if self._store is None else ("--store", str(self._store))
-        study = ("--study", str(self._study_file), "--profile", self._profile)
-        return ["calibrate", "--headless", *study, "--out", str(out), *store]
+        own = out / self._edited_name
+        study = ("--study", str(own if own.is_file() else self.study_file), "--profile", self._profile)
+        tries = () if self._tries == TRIES else ("--tries", str(self._tries))
+        return ["calibrate", "--headless", *study, "--out", str(out), *store, *tries]

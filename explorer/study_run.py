@@ -10,14 +10,16 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from doe.campaign import SCHEMA, CampaignResult, planned_runs, run_campaign, summary_of_runs
+from doe.campaign import SCHEMA, STAGES, CampaignResult, planned_runs, run_campaign, summary_of_runs
+from doe.partial import PartialStages
 from doe.profile import Profile
 from doe.record import plain
-from doe.runner import PourRunner
+from doe.runner import PourRunner, Run
 from doe.store import Store, default_store
-from doe.study import Study, load_study, with_profile
+from doe.study import TRIES, Study, load_study, with_profile
 from explorer.errors import CommandError
-from explorer.progress import Progress
+from explorer.partial_result import PartialResult
+from explorer.progress import Progress, told_of_pauses
 from explorer.report import write_report
 from explorer.run_result import versions
 from explorer.whole_file import write_whole
@@ -40,6 +42,7 @@ class StudyOrder:
     store: Path | None = None
     record: Path | None = None
     threads: int | None = None
+    tries: int = TRIES
 
 
 def run_study(order: StudyOrder, say: Callable[[str], None]) -> float:
@@ -48,16 +51,25 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> float:
     Finished runs are kept in the store, so a study that was interrupted goes on where it stopped.
     """
     study, profile = with_profile(load_study(order.study), order.profile)
-    if order.out.is_file() or (order.out.is_dir() and any(order.out.iterdir()) and not order.resume):
+    if order.out.is_file() or (holds_more_than(order.out, study.file) and not order.resume):
         raise CommandError(f"--out {order.out}: is not empty; name a new folder, or add --resume to go on there")
     path = order.store or default_store()
     store = Store(path)
     order.out.mkdir(parents=True, exist_ok=True)
-    planned = planned_runs(study, profile)
+    counts = planned_runs(study, profile)
+    planned = {stage: counts.get(stage, 0) for stage in STAGES}
     say(f"{study.name}, profile {profile.name}: {sum(planned.values())} runs of {1e3 * profile.mass:g} g; store {path}")
     progress = Progress(order.out / "progress.jsonl", planned, say, terminal=sys.stdout.isatty())
     progress.compiling()
+    partial = PartialResult(order.out, described(study, profile, order.tries))
+    follower = PartialStages(partial.show)
+
+    def ended(stage: str, run: Run, remaining: int) -> None:
+        progress.run(stage, run, remaining)
+        follower.add(stage, run)
+
     with ExitStack() as stack:
+        stack.enter_context(told_of_pauses(progress.went_on))
         stack.callback(store.close)
         recorder = stack.enter_context(_recorder(order.record)) if order.record else None
         # A recorder watches pours from within; all others run in processes of their own.
@@ -68,36 +80,52 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> float:
             study.name,
             study.seed,
             order.threads,
-            on_run=progress.run,
+            on_run=ended,
             observer=recorder,
             pours=crew.run_queue if crew else None,
+            tries=order.tries,
         )
-        found = run_campaign(study, profile, runner, estimator_bias(study.estimators), on_stage=progress.stage)
-    result = result_of(study, profile, found, progress.elapsed)
+        bias = estimator_bias(study.estimators)
+        found = run_campaign(study, profile, runner, bias, progress.stage, follower.begin, partial.keep)
+    result = result_of(study, profile, found, progress.elapsed, order.tries)
     write_whole(order.out / "result.json", json.dumps(result, ensure_ascii=False, allow_nan=False, indent=1) + "\n")
     write_report(result, order.out)
+    partial.remove()
     say(f"{order.out}/report.html, report.md, result.json")
     return found.verification.tests[0].relative_error_percent
 
 
-def result_of(study: Study, profile: Profile, found: CampaignResult, total_s: float) -> dict[str, Any]:
+def holds_more_than(folder: Path, study_file: Path) -> bool:
+    """True if ``folder`` holds anything but the study's own file, which the page writes there before the start."""
+    return folder.is_dir() and any(entry.resolve() != study_file.resolve() for entry in folder.iterdir())
+
+
+def described(study: Study, profile: Profile, tries: int = TRIES) -> dict[str, Any]:
+    """What was asked: the key ``study`` of ``result.json``."""
+    return {
+        "name": study.name,
+        "title": study.scene.title,
+        "file": str(study.file),
+        "profile": profile.to_dict(),
+        "targets": study.targets,
+        "factors": study.factors,
+        "assumptions": study.assumptions,
+        "assumed": study.scene.assumed,
+        "changes": study.changes,
+        "seed": study.seed,
+        "tries": tries,
+    }
+
+
+def result_of(
+    study: Study, profile: Profile, found: CampaignResult, total_s: float, tries: int = TRIES
+) -> dict[str, Any]:
     """The content of ``result.json``: study, one key per stage, runs, timing, versions, shapes."""
     runs = summary_of_runs(found)
     return plain(
         {
             "schema": SCHEMA,
-            "study": {
-                "name": study.name,
-                "title": study.scene.title,
-                "file": str(study.file),
-                "profile": profile.to_dict(),
-                "targets": study.targets,
-                "factors": study.factors,
-                "assumptions": study.assumptions,
-                "assumed": study.scene.assumed,
-                "changes": study.changes,
-                "seed": study.seed,
-            },
+            "study": described(study, profile, tries),
             **found.to_dict(),
             "runs": runs,
             "timing": {

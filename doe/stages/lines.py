@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from doe.stages.ascent import AscentResult
 from doe.stages.pilot import PilotResult
@@ -70,6 +72,19 @@ def verification_line(result: VerificationResult) -> str:
     """One line of what the verification found."""
     test = result.tests[0]
     return f"{test.statement} Relative error {test.relative_error_percent:.2f} %."
+
+
+LINES: Mapping[str, Callable[[Any], str]] = {
+    "pilot": pilot_line,
+    "screening": screening_line,
+    "assumptions": screening_line,
+    "scan": scan_line,
+    "ascent": ascent_line,
+    "surface": surface_line,
+    "optimum": optimum_line,
+    "verification": verification_line,
+}
+"""Stage → its line, from its result or from what there is of it so far."""
 
 
 def _observed(observable: str, value: float) -> str:

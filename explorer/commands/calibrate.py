@@ -21,6 +21,7 @@ def calibrate(
     store: Path | None = typer.Option(None, help="SQLite file that keeps every run."),
     record: Path | None = typer.Option(None, help="Folder for .rrd recordings of the verification pours."),
     threads: int | None = typer.Option(None, min=1, help="CPU threads; all if not given."),
+    tries: int = typer.Option(3, min=1, max=20, help="Seeds tried for one replicate that gives no pile."),
     fail_above: float | None = typer.Option(None, min=0.0, help="Exit with 3 above this relative error in percent."),
 ) -> None:
     """Calibrate a material: pilot, screening, ascent, response surface, optimum, verification, report."""
@@ -32,7 +33,7 @@ def calibrate(
         raise CommandError("calibrate: add --headless to run here, or start it from the panel of `explorer serve`")
     # The page cancels with SIGTERM; that has to end like Ctrl-C, with the store closed and finished runs kept.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    order = StudyOrder(study, profile, out, resume, store, record, threads)
+    order = StudyOrder(study, profile, out, resume, store, record, threads, tries)
     try:
         error_percent = run_study(order, typer.echo)
     except StudyStopped as stopped:

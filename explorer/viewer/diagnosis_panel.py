@@ -1,32 +1,48 @@
-"""The diagnosis on the page: choose measured data, start, watch, cancel, resume, and read the answer."""
+"""The diagnosis on the page: choose measured data, start, watch, pause, resume; the answer, its charts, older ones."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 
 import viser
 
-from explorer.diagnosis_process import DiagnosisProcess
+from explorer.diagnosis_process import RESULT, DiagnosisProcess
 from explorer.report.diagnosis.findings import summary_label, summary_value
 from explorer.report.diagnosis.in_short import verdict_sentence
+from explorer.report.diagnosis_plots import diagnosis_plots
 from explorer.report.findings import Plain
+from explorer.result_file import ResultFile
 from explorer.viewer.actions import Post
-from explorer.viewer.process_view import ProcessView, escaped, status_markdown
+from explorer.viewer.plot_view import PlotView
+from explorer.viewer.process_view import ProcessView, escaped
+from explorer.viewer.result_chooser import ResultChooser
+from explorer.viewer.stage_table import stages_markdown
 
 FIRST = "trefoil_1"
 """Chosen at first, where it is shipped: the data set of `make diagnose`."""
 OWN = "folder below"
 """Choice of the list that takes the folder in the text field."""
+PRESENT = "present or newest diagnosis"
+EMPTY = (
+    "No charts yet: they come with the answer of a diagnosis. Choose measured data above and press *Start*, or add a "
+    "folder with a finished diagnosis below."
+)
 
 
 class DiagnosisPanel:
     """Talks to a :class:`DiagnosisProcess`; ``shipped`` are the names of the data sets to choose from."""
 
     def __init__(
-        self, server: viser.ViserServer, diagnosis: DiagnosisProcess, shipped: Sequence[str], post: Post
+        self,
+        server: viser.ViserServer,
+        diagnosis: DiagnosisProcess,
+        shipped: Sequence[str],
+        post: Post,
+        dark: bool = True,
     ) -> None:
         gui = server.gui
-        self._diagnosis = diagnosis
+        self._diagnosis, self._file = diagnosis, ResultFile(RESULT)
+        self._shown: Hashable = None
         gui.add_markdown("Which physical effect do measured data ask for that the declared model lacks?")
         self._data = gui.add_dropdown(
             "Measured data",
@@ -37,14 +53,37 @@ class DiagnosisPanel:
         self._folder = gui.add_text(
             "Folder", "", hint="Folder with measurement.toml, on the machine that serves this page."
         )
-        acts = {"Start": self._start, "Cancel": diagnosis.cancel, "Resume": self._resume}
+        acts = {
+            "Start": self._start,
+            "Pause / go on": self._pause,
+            "Cancel": diagnosis.cancel,
+            "Resume": self._resume,
+        }
         self._view = ProcessView(server, "Diagnosis", acts, post)
+        self._answer = gui.add_markdown("")
+        self._plots = PlotView(server, "Chart", EMPTY, post, dark)
+        self._chooser = ResultChooser(server, "Result", PRESENT, RESULT, post, self._follow)
+
+    @property
+    def dark(self) -> bool:
+        """Whether the charts are for a dark page."""
+        return self._plots.dark
+
+    @dark.setter
+    def dark(self, dark: bool) -> None:
+        self._plots.dark = dark
 
     def _start(self) -> None:
         self._diagnosis.start(self._chosen())
 
     def _resume(self) -> None:
         self._diagnosis.resume(self._chosen())
+
+    def _pause(self) -> None:
+        if self._diagnosis.status().state == "paused":
+            self._diagnosis.go_on()
+        else:
+            self._diagnosis.pause()
 
     def _chosen(self) -> str:
         return str(self._folder.value if self._data.value == OWN else self._data.value)
@@ -55,9 +94,28 @@ class DiagnosisPanel:
         Call it inside ``server.atomic()``, about twice a second.
         """
         status = self._diagnosis.status()
-        text = status_markdown(status, "diagnosis", "Pours", notice)
-        result = self._diagnosis.result()
-        self._view.show(status, text if result is None else f"{answer_markdown(result)}\n\n{text}")
+        self._view.show(status, stages_markdown(status, "diagnosis", "Pours", notice))
+        self._chooser.offer(self._diagnosis.finished())
+        self._follow()
+
+    def _follow(self) -> None:
+        """Show the chosen result where it is another one than before."""
+        folder = self._chooser.folder
+        if folder is None:
+            folder = self._diagnosis.out or next(iter(self._diagnosis.finished()), None)
+        result = self._file.read(folder)
+        now = (folder, self._file.version)
+        if now == self._shown:
+            return
+        self._shown = now
+        try:
+            answer = "" if result is None else answer_markdown(result)
+            plots = {} if result is None else diagnosis_plots(result)
+        except (KeyError, IndexError, TypeError, ValueError) as error:
+            # A folder that somebody named may hold any JSON, also that of another version.
+            answer, plots = f"{escaped(str(folder))}: cannot be shown ({escaped(repr(error))})", {}
+        self._answer.content = answer
+        self._plots.offer(plots, now)
 
 
 def answer_markdown(result: Plain) -> str:

@@ -18,7 +18,6 @@ from explorer.viewer.actions import Actions
 from explorer.viewer.chart import Chart
 from explorer.viewer.diagnosis_panel import DiagnosisPanel
 from explorer.viewer.look_tab import LookTab
-from explorer.viewer.palette import BRAND
 from explorer.viewer.pour_panels import PourPanels
 from explorer.viewer.readout import not_later, readout_html
 from explorer.viewer.recording_switch import Recorder
@@ -26,6 +25,7 @@ from explorer.viewer.run_panel import RunPanel
 from explorer.viewer.scene_nodes import SceneNodes
 from explorer.viewer.second_pile import SecondPile
 from explorer.viewer.study_panel import StudyPanel
+from explorer.viewer.theme import DARK, ThemeSwitch, apply_theme
 from explorer.viewer.tour import Tour
 from explorer.viewer.view import light, look_at_height
 from solver.assets import shipped_measurements
@@ -65,9 +65,7 @@ class Page:
 
     def _build_panels(self, study: StudyProcess | None, study_name: str, diagnosis: DiagnosisProcess) -> None:
         server, session, post = self._server, self._session, self._actions.post
-        server.gui.configure_theme(
-            dark_mode=True, show_share_button=False, show_logo=False, brand_color=BRAND, control_width="large"
-        )
+        apply_theme(server, DARK)
         server.gui.main_panel.dock_right()
         Tour(server)
         colour_bar = server.gui.add_html("", visible=False)
@@ -85,9 +83,15 @@ class Page:
         self._study: StudyPanel | None = None
         if study is not None:
             with tabs.add_tab("Calibrate", viser.Icon.TARGET):
-                self._study = StudyPanel(server, study, study_name, post)
+                self._study = StudyPanel(server, study, study_name, post, session)
         with tabs.add_tab("Diagnose", viser.Icon.STETHOSCOPE):
             self._diagnosis = DiagnosisPanel(server, diagnosis, shipped_measurements(), post)
+        ThemeSwitch(server, post, self._follow_theme)
+
+    def _follow_theme(self, dark: bool) -> None:
+        for panel in (self._study, self._diagnosis):
+            if panel is not None:
+                panel.dark = dark
 
     def close(self) -> None:
         """End what the page itself has started: a second pour, and a recording, with its file whole."""

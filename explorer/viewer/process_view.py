@@ -14,6 +14,7 @@ MARKDOWN_MARKS = re.compile(r"([\\`*_{}\[\]<>()#+!|~&])")
 
 STATE_WORDS = {
     "running": "Running at low priority; the pour goes on.",
+    "paused": "Paused: it stands still and keeps what it has.",
     "cancelled": "Cancelled.",
     "finished": "Finished.",
     "failed": "Failed.",
@@ -21,16 +22,26 @@ STATE_WORDS = {
 
 
 class ProcessView:
-    """A group of buttons named ``title``, which post the ``acts`` of their names; under it a bar and a text."""
+    """Buttons named ``title``, which post the ``acts`` of their names, a second row for ``more``; a bar and a text."""
 
-    def __init__(self, server: viser.ViserServer, title: str, acts: Mapping[str, Action], post: Post) -> None:
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        title: str,
+        acts: Mapping[str, Action],
+        post: Post,
+        more: Mapping[str, Action] | None = None,
+    ) -> None:
+        every = {**acts, **(more or {})}
+
+        def clicked(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
+            if event.client_id is not None and event.target.value in every:
+                post(every[event.target.value])
+
         self._buttons = server.gui.add_button_group(title, tuple(acts))
-
-        @self._buttons.on_click
-        def _(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
-            if event.client_id is not None and event.target.value in acts:
-                post(acts[event.target.value])
-
+        self._buttons.on_click(clicked)
+        if more:
+            server.gui.add_button_group("", tuple(more)).on_click(clicked)
         self._bar = server.gui.add_progress_bar(0.0)
         self._text = server.gui.add_markdown("")
 
@@ -48,28 +59,6 @@ class ProcessView:
 def progress(status: CommandStatus) -> float:
     """Share of the planned runs that are done, 0 … 1."""
     return min(1.0, max(0.0, status.done / status.planned)) if status.planned > 0 else 0.0
-
-
-def status_markdown(status: CommandStatus, what: str, runs: str, notice: str = "") -> str:
-    """State, stage and partial results as markdown; texts of the command are escaped.
-
-    Args:
-        status: how far it is.
-        what: what a run of the command is called, such as "study".
-        runs: heading of what is counted, such as "Runs".
-        notice: the page's own last message, such as a refused click.
-    """
-    parts = [STATE_WORDS.get(status.state, f"No {what} runs.")]
-    parts += [escaped(text) for text in dict.fromkeys((notice, status.message)) if text]
-    if status.stage:
-        parts.append(
-            f"| Stage | {runs} | Time left |\n|:--|--:|--:|\n"
-            f"| {escaped(status.stage)} | {status.done} of {status.planned} | {time_left(status.eta_s)} |"
-        )
-    if status.lines:
-        rows = "\n".join(f"| {k} | {escaped(line)} |" for k, line in enumerate(status.lines, start=1))
-        parts.append(f"| | Partial results |\n|--:|:--|\n{rows}")
-    return "\n\n".join(parts)
 
 
 def time_left(eta_s: float | None) -> str:

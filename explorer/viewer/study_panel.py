@@ -1,31 +1,81 @@
-"""The design of experiments on the page: start, progress, partial results, cancel, resume."""
+"""The design of experiments on the page: order, run, watch; charts, profiler, runs and comparison of its result."""
 
 from __future__ import annotations
 
+from collections.abc import Hashable, Mapping
+from pathlib import Path
+
 import viser
 
-from explorer.study_process import PROFILES, StudyProcess
+from explorer.report.findings import Plain
+from explorer.report.study_plots import study_plots
+from explorer.result_file import ResultFile
+from explorer.session import Session
+from explorer.study_process import PARTIAL, PROFILES, RESULT, StudyProcess
 from explorer.viewer.actions import Post
-from explorer.viewer.process_view import ProcessView, escaped, status_markdown
+from explorer.viewer.comparison_panel import ComparisonPanel
+from explorer.viewer.order_panel import OrderPanel
+from explorer.viewer.plot_view import PlotView
+from explorer.viewer.process_view import ProcessView, escaped
+from explorer.viewer.profiler_panel import ProfilerPanel
+from explorer.viewer.result_chooser import ResultChooser, title
+from explorer.viewer.run_chooser import RunChooser
+from explorer.viewer.stage_table import stages_markdown
+from solver import Scene, canonical, parameters, with_values
+
+PRESENT = "present or newest study"
+EMPTY = (
+    "No charts yet: they come as soon as a stage can be analysed. Press *Start* (*quick* takes some minutes and shows "
+    "the whole chain), or add a folder with a finished study below."
+)
 
 
 class StudyPanel:
-    """Talks to a :class:`StudyProcess`; knows nothing of statistics."""
+    """Talks to a :class:`StudyProcess`; what a result says is read and drawn by `explorer.report`."""
 
-    def __init__(self, server: viser.ViserServer, study: StudyProcess, name: str, post: Post) -> None:
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        study: StudyProcess,
+        name: str,
+        post: Post,
+        session: Session,
+        dark: bool = True,
+    ) -> None:
         gui = server.gui
-        self._study = study
+        self._study, self._session = study, session
+        self._alive, self._over = ResultFile(PARTIAL, RESULT), ResultFile(RESULT, PARTIAL)
+        self._shown: Hashable = None
+        self._trouble = ""
+        self._so_far = ("", "")
         gui.add_markdown(f"**{escaped(name)}** — screening, steepest ascent, response surface, optimum, verification.")
         self._profile = gui.add_dropdown(
             "Profile",
             PROFILES,
             hint="quick: coarse shapes, less mass, one run per row; standard: 30 g, 3 seeds",
         )
-        acts = {"Start": self._start, "Cancel": study.cancel, "Resume": study.resume}
-        self._view = ProcessView(server, "Study", acts, post)
+        with gui.add_folder("Ranges and target of the next study", expand_by_default=False):
+            self._order = OrderPanel(server, study.study_file, post)
+        acts = {"Start": self._start, "Pause / go on": self._pause, "Cancel": study.cancel}
+        more = {"Resume": study.resume, "Retry": study.retry, "Queue": self._queue, "Clear queue": study.clear_queue}
+        self._view = ProcessView(server, "Study", acts, post, more)
+        self._plots = PlotView(server, "Chart", EMPTY, post, dark)
+        self._chooser = ResultChooser(server, "Result", PRESENT, RESULT, post, self._follow)
+        with gui.add_folder("Profiler", expand_by_default=False):
+            self._profiler = ProfilerPanel(server, post, self._plots.show_anew, self._set_live)
+        with gui.add_folder("Runs, poured again", expand_by_default=False):
+            self._runs = RunChooser(server, session, post)
+        with gui.add_folder("Compare two studies", expand_by_default=False):
+            self._comparison = ComparisonPanel(server, post)
 
-    def _start(self) -> None:
-        self._study.start(str(self._profile.value))
+    @property
+    def dark(self) -> bool:
+        """Whether the charts are for a dark page."""
+        return self._plots.dark
+
+    @dark.setter
+    def dark(self, dark: bool) -> None:
+        self._plots.dark = dark
 
     def show(self, notice: str) -> None:
         """Ask the study how far it is; ``notice`` is the page's own last message, such as a refused click.
@@ -33,4 +83,71 @@ class StudyPanel:
         Call it inside ``server.atomic()``, about twice a second.
         """
         status = self._study.status()
-        self._view.show(status, status_markdown(status, "study", "Runs", notice))
+        stage, line = self._so_far
+        text = stages_markdown(status, "study", "Runs", notice, line if stage == status.stage else "")
+        waiting = self._study.waiting()
+        if waiting:
+            text += f"\n\nWaiting: {escaped('; '.join(waiting))}."
+        if self._trouble:
+            text += f"\n\n{escaped(self._trouble)}"
+        self._view.show(status, text)
+        folders = self._study.finished()
+        self._chooser.offer(folders)
+        self._comparison.offer(folders)
+        self._follow()
+
+    def _start(self) -> None:
+        self._study.start(str(self._profile.value), self._order.edits)
+
+    def _queue(self) -> None:
+        self._study.queue(str(self._profile.value), self._order.edits)
+
+    def _pause(self) -> None:
+        if self._study.status().state == "paused":
+            self._study.go_on()
+        else:
+            self._study.pause()
+
+    def _follow(self) -> None:
+        """Show the chosen result where it is another one than before."""
+        folder = self._chooser.folder
+        present = folder is None
+        file = self._alive if present and self._study.status().alive else self._over
+        folder = self._present() if folder is None else folder
+        result = file.read(folder)
+        if present:
+            self._so_far = (str((result or {}).get("partial")), str((result or {}).get("line")))
+        now = (folder, file.version)
+        if now == self._shown:
+            return
+        self._shown, self._trouble = now, ""
+        try:
+            self._show_result(result, "" if folder is None else title(folder), now)
+        except (KeyError, IndexError, TypeError, ValueError) as error:
+            # A folder that somebody named may hold any JSON, also that of another version.
+            self._trouble = f"{folder}: cannot be shown ({type(error).__name__}: {error})"
+            self._show_result(None, "", None)
+
+    def _show_result(self, result: Plain | None, name: str, version: Hashable) -> None:
+        self._profiler.show(result)
+        plots = {} if result is None else {**study_plots(result), **self._profiler.plots()}
+        self._plots.offer(plots, version)
+        self._runs.show(result)
+        self._comparison.show(result, name, version)
+
+    def _present(self) -> Path | None:
+        """Folder of the study that was started last, or before any the newest finished one."""
+        return self._study.out or next(iter(self._study.finished()), None)
+
+    def _set_live(self, values: Mapping[str, float | str]) -> None:
+        set_live(self._session, values)
+
+
+def set_live(session: Session, values: Mapping[str, float | str]) -> None:
+    """Give the live pour ``values`` (by path, SI): at once if all of them can act on a running pour, else anew."""
+    scene: Scene = session.status().scene
+    known = parameters(scene)
+    if all(known[canonical(scene, path)].live for path in values):
+        session.set_parameters(values)
+    else:
+        session.restart(with_values(scene, dict(values)))

@@ -58,3 +58,9 @@ def test_pours_are_stored_reused_and_replaced(tmp_path):
     assert all(run.reused for runs in again for run in runs)
     assert [run.observables for run in again[0]] == [run.observables for run in first[0]]
     assert len(list(store.runs("test"))) == 2 + TRIES
+
+    # The whole design once, then again; a replicate may be given more seeds later.
+    assert [run.label for run, _ in seen[-5:]] == ["good", *["never at rest"] * TRIES, "good"]
+    more = PourRunner(scene, store, "test", 1, tries=TRIES + 1).run("stage", settings)
+    assert [run.attempt for run in more[1]] == list(range(TRIES + 1))
+    assert [run.reused for run in more[1]] == [True] * TRIES + [False]

@@ -8,9 +8,11 @@ import pytest
 
 from explorer.command_process import BackgroundError, CommandStatus
 from explorer.diagnosis_process import DiagnoseProcess
+from explorer.stage_progress import StageProgress
 from explorer.viewer.actions import Actions
 from explorer.viewer.diagnosis_panel import OWN, DiagnosisPanel, answer_markdown
 from explorer.viewer.guarded_server import guarded_server
+from explorer.viewer.plot_view import NOTHING
 from solver import AssetNotFoundError
 from solver.assets import measurement_folder, shipped_measurements
 from tests.explorer.background import only_folder, wait_for
@@ -43,7 +45,8 @@ def diagnosis(tmp_path, behaviour=""):
 def test_a_diagnosis_runs_to_its_end_at_lower_priority(tmp_path):
     process = diagnosis(tmp_path)
     assert process.status() == CommandStatus("idle")
-    assert process.result() is None
+    assert process.out is None
+    assert process.finished() == ()
     process.start("trefoil_1")
     wait_for(lambda: process.status().state != "running")
     status = process.status()
@@ -51,7 +54,8 @@ def test_a_diagnosis_runs_to_its_end_at_lower_priority(tmp_path):
     assert status.lines == ("base model: 3 settings",)
     folder = only_folder(tmp_path)
     assert status.message == f"report: {folder}/report.html"
-    assert process.result() == {"verdict": "no_missing_effect"}
+    assert process.out == folder
+    assert process.finished() == (folder,)
     data = str(measurement_folder("trefoil_1").absolute())
     arguments = json.loads((folder / "arguments.json").read_text())
     assert arguments == ["diagnose", data, "--out", str(folder), "--apply", "--store", str(tmp_path / "runs.sqlite")]
@@ -70,7 +74,7 @@ def test_cancel_and_resume_also_from_a_later_page(tmp_path):
     process.cancel()
     wait_for(lambda: process.status().state != "running")
     assert process.status().state == "cancelled"
-    assert process.result() is None
+    assert process.finished() == ()
     later = diagnosis(tmp_path)
     with pytest.raises(BackgroundError, match="no diagnosis of trefoil_2 has been stopped"):
         later.resume("trefoil_2")
@@ -88,7 +92,6 @@ def test_a_diagnosis_that_fails_says_why(tmp_path):
     wait_for(lambda: process.status().state != "running")
     assert process.status().state == "failed"
     assert process.status().message == "diagnose ended with exit code 1: error: condition fit: rate: -1"
-    assert process.result() is None
 
 
 def test_data_that_are_not_there_are_refused_before_a_start(tmp_path):
@@ -102,10 +105,10 @@ def test_data_that_are_not_there_are_refused_before_a_start(tmp_path):
 
 
 class FakeDiagnosis:
-    """Keeps what it was asked; status and result are what the test says."""
+    """Keeps what it was asked; its status and its folder are what the test says."""
 
     def __init__(self):
-        self.asked, self.now, self.found = [], CommandStatus("idle"), None
+        self.asked, self.now, self.out = [], CommandStatus("idle"), None
 
     def start(self, data):
         self.asked.append(f"start {data}")
@@ -113,14 +116,20 @@ class FakeDiagnosis:
     def cancel(self):
         self.asked.append("cancel")
 
+    def pause(self):
+        self.asked.append("pause")
+
+    def go_on(self):
+        self.asked.append("go on")
+
     def resume(self, data):
         self.asked.append(f"resume {data}")
 
     def status(self):
         return self.now
 
-    def result(self):
-        return self.found
+    def finished(self):
+        return ()
 
 
 def press(panel, button):
@@ -129,34 +138,56 @@ def press(panel, button):
         callback(click)
 
 
-def test_the_panel_asks_and_shows():
-    server, process, actions = guarded_server("127.0.0.1", 0, "test"), FakeDiagnosis(), Actions()
-    try:
-        panel = DiagnosisPanel(server, process, shipped_measurements(), actions.post)
-        panel._data.value = "trefoil_2"
-        for button in ("Start", "Cancel", "Delete everything"):
-            press(panel, button)
-        actions.carry_out()
-        panel._data.value = OWN
-        panel._folder.value = "/home/me/my data"
-        press(panel, "Resume")
-        actions.carry_out()
-        assert process.asked == ["start trefoil_2", "cancel", "resume /home/me/my data"]
-        process.now = CommandStatus("running", "screening", 5, 20, 125.0, ("base model: *64* settings",))
-        panel.show("no such folder")
-        assert panel._view._bar.value == 25.0
-        text = panel._view._text.content
-        assert "| screening | 5 of 20 | 2 min 05 s |" in text
-        assert r"base model: \*64\* settings" in text
-        assert "no such folder" in text
-        process.now = CommandStatus("finished", message="report: /home/me/out/report.html")
-        process.found = result_of_case("effect")
-        panel.show("")
-        text = panel._view._text.content
-        assert text.startswith(r"**effect:adhesion\_sjkr**")
-        assert "/home/me/out/report.html" in text
-    finally:
-        server.stop()
+@pytest.fixture(scope="module")
+def server():
+    server = guarded_server("127.0.0.1", 0, "test")
+    yield server
+    server.stop()
+
+
+def test_the_panel_asks_and_shows(server, tmp_path):
+    process, actions = FakeDiagnosis(), Actions()
+    panel = DiagnosisPanel(server, process, shipped_measurements(), actions.post)
+    panel._data.value = "trefoil_2"
+    for button in ("Start", "Pause / go on", "Cancel", "Delete everything"):
+        press(panel, button)
+    actions.carry_out()
+    panel._data.value = OWN
+    panel._folder.value = "/home/me/my data"
+    process.now = CommandStatus("paused")
+    press(panel, "Resume")
+    press(panel, "Pause / go on")
+    actions.carry_out()
+    assert process.asked == ["start trefoil_2", "pause", "cancel", "resume /home/me/my data", "go on"]
+    stages = (StageProgress("base model", 30, 30, "*64* settings"), StageProgress("screening", 5, 20))
+    process.now = CommandStatus("running", "screening", 5, 20, 125.0, stages=stages)
+    panel.show("no such folder")
+    assert panel._view._bar.value == 25.0
+    text = panel._view._text.content
+    assert "5 of 20 pours, time left 2 min 05 s" in text
+    assert r"| base model | 30 of 30 | done | \*64\* settings |" in text
+    assert "| screening | 5 of 20 | ▶ |" in text
+    assert "no such folder" in text
+    assert "Choose measured data above and press *Start*" in panel._plots._caption.content
+    process.now = CommandStatus("finished", message="report: /home/me/out/report.html")
+    process.out = tmp_path
+    (tmp_path / "diagnosis.json").write_text(json.dumps(result_of_case("effect")))
+    panel.show("")
+    assert panel._answer.content.startswith(r"**effect:adhesion\_sjkr**")
+    assert "/home/me/out/report.html" in panel._view._text.content
+    assert "Signatures of the effects" in panel._plots._choice.options
+    shown = json.loads(panel._plots._chart._plotly_json_str)
+    assert shown["layout"]["xaxis"]["title"]["text"] == "measured − model [σ]"
+
+
+def test_a_file_that_is_no_diagnosis_is_one_line(server, tmp_path):
+    process, actions = FakeDiagnosis(), Actions()
+    panel = DiagnosisPanel(server, process, shipped_measurements(), actions.post)
+    (tmp_path / "diagnosis.json").write_text('{"verdict": "<script>"}')
+    process.out = tmp_path
+    panel.show("")
+    assert "cannot be shown" in panel._answer.content
+    assert panel._plots._choice.options == (NOTHING,)
 
 
 def test_the_answer_holds_errors_before_after_and_by_noise_alone():

@@ -3,11 +3,16 @@
 import json
 import os
 import sys
+import time
 
 import pytest
 
+from doe.study import load_study
 from explorer.command_process import BackgroundError, CommandStatus, advanced
-from explorer.study_process import CalibrationProcess
+from explorer.stage_progress import StageProgress, failures, given_up, with_event
+from explorer.study_edit import StudyEdits
+from explorer.study_process import MOST_WAITING, CalibrationProcess
+from solver import asset_path
 from tests.explorer.background import only_folder, wait_for
 
 PROGRAM = """
@@ -131,3 +136,187 @@ def test_a_study_that_another_page_runs_is_not_resumed(tmp_path):
 def test_a_line_that_is_no_event_changes_nothing(line):
     status = CommandStatus("running", "ascent", 2, 9)
     assert advanced(status, line) == status
+
+
+def running(process):
+    return process.status().done == 3 and process.status().state == "running"
+
+
+def ticks(folder):
+    return len((folder / "ticks").read_text())
+
+
+# A worker of the command writes: what stands still has to be all of it.
+TICKING = """
+import os, subprocess
+worker = "import os, sys, time; parent = os.getppid()\\nwhile os.getppid() == parent:\\n"
+worker += " open(sys.argv[1], 'a').write('.'); time.sleep(0.01)"
+subprocess.Popen([sys.executable, "-c", worker, str(out / "ticks")]).wait()
+"""
+
+
+def test_a_paused_study_stands_still_and_goes_on(tmp_path):
+    process = study(tmp_path, TICKING)
+    process.start("quick")
+    wait_for(lambda: (process.out / "ticks").exists())
+    process.pause()
+    assert process.status().state == "paused"
+    assert process.status().alive
+    folder = only_folder(tmp_path)
+    time.sleep(0.1)
+    still = ticks(folder)
+    time.sleep(0.3)
+    assert ticks(folder) == still
+    with pytest.raises(BackgroundError, match="already"):
+        process.start("quick")
+    process.go_on()
+    assert process.status().state == "running"
+    wait_for(lambda: ticks(folder) > still)
+    process.pause()
+    process.cancel()  # a study that stands still could not hear it
+    wait_for(lambda: not process.status().alive)
+    assert process.status().state == "cancelled"
+
+
+def test_a_page_that_closes_ends_a_paused_study(tmp_path):
+    process = study(tmp_path, "time.sleep(60)")
+    process.start("quick")
+    wait_for(lambda: running(process))
+    process.pause()
+    process.close()
+    assert process.status().state == "cancelled"
+
+
+def test_a_worker_that_lingers_does_not_stand_in_the_way_of_going_on(tmp_path):
+    lingering = "import subprocess; subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(0.5)'])"
+    process = study(tmp_path, lingering)
+    process.start("quick")
+    wait_for(lambda: not process.status().alive)
+    process._process.resume(process.out, process._arguments(process.out))
+    wait_for(lambda: not process.status().alive)
+    assert process.status().state == "finished"
+
+
+def test_a_queued_study_starts_after_the_one_before(tmp_path):
+    process = study(tmp_path, "time.sleep(60 if 'quick' in arguments else 0)")
+    process.queue("quick")  # nothing runs: at once
+    assert process.waiting() == ()
+    wait_for(lambda: running(process))
+    process.queue("standard")
+    process.queue("full")
+    assert process.waiting() == ("standard", "full")
+    process.cancel()
+    wait_for(lambda: process.status().state == "cancelled")
+    assert process.waiting() == ("standard", "full")  # who cancels wants quiet
+    process.start("standard")
+    wait_for(lambda: process.status().state == "finished" and process.waiting() == () and "-full-" in process.out.name)
+    names = sorted(folder.name.split("-")[1] for folder in (tmp_path / "out").glob("*/"))
+    assert names == ["full", "quick", "standard", "standard"]
+
+
+def test_a_failed_study_does_not_hold_up_the_queue_and_it_can_be_cleared(tmp_path):
+    process = study(tmp_path, "time.sleep(0.3); sys.exit(1 if 'quick' in arguments else 0)")
+    process.start("quick")
+    process.queue("standard")
+    process.queue("full")
+    process.clear_queue()
+    assert process.waiting() == ()
+    process.queue("standard")
+    wait_for(lambda: process.status().state == "finished")
+    assert "-standard-" in process.out.name
+    for _ in range(MOST_WAITING + 1):
+        process._waiting.append(None)
+    with pytest.raises(BackgroundError, match="wait already"):
+        process.queue("quick")
+
+
+def test_a_changed_study_has_its_own_file_in_its_folder(tmp_path):
+    process = shipped(tmp_path)
+    edits = StudyEdits({"X4": {"low": 30e6}}, {"mean": 26.0})
+    process.start("quick", edits)
+    wait_for(lambda: process.status().state == "finished")
+    folder = only_folder(tmp_path)
+    file = folder / "sunflower_extract_changed.toml"
+    arguments = json.loads((folder / "arguments.json").read_text())
+    assert arguments[arguments.index("--study") + 1] == str(file)
+    changed = load_study(str(file))
+    assert (changed.factors[3].low, changed.targets[0].mean) == (30e6, 26.0)
+    # found again by a later page, file and all
+    later = shipped(tmp_path)
+    later.resume()
+    wait_for(lambda: later.status().state == "finished")
+    arguments = json.loads((folder / "arguments.json").read_text())
+    assert arguments[arguments.index("--study") + 1] == str(file)
+
+
+def test_a_change_that_is_not_allowed_starts_nothing(tmp_path):
+    process = shipped(tmp_path)
+    with pytest.raises(ValueError, match=r"^changed study: X4 .*low 9e\+07 is not below high 7\.05e\+07$"):
+        process.start("quick", StudyEdits({"X4": {"low": 90e6}}))
+    assert not (tmp_path / "out").exists()
+    assert process.status().state == "idle"
+
+
+def shipped(tmp_path):
+    program = tmp_path / "program.py"
+    program.write_text(PROGRAM.replace("BEHAVIOUR", "").replace('exist_ok="--resume" in arguments', "exist_ok=True"))
+    return CalibrationProcess(
+        asset_path("studies", "sunflower_extract"),
+        tmp_path / "out",
+        tmp_path / "runs.sqlite",
+        (sys.executable, str(program)),
+    )
+
+
+FAILING = """
+with (out / "progress.jsonl").open("a") as progress:
+    for attempt in range(6 if "--tries" in arguments else 3):
+        run = {"label": "row 2", "replicate": 0, "attempt": attempt, "seed": 10 + attempt, "outcome": "jammed",
+               "message": "4 g stay", "valid": False}
+        if attempt == 5:
+            run |= {"outcome": "at_rest", "message": "", "valid": True}
+        event = {"time": 1, "stage": "screening", "done": 3, "planned": 3, "eta_s": None, "line": None,
+                 "stages": {"pilot": [0, 5], "screening": [3, 3]}, "run": run}
+        progress.write(json.dumps(event) + "\\n")
+"""
+
+
+def test_a_retry_gives_more_seeds_to_replicates_without_a_valid_run(tmp_path):
+    process = study(tmp_path, FAILING.replace("\\\\n", "\\n"))
+    process.start("quick")
+    wait_for(lambda: process.status().state == "finished")
+    status = process.status()
+    assert [stage.name for stage in status.stages] == ["screening", "pilot"]
+    found = failures(status.tried)
+    assert [(one.run.seed, one.replaced_by and one.replaced_by.seed) for one in found] == [
+        (12, None),
+        (11, 12),
+        (10, 11),
+    ]
+    assert [run.seed for run in given_up(status.tried, 3)] == [12]
+    process.retry()
+    wait_for(lambda: process.status().state == "finished")
+    arguments = json.loads((only_folder(tmp_path) / "arguments.json").read_text())
+    assert arguments[-3:] == ["--tries", "6", "--resume"]
+    last = failures(process.status().tried)[0]
+    assert (last.run.seed, last.replaced_by.outcome) == (14, "at_rest")
+    with pytest.raises(BackgroundError, match="nothing to try again"):
+        process.retry()
+
+
+def test_a_finding_is_kept_with_its_stage():
+    event = {"stage": "scan", "done": 9, "planned": 20, "line": "first", "stages": {"scan": [4, 4], "ascent": [0, 16]}}
+    stages = with_event((), event)
+    assert stages == (StageProgress("scan", 4, 4, "first"), StageProgress("ascent", 0, 16))
+    stages = with_event(
+        stages, event | {"stage": "ascent", "line": None, "stages": {"scan": [4, 4], "ascent": [1, 16]}}
+    )
+    assert stages == (StageProgress("scan", 4, 4, "first"), StageProgress("ascent", 1, 16))
+
+
+def test_a_command_that_counts_its_present_stage_only_has_a_row_for_each():
+    stages = ()
+    for name, done, line in (("compiling", 0, None), ("base", 1, None), ("base", 2, "ok"), ("base", 2, "really")):
+        planned = 2 if name == "base" else 0
+        stages = with_event(stages, {"stage": name, "done": done, "planned": planned, "line": line})
+    assert stages == (StageProgress("base", 2, 2, "ok; really"),)

@@ -6,7 +6,9 @@ import json
 import pytest
 
 from doe.campaign import STAGES
+from doe.runner import TRIES
 from explorer import study_run
+from solver import asset_path
 from tests.doe.formula_runner import FormulaRunner
 from tests.doe.test_campaign import planted
 from tests.explorer.command_line import explorer
@@ -15,9 +17,10 @@ from tests.explorer.command_line import explorer
 class Formula(FormulaRunner):
     """Takes the arguments of a PourRunner and tells its progress in the same way."""
 
-    def __init__(self, scene, store, study, seed, threads, on_run, observer, pours):
+    def __init__(self, scene, store, study, seed, threads, on_run, observer, pours, tries):
         super().__init__(planted, sigma=0.5)
         self._on_run = on_run
+        Formula.tries = tries
 
     def run(self, stage, settings):
         rows = super().run(stage, settings)
@@ -54,6 +57,11 @@ def test_a_study_leaves_result_and_reports(tmp_path):
     events = [json.loads(line) for line in (tmp_path / "out" / "progress.jsonl").read_text().splitlines()]
     assert [event["stage"] for event in events if event["line"]] == list(STAGES)
     assert events[-1]["done"] == events[-1]["planned"] == result["runs"]["total"]
+    assert list(events[0]["stages"]) == list(STAGES)
+    assert {name: done for name, (done, _) in events[-1]["stages"].items() if done} == result["runs"]["by_stage"]
+    assert sum(event["run"] is not None for event in events) == result["runs"]["total"]
+    assert not (tmp_path / "out" / "partial.json").exists()
+    assert Formula.tries == TRIES
 
 
 @pytest.mark.usefixtures("formula")
@@ -66,6 +74,18 @@ def test_a_folder_that_is_not_empty_needs_resume(tmp_path):
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["notes.txt"]
     assert calibrate(tmp_path, "--resume").exit_code == 0
     assert (tmp_path / "out" / "notes.txt").read_text() == "mine"
+
+
+@pytest.mark.usefixtures("formula")
+def test_a_folder_with_nothing_but_its_own_study_file_is_new(tmp_path):
+    own = tmp_path / "out" / "changed.toml"
+    own.parent.mkdir()
+    own.write_text(asset_path("studies", "sunflower_extract").read_text())
+    assert calibrate(tmp_path).exit_code == 2
+    done = calibrate(tmp_path, "--study", str(own), "--tries", "6")
+    assert done.exit_code == 0, done.output
+    assert json.loads((tmp_path / "out" / "result.json").read_text())["study"]["file"] == str(own)
+    assert Formula.tries == 6
 
 
 @pytest.mark.usefixtures("formula")

@@ -9,11 +9,9 @@ import pytest
 from explorer.command_process import CommandStatus
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, SessionState, Status
-from explorer.viewer.actions import Actions
 from explorer.viewer.chart import MOST_POINTS, History
-from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.palette import BODY_COLOURS, linear
-from explorer.viewer.process_view import escaped, progress, status_markdown, time_left
+from explorer.viewer.process_view import escaped, progress, time_left
 from explorer.viewer.readout import (
     OUTCOME_WORDS,
     PHASE_WORDS,
@@ -26,7 +24,6 @@ from explorer.viewer.readout import (
     time_step_text,
 )
 from explorer.viewer.scene_nodes import component_poses
-from explorer.viewer.study_panel import StudyPanel
 from solver.observables.value import Value
 from solver.record import Outcome, Phase
 from tests.explorer.beads import bead_scene
@@ -223,48 +220,5 @@ def test_progress_is_a_share():
     assert progress(CommandStatus("idle")) == 0.0
 
 
-def test_partial_results_are_shown_as_text():
-    status = CommandStatus("running", "screening", 3, 28, 65.0, ("X4 *significant* | <b>",), "going on")
-    text = status_markdown(status, "study", "Runs")
-    assert "| screening | 3 of 28 | 1 min 05 s |" in text
-    assert r"X4 \*significant\* \| \<b\>" in text
+def test_text_from_a_command_brings_no_markdown():
     assert escaped("a\n# b") == r"a \# b"
-
-
-class FakeStudy:
-    """Keeps what it was asked; its status is what the test says."""
-
-    def __init__(self):
-        self.asked, self.now = [], CommandStatus("idle")
-
-    def start(self, profile):
-        self.asked.append(f"start {profile}")
-
-    def cancel(self):
-        self.asked.append("cancel")
-
-    def resume(self):
-        self.asked.append("resume")
-
-    def status(self):
-        return self.now
-
-
-def test_the_study_panel_asks_and_shows():
-    server, study, actions = guarded_server("127.0.0.1", 0, "test"), FakeStudy(), Actions()
-    try:
-        panel = StudyPanel(server, study, "sunflower_extract", actions.post)
-        for button in ("Start", "Cancel", "Resume", "Delete everything"):
-            click = type("Event", (), {"client_id": 0, "target": type("Group", (), {"value": button})})
-            for callback in panel._view._buttons._impl.update_cb:
-                callback(click)
-        actions.carry_out()
-        assert study.asked == ["start quick", "cancel", "resume"]
-        study.now = CommandStatus("running", "surface", 5, 20, 12.0, ("screening: 2 of 24 factors",))
-        panel.show("a study is running *already*")
-        assert panel._view._bar.value == 25.0
-        assert r"a study is running \*already\*" in panel._view._text.content
-        assert "surface" in panel._view._text.content
-        assert "screening: 2 of 24 factors" in panel._view._text.content
-    finally:
-        server.stop()

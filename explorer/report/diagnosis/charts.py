@@ -25,7 +25,7 @@ from explorer.report.units_for_people import fixed, parameter_label
 BEFORE, AFTER, MEASURED = ASSUMPTION, FACTOR, TARGET
 ROW_HEIGHT = 30
 """Height of one row with two bars [px]."""
-BAND = {TARGET: "rgba(43, 154, 129, 0.18)", FACTOR: "rgba(61, 127, 184, 0.18)", ASSUMPTION: "rgba(208, 122, 44, 0.18)"}
+BAND = {TARGET: "rgba(77, 173, 112, 0.18)", FACTOR: "rgba(76, 93, 209, 0.18)", ASSUMPTION: "rgba(212, 126, 44, 0.18)"}
 MM = 1e3
 
 

@@ -32,10 +32,18 @@ LABELLED = 12
 
 def pareto(screening: Plain) -> Spec | None:
     """|t| of every column against each error, with the limits for one factor and for all; None without an error."""
+    errors = errors_at_hand(screening)
+    return pareto_against(screening, errors) if errors else None
+
+
+def errors_at_hand(screening: Plain) -> list[ErrorName]:
+    """The errors against which effects can be judged, the deciding one first."""
+    return [e for e in ("replicates", "dummies") if _testable(screening["analysis"], e)]
+
+
+def pareto_against(screening: Plain, errors: list[ErrorName]) -> Spec:
+    """The same against ``errors``, side by side; there has to be one."""
     analysis = screening["analysis"]
-    errors: list[ErrorName] = [e for e in ("replicates", "dummies") if _testable(analysis, e)]
-    if not errors:
-        return None
     effects = sorted(analysis["effects"], key=lambda effect: t_of(effect, errors[0]) or -1.0)
     titles = _titles(screening)
     rows = [label(titles[effect["name"]]) for effect in effects]

@@ -1,4 +1,8 @@
-"""Colours and parts that the charts share. Every colour reads on a light and on a dark page."""
+"""Colours and parts that the charts share.
+
+Every colour reads on a light and on a dark page, and any two are told apart also by people with the common forms of
+colour blindness (a test holds both).
+"""
 
 from __future__ import annotations
 
@@ -9,16 +13,17 @@ from explorer.report.content import Spec
 
 Json = dict[str, Any]
 
-FACTOR = "#3d7fb8"
-ASSUMPTION = "#d07a2c"
+FACTOR = "#4c5dd1"
+ASSUMPTION = "#d47e2c"
 DUMMY = "#8d949c"
-TARGET = "#2b9a81"
-CHOSEN = "#c2455a"
+TARGET = "#4dad70"
+CHOSEN = "#b5292d"
 INK = "#2b2f34"
 """Lines on a filled ground that is light on every page."""
-MARGIN_BAND = "rgba(43, 154, 129, 0.08)"
-CLOUD = "rgba(61, 127, 184, 0.4)"
-BELOW_TO_ABOVE = [[0.0, "#3d7fb8"], [0.5, "#efece6"], [1.0, "#d07a2c"]]
+MARGIN_BAND = "rgba(77, 173, 112, 0.08)"
+INTERVAL_BAND = "rgba(76, 93, 209, 0.22)"
+CLOUD = "rgba(76, 93, 209, 0.4)"
+BELOW_TO_ABOVE = [[0.0, FACTOR], [0.5, "#efece6"], [1.0, ASSUMPTION]]
 """Colour scale of a surface: below, at and above the target."""
 
 
@@ -47,6 +52,36 @@ def side_by_side(panels: int, gap: float = 0.06) -> list[list[float]]:
     """Domains of ``panels`` charts in a row."""
     width = (1.0 - gap * (panels - 1)) / panels
     return [[k * (width + gap), k * (width + gap) + width] for k in range(panels)]
+
+
+def stacked(spec: Spec, gap: float = 0.16) -> Spec:
+    """A chart of panels in a row as panels one below the other, for a narrow place; a shared y axis is repeated."""
+    layout = dict(spec["layout"])
+    panels = sum(1 for key in layout if key.startswith("xaxis"))
+    height = (1.0 - gap * (panels - 1)) / panels
+    shared = [k for k in range(1, panels) if f"yaxis{suffix(k)}" not in layout]
+    for k in range(panels):
+        top = 1.0 - k * (height + gap)
+        y = layout["yaxis"] | {"title": {"text": ""}} if k in shared else layout[f"yaxis{suffix(k)}"]
+        layout[f"xaxis{suffix(k)}"] = layout[f"xaxis{suffix(k)}"] | {"domain": [0.0, 1.0], "anchor": f"y{suffix(k)}"}
+        domain = [max(0.0, top - height), top]
+        layout[f"yaxis{suffix(k)}"] = y | {"domain": domain, "anchor": f"x{suffix(k)}"}
+    own = {f"x{suffix(k)}": f"y{suffix(k)}" for k in shared}
+    traces = [t | {"yaxis": own[t["xaxis"]]} if t.get("xaxis") in own else t for t in spec["data"]]
+    for key in ("shapes", "annotations"):
+        if key in layout:
+            layout[key] = [
+                one | {"yref": f"{own[one['xref']]} domain"} if one.get("xref") in own else one for one in layout[key]
+            ]
+    return {"data": traces, "layout": layout | {"height": panels * layout["height"]}}
+
+
+def short_rows(spec: Spec) -> Spec:
+    """The same with the names of the rows cut at " · ", for a narrow place; hovering still tells all."""
+    rows = dict.fromkeys(row for trace in spec["data"] for row in trace["y"] if isinstance(row, str))
+    ticks = {"tickvals": list(rows), "ticktext": [row.split(" · ")[0].replace(", ", ",<br>") for row in rows]}
+    axes = {key: one | ticks for key, one in spec["layout"].items() if key.startswith("yaxis")}
+    return {"data": spec["data"], "layout": spec["layout"] | axes}
 
 
 def suffix(panel: int) -> str:

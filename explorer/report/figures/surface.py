@@ -5,12 +5,15 @@ from __future__ import annotations
 from itertools import combinations
 
 import numpy as np
+from scipy import stats
 
 from doe.surface import second_order_terms
 from explorer.report.content import Spec
+from explorer.report.figures.model import chosen_point, section_point
 from explorer.report.figures.style import (
     BELOW_TO_ABOVE,
     CHOSEN,
+    DUMMY,
     FACTOR,
     INK,
     TARGET,
@@ -29,7 +32,7 @@ GRID = 41
 
 
 def contours(result: Plain, index: int) -> Spec:
-    """The surface of target ``index`` over each pair of factors, the others at the optimum.
+    """The surface of target ``index`` over each pair of factors, the others at the optimum (before it: the middle).
 
     Runs of the design are projected on each panel; the thick line is where the model gives the target.
     """
@@ -37,8 +40,9 @@ def contours(result: Plain, index: int) -> Spec:
     unit = unit_of_observable(target["observable"])
     model, factors, region = surface["models"][index], surface["factors"], surface["region"]
     centre, half_width = np.array(region["centre"]), np.array(region["half_width"])
-    optimum = np.array([result["optimum"]["values"][factor["path"]] for factor in factors])
-    fixed = (optimum - centre) / half_width
+    chosen = chosen_point(result)
+    optimum = None if chosen is None else np.array(chosen)
+    fixed = (np.array(section_point(result)) - centre) / half_width
     pairs = list(combinations(range(len(factors)), 2))
     grids = [_slice(np.array(model["coefficients"]), fixed, i, j) / unit.size for i, j in pairs]
     level = unit.of(target["mean"])
@@ -97,7 +101,7 @@ def fit(result: Plain, index: int) -> Spec:
             "x": ends,
             "y": ends,
             "name": "predicted = observed",
-            "line": line("#8d949c", "dash"),
+            "line": line(DUMMY, "dash"),
         },
         points(observed, predicted, "pours of the design", FACTOR, marker={"opacity": 0.75}),
         points(predicted, anova["studentized_residuals"], "residual", FACTOR, marker={"opacity": 0.75}, **residuals),
@@ -112,6 +116,25 @@ def fit(result: Plain, index: int) -> Spec:
     return chart(traces, layout, 380)
 
 
+def residual_quantiles(result: Plain, index: int) -> Spec:
+    """Studentized residuals over the quantiles of t that a right model would give them, and the line y = x."""
+    surface = result["surface"]
+    df = surface["models"][index]["df_residual"]
+    known = sorted(r for r in surface["anova"][index]["studentized_residuals"] if r is not None)
+    # Externally studentized residuals follow t with one degree of freedom less than the error.
+    wanted = [float(stats.t.ppf((k + 0.5) / len(known), max(1, df - 1))) for k in range(len(known))]
+    ends = [min(wanted, default=-1.0), max(wanted, default=1.0)]
+    traces = [
+        {"type": "scatter", "mode": "lines", "x": ends, "y": ends, "name": "as expected", "line": line(DUMMY, "dash")},
+        points(wanted, known, "pours of the design", FACTOR, marker={"opacity": 0.75}),
+    ]
+    layout = {
+        "xaxis": axis(f"quantile of t ({max(1, df - 1)} degrees of freedom)"),
+        "yaxis": axis("studentized residual"),
+    }
+    return chart(traces, layout, 380)
+
+
 def _slice(coefficients: np.ndarray, fixed: np.ndarray, i: int, j: int) -> np.ndarray:
     """The model on a grid over factors i (columns) and j (rows), the others at ``fixed`` (coded)."""
     across, up = np.meshgrid(np.linspace(-1, 1, GRID), np.linspace(-1, 1, GRID))
@@ -122,17 +145,16 @@ def _slice(coefficients: np.ndarray, fixed: np.ndarray, i: int, j: int) -> np.nd
 
 def _marks(
     surface: Plain,
-    optimum: np.ndarray,
+    optimum: np.ndarray | None,
     factors: list[Plain],
     pair: tuple[int, int],
     scale: list[float],
     axes: Json,
     in_legend: bool,
 ) -> list[Json]:
-    """Runs of the design, the measured parameters where they lie in the region, and the optimum."""
+    """Runs of the design, the measured parameters where they lie in the region, and the optimum if there is one."""
     i, j = pair
     natural = np.array(surface["natural"])[:, pair] / scale
-    at = np.array([optimum[i], optimum[j]]) / scale
     reference = np.array([factors[i]["reference"], factors[j]["reference"]]) / scale
     low = (np.array(surface["region"]["centre"]) - surface["region"]["half_width"])[list(pair)] / scale
     high = (np.array(surface["region"]["centre"]) + surface["region"]["half_width"])[list(pair)] / scale
@@ -144,6 +166,9 @@ def _marks(
     if ((low <= reference) & (reference <= high)).all():
         x, y = (float(value) for value in reference)
         marks.append(points([x], [y], "measured parameters", INK, marker=diamond, **shown))
+    if optimum is None:
+        return marks
+    at = np.array([optimum[i], optimum[j]]) / scale
     return [*marks, points([float(at[0])], [float(at[1])], "optimum", CHOSEN, marker=star, **shown)]
 
 

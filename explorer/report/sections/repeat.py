@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from pathlib import Path
 
+from doe.study import TRIES
 from explorer.report.content import Block, Code, Section, Table, Text
 from explorer.report.findings import Plain, outcomes_by_stage
 from explorer.report.units_for_people import MISSING, duration, enumeration, fixed, number, percent
@@ -38,6 +39,8 @@ def repeat(result: Plain) -> Section:
     """Command line, time per stage and versions."""
     study, timing = result["study"], result["timing"]
     command = f"explorer calibrate --headless --study {_study(study)} --profile {shlex.quote(study['profile']['name'])}"
+    if study.get("tries", TRIES) != TRIES:
+        command += f" --tries {study['tries']}"
     times = [(stage, duration(seconds)) for stage, seconds in timing["stage_s"].items()]
     times.append(("all", duration(timing["total_s"])))
     rate = f"{number(timing['runs_per_minute'])} pours per minute."

@@ -1,0 +1,126 @@
+"""Two studies side by side: what was asked, what each found, and the effects of the factors that either has."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from explorer.report.content import Table
+from explorer.report.findings import Plain, deciding_error, factor_effects, half_width, sigma_of, significant
+from explorer.report.units_for_people import (
+    MISSING,
+    enumeration,
+    fixed,
+    observable_label,
+    observed,
+    parameter_label,
+    parameter_range,
+    parameter_value,
+    signed,
+    unit_of_observable,
+)
+
+EFFECTS_SHOWN = 12
+Cell = Callable[[Plain], str]
+
+
+def comparison(one: Plain, other: Plain, names: tuple[str, str]) -> tuple[Table, Table, Table]:
+    """Tables of findings, of the optimum with its 95 % set, and of effects with 95 % intervals."""
+    return _findings(one, other, names), _optima(one, other, names), _effects(one, other, names)
+
+
+def _findings(one: Plain, other: Plain, names: tuple[str, str]) -> Table:
+    rows: tuple[tuple[str, Cell], ...] = (
+        ("study, profile", lambda r: f"{r['study']['name']}, {r['study']['profile']['name']}"),
+        ("target", _target),
+        ("pours", lambda r: f"{r['runs']['total']}, {r['runs']['valid']} valid"),
+        ("σ of one pour", lambda r: observed(_of(r), sigma_of(r, _of(r)))),
+        ("significant (Holm)", _significant),
+        ("R², predicted R²", _fit),
+        ("predicted at the optimum", _predicted),
+        ("better than noise", lambda r: "yes" if r["optimum"]["single"]["better_than_noise"] else "no"),
+        ("verification", _verified),
+        ("difference from the target", _difference),
+        ("verdict", lambda r: r["verification"]["tests"][0]["verdict"]),
+    )
+    return Table(("", *names), tuple((title, cell(one), cell(other)) for title, cell in rows), "95 % intervals.")
+
+
+def _optima(one: Plain, other: Plain, names: tuple[str, str]) -> Table:
+    found = [_optimum(result) for result in (one, other)]
+    order = list(dict.fromkeys(path for cells in found for path in cells))
+    rows = tuple((parameter_label(path), *(cells.get(path, MISSING) for cells in found)) for path in order)
+    return Table(("optimum", *names), rows, "In brackets: 95 % set of the chosen point.")
+
+
+def _effects(one: Plain, other: Plain, names: tuple[str, str]) -> Table:
+    found = [_effects_of(result) for result in (one, other)]
+    size = {path: max(abs(cells[path][0]) for cells in found if path in cells) for cells in found for path in cells}
+    order = sorted(size, key=lambda path: -size[path])[:EFFECTS_SHOWN]
+    rows = tuple(
+        (parameter_label(path), *(cells[path][1] if path in cells else MISSING for cells in found)) for path in order
+    )
+    caption = "Low → high, each over its own range, which may differ between the two; the largest ones."
+    return Table(("effect", *names), rows, caption)
+
+
+def _of(result: Plain) -> str:
+    return str(result["study"]["targets"][0]["observable"])
+
+
+def _target(result: Plain) -> str:
+    target = result["study"]["targets"][0]
+    mean, margin = (observed(target["observable"], target[key]) for key in ("mean", "margin"))
+    return f"{observable_label(target['observable'])} {mean}, margin {margin}"
+
+
+def _significant(result: Plain) -> str:
+    analysis = result["screening"]["analysis"]
+    return enumeration(significant(analysis, deciding_error(analysis), "p_holm"))
+
+
+def _fit(result: Plain) -> str:
+    anova = result["surface"]["anova"][0]
+    return f"{fixed(anova['r_squared'])}, {fixed(anova['r_squared_predicted'])}"
+
+
+def _predicted(result: Plain) -> str:
+    found = result["optimum"]["single"]
+    low, high = (observed(_of(result), found[key]) for key in ("predicted_low", "predicted_high"))
+    return f"{observed(_of(result), found['predicted'])} ({low} … {high})"
+
+
+def _verified(result: Plain) -> str:
+    sample = result["verification"]["tests"][0]["simulated"]
+    return f"{observed(_of(result), sample['mean'])} ± {observed(_of(result), sample['sd'])} (sd), {sample['n']} pours"
+
+
+def _difference(result: Plain) -> str:
+    tests, unit = result["verification"]["tests"][0], unit_of_observable(_of(result))
+    test = tests["welch"] or tests["one_sample"]
+    if test is None:
+        return MISSING
+    middle, low, high = (None if test[key] is None else unit.of(test[key]) for key in ("difference", "low", "high"))
+    return f"{unit.attach(signed(middle))} ({signed(low)} … {signed(high)})"
+
+
+def _optimum(result: Plain) -> dict[str, str]:
+    found, values = result["optimum"]["single"], result["optimum"]["values"]
+    cells = {}
+    for k, factor in enumerate(result["optimum"]["factors"]):
+        path = factor["path"]
+        low, high = found["point_low"][k], found["point_high"][k]
+        cells[path] = f"{parameter_value(path, values[path])} ({parameter_range(path, low, high)})"
+    return cells
+
+
+def _effects_of(result: Plain) -> dict[str, tuple[float, str]]:
+    """Path → (effect, effect with its interval)."""
+    part = result["screening"]
+    paths, unit = {f["name"]: f["path"] for f in part["factors"]}, unit_of_observable(part["response"])
+    found = {}
+    for effect in factor_effects(part["analysis"]):
+        half = half_width(part["analysis"], effect)
+        text = unit.attach(signed(unit.of(effect["effect"])))
+        text += "" if half is None else f" ± {fixed(unit.of(half))}"
+        found[paths[effect["name"]]] = (effect["effect"], text)
+    return found

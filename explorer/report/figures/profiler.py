@@ -1,0 +1,88 @@
+"""The profiler: the model along each factor through one point, with its interval, and the target."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from explorer.report.content import Spec
+from explorer.report.figures.model import model_of
+from explorer.report.figures.style import (
+    CHOSEN,
+    FACTOR,
+    INTERVAL_BAND,
+    MARGIN_BAND,
+    TARGET,
+    Json,
+    axis,
+    chart,
+    line,
+    points,
+    suffix,
+)
+from explorer.report.findings import Plain
+from explorer.report.units_for_people import axis_title, observable_title, unit_of_observable, unit_of_parameter
+
+TRACE_POINTS = 31
+ROW_GAP = 0.13
+"""Space between two rows, for the title of the axis [share of the height]."""
+
+
+def profiler(result: Plain, index: int, natural: Sequence[float]) -> Spec:
+    """One row per factor: the mean of target ``index`` over its range, the others at ``natural`` (SI), band 95 %."""
+    model, factors = model_of(result, index), result["surface"]["factors"]
+    target = result["study"]["targets"][index]
+    unit = unit_of_observable(target["observable"])
+    here = model.coded(natural)
+    k, coded = len(factors), np.linspace(-1.0, 1.0, TRACE_POINTS)
+    along = np.broadcast_to(here, (k, TRACE_POINTS, k)).copy()
+    for row in range(k):
+        along[row, :, row] = coded
+    means = model.mean(along) / unit.size
+    widths = model.half_interval(along) / unit.size
+    height = unit.of(float(model.mean(here)))
+    traces: list[Json] = []
+    layout: Json = {"showlegend": False, "shapes": []}
+    goal, margin = unit.of(target["mean"]), unit.of(target["margin"])
+    ends = [float(np.min(means - widths)), float(np.max(means + widths)), goal]
+    room = 0.05 * (max(ends) - min(ends))
+    for row, factor in enumerate(factors):
+        size = unit_of_parameter(factor["path"]).size
+        x = ((model.centre[row] + model.half_width[row] * coded) / size).tolist()
+        at = natural[row] / size
+        low, high = (means[row] - widths[row]).round(5).tolist(), (means[row] + widths[row]).round(5).tolist()
+        place: Json = {"xaxis": f"x{suffix(row)}", "yaxis": f"y{suffix(row)}"}
+        band: Json = {"type": "scatter", "mode": "lines", "fill": "toself", "fillcolor": INTERVAL_BAND}
+        traces += [
+            band | place | {"x": x + x[::-1], "y": high + low[::-1], "line": {"width": 0}, "hoverinfo": "skip"},
+            {"type": "scatter", "mode": "lines", "x": x, "y": means[row].round(5).tolist(), "line": line(FACTOR)}
+            | place
+            | {"hovertemplate": "%{x:.4g}: %{y:.2f}<extra></extra>"},
+            points([at], [height], "here", CHOSEN, marker={"size": 10}, **place),
+        ]
+        layout |= _row(row, k, axis_title(factor["path"], factor["name"]), [min(ends) - room, max(ends) + room])
+        domain = {"xref": f"x{suffix(row)} domain", "yref": f"y{suffix(row)}", "x0": 0, "x1": 1}
+        layout["shapes"] += [
+            {"type": "rect", **domain, "y0": goal - margin, "y1": goal + margin, "fillcolor": MARGIN_BAND}
+            | {"line": {"width": 0}, "layer": "below"},
+            {"type": "line", **domain, "y0": goal, "y1": goal, "line": line(TARGET, "dash")},
+        ]
+    layout["yaxis"]["title"] = {"text": observable_title(target["observable"])}
+    return chart(traces, layout, 170 * k)
+
+
+def prediction(result: Plain, index: int, natural: Sequence[float]) -> tuple[float, float]:
+    """Mean of the model at ``natural`` (SI) and half its 95 % interval, in the unit of the screen."""
+    model, unit = model_of(result, index), unit_of_observable(result["study"]["targets"][index]["observable"])
+    here = model.coded(natural)
+    return unit.of(float(model.mean(here))), unit.of(float(model.half_interval(here)))
+
+
+def _row(row: int, rows: int, title: str, limits: list[float]) -> Json:
+    height = (1.0 - ROW_GAP * (rows - 1)) / rows
+    top = 1.0 - row * (height + ROW_GAP)
+    return {
+        f"xaxis{suffix(row)}": axis(title, anchor=f"y{suffix(row)}"),
+        f"yaxis{suffix(row)}": axis("", anchor=f"x{suffix(row)}", domain=[max(0.0, top - height), top], range=limits),
+    }

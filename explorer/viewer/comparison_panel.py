@@ -1,0 +1,73 @@
+"""Two finished studies side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from pathlib import Path
+
+import viser
+
+from explorer.report.comparison import comparison
+from explorer.report.content import Table
+from explorer.report.findings import Plain
+from explorer.result_file import ResultFile
+from explorer.viewer.actions import Post
+from explorer.viewer.process_view import escaped
+from explorer.viewer.result_chooser import ResultChooser, title
+
+NONE = "(choose a finished study)"
+EMPTY = "Choose a second finished study: optimum, intervals and effects are then shown beside those of the one above."
+NOT_YET = "The study above is not finished; a comparison needs two results."
+
+
+class ComparisonPanel:
+    """List of results to compare with the one that the page shows."""
+
+    def __init__(self, server: viser.ViserServer, post: Post) -> None:
+        self._file = ResultFile("result.json")
+        self._chooser = ResultChooser(server, "Compare with", NONE, "result.json", post, self._draw)
+        self._words = server.gui.add_markdown(EMPTY)
+        self._result: Plain | None = None
+        self._name = ""
+        self._version: Hashable = None
+
+    def offer(self, folders: Sequence[Path]) -> None:
+        """The finished studies that there are now."""
+        self._chooser.offer(folders)
+
+    def show(self, result: Plain | None, name: str, version: Hashable) -> None:
+        """Follow the result that the page shows, called ``name``."""
+        if (version, name) != self._version:
+            self._version, self._result, self._name = (version, name), result, name
+            self._draw()
+
+    def _draw(self) -> None:
+        folder = self._chooser.folder
+        other = self._file.read(folder)
+        if other is None or folder is None:
+            text = EMPTY
+        elif self._result is None or "runs" not in self._result:
+            text = NOT_YET
+        else:
+            text = comparison_markdown(self._result, other, (self._name, title(folder)))
+        if self._words.content != text:
+            self._words.content = text
+
+
+def comparison_markdown(one: Plain, other: Plain, names: tuple[str, str]) -> str:
+    """The tables, or one line where a file is not a whole result."""
+    try:
+        tables = comparison(one, other, names)
+    except (KeyError, IndexError, TypeError, ValueError) as error:
+        # A folder that somebody named may hold any JSON, also that of another version.
+        return f"These two cannot be compared: {escaped(f'{type(error).__name__}: {error}')}"
+    return "\n\n".join(table_markdown(table) for table in tables)
+
+
+def table_markdown(table: Table) -> str:
+    """A table with all its texts escaped."""
+    lines = [table.header, tuple(":--" for _ in table.header), *table.rows]
+    rows = [
+        "| " + " | ".join(cell if k == 1 else escaped(cell) for cell in cells) + " |" for k, cells in enumerate(lines)
+    ]
+    return "\n".join(rows) + (f"\n\n{escaped(table.caption)}" if table.caption else "")

@@ -1,0 +1,99 @@
+"""One chart at a time, chosen from a list. The chart is made when it is chosen, or when what it shows has changed."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from typing import Any
+
+import viser
+
+from explorer.report.plot import Plots
+from explorer.viewer.actions import Post
+from explorer.viewer.plot_theme import Drawn
+from explorer.viewer.process_view import escaped
+
+NOTHING = "(nothing yet)"
+
+
+class PlotView:
+    """List, chart and caption. ``empty`` says what to do while there is nothing to show.
+
+    The chart comes onto the page with the first thing to show: the first one brings plotly.js (4 MB) to every browser.
+    """
+
+    def __init__(self, server: viser.ViserServer, label: str, empty: str, post: Post, dark: bool = True) -> None:
+        self._gui, self._empty, self._dark = server.gui, empty, dark
+        self._place = server.gui.add_folder(None)
+        with self._place:
+            self._choice = server.gui.add_dropdown(
+                label, (NOTHING,), hint="One chart at a time. Hover over it for a button that shows it large."
+            )
+            self._caption = server.gui.add_markdown(empty)
+        self._chart: Any = None
+        self._plots: Plots = {}
+        self._version: Hashable = None
+        self._shown: tuple[Hashable, str, bool] | None = None
+
+        @self._choice.on_update
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None:
+                post(self._draw)
+
+    @property
+    def dark(self) -> bool:
+        """Whether charts are for a dark page."""
+        return self._dark
+
+    @dark.setter
+    def dark(self, dark: bool) -> None:
+        self._dark = dark
+        self._draw()
+
+    def offer(self, plots: Plots, version: Hashable) -> None:
+        """The charts that there are now; ``version`` changes when what they show does. Inside ``server.atomic()``."""
+        if version == self._version:
+            return
+        self._version, self._plots = version, plots
+        titles = tuple(plots) or (NOTHING,)
+        if tuple(self._choice.options) != titles:
+            # viser takes the first option where the present one is not among the new ones.
+            self._choice.options = titles
+        self._draw()
+
+    def show_anew(self, titles: Sequence[str]) -> None:
+        """Draw again what shows something else now: the chosen chart if it is one of ``titles``, else the first."""
+        if self._choice.value not in titles:
+            self._choice.value = titles[0]  # type: ignore[misc]
+        self._shown = None
+        self._draw()
+
+    def _draw(self) -> None:
+        title = str(self._choice.value)  # what a browser sent may be anything
+        plot = self._plots.get(title)
+        now = (self._version, title, self._dark)
+        if now == self._shown:
+            return
+        self._shown = now
+        try:
+            spec = None if plot is None else plot.make()
+        except (KeyError, IndexError, TypeError, ValueError) as error:
+            # A folder that somebody named may hold any JSON, also that of another version.
+            self._clear(f"This chart cannot be drawn: {escaped(f'{type(error).__name__}: {error}')}")
+            return
+        if plot is None or spec is None:
+            self._clear(self._empty)
+            return
+        drawn, aspect = Drawn(spec, self._dark, title), plot.aspect
+        if self._chart is None:
+            with self._place:
+                self._chart = self._gui.add_plotly(drawn, aspect=aspect)
+        else:
+            self._chart.aspect = aspect
+            self._chart.figure = drawn
+            self._chart.visible = True
+        self._caption.content = escaped(plot.caption)
+
+    def _clear(self, words: str) -> None:
+        if self._chart is not None:
+            self._chart.visible = False
+        self._caption.content = words

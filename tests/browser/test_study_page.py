@@ -1,0 +1,110 @@
+"""The panel of studies in headless Chromium: charts of a finished study, and a study that is started and stopped."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import time
+
+import pytest
+
+from tests.browser.test_page import FLAGS, PATIENCE, SMALL_POUR, slider, wait_for
+from tests.explorer import reported_studies
+
+pytestmark = pytest.mark.browser
+
+COMPILED = 240.0
+"""Seconds: the first run of a study comes after its workers have compiled the solver, beside the page's own."""
+TRACES = "() => document.querySelector('.js-plotly-plot').data.map(trace => trace.name ?? '')"
+HERE = (
+    """() => document.querySelector('.js-plotly-plot').data.filter(trace => trace.name === 'here').map(t => t.x[0])"""
+)
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory):
+    """Address of a page that finds one finished study in the user's data."""
+    data = tmp_path_factory.mktemp("data")
+    study = data / "repose-explorer" / "studies" / "sunflower_extract-quick-20260101-101010"
+    study.mkdir(parents=True)
+    (study / "result.json").write_text(json.dumps(reported_studies.result_of_case("planted")))
+    settings = [part for one in SMALL_POUR for part in ("--set", one)]
+    server = subprocess.Popen(
+        [sys.executable, "-m", "explorer", "serve", "--port", "0", "--store", str(data / "runs.sqlite"), *settings],
+        stdout=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"XDG_DATA_HOME": str(data)},
+    )
+    found = re.search(r"http://\S+", server.stdout.readline())
+    assert found, "the server did not tell its address"
+    yield found[0]
+    server.terminate()
+    assert server.wait(30) == 0
+
+
+@pytest.fixture(scope="module")
+def page(address, chromium):
+    """The opened tab; what its console complains about is collected in ``page.complaints``."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
+        page = browser.new_page(viewport={"width": 1280, "height": 1400})
+        page.set_default_timeout(PATIENCE)
+        page.complaints = []
+        page.on("console", lambda said: page.complaints.append(said.text) if said.type == "error" else None)
+        page.on("pageerror", lambda error: page.complaints.append(str(error)))
+        page.goto(address)
+        page.get_by_role("tab", name="Calibrate").click()
+        page.get_by_text("Profile").first.wait_for()
+        yield page
+        if shot := os.environ.get("REPOSE_SCREENSHOT"):
+            page.screenshot(path=shot)
+        browser.close()
+
+
+def choose(page, label, option):
+    page.get_by_label(label, exact=True).click()
+    page.get_by_role("option", name=option, exact=True).click()
+
+
+def test_the_newest_finished_study_is_drawn_and_another_chart_can_be_chosen(page):
+    page.locator(".js-plotly-plot").first.wait_for()
+    choose(page, "Chart", "Ascent path")
+    wait_for(lambda: "mean, 95 % interval" in page.evaluate(TRACES))
+    assert page.locator(".js-plotly-plot").count() == 1
+
+
+def test_a_slider_of_the_profiler_moves_its_chart_by_keyboard(page):
+    page.get_by_text("Profiler", exact=True).last.click()
+    thumb = slider(page, "X7")
+    thumb.scroll_into_view_if_needed()
+    thumb.focus()
+    page.keyboard.press("Home")
+    wait_for(lambda: len(page.evaluate(HERE)) == 3)
+    first = page.evaluate(HERE)
+    page.keyboard.press("End")
+    wait_for(lambda: page.evaluate(HERE)[0] > first[0])
+    assert page.evaluate(HERE)[1:] == first[1:]
+
+
+def test_a_study_is_started_paused_cancelled_and_resumed(page):
+    page.get_by_role("button", name="Start", exact=True).first.click()
+    page.get_by_text("Running at low priority").wait_for()
+    wait_for(lambda: re.search(r"[1-9]\d* of \d+ runs, time left", page.inner_text("body")), COMPILED)
+    page.get_by_role("button", name="Pause / go on").first.click()
+    page.get_by_text("Paused: it stands still").wait_for()
+    standing = re.search(r"(\d+) of \d+ runs", page.inner_text("body"))[1]
+    time.sleep(5.0)
+    assert re.search(r"(\d+) of \d+ runs", page.inner_text("body"))[1] == standing
+    page.get_by_role("button", name="Cancel", exact=True).first.click()
+    page.get_by_text("Cancelled.").wait_for()
+    page.get_by_role("button", name="Resume", exact=True).first.click()
+    page.get_by_text("Running at low priority").wait_for()
+    page.get_by_role("button", name="Cancel", exact=True).first.click()
+    page.get_by_text("Cancelled.").wait_for()
+
+
+def test_the_console_has_nothing_to_complain_about(page):
+    assert page.complaints == []

@@ -1,0 +1,79 @@
+"""A study changed on the page: the same study but for what was changed."""
+
+import dataclasses
+import tomllib
+
+import pytest
+
+from doe.study import load_study
+from explorer.study_edit import StudyEdits, edited_study, listed_edits, study_toml
+from solver import asset_path
+from solver.assets import shipped_assets
+from tests.explorer.command_line import explorer
+
+FILE = asset_path("studies", "sunflower_extract")
+
+
+@pytest.mark.parametrize("name", shipped_assets("studies"))
+def test_a_study_written_out_is_the_same_study(name, tmp_path):
+    file = tmp_path / f"{name}.toml"
+    file.write_text(study_toml(tomllib.loads(asset_path("studies", name).read_text()), "one\ntwo = 3"))
+    again, study = load_study(str(file)), load_study(name)
+    assert dataclasses.replace(again, file=study.file) == study
+
+
+def test_only_what_was_changed_differs():
+    study = load_study(str(FILE))
+    edits = StudyEdits({"X4": {"low": 45e6, "high": 80e6}, "X7": {}}, {"mean": 26.5, "n": 12.0})
+    text, changed = edited_study(FILE, edits)
+    assert (changed.factors[3].low, changed.factors[3].high, changed.factors[3].reference) == (45e6, 80e6, 56.3e6)
+    assert (changed.targets[0].mean, changed.targets[0].n, changed.targets[0].sd) == (26.5, 12, study.targets[0].sd)
+    back = dataclasses.replace(
+        changed,
+        factors=tuple(study.factors[k] if k == 3 else factor for k, factor in enumerate(changed.factors)),
+        targets=study.targets,
+    )
+    assert back == study
+    assert "changed on the page: X4, target" in text
+    assert listed_edits(study, edits) == [
+        ("X4", "low", 40.1e6, 45e6),
+        ("X4", "high", 70.5e6, 80e6),
+        ("target", "mean", 24.68, 26.5),
+        ("target", "n", 10, 12.0),
+    ]
+
+
+def test_nothing_changed_is_no_edit():
+    assert not StudyEdits()
+    assert not StudyEdits({"X4": {}}, {})
+    assert StudyEdits({"X4": {"low": 1.0}})
+
+
+@pytest.mark.parametrize(
+    ("edits", "line"),
+    [
+        (StudyEdits({"X4": {"low": 60e6}}), r"changed study: X4 .*: reference 5.63e\+07 is outside 6e\+07"),
+        (StudyEdits({"X7": {"high": -1.0}}), r"changed study: pair.seed.seed.static_friction.*-1"),
+        (StudyEdits({"X99": {"high": 1.0}}), r"factor 'X99' is not in the study; allowed: X1, X2"),
+        (StudyEdits({}, {"margin": 0.0}), r"changed study: target.margin: 0 must be positive"),
+        (StudyEdits({}, {"n": 1}), r"changed study: target.n: 1"),
+    ],
+)
+def test_what_is_not_allowed_is_one_line(edits, line):
+    with pytest.raises(ValueError, match=line) as raised:
+        edited_study(FILE, edits)
+    assert "\n" not in str(raised.value)
+
+
+def test_a_material_beside_the_study_is_still_found_from_elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert explorer("new", "study", "lentil").exit_code == 0
+    file = tmp_path / "lentil_study.toml"
+    study = load_study(str(file))
+    factor = study.factors[0]
+    text, changed = edited_study(file, StudyEdits({factor.name: {"low": float(factor.reference) * 0.999}}))
+    away = tmp_path / "elsewhere" / "changed.toml"
+    away.parent.mkdir()
+    away.write_text(text)
+    monkeypatch.chdir(away.parent)
+    assert load_study(str(away)).scene == changed.scene
