@@ -12,7 +12,7 @@ import viser
 import websockets
 from viser import _messages
 
-from explorer.command_process import CommandStatus
+from explorer.diagnosis_process import DiagnoseProcess
 from explorer.live.messages import SessionState
 from explorer.session import Session
 from explorer.viewer.camera import view_of
@@ -21,16 +21,13 @@ from explorer.viewer.page import Page
 from tests.explorer.beads import bead_scene
 from tests.explorer.test_session import wait_for
 
-IDLE = SimpleNamespace(status=lambda: CommandStatus("idle"), result=lambda: None, cancel=lambda: None)
-"""A diagnosis that nobody has started."""
-
 
 @pytest.fixture(scope="module")
-def page():
+def page(tmp_path_factory):
     """A page in a thread of its own, and the session behind it; no one else uses that while the thread runs."""
     server, session, stop = guarded_server("127.0.0.1", 0, "test"), Session(), threading.Event()
     session.start(bead_scene(), 1)
-    page = Page(server, session, None, "", IDLE)
+    page = Page(server, session, None, "", DiagnoseProcess(tmp_path_factory.mktemp("diagnoses"), None))
     thread = threading.Thread(target=page.run, args=(stop,))
     thread.start()
     yield SimpleNamespace(server=server, page=page, look=page._look)
