@@ -1,0 +1,86 @@
+"""A panel of studies with a study and a session that only remember, and a person at its controls."""
+
+import json
+
+from explorer.command_process import CommandStatus
+from explorer.live.messages import SessionState, Status
+from explorer.viewer.actions import Actions
+from explorer.viewer.study_panel import StudyPanel
+from solver import asset_path, load_material
+
+SCENE = load_material("sunflower_extract")
+
+
+class FakeStudy:
+    """Keeps what it was asked; its status and its folders are what the test says."""
+
+    study_file = asset_path("studies", "sunflower_extract")
+
+    def __init__(self):
+        self.asked, self.now, self.out, self.queued, self.done = [], CommandStatus("idle"), None, (), ()
+
+    def start(self, profile, edits):
+        self.asked.append(("start", profile, edits))
+
+    def queue(self, profile, edits):
+        self.asked.append(("queue", profile, edits))
+
+    def __getattr__(self, name):
+        if name not in ("cancel", "pause", "go_on", "resume", "retry", "clear_queue"):
+            raise AttributeError(name)
+        return lambda: self.asked.append(name)
+
+    def waiting(self):
+        return self.queued
+
+    def status(self):
+        return self.now
+
+    def finished(self):
+        return self.done
+
+
+class FakeSession:
+    def __init__(self):
+        self.asked = []
+
+    def status(self):
+        return Status(SessionState.RUNNING, "", SCENE, seed=1, generation=1, speed=1.0)
+
+    def set_parameters(self, values):
+        self.asked.append(("set", values))
+
+    def restart(self, scene, seed=None):
+        self.asked.append(("restart", scene, seed))
+
+
+class PanelAtHand:
+    """A panel with what it talks to; ``enter`` and ``press`` are a person at a browser."""
+
+    def __init__(self, server):
+        self.study, self.session, self.actions = FakeStudy(), FakeSession(), Actions()
+        self.panel = StudyPanel(server, self.study, "sunflower_extract", self.actions.post, self.session)
+
+    def enter(self, handle, value):
+        handle.value = value
+        self._call(handle, value)
+        return self.actions.carry_out()
+
+    def press(self, button):
+        self._call(self.panel._view._buttons, button)
+        return self.actions.carry_out()
+
+    def _call(self, handle, value):
+        event = type("Event", (), {"client_id": 0, "target": type("Handle", (), {"value": value})})
+        for callback in handle._impl.update_cb:
+            callback(event)
+
+
+def written(folder, content, name="result.json"):
+    folder.mkdir(exist_ok=True)
+    (folder / name).write_text(json.dumps(content))
+    return folder
+
+
+def drawn(view):
+    return json.loads(view._chart._plotly_json_str)
