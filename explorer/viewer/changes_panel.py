@@ -17,6 +17,7 @@ from explorer.presets import Preset, preset_names, preset_path, preset_values, r
 from explorer.scene_changes import Difference, differences, shown
 from explorer.session import Session
 from explorer.viewer.actions import Action, Post
+from explorer.viewer.small_text import small_html
 from solver.scene import Scene, parameters, with_values
 
 UNDO, REDO, BACK, POUR = "Undo", "Redo", "All back", "Pour the default"
@@ -116,7 +117,7 @@ class ChangesPanel:
         self._say(f"Saved: {path}")
 
     def _say(self, text: str) -> None:
-        self._about.content = f"<div style='padding:0 0.75em; font-size:0.8em'>{escape(text)}</div>"
+        self._about.content = small_html(escape(text))
 
 
 def defaults(session: Session) -> dict[str, Any]:
@@ -138,7 +139,7 @@ def apply_preset(session: Session, preset: Preset) -> None:
 def changes_html(found: Sequence[Difference], undoable: int, redoable: int) -> str:
     """One line per parameter that differs, default → now; marked where it acts on restart only."""
     rows = "".join(
-        f"<tr><td style='padding-right:1em; overflow-wrap:anywhere'>{escape(one.path)}"
+        f"<tr><td style='padding-right:1em'>{escape(one.path)}"
         f"{'' if one.live else ' <i>(on restart)</i>'}</td>"
         f"<td style='white-space:nowrap'>{escape(shown(one.before, one.unit))} → "
         f"<b>{escape(shown(one.now, one.unit))}</b></td></tr>"
@@ -147,10 +148,7 @@ def changes_html(found: Sequence[Difference], undoable: int, redoable: int) -> s
     more = f"<div>and {len(found) - MOST_SHOWN} more</div>" if len(found) > MOST_SHOWN else ""
     head = f"{len(found)} changed against the default" if found else "Everything is at its default"
     steps = f"{undoable} to undo, {redoable} to redo"
-    return (
-        f"<div style='padding:0 0.75em; font-size:0.8em'>{head}; {steps}."
-        f"<table style='font-variant-numeric:tabular-nums'>{rows}</table>{more}</div>"
-    )
+    return small_html(f"{head}; {steps}.<table style='font-variant-numeric:tabular-nums'>{rows}</table>{more}")
 
 
 def _on_choice(register: Callable[[Any], Any], act: Callable[[str], object]) -> None:

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from explorer.measured_curves import MeasuredCurve
 from explorer.viewer.palette import FLANK, MEASURED, css
+from explorer.viewer.small_text import small_html
 from solver.observables.outline import Flanks, Outline
 from solver.observables.repose import FlankLine
 
@@ -31,8 +32,7 @@ def outline_html(outline: Outline | None, measured: MeasuredCurve | None) -> str
     if measured is not None:
         fitted = f": {flank_words(measured.flanks)}" if any(measured.flanks) else ""
         lines.append(f"<span style='color:{css(MEASURED)}'>Dashed: measured, {escape(measured.name)}{fitted}.</span>")
-    caption = "<br>".join(lines)
-    return f"<div style='padding:0 0.75em; font-size:0.8em'>{''.join(parts)}<div>{caption}</div></div>"
+    return small_html(f"{''.join(parts)}<div>{'<br>'.join(lines)}</div>")
 
 
 def flank_words(flanks: Flanks) -> str:

@@ -18,6 +18,7 @@ from explorer.session import Session
 from explorer.viewer.actions import Post
 from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.recording_switch import HTML, RRD, RecordingSwitch
+from explorer.viewer.small_text import small_html
 from solver.scene import Scene
 
 LARGEST_PICTURE = (1440, 2560)
@@ -153,11 +154,8 @@ def command_html(source: SceneSource, scene: Scene, seed: int) -> str:
         line, select = command_line(source, scene, seed), "all"
     except CommandError as error:
         line, select = f"None: {error}", "auto"
-    return (
-        f"<div style='padding:0 0.75em 0.5em; font-size:0.8em'><code style='display:block; user-select:{select}; "
-        "white-space:pre-wrap; overflow-wrap:anywhere; padding:0.4em; background:rgba(128,150,170,0.14)'>"
-        f"{escape(line)}</code></div>"
-    )
+    style = f"display:block; user-select:{select}; white-space:pre-wrap; padding:0.4em; margin-bottom:0.6em"
+    return small_html(f"<code style='{style}; background:rgba(128,150,170,0.14)'>{escape(line)}</code>")
 
 
 def recording_html(recording: RecordingSwitch, busy_with: str, notice: str) -> str:
@@ -167,8 +165,7 @@ def recording_html(recording: RecordingSwitch, busy_with: str, notice: str) -> s
         lines.append(f"Recording into {recording.path}")
     elif recording.path is not None:
         lines.append(f"Recorded: {recording.path}")
-    text = "<br>".join(escape(line) for line in lines if line)
-    return f"<div style='padding:0 0.75em; font-size:0.8em; overflow-wrap:anywhere'>{text}</div>"
+    return small_html("<br>".join(escape(line) for line in lines if line))
 
 
 def _send(client: Any, name: str, content: bytes) -> None:

@@ -17,6 +17,7 @@ import viser
 from explorer.screen_units import InputError, checked, quantity, screen_unit, title
 from explorer.viewer.actions import Post
 from explorer.viewer.live_controls import HANDS_OFF, LINEAR_STEP, Apply, screen_range
+from explorer.viewer.small_text import small_html
 from solver.material import Pair
 from solver.params import Parameter, declared
 from solver.scene import Scene, value
@@ -132,7 +133,7 @@ def matrix_html(scene: Scene, parameter: Parameter, name: str) -> str:
         cells = ("–" if pair is None else quantity(getattr(pair, name), parameter.unit) for pair in pairs)
         rows.append(f"<tr><th {style}>{escape(one)}</th>{''.join(f'<td {style}>{cell}</td>' for cell in cells)}</tr>")
     table = f"<table><tr><th></th>{head}</tr>{''.join(rows)}</table>"
-    return f"<div style='padding:0 0.75em; font-size:0.8em; overflow-x:auto'>In the solver:{table}</div>"
+    return small_html(f"In the solver:<div style='overflow-x:auto; overflow-wrap:normal'>{table}</div>")
 
 
 def _pair(scene: Scene, one: str, other: str) -> Pair | None:

@@ -15,6 +15,7 @@ from explorer.session import Session
 from explorer.uploads import shaped_source
 from explorer.viewer.actions import Post
 from explorer.viewer.background_work import BackgroundWork
+from explorer.viewer.small_text import small_html
 from solver.assets import shipped_assets
 from solver.mesh_file import LENGTH_UNITS, SUFFIXES
 from solver.rigs import RIGS
@@ -76,7 +77,7 @@ class ScenePanel:
             if self._body.options != _names(status.scene):
                 self._body.options = _names(status.scene)
             self._show_material(self._session.source.material)
-        doing = f"<div style='padding:0 0.75em; font-size:0.8em'>{WORKING if self._background.busy_with else ''}</div>"
+        doing = small_html(WORKING if self._background.busy_with else "")
         if self._doing.content != doing:
             self._doing.content = doing
 
