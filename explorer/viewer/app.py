@@ -15,8 +15,8 @@ from explorer.session import Session
 from explorer.study_process import CalibrationProcess
 from explorer.user_data import data_folder
 from explorer.viewer.guarded_server import address, guarded_server
+from explorer.viewer.output.recording_switch import session_recorder
 from explorer.viewer.page import Page
-from explorer.viewer.recording_switch import session_recorder
 from solver.scene import Scene
 
 LABEL = "Granular material explorer"
@@ -87,7 +87,7 @@ def replay(
     """
     # Imported here: rerun takes a second to load, and a live page needs none of it.
     from explorer.logs.recording import read_recording
-    from explorer.viewer.replay_page import ReplayPage
+    from explorer.viewer.replay.replay_page import ReplayPage
 
     read = read_recording(recording)
     with stopped_by_signals() as stop, ExitStack() as ending:

@@ -15,16 +15,16 @@ from explorer.scene_meshes import scene_height
 from explorer.session import Session
 from explorer.study_process import StudyProcess
 from explorer.viewer.actions import Actions
-from explorer.viewer.chart import Chart
-from explorer.viewer.diagnosis_panel import DiagnosisPanel
-from explorer.viewer.look_tab import LookTab
-from explorer.viewer.pour_panels import PourPanels
-from explorer.viewer.readout import not_later, readout_html
-from explorer.viewer.recording_switch import Recorder
-from explorer.viewer.run_panel import RunPanel
+from explorer.viewer.look.look_tab import LookTab
+from explorer.viewer.output.recording_switch import Recorder
+from explorer.viewer.pour.chart import Chart
+from explorer.viewer.pour.pour_panels import PourPanels
+from explorer.viewer.pour.readout import not_later, readout_html
+from explorer.viewer.pour.run_panel import RunPanel
+from explorer.viewer.pour.second_pile import SecondPile
 from explorer.viewer.scene_nodes import SceneNodes
-from explorer.viewer.second_pile import SecondPile
-from explorer.viewer.study_panel import StudyPanel
+from explorer.viewer.study.diagnosis_panel import DiagnosisPanel
+from explorer.viewer.study.study_panel import StudyPanel
 from explorer.viewer.theme import DARK, ThemeSwitch, apply_theme
 from explorer.viewer.tour import Tour
 from explorer.viewer.view import light, look_at_height

@@ -5,7 +5,7 @@ import json
 from explorer.command_process import CommandStatus
 from explorer.live.messages import SessionState, Status
 from explorer.viewer.actions import Actions
-from explorer.viewer.study_panel import StudyPanel
+from explorer.viewer.study.study_panel import StudyPanel
 from solver import asset_path, load_material
 
 SCENE = load_material("sunflower_extract")

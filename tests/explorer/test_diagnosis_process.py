@@ -10,9 +10,9 @@ from explorer.command_process import BackgroundError, CommandStatus
 from explorer.diagnosis_process import DiagnoseProcess
 from explorer.stage_progress import StageProgress
 from explorer.viewer.actions import Actions
-from explorer.viewer.diagnosis_panel import OWN, DiagnosisPanel, answer_markdown
 from explorer.viewer.guarded_server import guarded_server
-from explorer.viewer.plot_view import NOTHING
+from explorer.viewer.study.diagnosis_panel import OWN, DiagnosisPanel, answer_markdown
+from explorer.viewer.study.plot_view import NOTHING
 from solver import AssetNotFoundError
 from solver.assets import measurement_folder, shipped_measurements
 from tests.explorer.background import only_folder, wait_for

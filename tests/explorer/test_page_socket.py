@@ -15,8 +15,8 @@ from viser import _messages
 from explorer.diagnosis_process import DiagnoseProcess
 from explorer.live.messages import SessionState
 from explorer.session import Session
-from explorer.viewer.camera import view_of
 from explorer.viewer.guarded_server import guarded_server
+from explorer.viewer.look.camera import view_of
 from explorer.viewer.page import Page
 from tests.explorer.beads import bead_scene
 from tests.explorer.test_session import wait_for

@@ -13,12 +13,12 @@ from explorer.live.messages import SessionState, Status
 from explorer.scene_meshes import body_triangles, scene_height
 from explorer.screen_units import InputError
 from explorer.viewer.actions import Actions
-from explorer.viewer.camera import DIRECTIONS, go_along, go_to, link_to, view_of
 from explorer.viewer.guarded_server import guarded_server
-from explorer.viewer.inspector import NOBODY, body_html
-from explorer.viewer.look_tab import LookTab
+from explorer.viewer.look.camera import DIRECTIONS, go_along, go_to, link_to, view_of
+from explorer.viewer.look.inspector import NOBODY, body_html
+from explorer.viewer.look.look_tab import LookTab
+from explorer.viewer.look.picking import first_crossing, nearest_hit
 from explorer.viewer.palette import SELECTED, linear
-from explorer.viewer.picking import first_crossing, nearest_hit
 from explorer.viewer.scene_nodes import SceneNodes
 from explorer.viewer.view import VIEW_FIELD
 from tests.explorer.beads import RADIUS, bead_scene

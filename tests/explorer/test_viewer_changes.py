@@ -8,8 +8,8 @@ from explorer.errors import CommandError
 from explorer.scene_changes import differences
 from explorer.scene_source import material_source
 from explorer.viewer.actions import Actions
-from explorer.viewer.changes_panel import BACK, MOST_SHOWN, POUR, REDO, UNDO, ChangesPanel, changes_html
 from explorer.viewer.guarded_server import guarded_server
+from explorer.viewer.pour.changes_panel import BACK, MOST_SHOWN, POUR, REDO, UNDO, ChangesPanel, changes_html
 from solver.scene import value, with_values
 from tests.explorer.page_session import PageSession
 from tests.explorer.test_viewer_controls import event

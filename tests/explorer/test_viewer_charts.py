@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from explorer.live.messages import Event, SessionState
-from explorer.viewer.chart import Chart, History
 from explorer.viewer.guarded_server import guarded_server
-from explorer.viewer.marks import (
+from explorer.viewer.pour.chart import Chart, History
+from explorer.viewer.pour.marks import (
     LEGEND_INTERVAL,
     MOST_LETTERS,
     MOST_MARKS,
@@ -19,7 +19,7 @@ from explorer.viewer.marks import (
     change_times,
     with_marks,
 )
-from explorer.viewer.motion_chart import MotionChart, MotionHistory
+from explorer.viewer.pour.motion_chart import MotionChart, MotionHistory
 from solver.observables.value import Value
 from tests.explorer.test_viewer_texts import STATUS
 

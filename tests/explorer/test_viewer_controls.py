@@ -8,9 +8,9 @@ from explorer.live.messages import SessionState, Status
 from explorer.screen_units import InputError, checked, quantity, screen_unit, title
 from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import guarded_server
-from explorer.viewer.live_controls import LiveControl, decade_mark, decades_around, mean_value
-from explorer.viewer.live_panel import echo_html, effect_targets, live_parameters, material_targets, pair_targets
-from explorer.viewer.restart_panel import PATHS, RestartPanel, entered, size_paths
+from explorer.viewer.pour.live_controls import LiveControl, decade_mark, decades_around, mean_value
+from explorer.viewer.pour.live_panel import echo_html, effect_targets, live_parameters, material_targets, pair_targets
+from explorer.viewer.pour.restart_panel import PATHS, RestartPanel, entered, size_paths
 from solver import load_material, parameters, with_values
 from solver.rigs import RIGS
 from solver.scene import value, with_rig

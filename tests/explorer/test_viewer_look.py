@@ -11,11 +11,11 @@ from explorer.live.details import Details
 from explorer.live.frames import Frame
 from explorer.screen_units import InputError
 from explorer.viewer.actions import Actions
-from explorer.viewer.colouring import QUANTITIES, bar_html, body_colours, colour_range, nice_top
-from explorer.viewer.force_chains import ForceChains, chain_segments, chain_text
 from explorer.viewer.guarded_server import guarded_server
-from explorer.viewer.look import COMPONENT, CUTS, NOTHING, Look, in_sight
-from explorer.viewer.look_panel import COLOURS, LookPanel
+from explorer.viewer.look.colouring import QUANTITIES, bar_html, body_colours, colour_range, nice_top
+from explorer.viewer.look.force_chains import ForceChains, chain_segments, chain_text
+from explorer.viewer.look.look import COMPONENT, CUTS, NOTHING, Look, in_sight
+from explorer.viewer.look.look_panel import COLOURS, LookPanel
 from explorer.viewer.palette import SELECTED, VIRIDIS, linear, linear_all, mapped
 from explorer.viewer.scene_nodes import SceneNodes, component_colour
 from tests.explorer.beads import bead_scene

@@ -8,10 +8,10 @@ import pytest
 from explorer.scene_source import material_source
 from explorer.screen_units import InputError
 from explorer.viewer.guarded_server import guarded_server
-from explorer.viewer.live_panel import LivePanel
-from explorer.viewer.pair_matrix import BOXES, PairMatrix, matrix_html, pair_parameters, triangle
-from explorer.viewer.restart_panel import RestartPanel
-from explorer.viewer.scene_bound import SceneBound
+from explorer.viewer.pour.live_panel import LivePanel
+from explorer.viewer.pour.pair_matrix import BOXES, PairMatrix, matrix_html, pair_parameters, triangle
+from explorer.viewer.pour.restart_panel import RestartPanel
+from explorer.viewer.pour.scene_bound import SceneBound
 from solver.material import Pair
 from solver.params import declared
 from solver.scene import canonical, parameters, value, with_rig, with_values

@@ -15,9 +15,9 @@ from explorer.measured_curves import MeasuredCurve, measured_curves
 from explorer.viewer.actions import Actions
 from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.guarded_server import guarded_server
-from explorer.viewer.outline_nodes import flank_segments, in_world, measured_segments
-from explorer.viewer.outline_panel import NONE, OWN, OutlinePanel
-from explorer.viewer.outline_svg import WAITING, corners_of, outline_html, outline_svg
+from explorer.viewer.pour.outline_nodes import flank_segments, in_world, measured_segments
+from explorer.viewer.pour.outline_panel import NONE, OWN, OutlinePanel
+from explorer.viewer.pour.outline_svg import WAITING, corners_of, outline_html, outline_svg
 from solver.assets import measurement_folder
 from solver.observables.reading import PileReading
 from tests.explorer.page_session import finished

@@ -12,9 +12,9 @@ from explorer.scene_source import SceneSource, material_source
 from explorer.viewer.actions import Actions
 from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.guarded_server import guarded_server
-from explorer.viewer.output_panel import DOWNLOAD, START, STOP, OutputPanel, command_html, picture
-from explorer.viewer.recording_switch import HTML, RRD, RecordingSwitch
-from explorer.viewer.scene_playback import BYTES_PER_BODY
+from explorer.viewer.output.output_panel import DOWNLOAD, START, STOP, OutputPanel, command_html, picture
+from explorer.viewer.output.recording_switch import HTML, RRD, RecordingSwitch
+from explorer.viewer.output.scene_playback import BYTES_PER_BODY
 from tests.explorer.page_session import PageSession, finished, frame_of
 from tests.explorer.test_viewer_controls import event
 
@@ -164,7 +164,7 @@ def test_the_scene_as_a_web_page_holds_what_moved(server, bench):
 
 
 def test_a_web_page_that_is_full_is_ended_and_written(bench, monkeypatch):
-    monkeypatch.setattr("explorer.viewer.scene_playback.MOST_BYTES", 2.5 * BYTES_PER_BODY)
+    monkeypatch.setattr("explorer.viewer.output.scene_playback.MOST_BYTES", 2.5 * BYTES_PER_BODY)
     bench.panel._kind.value = HTML
     assert bench.record(START) == ""
     bench.take(2)

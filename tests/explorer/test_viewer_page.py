@@ -44,7 +44,7 @@ class Session(PageSession):
 @pytest.fixture
 def running(tmp_path, monkeypatch):
     """A page whose loop runs in a thread, and its session."""
-    monkeypatch.setattr("explorer.viewer.pour_panels.data_folder", lambda: tmp_path)
+    monkeypatch.setattr("explorer.viewer.pour.pour_panels.data_folder", lambda: tmp_path)
     server, session, stop = guarded_server("127.0.0.1", 0, "test"), Session(SOURCE), threading.Event()
     diagnosis = DiagnoseProcess(tmp_path / "diagnoses", tmp_path / "runs.sqlite")
     page = Page(server, session, None, "", diagnosis)

@@ -9,7 +9,7 @@ from explorer.scene_text import material_toml
 from explorer.viewer.actions import Actions
 from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.guarded_server import guarded_server
-from explorer.viewer.scene_panel import OWN, ScenePanel
+from explorer.viewer.pour.scene_panel import OWN, ScenePanel
 from solver.rigs import RIGS
 from solver.scene import with_values
 from tests.explorer.beads import bead_scene

@@ -12,12 +12,12 @@ from explorer.screen_units import InputError
 from explorer.stage_progress import StageProgress, TriedRun
 from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import guarded_server
-from explorer.viewer.order_panel import number_on_screen
-from explorer.viewer.plot_theme import Drawn
-from explorer.viewer.plot_view import NOTHING, PlotView
-from explorer.viewer.profiler_panel import TITLE as PROFILER
-from explorer.viewer.stage_table import stages_markdown
-from explorer.viewer.study_panel import StudyPanel
+from explorer.viewer.study.order_panel import number_on_screen
+from explorer.viewer.study.plot_theme import Drawn
+from explorer.viewer.study.plot_view import NOTHING, PlotView
+from explorer.viewer.study.profiler_panel import TITLE as PROFILER
+from explorer.viewer.study.stage_table import stages_markdown
+from explorer.viewer.study.study_panel import StudyPanel
 from explorer.viewer.theme import ThemeSwitch
 from tests.explorer import reported_studies
 from tests.explorer.study_panel_at_hand import FakeSession, FakeStudy, PanelAtHand, drawn, written

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from explorer.viewer.guarded_server import guarded_server
-from explorer.viewer.plot_view import NOTHING
-from explorer.viewer.profiler_panel import TITLE as PROFILER
-from explorer.viewer.study_panel import PRESENT, set_live
+from explorer.viewer.study.plot_view import NOTHING
+from explorer.viewer.study.profiler_panel import TITLE as PROFILER
+from explorer.viewer.study.study_panel import PRESENT, set_live
 from solver.scene import value
 from tests.explorer import reported_studies
 from tests.explorer.study_panel_at_hand import FakeSession, PanelAtHand, drawn, written

@@ -9,10 +9,9 @@ import pytest
 from explorer.command_process import CommandStatus
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, SessionState, Status
-from explorer.viewer.chart import MOST_POINTS, History
 from explorer.viewer.palette import BODY_COLOURS, linear
-from explorer.viewer.process_view import escaped, progress, time_left
-from explorer.viewer.readout import (
+from explorer.viewer.pour.chart import MOST_POINTS, History
+from explorer.viewer.pour.readout import (
     OUTCOME_WORDS,
     PHASE_WORDS,
     STATE_WORDS,
@@ -24,6 +23,7 @@ from explorer.viewer.readout import (
     time_step_text,
 )
 from explorer.viewer.scene_nodes import component_poses
+from explorer.viewer.study.process_view import escaped, progress, time_left
 from solver.observables.value import Value
 from solver.record import Outcome, Phase
 from tests.explorer.beads import bead_scene

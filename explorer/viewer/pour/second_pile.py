@@ -18,7 +18,7 @@ from explorer.scene_changes import changes
 from explorer.scene_meshes import scene_height
 from explorer.session import Session
 from explorer.viewer.actions import Post
-from explorer.viewer.readout import OUTCOME_WORDS, STATE_WORDS, angle_of_repose_deg
+from explorer.viewer.pour.readout import OUTCOME_WORDS, STATE_WORDS, angle_of_repose_deg
 from explorer.viewer.scene_nodes import PLATE_RADIUS, SceneNodes
 from solver.record import Outcome
 from solver.scene import Scene

@@ -12,9 +12,9 @@ import viser
 import viser.uplot
 
 from explorer.live.messages import Event, SessionState, Status
-from explorer.viewer.chart import Curve, axis, line
-from explorer.viewer.marks import NO_MARKS, Marks, with_marks
 from explorer.viewer.palette import CONTACTS_LINE, ENERGY_LINE, MARK_LINE
+from explorer.viewer.pour.chart import Curve, axis, line
+from explorer.viewer.pour.marks import NO_MARKS, Marks, with_marks
 
 Array = npt.NDArray[np.float64]
 

@@ -23,7 +23,7 @@ from explorer.report.units_for_people import (
 )
 from explorer.screen_units import checked
 from explorer.viewer.actions import Post
-from explorer.viewer.process_view import escaped
+from explorer.viewer.study.process_view import escaped
 
 TITLE = "Profiler"
 STEPS = 200

@@ -12,7 +12,7 @@ from explorer.report.units_for_people import observable_label, observed, paramet
 from explorer.session import Session
 from explorer.study_runs import STAGES, StudyRun, scene_of, settings_of, study_runs
 from explorer.viewer.actions import Post
-from explorer.viewer.process_view import escaped
+from explorer.viewer.study.process_view import escaped
 from solver import Outcome
 
 NONE = "(no runs yet)"

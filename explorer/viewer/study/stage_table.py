@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from explorer.command_process import CommandStatus
 from explorer.stage_progress import Failure, StageProgress, failures
-from explorer.viewer.process_view import STATE_WORDS, escaped, time_left
+from explorer.viewer.study.process_view import STATE_WORDS, escaped, time_left
 
 FAILURES_SHOWN = 6
 DONE, AT_WORK, TO_COME = "done", "▶", "–"

@@ -12,9 +12,9 @@ import viser
 from explorer.live.details import Details
 from explorer.screen_units import InputError, checked
 from explorer.viewer.actions import Post
-from explorer.viewer.colouring import QUANTITIES, bar_html, colour_range
-from explorer.viewer.force_chains import chain_text
-from explorer.viewer.look import COMPONENT, CUTS, NOTHING, Look
+from explorer.viewer.look.colouring import QUANTITIES, bar_html, colour_range
+from explorer.viewer.look.force_chains import chain_text
+from explorer.viewer.look.look import COMPONENT, CUTS, NOTHING, Look
 
 COLOUR_KEY, CHAINS_KEY, CUT_KEY = "C", "K", "X"
 COLOURS = (COMPONENT, *QUANTITIES)

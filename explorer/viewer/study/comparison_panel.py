@@ -12,8 +12,8 @@ from explorer.report.content import Table
 from explorer.report.findings import Plain
 from explorer.result_file import ResultFile
 from explorer.viewer.actions import Post
-from explorer.viewer.process_view import escaped
-from explorer.viewer.result_chooser import ResultChooser, title
+from explorer.viewer.study.process_view import escaped
+from explorer.viewer.study.result_chooser import ResultChooser, title
 
 NONE = "(choose a finished study)"
 EMPTY = "Choose a second finished study: optimum, intervals and effects are then shown beside those of the one above."

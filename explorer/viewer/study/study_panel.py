@@ -13,14 +13,14 @@ from explorer.result_file import ResultFile
 from explorer.session import Session
 from explorer.study_process import PARTIAL, PROFILES, RESULT, StudyProcess
 from explorer.viewer.actions import Post
-from explorer.viewer.comparison_panel import ComparisonPanel
-from explorer.viewer.order_panel import OrderPanel
-from explorer.viewer.plot_view import PlotView
-from explorer.viewer.process_view import ProcessView, escaped
-from explorer.viewer.profiler_panel import ProfilerPanel
-from explorer.viewer.result_chooser import ResultChooser, title
-from explorer.viewer.run_chooser import RunChooser
-from explorer.viewer.stage_table import stages_markdown
+from explorer.viewer.study.comparison_panel import ComparisonPanel
+from explorer.viewer.study.order_panel import OrderPanel
+from explorer.viewer.study.plot_view import PlotView
+from explorer.viewer.study.process_view import ProcessView, escaped
+from explorer.viewer.study.profiler_panel import ProfilerPanel
+from explorer.viewer.study.result_chooser import ResultChooser, title
+from explorer.viewer.study.run_chooser import RunChooser
+from explorer.viewer.study.stage_table import stages_markdown
 from solver import Scene, canonical, parameters, with_values
 
 PRESENT = "present or newest study"

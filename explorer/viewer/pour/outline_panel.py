@@ -14,8 +14,8 @@ from explorer.measured_file import SUFFIXES, measured_file
 from explorer.uploads import unpacked_measurement
 from explorer.viewer.actions import Post
 from explorer.viewer.background_work import BackgroundWork
-from explorer.viewer.outline_nodes import OutlineNodes
-from explorer.viewer.outline_svg import outline_html
+from explorer.viewer.pour.outline_nodes import OutlineNodes
+from explorer.viewer.pour.outline_svg import outline_html
 from solver.observables.outline import Outline
 
 NONE, OWN = "none", "folder below"

@@ -13,7 +13,7 @@ from explorer.errors import CommandError
 from explorer.live.frames import Frame
 from explorer.live.messages import Status
 from explorer.viewer.background_work import BackgroundWork
-from explorer.viewer.scene_playback import ScenePlayback
+from explorer.viewer.output.scene_playback import ScenePlayback
 from explorer.whole_file import write_whole
 
 RRD, HTML = "rerun (.rrd)", "web page (.html)"

@@ -13,9 +13,9 @@ import viser
 import viser.uplot
 
 from explorer.live.messages import Event, Status
-from explorer.viewer.marks import NO_MARKS, Marks, with_marks
 from explorer.viewer.palette import ANGLE_LINE, ANGLE_SPREAD_LINE, AXIS_TEXT, GRID_LINE, MARK_LINE, MASS_LINE
-from explorer.viewer.readout import angle_of_repose_deg
+from explorer.viewer.pour.marks import NO_MARKS, Marks, with_marks
+from explorer.viewer.pour.readout import angle_of_repose_deg
 from solver.observables.value import Value
 
 Array = npt.NDArray[np.float64]

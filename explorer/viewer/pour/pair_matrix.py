@@ -16,7 +16,7 @@ import viser
 
 from explorer.screen_units import InputError, checked, quantity, screen_unit, title
 from explorer.viewer.actions import Post
-from explorer.viewer.live_controls import HANDS_OFF, LINEAR_STEP, Apply, screen_range
+from explorer.viewer.pour.live_controls import HANDS_OFF, LINEAR_STEP, Apply, screen_range
 from explorer.viewer.small_text import small_html
 from solver.material import Pair
 from solver.params import Parameter, declared

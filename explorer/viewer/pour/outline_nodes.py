@@ -10,8 +10,8 @@ import numpy.typing as npt
 import viser
 
 from explorer.measured_curves import MeasuredCurve
-from explorer.viewer.outline_svg import corners_of
 from explorer.viewer.palette import FLANK, MEASURED, Colour
+from explorer.viewer.pour.outline_svg import corners_of
 from solver.observables.outline import Outline
 from solver.observables.repose import AZIMUTHS_DEG
 

@@ -13,10 +13,10 @@ from explorer.report.diagnosis_plots import diagnosis_plots
 from explorer.report.findings import Plain
 from explorer.result_file import ResultFile
 from explorer.viewer.actions import Post
-from explorer.viewer.plot_view import PlotView
-from explorer.viewer.process_view import ProcessView, escaped
-from explorer.viewer.result_chooser import ResultChooser
-from explorer.viewer.stage_table import stages_markdown
+from explorer.viewer.study.plot_view import PlotView
+from explorer.viewer.study.process_view import ProcessView, escaped
+from explorer.viewer.study.result_chooser import ResultChooser
+from explorer.viewer.study.stage_table import stages_markdown
 
 FIRST = "trefoil_1"
 """Chosen at first, where it is shipped: the data set of `make diagnose`."""

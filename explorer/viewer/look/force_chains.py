@@ -11,7 +11,7 @@ import viser
 
 from explorer.live.details import Details
 from explorer.live.frames import Frame
-from explorer.viewer.look import Look
+from explorer.viewer.look.look import Look
 from explorer.viewer.palette import CHAINS
 
 STRONGER = (1.0, 2.0, 4.0)

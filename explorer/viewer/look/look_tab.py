@@ -13,13 +13,13 @@ from explorer.live.frames import Frame
 from explorer.screen_units import InputError
 from explorer.session import Session
 from explorer.viewer.actions import Post
-from explorer.viewer.camera import DIRECTIONS, go_along, go_to, link_to, view_of
-from explorer.viewer.colouring import body_colours
-from explorer.viewer.force_chains import ForceChains
-from explorer.viewer.inspector import body_html
-from explorer.viewer.look import COMPONENT, in_sight
-from explorer.viewer.look_panel import LookPanel
-from explorer.viewer.picking import nearest_hit
+from explorer.viewer.look.camera import DIRECTIONS, go_along, go_to, link_to, view_of
+from explorer.viewer.look.colouring import body_colours
+from explorer.viewer.look.force_chains import ForceChains
+from explorer.viewer.look.inspector import body_html
+from explorer.viewer.look.look import COMPONENT, in_sight
+from explorer.viewer.look.look_panel import LookPanel
+from explorer.viewer.look.picking import nearest_hit
 from explorer.viewer.scene_nodes import SceneNodes
 from solver.scene import Scene
 

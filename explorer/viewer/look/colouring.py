@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from explorer.live.details import Details
 from explorer.live.frames import Frame
-from explorer.viewer.look import Look
+from explorer.viewer.look.look import Look
 from explorer.viewer.palette import SELECTED, VIRIDIS, css, linear, linear_all, mapped
 from explorer.viewer.scene_nodes import component_colour
 

@@ -9,8 +9,8 @@ import viser
 
 from explorer.report.plot import Plots
 from explorer.viewer.actions import Post
-from explorer.viewer.plot_theme import Drawn
-from explorer.viewer.process_view import escaped
+from explorer.viewer.study.plot_theme import Drawn
+from explorer.viewer.study.process_view import escaped
 
 NOTHING = "(nothing yet)"
 

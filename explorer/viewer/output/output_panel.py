@@ -17,7 +17,7 @@ from explorer.scene_text import material_toml
 from explorer.session import Session
 from explorer.viewer.actions import Post
 from explorer.viewer.background_work import BackgroundWork
-from explorer.viewer.recording_switch import HTML, RRD, RecordingSwitch
+from explorer.viewer.output.recording_switch import HTML, RRD, RecordingSwitch
 from explorer.viewer.small_text import small_html
 from solver.scene import Scene
 

@@ -12,8 +12,8 @@ from explorer.live.messages import Status
 from explorer.screen_units import quantity, title
 from explorer.session import Session
 from explorer.viewer.actions import Post
-from explorer.viewer.live_controls import LiveControl
-from explorer.viewer.pair_matrix import PairMatrix, pair_parameters
+from explorer.viewer.pour.live_controls import LiveControl
+from explorer.viewer.pour.pair_matrix import PairMatrix, pair_parameters
 from solver.effects import EFFECTS, SetUpEffect
 from solver.params import Parameter
 from solver.scene import Scene, parameters, value

@@ -18,7 +18,7 @@ from explorer.report.units_for_people import (
 from explorer.screen_units import checked
 from explorer.study_edit import RANGE_KEYS, StudyEdits, edited_study, listed_edits
 from explorer.viewer.actions import Post
-from explorer.viewer.process_view import escaped
+from explorer.viewer.study.process_view import escaped
 from solver import parameters
 
 WORDS = {"low": "Low", "high": "High", "reference": "Measured", "mean": "Target", "sd": "Its sd", "margin": "Margin"}

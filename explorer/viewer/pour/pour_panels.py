@@ -12,15 +12,15 @@ from explorer.session import Session
 from explorer.user_data import data_folder
 from explorer.viewer.actions import Post
 from explorer.viewer.background_work import BackgroundWork
-from explorer.viewer.changes_panel import ChangesPanel
-from explorer.viewer.live_panel import LivePanel
-from explorer.viewer.motion_chart import MotionChart
-from explorer.viewer.outline_panel import OutlinePanel
-from explorer.viewer.output_panel import OutputPanel
-from explorer.viewer.recording_switch import RecordingSwitch
-from explorer.viewer.restart_panel import RestartPanel
-from explorer.viewer.scene_bound import SceneBound
-from explorer.viewer.scene_panel import ScenePanel
+from explorer.viewer.output.output_panel import OutputPanel
+from explorer.viewer.output.recording_switch import RecordingSwitch
+from explorer.viewer.pour.changes_panel import ChangesPanel
+from explorer.viewer.pour.live_panel import LivePanel
+from explorer.viewer.pour.motion_chart import MotionChart
+from explorer.viewer.pour.outline_panel import OutlinePanel
+from explorer.viewer.pour.restart_panel import RestartPanel
+from explorer.viewer.pour.scene_bound import SceneBound
+from explorer.viewer.pour.scene_panel import ScenePanel
 from solver.assets import shipped_measurements
 
 

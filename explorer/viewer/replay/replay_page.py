@@ -17,11 +17,11 @@ import viser.uplot
 from explorer.logs.recording import Recording
 from explorer.screen_units import checked
 from explorer.viewer.actions import Action, Actions
-from explorer.viewer.chart import LEAST_TOP_DEG
 from explorer.viewer.palette import ANGLE_LINE, AXIS_TEXT, BRAND, GRID_LINE, MASS_LINE
-from explorer.viewer.replay_nodes import ReplayNodes, highest
-from explorer.viewer.run_panel import FASTEST, SLOWEST
-from explorer.viewer.timeline import Timeline
+from explorer.viewer.pour.chart import LEAST_TOP_DEG
+from explorer.viewer.pour.run_panel import FASTEST, SLOWEST
+from explorer.viewer.replay.replay_nodes import ReplayNodes, highest
+from explorer.viewer.replay.timeline import Timeline
 from explorer.viewer.view import light, look_at_height
 
 FRAME_INTERVAL = 1.0 / 30.0

@@ -1,0 +1,1 @@
+"""The tab of what is taken along: the command line, files, recordings."""
