@@ -17,6 +17,7 @@ from explorer.study_process import StudyProcess
 from explorer.viewer.actions import Actions
 from explorer.viewer.look.look_tab import LookTab
 from explorer.viewer.output.recording_switch import Recorder
+from explorer.viewer.people import People
 from explorer.viewer.pour.chart import Chart
 from explorer.viewer.pour.pour_panels import PourPanels
 from explorer.viewer.pour.readout import not_later, readout_html
@@ -53,7 +54,7 @@ class Page:
     ) -> None:
         self._server, self._session, self._recorder = server, session, recorder
         self._events: deque[Event] = deque(maxlen=EVENTS_REMEMBERED)
-        self._actions = Actions()
+        self._actions, self._people = Actions(), People(server)
         self._notice = ""
         status = session.status()
         self._nodes, self._drawn = SceneNodes(server, status.scene), status.scene
@@ -108,7 +109,7 @@ class Page:
             frame = self._session.frame()
             status = self._session.status()
             happened = self._session.new_events()
-            self._events.extend(happened)
+            self._events.extend(map(self._people.signed, happened))
             self._forget_what_comes_later(status)
             self._panels.take(status, frame)
             with self._server.atomic():

@@ -41,11 +41,13 @@ class Browser:
     """As much of a browser as the server needs: a camera, and messages of one's own; what it is told it throws away."""
 
     def __init__(self, server):
+        self.received = 0
+        before = len(server.get_clients())
         self._server, self._loop, self._ready = server, asyncio.new_event_loop(), threading.Event()
         self._thread = threading.Thread(target=self._loop.run_until_complete, args=(self._talk(),), daemon=True)
         self._thread.start()
         assert self._ready.wait(10)
-        wait_for(server.get_clients)
+        wait_for(lambda: len(server.get_clients()) > before)
 
     async def _talk(self):
         port = self._server.get_port()
@@ -71,10 +73,14 @@ class Browser:
             )
             self._ready.set()
             async for _ in self._socket:
-                pass
+                self.received += 1
 
     def send(self, kind, **fields):
         asyncio.run_coroutine_threadsafe(self._socket.send(encoded(kind, **fields)), self._loop).result(10)
+
+    def leave(self):
+        """Close the connection, as a closed tab does."""
+        asyncio.run_coroutine_threadsafe(self._socket.close(), self._loop).result(10)
 
     def press(self, label):
         """Trigger the command that the key of ``label`` triggers."""
@@ -94,7 +100,7 @@ class Browser:
 
     @property
     def camera(self):
-        (client,) = self._server.get_clients().values()
+        client = next(iter(self._server.get_clients().values()))
         return client.camera
 
 
@@ -173,3 +179,35 @@ def test_keys_move_the_camera_of_the_browser_that_pressed_them(page, browser):
 def test_following_nobody_is_told_in_a_line(page, browser):
     browser.press("Follow the body that was clicked")
     wait_for(lambda: "click a body first" in readout(page))
+
+
+def move_slider(page, browser, label, value):
+    """What a browser sends when a person moves a slider."""
+    handles = page.server.gui._gui_input_handle_from_uuid
+    uuid = next(uuid for uuid, handle in handles.items() if handle._impl.props.label == label)
+    browser.send("GuiUpdateMessage", uuid=uuid, updates={"value": value})
+
+
+def test_two_browsers_share_one_pour_and_a_change_tells_whose_it_was(page, browser):
+    second = Browser(page.server)
+    wait_for(lambda: page.page._people.present == 2)
+    move_slider(page, second, "Static friction", 0.21)
+    wait_for(lambda: "· browser 2" in readout(page))
+    assert "0.21" in readout(page)
+    move_slider(page, browser, "Static friction", 0.33)
+    wait_for(lambda: "· browser 1" in readout(page))
+    # The first one leaves in the middle of it all: nothing ends, and who is alone is not named.
+    second.leave()
+    wait_for(lambda: page.page._people.present == 1)
+    move_slider(page, browser, "Static friction", 0.44)
+    wait_for(lambda: "0.44" in readout(page).split("· browser")[0])
+    assert status(page).state in (SessionState.RUNNING, SessionState.PAUSED, SessionState.ENDED)
+
+
+def test_a_browser_that_comes_back_finds_the_pour_as_it_is(page, browser):
+    """A reload is a new connection: the server sends it what stands, and the pour is the same one."""
+    generation = status(page).generation
+    again = Browser(page.server)
+    wait_for(lambda: again.received > 0)
+    assert status(page).generation == generation
+    again.leave()
