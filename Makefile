@@ -8,7 +8,7 @@ BIN := .venv/bin
 EXPLORER := $(BIN)/explorer
 
 .DEFAULT_GOAL := help
-.PHONY: help venv serve calibrate calibrate-quick diagnose test slow page-speed peers clean
+.PHONY: help venv serve calibrate calibrate-quick diagnose test slow pictures page-speed peers clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 18
@@ -42,6 +42,9 @@ test: .venv/.ready ## format check, lint, types, fast tests
 
 slow: .venv/.ready ## the tests marked slow, but for those of `make peers`
 	$(BIN)/pytest -m "slow and not peers"
+
+pictures: .venv/.ready ## the README's pictures, taken from the running program (needs Chromium; 6 min)
+	$(BIN)/python -m tests.browser.pictures
 
 page-speed: .venv/.ready ## frames, real-time factor and slider echo of the page, alone and beside a study (2 min)
 	$(BIN)/python -m tests.browser.page_speed
