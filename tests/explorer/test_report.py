@@ -363,6 +363,9 @@ def test_command_line_repeats_the_study(results):
     own = copy.deepcopy(results["planted"])
     own["study"] |= {"name": "mine", "file": "/home/me/my studies/mine.toml"}
     assert "--study '/home/me/my studies/mine.toml'" in report_markdown(own)
+    assert "--tries" not in report_markdown(own)
+    own["study"]["tries"] = 6
+    assert "--tries 6 --out results" in report_markdown(own)
 
 
 def test_files_appear_complete_or_not_at_all(results, tmp_path):
