@@ -39,9 +39,9 @@ class Budget:
     base: int = 48
     middle: int = 16
     scaling: int = 2
-    screening: int = 16
+    screening: int = 12
     """Per effect with one amplitude; half as many again with two."""
-    further: int = 16
+    further: int = 20
     """More for each survivor."""
 
     def scaled(self, runs: int, effects: int, conditions: int) -> Budget:
