@@ -76,6 +76,8 @@ class LivePour:
             case Pause():
                 self._paused, self._run_until = True, -math.inf
                 self._keep()
+                # What stands on the screen is the moment that is told, not the last frame that was due before it.
+                self._publish()
             case Step(duration=duration):
                 # Steps that are asked for while one runs are added to it.
                 self._paused, self._run_until = True, max(self._run_until, self._pour.time) + duration

@@ -111,6 +111,17 @@ def test_pausing_stops_time_and_a_step_is_one_sample_interval(session):
     assert first + 0.01 - 1e-5 * status.dt <= status.time < first + 0.01 + status.dt
 
 
+def test_a_pause_shows_the_moment_that_it_tells(session):
+    """Frames are published 60 times a second: without one of its own, a pause would show an earlier moment."""
+    for _ in range(5):
+        session.play()
+        going = session.status().time
+        wait_for(lambda: session.status().time > going)
+        session.pause()
+        wait_for(lambda: session.status().state == SessionState.PAUSED)
+        wait_for(lambda: session.frame().time == session.status().time)
+
+
 def test_a_step_back_leads_to_where_the_step_began(session):
     session.set_speed(10.0)
     session.step()
