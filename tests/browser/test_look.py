@@ -65,7 +65,7 @@ def test_keys_colour_the_bodies_and_draw_the_forces(page):  # noqa: F811
 def test_a_click_on_the_pile_tells_of_a_body_and_escape_lets_it_go(page):  # noqa: F811
     press(page, "4")  # from above, the axis in the middle of the picture
     time.sleep(2.0)
-    told = page.get_by_text("Coordination number")
+    told = page.get_by_text("Coordination number", exact=True)  # the chooser has it in small letters
     box = page.locator("canvas").first.bounding_box()
     # The panel covers a part of the canvas that viser does not tell; a pile is wider than these steps.
     for x in np.arange(box["x"] + 200.0, box["x"] + box["width"] - 400.0, 12.0):
