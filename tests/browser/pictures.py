@@ -71,7 +71,11 @@ def settled(page: Page) -> None:
 def live_pictures(browser: object, home: str) -> None:
     with served(home, "--set", "body.spheres=coarse") as address:
         page = opened(browser, address, "Static friction")
-        time.sleep(12.0)
+        # viser's word on software rendering, which a person with a graphics card does not see.
+        page.locator(".mantine-Notification-closeButton").first.click()
+        settled(page)
+        page.keyboard.press("r")
+        page.wait_for_function("() => /Simulated time\\s*1\\.[0-9]+ s/.test(document.querySelector('.pour').innerText)")
         shot(page, "pouring")
         settled(page)
         shot(page, "pour_dark")

@@ -116,7 +116,7 @@ def test_a_pause_shows_the_moment_that_it_tells(session):
     for _ in range(5):
         session.play()
         going = session.status().time
-        wait_for(lambda: session.status().time > going)
+        wait_for(lambda going=going: session.status().time > going)
         session.pause()
         wait_for(lambda: session.status().state == SessionState.PAUSED)
         wait_for(lambda: session.frame().time == session.status().time)

@@ -77,9 +77,16 @@ def stacked(spec: Spec, gap: float = 0.16) -> Spec:
 
 
 def short_rows(spec: Spec) -> Spec:
-    """The same with the names of the rows cut at " · ", for a narrow place; hovering still tells all."""
+    """The same with the names of the rows cut at " · ", and without a beginning that all share, for a narrow place.
+
+    Hovering still tells all.
+    """
     rows = dict.fromkeys(row for trace in spec["data"] for row in trace["y"] if isinstance(row, str))
-    ticks = {"tickvals": list(rows), "ticktext": [row.split(" · ")[0].replace(", ", ",<br>") for row in rows]}
+    names = [row.split(" · ")[0] for row in rows]
+    beginnings = {name.partition(", ")[0] for name in names if ", " in name}
+    if len(names) > 1 and len(beginnings) == 1 and all(", " in name for name in names):
+        names = [name.partition(", ")[2] for name in names]
+    ticks = {"tickvals": list(rows), "ticktext": [name.replace(", ", ",<br>") for name in names]}
     axes = {key: one | ticks for key, one in spec["layout"].items() if key.startswith("yaxis")}
     return {"data": spec["data"], "layout": spec["layout"] | axes}
 
