@@ -82,9 +82,11 @@ def live_pictures(browser: object, home: str) -> None:
         tab(page, "Look")
         page.keyboard.press("Escape")
         page.evaluate("document.activeElement?.blur()")
-        page.keyboard.press("c")
-        page.keyboard.press("k")
+        for key in "cck":  # speed, contact force, force chains
+            page.keyboard.press(key)
         shot(page, "look_dark")
+        for key in "ccck":  # coordination number, residence time, and back to the components
+            page.keyboard.press(key)
         for name, file in (("Take along", "take_along"), ("Calibrate", "calibrate"), ("Diagnose", "diagnose")):
             tab(page, name)
             time.sleep(4.0)

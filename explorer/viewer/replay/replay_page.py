@@ -17,11 +17,12 @@ import viser.uplot
 from explorer.logs.recording import Recording
 from explorer.screen_units import checked
 from explorer.viewer.actions import Action, Actions
-from explorer.viewer.palette import ANGLE_LINE, AXIS_TEXT, BRAND, GRID_LINE, MASS_LINE
-from explorer.viewer.pour.chart import LEAST_TOP_DEG
+from explorer.viewer.palette import ANGLE_LINE, MASS_LINE
+from explorer.viewer.pour.chart import LEAST_TOP_DEG, axis
 from explorer.viewer.pour.run_panel import FASTEST, SLOWEST
 from explorer.viewer.replay.replay_nodes import ReplayNodes, highest
 from explorer.viewer.replay.timeline import Timeline
+from explorer.viewer.theme import DARK, apply_theme
 from explorer.viewer.view import light, look_at_height
 
 FRAME_INTERVAL = 1.0 / 30.0
@@ -44,9 +45,7 @@ class ReplayPage:
         look_at_height(server, highest(recording))
         self._nodes = ReplayNodes(server, recording)
         self._shown = math.nan
-        server.gui.configure_theme(
-            dark_mode=True, show_share_button=False, show_logo=False, brand_color=BRAND, control_width="large"
-        )
+        apply_theme(server, DARK)
         server.gui.main_panel.dock_right()
         server.gui.add_markdown(f"**Replay** of `{name.replace('`', '')}`")
         self._controls()
@@ -127,7 +126,6 @@ class ReplayPage:
 def _plot(server: viser.ViserServer, recording: Recording, name: str, label: str, colour: str) -> tuple[str, Any]:
     data = columns(*recording.curves[name], recording.times[0])
     top = LEAST_TOP_DEG if name == "angle_of_repose_deg" else float(np.nanmax(data[1], initial=1.0))
-    axis: Any = {"stroke": AXIS_TEXT, "grid": {"stroke": GRID_LINE}, "size": 38}
     plot = server.gui.add_uplot(
         data,
         (
@@ -136,7 +134,7 @@ def _plot(server: viser.ViserServer, recording: Recording, name: str, label: str
             viser.uplot.Series(label="now", stroke=colour, width=0, points={"show": True, "size": 9, "fill": colour}),
         ),
         scales={"x": viser.uplot.Scale(time=False), "y": viser.uplot.Scale(range=(0.0, 1.05 * top))},
-        axes=(axis, axis | {"label": label, "labelSize": 18}),
+        axes=(axis("x", 2), axis("y", 3, label)),
         aspect=3.0,
         padding=(8, 8, 0, 0),
     )

@@ -18,7 +18,7 @@ from explorer.viewer.study.process_view import ProcessView, escaped
 from explorer.viewer.study.result_chooser import ResultChooser
 from explorer.viewer.study.stage_table import stages_markdown
 
-FIRST = "trefoil_1"
+FIRST = "trefoil_2"
 """Chosen at first, where it is shipped: the data set of `make diagnose`."""
 OWN = "folder below"
 """Choice of the list that takes the folder in the text field."""
