@@ -160,5 +160,26 @@ def test_the_r_key_pours_anew_with_the_parameters_in_force(page):
     page.get_by_text(re.compile(r"In the solver: Static friction 0\s")).wait_for()
 
 
+def test_a_slider_moved_by_keyboard_in_one_browser_is_seen_in_another(page, address):
+    second = page.context.browser.new_page(viewport={"width": 1280, "height": 900})
+    second.set_default_timeout(PATIENCE)
+    second.goto(address)
+    second.get_by_text("Static friction").first.wait_for()
+    second.get_by_text(re.compile(r"You are browser \d+")).wait_for()
+    slider(second, "Static friction").focus()
+    second.keyboard.press("End")
+    top = re.compile(r"In the solver: Static friction [1-9]")
+    for one in (second, page):
+        one.get_by_text(top).wait_for()
+    page.get_by_text(re.compile(r"· browser \d+")).first.wait_for()
+    second.close()
+    # One of them leaves; the pour and the other go on.
+    before = simulated_time(page)
+    page.evaluate("document.activeElement?.blur()")
+    if state(page) == "running":
+        wait_for(lambda: simulated_time(page) > before)
+    assert state(page) in ("running", "ended")
+
+
 def test_the_console_has_nothing_to_complain_about(page):
     assert page.complaints == []

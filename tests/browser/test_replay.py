@@ -1,0 +1,78 @@
+"""A recording on the page in headless Chromium: scrubbed by keyboard, played and stepped by keys."""
+
+import re
+import subprocess
+import sys
+
+import pytest
+
+from explorer.logs.pour_log import PourLog
+from explorer.scene_file import load_scene
+from tests.browser.test_page import FLAGS, PATIENCE, positions, slider, wait_for
+from tests.explorer.test_logs import poses
+
+pytestmark = pytest.mark.browser
+
+FRAMES = 60
+"""20 ms apart; body 0 rises by a millimetre per frame."""
+
+
+def state_at(k):
+    made = poses(0, 0)
+    made.position[0] = (0.0, 0.0, 1e-3 * k)
+    return made
+
+
+@pytest.fixture(scope="module")
+def page(chromium, tmp_path_factory):
+    from playwright.sync_api import sync_playwright
+
+    path = tmp_path_factory.mktemp("replay") / "rise.rrd"
+    with PourLog(path, load_scene("funnel"), seed=1) as log:
+        for k in range(FRAMES):
+            log.frame(0.02 * k, state_at(k), {"angle_of_repose_deg": 20.0 + 0.1 * k})
+    command = [sys.executable, "-m", "explorer", "serve", "--port", "0", "--replay", str(path)]
+    server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    found = re.search(r"http://\S+", server.stdout.readline())
+    assert found, "the server did not tell its address"
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
+        page = browser.new_page(viewport={"width": 1280, "height": 900})
+        page.set_default_timeout(PATIENCE)
+        page.goto(found[0])
+        page.get_by_text("rise.rrd").first.wait_for()
+        yield page
+        browser.close()
+    server.terminate()
+    assert server.wait(20) == 0
+
+
+def height(page):
+    """Of body 0 [mm]: the number of the frame that is drawn."""
+    return 1e3 * positions(page)[0, 2]
+
+
+def at_rest(page):
+    """Played to its end."""
+    wait_for(lambda: page.get_by_text(re.compile(r"^paused ·")).count() > 0)
+
+
+def test_the_slider_scrubs_through_the_recording(page):
+    at_rest(page)
+    assert height(page) == pytest.approx(FRAMES - 1, abs=1e-3)
+    thumb = slider(page, "Time [s]")
+    thumb.focus()
+    page.keyboard.press("Home")
+    wait_for(lambda: height(page) == pytest.approx(0.0, abs=1e-3))
+    page.keyboard.press("End")
+    wait_for(lambda: height(page) == pytest.approx(FRAMES - 1, abs=1e-3))
+
+
+def test_keys_step_and_play(page):
+    page.evaluate("document.activeElement?.blur()")
+    page.keyboard.press("ArrowLeft")
+    wait_for(lambda: height(page) == pytest.approx(FRAMES - 2, abs=1e-3))
+    page.keyboard.press("r")
+    wait_for(lambda: height(page) == pytest.approx(0.0, abs=1e-3))
+    page.keyboard.press("Space")
+    wait_for(lambda: height(page) == pytest.approx(FRAMES - 1, abs=1e-3))
