@@ -2,6 +2,7 @@
 
 import math
 import re
+from pathlib import Path
 
 import pytest
 from statsmodels.stats.proportion import proportion_confint
@@ -10,6 +11,7 @@ from tests.blind.sets import Row, answer_to, append_row, read_rows
 from tests.blind.table import campaign_text, targets, wilson
 
 NAN = math.nan
+ROOT = Path(__file__).parents[2]
 
 
 def row(number, kind, label, verdict, strength=NAN, cosine=NAN, after=NAN):
@@ -49,6 +51,14 @@ def test_rows_come_back_as_they_were_written(tmp_path):
     for one in rows:
         append_row(tmp_path / "sets.csv", one)
     assert [str(one) for one in read_rows(tmp_path / "sets.csv")] == [str(one) for one in reversed(rows)]
+
+
+def test_the_readme_s_table_is_that_of_the_rows_that_stand_beside_it():
+    rows = read_rows(ROOT / "assets/validation/sets.csv")
+    assert [one.number for one in rows] == list(range(len(rows)))
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert f"```\n{campaign_text(rows)}\n```" in readme
+    assert f"--n {len(rows)} --out assets/validation" in readme
 
 
 def test_targets_by_hand():
