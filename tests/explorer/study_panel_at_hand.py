@@ -67,7 +67,8 @@ class PanelAtHand:
         return self.actions.carry_out()
 
     def press(self, button):
-        self._call(self.panel._view._buttons, button)
+        for row in self.panel._view._buttons:
+            self._call(row, button)
         return self.actions.carry_out()
 
     def _call(self, handle, value):

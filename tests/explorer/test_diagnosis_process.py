@@ -134,7 +134,7 @@ class FakeDiagnosis:
 
 def press(panel, button):
     click = type("Event", (), {"client_id": 0, "target": type("Group", (), {"value": button})})
-    for callback in panel._view._buttons._impl.update_cb:
+    for callback in panel._view._buttons[0]._impl.update_cb:
         callback(click)
 
 

@@ -1,6 +1,7 @@
 """The page with a real solver behind it, driven over the socket as a browser drives it: clicks, keys, cameras."""
 
 import asyncio
+import contextlib
 import threading
 import time
 from types import SimpleNamespace
@@ -72,15 +73,17 @@ class Browser:
                 )
             )
             self._ready.set()
-            async for _ in self._socket:
-                self.received += 1
+            with contextlib.suppress(websockets.ConnectionClosed):
+                async for _ in self._socket:
+                    self.received += 1
 
     def send(self, kind, **fields):
         asyncio.run_coroutine_threadsafe(self._socket.send(encoded(kind, **fields)), self._loop).result(10)
 
     def leave(self):
         """Close the connection, as a closed tab does."""
-        asyncio.run_coroutine_threadsafe(self._socket.close(), self._loop).result(10)
+        self._loop.call_soon_threadsafe(self._socket.transport.abort)
+        self._thread.join(10)
 
     def press(self, label):
         """Trigger the command that the key of ``label`` triggers."""

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import viser
 
 from explorer.live.details import Details
 from explorer.screen_units import InputError, checked
-from explorer.viewer.actions import Post
+from explorer.viewer.actions import Action, Post
+from explorer.viewer.buttons import add_keys
 from explorer.viewer.look.colouring import QUANTITIES, bar_html, colour_range
 from explorer.viewer.look.force_chains import chain_text
 from explorer.viewer.look.look import COMPONENT, CUTS, NOTHING, Look
@@ -58,13 +58,12 @@ class LookPanel:
             self._cut_at = gui.add_slider("Place of the cut [mm]", -REACH_MM, REACH_MM, 1.0, 0.0)
             self._opacity = gui.add_slider("Opacity of the rig", 0.0, 1.0, 0.01, self.look.rig_opacity)
         self._listen()
-        keys: dict[str, tuple[Any, Callable[[], None]]] = {
-            "Colour by the next quantity": (COLOUR_KEY, lambda: self._next("colour_by", COLOURS)),
-            "Force chains": (CHAINS_KEY, lambda: self.change(chains=not self.look.chains)),
-            "Cut away the next side": (CUT_KEY, lambda: self._next("cut_away", CUT_CHOICES)),
+        acts: dict[str, Action] = {
+            "Colour by the next quantity": lambda: self._next("colour_by", COLOURS),
+            "Force chains": lambda: self.change(chains=not self.look.chains),
+            "Cut away the next side": lambda: self._next("cut_away", CUT_CHOICES),
         }
-        for label, (key, act) in keys.items():
-            gui.add_command(label, hotkey=key).on_trigger(partial(_trigger, post, act))
+        add_keys(gui, acts, dict(zip(acts, (COLOUR_KEY, CHAINS_KEY, CUT_KEY), strict=True)), post)
 
     def change(self, **settings: Any) -> None:
         """Take over settings of :class:`Look` and show them; raises InputError for a range that is none."""
@@ -151,8 +150,3 @@ def _on(handle: Any, post: Post, act: Callable[[object], None]) -> None:
             post(lambda: act(value))
 
     handle.on_update(entered)
-
-
-def _trigger(post: Post, action: Callable[[], None], event: object) -> None:
-    """A key was pressed."""
-    post(action)

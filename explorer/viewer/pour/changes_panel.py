@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from functools import partial
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,8 @@ from explorer.parameter_history import LiveValues, ParameterHistory
 from explorer.presets import Preset, preset_names, preset_path, preset_values, read_preset, save_preset
 from explorer.scene_changes import Difference, differences, shown
 from explorer.session import Session
-from explorer.viewer.actions import Action, Post
+from explorer.viewer.actions import Post
+from explorer.viewer.buttons import add_keys, button_group
 from explorer.viewer.small_text import small_html
 from solver.scene import Scene, parameters, with_values
 
@@ -38,9 +38,11 @@ class ChangesPanel:
         acts = {UNDO: self._undo, REDO: self._redo, BACK: self._back, POUR: self._pour_default}
         gui = server.gui
         with gui.add_folder("Changes and presets"):
-            self._buttons = gui.add_button_group(
+            self._buttons = button_group(
+                gui,
                 "Changes",
-                tuple(acts),
+                acts,
+                post,
                 hint="Keys: Z undoes and Y redoes a change of what acts now. All back: those return to the default. "
                 "Pour the default: everything does, with a new pour.",
             )
@@ -55,11 +57,9 @@ class ChangesPanel:
             )
             save = gui.add_button("Save as preset", hint="Keeps everything that differs from the default.")
         save.on_click(lambda _: post(self._save))
-        _on_choice(self._buttons.on_click, lambda chosen: post(acts[chosen]) if chosen in acts else None)
         _on_choice(self._one.on_update, lambda chosen: post(lambda: self._one_back(chosen)))
         _on_choice(self._preset.on_update, lambda chosen: post(lambda: self._apply(chosen)))
-        for label, key in KEYS.items():
-            gui.add_command(label, hotkey=key).on_trigger(partial(_trigger, post, acts[label]))
+        add_keys(gui, acts, KEYS, post)
 
     def take(self, status: Status) -> None:
         """Take note of the parameters in force; call it as often as there may be a new status."""
@@ -159,8 +159,3 @@ def _on_choice(register: Callable[[Any], Any], act: Callable[[str], object]) -> 
             act(str(event.target.value))
 
     register(chosen)
-
-
-def _trigger(post: Post, action: Action, event: object) -> None:
-    """A key was pressed."""
-    post(action)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import viser
@@ -10,7 +9,8 @@ import viser
 from explorer.live.messages import SessionState
 from explorer.screen_units import checked
 from explorer.session import Session
-from explorer.viewer.actions import Action, Post
+from explorer.viewer.actions import Post
+from explorer.viewer.buttons import add_keys, button_group
 
 PLAY_PAUSE, BACK, STEP, RESTART = "Play / pause", "◀ Back", "Step ▶", "Restart"
 KEYS: dict[str, Any] = {PLAY_PAUSE: "space", BACK: "arrowleft", STEP: "arrowright", RESTART: "R"}
@@ -24,21 +24,16 @@ class RunPanel:
     def __init__(self, server: viser.ViserServer, session: Session, post: Post) -> None:
         self._session = session
         acts = {PLAY_PAUSE: self._toggle, BACK: session.step_back, STEP: session.step, RESTART: session.restart}
-        buttons = server.gui.add_button_group(
+        button_group(
+            server.gui,
             "Pour",
-            tuple(acts),
+            acts,
+            post,
             hint="Keys: space plays and pauses; left arrow goes back by a sample interval (10 ms), to the parameters "
             "of that time as well; right arrow goes on by one; R restarts with the same seed.",
         )
 
-        @buttons.on_click
-        def _(event: viser.GuiEvent[Any]) -> None:
-            if event.client_id is not None and event.target.value in acts:
-                post(acts[event.target.value])
-
-        for label, key in KEYS.items():
-            server.gui.add_command(label, hotkey=key).on_trigger(partial(_trigger, post, acts[label]))
-
+        add_keys(server.gui, acts, KEYS, post)
         speed = server.gui.add_slider(
             "Speed",
             SLOWEST,
@@ -59,8 +54,3 @@ class RunPanel:
             self._session.play()
         else:
             self._session.pause()
-
-
-def _trigger(post: Post, action: Action, event: object) -> None:
-    """A key was pressed."""
-    post(action)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from html import escape
-from typing import Any
 
 import numpy as np
 import viser
@@ -18,6 +17,7 @@ from explorer.scene_changes import changes
 from explorer.scene_meshes import scene_height
 from explorer.session import Session
 from explorer.viewer.actions import Post
+from explorer.viewer.buttons import button_group
 from explorer.viewer.pour.readout import OUTCOME_WORDS, STATE_WORDS, angle_of_repose_deg
 from explorer.viewer.scene_nodes import PLATE_RADIUS, SceneNodes
 from solver.record import Outcome
@@ -44,17 +44,14 @@ class SecondPile:
         server.scene.add_frame(ROOT, show_axes=False, position=(BESIDE, 0.0, 0.0))
         acts = {"Pour beside": self._pour, "Take away": self.close}
         with server.gui.add_folder("Second pile", expand_by_default=False):
-            buttons = server.gui.add_button_group(
+            button_group(
+                server.gui,
                 "Second pile",
-                tuple(acts),
+                acts,
+                post,
                 hint="The same seed, with the parameters as they are now; it stays so while you change the first pile.",
             )
             self._text = server.gui.add_markdown(NONE)
-
-        @buttons.on_click
-        def _(event: viser.GuiEvent[Any]) -> None:
-            if event.client_id is not None and event.target.value in acts:
-                post(acts[event.target.value])
 
     def _pour(self) -> None:
         status = self._first.status()

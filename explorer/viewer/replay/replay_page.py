@@ -17,6 +17,7 @@ import viser.uplot
 from explorer.logs.recording import Recording
 from explorer.screen_units import checked
 from explorer.viewer.actions import Action, Actions
+from explorer.viewer.buttons import add_keys, button_group
 from explorer.viewer.palette import ANGLE_LINE, MASS_LINE
 from explorer.viewer.pour.chart import LEAST_TOP_DEG, axis
 from explorer.viewer.pour.run_panel import FASTEST, SLOWEST
@@ -66,17 +67,15 @@ class ReplayPage:
             "To start": partial(timeline.go_to, timeline.first),
         }
         keys: dict[str, Any] = dict(zip(acts, ("space", "arrowleft", "arrowright", "R"), strict=True))
-        buttons = gui.add_button_group(
-            "Time", tuple(acts), hint="Keys: space plays and pauses, arrows step a frame, R goes to the start."
+        button_group(
+            gui,
+            "Time",
+            acts,
+            self._actions.post,
+            hint="Keys: space plays and pauses, arrows step a frame, R goes to the start.",
         )
 
-        @buttons.on_click
-        def _(event: viser.GuiEvent[Any]) -> None:
-            if event.client_id is not None and event.target.value in acts:
-                self._actions.post(acts[event.target.value])
-
-        for label, key in keys.items():
-            gui.add_command(label, hotkey=key).on_trigger(partial(self._trigger, acts[label]))
+        add_keys(gui, acts, keys, self._actions.post)
         last = max(timeline.last, timeline.first + SLIDER_STEP)
         self._slider = gui.add_slider("Time [s]", timeline.first, last, SLIDER_STEP, timeline.first)
 
@@ -93,9 +92,6 @@ class ReplayPage:
             if event.client_id is not None:
                 value = event.target.value
                 self._actions.post(lambda: setattr(timeline, "speed", checked(value, SLOWEST, FASTEST, "speed")))
-
-    def _trigger(self, act: Action, event: object) -> None:
-        self._actions.post(act)
 
     def run(self, stop: threading.Event) -> None:
         """Keep the page up to date until ``stop`` is set."""

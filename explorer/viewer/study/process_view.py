@@ -9,6 +9,7 @@ import viser
 
 from explorer.command_process import CommandStatus
 from explorer.viewer.actions import Action, Post
+from explorer.viewer.buttons import button_group
 
 MARKDOWN_MARKS = re.compile(r"([\\`*_{}\[\]<>()#+!|~&])")
 
@@ -32,16 +33,8 @@ class ProcessView:
         post: Post,
         more: Mapping[str, Action] | None = None,
     ) -> None:
-        every = {**acts, **(more or {})}
-
-        def clicked(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
-            if event.client_id is not None and event.target.value in every:
-                post(every[event.target.value])
-
-        self._buttons = server.gui.add_button_group(title, tuple(acts))
-        self._buttons.on_click(clicked)
-        if more:
-            server.gui.add_button_group("", tuple(more)).on_click(clicked)
+        rows = [(title, acts)] + ([("", more)] if more else [])
+        self._buttons = [button_group(server.gui, name, row, post) for name, row in rows]
         self._bar = server.gui.add_progress_bar(0.0)
         self._text = server.gui.add_markdown("")
 

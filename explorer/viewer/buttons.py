@@ -1,0 +1,36 @@
+"""Buttons and keys that leave an action for the page's loop; what the program itself sets is no click."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import viser
+
+from explorer.viewer.actions import Action, Post
+
+
+def button_group(gui: viser.GuiApi, title: str, acts: Mapping[str, Action], post: Post, hint: str | None = None) -> Any:
+    """A row of buttons named by the keys of ``acts``; a click posts the action. Returns viser's handle."""
+    buttons = gui.add_button_group(title, tuple(acts), hint=hint)
+
+    @buttons.on_click
+    def _(event: viser.GuiEvent[Any]) -> None:
+        # A browser may send any name.
+        if event.client_id is not None and event.target.value in acts:
+            post(acts[event.target.value])
+
+    return buttons
+
+
+def add_keys(gui: viser.GuiApi, acts: Mapping[str, Action], keys: Mapping[str, Any], post: Post) -> None:
+    """A command per entry of ``keys`` (label → key), which posts the action of that label; in viser's palette too."""
+    for label, key in keys.items():
+        gui.add_command(label, hotkey=key).on_trigger(_posting(acts[label], post))
+
+
+def _posting(action: Action, post: Post) -> Any:
+    def pressed(event: object) -> None:
+        post(action)
+
+    return pressed
