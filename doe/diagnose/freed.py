@@ -52,7 +52,7 @@ def freed_parameters(declared: Declared, base: Fit, evidence: Evidence) -> tuple
                 if parameter.mean is None or parameter.sd is None
                 else (value - parameter.mean) / parameter.sd,
                 outside=not parameter.low <= value <= parameter.high,
-                t2=float(square - 2 * step @ pull + step @ curvature @ step + off.sum()),
+                t2=float(np.maximum(square - 2 * step @ pull + step @ curvature @ step + off.sum(), 0.0)),
             )
         )
     return tuple(rows)
