@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 import viser
 
 VIEW_DIRECTION = (0.62, -0.75, 0.24)
@@ -13,6 +15,23 @@ VIEW_FIELD = 0.6
 """Vertical field of view [rad]."""
 FILL = 0.68
 """Share of the height of the window that rig and feed take."""
+MIDDLE = 0.42
+"""Height that the camera looks at, as a share of the height of rig and feed."""
+
+
+@dataclass(frozen=True)
+class View:
+    """A place of the camera [m] and what it looks at [m]."""
+
+    position: npt.NDArray[np.float64]
+    look_at: npt.NDArray[np.float64]
+
+
+def view_from(direction: tuple[float, float, float], height: float) -> View:
+    """From ``direction`` (pile to camera), with everything up to ``height`` [m] in one picture."""
+    distance = height / FILL / (2.0 * math.tan(VIEW_FIELD / 2.0))
+    middle = np.array([0.0, 0.0, MIDDLE * height])
+    return View(middle + distance * np.array(direction), middle)
 
 
 def light(server: viser.ViserServer) -> None:
@@ -23,10 +42,7 @@ def light(server: viser.ViserServer) -> None:
 
 def look_at_height(server: viser.ViserServer, height: float) -> None:
     """Camera that new clients start with: everything up to ``height`` [m] in one picture."""
-    distance = height / FILL / (2.0 * math.tan(VIEW_FIELD / 2.0))
-    middle = (0.0, 0.0, 0.42 * height)
-    camera = server.initial_camera
-    camera.position = np.array(middle) + distance * np.array(VIEW_DIRECTION)
-    camera.look_at = middle
+    view, camera = view_from(VIEW_DIRECTION, height), server.initial_camera
+    camera.position, camera.look_at = view.position, view.look_at
     camera.fov = VIEW_FIELD
     camera.near = 0.01

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,7 +11,7 @@ import viser
 
 from explorer.scene_meshes import scene_height
 from explorer.viewer.guarded_server import address
-from explorer.viewer.view import FILL, VIEW_DIRECTION, VIEW_FIELD
+from explorer.viewer.view import VIEW_DIRECTION, VIEW_FIELD, View, view_from
 from solver.scene import Scene
 
 Array = npt.NDArray[np.float64]
@@ -26,26 +24,13 @@ DIRECTIONS: Mapping[str, tuple[float, float, float]] = {
     "Top": (0.0, -1e-3, 1.0),
 }
 """From the pile to the camera."""
-MIDDLE = 0.42
-"""Height that the camera looks at, as a share of the height of rig and feed."""
 STILL = 1e-5
 """A body that has moved by less than this [m] does not move the camera."""
 
 
-@dataclass(frozen=True)
-class View:
-    """A place of the camera [m] and what it looks at [m]."""
-
-    position: Array
-    look_at: Array
-
-
 def view_of(scene: Scene, name: str) -> View:
     """The preset ``name``: rig, pile and feed in one picture."""
-    height = scene_height(scene)
-    distance = height / FILL / (2.0 * math.tan(VIEW_FIELD / 2.0))
-    middle = np.array([0.0, 0.0, MIDDLE * height])
-    return View(middle + distance * np.array(DIRECTIONS[name]), middle)
+    return view_from(DIRECTIONS[name], scene_height(scene))
 
 
 def go_to(client: Any, view: View) -> None:

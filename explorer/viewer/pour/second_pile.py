@@ -20,6 +20,7 @@ from explorer.viewer.actions import Post
 from explorer.viewer.buttons import button_group
 from explorer.viewer.pour.readout import OUTCOME_WORDS, STATE_WORDS, angle_of_repose_deg
 from explorer.viewer.scene_nodes import PLATE_RADIUS, SceneNodes
+from explorer.viewer.view import MIDDLE
 from solver.record import Outcome
 from solver.scene import Scene
 
@@ -134,7 +135,7 @@ def comparison_markdown(first: Status, second: Status) -> str:
 
 def step_aside(server: viser.ViserServer, scene: Scene) -> None:
     """Move every camera so that both piles are in the picture."""
-    aim = np.array([0.5 * BESIDE, 0.0, 0.42 * scene_height(scene)])
+    aim = np.array([0.5 * BESIDE, 0.0, MIDDLE * scene_height(scene)])
     for client in server.get_clients().values():
         away = np.array(client.camera.position) - np.array(client.camera.look_at)
         least = 2.2 * BESIDE
