@@ -69,16 +69,14 @@ def run_diagnosis(
     screened = screen(declared, model, budget, say)
     verdict = diagnose(screened.declared, screened.runs, observed)
     say(f"after screening: {verdict.kind}")
-    for _ in range(ROUNDS):
-        names = survivors(verdict)
-        if not names:
+    for turn in range(ROUNDS):
+        names, cramped = survivors(verdict), at_edge(verdict, screened.declared, declared)
+        if not names or (turn > 0 and not cramped):
             break
-        cramped = at_edge(verdict, screened.declared, declared)
         screened = further(widened(screened, cramped, declared), names, model, budget, say)
         verdict = diagnose(screened.declared, screened.runs, observed)
-        if not cramped:
-            break
-        say(f"wider range of {', '.join(cramped)}: {verdict.kind}")
+        if cramped:
+            say(f"wider range of {', '.join(cramped)}: {verdict.kind}")
     say(f"verdict: {verdict.kind}")
     before, after = models(verdict)
     fresh = max(FRESH, *(2 * condition.replicates for condition in measurement.conditions))

@@ -5,13 +5,14 @@ sequence instead of beginning another:
 
     base              parameters over the whole box (scrambled Sobol sequence)
     effect, scaling   parameters in the middle, the amplitude where it stands at present
-    effect, screening parameters over the box, amplitude at half and full range in turn, both signs where there are two
+    effect, screening parameters and amplitude over their box together, the amplitude in quarters of its range, both
+                      signs where there are two, two amplitudes around a circle
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,8 +23,11 @@ from doe.diagnose.runs import Effect, Parameter
 
 FloatArray = npt.NDArray[np.float64]
 
-LEVELS = (1.0, 0.5)
-"""Shares of an amplitude's range, in turn."""
+LEVELS = (0.25, 0.5, 0.75, 1.0)
+"""Shares of an amplitude's range. Which one a point gets is a dimension of the sequence: taken in turn, they would go
+with the digits of a parameter, and a curvature in the amplitude would look like a product with that parameter."""
+ANGLES = 8
+"""Directions of two amplitudes."""
 EFFECT_STREAM = 1000
 """Seed of the sequence of the first effect; the base model has 0."""
 
@@ -42,7 +46,7 @@ class Point:
 
 def base_points(parameters: tuple[Parameter, ...], number: int) -> list[Point]:
     """The first ``number`` points of the base model."""
-    rows = box_points(parameters, number, 0)
+    rows = sobol([(p.low, p.high) for p in parameters], number, 0)
     return [Point("base", k, row) for k, row in enumerate(rows)]
 
 
@@ -50,12 +54,13 @@ def effect_points(
     parameters: tuple[Parameter, ...], effect: Effect, stream: int, number: int, first: int = 0
 ) -> list[Point]:
     """Points ``first`` … ``number`` - 1 of an effect's sequence; ``stream`` is its place in the list of effects."""
-    rows = box_points(parameters, number, EFFECT_STREAM + stream)
-    directions = list(amplitudes(effect))
+    axes = [(p.low, p.high) for p in parameters] + [(0.0, 1.0)] * effect.amplitudes
+    rows = sobol(axes, number, EFFECT_STREAM + stream)
     scale = "_".join(f"{bound:.6g}" for bound in effect.high)
+    k = len(parameters)
     return [
-        Point(f"{effect.name}@{scale}", k, rows[k], ((effect.name, directions[k % len(directions)]),))
-        for k in range(first, number)
+        Point(f"{effect.name}@{scale}", n, row[:k], ((effect.name, amplitude_at(effect, row[k:])),))
+        for n, row in list(enumerate(rows))[first:]
     ]
 
 
@@ -73,20 +78,29 @@ def scaling_points(parameters: tuple[Parameter, ...], effect: Effect, number: in
     ]
 
 
-def amplitudes(effect: Effect) -> Iterator[tuple[float, ...]]:
-    """Amplitudes of an effect's sequence: one at its upper or either bound, two around a circle."""
+def amplitude_at(effect: Effect, unit: Sequence[float]) -> tuple[float, ...]:
+    """The amplitude at ``unit`` (m,) in [0, 1)^m: sign and level of one, level and direction of two."""
     if effect.amplitudes == 1:
-        signs = (1.0, -1.0) if effect.low[0] < 0.0 else (1.0,)
-        for level in LEVELS:
-            for sign in signs:
-                yield (level * (effect.high[0] if sign > 0 else -effect.low[0] * sign),)
-        return
-    for k in range(8):
-        level, angle = LEVELS[k // 4], 2.0 * math.pi * ((k % 4) + 0.5 * (k // 4)) / 4.0
-        yield tuple(
-            level * part * (high if part > 0 else -low)
+        low, high = effect.low[0], effect.high[0]
+        sided = [level * low for level in reversed(LEVELS)] if low < 0.0 else []
+        choices = [*sided, *(level * high for level in LEVELS)]
+        return (choices[int(unit[0] * len(choices))],)
+    level = LEVELS[int(unit[0] * len(LEVELS))]
+    return tuple(level * part for part in directions(effect)[int(unit[1] * ANGLES)])
+
+
+def directions(effect: Effect) -> list[tuple[float, ...]]:
+    """Full amplitudes in every direction that is simulated: up and, where there is one, down; two around a circle."""
+    if effect.amplitudes == 1:
+        return [effect.high, *([effect.low] if effect.low[0] < 0.0 else [])]
+    around = [2.0 * math.pi * k / ANGLES for k in range(ANGLES)]
+    return [
+        tuple(
+            part * (high if part > 0 else -low)
             for part, low, high in zip((math.cos(angle), math.sin(angle)), effect.low, effect.high, strict=True)
         )
+        for angle in around
+    ]
 
 
 def full(effect: Effect) -> tuple[float, ...]:
@@ -99,10 +113,10 @@ def middle(parameters: tuple[Parameter, ...]) -> tuple[float, ...]:
     return tuple(p.mean if p.mean is not None else (p.low + p.high) / 2.0 for p in parameters)
 
 
-def box_points(parameters: tuple[Parameter, ...], number: int, stream: int) -> list[tuple[float, ...]]:
-    """The first ``number`` points of a scrambled Sobol sequence over the box, natural units."""
+def sobol(axes: Sequence[tuple[float, float]], number: int, stream: int) -> list[tuple[float, ...]]:
+    """The first ``number`` points of a scrambled Sobol sequence over the box of ``axes`` (low, high)."""
     if number == 0:
         return []
     power = max(3, math.ceil(math.log2(number)))
-    unit = qmc.Sobol(len(parameters), scramble=True, seed=stream).random_base2(power)[:number]
-    return [tuple(p.low + u * (p.high - p.low) for p, u in zip(parameters, row, strict=True)) for row in unit]
+    unit = qmc.Sobol(len(axes), scramble=True, seed=stream).random_base2(power)[:number]
+    return [tuple(low + u * (high - low) for (low, high), u in zip(axes, row, strict=True)) for row in unit]

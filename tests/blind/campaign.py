@@ -36,6 +36,10 @@ CHUNK = 6
 SAID_EVERY = 100
 """Pours of the emulator between two lines of progress."""
 
+BUDGET = Budget(base=160, middle=32, scaling=2, screening=24, further=36)
+"""The runs belong to the declared model and are made once for all its data sets: a campaign affords about twice those
+of one diagnosis per effect, and three times those of the base model."""
+
 Say = Callable[[str], None]
 
 
@@ -50,7 +54,7 @@ class CampaignOrder:
     workers: int | None = None
     model: Path = MODEL
     effects: tuple[str, ...] = tuple(EFFECTS)
-    budget: Budget = Budget()
+    budget: Budget = BUDGET
     cases: tuple[Case, ...] = ()
 
     @cached_property

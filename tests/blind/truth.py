@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from doe.diagnose.calibrate import priors
 from doe.diagnose.emulator import Emulator, fit_emulator
-from doe.diagnose.plan import amplitudes
+from doe.diagnose.plan import directions
 from doe.diagnose.runs import BASE, Declared, Effect, Observed, Runs, select_summaries
 from doe.diagnose.signatures import Whitening, cosine, noise_square, projected, shift_of, whitening_at
 from tests.blind.schedule import Case
@@ -124,12 +124,9 @@ def amplitude_for(
     effect = ruler.declared.effects[e]
     if e not in ruler.emulator.simulated_effects:
         return "not simulated"
-    choices = {
-        tuple(np.round(np.array(a) / effect.scale / np.abs(np.array(a) / effect.scale).max(), 9))
-        for a in amplitudes(effect)
-    }
-    for k in rng.permutation(len(choices)):
-        direction = np.clip(sorted(choices)[k], ruler.emulator.low[e], ruler.emulator.high[e])
+    ways = directions(effect)
+    for k in rng.permutation(len(ways)):
+        direction = np.clip(np.array(ways[k]) / effect.scale, ruler.emulator.low[e], ruler.emulator.high[e])
         shares = np.linspace(0.0, 1.0, 51)[1:]
         reached = [s for s in shares if ruler.shift(e, frame, theta, s * direction) >= strength]
         if reached:
