@@ -15,7 +15,7 @@ from explorer.export import WRITERS
 from explorer.export import bed as peer_bed
 from explorer.export.deck import deck_of
 from explorer.export.run import PeerRun, run_liggghts, run_yade
-from explorer.scene_file import load_scene
+from explorer.scene.file import load_scene
 from solver.benchmark import Bed, Measurement, measure_batch, measure_bed, measure_pour, wide_bed
 from solver.benchmark.packed_bed import RADIUS, bed_name, bed_scene
 from solver.time_step import time_step

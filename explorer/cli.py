@@ -87,7 +87,7 @@ app = typer.Typer(
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from explorer.run_result import package_version
+        from explorer.files.run_result import package_version
 
         typer.echo(f"explorer {package_version('repose-explorer') or 'from a source tree that is not installed'}")
         raise typer.Exit

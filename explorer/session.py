@@ -36,7 +36,7 @@ from explorer.live.messages import (
 )
 from explorer.live.process import run
 from explorer.live.slots import SlotReader
-from explorer.scene_source import SceneSource
+from explorer.scene.source import SceneSource
 from solver.params import ParameterError
 from solver.scene import Scene, body_counts, canonical, parameters, poured_mass, with_values
 

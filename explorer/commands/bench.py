@@ -22,10 +22,10 @@ def bench(
     import shutil
 
     from explorer.benchmark import BEDS, CASES, PEERS, Options
-    from explorer.benchmark_table import result_of, table_text
     from explorer.errors import CommandError
-    from explorer.run_folder import json_text
-    from explorer.whole_file import write_whole
+    from explorer.files.run_folder import json_text
+    from explorer.files.whole_file import write_whole
+    from explorer.tables.benchmark import result_of, table_text
 
     for name in only:
         if name not in CASES:

@@ -27,7 +27,7 @@ def calibrate(
     """Calibrate a material: pilot, screening, ascent, response surface, optimum, verification, report."""
     from doe.errors import StudyStopped
     from explorer.errors import CommandError
-    from explorer.study_run import StudyOrder, run_study
+    from explorer.study.run import StudyOrder, run_study
 
     if not headless:
         raise CommandError("calibrate: add --headless to run here, or start it from the panel of `explorer serve`")

@@ -21,7 +21,7 @@ def diagnose(
     apply: bool = typer.Option(False, "--apply", help="Also write the corrected material as OUT/corrected.toml."),
 ) -> None:
     """Calibrate the declared model, test what is left, name the missing effect, confirm it by fresh pours."""
-    from explorer.diagnose_run import DiagnoseOrder, run_diagnose
+    from explorer.diagnosis.run import DiagnoseOrder, run_diagnose
     from solver.assets import measurement_folder
 
     # The page cancels with SIGTERM; that has to end like Ctrl-C, with the store closed and finished pours kept.

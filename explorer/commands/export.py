@@ -26,8 +26,8 @@ def export(
     from explorer.errors import CommandError
     from explorer.export import WRITERS
     from explorer.export.deck import check_exportable, deck_of
-    from explorer.run_folder import appearing
-    from explorer.scene_file import load_scene, with_settings
+    from explorer.files.run_folder import appearing
+    from explorer.scene.file import load_scene, with_settings
     from solver import run_pour, value
 
     if to not in WRITERS:

@@ -22,8 +22,8 @@ def check(
     Lists conditions, observables and parameter ranges, what was ignored, and what no amount of fitting could reveal.
     """
     from doe.measurement import load_measurement
-    from explorer.measurement_table import check_result, check_text
-    from explorer.run_folder import json_text
+    from explorer.files.run_folder import json_text
+    from explorer.tables.measurement import check_result, check_text
     from solver.assets import measurement_folder
 
     measurement = load_measurement(measurement_folder(folder))

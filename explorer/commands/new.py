@@ -29,7 +29,7 @@ def new(
     NAME.toml for a material, NAME_study.toml for a study (and NAME.toml beside it, where that is missing).
     """
     from explorer.errors import CommandError
-    from explorer.starter_files import write_material, write_study
+    from explorer.scene.starter_files import write_material, write_study
 
     if kind == Kind.MATERIAL and material is not None:
         raise CommandError("--material: belongs to `new study`")

@@ -19,9 +19,9 @@ def replay(
     In the browser, served on 127.0.0.1 until Ctrl-C, or in rerun's native viewer; its statistics are off.
     """
     from explorer.errors import CommandError
+    from explorer.files.run_folder import appearing
     from explorer.logs.replay import check_recording, open_native, serve_replay
     from explorer.logs.static_replay import write_static_replay
-    from explorer.run_folder import appearing
 
     if native and static:
         raise CommandError("--native and --static exclude each other")

@@ -16,7 +16,7 @@ def runs(
     """List or export the stored runs."""
     from doe.store import Store, default_store, write_csv
     from explorer.errors import CommandError
-    from explorer.text_table import text_table
+    from explorer.tables.text_table import text_table
 
     path = store or default_store()
     if not path.is_file():

@@ -22,13 +22,13 @@ def serve(
 ) -> None:
     """Open the page: watch a pour, turn its parameters, calibrate; or play a recording."""
     from explorer.errors import CommandError
-    from explorer.scene_file import (
+    from explorer.scene.file import (
         DEFAULT_MATERIAL,
         DEFAULT_STUDY,
         study_path,
         with_settings,
     )
-    from explorer.scene_source import material_source, study_source
+    from explorer.scene.source import material_source, study_source
     from explorer.viewer.app import replay as replay_page
     from explorer.viewer.app import serve as serve_page
 

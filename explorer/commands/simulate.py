@@ -43,13 +43,13 @@ def simulate(
     from contextlib import ExitStack
     from time import perf_counter
 
-    from explorer.bench_report import bench_data, bench_text, write_bench
-    from explorer.checkpoint_writer import CheckpointWriter
     from explorer.errors import CommandError
-    from explorer.run_folder import appearing, json_text, write_run
-    from explorer.run_result import result_of
-    from explorer.run_table import RunTable
-    from explorer.scene_file import load_scene, with_settings
+    from explorer.files.checkpoint_writer import CheckpointWriter
+    from explorer.files.run_folder import appearing, json_text, write_run
+    from explorer.files.run_result import result_of
+    from explorer.scene.file import load_scene, with_settings
+    from explorer.tables.bench_test import bench_data, bench_text, write_bench
+    from explorer.tables.pours import RunTable
     from solver import Job, run_pours
     from solver.bench_tests import run_bench_test
     from solver.checkpoint import read_checkpoint

@@ -18,9 +18,9 @@ def verify(
     without a limit is shown for comparison.
     """
     from explorer.errors import CommandError
-    from explorer.run_folder import json_text
-    from explorer.verification_table import result_of, summary_text, table_text
-    from explorer.whole_file import write_whole
+    from explorer.files.run_folder import json_text
+    from explorer.files.whole_file import write_whole
+    from explorer.tables.verification import result_of, summary_text, table_text
     from solver.verification import FAMILIES
     from solver.verification import verify as rows_of
 

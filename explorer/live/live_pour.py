@@ -32,7 +32,7 @@ from explorer.live.messages import (
 )
 from explorer.live.pace import Pace
 from explorer.outcomes import outcome_text
-from explorer.scene_changes import changes
+from explorer.scene.changes import changes
 from solver.effects.columns import kernel_effects
 from solver.params import ParameterError
 from solver.pour import Pour

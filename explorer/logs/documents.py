@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from explorer.run_result import parameter_values, versions
+from explorer.files.run_result import parameter_values, versions
 from solver import Scene
 from solver.observables import Value
 

@@ -21,10 +21,10 @@ import numpy as np
 import numpy.typing as npt
 import rerun as rr
 
+from explorer.files.new_file import check_new_file
 from explorer.logs.blueprint import CURVES, TIMELINE, blueprint, curve_entity
 from explorer.logs.documents import outcome_document, parameters_document
-from explorer.new_file import check_new_file
-from explorer.scene_meshes import (
+from explorer.scene.meshes import (
     GATE_NAME,
     PLATE_NAME,
     Triangles,

@@ -9,9 +9,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
+from explorer.files.new_file import check_new_file
 from explorer.logs.blueprint import motion_curves
 from explorer.logs.pour_log import PourLog
-from explorer.new_file import check_new_file
 from explorer.outcomes import outcome_text
 from solver import Outcome, Record
 from solver.observables import observe

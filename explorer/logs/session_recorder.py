@@ -6,13 +6,13 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
+from explorer.files.new_file import check_new_file
 from explorer.live.frames import Frame
 from explorer.live.messages import SessionState, Status
 from explorer.logs.blueprint import motion_curves
 from explorer.logs.pour_log import PourLog
-from explorer.new_file import check_new_file
 from explorer.outcomes import outcome_text
-from explorer.scene_changes import changes
+from explorer.scene.changes import changes
 from solver.scene import Scene
 
 FRAME_INTERVAL = 0.02

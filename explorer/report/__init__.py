@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from explorer.files.whole_file import write_whole
 from explorer.report.html import page
 from explorer.report.markdown import document
 from explorer.report.sections import sections_of
-from explorer.whole_file import write_whole
 
 __all__ = ["report_html", "report_markdown", "write_report"]
 
@@ -16,7 +16,7 @@ __all__ = ["report_html", "report_markdown", "write_report"]
 def write_report(result: dict[str, Any], folder: Path) -> None:
     """Write ``report.html`` and ``report.md`` into ``folder``; each appears complete or not at all.
 
-    ``result`` is the content of ``result.json`` (see `explorer.study_run.result_of`).
+    ``result`` is the content of ``result.json`` (see `explorer.study.run.result_of`).
     """
     texts = {"report.html": report_html(result), "report.md": report_markdown(result)}
     for name, text in texts.items():

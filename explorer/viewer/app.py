@@ -9,11 +9,11 @@ from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 from types import FrameType
 
-from explorer.diagnosis_process import DiagnoseProcess
-from explorer.scene_source import SceneSource
+from explorer.diagnosis.process import DiagnoseProcess
+from explorer.files.user_data import data_folder
+from explorer.scene.source import SceneSource
 from explorer.session import Session
-from explorer.study_process import CalibrationProcess
-from explorer.user_data import data_folder
+from explorer.study.process import CalibrationProcess
 from explorer.viewer.guarded_server import address, guarded_server
 from explorer.viewer.output.recording_switch import session_recorder
 from explorer.viewer.page import Page

@@ -8,12 +8,12 @@ from collections import deque
 
 import viser
 
-from explorer.diagnosis_process import DiagnosisProcess
+from explorer.diagnosis.process import DiagnosisProcess
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, Status
-from explorer.scene_meshes import scene_height
+from explorer.scene.meshes import scene_height
 from explorer.session import Session
-from explorer.study_process import StudyProcess
+from explorer.study.process import StudyProcess
 from explorer.viewer.actions import Actions
 from explorer.viewer.look.look_tab import LookTab
 from explorer.viewer.output.recording_switch import Recorder

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import viser
 
 from explorer.live.frames import Frame
-from explorer.scene_meshes import GATE_NAME, PLATE_NAME, body_triangles, rig_poses, rig_triangles, rim_circles
+from explorer.scene.meshes import GATE_NAME, PLATE_NAME, body_triangles, rig_poses, rig_triangles, rim_circles
 from explorer.viewer.palette import BODY_COLOURS, GLASS, PLATE, RIM, RING, Colour, linear
 from solver.scene import Scene, body_counts
 

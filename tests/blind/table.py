@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from explorer.text_table import text_table
+from explorer.tables.text_table import text_table
 from tests.blind.sets import Answer, Row
 
 ANSWERS: tuple[Answer, ...] = ("nothing", "right", "undecided", "unexplained", "wrong")

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from explorer.logs.pour_log import PourLog
-from explorer.scene_file import load_scene
+from explorer.scene.file import load_scene
 from tests.browser.test_page import FLAGS, PATIENCE, positions, slider, wait_for
 from tests.explorer.test_logs import poses
 

@@ -20,7 +20,7 @@ from doe.diagnose.menu import Suggestion
 from doe.diagnose.next_experiment import MenuItem, Prediction, rank_experiments
 from doe.diagnose.runs import BASE, Runs
 from doe.measurement.measurement import Condition, MeasuredParameter, Measurement, Observation
-from explorer.diagnose_run import DiagnoseOrder, result_of
+from explorer.diagnosis.run import DiagnoseOrder, result_of
 from solver import EFFECTS, load_material, with_values
 
 HOSTILE = "<script>alert('x')</script> & | `co` \"q\" 日本"

@@ -8,8 +8,8 @@ import numpy as np
 
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, SessionState, Status
-from explorer.scene_changes import changes
-from explorer.scene_source import SceneSource
+from explorer.scene.changes import changes
+from explorer.scene.source import SceneSource
 from explorer.viewer.actions import Actions
 from explorer.viewer.background_work import BackgroundWork
 from solver.scene import Scene, with_values

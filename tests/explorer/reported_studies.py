@@ -6,7 +6,7 @@ import json
 from doe.campaign import run_campaign
 from doe.profile import Profile
 from doe.study import load_study
-from explorer.study_run import result_of
+from explorer.study.run import result_of
 from tests.doe.formula_runner import FormulaRunner
 
 STUDY = load_study("sunflower_extract")

@@ -2,7 +2,7 @@
 
 import json
 
-from explorer.command_process import CommandStatus
+from explorer.background.command_process import CommandStatus
 from explorer.live.messages import SessionState, Status
 from explorer.viewer.actions import Actions
 from explorer.viewer.study.study_panel import StudyPanel

@@ -7,9 +7,9 @@ import pytest
 from typer.testing import CliRunner
 
 from explorer.benchmark import POUR, growth
-from explorer.benchmark_table import result_of, table_text
 from explorer.cli import app
-from explorer.scene_file import load_scene
+from explorer.scene.file import load_scene
+from explorer.tables.benchmark import result_of, table_text
 from solver.benchmark import Measurement, measure_bed, measure_pour
 from solver.benchmark.packed_bed import RADIUS, SPACING, Bed, Box
 

@@ -173,7 +173,7 @@ def test_a_bug_keeps_its_traceback(monkeypatch):
     def broken(*arguments):
         raise ValueError("a mistake of the program")
 
-    monkeypatch.setattr("explorer.scene_file.load_scene", broken)
+    monkeypatch.setattr("explorer.scene.file.load_scene", broken)
     result = explorer("parameters")
     assert result.exit_code == 1
     assert isinstance(result.exception, ValueError)

@@ -7,8 +7,8 @@ import pytest
 import trimesh
 
 from doe.study import load_study
-from explorer.scene_file import load_scene
-from explorer.starter_files import study_text
+from explorer.scene.file import load_scene
+from explorer.scene.starter_files import study_text
 from solver import value
 from tests.explorer.command_line import TINY, explorer, refused, settings
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from explorer.scene_file import load_scene
-from explorer.scene_meshes import body_triangles
+from explorer.scene.file import load_scene
+from explorer.scene.meshes import body_triangles
 from solver.shape import Solid, mass_properties
 from tests.explorer.command_line import TINY, explorer, refused, settings
 from tests.solver.meshes import bent_rod, saved

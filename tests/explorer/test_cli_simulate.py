@@ -8,8 +8,8 @@ import tomllib
 import numpy as np
 import pytest
 
-from explorer.run_result import result_of
-from explorer.scene_file import load_scene, with_settings
+from explorer.files.run_result import result_of
+from explorer.scene.file import load_scene, with_settings
 from solver import Outcome, run_pour
 from solver.observables import Value, observe
 from tests.explorer.command_line import TINY, explorer, settings
@@ -88,7 +88,9 @@ def test_nothing_but_results_is_left(simulation):
 def test_means_are_over_the_replicates_at_rest(record, monkeypatch):
     """Angles 10, 20, 30, 40° and one that could not be measured; the pour with 20° jammed."""
     angles = {1: 10.0, 2: 20.0, 3: 30.0, 4: 40.0, 5: float("nan")}
-    monkeypatch.setattr("explorer.run_result.observe", lambda record: {"angle": Value(angles[record.seed], "deg", 1.5)})
+    monkeypatch.setattr(
+        "explorer.files.run_result.observe", lambda record: {"angle": Value(angles[record.seed], "deg", 1.5)}
+    )
     outcomes = {seed: Outcome.JAMMED if seed == 2 else Outcome.AT_REST for seed in angles}
     records = [dataclasses.replace(record, seed=seed, outcome=outcomes[seed]) for seed in angles]
     result = result_of(record.scene, records, wall_s=1.0)

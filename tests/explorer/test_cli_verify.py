@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from explorer.verification_table import HEADER, curves, furthest, result_of, summary_text, table_text
+from explorer.tables.verification import HEADER, curves, furthest, result_of, summary_text, table_text
 from solver.verification.row import of_value
 from tests.explorer.command_line import explorer, refused
 

@@ -6,9 +6,9 @@ import sys
 
 import pytest
 
-from explorer.command_process import BackgroundError, CommandStatus
-from explorer.diagnosis_process import DiagnoseProcess
-from explorer.stage_progress import StageProgress
+from explorer.background.command_process import BackgroundError, CommandStatus
+from explorer.background.stage_progress import StageProgress
+from explorer.diagnosis.process import DiagnoseProcess
 from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.study.diagnosis_panel import OWN, DiagnosisPanel, answer_markdown

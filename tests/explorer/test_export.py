@@ -15,7 +15,7 @@ from explorer.export.deck import assembled, deck_of, read_deck
 from explorer.export.frames import Frame, motion, read_frames, rigid_fit
 from explorer.export.liggghts import unclamped_restitution, write_liggghts
 from explorer.export.triangles import revolved_triangles, write_stl
-from explorer.scene_file import load_scene, with_settings
+from explorer.scene.file import load_scene, with_settings
 from solver import run_pour, with_values
 from solver.insertion import random_quaternion, rotation_matrix
 from solver.record import Entries

@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from explorer.errors import CommandError
-from explorer.exports import bodies_csv, bodies_stl, png
+from explorer.files.exports import bodies_csv, bodies_stl, png
 from solver import load_material
 from tests.explorer.beads import MASS, RADIUS, bead_scene
 from tests.explorer.page_session import frame_of

@@ -17,8 +17,8 @@ from explorer.logs.pour_log import PourLog
 from explorer.logs.pour_recorder import recorder_of
 from explorer.logs.recording import read_recording
 from explorer.logs.session_recorder import SessionRecorder
-from explorer.scene_file import load_scene, with_settings
-from explorer.scene_meshes import rig_poses
+from explorer.scene.file import load_scene, with_settings
+from explorer.scene.meshes import rig_poses
 from solver import Job, Outcome, Phase, Scene, run_pours, with_values
 from tests.explorer.command_line import TINY
 
@@ -197,7 +197,7 @@ import os, signal, sys
 from pathlib import Path
 from explorer.logs.pour_log import PourLog
 from tests.explorer.test_logs import poses
-from explorer.scene_file import load_scene
+from explorer.scene.file import load_scene
 log = PourLog(Path(sys.argv[1]), load_scene("funnel"), seed=1)
 for k in range(20):
     log.frame(0.02 * k, poses(0, 0), {})

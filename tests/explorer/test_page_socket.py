@@ -13,7 +13,7 @@ import viser
 import websockets
 from viser import _messages
 
-from explorer.diagnosis_process import DiagnoseProcess
+from explorer.diagnosis.process import DiagnoseProcess
 from explorer.live.messages import SessionState
 from explorer.session import Session
 from explorer.viewer.guarded_server import guarded_server

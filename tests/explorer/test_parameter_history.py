@@ -4,7 +4,7 @@ import pytest
 
 from explorer.errors import CommandError
 from explorer.parameter_history import MERGED, ParameterHistory, live_values
-from explorer.scene_changes import changes, differences
+from explorer.scene.changes import changes, differences
 from solver import load_material, parameters, value, with_values
 from solver.scene import values
 

@@ -7,7 +7,7 @@ import signal
 import pytest
 
 from doe.runner import Setting
-from explorer.progress import Progress, told_of_pauses
+from explorer.study.progress import Progress, told_of_pauses
 from tests.doe.formula_runner import FormulaRunner
 
 

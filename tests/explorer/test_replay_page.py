@@ -9,7 +9,7 @@ import pytest
 
 from explorer.logs.pour_log import PourLog
 from explorer.logs.recording import read_recording
-from explorer.scene_file import load_scene
+from explorer.scene.file import load_scene
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.replay.replay_page import ReplayPage, columns, moment_html
 from tests.explorer.test_logs import poses

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from explorer.live.frames import FrameReader, FrameWriter, shared_block
-from explorer.scene_file import load_scene, with_settings
-from explorer.scene_meshes import PLATE_OVERHANG, rig_poses, rig_triangles, rim_circles, scene_height
+from explorer.scene.file import load_scene, with_settings
+from explorer.scene.meshes import PLATE_OVERHANG, rig_poses, rig_triangles, rim_circles, scene_height
 from solver.assets import asset_path
 from solver.insertion import rotation_matrix
 from solver.params import ParameterError

@@ -2,7 +2,7 @@
 
 import pytest
 
-from explorer.scene_file import load_scene, with_settings
+from explorer.scene.file import load_scene, with_settings
 from solver.assets import asset_path
 from solver.params import ParameterError
 from solver.scene import value

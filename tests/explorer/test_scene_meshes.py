@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from explorer.scene_meshes import PLATE_OVERHANG, body_triangles, rig_triangles
+from explorer.scene.meshes import PLATE_OVERHANG, body_triangles, rig_triangles
 from solver import load_material
 from solver.body import Body, Members
 

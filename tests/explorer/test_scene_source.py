@@ -10,10 +10,10 @@ from typer.testing import CliRunner
 import solver
 from explorer.cli import app
 from explorer.errors import CommandError
-from explorer.scene_changes import Difference
-from explorer.scene_file import study_path, with_settings
-from explorer.scene_source import SceneSource, command_line, material_source, rig_source, setting_text, study_source
-from explorer.scene_text import material_toml
+from explorer.scene.changes import Difference
+from explorer.scene.file import study_path, with_settings
+from explorer.scene.source import SceneSource, command_line, material_source, rig_source, setting_text, study_source
+from explorer.scene.text import material_toml
 from solver.rigs import RIGS
 from solver.scene import value, with_rig, with_values
 

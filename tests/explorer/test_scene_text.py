@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 import trimesh
 
-from explorer.corrected_material import corrected_scene, corrected_toml
-from explorer.scene_file import load_scene
-from explorer.scene_text import material_toml
+from explorer.diagnosis.corrected_material import corrected_scene, corrected_toml
+from explorer.scene.file import load_scene
+from explorer.scene.text import material_toml
 from solver import load_material, value, with_rig, with_settings, with_values
 from solver.assets import measurement_folder, shipped_assets
 from solver.clump_fit import ClumpFit

@@ -8,7 +8,7 @@ import pytest
 
 from explorer.live.frames import Frame
 from explorer.live.messages import SessionState, Status
-from explorer.scene_file import load_scene
+from explorer.scene.file import load_scene
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.pour.second_pile import BESIDE, NONE, ROOT, SecondPile, comparison_markdown
 from solver import Outcome, with_values

@@ -6,7 +6,7 @@ import tomllib
 import pytest
 
 from doe.study import load_study
-from explorer.study_edit import StudyEdits, edited_study, listed_edits, study_toml
+from explorer.study.edit import StudyEdits, edited_study, listed_edits, study_toml
 from solver import asset_path
 from solver.assets import shipped_assets
 from tests.explorer.command_line import explorer

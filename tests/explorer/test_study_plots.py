@@ -11,7 +11,6 @@ from scipy import stats
 
 from doe.campaign import run_campaign
 from doe.partial import PartialStages
-from explorer.partial_result import PartialResult
 from explorer.report.diagnosis_plots import diagnosis_plots
 from explorer.report.figures.effects import errors_at_hand, pareto_against
 from explorer.report.figures.main_effects import main_effects
@@ -22,8 +21,9 @@ from explorer.report.figures.style import short_rows, stacked
 from explorer.report.figures.surface import residual_quantiles
 from explorer.report.figures.surface_3d import height_over, solutions
 from explorer.report.study_plots import study_plots
-from explorer.study_process import PARTIAL
-from explorer.study_run import described
+from explorer.study.partial_result import PartialResult
+from explorer.study.process import PARTIAL
+from explorer.study.run import described
 from tests.doe.formula_runner import FormulaRunner
 from tests.explorer import diagnosed, reported_studies
 from tests.explorer.reported_studies import BIAS, PROFILE, STUDY, planted

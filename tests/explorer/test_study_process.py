@@ -8,10 +8,10 @@ import time
 import pytest
 
 from doe.study import load_study
-from explorer.command_process import BackgroundError, CommandStatus, advanced
-from explorer.stage_progress import StageProgress, failures, given_up, with_event
-from explorer.study_edit import StudyEdits
-from explorer.study_process import MOST_WAITING, CalibrationProcess
+from explorer.background.command_process import BackgroundError, CommandStatus, advanced
+from explorer.background.stage_progress import StageProgress, failures, given_up, with_event
+from explorer.study.edit import StudyEdits
+from explorer.study.process import MOST_WAITING, CalibrationProcess
 from solver import asset_path
 from tests.explorer.background import only_folder, wait_for
 
@@ -73,7 +73,7 @@ def test_cancel_and_resume(tmp_path):
 
 
 def test_a_study_that_ignores_cancel_is_ended(tmp_path, monkeypatch):
-    monkeypatch.setattr("explorer.command_process.CANCEL_WAIT", 0.2)
+    monkeypatch.setattr("explorer.background.command_process.CANCEL_WAIT", 0.2)
     deaf = "import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN); (out / 'deaf').touch(); time.sleep(60)"
     process = study(tmp_path, deaf)
     process.start("quick")

@@ -7,7 +7,7 @@ import pytest
 
 from doe.campaign import STAGES
 from doe.runner import TRIES
-from explorer import study_run
+from explorer.study import run as study_run
 from solver import asset_path
 from tests.doe.formula_runner import FormulaRunner
 from tests.doe.test_campaign import planted

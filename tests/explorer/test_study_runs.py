@@ -8,7 +8,7 @@ from doe.campaign import run_campaign
 from doe.runner import Setting
 from doe.store import run_key
 from doe.study import load_study, with_profile
-from explorer.study_runs import STAGES, scene_of, settings_of, study_runs
+from explorer.study.runs import STAGES, scene_of, settings_of, study_runs
 from solver import code_version, with_values
 from tests.doe.formula_runner import FormulaRunner
 from tests.explorer import reported_studies

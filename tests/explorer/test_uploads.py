@@ -10,8 +10,8 @@ import trimesh
 
 from doe.measurement.load import load_measurement
 from explorer.errors import CommandError
-from explorer.scene_file import load_scene
-from explorer.uploads import MOST_MEMBERS, label, shaped_source, unpacked_measurement
+from explorer.files.uploads import MOST_MEMBERS, label, shaped_source, unpacked_measurement
+from explorer.scene.file import load_scene
 from solver.assets import measurement_folder
 from solver.scene import with_values
 from solver.shape import mass_properties

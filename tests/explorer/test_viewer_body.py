@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from explorer.live.messages import SessionState, Status
-from explorer.scene_meshes import body_triangles, scene_height
+from explorer.scene.meshes import body_triangles, scene_height
 from explorer.screen_units import InputError
 from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import guarded_server

@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from explorer.errors import CommandError
-from explorer.scene_changes import differences
-from explorer.scene_source import material_source
+from explorer.scene.changes import differences
+from explorer.scene.source import material_source
 from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.pour.changes_panel import BACK, MOST_SHOWN, POUR, REDO, UNDO, ChangesPanel, changes_html

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from explorer.scene_source import material_source
+from explorer.scene.source import material_source
 from explorer.screen_units import InputError
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.pour.live_panel import LivePanel

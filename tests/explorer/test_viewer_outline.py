@@ -11,7 +11,7 @@ from viser import UploadedFile
 
 from doe.measurement.load import load_measurement
 from explorer.errors import CommandError
-from explorer.measured_curves import MeasuredCurve, measured_curves
+from explorer.files.measured_curves import MeasuredCurve, measured_curves
 from explorer.viewer.actions import Actions
 from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.guarded_server import guarded_server

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from explorer.errors import CommandError
-from explorer.scene_file import load_scene
-from explorer.scene_source import SceneSource, material_source
+from explorer.scene.file import load_scene
+from explorer.scene.source import SceneSource, material_source
 from explorer.viewer.actions import Actions
 from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.guarded_server import guarded_server

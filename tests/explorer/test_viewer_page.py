@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from explorer.diagnosis_process import DiagnoseProcess
+from explorer.diagnosis.process import DiagnoseProcess
 from explorer.live.messages import Event
-from explorer.scene_source import material_source, rig_source
+from explorer.scene.source import material_source, rig_source
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.page import Page
 from solver.scene import value

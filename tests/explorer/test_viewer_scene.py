@@ -3,9 +3,9 @@
 import pytest
 from viser import UploadedFile
 
-from explorer.scene_file import load_scene
-from explorer.scene_source import material_source
-from explorer.scene_text import material_toml
+from explorer.scene.file import load_scene
+from explorer.scene.source import material_source
+from explorer.scene.text import material_toml
 from explorer.viewer.actions import Actions
 from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.guarded_server import guarded_server

@@ -6,10 +6,10 @@ import math
 import plotly.io
 import pytest
 
-from explorer.command_process import CommandStatus
+from explorer.background.command_process import CommandStatus
+from explorer.background.stage_progress import StageProgress, TriedRun
 from explorer.report.plot import Plot
 from explorer.screen_units import InputError
-from explorer.stage_progress import StageProgress, TriedRun
 from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.study.order_panel import number_on_screen

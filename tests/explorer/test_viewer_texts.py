@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from explorer.command_process import CommandStatus
+from explorer.background.command_process import CommandStatus
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, SessionState, Status
 from explorer.viewer.palette import BODY_COLOURS, linear

@@ -12,7 +12,7 @@ from explorer.export.frames import TRAJECTORY, Motion, motion, read_frames
 from explorer.export.liggghts import INPUT
 from explorer.export.run import run_liggghts, run_yade
 from explorer.export.yade import LAW
-from explorer.scene_file import load_scene
+from explorer.scene.file import load_scene
 from solver.insertion import rotation_matrix
 from solver.laboratory import Laboratory
 from solver.record import Entries

@@ -9,7 +9,7 @@ from explorer.export import WRITERS
 from explorer.export.deck import deck_of
 from explorer.export.frames import motion
 from explorer.export.run import run_liggghts, run_yade
-from explorer.scene_file import load_scene
+from explorer.scene.file import load_scene
 from solver.observables import observe_pile
 from solver.observables.footprint import centre_of_mass
 from solver.record import Pile, Spheres

@@ -6,7 +6,7 @@ import pytest
 from explorer.export.deck import read_deck
 from explorer.export.frames import motion
 from explorer.export.run import run_liggghts, run_yade
-from explorer.scene_file import load_scene, with_settings
+from explorer.scene.file import load_scene, with_settings
 from solver import run_pour
 from tests.explorer.command_line import explorer
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from explorer.files.whole_file import write_whole
 from explorer.report.diagnosis.sections import sections_of
 from explorer.report.html import page
 from explorer.report.markdown import document
-from explorer.whole_file import write_whole
 
 __all__ = ["diagnosis_html", "diagnosis_markdown", "write_diagnosis_report"]
 
@@ -16,7 +16,7 @@ __all__ = ["diagnosis_html", "diagnosis_markdown", "write_diagnosis_report"]
 def write_diagnosis_report(result: dict[str, Any], folder: Path) -> None:
     """Write ``report.html`` and ``report.md`` into ``folder``; each appears complete or not at all.
 
-    ``result`` is the content of ``diagnosis.json`` (see `explorer.diagnose_run.result_of`).
+    ``result`` is the content of ``diagnosis.json`` (see `explorer.diagnosis.run.result_of`).
     """
     texts = {"report.html": diagnosis_html(result), "report.md": diagnosis_markdown(result)}
     for name, text in texts.items():

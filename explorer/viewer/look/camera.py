@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import viser
 
-from explorer.scene_meshes import scene_height
+from explorer.scene.meshes import scene_height
 from explorer.viewer.guarded_server import address
 from explorer.viewer.view import VIEW_DIRECTION, VIEW_FIELD, View, view_from
 from solver.scene import Scene

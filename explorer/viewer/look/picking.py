@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from explorer.live.frames import Frame
-from explorer.scene_meshes import Triangles
+from explorer.scene.meshes import Triangles
 from solver.insertion import rotation_matrix
 
 Array = npt.NDArray[np.float64]

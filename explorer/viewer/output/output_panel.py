@@ -9,11 +9,11 @@ from typing import Any
 import viser
 
 from explorer.errors import CommandError
-from explorer.exports import bodies_csv, bodies_stl, png
+from explorer.files.exports import bodies_csv, bodies_stl, png
 from explorer.live.frames import Frame
 from explorer.live.messages import Status
-from explorer.scene_source import SceneSource, command_line
-from explorer.scene_text import material_toml
+from explorer.scene.source import SceneSource, command_line
+from explorer.scene.text import material_toml
 from explorer.session import Session
 from explorer.viewer.actions import Post
 from explorer.viewer.background_work import BackgroundWork

@@ -10,11 +10,11 @@ from typing import Protocol
 import viser
 
 from explorer.errors import CommandError
+from explorer.files.whole_file import write_whole
 from explorer.live.frames import Frame
 from explorer.live.messages import Status
 from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.output.scene_playback import ScenePlayback
-from explorer.whole_file import write_whole
 
 RRD, HTML = "rerun (.rrd)", "web page (.html)"
 

@@ -12,8 +12,8 @@ import viser
 
 from explorer.live.messages import Status
 from explorer.parameter_history import LiveValues, ParameterHistory
-from explorer.presets import Preset, preset_names, preset_path, preset_values, read_preset, save_preset
-from explorer.scene_changes import Difference, differences, shown
+from explorer.scene.changes import Difference, differences, shown
+from explorer.scene.presets import Preset, preset_names, preset_path, preset_values, read_preset, save_preset
 from explorer.session import Session
 from explorer.viewer.actions import Post
 from explorer.viewer.buttons import add_keys, button_group

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import viser
 
-from explorer.measured_curves import MeasuredCurve
+from explorer.files.measured_curves import MeasuredCurve
 from explorer.viewer.palette import FLANK, MEASURED, Colour
 from explorer.viewer.pour.outline_svg import corners_of
 from solver.observables.outline import Outline

@@ -8,10 +8,10 @@ from typing import Any
 
 import viser
 
+from explorer.files.measured_curves import MeasuredCurve, measured_curves
+from explorer.files.measured_file import SUFFIXES, measured_file
+from explorer.files.uploads import unpacked_measurement
 from explorer.live.messages import Status
-from explorer.measured_curves import MeasuredCurve, measured_curves
-from explorer.measured_file import SUFFIXES, measured_file
-from explorer.uploads import unpacked_measurement
 from explorer.viewer.actions import Post
 from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.pour.outline_nodes import OutlineNodes

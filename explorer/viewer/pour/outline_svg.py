@@ -7,7 +7,7 @@ from html import escape
 import numpy as np
 import numpy.typing as npt
 
-from explorer.measured_curves import MeasuredCurve
+from explorer.files.measured_curves import MeasuredCurve
 from explorer.viewer.palette import FLANK, MEASURED, css
 from explorer.viewer.small_text import small_html
 from solver.observables.outline import Flanks, Outline

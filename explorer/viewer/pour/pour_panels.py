@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import viser
 
+from explorer.files.user_data import data_folder
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, Status
 from explorer.session import Session
-from explorer.user_data import data_folder
 from explorer.viewer.actions import Post
 from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.output.output_panel import OutputPanel

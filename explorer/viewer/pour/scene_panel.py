@@ -9,10 +9,10 @@ from typing import Any
 import viser
 
 from explorer.errors import CommandError
+from explorer.files.uploads import shaped_source
 from explorer.live.messages import Status
-from explorer.scene_source import SceneSource, rig_source
+from explorer.scene.source import SceneSource, rig_source
 from explorer.session import Session
-from explorer.uploads import shaped_source
 from explorer.viewer.actions import Post
 from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.small_text import small_html

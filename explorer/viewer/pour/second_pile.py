@@ -13,8 +13,8 @@ import numpy as np
 import viser
 
 from explorer.live.messages import SessionState, Status
-from explorer.scene_changes import changes
-from explorer.scene_meshes import scene_height
+from explorer.scene.changes import changes
+from explorer.scene.meshes import scene_height
 from explorer.session import Session
 from explorer.viewer.actions import Post
 from explorer.viewer.buttons import button_group

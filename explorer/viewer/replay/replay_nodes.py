@@ -8,7 +8,7 @@ import numpy as np
 import viser
 
 from explorer.logs.recording import Component, Recording
-from explorer.scene_meshes import PLATE_NAME
+from explorer.scene.meshes import PLATE_NAME
 from explorer.viewer.palette import linear
 from explorer.viewer.scene_nodes import Poses, nowhere
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import viser
 
+from explorer.background.result_file import ResultFile
 from explorer.report.comparison import comparison
 from explorer.report.content import Table
 from explorer.report.findings import Plain
-from explorer.result_file import ResultFile
 from explorer.viewer.actions import Post
 from explorer.viewer.study.process_view import escaped
 from explorer.viewer.study.result_chooser import ResultChooser, title

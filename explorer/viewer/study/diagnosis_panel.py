@@ -6,12 +6,12 @@ from collections.abc import Hashable, Sequence
 
 import viser
 
-from explorer.diagnosis_process import RESULT, DiagnosisProcess
+from explorer.background.result_file import ResultFile
+from explorer.diagnosis.process import RESULT, DiagnosisProcess
 from explorer.report.diagnosis.findings import summary_label, summary_value
 from explorer.report.diagnosis.in_short import verdict_sentence
 from explorer.report.diagnosis_plots import diagnosis_plots
 from explorer.report.findings import Plain
-from explorer.result_file import ResultFile
 from explorer.viewer.actions import Post
 from explorer.viewer.study.plot_view import PlotView
 from explorer.viewer.study.process_view import ProcessView, escaped

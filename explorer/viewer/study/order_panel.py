@@ -16,7 +16,7 @@ from explorer.report.units_for_people import (
     unit_of_parameter,
 )
 from explorer.screen_units import checked
-from explorer.study_edit import RANGE_KEYS, StudyEdits, edited_study, listed_edits
+from explorer.study.edit import RANGE_KEYS, StudyEdits, edited_study, listed_edits
 from explorer.viewer.actions import Post
 from explorer.viewer.study.process_view import escaped
 from solver import parameters

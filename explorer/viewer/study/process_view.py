@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import viser
 
-from explorer.command_process import CommandStatus
+from explorer.background.command_process import CommandStatus
 from explorer.viewer.actions import Action, Post
 from explorer.viewer.buttons import button_group
 

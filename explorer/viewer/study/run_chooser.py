@@ -10,7 +10,7 @@ from explorer.errors import CommandError
 from explorer.report.findings import Plain
 from explorer.report.units_for_people import observable_label, observed, parameter_label, parameter_value
 from explorer.session import Session
-from explorer.study_runs import STAGES, StudyRun, scene_of, settings_of, study_runs
+from explorer.study.runs import STAGES, StudyRun, scene_of, settings_of, study_runs
 from explorer.viewer.actions import Post
 from explorer.viewer.study.process_view import escaped
 from solver import Outcome

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import viser
 
+from explorer.background.result_file import ResultFile
 from explorer.report.findings import Plain
 from explorer.report.study_plots import study_plots
-from explorer.result_file import ResultFile
 from explorer.session import Session
-from explorer.study_process import PARTIAL, PROFILES, RESULT, StudyProcess
+from explorer.study.process import PARTIAL, PROFILES, RESULT, StudyProcess
 from explorer.viewer.actions import Post
 from explorer.viewer.study.comparison_panel import ComparisonPanel
 from explorer.viewer.study.order_panel import OrderPanel

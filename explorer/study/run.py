@@ -18,11 +18,11 @@ from doe.runner import PourRunner, Run
 from doe.store import Store, default_store
 from doe.study import TRIES, Study, load_study, with_profile
 from explorer.errors import CommandError
-from explorer.partial_result import PartialResult
-from explorer.progress import Progress, told_of_pauses
+from explorer.files.run_result import versions
+from explorer.files.whole_file import write_whole
 from explorer.report import write_report
-from explorer.run_result import versions
-from explorer.whole_file import write_whole
+from explorer.study.partial_result import PartialResult
+from explorer.study.progress import Progress, told_of_pauses
 from solver import Crew, code_version
 from solver.arch import chosen
 from solver.observables.made_up import estimator_bias

@@ -9,11 +9,11 @@ import re
 from pathlib import Path
 
 from explorer.errors import CommandError
-from explorer.scene_file import load_scene
+from explorer.scene.file import load_scene
 from solver import Parameter, Scene, parameters, value
 from solver.assets import shipped_assets
 
-TEMPLATES = Path(__file__).with_name("templates")
+TEMPLATES = Path(__file__).parents[1] / "templates"
 NAME = re.compile(r"[A-Za-z0-9_-]+")
 SPAN = 0.2
 """Half the width of a factor's range, as a fraction of its reference."""

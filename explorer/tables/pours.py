@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from explorer.text_table import table_line, text_table
+from explorer.tables.text_table import table_line, text_table
 from solver import Record
 from solver.observables import Value, observable_names, observe
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from explorer.whole_file import write_whole_bytes
+from explorer.files.whole_file import write_whole_bytes
 from solver.checkpoint import checkpoint_bytes, checkpoint_of
 from solver.pour import Pour
 

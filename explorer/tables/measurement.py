@@ -9,7 +9,7 @@ import numpy as np
 
 from doe.measurement import Condition, Measurement, Observation, Reach, reach_of
 from doe.record import plain
-from explorer.text_table import text_table
+from explorer.tables.text_table import text_table
 
 CALIBRATED = "free parameters"
 

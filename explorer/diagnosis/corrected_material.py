@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from doe.diagnose.diagnosis import Diagnosis
 from doe.measurement.measurement import Measurement
-from explorer.scene_text import material_toml
+from explorer.scene.text import material_toml
 from solver import EFFECTS, Scene, with_values
 
 

@@ -1,6 +1,6 @@
 """The folder that a simulation leaves behind. It appears at once and complete, or not at all.
 
-result.json            as in `explorer.run_result`
+result.json            as in `explorer.files.run_result`
 parameters.toml        every parameter, SI
 trace_<seed>.csv       curves over time
 pile_<seed>.npz        xyz (n, 3) [m], radius (n,) [m], body (n,): the spheres on the plate

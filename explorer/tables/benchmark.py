@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from explorer.benchmark import growth
-from explorer.run_result import package_version
-from explorer.text_table import text_table
+from explorer.files.run_result import package_version
+from explorer.tables.text_table import text_table
 from solver.benchmark import Measurement
 
 HEADER = (

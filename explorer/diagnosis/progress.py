@@ -1,4 +1,4 @@
-"""Progress of a diagnosis: the same two readers as that of a study (`explorer.progress`), counted in pours."""
+"""Progress of a diagnosis: the same two readers as that of a study (`explorer.study.progress`), counted in pours."""
 
 from __future__ import annotations
 

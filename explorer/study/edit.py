@@ -15,7 +15,7 @@ from typing import Any
 
 from doe.study import Study, study_from
 from explorer.errors import CommandError
-from explorer.scene_text import toml_key, toml_value
+from explorer.scene.text import toml_key, toml_value
 from solver import ParameterError, asset_path, read_toml
 from solver.assets import shipped_assets
 

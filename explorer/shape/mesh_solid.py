@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from explorer.errors import CommandError
-from explorer.shape_table import mm
+from explorer.tables.shape import mm
 from solver.mesh_file import LENGTH_UNITS
 from solver.shape import Solid, surface_mesh
 

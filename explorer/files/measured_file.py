@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from explorer.errors import CommandError
-from explorer.measured_curves import MeasuredCurve
+from explorer.files.measured_curves import MeasuredCurve
 from solver.observables.outline import outline
 from solver.observables.repose import AZIMUTHS_DEG
 from solver.record import Spheres

@@ -11,9 +11,9 @@ import math
 from pathlib import Path
 from typing import Any
 
-from explorer.run_folder import json_text, parameters_text
-from explorer.run_result import parameter_values, versions
-from explorer.text_table import text_table
+from explorer.files.run_folder import json_text, parameters_text
+from explorer.files.run_result import parameter_values, versions
+from explorer.tables.text_table import text_table
 from solver import Scene
 from solver.bench_tests import BenchResult
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from explorer.errors import CommandError
-from explorer.scene_changes import Difference, differences
-from explorer.scene_file import load_scene, material_scene, study_scene
+from explorer.scene.changes import Difference, differences
+from explorer.scene.file import load_scene, material_scene, study_scene
 from explorer.screen_units import SCREEN_UNIT
 from solver.params import UNITS, ParameterError, parse_quantity
 from solver.scene import Scene, with_rig
@@ -32,13 +32,13 @@ class SceneSource:
 
 
 def rig_source(rig: str, material: str) -> SceneSource:
-    """The source "``material`` in ``rig``"; raises as :func:`explorer.scene_file.load_scene`."""
+    """The source "``material`` in ``rig``"; raises as :func:`explorer.scene.file.load_scene`."""
     named = _named(material)
     return SceneSource((rig, "--material", named), load_scene(rig, named), named)
 
 
 def material_source(material: str) -> SceneSource:
-    """The source of a material in the rig of its own file; raises as :func:`explorer.scene_file.material_scene`."""
+    """The source of a material in the rig of its own file; raises as :func:`explorer.scene.file.material_scene`."""
     named = _named(material)
     return SceneSource((named,), material_scene(named), named)
 

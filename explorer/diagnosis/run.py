@@ -23,12 +23,12 @@ from doe.measurement.measurement import Measurement
 from doe.measurement.summaries import summaries
 from doe.record import plain
 from doe.store import Store, default_store
-from explorer.corrected_material import corrected_toml
+from explorer.diagnosis.corrected_material import corrected_toml
+from explorer.diagnosis.progress import PourProgress
 from explorer.errors import CommandError
-from explorer.pour_progress import PourProgress
+from explorer.files.run_result import versions
+from explorer.files.whole_file import write_whole
 from explorer.report.diagnosis import write_diagnosis_report
-from explorer.run_result import versions
-from explorer.whole_file import write_whole
 from solver import EFFECTS, Crew, code_version
 
 SCHEMA = 1

@@ -4,7 +4,8 @@ The command writes ``progress.jsonl`` into its output folder, one object per eve
 
     {"time": seconds, "stage": text, "done": runs, "planned": runs, "eta_s": seconds or null, "line": text or null}
 
-and, where the command tells it, "stages": {name: [done, planned]} and "run", one run that ended (`explorer.progress`).
+and, where the command tells it, "stages": {name: [done, planned]} and "run", one run that ended
+(`explorer.study.progress`).
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO, Any, Literal
 
+from explorer.background.stage_progress import StageProgress, TriedRun, with_event, with_run
 from explorer.errors import CommandError
-from explorer.stage_progress import StageProgress, TriedRun, with_event, with_run
 
 CommandState = Literal["idle", "running", "paused", "cancelled", "finished", "failed"]
 

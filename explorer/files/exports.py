@@ -14,7 +14,7 @@ import trimesh
 
 from explorer.errors import CommandError
 from explorer.live.frames import Frame
-from explorer.scene_meshes import Triangles, body_triangles
+from explorer.scene.meshes import Triangles, body_triangles
 from solver.insertion import rotation_matrix
 from solver.scene import Scene
 

@@ -1,4 +1,5 @@
-"""Calibrations in the background: the command line's ``calibrate --headless`` (see `explorer.command_process`).
+"""Calibrations in the background: the command line's ``calibrate --headless``, run by
+`explorer.background.command_process`.
 
 One runs at a time. Others wait in a queue: the next one starts when the one before has come to its end, be that a
 report or a failure; a study that was cancelled leaves the queue waiting for the next start.
@@ -13,7 +14,7 @@ from pathlib import Path
 from typing import Protocol
 
 from doe.study import TRIES, with_profile
-from explorer.command_process import (
+from explorer.background.command_process import (
     PROGRAM,
     BackgroundError,
     CommandProcess,
@@ -22,9 +23,9 @@ from explorer.command_process import (
     new_folder,
     newest_unfinished,
 )
-from explorer.stage_progress import given_up
-from explorer.study_edit import StudyEdits, edited_study
-from explorer.whole_file import write_whole
+from explorer.background.stage_progress import given_up
+from explorer.files.whole_file import write_whole
+from explorer.study.edit import StudyEdits, edited_study
 
 PROFILES = ("quick", "standard", "full")
 ENDINGS = {0: "report", 3: "above the error limit; report"}

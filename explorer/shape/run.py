@@ -8,13 +8,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from explorer.body_text import body_text
 from explorer.errors import CommandError
-from explorer.mesh_solid import MOST_FACES_DRAWN, USUAL_UNIT, mesh_solid
-from explorer.new_file import check_new_file
-from explorer.shape_choice import Fitted, fewest, fits, shown_numbers, standard_limit
-from explorer.shape_table import error_line, heading, mm, solid_line
-from explorer.whole_file import write_whole
+from explorer.files.new_file import check_new_file
+from explorer.files.whole_file import write_whole
+from explorer.scene.body_text import body_text
+from explorer.shape.choice import Fitted, fewest, fits, shown_numbers, standard_limit
+from explorer.shape.mesh_solid import MOST_FACES_DRAWN, USUAL_UNIT, mesh_solid
+from explorer.tables.shape import error_line, heading, mm, solid_line
 from solver.clump import MOST_SPHERES
 from solver.shape import Solid, mass_properties, surface_mesh
 

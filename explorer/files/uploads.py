@@ -20,10 +20,10 @@ from pathlib import Path, PurePosixPath
 from doe.measurement.load import FILE as MEASUREMENT_FILE
 from doe.measurement.load import load_measurement
 from explorer.errors import CommandError
-from explorer.mesh_solid import MOST_FACES_DRAWN, mesh_solid
-from explorer.scene_source import SceneSource, material_source
-from explorer.scene_text import material_toml
-from explorer.whole_file import write_whole, write_whole_bytes
+from explorer.files.whole_file import write_whole, write_whole_bytes
+from explorer.scene.source import SceneSource, material_source
+from explorer.scene.text import material_toml
+from explorer.shape.mesh_solid import MOST_FACES_DRAWN, mesh_solid
 from solver.mesh_file import SUFFIXES
 from solver.scene import Scene, check
 from solver.shape import Solid, surface_mesh

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from explorer.text_table import table_line
+from explorer.tables.text_table import table_line
 from solver.shape import MassProperties
 from solver.sphere_error import SphereError
 

@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from explorer.run_result import versions
-from explorer.text_table import text_table
+from explorer.files.run_result import versions
+from explorer.tables.text_table import text_table
 from solver.verification import Row
 
 HEADER = ("test", "quantity", "points", "at", "reference", "ours", "error %", "limit %", "of", "ok")

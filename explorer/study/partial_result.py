@@ -14,8 +14,8 @@ from typing import Any
 
 from doe.record import plain
 from doe.stages.lines import LINES
-from explorer.study_process import PARTIAL
-from explorer.whole_file import write_whole
+from explorer.files.whole_file import write_whole
+from explorer.study.process import PARTIAL
 
 
 class PartialResult:

@@ -1,4 +1,4 @@
-"""A diagnosis in the background: the command line's ``diagnose`` (see `explorer.command_process`)."""
+"""A diagnosis in the background: the command line's ``diagnose`` (see `explorer.background.command_process`)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol
 
-from explorer.command_process import (
+from explorer.background.command_process import (
     PROGRAM,
     BackgroundError,
     CommandProcess,

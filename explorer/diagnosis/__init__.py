@@ -1,0 +1,1 @@
+"""A diagnosis: from its order to its files."""

@@ -1,0 +1,1 @@
+"""Scenes as people name, change, draw and write them."""

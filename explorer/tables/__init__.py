@@ -1,0 +1,1 @@
+"""What commands print: plain tables for a terminal, and the same as plain data."""
