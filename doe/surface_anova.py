@@ -84,7 +84,7 @@ def analyse_surface(surface: Surface) -> SurfaceAnova:
         _tested(term, float(ss) if total_ss > 0 else 0.0, 1, mse, surface.df_residual)
         for term, ss in zip(surface.terms[1:], term_ss[1:], strict=True)
     ]
-    press = float(((residuals / (1 - surface.leverage)) ** 2).sum())
+    press = float((_left_out(residuals, surface.leverage) ** 2).sum())
     predicted_r2 = _ratio(total_ss - press, total_ss)
     rows = (
         model_row,
@@ -144,6 +144,12 @@ def _lack_of_fit(surface: Surface, residual_ss: float) -> tuple[AnovaRow, ...]:
     return tuple(rows)
 
 
+def _left_out(residuals: FloatArray, leverage: FloatArray) -> FloatArray:
+    """Return e_i/(1 - h_i), the error of a run predicted by all others; NaN where the fit cannot do without it."""
+    spare = 1 - leverage
+    return np.divide(residuals, spare, out=np.full(residuals.shape, np.nan), where=spare > 1e-9)
+
+
 def _press_by_row(surface: Surface, residuals: FloatArray) -> float:
     """Return the sum of squared errors when each row of the design is predicted from all others.
 
@@ -168,7 +174,7 @@ def _externally_studentized(residuals: FloatArray, leverage: FloatArray, mse: fl
     """
     if mse == 0 or df < 2:
         return np.full(residuals.shape, np.nan)
-    without = (df * mse - residuals**2 / (1 - leverage)) / (df - 1)
+    without = (df * mse - residuals * _left_out(residuals, leverage)) / (df - 1)
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(residuals / np.sqrt(without * (1 - leverage)))
 

@@ -35,8 +35,19 @@ FloatArray = npt.NDArray[np.float64]
 ROOT = 0
 """Root of the seeds: the same for every data set of a model, so that its pours are found again."""
 
-OnPour = Callable[[str, int], None]
-"""Called with (what is being run, pours still to come)."""
+
+@dataclass(frozen=True)
+class Ended:
+    """How one pour ended. ``label``: point and condition."""
+
+    label: str
+    seed: int
+    outcome: Outcome
+    message: str
+
+
+OnPour = Callable[[str, int, Ended], None]
+"""Called with (what is being run, pours still to come, how this one ended)."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +102,8 @@ class ModelPours:
                 self.run_now += 1
                 left -= 1
                 if self._on_pour is not None:
-                    self._on_pour(what, left)
+                    label = f"{point.sequence} {point.number}, {self._conditions[c].name}"
+                    self._on_pour(what, left, Ended(label, job.seed, record.outcome, record.message))
         return [[self._known[point, c] for c in range(len(self._conditions))] for point in points]
 
     def scene(self, point: Point, condition: int) -> Scene:

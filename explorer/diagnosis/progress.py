@@ -6,6 +6,9 @@ import json
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+
+from doe.diagnose.pours import Ended
 
 EVERY = 20.0
 """Seconds between two lines of progress where there is no terminal."""
@@ -28,20 +31,20 @@ class PourProgress:
         """The diagnosis has begun; the first pour shows itself only after the solver is compiled."""
         self._tell("compiling the solver", 0, None, None)
 
-    def pour(self, part: str, left: int) -> None:
-        """A pour of ``part`` has ended; ``left`` are still to come."""
+    def pour(self, part: str, left: int, ended: Ended) -> None:
+        """A pour of ``part`` has ended so; ``left`` are still to come."""
         if part != self._part:
             self._part, self._part_began, self._done = part, self.elapsed, 0
         self._done += 1
         eta = left * (self.elapsed - self._part_began) / self._done if self._done > 1 else None
-        self._tell(part, left, eta, None)
+        self._tell(part, left, eta, None, ended)
 
     def stage(self, line: str) -> None:
         """A part has ended with this finding."""
         self._tell(self._part, 0, None, line)
 
-    def _tell(self, part: str, left: int, eta: float | None, line: str | None) -> None:
-        event = {
+    def _tell(self, part: str, left: int, eta: float | None, line: str | None, ended: Ended | None = None) -> None:
+        event: dict[str, Any] = {
             "time": self.elapsed,
             "stage": part,
             "done": self._done,
@@ -49,6 +52,17 @@ class PourProgress:
             "eta_s": eta,
             "line": line,
         }
+        if ended is not None and not ended.outcome.valid:
+            # No seed is tried again: the other points carry the emulator.
+            event["run"] = {
+                "label": ended.label,
+                "replicate": 0,
+                "attempt": 0,
+                "seed": ended.seed,
+                "outcome": str(ended.outcome),
+                "message": ended.message,
+                "valid": False,
+            }
         with self._file.open("a", encoding="utf-8") as file:
             file.write(json.dumps(event, ensure_ascii=False) + "\n")
         about = "" if eta is None else f", about {eta:.0f} s"

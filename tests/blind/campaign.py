@@ -14,7 +14,7 @@ from functools import cached_property
 from pathlib import Path
 
 from doe.diagnose.diagnosis import declare
-from doe.diagnose.pours import ModelPours
+from doe.diagnose.pours import Ended, ModelPours
 from doe.diagnose.screen import Budget, Screened, further, screen
 from doe.measurement import Measurement
 from doe.store import Store, default_store
@@ -88,7 +88,7 @@ def emulated(order: CampaignOrder, measurement: Measurement, place: WorkPlace, s
     """The declared model with every effect screened as far as survivors are; from the store where it is there."""
     paths = [parameter.path for parameter in measurement.parameters]
 
-    def on_pour(what: str, left: int) -> None:
+    def on_pour(what: str, left: int, _: Ended) -> None:
         place.look_at_the_clock()
         if left > 0 and left % SAID_EVERY == 0:
             say(f"{what}: {left} pours to come")

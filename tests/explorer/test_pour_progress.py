@@ -1,0 +1,23 @@
+"""What a diagnosis tells while it runs, read back by the page's readers."""
+
+import json
+
+from doe.diagnose.pours import Ended
+from explorer.background.command_process import CommandStatus
+from explorer.background.stage_progress import failures, with_event, with_run
+from explorer.diagnosis.progress import PourProgress
+from explorer.viewer.study.stage_table import stages_markdown
+from solver import Outcome
+
+
+def test_a_pour_that_broke_off_is_told_with_its_seed(tmp_path):
+    progress = PourProgress(tmp_path / "progress.jsonl", lambda line: None, terminal=False)
+    progress.pour("screening", 2, Ended("air_drag@2 0, fast", 11, Outcome.AT_REST, ""))
+    progress.pour("screening", 1, Ended("air_drag@2 1, fast", 12, Outcome.JAMMED, "the outlet is blocked"))
+    stages, tried = (), ()
+    for line in (tmp_path / "progress.jsonl").read_text().splitlines():
+        stages, tried = with_event(stages, json.loads(line)), with_run(tried, json.loads(line))
+    (lost,) = failures(tried)
+    assert (lost.run.label, lost.run.seed, lost.replaced_by) == ("air_drag@2 1, fast", 12, None)
+    shown = stages_markdown(CommandStatus("running", stages=stages, tried=tried), "diagnosis", "Pours")
+    assert r"| screening | air\_drag@2 1, fast | jammed: the outlet is blocked | 12 | none |" in shown
