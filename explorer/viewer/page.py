@@ -150,7 +150,7 @@ class Page:
             look_at_height(self._server, scene_height(scene))
 
     def _show_panels(self, status: Status) -> None:
-        readout = readout_html(status, self._events, self._notice)
+        readout = readout_html(status, self._events, self._notice, self._look.by_component)
         if self._readout.content != readout:
             self._readout.content = readout
         self._chart.show(status, self._events)

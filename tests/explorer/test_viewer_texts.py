@@ -58,6 +58,8 @@ def test_the_readout_tells_what_the_solver_said():
         assert part in text
     assert "23.4°" in text
     assert "± 3.2°" in text
+    assert "class='dot'" in text
+    assert "class='dot'" not in readout_html(STATUS, [], "", by_component=False)
     assert "left 21.0°" in text
     assert "right –" in text
 

@@ -50,6 +50,11 @@ class LookTab:
         self._told_for: object = None
         self._build(post)
 
+    @property
+    def by_component(self) -> bool:
+        """Whether a body's colour says what it is."""
+        return self._panel.look.colour_by == COMPONENT
+
     def _build(self, post: Post) -> None:
         gui = self._server.gui
         with gui.add_folder("Camera"):

@@ -69,12 +69,16 @@ STYLE = """<style>
 </style>"""
 
 
-def readout_html(status: Status, events: Sequence[Event], notice: str) -> str:
-    """The whole readout; ``notice`` is the page's own last message (a refused input, for instance)."""
+def readout_html(status: Status, events: Sequence[Event], notice: str, by_component: bool = True) -> str:
+    """The whole readout; ``notice`` is the page's own last message (a refused input, for instance).
+
+    ``by_component``: whether a body's colour says what it is; a legend of components would be wrong otherwise.
+    """
     cells = "".join(_cell(name, text) for name, text in readings(status))
     cells += "".join(_cell(name, text, "wide") for name, text in long_readings(status))
     lines = "".join(f"<div class='note'>{escape(text)}</div>" for text in notes(status, events, notice))
-    top = f"<div class='top'>{_state(status)}<span>{legend(status.scene)}</span></div>"
+    components = legend(status.scene) if by_component else ""
+    top = f"<div class='top'>{_state(status)}<span>{components}</span></div>"
     return f"{STYLE}<div class='pour'>{top}{_angle(status)}<div class='grid'>{cells}</div>{lines}</div>"
 
 
