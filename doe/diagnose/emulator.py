@@ -14,8 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from doe.diagnose.lack_of_fit import lack_of_fit_variance
-from doe.diagnose.noise import AMPLE_DF, PourNoise, pour_noise
+from doe.diagnose.block import Block, Rows, fit_block
 from doe.diagnose.predictor import Predictor
 from doe.diagnose.runs import BASE, Declared, Runs
 from doe.diagnose.terms import base_candidates, effect_candidates, monomials
@@ -32,28 +31,6 @@ TOLERATED = 1.2
 """Leave-one-out error, relative to the least, up to which the richer polynomial is taken: a term left out is a bias
 that
 the prediction's standard error does not know of."""
-
-LEAST_SHARE = 0.1
-"""Standard deviation of a pour, at least, as a share of that over all runs: a summary that never varies in the base
-runs
-(nothing left in the funnel) but does with an effect would otherwise have no noise at all."""
-
-
-@dataclass(frozen=True)
-class Block:
-    """The fit of one condition with P terms and d summaries.
-
-    coefficients: (P, d). information_inverse: (X'X)^-1, (P, P). noise: of one simulated pour. lack_of_fit: (d,)
-    variance of the emulator's bias, found from replicated points (zero without). r2: (d,) cross-validated.
-    standardised_error: (d,) root mean square of leave-one-out error over its standard error (1 where both agree).
-    """
-
-    coefficients: FloatArray
-    information_inverse: FloatArray
-    noise: PourNoise
-    lack_of_fit: FloatArray
-    r2: FloatArray
-    standardised_error: FloatArray
 
 
 @dataclass(frozen=True)
@@ -106,6 +83,8 @@ class Emulator:
             information_inverse=tuple(b.information_inverse[np.ix_(chosen, chosen)] for b in self.blocks),
             pour_covariance=tuple(b.noise.covariance for b in self.blocks),
             lack_of_fit=tuple(b.lack_of_fit for b in self.blocks),
+            excess=tuple(b.excess[list(members)] for b in self.blocks),
+            amplitudes=tuple(sizes),
             low=np.concatenate([self.theta_low, *(self.low[e] for e in members)]),
             high=np.concatenate([self.theta_high, *(self.high[e] for e in members)]),
         )
@@ -128,7 +107,10 @@ def fit_emulator(declared: Declared, runs: Runs, floors: tuple[FloatArray, ...])
         declared=declared,
         base_exponents=base,
         effect_exponents=effects,
-        blocks=tuple(_fit_block(design, runs, c, floors[c]) for c in range(len(runs.blocks))),
+        blocks=tuple(
+            fit_block(_rows(design, runs, c, declared), len(declared.effects), floors[c])
+            for c in range(len(runs.blocks))
+        ),
         theta_low=np.maximum(-1.0, theta[used].min(axis=0)),
         theta_high=np.minimum(1.0, theta[used].max(axis=0)),
         low=tuple(np.concatenate([o, z]).min(axis=0) for o, z in zip(own, zero, strict=True)),
@@ -136,31 +118,15 @@ def fit_emulator(declared: Declared, runs: Runs, floors: tuple[FloatArray, ...])
     )
 
 
-def _fit_block(design: FloatArray, runs: Runs, condition: int, floor: FloatArray) -> Block:
-    """Fit one condition; the noise is that of the base runs where they are ample, else of all runs."""
-    rows = runs.simulated(condition) & np.isfinite(design).all(axis=1)
-    x, y = design[rows], runs.blocks[condition][rows]
-    inverse: FloatArray = np.linalg.inv(x.T @ x).astype(np.float64)
-    coefficients = inverse @ (x.T @ y)
-    leverage = np.minimum(np.einsum("np,pr,nr->n", x, inverse, x), 1 - 1e-9)
-    residuals = y - x @ coefficients
-    base = runs.effect[rows] == BASE
-    ample = (1 - leverage[base]).sum() >= AMPLE_DF * y.shape[1]
-    basis = base if ample else np.ones(len(y), dtype=bool)
-    overall = np.sqrt((residuals**2).sum(axis=0) / (1 - leverage).sum())
-    noise = pour_noise(residuals[basis], leverage[basis], np.maximum(floor, LEAST_SHARE * overall))
-    left_out = residuals / (1 - leverage)[:, None]
-    scatter = ((y - y.mean(axis=0)) ** 2).sum(axis=0)
-    expected = np.sqrt(np.diag(noise.covariance))[None, :] / np.sqrt(1 - leverage)[:, None]
-    settings = np.column_stack([runs.theta, runs.effect, runs.amplitude])[rows]
-    return Block(
-        coefficients=coefficients,
-        information_inverse=inverse,
-        noise=noise,
-        lack_of_fit=lack_of_fit_variance(settings[basis], y[basis], residuals[basis], leverage[basis]),
-        r2=1 - np.divide((left_out**2).sum(axis=0), scatter, out=np.ones(y.shape[1]), where=scatter > 0),
-        standardised_error=np.sqrt(((left_out / expected) ** 2).mean(axis=0)),
-    )
+def _rows(design: FloatArray, runs: Runs, condition: int, declared: Declared) -> Rows:
+    """Return the complete runs of a condition."""
+    kept = runs.simulated(condition) & np.isfinite(design).all(axis=1)
+    level = np.zeros(len(kept))
+    for e, effect in enumerate(declared.effects):
+        own = runs.effect == e
+        level[own] = ((runs.amplitude[own, : effect.amplitudes] / effect.scale) ** 2).sum(axis=1)
+    settings = np.column_stack([runs.theta, runs.effect, runs.amplitude])
+    return Rows(design[kept], runs.effect[kept], level[kept], settings[kept], runs.blocks[condition][kept])
 
 
 def _choose_base(theta: FloatArray, runs: Runs) -> IntArray:

@@ -18,8 +18,9 @@ IntArray = npt.NDArray[np.int64]
 class Predictor:
     """y_c(x) = terms(x) @ coefficients_c; x: (..., q) coded parameters, then coded amplitudes.
 
-    Per condition c: coefficients (p, d_c), information_inverse (p, p), pour_covariance (d_c, d_c), lack_of_fit (d_c,).
-    low, high: (q,) the sampled box, in which alone it predicts.
+    Per condition c: coefficients (p, d_c), information_inverse (p, p), pour_covariance (d_c, d_c), lack_of_fit (d_c,),
+    excess (members, d_c) with the numbers of their amplitudes (block.py). low, high: (q,) the sampled box, in which
+    alone it predicts.
     """
 
     parameters: int
@@ -28,6 +29,8 @@ class Predictor:
     information_inverse: tuple[FloatArray, ...]
     pour_covariance: tuple[FloatArray, ...]
     lack_of_fit: tuple[FloatArray, ...]
+    excess: tuple[FloatArray, ...]
+    amplitudes: tuple[int, ...]
     low: FloatArray
     high: FloatArray
 
@@ -47,16 +50,24 @@ class Predictor:
         return np.concatenate([rows @ c for c in self.coefficients], axis=-1).T
 
     def mean_covariance(self, x: FloatArray) -> tuple[FloatArray, ...]:
-        """Return per condition the covariance of the predicted mean at x (q,): terms' (X'X)^-1 terms S + lack of
-        fit.
-        """
-        terms = monomials(x, self.exponents)
+        """Return per condition the covariance of the predicted mean at x (q,): terms' (X'X)^-1 terms S + bias."""
         return tuple(
-            float(terms @ inverse @ terms) * noise + np.diag(lack)
-            for inverse, noise, lack in zip(
-                self.information_inverse, self.pour_covariance, self.lack_of_fit, strict=True
+            share * noise + np.diag(bias)
+            for share, noise, bias in zip(
+                self.variance_shares(x), self.pour_covariance, self.bias_variance(x), strict=True
             )
         )
+
+    def variance_shares(self, x: FloatArray) -> tuple[float, ...]:
+        """Return per condition terms' (X'X)^-1 terms at x (q,): variance of the predicted mean in pours."""
+        terms = monomials(x, self.exponents)
+        return tuple(float(terms @ inverse @ terms) for inverse in self.information_inverse)
+
+    def bias_variance(self, x: FloatArray) -> tuple[FloatArray, ...]:
+        """Return per condition the variance of what no number of runs would mend at x (q,): (d_c,)."""
+        ends = np.cumsum([self.parameters, *self.amplitudes])
+        squares = np.array([(part**2).sum() for part in np.split(x, ends[:-1])[1:]])
+        return tuple(lack + squares @ excess for lack, excess in zip(self.lack_of_fit, self.excess, strict=True))
 
     def require_inside(self, x: FloatArray) -> None:
         """Raise StatisticsError unless every point lies in the sampled box (rounding aside)."""

@@ -33,7 +33,8 @@ def draw_pseudo_data(emulator: Emulator, evidence: Evidence, truth: Fit, sets: i
     generator = np.random.default_rng(seed)
     predictor, k = truth.predictor, truth.predictor.parameters
     fitted = np.split(predictor.mean(truth.x), np.cumsum([m.size for m in evidence.means])[:-1])
-    emulated = predictor.mean_covariance(truth.x)
+    emulated, shares = predictor.mean_covariance(truth.x), predictor.variance_shares(truth.x)
+    biases = predictor.bias_variance(truth.x)
     means, weights = [], []
     for c, block in enumerate(emulator.blocks):
         systematic, count, pour = np.diag(evidence.systematic[c]), evidence.counts[c], evidence.pour[c]
@@ -42,10 +43,9 @@ def draw_pseudo_data(emulator: Emulator, evidence: Evidence, truth: Fit, sets: i
         means.append(fitted[c] + _mean_of_pours(block.noise.rows, pour, count, sets, generator) + error)
         estimate = shrink(wishart(simulated, block.noise.df, sets, generator), block.noise.shrinkage)
         spread = np.sqrt(np.diag(pour) / np.diag(simulated)) * _spread_error(evidence, c, sets, generator)
-        factor = _variance_factor(emulated[c], simulated, predictor.lack_of_fit[c])
-        lack = np.diag(predictor.lack_of_fit[c])
+        bias = np.diag(biases[c])
         covariance = (
-            estimate * (spread[:, :, None] * spread[:, None, :]) / count + factor * estimate + lack + systematic
+            estimate * (spread[:, :, None] * spread[:, None, :]) / count + shares[c] * estimate + bias + systematic
         )
         weights.append(np.asarray(np.linalg.inv(covariance), dtype=np.float64))
     measured = evidence.prior_weight > 0
@@ -94,8 +94,3 @@ def _spread_error(evidence: Evidence, condition: int, sets: int, generator: np.r
     df = max(comparison.measured_df, 1)
     drawn = np.sqrt(generator.chisquare(df, size=(sets, comparison.differs.size)) / df)
     return np.where(comparison.differs, drawn, 1.0)
-
-
-def _variance_factor(emulated: FloatArray, simulated: FloatArray, lack_of_fit: FloatArray) -> float:
-    """Return v in Cov(emulated mean) = v S + lack of fit."""
-    return float((emulated[0, 0] - lack_of_fit[0]) / simulated[0, 0])

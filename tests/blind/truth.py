@@ -3,7 +3,8 @@ acts that the declared model lacks.
 
 A truth's strength is the length of its projected, whitened shift of the summaries (`doe.diagnose.signatures`), in
 standard errors of a data set of ``REPLICATES`` pours. The emulator's own error is no part of that standard error, so
-that a strength means the same however much was simulated.
+that a strength means the same however much was simulated; how much an effect's own pours stray is, for nobody can say
+beforehand how far they go in one data set.
 """
 
 from collections.abc import Sequence
@@ -52,9 +53,14 @@ class Ruler:
     declared: Declared
     widest: tuple[Effect, ...]
 
-    def frame(self, theta: FloatArray) -> Whitening:
-        """Whitening by the noise of ``REPLICATES`` pours, and projection, at coded parameters (k,)."""
+    def frame(self, theta: FloatArray, stray: Sequence[FloatArray] | None = None) -> Whitening:
+        """Whitening by the noise of ``REPLICATES`` pours, and projection, at coded parameters (k,).
+
+        ``stray``: per condition (d_c,), variance beyond noise.
+        """
         noise = [block.noise.covariance / REPLICATES for block in self.emulator.blocks]
+        if stray is not None:
+            noise = [covariance + np.diag(more) for covariance, more in zip(noise, stray, strict=True)]
         return whitening_at(self.emulator.predictor(()), theta, noise, priors(self.declared)[1])
 
     def coded(self, theta: Sequence[float]) -> FloatArray:
@@ -62,8 +68,10 @@ class Ruler:
         coded = [float(p.coded(x)) for p, x in zip(self.declared.parameters, theta, strict=True)]
         return np.clip(coded, self.emulator.theta_low, self.emulator.theta_high)
 
-    def shift(self, effect: int, frame: Whitening, theta: FloatArray, amplitude: FloatArray) -> float:
+    def shift(self, effect: int, theta: FloatArray, amplitude: FloatArray) -> float:
         """Shift [σ] by an effect at coded amplitudes (m,), freed from what the emulator's error adds on average."""
+        stray = self.emulator.predictor((effect,)).bias_variance(np.concatenate([theta, amplitude]))
+        frame = self.frame(theta, stray)
         z = projected(frame, shift_of(self.emulator, effect, theta, amplitude))
         return float(np.sqrt(max(0.0, z @ z - noise_square(self.emulator, effect, frame, theta, amplitude))))
 
@@ -95,14 +103,13 @@ def truth_of(case: Case, ruler: Ruler) -> Truth:
     if case.kind in ("null", "outside"):
         return Truth(case, theta)
     coded = ruler.coded(theta)
-    frame = ruler.frame(coded)
     names = [effect.name for effect in ruler.declared.effects]
     if case.kind == "effect":
-        found = amplitude_for(ruler, frame, names.index(case.label), coded, case.strength, rng)
+        found = amplitude_for(ruler, names.index(case.label), coded, case.strength, rng)
         if isinstance(found, str):
             return Truth(case, theta, missing=found)
         return Truth(case, theta, ((case.label, found),))
-    return drawn_pair(case, theta, ruler, frame, rng)
+    return drawn_pair(case, theta, ruler, rng)
 
 
 def drawn_theta(declared: Declared, rng: np.random.Generator) -> tuple[float, ...]:
@@ -114,7 +121,7 @@ def drawn_theta(declared: Declared, rng: np.random.Generator) -> tuple[float, ..
 
 
 def amplitude_for(
-    ruler: Ruler, frame: Whitening, e: int, theta: FloatArray, strength: float, rng: np.random.Generator
+    ruler: Ruler, e: int, theta: FloatArray, strength: float, rng: np.random.Generator
 ) -> tuple[float, ...] | str:
     """Amplitudes [natural units] at which effect ``e`` shifts by ``strength`` σ, in a direction drawn at random.
 
@@ -128,24 +135,25 @@ def amplitude_for(
     for k in rng.permutation(len(ways)):
         direction = np.clip(np.array(ways[k]) / effect.scale, ruler.emulator.low[e], ruler.emulator.high[e])
         shares = np.linspace(0.0, 1.0, 51)[1:]
-        reached = [s for s in shares if ruler.shift(e, frame, theta, s * direction) >= strength]
+        reached = [s for s in shares if ruler.shift(e, theta, s * direction) >= strength]
         if reached:
             low, high = reached[0] - shares[0], reached[0]
             for _ in range(30):
                 middle = 0.5 * (low + high)
-                enough = ruler.shift(e, frame, theta, middle * direction) >= strength
+                enough = ruler.shift(e, theta, middle * direction) >= strength
                 low, high = (low, middle) if enough else (middle, high)
             return tuple(float(x) for x in high * direction * effect.scale)
     return "bounds" if np.allclose(effect.high, ruler.widest[e].high) else "range"
 
 
-def drawn_pair(case: Case, theta: tuple[float, ...], ruler: Ruler, frame: Whitening, rng: np.random.Generator) -> Truth:
+def drawn_pair(case: Case, theta: tuple[float, ...], ruler: Ruler, rng: np.random.Generator) -> Truth:
     """Two effects of ``case.strength`` each, whose signatures differ."""
     coded = ruler.coded(theta)
+    frame = ruler.frame(coded)
     found: list[tuple[str, tuple[float, ...], FloatArray]] = []
     for e in rng.permutation(len(ruler.declared.effects)):
         effect = ruler.declared.effects[e]
-        amplitude = amplitude_for(ruler, frame, int(e), coded, case.strength, rng)
+        amplitude = amplitude_for(ruler, int(e), coded, case.strength, rng)
         if isinstance(amplitude, str):
             continue
         z = projected(frame, shift_of(ruler.emulator, int(e), coded, np.array(amplitude) / effect.scale))

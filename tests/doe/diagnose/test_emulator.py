@@ -1,5 +1,7 @@
 """The emulator on polynomials that it must recover, and its errors against brute force."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -112,3 +114,41 @@ def test_lack_of_fit_finds_the_bias_of_a_straight_line_on_a_parabola():
     assert lack_of_fit_variance(x[:, None], straight, straight - hat @ straight, np.diag(hat)) == [0.0]
     distinct = np.arange(30.0)[:, None]
     assert lack_of_fit_variance(distinct, values, values - hat @ values, np.diag(hat)) == [0.0]
+
+
+def with_jams(runs, effect, size, seed=1):
+    """Every fourth run of ``effect`` jams, which adds ``size`` times the amplitude to the first summary."""
+    generator = np.random.default_rng(seed)
+    jams = (runs.effect == effect) & (generator.uniform(size=len(runs.effect)) < 0.25)
+    first = runs.blocks[0].copy()
+    first[jams, 0] += size * runs.amplitude[jams, 0] / 5
+    return replace(runs, blocks=(first, runs.blocks[1]))
+
+
+def test_an_effect_that_strays_answers_for_it_alone():
+    """Jams of one effect widen that effect's own prediction in that summary, and leave the base as it was."""
+    clean = make_runs(noise=0.1)
+    still, jammed = (fit_emulator(DECLARED, runs, NO_FLOORS) for runs in (clean, with_jams(clean, 0, 50.0)))
+    assert not any(block.excess.any() for block in still.blocks)
+    excess = jammed.blocks[0].excess
+    assert np.argwhere(excess).tolist() == [[0, 0]]
+    # A quarter of the runs is 50 too high at full amplitude: variance 50² · 1/4 · 3/4, known to a half from 7 jams.
+    assert excess[0, 0] == pytest.approx(469, rel=0.6)
+    theta = np.array([0.4, -0.3])
+    apart = jammed.predictor(()).mean(theta) - still.predictor(()).mean(theta)
+    assert apart == pytest.approx(0, abs=0.1)
+    covariance = jammed.predictor((0,)).mean_covariance
+    assert np.sqrt(covariance(np.append(theta, 1.0))[0][0, 0]) > 10
+    assert covariance(np.append(theta, 0.0))[0][0, 0] == pytest.approx(
+        still.predictor(()).mean_covariance(theta)[0][0, 0], rel=0.6
+    )
+
+
+def test_noise_alone_is_not_taken_for_straying():
+    """Eighty sets of pure noise: an excess is seen in no more of them than the tests' level allows."""
+    seen = [
+        any(block.excess.any() for block in fit_emulator(DECLARED, make_runs(noise=0.5, seed=seed), NO_FLOORS).blocks)
+        for seed in range(80)
+    ]
+    # 1 % per condition and two of them: 1.6 expected; more than 6 has a chance of 0.2 %.
+    assert sum(seen) <= 6

@@ -1,5 +1,7 @@
 """The batched minimiser against normal equations, SciPy's bounded solvers and a non-linear fit."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import least_squares, lsq_linear
@@ -15,7 +17,16 @@ def predictor(exponents, generator, low, high, parameters):
     p = len(exponents)
     coefficients = generator.standard_normal((p, D)) * 5
     return Predictor(
-        parameters, exponents, (coefficients,), (np.zeros((p, p)),), (np.eye(D),), (np.zeros(D),), low, high
+        parameters=parameters,
+        exponents=exponents,
+        coefficients=(coefficients,),
+        information_inverse=(np.zeros((p, p)),),
+        pour_covariance=(np.eye(D),),
+        lack_of_fit=(np.zeros(D),),
+        excess=(np.zeros((1, D)),),
+        amplitudes=(exponents.shape[1] - parameters,),
+        low=low,
+        high=high,
     )
 
 
@@ -93,8 +104,8 @@ def test_a_start_is_found_where_there_is_no_slope_at_zero():
     """y = a^2 (no linear term): from a = 0 no descent is possible, from the best start the fit is exact."""
     exponents = np.array([[0], [2]])
     coefficients = np.array([np.zeros(D), np.full(D, 10.0)])
-    model = Predictor(
-        0, exponents, (coefficients,), (np.zeros((2, 2)),), (np.eye(D),), (np.zeros(D),), np.zeros(1), np.ones(1)
+    model = replace(
+        predictor(exponents, np.random.default_rng(0), np.zeros(1), np.ones(1), 0), coefficients=(coefficients,)
     )
     misfit = build_misfit(model, [np.full((1, D), 4.9)], [np.eye(D)[None]], np.zeros((1, 0)), np.zeros(0))
     assert minimise(misfit, np.zeros((1, 1)))[1] > 100

@@ -83,7 +83,9 @@ def known_emulator(toy, generator, df=40):
     coefficients = np.concatenate([np.zeros((1, d)), toy.jacobian.T, toy.signatures])
     noise = PourNoise(covariance, float(df), LEAST_SHRINKAGE, np.empty((0, d)))
     terms = len(coefficients)
-    block = Block(coefficients, np.zeros((terms, terms)), noise, np.zeros(d), np.ones(d), np.ones(d))
+    block = Block(
+        coefficients, np.zeros((terms, terms)), noise, np.zeros(d), np.zeros((EFFECTS, d)), np.ones(d), np.ones(d)
+    )
     return Emulator(
         declared=toy.declared,
         base_exponents=base_candidates(PARAMETERS)[0],
