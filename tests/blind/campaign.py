@@ -13,16 +13,20 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
+
 from doe.diagnose.diagnosis import declare
+from doe.diagnose.plan import directions
 from doe.diagnose.pours import Ended, ModelPours
-from doe.diagnose.screen import Budget, Screened, further, screen
+from doe.diagnose.runs import Declared
+from doe.diagnose.screen import Budget, Screened, further, screen, widened
 from doe.measurement import Measurement
 from doe.store import Store, default_store
 from solver import EFFECTS
 from tests.blind.answers import Answers
 from tests.blind.laboratory import MODEL, declared_model
 from tests.blind.outside import AMPLITUDE
-from tests.blind.schedule import Case, cases
+from tests.blind.schedule import STRENGTHS, Case, cases
 from tests.blind.sets import Row, append_row, read_rows
 from tests.blind.table import campaign_text
 from tests.blind.truth import ruler
@@ -94,8 +98,25 @@ def emulated(order: CampaignOrder, measurement: Measurement, place: WorkPlace, s
             say(f"{what}: {left} pours to come")
 
     model = ModelPours(measurement.fit, paths, place.store, place.crew.run_queue, on_pour)
-    screened = screen(declare(measurement, order.effects), model, order.budget, say)
-    return further(screened, order.effects, model, order.budget, say)
+    widest = declare(measurement, order.effects)
+    screened = screen(widest, model, order.budget, say)
+    screened = further(screened, order.effects, model, order.budget, say)
+    weak = short_of(max(STRENGTHS), screened, widest)
+    say(f"wider range of {', '.join(weak) or 'nothing'}")
+    return further(widened(screened, weak, widest), weak, model, order.budget, say)
+
+
+def short_of(strength: float, screened: Screened, widest: Declared) -> list[str]:
+    """Effects that do not shift by ``strength`` σ in the middle of the box, where the literature supports more."""
+    measure = ruler(screened.declared, screened.runs, widest.effects)
+    middle = np.zeros(len(widest.parameters))
+    names = []
+    for e, (effect, end) in enumerate(zip(screened.declared.effects, widest.effects, strict=True)):
+        if e in measure.emulator.simulated_effects and max(effect.high) < max(end.high):
+            full = [measure.within(e, np.array(way) / effect.scale) for way in directions(effect)]
+            if max(measure.shift(e, middle, amplitude) for amplitude in full) < strength:
+                names.append(effect.name)
+    return names
 
 
 def _answer(order: CampaignOrder, todo: Sequence[Case], place: WorkPlace, path: Path, say: Say) -> None:

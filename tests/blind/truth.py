@@ -68,6 +68,10 @@ class Ruler:
         coded = [float(p.coded(x)) for p, x in zip(self.declared.parameters, theta, strict=True)]
         return np.clip(coded, self.emulator.theta_low, self.emulator.theta_high)
 
+    def within(self, effect: int, amplitude: FloatArray) -> FloatArray:
+        """Coded amplitudes (m,) within what was simulated."""
+        return np.clip(amplitude, self.emulator.low[effect], self.emulator.high[effect])
+
     def shift(self, effect: int, theta: FloatArray, amplitude: FloatArray) -> float:
         """Shift [σ] by an effect at coded amplitudes (m,), freed from what the emulator's error adds on average."""
         stray = self.emulator.predictor((effect,)).bias_variance(np.concatenate([theta, amplitude]))
@@ -133,7 +137,7 @@ def amplitude_for(
         return "not simulated"
     ways = directions(effect)
     for k in rng.permutation(len(ways)):
-        direction = np.clip(np.array(ways[k]) / effect.scale, ruler.emulator.low[e], ruler.emulator.high[e])
+        direction = ruler.within(e, np.array(ways[k]) / effect.scale)
         shares = np.linspace(0.0, 1.0, 51)[1:]
         reached = [s for s in shares if ruler.shift(e, theta, s * direction) >= strength]
         if reached:
