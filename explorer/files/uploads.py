@@ -109,6 +109,11 @@ def unpacked_measurement(name: str, content: bytes, folder: Path) -> Path:
     return kept
 
 
+def kept_measurements(folder: Path) -> dict[str, Path]:
+    """Name → folder of every data set that :func:`unpacked_measurement` has kept in ``folder``."""
+    return {file.parent.name: file.parent for file in sorted(folder.glob(f"[!.]*/{MEASUREMENT_FILE}"))}
+
+
 def label(text: str) -> str:
     """``text`` from outside as a part of a file's name."""
     return LABEL.sub("_", text)[:40].strip("_") or "unnamed"

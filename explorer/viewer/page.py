@@ -9,6 +9,7 @@ from collections import deque
 import viser
 
 from explorer.diagnosis.process import DiagnosisProcess
+from explorer.files.user_data import uploads_folder
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, Status
 from explorer.scene.meshes import scene_height
@@ -86,7 +87,7 @@ class Page:
             with tabs.add_tab("Calibrate", viser.Icon.TARGET):
                 self._study = StudyPanel(server, study, study_name, post, session)
         with tabs.add_tab("Diagnose", viser.Icon.STETHOSCOPE):
-            self._diagnosis = DiagnosisPanel(server, diagnosis, shipped_measurements(), post)
+            self._diagnosis = DiagnosisPanel(server, diagnosis, shipped_measurements(), uploads_folder(), post)
         ThemeSwitch(server, post, self._follow_theme)
 
     def _follow_theme(self, dark: bool) -> None:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import sys
 
 import pytest
@@ -147,7 +148,7 @@ def server():
 
 def test_the_panel_asks_and_shows(server, tmp_path):
     process, actions = FakeDiagnosis(), Actions()
-    panel = DiagnosisPanel(server, process, shipped_measurements(), actions.post)
+    panel = DiagnosisPanel(server, process, shipped_measurements(), tmp_path / "uploads", actions.post)
     panel._data.value = "trefoil_2"
     for button in ("Start", "Pause / go on", "Cancel", "Delete everything"):
         press(panel, button)
@@ -180,9 +181,22 @@ def test_the_panel_asks_and_shows(server, tmp_path):
     assert shown["layout"]["xaxis"]["title"]["text"] == "measured − model [σ]"
 
 
+def test_an_uploaded_data_set_can_be_diagnosed(server, tmp_path):
+    process, actions = FakeDiagnosis(), Actions()
+    panel = DiagnosisPanel(server, process, shipped_measurements(), tmp_path / "uploads", actions.post)
+    kept = tmp_path / "uploads" / "mine-0123456789ab"
+    shutil.copytree(measurement_folder("trefoil_1"), kept)
+    panel.show("")
+    assert "mine-0123456789ab" in panel._data.options
+    panel._data.value = "mine-0123456789ab"
+    press(panel, "Start")
+    actions.carry_out()
+    assert process.asked == [f"start {kept}"]
+
+
 def test_a_file_that_is_no_diagnosis_is_one_line(server, tmp_path):
     process, actions = FakeDiagnosis(), Actions()
-    panel = DiagnosisPanel(server, process, shipped_measurements(), actions.post)
+    panel = DiagnosisPanel(server, process, shipped_measurements(), tmp_path / "uploads", actions.post)
     (tmp_path / "diagnosis.json").write_text('{"verdict": "<script>"}')
     process.out = tmp_path
     panel.show("")

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import viser
 
-from explorer.files.user_data import data_folder
+from explorer.files.user_data import data_folder, uploads_folder
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, Status
 from explorer.session import Session
@@ -30,7 +30,7 @@ class PourPanels:
     def __init__(self, server: viser.ViserServer, session: Session, post: Post) -> None:
         self._server, self._session, self._post = server, session, post
         self._background = BackgroundWork(post)
-        scene, uploads = session.status().scene, data_folder() / "uploads"
+        scene, uploads = session.status().scene, uploads_folder()
         self.motion = MotionChart(server)
         self.outline = OutlinePanel(server, shipped_measurements(), uploads, post, self._background)
         self.live = SceneBound(server, lambda scene: LivePanel(server, session, scene, post), scene)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
+from pathlib import Path
 
 import viser
 
 from explorer.background.result_file import ResultFile
 from explorer.diagnosis.process import RESULT, DiagnosisProcess
+from explorer.files.uploads import kept_measurements
 from explorer.report.diagnosis.findings import summary_label, summary_value
 from explorer.report.diagnosis.in_short import verdict_sentence
 from explorer.report.diagnosis_plots import diagnosis_plots
@@ -30,25 +32,28 @@ EMPTY = (
 
 
 class DiagnosisPanel:
-    """Talks to a :class:`DiagnosisProcess`; ``shipped`` are the names of the data sets to choose from."""
+    """Talks to a :class:`DiagnosisProcess`; ``shipped``: names of data sets to choose from; ``uploads``: the others."""
 
     def __init__(
         self,
         server: viser.ViserServer,
         diagnosis: DiagnosisProcess,
         shipped: Sequence[str],
+        uploads: Path,
         post: Post,
         dark: bool = True,
     ) -> None:
         gui = server.gui
         self._diagnosis, self._file = diagnosis, ResultFile(RESULT)
+        self._shipped, self._uploads = tuple(shipped), uploads
+        kept = tuple(kept_measurements(uploads))
         self._shown: Hashable = None
         gui.add_markdown("Which physical effect do measured data ask for that the declared model lacks?")
         self._data = gui.add_dropdown(
             "Measured data",
-            (*shipped, OWN),
+            (*shipped, *kept, OWN),
             initial_value=FIRST if FIRST in shipped else OWN,
-            hint="Data sets that come with the program, or a folder of your own.",
+            hint="Data sets that come with the program, those uploaded in the tab Pour, or a folder of your own.",
         )
         self._folder = gui.add_text(
             "Folder", "", hint="Folder with measurement.toml, on the machine that serves this page."
@@ -86,13 +91,17 @@ class DiagnosisPanel:
             self._diagnosis.pause()
 
     def _chosen(self) -> str:
-        return str(self._folder.value if self._data.value == OWN else self._data.value)
+        chosen = str(self._folder.value if self._data.value == OWN else self._data.value)
+        return str(kept_measurements(self._uploads).get(chosen, chosen))
 
     def show(self, notice: str) -> None:
         """Ask the diagnosis how far it is; ``notice`` is the page's own last message, such as a refused click.
 
         Call it inside ``server.atomic()``, about twice a second.
         """
+        data = (*self._shipped, *kept_measurements(self._uploads), OWN)
+        if tuple(self._data.options) != data:
+            self._data.options = data
         status = self._diagnosis.status()
         self._view.show(status, stages_markdown(status, "diagnosis", "Pours", notice))
         self._chooser.offer(self._diagnosis.finished())
