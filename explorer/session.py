@@ -116,12 +116,12 @@ class Session:
         """Go on by one sample interval of the scene (``numerics.sample_interval``), then stand still."""
         self._send(Step(self._present().scene.numerics.sample_interval))
 
-    def step_back(self) -> None:
-        """Go back by one sample interval, with everything as it was then, parameters too, and stand still.
+    def step_back(self, duration: float | None = None) -> None:
+        """Go back by ``duration`` [s], by default one sample interval, with everything as it was then, parameters too.
 
-        From there the pour repeats the same bits until something is changed.
+        It stands still there, and repeats the same bits until something is changed.
         """
-        self._send(StepBack(self._present().scene.numerics.sample_interval))
+        self._send(StepBack(self._present().scene.numerics.sample_interval if duration is None else duration))
 
     def set_speed(self, factor: float) -> None:
         """Aim at ``factor`` seconds of simulated time per second."""

@@ -41,6 +41,9 @@ class FakeSession:
     def play(self):
         self.told.append("play")
 
+    def step_back(self, duration):
+        self.told.append(("back", pytest.approx(duration)))
+
     def set_speed(self, factor):
         self.told.append(("speed", factor))
 
@@ -110,6 +113,27 @@ def test_it_pauses_plays_and_keeps_speed_with_the_first(bench):
     assert bench.second.told == []
     bench.panel.show(replace(bench.first.now, state=SessionState.RUNNING))
     assert bench.second.told == ["play"]
+
+
+def test_where_the_first_stands_still_the_second_comes_to_its_moment(bench):
+    bench.panel._pour()
+    bench.second.told.clear()
+    first = replace(bench.first.now, state=SessionState.PAUSED, time=0.5)
+    for time, state, asked in (
+        (0.7, SessionState.RUNNING, "pause"),
+        (0.7, SessionState.PAUSED, ("back", 0.2)),
+        (0.7, SessionState.ENDED, ("back", 0.2)),
+        (0.3, SessionState.PAUSED, "play"),
+        (0.3, SessionState.RUNNING, None),
+        (0.502, SessionState.PAUSED, None),
+    ):
+        bench.second.now = replace(bench.second.now, state=state, time=time, earliest=0.0)
+        bench.panel.show(first)
+        assert bench.second.told == ([] if asked is None else [asked]), (time, state)
+        bench.second.told.clear()
+    bench.second.now = replace(bench.second.now, state=SessionState.PAUSED, time=0.7, earliest=0.6)
+    bench.panel.show(first)
+    assert bench.second.told == []  # so far back nothing is kept
 
 
 def test_taken_away_it_leaves_nothing(bench):

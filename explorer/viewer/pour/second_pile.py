@@ -1,6 +1,7 @@
 """A second pile beside the first, in a solver process of its own: it stays as it was poured while the first is changed.
 
-Both are drawn in one scene, so every camera sees both. The second one pauses, plays and keeps speed with the first.
+Both are drawn in one scene, so every camera sees both. The second one plays and keeps speed with the first; where the
+first one stands still, the second comes to the same moment, back or on.
 """
 
 from __future__ import annotations
@@ -42,6 +43,7 @@ class SecondPile:
         self._nodes: SceneNodes | None = None
         self._drawn: Scene | None = None
         self._frame_number = 0
+        self._kept_for: object = None
         server.scene.add_frame(ROOT, show_axes=False, position=(BESIDE, 0.0, 0.0))
         acts = {"Pour beside": self._pour, "Take away": self.close}
         with server.gui.add_folder("Second pile", expand_by_default=False):
@@ -84,7 +86,10 @@ class SecondPile:
     def show(self, first: Status) -> None:
         """Tell both results, and let time go or stand as in the first; call it inside ``server.atomic()``."""
         second = None if self._second is None else self._second.status()
-        if self._second is not None and second is not None:
+        moments = None if second is None else (second.state, second.time, first.state, first.time, first.speed)
+        if self._second is not None and second is not None and moments != self._kept_for:
+            # Once per moment: what was asked shows in a later status only.
+            self._kept_for = moments
             keep_time(self._second, second, first)
         text = NONE if second is None else comparison_markdown(first, second)
         if self._text.content != text:
@@ -98,13 +103,24 @@ class SecondPile:
 
 
 def keep_time(session: Session, second: Status, first: Status) -> None:
-    """Pause, play and pace ``session`` as the first pour does."""
-    if second.state == SessionState.RUNNING and first.state == SessionState.PAUSED:
-        session.pause()
+    """Play and pace ``session`` as the first pour does; bring it to the first one's moment where that stands still."""
+    if first.state == SessionState.PAUSED:
+        _come_to(session, second, first.time)
     elif second.state == SessionState.PAUSED and first.state in (SessionState.RUNNING, SessionState.ENDED):
         session.play()
     if not math.isclose(second.speed, first.speed):
         session.set_speed(first.speed)
+
+
+def _come_to(session: Session, second: Status, time: float) -> None:
+    ahead, hair = second.time - time, 0.5 * second.scene.numerics.sample_interval
+    if ahead < -hair:
+        if second.state == SessionState.PAUSED:
+            session.play()
+    elif second.state == SessionState.RUNNING:
+        session.pause()
+    elif ahead > hair and second.earliest <= time:
+        session.step_back(ahead)
 
 
 def comparison_markdown(first: Status, second: Status) -> str:
