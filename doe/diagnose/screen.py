@@ -39,7 +39,7 @@ class Budget:
     base: int = 48
     middle: int = 16
     scaling: int = 2
-    screening: int = 12
+    screening: int = 10
     """Per effect with one amplitude; half as many again with two."""
     further: int = 20
     """More for each survivor."""
