@@ -12,7 +12,7 @@ import numpy.typing as npt
 from explorer.live.slots import SlotReader, SlotWriter, shared_slots
 from solver.record import Bodies
 
-MAX_BODIES = 8192
+MAX_BODIES = 32768
 """Bodies for which there is room in a frame."""
 
 MAX_SURFACES = 64

@@ -28,6 +28,10 @@ CLEAR, OPACITY = 0.16, {GATE_NAME: 0.5}
 """Opacity of what one has to look through: all surfaces but the plate."""
 
 
+FINE = 2000
+"""Bodies up to which each is drawn with all its faces, however far it is."""
+
+
 @dataclass(frozen=True)
 class Poses:
     """Instances of one component as viser wants them; bodies that are not in the scene have scale 0."""
@@ -59,7 +63,7 @@ class SceneNodes:
                     batched_positions=none.position,
                     batched_scales=none.scale,
                     batched_colors=plain_colours(k, n),
-                    lod="off",
+                    lod="off" if n <= FINE else "auto",
                 )
                 if n > 0
                 else None
