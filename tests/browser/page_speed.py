@@ -25,6 +25,7 @@ import zstandard
 
 POUR = ("body.spheres=coarse", "rig.mass=30g")
 MANY, RADIUS, DENSITY = 20_000, 1.5e-3, 1000.0
+MASS = DENSITY * 4.0 / 3.0 * math.pi * RADIUS**3
 SPHERES = f"""
 format = 1
 title = "{MANY} spheres in a box"
@@ -40,6 +41,8 @@ name = "bead"
 material = "glass"
 sphere_centres = [[0.0, 0.0, 0.0]]
 sphere_radii = [{RADIUS}]
+mass = {MASS}
+inertia = {[0.4 * MASS * RADIUS**2] * 3}
 [pair.glass.glass]
 static_friction = 0.5
 restitution = 0.5
@@ -48,7 +51,7 @@ static_friction = 0.5
 restitution = 0.5
 [rig]
 name = "draw_down_box"
-mass = {MANY * DENSITY * 4.0 / 3.0 * math.pi * RADIUS**3}
+mass = {MANY * MASS}
 [insertion]
 rate = 10.0
 region_height = 0.18
