@@ -75,7 +75,9 @@ class WorkPlace:
         for acting in (False, True):
             plain = [order for order in wanted if not order.outside and kernel_effects(order.scene) == acting]
             queue = deque(Job(order.scene, order.seed, tag=k) for k, order in enumerate(plain))
-            for job, record in self.crew.run_queue(queue, room(acting)) if queue else ():
+            # A pair of effects may need more bodies than any single one.
+            scenes = [*room(acting), *(job.scene for job in queue)]
+            for job, record in self.crew.run_queue(queue, scenes) if queue else ():
                 self._keep(plain[job.tag], record)
         strange = [order for order in wanted if order.outside]
         tasks = [(order.outside, order.scene, order.seed, AMPLITUDE[order.outside]) for order in strange]
