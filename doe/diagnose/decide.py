@@ -7,7 +7,7 @@ race.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from doe.diagnose.tables import (
     signature_table,
     where_the_residual_sits,
 )
+from doe.diagnose.tails import heavy_tails
 from doe.diagnose.verdict import EffectRow, FittedModel, Signature, Verdict
 from doe.errors import StatisticsError
 
@@ -65,8 +66,11 @@ def diagnose(
     Raises StatisticsError for shapes that disagree, too few runs or bootstrap < 500.
     """
     selected = select_summaries(declared, runs, observed)
-    emulator = fit_emulator(selected.declared, selected.runs, selected.floors)
-    return judge(emulator, selected.observed, bootstrap, seed, limits, selected.dropped, selected.floored)
+    tails = heavy_tails(selected.declared, selected.runs, selected.observed)
+    emulator = fit_emulator(selected.declared, tails.of_runs(selected.runs), selected.floors)
+    measured = tails.of_observed(selected.observed)
+    verdict = judge(emulator, measured, bootstrap, seed, limits, selected.dropped, selected.floored)
+    return replace(verdict, residuals=tails.natural(verdict.residuals), drawn_in=tails.labels(selected.declared))
 
 
 def judge(
@@ -164,7 +168,11 @@ def _conclude(
             asked.append(specific(emulator, base, final, pairs.best, signatures, frame, limits, seed + 3))
             if both.gate.passed and asked[-1].passed:
                 near, gates = _near(emulator, evidence, pairs, limits, seed + 4)
-                return Conclusion(*_named("effects", near), (*asked, *gates), final, both, pairs)
+                if len(near) == 1:
+                    return Conclusion(*_named("effects", near), (*asked, *gates), final, both, pairs)
+                # So many pairs are asked that some fit anything: one among several is no evidence.
+                text = f"No single effect explains it, and more than one pair would: {listed(near)}."
+                return Conclusion("unexplained", (), text, (*asked, *gates), fit, None, pairs)
     text = "The data hold more than noise, and none of the effects in the race explains it."
     return Conclusion("unexplained", (), text, tuple(asked), fit, None, pairs)
 

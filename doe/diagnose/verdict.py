@@ -148,8 +148,8 @@ class Verdict(Record):
     """The answer. names: effects it names, best first ("a+b" for a pair). t2_before, t2_after with df_before, df_after.
 
     models: the base and all that were raced, best first. where: per condition its share of T^2 that is left by the
-    final model, and its worst summary. dropped, floored: see
-    runs.py. variances: per condition. seed and bootstrap make it repeatable.
+    final model, and its worst summary. dropped, floored: see runs.py. drawn_in: see tails.py. variances: per
+    condition. seed and bootstrap make it repeatable.
     """
 
     kind: str
@@ -174,3 +174,4 @@ class Verdict(Record):
     limits: Limits
     bootstrap: int
     seed: int
+    drawn_in: tuple[str, ...] = ()

@@ -117,6 +117,7 @@ def result_of(measurement: Measurement, order: DiagnoseOrder, found: Diagnosis, 
             },
             "dropped": verdict.dropped,
             "floored": verdict.floored,
+            "drawn_in": verdict.drawn_in,
             "ranges": found.declared.effects,
             "confirmation": {
                 "before": _confirmed(measurement, found.before),

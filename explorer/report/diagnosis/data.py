@@ -38,6 +38,7 @@ def _left_out(result: Plain) -> list[Block]:
         ("Changed in reading:", result["data"]["notes"]),
         ("Left out, because constant and equal in runs and data:", _labels(result["dropped"])),
         ("Constant in the runs but not in the data, compared with an assumed spread:", _labels(result["floored"])),
+        ("With heavy tails in the runs, outliers drawn in on both sides:", _labels(result.get("drawn_in", []))),
     )
     blocks: list[Block] = []
     for words, items in parts:
