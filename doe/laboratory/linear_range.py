@@ -12,8 +12,8 @@
    through the remaining points, all of them, gives the slope.
 
 The idea, to search for the straightest stretch of a stated least size, is that of ASTM E3076 (slope of the linear
-region of a test record); rule and numbers are ours and are tested on made-up curves with toe and yield. A curve that follows
-F ∝ δ^1.5 all the way is a Hertzian contact; its slope grows with the force, and ``hertzian`` says so.
+region of a test record); rule and numbers are ours and are tested on made-up curves with toe and yield. A curve that
+follows F ∝ δ^1.5 all the way is a Hertzian contact; its slope grows with the force, and ``hertzian`` says so.
 """
 
 from __future__ import annotations
@@ -75,8 +75,10 @@ def linear_range(displacement: npt.ArrayLike, force: npt.ArrayLike) -> LinearRan
     coarse_x, coarse_f = averaged(x, f, MOST_POINTS)
     window = widest_straight_window(coarse_x, coarse_f / peak)
     if window is None:
+        why = "; it follows F ∝ δ^1.5, a Hertzian contact" if is_hertzian(x, f) else ""
         raise StatisticsError(
-            f"no straight part: every stretch of {LEAST_SPAN:.0%} of the largest force and {FEWEST_POINTS} points bends"
+            f"no straight part: every stretch of {LEAST_SPAN:.0%} of the largest force and {FEWEST_POINTS} points "
+            f"bends{why}"
         )
     first, last = window
     low, high = _trimmed(coarse_x[first : last + 1])

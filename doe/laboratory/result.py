@@ -13,7 +13,8 @@ from doe.record import Record
 class Derived(Record):
     """One quantity of one component or pair, from replicates; SI.
 
-    file: that the readings stand in. parameter: where it belongs in a material file (``pair.seed.plate.static_friction``), empty if it is no parameter.
+    file: that the readings stand in. parameter: where it belongs in a material file
+    (``pair.seed.plate.static_friction``), empty if it is no parameter.
     """
 
     name: str

@@ -1,8 +1,8 @@
 """Replicates in one line: mean, standard deviation, interval of the mean, normality, outliers.
 
 Nothing is removed: an outlier is named, and the mean without it stands beside the mean. Who leaves a reading out does
-so in the file, where it can be seen. Normality is Shapiro and Wilk's W (1965, Biometrika 52:591); ten replicates can show
-gross departures only.
+so in the file, where it can be seen. Normality is Shapiro and Wilk's W (1965, Biometrika 52:591); ten replicates can
+show gross departures only.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ Table = dict[str, Any]
 
 
 def part_table(result: LabResult) -> Table:
-    """The part as plain tables; ParameterError if nothing of ``result`` is a parameter or worth keeping."""
+    """The part as plain tables: parameters, and under ``measured`` their origin. Moisture has a place only there."""
     found: Table = {"format": 1}
     for one in result.derived:
         if one.parameter:

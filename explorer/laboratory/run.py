@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from doe.laboratory import LabResult, analyse
 from doe.laboratory.analysis import analyse_composition, analyse_elastic
@@ -46,17 +47,11 @@ def run_lab(order: LabOrder, say: Callable[[str], None]) -> bool:
     result = analysed(order)
     part = part_table(result)
     scene = _scene_with(part, order) if order.simulate else None
+    _write(order, result, part)
     if not order.json:
         say(lab_text(result))
     bias = _bias(order, result, scene)
     rows = list(twins(result, scene)) if scene else []
-    if order.out:
-        heading = f"{order.test}: measured, from {Path(result.file).name}. SI. Written by explorer lab."
-        order.out.write_text(part_text(part, heading), encoding="utf-8")
-    if order.figure:
-        from explorer.report.figures.force_displacement import write_curves
-
-        write_curves(order.figure, result)
     if order.json:
         say(json_text(lab_data(result, rows, bias)))
     else:
@@ -65,6 +60,17 @@ def run_lab(order: LabOrder, say: Callable[[str], None]) -> bool:
         for path in filter(None, (order.out, order.figure)):
             say(f"\nwrote {path}")
     return all(row.closes is not False for row in rows)
+
+
+def _write(order: LabOrder, result: LabResult, part: dict[str, Any]) -> None:
+    """The files that were asked for."""
+    if order.figure:
+        from explorer.report.figures.force_displacement import write_curves
+
+        write_curves(order.figure, result)
+    if order.out:
+        heading = f"{order.test}: measured, from {Path(result.file).name}. SI. Written by explorer lab."
+        order.out.write_text(part_text(part, heading), encoding="utf-8")
 
 
 def analysed(order: LabOrder) -> LabResult:
@@ -91,6 +97,8 @@ def _check(order: LabOrder) -> None:
         raise CommandError("--plot: draws force–displacement curves; allowed with compression and shear")
     if order.material is not None and not order.simulate:
         raise CommandError("--material: is what --simulate runs with")
+    if order.bias:
+        bias_table(order.test)  # refuses a test without one
     if order.simulate:
         check_twin(order.test)
     if order.out:
@@ -99,7 +107,7 @@ def _check(order: LabOrder) -> None:
         check_new_file(order.figure, ".html")
 
 
-def _scene_with(part: dict[str, object], order: LabOrder) -> Scene:
+def _scene_with(part: dict[str, Any], order: LabOrder) -> Scene:
     """The material of the twins with what was derived."""
     name = order.material or DEFAULT_MATERIAL
     try:
