@@ -9,6 +9,10 @@ from doe.laboratory.summary import Summary
 from doe.record import Record
 
 
+CONDITIONS = ("drop_height",)
+"""Names of what is carried along for the twins, and no result."""
+
+
 @dataclass(frozen=True)
 class Derived(Record):
     """One quantity of one component or pair, from replicates; SI.

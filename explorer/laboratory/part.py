@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from doe.laboratory import Derived, Estimate, LabResult
+from doe.laboratory.result import CONDITIONS
 from explorer.scene.text import toml_key, toml_value
 from solver import ParameterError, Scene, read_toml, with_values
 from solver.toml_table import as_table, list_at, refuse_unknown
@@ -28,14 +29,14 @@ Table = dict[str, Any]
 
 
 def part_table(result: LabResult) -> Table:
-    """The part as plain tables: parameters, and under ``measured`` their origin. Moisture has a place only there."""
+    """The part as plain tables: parameters, and under ``measured`` their origin and what is no parameter."""
     found: Table = {"format": 1}
     for one in result.derived:
         if one.parameter:
             _put(found, one.parameter, one.summary.mean)
             _keep(found, one.parameter.split("."), _of_derived(one))
-        elif one.name.startswith("moisture"):
-            _keep(found, [*one.of, one.name], _of_derived(one))
+        elif one.name not in CONDITIONS:
+            _keep(found, [*(["pair"] if len(one.of) == 2 else []), *one.of, one.name], _of_derived(one))
     for other in result.estimates:
         _put(found, other.parameter, other.value)
         _keep(found, other.parameter.split("."), _of_estimate(other))

@@ -14,7 +14,7 @@ from explorer.errors import CommandError
 from explorer.files.new_file import check_new_file
 from explorer.files.run_folder import json_text
 from explorer.laboratory.part import part_table, part_text, with_part
-from explorer.laboratory.twin import check_twin, twins
+from explorer.laboratory.twin_row import TwinRow, check_twin
 from explorer.scene.file import DEFAULT_MATERIAL, material_scene
 from explorer.tables.laboratory import bias_data, bias_text, lab_data, lab_text, twin_text
 from solver import ParameterError, Scene
@@ -51,7 +51,7 @@ def run_lab(order: LabOrder, say: Callable[[str], None]) -> bool:
     if not order.json:
         say(lab_text(result))
     bias = _bias(order, result, scene)
-    rows = list(twins(result, scene)) if scene else []
+    rows = _twins(result, scene) if scene else []
     if order.json:
         say(json_text(lab_data(result, rows, bias)))
     else:
@@ -114,6 +114,13 @@ def _scene_with(part: dict[str, Any], order: LabOrder) -> Scene:
         return with_part(material_scene(name), part)
     except ParameterError as error:
         raise CommandError(f"--simulate in material {name}: {error}") from None
+
+
+def _twins(result: LabResult, scene: Scene) -> list[TwinRow]:
+    # Loads Taichi, which takes a second, and only this needs it.
+    from explorer.laboratory.twin import twins
+
+    return list(twins(result, scene))
 
 
 def _bias(order: LabOrder, result: LabResult, scene: Scene | None) -> BiasTable | None:

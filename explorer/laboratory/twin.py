@@ -21,54 +21,17 @@ from collections.abc import Iterator
 from scipy.optimize import brentq
 
 from doe.laboratory import Derived, LabResult
-from doe.record import Record
 from explorer.errors import CommandError
+from explorer.laboratory.twin_row import CLOSES, RIGS, TwinRow
 from solver import Scene, with_rig, with_values
 from solver.bench_tests import BenchResult, run_bench_test
 from solver.body import Body
 from solver.material import Material
 
-CLOSES = 0.01
-RIGS = {
-    "inclined_plane": "inclined_plane",
-    "drop": "drop_plate_45",
-    "compression": "compression",
-    "shear": "compression",
-}
-"""Rig of each test that has a twin."""
 TILT_RATE = 5.0
 """Of the inclined plane [°/s]; the angle moves by less than a hundredth of a degree against the rig's own 1 °/s."""
 LOWEST, HIGHEST = 0.05, 1.0
 """Restitutions that the solver takes."""
-
-
-@dataclasses.dataclass(frozen=True)
-class TwinRow(Record):
-    """One quantity of one twin, SI; None where there is none.
-
-    error: simulated over what was put in, less one; over what was measured where nothing was put in. closes: whether
-    the round trip does, None for a row that shows a bias.
-    """
-
-    of: tuple[str, ...]
-    quantity: str
-    unit: str
-    measured: float | None
-    put_in: float | None
-    simulated: float
-    closes: bool | None
-
-    @property
-    def error(self) -> float:
-        """Relative deviation of ``simulated``."""
-        reference = self.put_in if self.put_in is not None else self.measured
-        return self.simulated / reference - 1.0 if reference else math.nan
-
-
-def check_twin(test: str) -> None:
-    """Raise CommandError for a test that has no rig."""
-    if test not in RIGS:
-        raise CommandError(f"--simulate: {test} has no rig; allowed: {', '.join(RIGS)}")
 
 
 def twins(result: LabResult, scene: Scene) -> Iterator[TwinRow]:

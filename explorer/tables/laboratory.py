@@ -8,15 +8,14 @@ from typing import Any
 
 from doe.laboratory import Derived, Estimate, LabResult
 from doe.laboratory.bias import BiasTable
-from explorer.laboratory.twin import CLOSES, TwinRow
+from doe.laboratory.result import CONDITIONS
+from explorer.laboratory.twin_row import CLOSES, TwinRow
 from explorer.tables.text_table import text_table
 
 PEOPLE = {"Pa": ("MPa", 1e-6), "rad": ("deg", 180.0 / math.pi), "m": ("mm", 1e3), "N": ("N", 1.0)}
 """Units on the screen and the factor to them from SI."""
 PERCENT = ("moisture_wet_basis", "moisture_dry_basis")
 NORMALITY_LEVEL = 0.05
-CONDITIONS = ("drop_height",)
-"""Derived for the twins, and no result."""
 
 
 def lab_data(result: LabResult, rows: Sequence[TwinRow], bias: BiasTable | None) -> dict[str, Any]:

@@ -31,8 +31,8 @@ def test_units_for_people_and_what_must_not_be_overlooked(tmp_path):
         "replicate r7 is an outlier at the 5 % level (Grubbs) and was kept; without it the mean is 30.01 deg" in shown
     )
     assert "not normal" in shown
-    # the friction without it, with no digit lost and no unit behind
-    assert "without it the mean is 0.5776\n" in shown
+    # tan 30° + 0.0143° · (1 + 1/3): no digit lost, no unit behind
+    assert "without it the mean is 0.5777\n" in shown
 
 
 def test_json_is_all_of_it_in_si():

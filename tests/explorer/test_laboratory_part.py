@@ -79,6 +79,13 @@ def test_moisture_is_kept_though_it_is_no_parameter():
     assert table["measured"]["seed"]["moisture_wet_basis"]["value"] == pytest.approx(0.287, abs=1e-4)
 
 
+def test_the_other_estimates_of_a_drop_are_kept_beside_the_paper_s():
+    table = part_table(analyse("drop", shipped("drop")))
+    measured = table["measured"]["pair"]["seed"]["plate"]
+    assert set(measured) == {"restitution", "restitution_gripping_sphere"}
+    assert set(table["pair"]["seed"]["plate"]) == {"restitution"}
+
+
 @pytest.mark.parametrize(
     ("table", "word"),
     [
