@@ -8,7 +8,6 @@ from doe.laboratory.linear_range import LinearRange
 from doe.laboratory.summary import Summary
 from doe.record import Record
 
-
 CONDITIONS = ("drop_height",)
 """Names of what is carried along for the twins, and no result."""
 
