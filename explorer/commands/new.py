@@ -23,6 +23,10 @@ def new(
         None,
         help="Material of the study: name or file. By default NAME.toml beside it, written if it is missing.",
     ),
+    like: str | None = typer.Option(None, metavar="MATERIAL", help="A new material starts as this one: name or file."),
+    part: list[Path] = typer.Option(
+        [], metavar="PART.toml", help="Measured parameters for the new material, from `explorer lab --out`; repeatable."
+    ),
 ) -> None:
     """Write a commented file that runs as it is.
 
@@ -33,7 +37,14 @@ def new(
 
     if kind == Kind.MATERIAL and material is not None:
         raise CommandError("--material: belongs to `new study`")
-    written = [write_material(out, name)] if kind == Kind.MATERIAL else write_study(out, name, material)
+    if kind == Kind.STUDY and (like is not None or part):
+        raise CommandError("--like, --part: belong to `new material`")
+    if like is not None or part:
+        from explorer.laboratory.new_material import write_measured_material
+
+        written = [write_measured_material(out, name, like, part)]
+    else:
+        written = [write_material(out, name)] if kind == Kind.MATERIAL else write_study(out, name, material)
     for path in written:
         typer.echo(f"wrote {path}")
     typer.echo(f"try it: explorer simulate {written[-1]}")

@@ -26,6 +26,14 @@ def write_material(folder: Path, name: str) -> Path:
     return _write_new(path, material_text(path))
 
 
+def new_path(folder: Path, name: str) -> Path:
+    """Path of a new material ``NAME.toml``; :class:`CommandError` if it exists or the name is not allowed."""
+    path = folder / f"{_checked(name)}.toml"
+    if path.exists():
+        raise CommandError(f"{path}: exists already; choose another name")
+    return path
+
+
 def write_study(folder: Path, name: str, material: str | None) -> list[Path]:
     """Write ``NAME_study.toml`` into ``folder``, and before it the material where that is missing.
 

@@ -1,0 +1,19 @@
+"""From the readings of a bench test to parameters of a material: statistics on tables, no solver and no picture."""
+
+from doe.laboratory.analysis import TESTS, analyse
+from doe.laboratory.result import CurveFit, Derived, Estimate, LabResult
+from doe.laboratory.summary import Summary, summarise
+from doe.laboratory.table import LaboratoryError, read_table
+
+__all__ = [
+    "TESTS",
+    "CurveFit",
+    "Derived",
+    "Estimate",
+    "LabResult",
+    "LaboratoryError",
+    "Summary",
+    "analyse",
+    "read_table",
+    "summarise",
+]

@@ -1,0 +1,97 @@
+"""The tests of a bench by name: how the table of each looks, and what follows from it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from pathlib import Path
+
+from doe.laboratory import columns, weighing
+from doe.laboratory.columns import Layout
+from doe.laboratory.contact import friction, restitution
+from doe.laboratory.elastic import moduli, poisson_ratios
+from doe.laboratory.result import LabResult
+from doe.laboratory.table import LaboratoryError, Table, read_table
+
+
+@dataclass(frozen=True)
+class BenchTest:
+    """How the readings of a test are laid out, and the analysis of such a table."""
+
+    layout: Layout
+    analyse: Callable[[Table], LabResult]
+
+
+def _compression(table: Table) -> LabResult:
+    return _elastic("compression", table)
+
+
+def _shear(table: Table) -> LabResult:
+    return _elastic("shear", table)
+
+
+def _elastic(test: str, table: Table) -> LabResult:
+    derived, curves = moduli(table, test)
+    return LabResult(test, table.file, derived, curves=curves)
+
+
+def _inclined_plane(table: Table) -> LabResult:
+    return LabResult("inclined_plane", table.file, friction(table))
+
+
+def _drop(table: Table) -> LabResult:
+    derived, notes = restitution(table)
+    return LabResult("drop", table.file, derived, notes=notes)
+
+
+def _moisture(table: Table) -> LabResult:
+    return LabResult("moisture", table.file, weighing.moisture(table))
+
+
+def _density(table: Table) -> LabResult:
+    return LabResult("density", table.file, weighing.density(table))
+
+
+def _composition(table: Table) -> LabResult:
+    return LabResult("composition", table.file, weighing.composition(table), notes=(weighing.FRACTIONS,))
+
+
+TESTS: dict[str, BenchTest] = {
+    "compression": BenchTest(columns.FORCE_DISPLACEMENT, _compression),
+    "shear": BenchTest(columns.FORCE_DISPLACEMENT, _shear),
+    "inclined_plane": BenchTest(columns.INCLINED_PLANE, _inclined_plane),
+    "drop": BenchTest(columns.DROP, _drop),
+    "moisture": BenchTest(columns.MOISTURE, _moisture),
+    "density": BenchTest(columns.IMMERSION, _density),
+    "composition": BenchTest(columns.COMPOSITION, _composition),
+}
+
+
+def analyse(test: str, path: Path) -> LabResult:
+    """What the readings in ``path`` give; LaboratoryError in one line for a bad file."""
+    if test not in TESTS:
+        raise LaboratoryError(f"test {test!r}; allowed: {', '.join(TESTS)}")
+    return TESTS[test].analyse(read_table(path, TESTS[test].layout))
+
+
+def analyse_elastic(shear: Path, compression: Path) -> LabResult:
+    """Shear tests with the compression tests of the same components: G, E and ν."""
+    by_shear, by_compression = analyse("shear", shear), analyse("compression", compression)
+    ratios = poisson_ratios(by_compression.derived, by_shear.derived)
+    if not ratios:
+        raise LaboratoryError(f"{shear} and {compression}: no component stands in both")
+    return LabResult(
+        test="shear",
+        file=by_shear.file,
+        derived=by_shear.derived + by_compression.derived,
+        estimates=ratios,
+        curves=by_shear.curves + by_compression.curves,
+    )
+
+
+def analyse_composition(path: Path, left_out: Collection[str]) -> LabResult:
+    """Composition without the components ``left_out``, such as impurities that are blown away."""
+    table = read_table(path, TESTS["composition"].layout)
+    note = f"left out: {', '.join(left_out)}; the others were scaled to add up to one"
+    notes = (weighing.FRACTIONS, note) if left_out else (weighing.FRACTIONS,)
+    return LabResult("composition", table.file, weighing.composition(table, left_out), notes=notes)

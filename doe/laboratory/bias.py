@@ -1,0 +1,91 @@
+"""What the paper's formulas give where the answer is known: closed forms over the range of the parameters.
+
+    drop          L/(2H) of a rigid sphere against its e, over friction (``drop_flight.py``)
+    compression   Equation (1) on a sphere between rigid plates, A = π R δ the area of the contact, ΔL = 2 δ, T = 2 R:
+                  E_app/E = 4/(3 π (1 − ν²) √(δ/R))
+    shear         Equation (2) there, on the contact that is sheared with no slip, ΔL twice its slip:
+                  G_app/G = 8/(π (2 − ν) √(δ/R))
+
+δ/R, overlap over radius, is also the approach of the plates over the thickness, the strain of Equation (1).
+Sources: Hertz 1882; Mindlin 1949; ``drop_flight.py``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from doe.laboratory.drop_flight import flight, tangential_share
+from doe.laboratory.table import LaboratoryError
+from doe.record import Record
+
+RESTITUTIONS = (0.2, 0.35, 0.5, 0.65, 0.8)
+FRICTIONS = (0.0, 0.1, 0.3, 0.6)
+STRAINS = (0.001, 0.003, 0.01, 0.03)
+POISSON_RATIOS = (0.2, 0.3, 0.4)
+
+
+@dataclass(frozen=True)
+class BiasTable(Record):
+    """One row per setting: what was put in, what the formula gives, and their ratio."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[float, ...], ...]
+    statement: str
+
+
+def bias_table(test: str) -> BiasTable:
+    """The table of a test whose formula does not give back what was put in; LaboratoryError for another one."""
+    tables = {"drop": drop_bias, "compression": compression_bias, "shear": shear_bias}
+    if test not in tables:
+        exact = "tan σ gives back the friction" if test == "inclined_plane" else "a difference of masses has no model"
+        raise LaboratoryError(f"--bias: {test}: {exact}; allowed: {', '.join(tables)}")
+    return tables[test]()
+
+
+def drop_bias() -> BiasTable:
+    """L/(2H) over restitution and friction."""
+    rows = []
+    for friction in FRICTIONS:
+        for e in RESTITUTIONS:
+            shown = flight(e, tangential_share(e, friction))
+            rows.append((friction, e, shown, shown / e))
+    least = flight(0.0, tangential_share(0.0, 1.0))
+    return BiasTable(
+        title="a rigid sphere that falls on the plate at 45°: e = L/(2H) against the e of the contact",
+        columns=("static_friction", "restitution", "L_over_2H", "ratio"),
+        rows=tuple(rows),
+        statement=f"exact only for a horizontal rebound; even e = 0 gives {least:.3f} where the sphere grips",
+    )
+
+
+def compression_bias() -> BiasTable:
+    """Equation (1) over strain and ν."""
+    return BiasTable(
+        title="a sphere between rigid plates: E = (F/A)/(ΔL/T) against the E of its material, by Hertz",
+        columns=("strain", "poisson_ratio", "ratio"),
+        rows=tuple((strain, ratio, compression_ratio(strain, ratio)) for strain in STRAINS for ratio in POISSON_RATIOS),
+        statement="no constant of the material: the ratio falls with the root of the strain. A block with flat faces "
+        "that the plates cover has ratio 1",
+    )
+
+
+def shear_bias() -> BiasTable:
+    """Equation (2) over strain and ν."""
+    return BiasTable(
+        title="a sphere between rigid plates, sheared: G = (F/A)/(ΔL/T) against the G of its material, by Mindlin",
+        columns=("strain", "poisson_ratio", "ratio"),
+        rows=tuple((strain, ratio, shear_ratio(strain, ratio)) for strain in STRAINS for ratio in POISSON_RATIOS),
+        statement="strain is that of the squeezing before; the ratio falls with its root",
+    )
+
+
+def compression_ratio(strain: float, poisson_ratio: float) -> float:
+    """E_app/E at strain δ/R."""
+    return 4.0 / (3.0 * math.pi * (1.0 - poisson_ratio**2) * math.sqrt(strain))
+
+
+def shear_ratio(strain: float, poisson_ratio: float) -> float:
+    """G_app/G at strain δ/R of the preload."""
+    return 8.0 / (math.pi * (2.0 - poisson_ratio) * math.sqrt(strain))

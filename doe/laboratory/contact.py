@@ -1,0 +1,99 @@
+"""Friction from the inclined plane and restitution from the drop on a plate at 45°.
+
+    inclined plane   μ = tan σ, of every replicate
+    drop             e = L/(2H), Equation (7) of Processes 2022, 10, 185; it holds for a horizontal rebound only
+    tracked drop     e = (v_x + v_z)/√(2gH), where a camera gives the velocity after the impact, v_z upward: exact for a
+                     central impact, whatever the friction
+
+For a sphere L/(2H) can be inverted (``drop_flight.py``); that value stands beside it, and is the better one where
+bodies are round. Everything is a mean over replicates of what each gives, not what the mean reading gives.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from doe.laboratory.derive import derived, no_parameter, per_row
+from doe.laboratory.drop_flight import GRAVITY, GRIPPING, restitution_of_flight
+from doe.laboratory.result import Derived
+from doe.laboratory.table import Row, Table
+
+PAPER = (
+    "L/2H holds for a horizontal rebound only and gives back another number than the contact's restitution (--bias); "
+    "restitution_gripping_sphere stands for round bodies, v_x and v_z of a camera settle it"
+)
+
+
+def friction(table: Table) -> tuple[Derived, ...]:
+    """The angle σ at which sliding begins, and μ = tan σ, of every pair."""
+    angles = per_row(table, "sliding_angle", "rad", "σ", lambda row: row.values["angle"], no_parameter)
+    coefficients = per_row(
+        table, "static_friction", "1", "μ = tan σ", lambda row: math.tan(row.values["angle"]), _path("static_friction")
+    )
+    return tuple(one for both in zip(coefficients, angles, strict=True) for one in both)
+
+
+def restitution(table: Table) -> tuple[tuple[Derived, ...], tuple[str, ...]]:
+    """Every restitution that the readings allow, of every pair, and notes."""
+    found: list[Derived] = []
+    for of, rows in table.groups().items():
+        for row in rows:
+            _check(table, row)
+        tracked = all("v_x" in row.values for row in rows)
+        if tracked:
+            found.append(
+                _each(table, "restitution", of, "(v_x + v_z)/√(2gH)", rows, [tracked_rebound(row) for row in rows])
+            )
+        if "distance" in rows[0].values:
+            name = "restitution_paper_L_over_2H" if tracked else "restitution"
+            flights = [paper_estimate(row) for row in rows]
+            found.append(_each(table, name, of, "L/(2H)", rows, flights, () if tracked else (PAPER,)))
+            round_ones = [restitution_of_flight(flight, GRIPPING) for flight in flights]
+            if all(map(math.isfinite, round_ones)):
+                found.append(
+                    _each(table, "restitution_gripping_sphere", of, "from L/(2H), sphere that grips", rows, round_ones)
+                )
+        heights = [row.values["drop_height"] for row in rows]
+        found.append(derived(table, "drop_height", "m", of, "H", [row.replicate for row in rows], heights))
+    notes = ("g = 9.81 m/s²",) if any(one.formula.startswith("(v_x") for one in found) else ()
+    return tuple(found), notes
+
+
+def paper_estimate(row: Row) -> float:
+    """L/(2H)."""
+    return row.values["distance"] / (2.0 * row.values["drop_height"])
+
+
+def tracked_rebound(row: Row) -> float:
+    """(v_x + v_z)/√(2gH)."""
+    return (row.values["v_x"] + row.values["v_z"]) / math.sqrt(2.0 * GRAVITY * row.values["drop_height"])
+
+
+def _each(
+    table: Table,
+    name: str,
+    of: tuple[str, ...],
+    formula: str,
+    rows: tuple[Row, ...],
+    values: list[float],
+    notes: tuple[str, ...] = (),
+) -> Derived:
+    path = f"pair.{of[0]}.{of[1]}.restitution" if name == "restitution" else ""
+    return derived(table, name, "1", of, formula, [row.replicate for row in rows], values, path, notes)
+
+
+def _path(quantity: str) -> Callable[..., str]:
+    return lambda a, b: f"pair.{a}.{b}.{quantity}"
+
+
+def _check(table: Table, row: Row) -> None:
+    """One of the two measurements must be there, and a rebound must be slower than the fall."""
+    speeds = [name for name in ("v_x", "v_z") if name in row.values]
+    if len(speeds) == 1:
+        raise table.wrong(row, speeds[0], "stands alone; allowed: both of v_x_m_s and v_z_m_s, or none")
+    if not speeds and "distance" not in row.values:
+        raise table.wrong(row, "distance_mm", "is missing; allowed: distance_mm, or v_x_m_s and v_z_m_s, or all three")
+    fall = math.sqrt(2.0 * GRAVITY * row.values["drop_height"])
+    if speeds and math.hypot(row.values["v_x"], row.values["v_z"]) > fall:
+        raise table.wrong(row, "v_x_m_s", f"the rebound is faster than the fall, {fall:.4g} m/s")

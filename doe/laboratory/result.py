@@ -1,0 +1,75 @@
+"""What the analysis of a bench test returns: plain records."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from doe.laboratory.linear_range import LinearRange
+from doe.laboratory.summary import Summary
+from doe.record import Record
+
+CONDITIONS = ("drop_height",)
+"""Names of what is carried along for the twins, and no result."""
+
+
+@dataclass(frozen=True)
+class Derived(Record):
+    """One quantity of one component or pair, from replicates; SI.
+
+    file: that the readings stand in. parameter: where it belongs in a material file
+    (``pair.seed.plate.static_friction``), empty if it is no parameter.
+    """
+
+    name: str
+    unit: str
+    of: tuple[str, ...]
+    formula: str
+    file: str
+    replicates: tuple[str, ...]
+    values: tuple[float, ...]
+    summary: Summary
+    parameter: str = ""
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Estimate(Record):
+    """A quantity from the means of several tests, with its 95 % interval; SI. ``df`` by Welch and Satterthwaite."""
+
+    name: str
+    unit: str
+    of: tuple[str, ...]
+    formula: str
+    files: tuple[str, ...]
+    value: float
+    standard_error: float
+    df: float
+    low: float
+    high: float
+    parameter: str = ""
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class CurveFit(Record):
+    """One force–displacement curve [m, N], where it was taken as straight, and the modulus [Pa] that follows."""
+
+    quantity: str
+    of: tuple[str, ...]
+    replicate: str
+    displacement: tuple[float, ...]
+    force: tuple[float, ...]
+    fit: LinearRange
+    modulus: float
+
+
+@dataclass(frozen=True)
+class LabResult(Record):
+    """Everything that one table of readings gave."""
+
+    test: str
+    file: str
+    derived: tuple[Derived, ...]
+    estimates: tuple[Estimate, ...] = ()
+    curves: tuple[CurveFit, ...] = ()
+    notes: tuple[str, ...] = ()

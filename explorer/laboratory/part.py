@@ -1,0 +1,198 @@
+"""Part of a material: measured parameters with where they come from, as `explorer lab --out` writes it.
+
+format = 1
+[materials.<name>]  [pair.<a>.<b>]  [[body]] name, mass_fraction      as in a material file; only what was measured
+[measured.….<parameter>]     value, unit, n, sd, low_95, high_95, formula, source, sha256: the same number's origin
+
+`explorer new material NAME --like MATERIAL --part FILE` lays parts over a material; by hand, the tables can be copied
+into a material file as they are, ``[measured]`` included.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from doe.laboratory import Derived, Estimate, LabResult
+from doe.laboratory.result import CONDITIONS
+from explorer.scene.text import toml_key, toml_value
+from solver import ParameterError, Scene, read_toml, with_values
+from solver.toml_table import as_table, list_at, refuse_unknown
+
+KEYS = ("format", "materials", "pair", "body", "measured")
+ELASTIC = ("youngs_modulus", "shear_modulus", "poisson_ratio")
+Table = dict[str, Any]
+
+
+def part_table(result: LabResult) -> Table:
+    """The part as plain tables: parameters, and under ``measured`` their origin and what is no parameter."""
+    found: Table = {"format": 1}
+    for one in result.derived:
+        if one.parameter:
+            _put(found, one.parameter, one.summary.mean)
+            _keep(found, one.parameter.split("."), _of_derived(one))
+        elif one.name not in CONDITIONS:
+            _keep(found, [*(["pair"] if len(one.of) == 2 else []), *one.of, one.name], _of_derived(one))
+    for other in result.estimates:
+        _put(found, other.parameter, other.value)
+        _keep(found, other.parameter.split("."), _of_estimate(other))
+    return found
+
+
+def part_text(table: Table, heading: str) -> str:
+    """TOML of :func:`part_table`; ``heading`` becomes comment lines at its top."""
+    lines = [f"# {line}".rstrip() for line in heading.splitlines()]
+    lines += ["", f"format = {table['format']}"]
+    for body in table.get("body", []):
+        lines += ["", "[[body]]", *_entries(body)]
+    for kind in ("materials", "pair", "measured"):
+        lines += _tables((kind,), table.get(kind, {}))
+    return "\n".join(lines) + "\n"
+
+
+def measured_text(measured: Mapping[str, Any]) -> str:
+    """The tables ``[measured.…]`` alone."""
+    return "\n".join(_tables(("measured",), measured)) + "\n" if measured else ""
+
+
+def read_part(path: Path) -> Table:
+    """The tables of a part; ParameterError in one line for a bad one."""
+    table = read_toml(path)
+    refuse_unknown(table, KEYS, f"{path}: ")
+    if table.get("format") != 1:
+        raise ParameterError(f"{path}: format: {table.get('format')!r} is not 1")
+    return table
+
+
+def with_part(scene: Scene, table: Table) -> Scene:
+    """``scene`` with the parameters of a part; they are no longer assumed. ParameterError where they do not fit."""
+    settings: dict[str, Any] = {}
+    struck: set[str] = set()
+    for name, entry in as_table(table.get("materials", {}), "materials").items():
+        settings |= _of_material(scene, name, as_table(entry, f"materials.{name}"))
+        struck |= {f"materials.{name}.{key}" for key in entry}
+    for a, partners in as_table(table.get("pair", {}), "pair").items():
+        for b, entry in as_table(partners, f"pair.{a}").items():
+            for key, value in as_table(entry, f"pair.{a}.{b}").items():
+                settings[f"pair.{a}.{b}.{key}"] = value
+                struck |= {f"pair.{a}.{b}.{key}", f"pair.{b}.{a}.{key}"}
+    fractions = _fractions(list_at(table, "body"))
+    struck |= {f"body.{name}.mass_fraction" for name in fractions}
+    scene = with_values(_with_fractions(scene, fractions), settings)
+    return dataclasses.replace(scene, assumed=tuple(path for path in scene.assumed if path not in struck))
+
+
+def merged(one: Mapping[str, Any], other: Mapping[str, Any]) -> Table:
+    """Tables of both; where both have a value, that of ``other``."""
+    both = dict(one)
+    for key, value in other.items():
+        old = both.get(key)
+        both[key] = merged(old, value) if isinstance(old, dict) and isinstance(value, dict) else value
+    return both
+
+
+def _of_material(scene: Scene, name: str, entry: Table) -> dict[str, Any]:
+    """Settings of a material. Two elastic constants fix the third; of a modulus alone, ν stays as it was."""
+    settings = {f"material.{name}.{key}": value for key, value in entry.items() if key != "youngs_modulus"}
+    if "youngs_modulus" not in entry:
+        return settings
+    young = _number(entry["youngs_modulus"], f"materials.{name}.youngs_modulus")
+    if all(key in entry for key in ELASTIC):
+        return settings
+    if "shear_modulus" in entry:
+        shear = _number(entry["shear_modulus"], f"materials.{name}.shear_modulus")
+        return settings | {f"material.{name}.poisson_ratio": young / (2.0 * shear) - 1.0}
+    ratio = float(entry.get("poisson_ratio", scene.material(name).poisson_ratio))
+    return settings | {f"material.{name}.shear_modulus": young / (2.0 * (1.0 + ratio))}
+
+
+def _number(value: Any, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0.0 or not math.isfinite(value):
+        raise ParameterError(f"{where}: {value!r}; allowed: a number above 0 in Pa")
+    return float(value)
+
+
+def _fractions(bodies: list[Any]) -> dict[str, float]:
+    found = {}
+    for entry in bodies:
+        body = as_table(entry, "body")
+        refuse_unknown(body, ("name", "mass_fraction"), "body.")
+        name, fraction = body.get("name"), body.get("mass_fraction")
+        if not isinstance(name, str) or not isinstance(fraction, int | float) or not 0.0 <= fraction <= 1.0:
+            raise ParameterError(f"body: {body}; allowed: a name and a mass_fraction of 0 … 1")
+        found[name] = float(fraction)
+    return found
+
+
+def _with_fractions(scene: Scene, fractions: Mapping[str, float]) -> Scene:
+    """All at once: one after the other, each would scale those before it."""
+    if not fractions:
+        return scene
+    names = [body.name for body in scene.bodies]
+    if set(names) != set(fractions):
+        raise ParameterError(
+            f"body.*.mass_fraction: measured are {', '.join(fractions)}; the material has {', '.join(names)}"
+        )
+    if not math.isclose(sum(fractions.values()), 1.0, abs_tol=1e-6):
+        raise ParameterError(f"body.*.mass_fraction: add up to {sum(fractions.values()):g}, not to 1")
+    bodies = tuple(dataclasses.replace(body, mass_fraction=fractions[body.name]) for body in scene.bodies)
+    return dataclasses.replace(scene, bodies=bodies)
+
+
+def _put(table: Table, parameter: str, value: float) -> None:
+    kind, *names, key = parameter.split(".")
+    if kind == "body":
+        table.setdefault("body", []).append({"name": names[0], key: value})
+    else:
+        _keep(table, [kind, *names], {key: value}, root="")
+
+
+def _keep(table: Table, keys: Sequence[str], entries: Mapping[str, Any], root: str = "measured") -> None:
+    here = table
+    for key in (*([root] if root else []), *keys):
+        here = here.setdefault(key, {})
+    here.update(entries)
+
+
+def _of_derived(one: Derived) -> Table:
+    s = one.summary
+    numbers = {"value": s.mean, "unit": one.unit, "n": s.n, "sd": s.sd, "low_95": s.low, "high_95": s.high}
+    return _finite(numbers) | {"formula": one.formula} | _origin((one.file,))
+
+
+def _of_estimate(one: Estimate) -> Table:
+    numbers = {"value": one.value, "unit": one.unit, "low_95": one.low, "high_95": one.high}
+    return _finite(numbers) | {"formula": one.formula} | _origin(one.files)
+
+
+def _origin(files: Sequence[str]) -> Table:
+    """The files by name and by what is in them."""
+    paths = [Path(file) for file in files]
+    return {"source": ", ".join(path.name for path in paths), "sha256": ", ".join(map(_digest, paths))}
+
+
+def _finite(numbers: Mapping[str, Any]) -> Table:
+    """Without what a single replicate does not have."""
+    return {key: value for key, value in numbers.items() if isinstance(value, str) or math.isfinite(value)}
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _tables(keys: tuple[str, ...], table: Mapping[str, Any]) -> list[str]:
+    """A table and those below it, each under its own heading."""
+    own = {key: value for key, value in table.items() if not isinstance(value, dict)}
+    lines = ["", f"[{'.'.join(map(toml_key, keys))}]", *_entries(own)] if own else []
+    for key, value in table.items():
+        if isinstance(value, dict):
+            lines += _tables((*keys, key), value)
+    return lines
+
+
+def _entries(entries: Mapping[str, Any]) -> list[str]:
+    return [f"{toml_key(key)} = {toml_value(value)}" for key, value in entries.items()]

@@ -1,0 +1,133 @@
+"""From an order to what `explorer lab` prints and writes: read, derive, write the part, run the twins."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from doe.laboratory import LabResult, analyse
+from doe.laboratory.analysis import analyse_composition, analyse_elastic
+from doe.laboratory.bias import BiasTable, bias_table
+from explorer.errors import CommandError
+from explorer.files.new_file import check_new_file
+from explorer.files.run_folder import json_text
+from explorer.laboratory.part import part_table, part_text, with_part
+from explorer.laboratory.twin_row import TwinRow, check_twin
+from explorer.scene.file import DEFAULT_MATERIAL, material_scene
+from explorer.tables.laboratory import bias_data, bias_text, lab_data, lab_text, twin_text
+from solver import ParameterError, Scene
+from solver.assets import asset_path
+
+
+@dataclass(frozen=True)
+class LabOrder:
+    """What `explorer lab` was asked for; ``file`` None means that only the bias of the test's formula is wanted."""
+
+    test: str
+    file: str | None = None
+    compression: str | None = None
+    left_out: tuple[str, ...] = ()
+    out: Path | None = None
+    figure: Path | None = None
+    material: str | None = None
+    simulate: bool = False
+    bias: bool = False
+    json: bool = False
+
+
+def run_lab(order: LabOrder, say: Callable[[str], None]) -> bool:
+    """Carry out ``order``; True if every round trip that was asked for closes. CommandError and others in one line."""
+    _check(order)
+    if order.file is None:
+        table = bias_table(order.test)
+        say(json_text({"test": order.test, "bias": bias_data(table)}) if order.json else bias_text(table))
+        return True
+    result = analysed(order)
+    part = part_table(result)
+    scene = _scene_with(part, order) if order.simulate else None
+    _write(order, result, part)
+    if not order.json:
+        say(lab_text(result))
+    bias = _bias(order, result, scene)
+    rows = _twins(result, scene) if scene else []
+    if order.json:
+        say(json_text(lab_data(result, rows, bias)))
+    else:
+        for text in filter(None, (bias and bias_text(bias), rows and twin_text(rows))):
+            say(f"\n{text}")
+        for path in filter(None, (order.out, order.figure)):
+            say(f"\nwrote {path}")
+    return all(row.closes is not False for row in rows)
+
+
+def _write(order: LabOrder, result: LabResult, part: dict[str, Any]) -> None:
+    """The files that were asked for."""
+    if order.figure:
+        from explorer.report.figures.force_displacement import write_curves
+
+        write_curves(order.figure, result)
+    if order.out:
+        heading = f"{order.test}: measured, from {Path(result.file).name}. SI. Written by explorer lab."
+        order.out.write_text(part_text(part, heading), encoding="utf-8")
+
+
+def analysed(order: LabOrder) -> LabResult:
+    """What the readings that ``order`` names give."""
+    path = asset_path("laboratory", str(order.file))
+    if order.test == "shear" and order.compression is not None:
+        return analyse_elastic(path, asset_path("laboratory", order.compression))
+    if order.test == "composition":
+        return analyse_composition(path, order.left_out)
+    return analyse(order.test, path)
+
+
+def _check(order: LabOrder) -> None:
+    """Refuse, before any work, what cannot be carried out."""
+    if order.file is None and not order.bias:
+        raise CommandError("FILE.csv is missing; without readings only --bias has something to show")
+    if order.file is None and (order.simulate or order.out or order.figure or order.compression or order.left_out):
+        raise CommandError("--simulate, --out, --plot, --compression and --leave-out need readings: FILE.csv")
+    if order.compression is not None and order.test != "shear":
+        raise CommandError("--compression: belongs to the test shear; both moduli give Poisson's ratio")
+    if order.left_out and order.test != "composition":
+        raise CommandError("--leave-out: belongs to the test composition")
+    if order.figure and order.test not in ("compression", "shear"):
+        raise CommandError("--plot: draws force–displacement curves; allowed with compression and shear")
+    if order.material is not None and not order.simulate:
+        raise CommandError("--material: is what --simulate runs with")
+    if order.bias:
+        bias_table(order.test)  # refuses a test without one
+    if order.simulate:
+        check_twin(order.test)
+    if order.out:
+        check_new_file(order.out, ".toml")
+    if order.figure:
+        check_new_file(order.figure, ".html")
+
+
+def _scene_with(part: dict[str, Any], order: LabOrder) -> Scene:
+    """The material of the twins with what was derived."""
+    name = order.material or DEFAULT_MATERIAL
+    try:
+        return with_part(material_scene(name), part)
+    except ParameterError as error:
+        raise CommandError(f"--simulate in material {name}: {error}") from None
+
+
+def _twins(result: LabResult, scene: Scene) -> list[TwinRow]:
+    # Loads Taichi, which takes a second, and only this needs it.
+    from explorer.laboratory.twin import twins
+
+    return list(twins(result, scene))
+
+
+def _bias(order: LabOrder, result: LabResult, scene: Scene | None) -> BiasTable | None:
+    if not order.bias:
+        return None
+    if scene is None or order.test == "shear":
+        return bias_table(order.test)
+    from explorer.laboratory.simulated_bias import simulated_bias
+
+    return simulated_bias(order.test, scene, result.derived[0].of)

@@ -1,0 +1,147 @@
+"""Virtual twins: the bench test run on the solver, with the parameters that the bench test gave.
+
+A round trip closes where what comes out is within ``CLOSES`` of what was put in:
+
+    inclined_plane        tan of the angle at which the body slides = μ
+    drop                  tracked rebound (v_x + v_z)/√(2gH) = e
+    compression, shear    E* and G* of the contact by Hertz and Mindlin, and E and G of the specimen from them:
+                          1/E* = (1 − ν²)/E + (1 − ν_w²)/E_w,  1/G* = (2 − ν)/G + (2 − ν_w)/G_w
+
+Where the paper's formula is applied to the same simulated test (L/2H, Equation 1), what it misses by is shown and
+closes nothing. From the drop, the twin also finds the e with which a ball of the body's mass lands where the
+laboratory's bodies did.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator
+
+from scipy.optimize import brentq
+
+from doe.laboratory import Derived, LabResult
+from explorer.errors import CommandError
+from explorer.laboratory.twin_row import CLOSES, RIGS, TwinRow
+from solver import Scene, with_rig, with_values
+from solver.bench_tests import BenchResult, run_bench_test
+from solver.body import Body
+from solver.material import Material
+
+TILT_RATE = 5.0
+"""Of the inclined plane [°/s]; the angle moves by less than a hundredth of a degree against the rig's own 1 °/s."""
+LOWEST, HIGHEST = 0.05, 1.0
+"""Restitutions that the solver takes."""
+
+
+def twins(result: LabResult, scene: Scene) -> Iterator[TwinRow]:
+    """Rows of every component or pair of ``result``, in whose ``scene`` its parameters stand already."""
+    for of in dict.fromkeys(one.of for one in result.derived):
+        own = {one.name: one for one in result.derived if one.of == of}
+        if result.test == "inclined_plane":
+            yield from _friction(of, own, scene)
+        elif result.test == "drop":
+            yield from _restitution(of, own, scene)
+        else:
+            yield from _moduli(of, own, scene)
+
+
+def bench_scene(scene: Scene, test: str, of: tuple[str, ...]) -> Scene:
+    """``scene`` with the rig of ``test``, the specimen of ``of`` on it, and the partner's material as its surface."""
+    body, wall = specimen(scene, of)
+    # A ball, or a body that slides without turning: what is measured does not hang on how many spheres stand for it.
+    rig_scene = with_rig(with_values(scene, {"body.spheres": "coarse"}), RIGS[test])
+    return dataclasses.replace(rig_scene, rig=dataclasses.replace(rig_scene.rig, body=body.name, wall=wall))  # type: ignore[type-var]
+
+
+def specimen(scene: Scene, of: tuple[str, ...]) -> tuple[Body, str]:
+    """The body that is tested and the material that it lies on; of one component alone, the wall's."""
+    bodies = {name: body for body in reversed(scene.bodies) for name in (body.material, body.name)}
+    one, other = of if len(of) == 2 else (of[0], scene.rig.wall)
+    if not {*of} & {*bodies}:
+        raise CommandError(f"--simulate: {'-'.join(of)}: no body of that name; there are {', '.join(bodies)}")
+    if one not in bodies:
+        one, other = other, one
+    wall = other if other in {m.name for m in scene.materials} else bodies[other].material
+    if len(of) == 2 and scene.contact_pair(bodies[one], wall) is not scene.pair(*of):
+        raise CommandError(f"--simulate: {'-'.join(of)}: a plate of {wall} would touch by another pair of the material")
+    return bodies[one], wall
+
+
+def _friction(of: tuple[str, ...], own: dict[str, Derived], scene: Scene) -> Iterator[TwinRow]:
+    found = run_bench_test(with_values(bench_scene(scene, "inclined_plane", of), {"rig.tilt_rate": TILT_RATE}))
+    yield _closing(of, "static_friction", "1", own["static_friction"], found)
+    angle = found.quantity("sliding_angle_deg")
+    measured = own["sliding_angle"].summary.mean
+    yield TwinRow(of, "sliding_angle", "rad", measured, None, math.radians(angle.value), None)
+
+
+def _restitution(of: tuple[str, ...], own: dict[str, Derived], scene: Scene) -> Iterator[TwinRow]:
+    height = own["drop_height"].summary.mean
+    bench = with_values(bench_scene(scene, "drop", of), {"rig.drop_height": height})
+    found = run_bench_test(bench)
+    yield _closing(of, "restitution", "1", own["restitution"], found)
+    paper = found.quantity("restitution_paper_L_over_2H")
+    flight = own.get("restitution_paper_L_over_2H", own["restitution"])
+    if flight.formula != "L/(2H)":
+        yield TwinRow(of, "L_over_2H", "1", None, own["restitution"].summary.mean, paper.value, None)
+        return
+    yield TwinRow(of, "L_over_2H", "1", flight.summary.mean, None, paper.value, None)
+    landing = restitution_that_lands(bench, flight.summary.mean)
+    if landing is not None:
+        yield TwinRow(of, "restitution_that_lands_there", "1", None, own["restitution"].summary.mean, landing, None)
+
+
+def restitution_that_lands(bench: Scene, measured: float) -> float | None:
+    """The e with which the ball of the drop rig gives L/(2H) = ``measured``; None if no e that is allowed does."""
+    # Only here: the drop alone, without the study beside it.
+    from solver.bench_tests.bench import UPRIGHT, ball
+    from solver.bench_tests.drop_plate_45 import drop, paper_estimate
+
+    gravity, height = math.hypot(*bench.gravity), bench.rig.drop_height  # type: ignore[attr-defined]
+    body = next(body for body in bench.bodies if body.name == bench.rig.body)  # type: ignore[attr-defined]
+    pair = bench.contact_pair(body, bench.rig.wall)
+
+    def miss(restitution: float) -> float:
+        changed = with_values(bench, {f"pair.{pair.a}.{pair.b}.restitution": restitution})
+        return paper_estimate(drop(changed, ball(body), UPRIGHT), gravity, height) - measured
+
+    if not miss(LOWEST) < 0.0 < miss(HIGHEST):
+        return None
+    return float(brentq(miss, LOWEST, HIGHEST, xtol=1e-4))
+
+
+def _moduli(of: tuple[str, ...], own: dict[str, Derived], scene: Scene) -> Iterator[TwinRow]:
+    bench = bench_scene(scene, "compression", of)
+    found = run_bench_test(bench)
+    body, wall = specimen(scene, of)
+    material, plate = scene.material(body.material), scene.material(wall)
+    for name in ("effective_youngs_modulus", "effective_shear_modulus"):
+        yield _closing(of, name, "Pa", None, found)
+    simulated = specimen_moduli(found, material, plate)
+    declared = {"youngs_modulus": material.youngs_modulus, "shear_modulus": material.shear_modulus}
+    for name, value in simulated.items():
+        measured = own[name].summary.mean if name in own else None
+        closes = abs(value / declared[name] - 1.0) <= CLOSES
+        yield TwinRow(of, name, "Pa", measured, declared[name], value, closes)
+    paper = found.quantity("youngs_modulus_paper_equation_1")
+    yield TwinRow(of, "youngs_modulus_by_equation_1", "Pa", None, paper.reference, paper.value, None)
+
+
+def specimen_moduli(found: BenchResult, material: Material, plate: Material) -> dict[str, float]:
+    """E and G of the specimen [Pa] from the moduli of the contact, with its ν and the plate's constants known."""
+    e_star, g_star = (found.quantity(f"effective_{kind}_modulus").value for kind in ("youngs", "shear"))
+    e_rest = 1.0 / e_star - (1.0 - plate.poisson_ratio**2) / plate.youngs_modulus
+    g_rest = 1.0 / g_star - (2.0 - plate.poisson_ratio) / plate.shear_modulus
+    return {
+        "youngs_modulus": (1.0 - material.poisson_ratio**2) / e_rest,
+        "shear_modulus": (2.0 - material.poisson_ratio) / g_rest,
+    }
+
+
+def _closing(of: tuple[str, ...], name: str, unit: str, own: Derived | None, found: BenchResult) -> TwinRow:
+    """What the twin measured beside what was put in; a number that could not be measured closes nothing."""
+    quantity = found.quantity(name)
+    closes = quantity.error is not None and abs(quantity.error) <= CLOSES
+    measured = None if own is None else own.summary.mean
+    return TwinRow(of, name, unit, measured, quantity.reference, quantity.value, closes)

@@ -1,0 +1,73 @@
+"""Figure of a laboratory's force–displacement curves: every replicate, and the part that was taken as straight."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import plotly.graph_objects as go
+
+from doe.laboratory import CurveFit, LabResult
+from explorer.errors import CommandError
+from explorer.report.content import Spec
+from explorer.report.figures.style import CHOSEN, FACTOR, Json, axis, chart, label
+
+PANEL_HEIGHT = 420
+
+
+def write_curves(path: Path, result: LabResult) -> None:
+    """Write one chart per component and quantity to a page that needs nothing else; CommandError without curves."""
+    if not result.curves:
+        raise CommandError("--plot: single readings only, no curve to draw")
+    groups: dict[tuple[str, str], list[CurveFit]] = {}
+    for curve in result.curves:
+        groups.setdefault((curve.quantity, "-".join(curve.of)), []).append(curve)
+    charts = [
+        go.Figure(force_displacement(curves, f"{name}, {quantity}")).to_html(
+            full_html=False, include_plotlyjs=k == 0, config={"displaylogo": False}
+        )
+        for k, ((quantity, name), curves) in enumerate(groups.items())
+    ]
+    title = label(f"{result.test}: {Path(result.file).name}")
+    head = f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{title}</title></head>'
+    path.write_text(f"{head}<body><h1>{title}</h1>{''.join(charts)}</body></html>\n", encoding="utf-8")
+
+
+def force_displacement(curves: list[CurveFit], title: str) -> Spec:
+    """Points of every replicate and, over them, its straight part, drawn on to zero force."""
+    traces: list[Json] = []
+    for curve in curves:
+        first = curve is curves[0]
+        traces.append(
+            {
+                "type": "scatter",
+                "mode": "markers",
+                "x": [1e3 * x for x in curve.displacement],
+                "y": list(curve.force),
+                "name": "points",
+                "legendgroup": "points",
+                "showlegend": first,
+                "marker": {"size": 4, "color": FACTOR, "opacity": 0.5},
+                "hovertemplate": f"replicate {label(curve.replicate)}: %{{x:.4g}} mm, %{{y:.4g}} N<extra></extra>",
+            }
+        )
+        fit = curve.fit
+        traces.append(
+            {
+                "type": "scatter",
+                "mode": "lines",
+                "x": [1e3 * x for x in (fit.origin, fit.first_displacement, fit.last_displacement)],
+                "y": [0.0, fit.first_force, fit.last_force],
+                "name": "straight part, on to zero force",
+                "legendgroup": "straight",
+                "showlegend": first,
+                "line": {"color": CHOSEN, "width": 2},
+                "hovertemplate": f"replicate {label(curve.replicate)}: {1e-6 * curve.modulus:.4g} MPa<extra></extra>",
+            }
+        )
+    layout: Json = {
+        "title": {"text": label(title)},
+        "xaxis": axis("displacement [mm]"),
+        "yaxis": axis("force [N]"),
+        "margin": {"l": 60, "r": 24, "t": 80, "b": 52},
+    }
+    return chart(traces, layout, PANEL_HEIGHT)

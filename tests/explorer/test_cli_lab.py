@@ -1,0 +1,159 @@
+"""`explorer lab`: text, JSON, parts, figures and refusals, on the shipped examples."""
+
+import json
+import tomllib
+
+import pytest
+
+from doe.laboratory import TESTS
+from solver import load_material, value
+from solver.assets import asset_path
+from tests.explorer.command_line import explorer, refused
+
+
+@pytest.mark.parametrize("test", TESTS)
+def test_every_shipped_example_is_evaluated(test):
+    result = explorer("lab", test, test)
+    assert result.exit_code == 0, result.output
+    assert result.stdout.startswith(f"{test}: ")
+    assert "95 % of the mean" in result.stdout
+
+
+def test_units_for_people_and_what_must_not_be_overlooked(tmp_path):
+    path = tmp_path / "readings.csv"
+    angles = [30.0, 30.2, 29.9, 30.1, 30.0, 29.8, 30.1, 45.0]
+    path.write_text("a,b,replicate,angle_deg\n" + "".join(f"x,y,r{k},{a}\n" for k, a in enumerate(angles)))
+    shown = explorer("lab", "inclined_plane", path).stdout
+    (angle,) = [line for line in shown.splitlines() if " sliding_angle " in line and not line.startswith("note")]
+    assert " deg " in angle
+    assert angle.endswith("r7")
+    assert (
+        "replicate r7 is an outlier at the 5 % level (Grubbs) and was kept; without it the mean is 30.01 deg" in shown
+    )
+    assert "not normal" in shown
+    # tan 30° + 0.0143° · (1 + 1/3): no digit lost, no unit behind
+    assert "without it the mean is 0.5777\n" in shown
+
+
+def test_json_is_all_of_it_in_si():
+    result = explorer("lab", "shear", "shear", "--compression", "compression", "--json")
+    data = json.loads(result.stdout)
+    assert {one["name"] for one in data["derived"]} == {"shear_modulus", "youngs_modulus"}
+    assert data["derived"][0]["summary"]["mean"] == pytest.approx(56.3e6, rel=3e-3)
+    assert [one["of"] for one in data["estimates"]] == [["seed"], ["plate"], ["petiole"]]
+    assert len(data["curves"]) == 60
+    assert (data["twins"], data["bias"]) == ([], None)
+
+
+def test_the_bias_needs_no_readings():
+    shown = explorer("lab", "drop", "--bias")
+    assert shown.exit_code == 0
+    assert "0.5456" in shown.stdout
+    data = json.loads(explorer("lab", "compression", "--bias", "--json").stdout)
+    assert data["bias"]["columns"] == ["strain", "poisson_ratio", "ratio"]
+    both = explorer("lab", "drop", "drop", "--bias").stdout
+    assert "seed-seed" in both
+    assert "0.5456" in both
+
+
+def test_from_readings_to_a_material(tmp_path):
+    """Parts of five tests over the shipped material: its own numbers, with their origin, and no fraction assumed."""
+    orders = {
+        "friction": ["inclined_plane", "inclined_plane"],
+        "drop": ["drop", "drop"],
+        "elastic": ["shear", "shear", "--compression", "compression"],
+        "density": ["density", "density"],
+        "composition": ["composition", "composition", "--leave-out", "light_impurity"],
+    }
+    parts = []
+    for name, words in orders.items():
+        part = tmp_path / f"{name}.toml"
+        assert explorer("lab", *words, "--out", part).exit_code == 0
+        parts += ["--part", part]
+    made = explorer("new", "material", "own", "--like", "sunflower_extract", *parts, "--out", tmp_path)
+    assert made.exit_code == 0, made.output
+    path = tmp_path / "own.toml"
+    ours, shipped = load_material(str(path)), load_material("sunflower_extract")
+    for pair in shipped.pairs:
+        for key in ("static_friction", "restitution"):
+            parameter = f"pair.{pair.a}.{pair.b}.{key}"
+            # angles to 0.01°, distances to 0.1 mm
+            assert value(ours, parameter) == pytest.approx(value(shipped, parameter), abs=2e-4)
+    for material in shipped.materials:
+        own = ours.material(material.name)
+        assert own.density == pytest.approx(material.density, rel=1e-3)
+        assert own.shear_modulus == pytest.approx(material.shear_modulus, rel=3e-3)
+        # printed digits of ν
+        assert own.poisson_ratio == pytest.approx(material.poisson_ratio, abs=5e-3)
+    measured = tomllib.loads(path.read_text())["measured"]
+    assert measured["pair"]["seed"]["seed"]["restitution"]["source"] == "drop.csv"
+    assert measured["seed"]["moisture_percent"] == 28.7
+    assert not any("mass_fraction" in entry for entry in ours.assumed)
+    assert explorer("parameters", path).exit_code == 0
+
+
+def test_parts_fit_the_starter_material_too(tmp_path):
+    readings = tmp_path / "plane.csv"
+    readings.write_text("a,b,replicate,angle_deg\ngrain,steel,1,20\ngrain,steel,2,22\n")
+    part = tmp_path / "part.toml"
+    assert explorer("lab", "inclined_plane", readings, "--out", part).exit_code == 0
+    assert explorer("new", "material", "lentil", "--part", part, "--out", tmp_path).exit_code == 0
+    scene = load_material(str(tmp_path / "lentil.toml"))
+    assert value(scene, "pair.grain.steel.static_friction") == pytest.approx(0.384, abs=1e-3)
+    assert "pair.grain.steel.static_friction" not in scene.assumed
+    assert "pair.grain.steel.restitution" in scene.assumed
+
+
+def test_a_part_of_another_material_makes_no_file(tmp_path):
+    part = tmp_path / "part.toml"
+    assert explorer("lab", "drop", "drop", "--out", part).exit_code == 0
+    line = refused(explorer("new", "material", "lentil", "--part", part, "--out", tmp_path))
+    assert "part.toml: does not fit the starter material" in line
+    assert not (tmp_path / "lentil.toml").exists()
+    assert "exists" in refused(explorer("new", "material", "part", "--part", part, "--out", tmp_path))
+    assert "new material" in refused(explorer("new", "study", "lentil", "--part", part, "--out", tmp_path))
+
+
+def test_the_figure_holds_every_replicate_and_escapes_names(tmp_path):
+    path = tmp_path / "curves.html"
+    assert explorer("lab", "compression", "compression", "--plot", path).exit_code == 0
+    page = path.read_text()
+    assert page.count("Plotly.newPlot") == 3
+    assert page.count("replicate 10:") == 6
+    assert "<script src" not in page
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["torsion", "drop"], "torsion"),
+        (["drop"], "FILE.csv is missing"),
+        (["drop", "nowhere.csv"], "nowhere.csv"),
+        (["drop", "--bias", "--simulate"], "need readings"),
+        (["moisture", "moisture", "--simulate"], "moisture has no rig"),
+        (["moisture", "moisture", "--bias"], "difference of masses"),
+        (["drop", "drop", "--compression", "compression"], "shear"),
+        (["drop", "drop", "--leave-out", "seed"], "composition"),
+        (["drop", "drop", "--plot", "x.html"], "force–displacement"),
+        (["drop", "drop", "--material", "sunflower_extract"], "--simulate"),
+        (["drop", "drop", "--out", "x.txt"], ".toml"),
+        (["drop", "drop", "--out", "none/x.toml"], "no folder"),
+        (["drop", "inclined_plane"], "angle_deg"),
+    ],
+)
+def test_lab_refuses(words, expected, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert expected in refused(explorer("lab", *words))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_single_readings_have_no_figure(tmp_path):
+    readings = tmp_path / "one.csv"
+    readings.write_text("component,replicate,thickness_mm,area_mm2,displacement_mm,force_N\nseed,1,5,20,0.05,30\n")
+    assert "no curve" in refused(explorer("lab", "compression", readings, "--plot", tmp_path / "x.html"))
+    assert not (tmp_path / "x.html").exists()
+
+
+def test_shipped_examples_say_that_they_are_made_up():
+    for test in TESTS:
+        assert "# Made up" in asset_path("laboratory", test).read_text()

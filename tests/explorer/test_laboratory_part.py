@@ -1,0 +1,130 @@
+"""Parts of a material: what `explorer lab --out` writes, and how it gets into a material."""
+
+import hashlib
+import tomllib
+
+import pytest
+
+from doe.laboratory import analyse
+from doe.laboratory.analysis import analyse_composition, analyse_elastic
+from explorer.laboratory.part import merged, part_table, part_text, read_part, with_part
+from solver import ParameterError, load_material, value
+from solver.assets import asset_path
+
+
+def shipped(test):
+    return asset_path("laboratory", test)
+
+
+@pytest.fixture
+def scene():
+    return load_material("sunflower_extract")
+
+
+def test_a_part_reads_back_as_it_was_and_says_where_it_is_from(tmp_path):
+    table = part_table(analyse("inclined_plane", shipped("inclined_plane")))
+    path = tmp_path / "friction.toml"
+    path.write_text(part_text(table, "two\nlines"))
+    assert read_part(path) == table
+    assert path.read_text().startswith("# two\n# lines\n")
+    origin = table["measured"]["pair"]["seed"]["plate"]["static_friction"]
+    assert origin["value"] == table["pair"]["seed"]["plate"]["static_friction"] == pytest.approx(0.55, abs=1e-4)
+    assert (origin["n"], origin["source"], origin["formula"]) == (10, "inclined_plane.csv", "μ = tan σ")
+    assert origin["sha256"] == hashlib.sha256(shipped("inclined_plane").read_bytes()).hexdigest()
+    assert origin["low_95"] < origin["value"] < origin["high_95"]
+    assert origin["sd"] > 0.0
+
+
+def test_two_files_are_both_named_where_both_counted():
+    table = part_table(analyse_elastic(shipped("shear"), shipped("compression")))
+    measured = table["measured"]["materials"]["seed"]
+    assert measured["poisson_ratio"]["source"] == "compression.csv, shear.csv"
+    assert measured["youngs_modulus"]["source"] == "compression.csv"
+    assert measured["shear_modulus"]["source"] == "shear.csv"
+
+
+def test_friction_and_restitution_get_into_the_material_in_either_order(scene):
+    other = with_part(scene, {"format": 1, "pair": {"plate": {"seed": {"static_friction": 0.3, "restitution": 0.2}}}})
+    assert value(other, "pair.seed.plate.static_friction") == 0.3
+    assert value(other, "pair.seed.plate.restitution") == 0.2
+    assert value(other, "pair.seed.seed.restitution") == value(scene, "pair.seed.seed.restitution")
+
+
+@pytest.mark.parametrize(
+    ("entry", "shear", "ratio"),
+    [
+        ({"shear_modulus": 4e7}, 4e7, 0.31),
+        ({"youngs_modulus": 1.31e8}, 5e7, 0.31),
+        ({"youngs_modulus": 1.2e8, "shear_modulus": 5e7}, 5e7, 0.2),
+        ({"youngs_modulus": 1.2e8, "poisson_ratio": 0.2}, 5e7, 0.2),
+        ({"youngs_modulus": 1.2e8, "shear_modulus": 5e7, "poisson_ratio": 0.2}, 5e7, 0.2),
+    ],
+)
+def test_what_is_measured_of_elasticity_fixes_the_rest(entry, shear, ratio, scene):
+    seed = with_part(scene, {"format": 1, "materials": {"seed": entry}}).material("seed")
+    assert (seed.shear_modulus, seed.poisson_ratio) == pytest.approx((shear, ratio))
+
+
+def test_composition_replaces_all_fractions_at_once_and_they_are_no_longer_assumed(scene):
+    part = part_table(analyse_composition(shipped("composition"), ["light_impurity"]))
+    other = with_part(scene, part)
+    assert [body.mass_fraction for body in other.bodies] == pytest.approx([75 / 96, 13 / 96, 8 / 96], rel=1e-3)
+    assert "body.seed.mass_fraction" in scene.assumed
+    assert set(scene.assumed) - set(other.assumed) == {f"body.{b.name}.mass_fraction" for b in scene.bodies}
+
+
+def test_moisture_is_kept_though_it_is_no_parameter():
+    table = part_table(analyse("moisture", shipped("moisture")))
+    assert set(table) == {"format", "measured"}
+    assert table["measured"]["seed"]["moisture_wet_basis"]["value"] == pytest.approx(0.287, abs=1e-4)
+
+
+def test_the_other_estimates_of_a_drop_are_kept_beside_the_paper_s():
+    table = part_table(analyse("drop", shipped("drop")))
+    measured = table["measured"]["pair"]["seed"]["plate"]
+    assert set(measured) == {"restitution", "restitution_gripping_sphere"}
+    assert set(table["pair"]["seed"]["plate"]) == {"restitution"}
+
+
+@pytest.mark.parametrize(
+    ("table", "word"),
+    [
+        ({"pair": {"seed": {"stone": {"restitution": 0.5}}}}, "pair.seed.stone"),
+        ({"pair": {"seed": {"seed": {"restitution": 1.4}}}}, "outside"),
+        ({"pair": {"seed": {"seed": {"grip": 1.4}}}}, "grip"),
+        ({"pair": {"seed": 3}}, "pair.seed"),
+        ({"materials": {"stone": {"density": 3.0}}}, "stone"),
+        ({"materials": {"seed": {"youngs_modulus": 3e8, "shear_modulus": 5e7}}}, "poisson_ratio"),
+        ({"materials": {"seed": {"youngs_modulus": "soft", "shear_modulus": 5e7}}}, "youngs_modulus"),
+        ({"body": [{"name": "seed", "mass_fraction": 1.0}]}, "seed, plate, petiole"),
+        ({"body": [{"name": n, "mass_fraction": 0.5} for n in ("seed", "plate", "petiole")]}, "add up to 1.5"),
+        ({"body": [{"name": "seed", "mass_fraction": "much"}]}, "mass_fraction"),
+    ],
+)
+def test_a_part_that_does_not_fit_is_refused(table, word, scene):
+    with pytest.raises(ParameterError, match=word) as caught:
+        with_part(scene, {"format": 1, **table})
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "word"), [("format = 2", "format"), ("format = 1\nrig = 3", "rig"), ("= 1", "line 1")]
+)
+def test_a_file_that_is_no_part_is_refused(text, word, tmp_path):
+    path = tmp_path / "part.toml"
+    path.write_text(text)
+    with pytest.raises(ParameterError, match=word):
+        read_part(path)
+
+
+def test_merging_keeps_both_and_the_later_of_two():
+    one, other = {"a": {"x": 1, "y": 1}, "b": 1}, {"a": {"y": 2}, "c": {"z": 3}}
+    assert merged(one, other) == {"a": {"x": 1, "y": 2}, "b": 1, "c": {"z": 3}}
+    assert one == {"a": {"x": 1, "y": 1}, "b": 1}
+
+
+def test_names_that_toml_would_misread_are_quoted(tmp_path):
+    path = tmp_path / "r.csv"
+    path.write_text("a,b,replicate,angle_deg\n-x_1,2-y,1,30\n")
+    table = part_table(analyse("inclined_plane", path))
+    assert tomllib.loads(part_text(table, "")) == table
