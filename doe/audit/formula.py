@@ -35,8 +35,12 @@ OPERATIONS: dict[type[ast.operator], Callable[[float, float], float]] = {
 
 def names_in(formula: str) -> tuple[str, ...]:
     """Names of the numbers that a formula asks for, in order of appearance. Raises AuditError if it is not one."""
-    nodes = [node for node in ast.walk(_parsed(formula)) if isinstance(node, ast.Name)]
-    return tuple(dict.fromkeys(node.id for node in nodes if node.id not in FUNCTIONS and node.id != "pi"))
+    nodes = list(ast.walk(_parsed(formula)))
+    called = {id(node.func) for node in nodes if isinstance(node, ast.Call)}
+    found = (node.id for node in nodes if isinstance(node, ast.Name) and id(node) not in called)
+    names = tuple(dict.fromkeys(name for name in found if name != "pi"))
+    evaluated(formula, dict.fromkeys(names, 1.0))  # refuses what is no arithmetic before any number is looked up
+    return names
 
 
 def evaluated(formula: str, numbers: Mapping[str, float]) -> float:

@@ -181,7 +181,8 @@ def _own_runs(study: SurfaceStudy, equation: Equation) -> Iterator[Finding]:
     centre = [k for k in range(len(points)) if not points[k].any() and k != worst]
     for k in (*centre, worst):
         yield _own_run(study, equation, surface, points[k], sigma)
-    if abs(float(off[worst])) > sigma:
+    miss = abs(float(off[worst]))
+    if miss > sigma and coefficient_slack(study, equation, points[worst]) > miss / 2:
         yield _culprit(study, equation)
 
 
