@@ -10,7 +10,7 @@ import typer
 def export(
     source: str = typer.Argument(
         metavar="RIG_OR_FILE",
-        help="A rig (funnel), or a material, set-up or study, by file or shipped name.",
+        help="A rig (funnel), or a material, set-up or study, by file or shipped name, or the folder of a calibration.",
     ),
     folder: Path = typer.Argument(metavar="DIR", help="New folder for the files."),
     to: str = typer.Option(..., metavar="PROGRAM", help="liggghts, yade, paraview or edem."),
@@ -30,7 +30,8 @@ def export(
 
     liggghts, yade: an input deck that runs as it is. The pour runs here first: when and where a body enters depends
     on what lies in its way. paraview: bodies, true shapes, contacts and rig as VTK files. edem: the material as
-    tables (CSV) with the convention of every coefficient; nothing is poured.
+    tables (CSV) with the convention of every coefficient; nothing is poured. The folder that `explorer calibrate` wrote
+    stands for its study with the factors at the optimum.
     """
     from explorer.errors import CommandError
     from explorer.export import PROGRAMS, WRITERS
@@ -39,6 +40,7 @@ def export(
     from explorer.export.moments import moments
     from explorer.export.paraview import check_meshio, write_paraview
     from explorer.files.run_folder import appearing
+    from explorer.scene.calibrated import calibrated_scene, is_calibration
     from explorer.scene.file import load_scene, with_settings
     from solver import run_pour, value
 
@@ -46,7 +48,13 @@ def export(
         raise CommandError(f"--to {to}: not a program; allowed: {', '.join(PROGRAMS)}")
     if every is not None and to != "paraview":
         raise CommandError(f"--every: belongs to --to paraview, not to {to}")
-    scene = with_settings(load_scene(source, material), set_)
+    if material is None and is_calibration(source):
+        scene, caution = calibrated_scene(source)
+        if caution:
+            typer.echo(f"note: {caution}", err=True)
+    else:
+        scene = load_scene(source, material)
+    scene = with_settings(scene, set_)
     if time is not None and time < float(value(scene, "numerics.max_time")):
         scene = with_settings(scene, [f"numerics.max_time={time!r}"])
     if to == "edem":

@@ -121,7 +121,7 @@ def sphere_grid(scene: Scene, moment: Moment) -> Grid:
     """A point per member sphere."""
     spheres = moment.spheres
     owner = moment.bodies.component[spheres.body]
-    numbers = {"radius": spheres.radius, "body": spheres.body, "component": owner}
+    numbers: Numbers = {"radius": spheres.radius, "body": spheres.body, "component": owner}
     return spheres.centre, "vertex", _vertices(len(spheres.radius)), numbers, {}
 
 

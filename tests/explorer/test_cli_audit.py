@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from doe.audit import Printed, audit_study
+from doe.audit.surface_refit import refit
 from explorer.audit.read_study import read_study
 from explorer.audit.report import audit_sections, write_audit
 from explorer.audit.sentences import audit_text
@@ -140,6 +141,29 @@ def test_a_study_survives_its_folder(clean, tmp_path):
     again = read_study(write_study(tmp_path, clean))
     assert _plain(again) == _plain(clean)
     assert audit_study(again).having("differs") == ()
+
+
+def test_a_surface_may_be_written_in_other_units(clean, tmp_path):
+    """The same runs in natural units, the equation in coded ones."""
+    surface = clean.surface
+    folder = write_study(tmp_path, clean)
+    natural = (surface.low + surface.high) / 2 + surface.coded * (surface.high - surface.low) / 2
+    rows = [",".join((*map(repr, row), y.text)) for row, y in zip(natural.tolist(), surface.responses, strict=True)]
+    (folder / "surface.csv").write_text("\n".join((",".join((*surface.factors, "angle")), *rows)), encoding="utf-8")
+    coded = refit(surface).coefficients
+    terms = "\n".join(f'"{name}" = {b:.4f}' for name, b in zip(surface.equation.coefficients, coded, strict=True))
+    text = (folder / "study.toml").read_text(encoding="utf-8")
+    head, _, tail = text.partition("[surface.equation]")
+    end = tail[tail.index("[optimum]") :]
+    equation = f'[surface.equation]\nwhere = "Equation 5"\nunits = "coded"\n[surface.equation.terms]\n{terms}\n'
+    text = head.replace('runs = "surface.csv"', 'runs = "surface.csv"\ncoded = false') + equation + end
+    (folder / "study.toml").write_text(text, encoding="utf-8")
+    again = read_study(folder)
+    assert again.surface.coded == pytest.approx(surface.coded, abs=1e-9)
+    assert again.surface.equation.coded
+    audit = audit_study(again)
+    assert audit.having("differs") == ()
+    assert len(of(audit, "printed equation", "Equation 5")) == 10
 
 
 def _plain(value):

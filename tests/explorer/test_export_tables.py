@@ -1,6 +1,7 @@
 """A material as tables: the declared numbers, and what is said of those that do not transfer."""
 
 import csv
+import json
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from explorer.export.liggghts import unclamped_restitution
 from explorer.export.material_table import write_material_table
 from explorer.scene.file import load_scene, with_settings
 from tests.explorer.command_line import explorer, refused
+from tests.explorer.reported_studies import result_of_case
 
 ROLLING = "effect.rolling_resistance.rolling_friction=0.1"
 
@@ -82,3 +84,40 @@ def test_the_command_writes_them_without_a_pour(tmp_path):
 def test_every_is_about_moments_only(tmp_path):
     line = refused(explorer("export", "funnel", tmp_path / "new", "--to", "edem", "--every", "0.1"))
     assert line == "--every: belongs to --to paraview, not to edem"
+
+
+@pytest.fixture(scope="module")
+def calibrations(tmp_path_factory):
+    """Folders with the result.json of a study that found something, and of one that did not."""
+    folders = {}
+    for case in ("planted", "nothing acts"):
+        folders[case] = tmp_path_factory.mktemp(case.replace(" ", "_"))
+        result = result_of_case(case)
+        result["study"]["profile"]["name"] = "standard"  # the made-up studies run in a profile of no file
+        (folders[case] / "result.json").write_text(json.dumps(result), encoding="utf-8")
+    return folders
+
+
+def test_a_calibration_is_exported_at_its_optimum(calibrations, tmp_path):
+    folder = calibrations["planted"]
+    result = explorer("export", folder, tmp_path / "edem", "--to", "edem")
+    assert (result.exit_code, result.stderr) == (0, ""), result.output
+    values = json.loads((folder / "result.json").read_text())["optimum"]["values"]
+    assert "pair.seed.seed.static_friction" in values
+    with (tmp_path / "edem" / "interactions.csv").open(newline="", encoding="utf-8") as file:
+        seeds = next(csv.DictReader(file))
+    assert float(seeds["static_friction"]) == pytest.approx(values["pair.seed.seed.static_friction"], rel=1e-6)
+    assert float(seeds["static_friction"]) != 0.57
+
+
+def test_an_optimum_in_noise_is_exported_with_a_note(calibrations, tmp_path):
+    result = explorer("export", calibrations["nothing acts"], tmp_path / "edem", "--to", "edem")
+    assert result.exit_code == 0, result.output
+    assert "not better than noise, so this is not a calibration" in result.stderr
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"study": 3}', '{"study": {"profile": {"name": "x"}, "file": "x"}}'])
+def test_a_folder_with_another_result_is_one_line(text, tmp_path):
+    (tmp_path / "result.json").write_text(text)
+    line = refused(explorer("export", tmp_path, tmp_path / "new", "--to", "edem"))
+    assert line == f"{tmp_path}/result.json: is not the result of `explorer calibrate`"
