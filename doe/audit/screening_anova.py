@@ -23,16 +23,21 @@ from doe.multiple_tests import holm
 
 FloatArray = npt.NDArray[np.float64]
 ALPHA = 0.05
+ADDS_UP = "sums of squares add up"
 
 
 def check_screening(screening: Screening) -> Iterator[Finding]:
     """F and p of every factor, the total sum of squares, the sums of squares themselves, and what is significant."""
-    low, high = implied_mse(screening.sums, screening.f)
-    yield from _f_values(screening, low, high)
-    yield from _p_values(screening)
-    yield from _adding_up(screening, low, high)
+    yield from _total(screening)
+    if screening.f:
+        low, high = implied_mse(screening.sums, screening.f)
+        yield from _f_values(screening, low, high)
+        yield from _adding_up(screening, low, high)
+    if screening.f and screening.p:
+        yield from _p_values(screening)
     yield from _sums(screening)
-    yield from _significance(screening)
+    if screening.p:
+        yield from _significance(screening)
 
 
 def implied_mse(sums: Sequence[Printed], f: Sequence[Printed]) -> tuple[float, float]:
@@ -76,19 +81,30 @@ def _p_values(screening: Screening) -> Iterator[Finding]:
         yield compared("p from F", screening.where_anova, f"p of {factor.name}", p, float(tail(values)[0]), how, slack)
 
 
+def _total(screening: Screening) -> Iterator[Finding]:
+    """The printed total sum of squares against that of the runs."""
+    if screening.total is not None:
+        value, slack = _total_of_runs(screening)
+        how = f"Σ (y − mean)² of the {len(screening.responses)} runs of {screening.where_runs}"
+        yield compared(ADDS_UP, screening.where_anova, "total sum of squares", screening.total, value, how, slack)
+
+
+def _total_of_runs(screening: Screening) -> tuple[float, float]:
+    """Σ (y − mean)² and what rounding of the runs does to it."""
+
+    def total(y: FloatArray) -> FloatArray:
+        return np.array([((y - y.mean()) ** 2).sum()])
+
+    runs = values_of(screening.responses)
+    return float(total(runs)[0]), float(rounding_slack(total, runs, common_half(screening.responses))[0])
+
+
 def _adding_up(screening: Screening, low: float, high: float) -> Iterator[Finding]:
     """Total sum of squares of the runs against the factors' and the error's."""
-    check = "sums of squares add up"
-    runs, factors = values_of(screening.responses), values_of(screening.sums)
-    total = float(((runs - runs.mean()) ** 2).sum())
-    of_runs = float(
-        rounding_slack(lambda y: np.array([((y - y.mean()) ** 2).sum()]), runs, common_half(screening.responses))[0]
-    )
-    if screening.total is not None:
-        how = f"Σ (y − mean)² of the {runs.size} runs of {screening.where_runs}"
-        yield compared(check, screening.where_anova, "total sum of squares", screening.total, total, how, of_runs)
+    check, factors, n = ADDS_UP, values_of(screening.sums), len(screening.responses)
+    total, of_runs = _total_of_runs(screening)
     error = screening.error_df * 0.5 * (low + high)
-    explained, parts = float(factors.sum()), runs.size - 1 - factors.size
+    explained, parts = float(factors.sum()), n - 1 - factors.size
     slack = of_runs + float(np.sqrt(3 * (halves_of(screening.sums) ** 2).sum())) + screening.error_df * (high - low) / 2
     words = f"{explained:.2f} of the {factors.size} factors + {error:.2f} of the error that the F values imply"
     closes = abs(explained + error - total) <= slack
@@ -106,7 +122,7 @@ def _adding_up(screening: Screening, low: float, high: float) -> Iterator[Findin
         yield Remark(
             check,
             screening.where_anova,
-            f"{runs.size} runs leave {parts} degrees of freedom beside the {factors.size} factors; the error has "
+            f"{n} runs leave {parts} degrees of freedom beside the {factors.size} factors; the error has "
             f"{screening.error_df}.",
         )
 

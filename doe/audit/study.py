@@ -107,8 +107,8 @@ class Screening:
     """A two-level screening: runs, and the analysis of variance as printed.
 
     design: coded levels, shape (runs, factors), None if not printed. error_df: degrees of freedom of the error that
-    F is tested against (dummy columns). sums, f, p: per factor. total: printed total sum of squares. significant:
-    names claimed to be so at `level`, None without a claim.
+    F is tested against (dummy columns). sums, f, p: per factor; f and p are empty if not printed. total: printed total
+    sum of squares. significant: names claimed to be so at `level`, None without a claim.
     """
 
     where_runs: str

@@ -7,6 +7,7 @@ of them agree on one that is not the stated one, that is what they were computed
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -25,8 +26,10 @@ def check_ascent_errors(ascent: Ascent, target: Target) -> Iterator[Finding]:
     """Every printed error of a walk, the target that they imply, and which step is nearest."""
     stated = target.mean.value
     halves = common_half(ascent.responses)
-    other = implied_target(ascent.responses, ascent.errors, target.mean) if ascent.errors else None
-    for step, response, half, error in zip(ascent.steps, ascent.responses, halves, ascent.errors, strict=False):
+    # Some print errors with a sign; their size is what is checked.
+    errors = tuple(replace(error, value=abs(error.value)) for error in ascent.errors)
+    other = implied_target(ascent.responses, errors, target.mean) if errors else None
+    for step, response, half, error in zip(ascent.steps, ascent.responses, halves, errors, strict=False):
         value = relative_error_percent(response.value, stated)
         slack = 100 * float(half) / abs(stated)
         how = f"100 |{response.text} − {target.mean.text}|/{target.mean.text}"
@@ -35,7 +38,7 @@ def check_ascent_errors(ascent: Ascent, target: Target) -> Iterator[Finding]:
             used = relative_error_percent(response.value, other.value)
             if error.agrees(used, slack):
                 how = f"{how}; {other.text} instead of {target.mean.text} gives {like(used, error)}"
-                figure = _with_how(figure, how)
+                figure = replace(figure, how=how)
         yield figure
     if other is not None:
         yield Remark(
@@ -136,16 +139,3 @@ def _targets(response: float, half: float, error: Printed) -> tuple[tuple[float,
 
 def _one_digit_off(one: str, other: str) -> bool:
     return len(one) == len(other) and sum(a != b for a, b in zip(one, other, strict=True)) == 1
-
-
-def _with_how(figure: Figure, how: str) -> Figure:
-    return Figure(
-        figure.check,
-        figure.where,
-        figure.quantity,
-        figure.status,
-        figure.printed,
-        figure.recomputed,
-        figure.slack,
-        how,
-    )

@@ -9,7 +9,7 @@ from doe.audit import Audit, Figure, Status
 from explorer.tables.text_table import text_table
 
 HEADINGS: dict[Status, str] = {
-    "differs": "differs",
+    "differs": "differ",
     "cannot be checked": "cannot be checked",
     "reproduced": "reproduced",
 }

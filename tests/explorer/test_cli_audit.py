@@ -184,7 +184,7 @@ def test_the_command_prints_counts_and_every_difference(article):
     assert result.exit_code == 0, result.output
     assert result.stdout.rstrip("\n") == audit_text(article)
     counts = [len(article.having(status)) for status in ("differs", "cannot be checked", "reproduced")]
-    assert "{} differs, {} cannot be checked, {} reproduced".format(*counts) in result.stdout
+    assert "{} differ, {} cannot be checked, {} reproduced".format(*counts) in result.stdout
     assert "Table 10: relative error [%]: printed 0.923, recomputed 0.9454." in result.stdout
 
 

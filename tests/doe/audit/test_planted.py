@@ -266,6 +266,18 @@ def test_a_factor_that_holm_s_correction_loses_is_remarked(clean):
     assert "F5 (p = 0.054)" in remarks[0].text
 
 
+def test_errors_printed_with_a_sign_are_no_fault(clean):
+    signed = tuple(printed(f"-{error.text}") for error in clean.ascent.errors)
+    assert differing(replace(clean, ascent=replace(clean.ascent, errors=signed))) == []
+
+
+def test_sums_of_squares_alone_are_held_against_the_design(clean):
+    bare = replace(clean.screening, f=(), p=(), significant=None)
+    audit = audit_study(replace(clean, screening=bare))
+    assert audit.having("differs") == ()
+    assert sum(figure.where == "Table 5" for figure in audit.figures) == 9
+
+
 def test_without_its_design_the_standard_order_is_tried(clean):
     screening = replace(clean.screening, design=None)
     assert audit_study(replace(clean, screening=screening)).having("cannot be checked") == ()
