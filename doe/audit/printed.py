@@ -13,6 +13,8 @@ from doe.errors import AuditError
 from doe.record import Record
 
 NUMBER = re.compile(r"([<>]?)\s*([+-]?(?:\d+\.?\d*|\.\d+))(?:[eE]([+-]?\d{1,3}))?")
+SMALLEST, LARGEST = 1e-30, 1e30
+"""Sizes that physical quantities have in any unit; squares of sums of them stay finite."""
 DUST = 1e-9
 """Relative rounding of the recomputation itself, far below any print."""
 
@@ -42,7 +44,7 @@ class Printed(Record):
 
 
 def printed(text: str) -> Printed:
-    """Read a figure. Raises AuditError for what is no decimal number, with or without < or >."""
+    """Read a figure. Raises AuditError for what is no decimal number, with or without < or >, of ordinary size."""
     plain = text.strip().replace("\u2212", "-")
     match = NUMBER.fullmatch(plain)
     if match is None:
@@ -54,4 +56,7 @@ def printed(text: str) -> Printed:
         kind: Literal["", "<", ">"] = "<"
     else:
         kind = ">" if bound == ">" else ""
-    return Printed(plain, float(f"{digits}e{exponent or 0}"), half * scale, kind)
+    value = float(f"{digits}e{exponent or 0}")
+    if not (value == 0 or SMALLEST <= abs(value) <= LARGEST):
+        raise AuditError(f"{text!r} is out of range; allowed are sizes from {SMALLEST:g} to {LARGEST:g}, and 0")
+    return Printed(plain, value, half * scale, kind)

@@ -60,6 +60,12 @@ def check_surface(study: SurfaceStudy) -> Iterator[Finding]:
         yield from _own_runs(study, study.equation)
 
 
+def _analysed(study: SurfaceStudy, responses: FloatArray | None = None) -> SurfaceAnova:
+    """The analysis of variance of a refit; what a run that nothing can replace leaves undefined is NaN or infinite."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return analyse_surface(refit(study, responses))
+
+
 def equation_terms(equation: Equation, factors: tuple[str, ...]) -> FloatArray:
     """Coefficients of a printed equation in the order of `doe.surface`; a term that is not printed is zero."""
     names = ("1", *term_names(factors)[1:])
@@ -97,18 +103,18 @@ def _anova(study: SurfaceStudy) -> Iterator[Finding]:
     for line in study.anova:
         source = source_name(line.source, study.factors)
         cells += [(source, column, cast(Printed, getattr(line, column))) for column in COLUMNS if getattr(line, column)]
-    fitted = {row.source: row for row in analyse_surface(refit(study)).rows}
+    fitted = {row.source: row for row in _analysed(study).rows}
     known = [(source, column, cell) for source, column, cell in cells if source in fitted]
 
     def recomputed(responses: FloatArray) -> FloatArray:
-        rows = {row.source: row for row in analyse_surface(refit(study, responses)).rows}
+        rows = {row.source: row for row in _analysed(study, responses).rows}
         return np.array([COLUMNS[column][1](rows[source]) for source, column, _ in known])
 
     values, slack = _with_slack(study, recomputed)
     check, how = "analysis of variance from the runs", f"second-order fit to {study.where_runs}"
     for k, (source, column, cell) in enumerate(known):
         quantity = f"{COLUMNS[column][0]} of {source}"
-        if np.isnan(values[k]):
+        if not np.isfinite(values[k]):
             yield unchecked(check, study.where_anova, quantity, "the refit tests this line against nothing", cell.text)
         else:
             yield compared(check, study.where_anova, quantity, cell, float(values[k]), how, float(slack[k]))
@@ -140,16 +146,18 @@ def _statistics(study: SurfaceStudy) -> Iterator[Finding]:
         return
 
     def recomputed(responses: FloatArray) -> FloatArray:
-        anova = analyse_surface(refit(study, responses))
+        anova = _analysed(study, responses)
         return np.array([STATISTICS[name][1](anova) for name in names])
 
     values, slack = _with_slack(study, recomputed)
     how = f"second-order fit to {study.where_runs}"
     for k, name in enumerate(names):
         print_, words = study.statistics[name], STATISTICS[name][0]
-        yield compared(
-            "statistics of the fit", study.where_statistics, words, print_, float(values[k]), how, float(slack[k])
-        )
+        check, where = "statistics of the fit", study.where_statistics
+        if np.isfinite(values[k]):
+            yield compared(check, where, words, print_, float(values[k]), how, float(slack[k]))
+        else:
+            yield unchecked(check, where, words, "the refit cannot do without one of the runs", print_.text)
 
 
 def _coefficients(study: SurfaceStudy, equation: Equation) -> Iterator[Finding]:

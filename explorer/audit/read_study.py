@@ -143,13 +143,17 @@ def _drop_test(entries: Entries, folder: Path) -> DropTest:
     unknown = set(names_in(formula)) - set("LHhvtg") - {"vx", "vy"}
     if unknown:
         raise entries.error("formula", f"{sorted(unknown)[0]!r} is not known; allowed: L, H, h, v, vx, vy, t, g")
+    restitutions = table.numbers(entries.text("column"))
+    wrong = [one.text for one in restitutions if not 0 <= one.value <= 1]
+    if wrong:
+        raise entries.error("column", f"a restitution of {wrong[0]} is not allowed; allowed: 0 … 1")
     return DropTest(
         where=entries.text("where"),
         formula=formula,
         plate_angle_deg=entries.number("plate_angle_deg", 0.0, 89.0),
         fall=entries.number("fall", 0.0, 100.0),
         landing=entries.number("landing", 0.0, 100.0) if "landing" in entries else None,
-        restitutions=table.numbers(entries.text("column")),
+        restitutions=restitutions,
     )
 
 

@@ -234,6 +234,8 @@ SPOILED = {
     "formula": ("study.toml", "E / (2 * G) - 1", "open('x')", "is not arithmetic"),
     "name in a formula": ("study.toml", "(vx + vy) / v", "vz / v", "drop_test.formula: 'vz' is not known"),
     "angle": ("study.toml", "plate_angle_deg = 45.0", "plate_angle_deg = 120", "120 is not allowed; allowed: 0 … 89"),
+    "restitution": ("drop.csv", "0.55", "5.5", "drop_test.column: a restitution of 5.5 is not allowed; allowed: 0 … 1"),
+    "size": ("surface.csv", ",3", ",1e300\n#", "'1e300' is out of range"),
     "row": ("study.toml", 'pair = "0"', 'pair = "9"', "quoted 1.row: 0 rows of drop.csv fit; exactly one is needed"),
     "range": ("study.toml", "low = 20.0", "low = 60.0", "surface.factor: low must be below high"),
     "term": ("study.toml", '"A*B" =', '"A*D" =', "A*D: is not one of 1, A, B, C"),

@@ -39,6 +39,12 @@ def test_a_bound_holds_what_is_beyond_it():
     assert not printed(">100").agrees(80.0)
 
 
+@pytest.mark.parametrize("text", ["1e300", "-1e31", "1e-300"])
+def test_a_size_that_no_quantity_has_is_refused(text):
+    with pytest.raises(AuditError, match="is out of range"):
+        printed(text)
+
+
 @pytest.mark.parametrize("text", ["", "24,68", "nan", "inf", "about 3", "1e9999", "--1", "0x10"])
 def test_what_is_no_printed_number_is_refused(text):
     with pytest.raises(AuditError, match="is not a printed number"):
