@@ -15,6 +15,10 @@ class MeasurementError(ValueError):
     """Measured data that cannot be read; the message is one line naming file, key, value and what is allowed."""
 
 
+class AuditError(ValueError):
+    """A published study that cannot be read; the message is one line naming file, key, value and what is allowed."""
+
+
 class StudyStopped(RuntimeError):
     """A study that ended before its last stage, because what the runs gave cannot be analysed.
 

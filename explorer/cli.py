@@ -13,6 +13,7 @@ import typer
 from typer.core import TyperGroup
 
 from explorer.commands import (
+    audit,
     bench,
     calibrate,
     diagnose,
@@ -117,6 +118,7 @@ app.command()(parameters.parameters)
 app.command()(new.new)
 app.command()(shape.shape)
 app.command()(lab.lab)
+app.command()(audit.audit)
 app.command()(export.export)
 app.command()(replay.replay)
 app.command()(verify.verify)

@@ -1,4 +1,4 @@
-"""Decks for other engines: one file per engine, and what they share.
+"""Files for other programs: decks for engines, one file per engine, and what they share; VTK; material tables.
 
 deck.py         what a deck says, whatever the engine;  deck_of(record) makes it from a pour of ours
 triangles.py    cone and gate as triangles, STL
@@ -7,6 +7,8 @@ yade.py         YADE 2023 (yade_pour.py, copied into the folder, reads deck.json
 bed.py          a bed of equal spheres for both, for timing
 frames.py       what the engines write: spheres of one moment
 run.py          run a folder with the installed engine and time its stepping loop
+moments.py      a pour at given moments;  paraview.py them as VTK files
+material_table.py   a material as CSV for EDEM, with the convention of every coefficient
 """
 
 from __future__ import annotations
@@ -21,4 +23,7 @@ from explorer.export.yade import write_yade
 WRITERS: dict[str, Callable[[Path, Deck], None]] = {"liggghts": write_liggghts, "yade": write_yade}
 """Engine → what writes its deck into an existing folder."""
 
-__all__ = ["WRITERS", "Deck", "write_liggghts", "write_yade"]
+PROGRAMS = (*WRITERS, "paraview", "edem")
+"""Everything that something can be exported to."""
+
+__all__ = ["PROGRAMS", "WRITERS", "Deck", "write_liggghts", "write_yade"]

@@ -18,6 +18,10 @@ POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inli
 NUMBER = re.compile(r"^(± )?[−+<]?\d[\d.e−+]*( ?(°|%|mm|MPa|g|s|min|g/s|m/s|kg/m³))?( ± [\d.]+°?)?$")
 
 
+LONGEST_LINE = 60
+"""Characters of a table's cell beyond which its column is broken into lines."""
+
+
 def page(title: str, subtitle: str, sections: Sequence[Section]) -> str:
     """The whole page."""
     links = "\n".join(f'<a href="#{anchor(section.title)}">{escaped(section.title)}</a>' for section in sections)
@@ -100,7 +104,11 @@ def _figure(figure: Figure) -> str:
 
 def _table(table: Table) -> str:
     numeric = [all(_is_number(row[k]) for row in table.rows) for k in range(len(table.header))]
-    kinds = [' class="number"' if is_number else "" for is_number in numeric]
+    long = [any(len(row[k]) > LONGEST_LINE for row in table.rows) for k in range(len(table.header))]
+    kinds = [
+        ' class="number"' if is_number else ' class="sentence"' if is_long else ""
+        for is_number, is_long in zip(numeric, long, strict=True)
+    ]
     head = "".join(f"<th{kind}>{escaped(cell)}</th>" for kind, cell in zip(kinds, table.header, strict=True))
     rows = "\n".join(
         f"<tr>{''.join(f'<td{kind}>{escaped(cell)}</td>' for kind, cell in zip(kinds, row, strict=True))}</tr>"

@@ -32,6 +32,7 @@ caption { caption-side: bottom; text-align: left; padding-top: 7px; }
 th { text-align: left; font-weight: 600; color: var(--soft); vertical-align: bottom; max-width: 15ch; }
 th, td { padding: 5px 14px 5px 0; border-bottom: 1px solid var(--line); }
 td { white-space: nowrap; }
+td.sentence { white-space: normal; min-width: 40ch; }
 .number { text-align: right; }
 figure { margin: 22px 0; }
 figcaption { margin-top: 6px; }

@@ -187,8 +187,8 @@ def test_a_bed_is_written_for_both_engines(engine, tmp_path):
 
 
 def test_an_unknown_engine_is_refused(tmp_path):
-    line = refused(explorer("export", "seed_pour", tmp_path / "new", "--to", "edem"))
-    assert line == "--to edem: not an engine; allowed: liggghts, yade"
+    line = refused(explorer("export", "seed_pour", tmp_path / "new", "--to", "rocky"))
+    assert line == "--to rocky: not a program; allowed: liggghts, yade, paraview, edem"
     assert not (tmp_path / "new").exists()
 
 

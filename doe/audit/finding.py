@@ -1,0 +1,81 @@
+"""What an audit says: of every figure whether it is reproduced, and remarks on what is no figure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from doe.audit.printed import Printed
+from doe.record import Record
+
+Status = Literal["reproduced", "differs", "cannot be checked"]
+
+
+@dataclass(frozen=True)
+class Figure(Record):
+    """One printed figure, or one group of figures that cannot be checked.
+
+    check: the general check that was made. where: table, equation or section. printed: as printed. recomputed: a
+    number in the unit of the print, words, or None. slack: how far rounding of what went in can move it. how: from
+    what it was recomputed, or why it cannot be.
+    """
+
+    check: str
+    where: str
+    quantity: str
+    status: Status
+    printed: str
+    recomputed: float | str | None
+    slack: float
+    how: str
+
+
+@dataclass(frozen=True)
+class Remark(Record):
+    """Something that a check found which is no figure: a sentence with its numbers."""
+
+    check: str
+    where: str
+    text: str
+
+
+Finding = Figure | Remark
+
+
+@dataclass(frozen=True)
+class Audit(Record):
+    """All findings about one study."""
+
+    title: str
+    source: str
+    figures: tuple[Figure, ...]
+    remarks: tuple[Remark, ...]
+
+    def having(self, status: Status) -> tuple[Figure, ...]:
+        """The figures with one status."""
+        return tuple(figure for figure in self.figures if figure.status == status)
+
+
+def compared(
+    check: str, where: str, quantity: str, print_: Printed, value: float, how: str, slack: float = 0.0
+) -> Figure:
+    """A figure held against what was recomputed, known to ± slack."""
+    status: Status = "reproduced" if print_.agrees(value, slack) else "differs"
+    if status == "reproduced" and not print_.agrees(value):
+        how = f"{how}; within the rounding of what it is computed from"
+    return Figure(check, where, quantity, status, print_.text, value, slack, how)
+
+
+def unchecked(check: str, where: str, quantity: str, why: str, print_: str = "") -> Figure:
+    """A figure that nothing in the publication can be held against."""
+    return Figure(check, where, quantity, "cannot be checked", print_, None, 0.0, why)
+
+
+def short(value: float, digits: int = 4) -> str:
+    """A number inside a sentence."""
+    return f"{value:.{digits}g}"
+
+
+def like(value: float, print_: Printed) -> str:
+    """A number with the decimals of a print."""
+    return f"{value:.{print_.decimals}f}"

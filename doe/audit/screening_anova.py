@@ -1,0 +1,198 @@
+"""The printed analysis of variance of a two-level screening, checked without and with its design.
+
+Without the design: F_j = SS_j/MSE for one and the same MSE, p_j = P(F(1, df_error) > F_j), and the total sum of squares
+of the runs is Σ SS_j + df_error · MSE for an orthogonal design whose dummy columns are the error. With the design:
+SS_j = (Σ x_j y)²/N. Source: Plackett and Burman 1946, Biometrika 33:305.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from doe.audit.finding import Figure, Finding, Remark, compared, short, unchecked
+from doe.audit.printed import Printed
+from doe.audit.rounding import common_half, halves_of, most_agreed, rounding_slack, values_of
+from doe.audit.study import Screening
+from doe.designs import plackett_burman
+from doe.errors import StatisticsError
+from doe.multiple_tests import holm
+
+FloatArray = npt.NDArray[np.float64]
+ALPHA = 0.05
+ADDS_UP = "sums of squares add up"
+
+
+def check_screening(screening: Screening) -> Iterator[Finding]:
+    """F and p of every factor, the total sum of squares, the sums of squares themselves, and what is significant."""
+    yield from _total(screening)
+    if screening.f:
+        low, high = implied_mse(screening.sums, screening.f)
+        yield from _f_values(screening, low, high)
+        yield from _adding_up(screening, low, high)
+    if screening.f and screening.p:
+        yield from _p_values(screening)
+    yield from _sums(screening)
+    if screening.p:
+        yield from _significance(screening)
+
+
+def implied_mse(sums: Sequence[Printed], f: Sequence[Printed]) -> tuple[float, float]:
+    """Interval of the error mean square SS_j/F_j that most factors agree on.
+
+    Raises StatisticsError where no line's F has a digit to say so.
+    """
+    intervals = []
+    for total, ratio in zip(sums, f, strict=True):
+        if ratio.value <= ratio.half:
+            intervals.append(((0.0, np.inf),))
+        else:
+            least = max(0.0, total.value - total.half) / (ratio.value + ratio.half)
+            intervals.append(((least, (total.value + total.half) / (ratio.value - ratio.half)),))
+    middle = float(np.median(values_of(sums) / np.maximum(values_of(f), 1e-300)))
+    low, high, _ = most_agreed(intervals, middle)
+    if not np.isfinite(high) or high <= 0:
+        raise StatisticsError("F is too small in every line to say what the error mean square was")
+    return low, high
+
+
+def _f_values(screening: Screening, low: float, high: float) -> Iterator[Finding]:
+    mse = 0.5 * (low + high)
+    for factor, total, ratio in zip(screening.factors, screening.sums, screening.f, strict=True):
+        value = total.value / mse
+        slack = total.half / mse + value * (high - low) / (2 * mse)
+        how = f"SS/MSE, with the MSE of {short(mse)} that the other lines imply"
+        yield compared("F from sums of squares", screening.where_anova, f"F of {factor.name}", ratio, value, how, slack)
+
+
+def _p_values(screening: Screening) -> Iterator[Finding]:
+    df = screening.error_df
+    for factor, ratio, p in zip(screening.factors, screening.f, screening.p, strict=True):
+
+        def tail(f: FloatArray) -> FloatArray:
+            return np.asarray(stats.f.sf(np.maximum(f, 0.0), 1, df))
+
+        values = values_of([ratio])
+        slack = float(rounding_slack(tail, values, halves_of([ratio]))[0])
+        how = f"from the printed F on 1 and {df} degrees of freedom"
+        yield compared("p from F", screening.where_anova, f"p of {factor.name}", p, float(tail(values)[0]), how, slack)
+
+
+def _total(screening: Screening) -> Iterator[Finding]:
+    """The printed total sum of squares against that of the runs."""
+    if screening.total is not None:
+        value, slack = _total_of_runs(screening)
+        how = f"Σ (y − mean)² of the {len(screening.responses)} runs of {screening.where_runs}"
+        yield compared(ADDS_UP, screening.where_anova, "total sum of squares", screening.total, value, how, slack)
+
+
+def _total_of_runs(screening: Screening) -> tuple[float, float]:
+    """Σ (y − mean)² and what rounding of the runs does to it."""
+
+    def total(y: FloatArray) -> FloatArray:
+        return np.array([((y - y.mean()) ** 2).sum()])
+
+    runs = values_of(screening.responses)
+    return float(total(runs)[0]), float(rounding_slack(total, runs, common_half(screening.responses))[0])
+
+
+def _adding_up(screening: Screening, low: float, high: float) -> Iterator[Finding]:
+    """Total sum of squares of the runs against the factors' and the error's."""
+    check, factors, n = ADDS_UP, values_of(screening.sums), len(screening.responses)
+    total, of_runs = _total_of_runs(screening)
+    error = screening.error_df * 0.5 * (low + high)
+    explained, parts = float(factors.sum()), n - 1 - factors.size
+    slack = of_runs + float(np.sqrt(3 * (halves_of(screening.sums) ** 2).sum())) + screening.error_df * (high - low) / 2
+    words = f"{explained:.2f} of the {factors.size} factors + {error:.2f} of the error that the F values imply"
+    closes = abs(explained + error - total) <= slack
+    yield Figure(
+        check,
+        f"{screening.where_runs} and {screening.where_anova}",
+        "total sum of squares",
+        "reproduced" if closes else "differs",
+        f"{explained + error:.2f}",
+        total,
+        slack,
+        f"{words}; the runs have {total:.2f}",
+    )
+    if parts != screening.error_df:
+        yield Remark(
+            check,
+            screening.where_anova,
+            f"{n} runs leave {parts} degrees of freedom beside the {factors.size} factors; the error has "
+            f"{screening.error_df}.",
+        )
+
+
+def _sums(screening: Screening) -> Iterator[Finding]:
+    """Every sum of squares from the design, where there is one."""
+    check = "sums of squares from the design"
+    if screening.design is not None:
+        values, slack = _contrasts(screening, screening.design)
+        how = "(Σ x y)²/N over the printed design"
+        for k, (factor, print_) in enumerate(zip(screening.factors, screening.sums, strict=True)):
+            quantity = f"sum of squares of {factor.name}"
+            yield compared(check, screening.where_anova, quantity, print_, float(values[k]), how, float(slack[k]))
+        return
+    where, quantity = screening.where_anova, f"sums of squares of {len(screening.factors)} factors"
+    why = f"{screening.where_runs} prints responses without the rows of the design"
+    standard = _standard_design(len(screening.responses), len(screening.factors))
+    if standard is not None:
+        values, slack = _contrasts(screening, standard)
+        fits = sum(one.agrees(float(v), float(s)) for one, v, s in zip(screening.sums, values, slack, strict=True))
+        if fits == len(screening.sums):
+            how = "(Σ x y)²/N with the Plackett–Burman table in standard order"
+            yield Figure(check, where, quantity, "reproduced", "", None, float(slack.max()), how)
+            return
+        why += (
+            f"; with the Plackett–Burman table in standard order {fits} of {len(screening.sums)} fit, so the runs are "
+            "in another order or of another table"
+        )
+    yield unchecked(check, where, quantity, why)
+
+
+def _contrasts(screening: Screening, design: FloatArray) -> tuple[FloatArray, FloatArray]:
+    runs = values_of(screening.responses)
+
+    def sums(y: FloatArray) -> FloatArray:
+        return np.asarray((design.T @ y) ** 2 / len(y))
+
+    return sums(runs), rounding_slack(sums, runs, common_half(screening.responses))
+
+
+def _standard_design(runs: int, factors: int) -> FloatArray | None:
+    try:
+        return plackett_burman(runs)[:, :factors].astype(np.float64)
+    except StatisticsError:
+        return None
+
+
+def _significance(screening: Screening) -> Iterator[Finding]:
+    if screening.significant is None:
+        return
+    names = [factor.name for factor in screening.factors]
+    p = values_of(screening.p)
+    found = tuple(name for name, value in zip(names, p, strict=True) if value < screening.level)
+    yield Figure(
+        "significance",
+        screening.where_anova,
+        f"factors with p < {screening.level:g}",
+        "reproduced" if set(found) == set(screening.significant) else "differs",
+        ", ".join(screening.significant),
+        ", ".join(found),
+        0.0,
+        "from the printed p values",
+    )
+    adjusted = dict(zip(names, holm(p), strict=True))
+    lost = [name for name in found if adjusted[name] >= ALPHA]
+    if lost:
+        yield Remark(
+            "significance",
+            screening.where_anova,
+            f"{len(names)} factors were tested at once. After Holm's correction {', '.join(lost)} "
+            f"({', '.join(f'p = {adjusted[name]:.3f}' for name in lost)}) "
+            f"{'is' if len(lost) == 1 else 'are'} not significant at {ALPHA:g}.",
+        )

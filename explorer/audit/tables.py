@@ -1,0 +1,87 @@
+"""The CSV files of a published study: text as printed, with file, line and column for whoever has to mend it."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from doe.audit import Printed, printed
+from doe.errors import AuditError
+
+LARGEST = 2_000_000
+"""Bytes of one file; published tables hold thousands."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table as text: column → cells; ``lines`` are the line numbers of its rows."""
+
+    name: str
+    columns: Mapping[str, tuple[str, ...]]
+    lines: tuple[int, ...]
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return len(self.lines)
+
+    def texts(self, column: str) -> tuple[str, ...]:
+        """Cells of a column; AuditError where there is none of that name."""
+        if column not in self.columns:
+            raise AuditError(f"{self.name}: no column {column!r}; it has {', '.join(self.columns)}")
+        return self.columns[column]
+
+    def numbers(self, column: str) -> tuple[Printed, ...]:
+        """A column in which every cell is a number."""
+        return tuple(self.number(column, row) for row in range(self.rows))
+
+    def number(self, column: str, row: int) -> Printed:
+        """One cell; AuditError names file, line and column where it is no number."""
+        try:
+            return printed(self.texts(column)[row])
+        except AuditError as error:
+            raise AuditError(f"{self.name}, line {self.lines[row]}, {column}: {error}") from None
+
+    def number_or_none(self, column: str, row: int) -> Printed | None:
+        """One cell, None where it is empty or the column is not there."""
+        return self.number(column, row) if self.columns.get(column, ())[row : row + 1] not in ((), ("",)) else None
+
+
+def read_table(folder: Path, name: str) -> Table:
+    """A CSV file of a study's folder. Raises AuditError for what is not one, OSError for what cannot be opened."""
+    if Path(name).name != name or not name:
+        raise AuditError(f"{name!r} is not the name of a file beside study.toml")
+    path = folder / name
+    if not path.is_file():
+        raise AuditError(f"{path}: no such file")
+    if path.stat().st_size > LARGEST:
+        raise AuditError(f"{path}: {path.stat().st_size} bytes; allowed are up to {LARGEST}")
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise AuditError(f"{path}: not a text file in UTF-8") from None
+    try:
+        rows = [(number, row) for number, row in _lines(text) if any(cell.strip() for cell in row)]
+    except csv.Error as error:
+        raise AuditError(f"{path}: {error}") from None
+    if len(rows) < 2:
+        raise AuditError(f"{path}: a line of column names and at least one row are needed")
+    header = [cell.strip() for cell in rows[0][1]]
+    if len(set(header)) < len(header) or "" in header:
+        raise AuditError(f"{path}: column names must be there and differ: {', '.join(header)}")
+    for number, row in rows[1:]:
+        if len(row) != len(header):
+            raise AuditError(f"{path}, line {number}: {len(row)} cells; the table has {len(header)} columns")
+    cells = zip(*(row for _, row in rows[1:]), strict=True)
+    columns = {title: tuple(cell.strip() for cell in column) for title, column in zip(header, cells, strict=True)}
+    return Table(name, columns, tuple(number for number, _ in rows[1:]))
+
+
+def _lines(text: str) -> list[tuple[int, list[str]]]:
+    """Line number and cells; lines that begin with # are remarks."""
+    kept = [(number, line) for number, line in enumerate(text.splitlines(), 1) if not line.lstrip().startswith("#")]
+    reader = csv.reader(io.StringIO("\n".join(line for _, line in kept)), strict=True)
+    return [(kept[min(reader.line_num, len(kept)) - 1][0], row) for row in reader]

@@ -1,0 +1,39 @@
+"""``explorer audit``: recompute what a published study prints, from its own tables."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+
+def audit(
+    folder: Path | None = typer.Argument(
+        None,
+        metavar="[FOLDER]",
+        help="Folder with study.toml and its tables (doe/audit/README.md); the shipped article if not given.",
+        show_default=False,
+    ),
+    json: bool = typer.Option(False, "--json", help="Print every finding as plain data."),
+    out: Path | None = typer.Option(None, metavar="DIR", help="Folder for report.html, report.md and audit.json."),
+) -> None:
+    """Recompute every figure of a published calibration study that can be recomputed.
+
+    Each is reproduced, differs (with the recomputed value and how it came about), or cannot be checked (with the
+    reason). Exit code 0 whatever was found.
+    """
+    from doe.audit import audit_study
+    from explorer.audit.read_study import read_study
+    from explorer.audit.report import write_audit
+    from explorer.audit.sentences import audit_text
+    from explorer.files.run_folder import appearing, json_text
+    from solver.assets import asset_path
+
+    shipped = asset_path("source_tables", "table1_physical").parent
+    found = audit_study(read_study(shipped if folder is None else folder))
+    if out is not None:
+        with appearing(out) as temporary:
+            write_audit(found, temporary)
+    typer.echo(json_text(found.to_dict()) if json else audit_text(found))
+    if out is not None:
+        typer.echo(f"{out}/report.html, report.md, audit.json", err=True)

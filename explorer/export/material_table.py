@@ -1,0 +1,175 @@
+"""A material as tables for EDEM, and any engine whose parameters are typed in: each coefficient with its convention.
+
+materials.csv      density, shear modulus, Poisson's ratio, Young's modulus                       one row per material
+interactions.csv   restitution, static friction, rolling friction                                 one row per pair
+bodies.csv         mass, principal moments, member spheres: they do not follow from overlapping spheres
+conventions.csv    what each number means here and in EDEM, and whether it may be typed in as it is
+
+Coefficients of the same name differ between engines: a rolling friction acts on another arm and by another law, and a
+restitution may be damping that returns another restitution. Sources: Altair EDEM documentation (Hertz–Mindlin no slip,
+standard rolling friction); Ai, Chen, Rotter and Ooi 2011, Powder Technology 206:269; Thornton, Cummins and Cleary 2013,
+Powder Technology 233:30.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from explorer.export.liggghts import unclamped_restitution
+from solver import Body, Scene
+from solver.effects.set_up import actual
+from solver.material import Pair
+
+Rows = list[Sequence[str]]
+ROLLING, KINETIC = "rolling_resistance", "kinetic_friction"
+
+README = """\
+{title}
+A material for EDEM, or any engine whose parameters are typed in. SI units.
+
+materials.csv     one row per material
+interactions.csv  one row per pair of components, and of each with the wall
+bodies.csv        mass and principal moments of inertia of every component, from its true solid
+conventions.csv   READ THIS FIRST: what each number means here, what EDEM makes of it, and whether it transfers
+
+The law here is Hertz–Mindlin without slip, as EDEM's default is. Rolling friction does not transfer between engines and
+has to be calibrated again where it is not 0.
+{effects}"""
+
+
+def write_material_table(folder: Path, scene: Scene) -> None:
+    """Write the tables of ``scene``, its set-up effects carried out, and a README into an existing folder."""
+    scene = actual(scene)
+    tables = {
+        "materials.csv": _materials(scene),
+        "interactions.csv": _interactions(scene),
+        "bodies.csv": _bodies(scene),
+        "conventions.csv": _conventions(scene),
+    }
+    for name, rows in tables.items():
+        with (folder / name).open("w", newline="", encoding="utf-8") as file:
+            csv.writer(file, lineterminator="\n").writerows(rows)
+    others = [effect.name for effect in scene.effects if effect.on and effect.name not in (ROLLING, KINETIC)]
+    words = f"Effects that these tables cannot hold: {', '.join(others)}.\n" if others else ""
+    (folder / "README.txt").write_text(README.format(title=scene.title, effects=words), encoding="utf-8")
+
+
+def _materials(scene: Scene) -> Rows:
+    used, poured = {scene.rig.wall}, {body.material for body in scene.bodies}
+    rows: Rows = [("material", "density_kg_m3", "shear_modulus_Pa", "poisson_ratio", "youngs_modulus_Pa")]
+    for one in scene.materials:
+        if one.name in used | poured:
+            # Nothing here hangs on the density of a wall, so nobody has to have declared it.
+            density = _number(one.density) if one.name in poured else ""
+            rows.append((one.name, density, *map(_number, (one.shear_modulus, one.poisson_ratio, one.youngs_modulus))))
+    return rows
+
+
+def _interactions(scene: Scene) -> Rows:
+    columns = (
+        "restitution",
+        "restitution_same_damping",
+        "static_friction",
+        "rolling_friction",
+        "rolling_friction_here",
+    )
+    rolling, on = _rolling(scene)
+    rows: Rows = [("a", "b", *columns)]
+    for (a, b), pair in _pairs(scene):
+        same = unclamped_restitution(pair.restitution)
+        # An empty cell: no restitution has that damping; a rolling friction has to be calibrated in the other engine.
+        damping = _number(same) if same > 0.0 else ""
+        friction = (_number(pair.static_friction), "" if on else "0", _number(rolling))
+        rows.append((a, b, _number(pair.restitution), damping, *friction))
+    return rows
+
+
+def _pairs(scene: Scene) -> Iterator[tuple[tuple[str, str], Pair]]:
+    """Every contact that can occur, by component and wall: (names, pair)."""
+    for k, one in enumerate(scene.bodies):
+        others: tuple[Body | str, ...] = (*scene.bodies[k:], scene.rig.wall)
+        for other in others:
+            name = other if isinstance(other, str) else other.name
+            yield (one.name, name), scene.contact_pair(one, other)
+
+
+def _bodies(scene: Scene) -> Rows:
+    columns = ("mass_kg", "Ixx_kg_m2", "Iyy_kg_m2", "Izz_kg_m2", "member_spheres", "mass_fraction", "size_distribution")
+    rows: Rows = [("body", "material", *columns)]
+    for body in scene.bodies:
+        numbers = (body.mass, *map(float, body.clump.inertia))
+        counts = (str(len(body.clump.radii)), _number(body.mass_fraction))
+        spread = f"{body.sizes.kind} {body.sizes.spread:g}" if body.sizes.varies else "none"
+        rows.append((body.name, body.material, *map(_number, numbers), *counts, spread))
+    return rows
+
+
+def _conventions(scene: Scene) -> Rows:
+    rolling, on = _rolling(scene)
+    rows: Rows = [("quantity", "unit", "here", "in EDEM", "transfers")]
+    rows += [
+        (
+            "density",
+            "kg/m3",
+            "of the solid; mass and inertia are those of the true shape (bodies.csv)",
+            "times the volume of the particle, which for overlapping spheres is an estimate",
+            "yes, if mass and inertia of bodies.csv are set by hand",
+        ),
+        (
+            "shear modulus, Poisson's ratio",
+            "Pa, 1",
+            "1/E* = sum of (1 - nu^2)/E with E = 2 G (1 + nu); 1/G* = sum of (2 - nu)/G",
+            "the same",
+            "yes",
+        ),
+        (
+            "restitution",
+            "1",
+            "of one central impact, returned exactly: damping of Thornton, Cummins & Cleary (2013), never pulling",
+            "damping 2 sqrt(5/6) |beta| sqrt(S_n m*), beta = ln e/sqrt(ln^2 e + pi^2): returns e only if the force may "
+            "pull at the end of the contact",
+            "yes, if the force may pull; else type in restitution_same_damping, which gives the same damping as here",
+        ),
+        (
+            "static friction",
+            "1",
+            "Coulomb: |F_t| <= mu F_n" + _kinetic(scene),
+            "the same limit",
+            "yes" if not _kinetic(scene) else "only while nothing slides",
+        ),
+        (
+            "rolling friction",
+            "1",
+            f"{_number(rolling)}: elastic-plastic spring (type C, EPSD2), torque up to mu_r F_n R*, R* = reduced "
+            "radius of the two member spheres",
+            "standard model: constant torque mu_r F_n R_i against the spin of each body, R_i = contact point to its "
+            "centre of mass",
+            "no: another arm and another law; calibrate again" if on else "yes: nothing resists rolling here, 0",
+        ),
+        ("mass, moments of inertia", "kg, kg m2", "of the true shape, principal axes", "set by hand", "yes"),
+    ]
+    for effect in scene.effects:
+        if effect.on and effect.name not in (ROLLING, KINETIC):
+            numbers = ", ".join(f"{name} = {getattr(effect, name):g}" for name in effect.amplitudes)
+            rows.append((f"effect {effect.name}", "SI", numbers, "not in these tables", "no"))
+    return rows
+
+
+def _rolling(scene: Scene) -> tuple[float, bool]:
+    """Rolling friction here, and whether anything resists rolling."""
+    effect = scene.effect(ROLLING)
+    return float(getattr(effect, effect.amplitudes[0])), effect.on
+
+
+def _kinetic(scene: Scene) -> str:
+    """Words about kinetic friction; empty where it is the static one."""
+    effect = scene.effect(KINETIC)
+    if not effect.on:
+        return ""
+    return "; while sliding less: " + ", ".join(f"{name} = {getattr(effect, name):g}" for name in effect.amplitudes)
+
+
+def _number(value: float) -> str:
+    return f"{value:.7g}"

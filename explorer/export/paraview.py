@@ -1,0 +1,209 @@
+"""A pour as VTK files (.vtu, unstructured grids) for ParaView: bodies, true shapes, member spheres, contacts, rig.
+
+Each file is a set of points with numbers at them, SI. Several moments are one file each, and a collection (.pvd) per
+kind that ParaView opens as one animation. Written by meshio, which is an optional extra.
+"""
+
+from __future__ import annotations
+
+import importlib
+import xml.etree.ElementTree as ET
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from explorer.errors import CommandError
+from explorer.export.moments import Moment
+from explorer.scene.meshes import GATE_NAME, Triangles, body_triangles, rig_triangles
+from solver import Scene
+from solver.contacts import loads
+from solver.insertion import rotation_matrix
+from solver.rigs import Rig
+
+Array = npt.NDArray[np.float64]
+Numbers = Mapping[str, npt.NDArray[Any]]
+Grid = tuple[Array, str, npt.NDArray[Any], Numbers, Numbers]
+"""Points (n, 3) [m], type of the cells, their points, numbers per point, numbers per cell."""
+
+README = """\
+{title}
+Seed {seed}, {outcome} after {time:.4g} s. {moments} moment(s). SI units throughout; z is up.
+
+bodies     a point per body at its centre of mass: body (order of entry), component, mass [kg], scale (size relative to
+           the declared one), velocity [m/s], quaternion (wxyz of the principal frame), load (sum of normal forces [N])
+shapes     triangles of the true shapes: body, component
+spheres    a point per member sphere: radius [m], body, component. In ParaView: Representation > Point Gaussian, or
+           Glyph > Sphere with Scale Array = radius, Scale Factor = 2
+contacts   a point per contact: body, partner (another body, or -1 - index of a surface of the rig), force on the body,
+           normal_force, tangential_force [N], normal (from the partner to the body). Left out where nothing touches.
+           Glyph > Arrow with Orientation Array = force shows them
+rig        triangles of the rig's surfaces: surface
+
+components {components}
+surfaces   {surfaces}
+"""
+
+
+def check_meshio() -> None:
+    """Raise :class:`CommandError` where the library that writes VTK files is missing; before anything is simulated."""
+    _meshio()
+
+
+def write_paraview(folder: Path, scene: Scene, seen: tuple[Moment, ...], seed: int, outcome: str) -> None:
+    """Write the files of all moments, collections of them if there are several, and a README into a folder."""
+    names: dict[str, list[tuple[float, str]]] = {}
+    for k, moment in enumerate(seen):
+        for kind, make in KINDS.items():
+            grid = make(scene, moment)
+            if len(grid[2]):
+                name = f"{kind}.vtu" if len(seen) == 1 else f"{kind}_{k:04d}.vtu"
+                _write(folder / name, grid)
+                names.setdefault(kind, []).append((moment.time, name))
+    if len(seen) > 1:
+        for kind, files in names.items():
+            (folder / f"{kind}.pvd").write_text(collection(files), encoding="utf-8")
+    text = README.format(
+        title=scene.title,
+        seed=seed,
+        outcome=outcome,
+        time=seen[-1].time,
+        moments=len(seen),
+        components=_numbered(tuple(body.name for body in scene.bodies)),
+        surfaces=_numbered(scene.rig.surface_names),
+    )
+    (folder / "README.txt").write_text(text, encoding="utf-8")
+
+
+def collection(files: list[tuple[float, str]]) -> str:
+    """A ParaView collection: (time [s], name of a file beside it)."""
+    root = ET.Element("VTKFile", type="Collection", version="0.1")
+    table = ET.SubElement(root, "Collection")
+    for time, name in files:
+        ET.SubElement(table, "DataSet", timestep=f"{time:.9g}", part="0", file=name)
+    ET.indent(root)
+    return '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
+
+
+def body_grid(scene: Scene, moment: Moment) -> Grid:
+    """A point per body in the domain."""
+    bodies = moment.bodies
+    inside = np.flatnonzero(bodies.inside)
+    force = loads(moment.contacts, len(bodies.mass))
+    numbers: Numbers = {
+        "body": inside,
+        "component": bodies.component[inside],
+        "mass": bodies.mass[inside],
+        "scale": bodies.scale[inside],
+        "velocity": bodies.velocity[inside],
+        "quaternion": bodies.quaternion[inside],
+        "load": force[inside],
+    }
+    return bodies.position[inside], "vertex", _vertices(len(inside)), numbers, {}
+
+
+def shape_grid(scene: Scene, moment: Moment) -> Grid:
+    """Triangles of the true shapes of all bodies in the domain, where they are."""
+    shapes = [body_triangles(body) for body in scene.bodies]
+    bodies = moment.bodies
+    parts = []
+    for k in np.flatnonzero(bodies.inside):
+        shape = shapes[bodies.component[k]]
+        turn = rotation_matrix(bodies.quaternion[k])
+        parts.append((bodies.position[k] + float(bodies.scale[k]) * _corners(shape) @ turn.T, shape.faces, int(k)))
+    points, faces, owners = _joined(parts)
+    return points, "triangle", faces, {}, {"body": owners, "component": bodies.component[owners]}
+
+
+def sphere_grid(scene: Scene, moment: Moment) -> Grid:
+    """A point per member sphere."""
+    spheres = moment.spheres
+    owner = moment.bodies.component[spheres.body]
+    numbers: Numbers = {"radius": spheres.radius, "body": spheres.body, "component": owner}
+    return spheres.centre, "vertex", _vertices(len(spheres.radius)), numbers, {}
+
+
+def contact_grid(scene: Scene, moment: Moment) -> Grid:
+    """A point per contact."""
+    contacts = moment.contacts
+    numbers: Numbers = {
+        "body": contacts.body,
+        "partner": contacts.partner,
+        "force": contacts.force,
+        "normal": contacts.normal,
+        "normal_force": contacts.normal_force,
+        "tangential_force": contacts.tangential_force,
+    }
+    return contacts.point, "vertex", _vertices(len(contacts.body)), numbers, {}
+
+
+def rig_grid(scene: Scene, moment: Moment) -> Grid:
+    """Triangles of the rig's surfaces where they stand, without an open gate; infinite planes end beside the rest."""
+    rig: Rig = scene.rig
+    surfaces, parts = rig_triangles(rig), []
+    for index, name in enumerate(rig.surface_names):
+        if name == GATE_NAME and not moment.gate_shut:
+            continue
+        pose = moment.poses[index]
+        parts.append((pose[:3] + _corners(surfaces[name]) @ rotation_matrix(pose[3:]).T, surfaces[name].faces, index))
+    points, faces, owners = _joined(parts)
+    return points, "triangle", faces, {}, {"surface": owners}
+
+
+KINDS: dict[str, Callable[[Scene, Moment], Grid]] = {
+    "bodies": body_grid,
+    "shapes": shape_grid,
+    "spheres": sphere_grid,
+    "contacts": contact_grid,
+    "rig": rig_grid,
+}
+"""Stem of a file → what is in it."""
+
+
+def _write(path: Path, grid: Grid) -> None:
+    points, kind, cells, at_points, at_cells = grid
+    mesh = _meshio().Mesh(
+        np.ascontiguousarray(points, dtype=np.float64),
+        [(kind, np.ascontiguousarray(cells, dtype=np.int64))],
+        point_data={name: np.ascontiguousarray(_wide(values)) for name, values in at_points.items()},
+        cell_data={name: [np.ascontiguousarray(_wide(values))] for name, values in at_cells.items()},
+    )
+    mesh.write(path, file_format="vtu")
+
+
+def _wide(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Whole numbers as 32 bits, which every reader of VTK has."""
+    return values.astype(np.int32) if np.issubdtype(values.dtype, np.integer) else values.astype(np.float64)
+
+
+def _corners(shape: Triangles) -> Array:
+    return shape.vertices.astype(np.float64)
+
+
+def _joined(parts: list[tuple[Array, npt.NDArray[Any], int]]) -> tuple[Array, npt.NDArray[Any], npt.NDArray[Any]]:
+    """Points, triangles renumbered, and the number that each triangle belongs to."""
+    if not parts:
+        return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64), np.zeros(0, dtype=np.int64)
+    first = np.cumsum([0, *(len(points) for points, _, _ in parts[:-1])])
+    faces = [np.asarray(faces, dtype=np.int64) + start for (_, faces, _), start in zip(parts, first, strict=True)]
+    owners = np.repeat([owner for _, _, owner in parts], [len(faces) for _, faces, _ in parts])
+    return np.concatenate([points for points, _, _ in parts]), np.concatenate(faces), owners
+
+
+def _vertices(n: int) -> npt.NDArray[Any]:
+    return np.arange(n, dtype=np.int64)[:, None]
+
+
+def _numbered(names: tuple[str, ...]) -> str:
+    return ", ".join(f"{k} {name}" for k, name in enumerate(names))
+
+
+def _meshio() -> Any:
+    try:
+        return importlib.import_module("meshio")
+    except ImportError:
+        raise CommandError(
+            "--to paraview: meshio, which writes VTK files, is not installed; pip install 'repose-explorer[paraview]'"
+        ) from None

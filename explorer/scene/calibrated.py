@@ -1,0 +1,41 @@
+"""What a finished calibration found, as a scene: its study's set-up with the factors at the optimum."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from doe.study import load_study, with_profile
+from explorer.errors import CommandError
+from solver import ParameterError, Scene, with_values
+
+RESULT = "result.json"
+
+
+def is_calibration(source: str) -> bool:
+    """Whether ``source`` names the folder of a finished calibration."""
+    return (Path(source).expanduser() / RESULT).is_file()
+
+
+def calibrated_scene(source: str) -> tuple[Scene, str]:
+    """The scene at the optimum of the calibration in folder ``source``, and a caution; empty where none is due.
+
+    Raises CommandError for a result that is not one of `explorer calibrate`, ParameterError or AssetNotFoundError where
+    its study is not there any more or has changed so that the optimum does not fit it.
+    """
+    path = Path(source).expanduser() / RESULT
+    try:
+        result: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        study, profile = result["study"], str(result["study"]["profile"]["name"])
+        name = str(study["file"]) if Path(study["file"]).is_file() else str(study["name"])
+        values = {str(key): float(value) for key, value in result["optimum"]["values"].items()}
+        trusted = bool(result["optimum"]["single"]["better_than_noise"])
+    except (json.JSONDecodeError, UnicodeDecodeError, KeyError, TypeError, AttributeError, ValueError, OSError):
+        raise CommandError(f"{path}: is not the result of `explorer calibrate`") from None
+    try:
+        scene = with_values(with_profile(load_study(name), profile)[0].scene, dict(values))
+    except ParameterError as error:
+        raise ParameterError(f"{path}: {error}") from None
+    caution = "" if trusted else f"{path}: its response surface is not better than noise, so this is not a calibration"
+    return scene, caution

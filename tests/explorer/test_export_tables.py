@@ -1,0 +1,123 @@
+"""A material as tables: the declared numbers, and what is said of those that do not transfer."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from explorer.export.liggghts import unclamped_restitution
+from explorer.export.material_table import write_material_table
+from explorer.scene.file import load_scene, with_settings
+from tests.explorer.command_line import explorer, refused
+from tests.explorer.reported_studies import result_of_case
+
+ROLLING = "effect.rolling_resistance.rolling_friction=0.1"
+
+
+def tables(folder, settings=()):
+    write_material_table(folder, with_settings(load_scene("funnel"), settings))
+    found = {}
+    for path in folder.glob("*.csv"):
+        with path.open(newline="", encoding="utf-8") as file:
+            found[path.stem] = list(csv.DictReader(file))
+    return found
+
+
+def test_the_declared_numbers_are_in_the_tables(tmp_path):
+    found = tables(tmp_path, ["material.seed.shear_modulus=60MPa"])
+    seed = found["materials"][0]
+    assert (seed["material"], float(seed["density_kg_m3"])) == ("seed", 346.0)
+    assert float(seed["shear_modulus_Pa"]) == 60e6
+    assert float(seed["youngs_modulus_Pa"]) == pytest.approx(2 * 60e6 * 1.31)
+    wall = found["materials"][-1]
+    assert (wall["material"], wall["density_kg_m3"]) == ("rigid_sieve_plate", "")
+    pairs = {(row["a"], row["b"]): row for row in found["interactions"]}
+    assert len(pairs) == 9
+    petiole = pairs["plate", "petiole"]
+    assert [float(petiole[key]) for key in ("restitution", "static_friction")] == [0.40, 0.82]
+    assert float(petiole["restitution_same_damping"]) == pytest.approx(unclamped_restitution(0.40), rel=1e-6)
+
+
+def test_bodies_have_the_mass_of_their_true_solid(tmp_path):
+    bodies = {row["body"]: row for row in tables(tmp_path)["bodies"]}
+    ellipsoid = np.pi / 6 * 27.92e-3 * 11.18e-3 * 6.11e-3 * 346.0
+    assert float(bodies["seed"]["mass_kg"]) == pytest.approx(ellipsoid, rel=1e-4)
+    assert float(bodies["petiole"]["Iyy_kg_m2"]) == float(bodies["petiole"]["Izz_kg_m2"])
+
+
+@pytest.mark.parametrize("settings, cell, here, transfers", [((), "0", "0", "yes"), ((ROLLING,), "", "0.1", "no:")])
+def test_a_rolling_friction_is_not_handed_on_as_a_number(tmp_path, settings, cell, here, transfers):
+    found = tables(tmp_path, settings)
+    assert {row["rolling_friction"] for row in found["interactions"]} == {cell}
+    assert {row["rolling_friction_here"] for row in found["interactions"]} == {here}
+    (row,) = [row for row in found["conventions"] if row["quantity"] == "rolling friction"]
+    assert row["transfers"].startswith(transfers)
+
+
+def test_a_restitution_that_no_other_damping_has_is_left_out(tmp_path):
+    row = tables(tmp_path, ["pair.seed.seed.restitution=0.06"])["interactions"][0]
+    assert (row["restitution"], row["restitution_same_damping"]) == ("0.06", "")
+
+
+def test_effects_that_the_tables_cannot_hold_are_named(tmp_path):
+    found = tables(tmp_path, ["effect.air_drag.strength=1"])
+    assert found["conventions"][-1]["quantity"] == "effect air_drag"
+    assert "air_drag" in (tmp_path / "README.txt").read_text()
+
+
+def test_effects_of_the_set_up_are_carried_out(tmp_path):
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    plain = tables(tmp_path / "a")["bodies"][0]
+    heavy = tables(tmp_path / "b", ["effect.density_error.excess=0.1"])["bodies"][0]
+    assert float(heavy["mass_kg"]) == pytest.approx(1.1 * float(plain["mass_kg"]), rel=1e-5)
+
+
+def test_the_command_writes_them_without_a_pour(tmp_path):
+    result = explorer("export", "sunflower_extract", tmp_path / "edem", "--to", "edem")
+    assert result.exit_code == 0, result.output
+    names = {path.name for path in (tmp_path / "edem").iterdir()}
+    assert names == {"README.txt", "materials.csv", "interactions.csv", "bodies.csv", "conventions.csv"}
+
+
+def test_every_is_about_moments_only(tmp_path):
+    line = refused(explorer("export", "funnel", tmp_path / "new", "--to", "edem", "--every", "0.1"))
+    assert line == "--every: belongs to --to paraview, not to edem"
+
+
+@pytest.fixture(scope="module")
+def calibrations(tmp_path_factory):
+    """Folders with the result.json of a study that found something, and of one that did not."""
+    folders = {}
+    for case in ("planted", "nothing acts"):
+        folders[case] = tmp_path_factory.mktemp(case.replace(" ", "_"))
+        result = result_of_case(case)
+        result["study"]["profile"]["name"] = "standard"  # the made-up studies run in a profile of no file
+        (folders[case] / "result.json").write_text(json.dumps(result), encoding="utf-8")
+    return folders
+
+
+def test_a_calibration_is_exported_at_its_optimum(calibrations, tmp_path):
+    folder = calibrations["planted"]
+    result = explorer("export", folder, tmp_path / "edem", "--to", "edem")
+    assert (result.exit_code, result.stderr) == (0, ""), result.output
+    values = json.loads((folder / "result.json").read_text())["optimum"]["values"]
+    assert "pair.seed.seed.static_friction" in values
+    with (tmp_path / "edem" / "interactions.csv").open(newline="", encoding="utf-8") as file:
+        seeds = next(csv.DictReader(file))
+    assert float(seeds["static_friction"]) == pytest.approx(values["pair.seed.seed.static_friction"], rel=1e-6)
+    assert float(seeds["static_friction"]) != 0.57
+
+
+def test_an_optimum_in_noise_is_exported_with_a_note(calibrations, tmp_path):
+    result = explorer("export", calibrations["nothing acts"], tmp_path / "edem", "--to", "edem")
+    assert result.exit_code == 0, result.output
+    assert "not better than noise, so this is not a calibration" in result.stderr
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"study": 3}', '{"study": {"profile": {"name": "x"}, "file": "x"}}'])
+def test_a_folder_with_another_result_is_one_line(text, tmp_path):
+    (tmp_path / "result.json").write_text(text)
+    line = refused(explorer("export", tmp_path, tmp_path / "new", "--to", "edem"))
+    assert line == f"{tmp_path}/result.json: is not the result of `explorer calibrate`"
