@@ -23,6 +23,8 @@ BoolArray = npt.NDArray[np.bool_]
 COARSE_LINES = 15
 FINE_LINES = 7
 REFINEMENTS = 19
+BLOCK = 5_000_000
+"""Coordinates that are held at once; more models are worked off in blocks."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +76,19 @@ def nearest_points(
     Where the model cannot reach the target the point is its extreme nearest in value. Returns shapes (models,
     k) and (models,). Accuracy about 1e-6 in coded units.
     """
+    k = reference.size
+    block = max(1, BLOCK // (2 * k * k * COARSE_LINES ** (k - 1)))
+    targets = np.broadcast_to(np.asarray(target, dtype=np.float64), len(coefficients))
+    parts = [
+        _nearest_of_block(coefficients[start : start + block], targets[start : start + block], reference, scale)
+        for start in range(0, len(coefficients), block)
+    ]
+    return np.concatenate([points for points, _ in parts]), np.concatenate([reached for _, reached in parts])
+
+
+def _nearest_of_block(
+    coefficients: FloatArray, target: FloatArray, reference: FloatArray, scale: FloatArray
+) -> tuple[FloatArray, BoolArray]:
     k = reference.size
     bounds = extremes(coefficients, k)
     reached = (bounds.low <= target) & (target <= bounds.high)

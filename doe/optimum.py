@@ -27,6 +27,8 @@ from doe.surface_anova import analyse_surface
 FloatArray = npt.NDArray[np.float64]
 
 WIDTH_LINES = 81
+WIDTH_LINES_4 = 31
+"""The same for four factors and more, whose lines stand on a grid of three dimensions and more."""
 SHARE_LEVELS = 21
 
 
@@ -150,10 +152,11 @@ def find_optimum(
 def solution_range(surface: Surface, target: float) -> tuple[FloatArray, FloatArray]:
     """Return the least and greatest coded value of each factor on {model = target}, each of shape (factors,).
 
-    Sampled by axis-parallel lines 2/80 apart; NaN where the cube holds no such point.
+    Sampled by axis-parallel lines 2/80 apart (2/30 from four factors on); NaN where the cube holds no such point.
     """
     k = len(surface.names)
-    points, valid = crossings(surface.coefficients[None, :], target, np.zeros((1, k)), 1.0, WIDTH_LINES)
+    lines = WIDTH_LINES if k < 4 else WIDTH_LINES_4
+    points, valid = crossings(surface.coefficients[None, :], target, np.zeros((1, k)), 1.0, lines)
     found = points[0][valid[0]]
     if not len(found):
         return np.full(k, np.nan), np.full(k, np.nan)

@@ -13,8 +13,10 @@ import typer
 from typer.core import TyperGroup
 
 from explorer.commands import (
+    analyse,
     bench,
     calibrate,
+    design,
     diagnose,
     export,
     measurements,
@@ -111,6 +113,8 @@ app.command()(serve.serve)
 app.command()(simulate.simulate)
 app.command()(calibrate.calibrate)
 app.command()(diagnose.diagnose)
+app.command()(design.design)
+app.command()(analyse.analyse)
 app.command()(runs.runs)
 app.command()(parameters.parameters)
 app.command()(new.new)

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Literal, get_args
 
-AssetKind = Literal["materials", "studies", "benchmarks", "presets", "meshes", "source_tables"]
+AssetKind = Literal["materials", "studies", "benchmarks", "presets", "meshes", "source_tables", "designs", "runs"]
 
 _SUFFIX: dict[AssetKind, str] = {
     "materials": ".toml",
@@ -12,6 +12,8 @@ _SUFFIX: dict[AssetKind, str] = {
     "presets": ".toml",
     "meshes": ".stl",
     "source_tables": ".csv",
+    "designs": ".toml",
+    "runs": ".csv",
 }
 
 
@@ -22,7 +24,12 @@ _SINGULAR: dict[AssetKind, str] = {
     "presets": "preset",
     "meshes": "mesh",
     "source_tables": "source table",
+    "designs": "factors file",
+    "runs": "sheet of runs",
 }
+
+_FOLDER = {"runs": "designs"}
+"""Kinds whose folder is that of another one: a filled sheet lies beside its factors."""
 
 
 class AssetNotFoundError(ValueError):
@@ -94,4 +101,4 @@ def _folder(kind: str) -> Path:
     """Folder of one kind: inside this package in a wheel, in the repository's root in a checkout."""
     packaged = Path(__file__).with_suffix("")
     root = packaged if packaged.is_dir() else Path(__file__).parents[1] / "assets"
-    return root / kind
+    return root / _FOLDER.get(kind, kind)
