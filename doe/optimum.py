@@ -19,7 +19,7 @@ from scipy import stats
 
 from doe.bootstrap import Resampling, bootstrap_coefficients
 from doe.errors import StatisticsError
-from doe.level_set import crossings, extremes, nearest_points
+from doe.level_set import REFINEMENTS, crossings, extremes, nearest_points
 from doe.record import Record
 from doe.surface import Surface
 from doe.surface_anova import analyse_surface
@@ -28,7 +28,8 @@ FloatArray = npt.NDArray[np.float64]
 
 WIDTH_LINES = 81
 WIDTH_LINES_4 = 31
-"""The same for four factors and more, whose lines stand on a grid of three dimensions and more."""
+CLOUD_REFINEMENTS_4 = 9
+"""The same, and refinements of a refit's point (to 1e-3 of the half-width), for four factors and more, whose lines stand on a grid of three dimensions and more."""
 SHARE_LEVELS = 21
 
 
@@ -108,7 +109,8 @@ def find_optimum(
     resampled, resampling = bootstrap_coefficients(surface, refits, seed)
     # A stream of its own: the refits stay the same whether or not the target is uncertain.
     drawn = target + target_standard_error * np.random.default_rng([seed, 1]).standard_normal(refits)
-    cloud, cloud_reached = nearest_points(resampled, drawn, coded_reference, coded_scale)
+    refinements = REFINEMENTS if k < 4 else CLOUD_REFINEMENTS_4
+    cloud, cloud_reached = nearest_points(resampled, drawn, coded_reference, coded_scale, refinements)
     low, high = np.percentile(cloud, [2.5, 97.5], axis=0)
     bounds = extremes(fitted, k)
     solution_low, solution_high = solution_range(surface, target)

@@ -30,6 +30,8 @@ FloatArray = npt.NDArray[np.float64]
 
 MOST_SOLVED = 4
 """Factors up to which the settings that give a target are searched for."""
+REFITS = 1000
+"""Bootstrap refits of the solution; half of them where the search takes long."""
 
 
 @dataclass(frozen=True)
@@ -87,8 +89,8 @@ def analyse_design(
     """Analyse one response.
 
     coded: settings, shape (rows, k), low = -1, high = +1. responses: (rows, replicates), NaN where a run is missing.
-    order: "linear", "interactions" or "quadratic"; None for the highest that the runs bear with 3 degrees of freedom for
-    the error. terms: instead of an order, the terms of the model; what they stand on is added.
+    order: "linear", "interactions" or "quadratic"; None for the highest that the runs bear with 3 degrees of freedom
+    for the error. terms: instead of an order, the terms of the model; what they stand on is added.
     Raises StatisticsError where nothing can be estimated, or an order or term is asked for that the runs cannot bear.
     """
     notes: list[str] = []
@@ -106,7 +108,11 @@ def analyse_design(
             )
         else:
             optimum = find_optimum(
-                model.surface, target.value, target.reference, target_standard_error=target.standard_error
+                model.surface,
+                target.value,
+                target.reference,
+                refits=REFITS if len(region.names) < MOST_SOLVED else REFITS // 2,
+                target_standard_error=target.standard_error,
             )
             notes += _extrapolation(optimum, model.surface)
     fits = () if chosen is None else fit_summary(coded, responses, region)
