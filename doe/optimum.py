@@ -29,7 +29,9 @@ FloatArray = npt.NDArray[np.float64]
 WIDTH_LINES = 81
 WIDTH_LINES_4 = 31
 CLOUD_REFINEMENTS_4 = 9
-"""The same, and refinements of a refit's point (to 1e-3 of the half-width), for four factors and more, whose lines stand on a grid of three dimensions and more."""
+"""The same for four factors and more, whose lines stand on a grid of three dimensions and more, and the refinements of
+a refit's point there, to about 1e-3 half-widths.
+"""
 SHARE_LEVELS = 21
 
 

@@ -129,7 +129,7 @@ def curvature(levels: FloatArray, responses: FloatArray) -> Curvature | None:
 
 
 def _unused_columns(levels: IntArray) -> IntArray:
-    """Return the columns of the table that `levels` are the first columns of, (rows, unused); none for another."""
+    """Return the columns of a table that are none of `levels`, (rows, unused); none where they come from no table."""
     rows, k = levels.shape
     for folded in (False, True):
         size = rows // 2 if folded else rows
@@ -138,6 +138,7 @@ def _unused_columns(levels: IntArray) -> IntArray:
         table = plackett_burman(size)
         if folded:
             table = np.vstack([table, -table])
-        if np.array_equal(table[:, :k], levels):
-            return table[:, k:]
+        taken = [j for column in levels.T for j in range(size - 1) if np.array_equal(table[:, j], column)]
+        if len(taken) == k:
+            return np.delete(table, taken, axis=1)
     return np.zeros((rows, 0), dtype=np.int64)

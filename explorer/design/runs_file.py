@@ -25,6 +25,7 @@ DELIMITERS = (",", ";", "\t")
 MISSING = ("", "NA", "-", "–")
 MOST_BYTES = 10_000_000
 HEADER_CELL = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<unit>[^\]]*)\])?$")
+WORDS = re.compile(r"[^<>&\"'`\x00-\x1f]{0,60}")
 SNAP = 1e-6
 """A coded level this near to low, middle or high is that level: what twelve digits and a spreadsheet leave."""
 
@@ -119,6 +120,7 @@ def read_sheet(path: Path, factors: Sequence[Factor] = ()) -> Sheet:
 def runs_of(sheet: Sheet, response: str, only: Sequence[str] = ()) -> Runs:
     """The runs of one response, with all factors or with ``only`` some; raises CommandError as `read_sheet` does."""
     factors = _kept(sheet, only)
+    _check_words(sheet, response)
     if response not in sheet.responses:
         offered = ", ".join(sheet.responses) or "none"
         raise CommandError(f"{sheet.path}: --response {response}: no such column; the responses are {offered}")
@@ -146,6 +148,15 @@ def runs_of(sheet: Sheet, response: str, only: Sequence[str] = ()) -> Runs:
         labels=tuple(map(tuple, labels)),
         missing=sum(map(math.isnan, values)),
     )
+
+
+def _check_words(sheet: Sheet, response: str) -> None:
+    """Name and unit of a response go into titles of charts, which read a little HTML."""
+    for what, text in (("name", response), ("unit", sheet.units.get(response, ""))):
+        if not WORDS.fullmatch(text):
+            raise CommandError(
+                f"{sheet.path}: {what} {_short(text)} of a response; allowed: up to 60 characters, no < > & or quotes"
+            )
 
 
 def _text(path: Path) -> str:

@@ -48,6 +48,9 @@ def equation(part: Plain, index: int) -> tuple[str, str]:
     terms, scales = _terms(names, sizes)
     coded = [unit.of(value) for value in model["coefficients"]]
     actual = [unit.of(value) * scale for value, scale in zip(model["coefficients_natural"], scales, strict=True)]
+    # Results from before models could leave terms out have them all.
+    kept = [k for k, is_in in enumerate(model.get("included", [True] * len(terms))) if is_in]
+    terms, coded, actual = ([values[k] for k in kept] for values in (terms, coded, actual))
     return _sum(coded, terms, 4), _sum(actual, terms, 5)
 
 

@@ -23,8 +23,11 @@ FILTRATION_EFFECTS = {
 
 # Montgomery 2017, section 11.2 (table 11.6): chemical process, coded time and temperature, yield in per cent.
 YIELD_POINTS = np.array(
-    [(-1, -1), (-1, 1), (1, -1), (1, 1), (0, 0), (0, 0), (0, 0), (0, 0), (0, 0)]
-    + [(1.414, 0), (-1.414, 0), (0, 1.414), (0, -1.414)]
+    [
+        *[(-1, -1), (-1, 1), (1, -1), (1, 1)],
+        *[(0, 0)] * 5,
+        *[(1.414, 0), (-1.414, 0), (0, 1.414), (0, -1.414)],
+    ]
 )
 YIELD = np.array([76.5, 77.0, 78.0, 79.5, 79.9, 80.3, 80.0, 79.7, 79.8, 78.4, 75.6, 78.5, 77.0])
 YIELD_REGION = region("AB", np.array([85.0, 175.0]), np.array([5.0, 5.0]))
