@@ -21,10 +21,13 @@ def analysis_text(result: Plain) -> str:
             parts.append(curvature(result["effects"]))
     if result["surface"] is not None:
         parts += [_table(fit_summary(result)), _table(anova_table(result["surface"]["anova"][0]))]
+    told: set[str] = set()
     for section in (in_short(result), diagnostics(result), shape(result), target(result)):
         if section is not None:
             facts = [pair for block in section.blocks if isinstance(block, Facts) for pair in block.pairs]
-            parts.append("\n".join(f"{what}: {words}" for what, words in facts))
+            # The answer stands first and again under its own heading in a report; a terminal needs it once.
+            parts.append("\n".join(f"{what}: {words}" for what, words in facts if words not in told))
+            told |= {words for _, words in facts}
     parts += [f"note: {note}" for note in result["notes"]]
     if result["surface"] is not None:
         parts += [f"note: {note}" for note in result["surface"]["anova"][0]["notes"]]

@@ -50,6 +50,8 @@ CASES = {
     "without a target": (runs(box_behnken(3, 5), 9 + noise(17)), None),
     "target out of reach": (runs(factorial(2), 9 + noise((4, 3))), 1e6),
     "five factors": (runs(factorial(5, ["E=ABCD"]), 9 + noise(16)), 9.0),
+    "four factors": (runs(central_composite(4, 3, "face-centred"), 9 + noise(27)), None),
+    "fifteen factors": (runs(latin_hypercube(15, 40, 1), 9 + noise(40)), None),
     "screening": (runs(plackett_burman(12)[:, :8], 9 + noise(12), "plackett-burman"), None),
     "saturated": (runs(plackett_burman(8), 9 + noise(8), "plackett-burman"), 9.0),
     "hypercube": (

@@ -29,7 +29,7 @@ def model(result: Plain) -> Section | None:
         Facts(
             (
                 ("Equation, coded", f"{coded} (each factor from −1 to +1)"),
-                ("Equation, actual", actual),
+                ("Equation, actual", actual + units_of_factors(result)),
                 ("R²", f"{fixed(anova['r_squared'], 4)}; adjusted {fixed(anova['r_squared_adjusted'], 4)}; predicted "
                        f"{fixed(anova['r_squared_predicted'], 4)} (PRESS {number(anova['press'], 4)}), by whole rows "
                        f"{fixed(anova['r_squared_predicted_by_row'], 4)}"),
@@ -44,6 +44,12 @@ def model(result: Plain) -> Section | None:
     if anova["notes"]:
         blocks.append(Bullets(tuple(anova["notes"])))
     return Section("Model", (*blocks, *_charts(result)))
+
+
+def units_of_factors(result: Plain) -> str:
+    """Units of an equation's letters, in brackets; empty for plain numbers."""
+    units = [f"{factor['name']} in {factor['unit']}" for factor in result["factors"] if factor["unit"]]
+    return f" ({', '.join(units)})" if units else ""
 
 
 def fit_summary(result: Plain) -> Table:

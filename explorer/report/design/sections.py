@@ -5,9 +5,9 @@ from __future__ import annotations
 import shlex
 from collections.abc import Callable
 
-from explorer.report.content import Block, Bullets, Caution, Code, Facts, Section, Table, Text
+from explorer.report.content import Block, Caution, Code, Facts, Section, Table, Text
 from explorer.report.design.effects import effects
-from explorer.report.design.model import diagnostics, model
+from explorer.report.design.model import diagnostics, model, units_of_factors
 from explorer.report.design.target import shape, target
 from explorer.report.findings import Plain, mean_and_sd
 from explorer.report.sections.surface import equation
@@ -18,7 +18,6 @@ from explorer.report.units_for_people import (
     observed,
     parameter_label,
     parameter_value,
-    unit_of_parameter,
 )
 
 
@@ -36,11 +35,13 @@ def in_short(result: Plain) -> Section:
         facts.append(("Factors that act", acting(result)))
     if result["surface"] is not None:
         anova = result["surface"]["anova"][0]
+        if result["effects"] is None:
+            facts.append(("Terms that act", terms_that_act(anova)))
         coded, actual = equation(result["surface"], 0)
         r2 = (anova["r_squared"], anova["r_squared_adjusted"], anova["r_squared_predicted"])
         facts += [
             ("Equation, coded", coded),
-            ("Equation, actual", actual),
+            ("Equation, actual", actual + units_of_factors(result)),
             ("R², adjusted, predicted", ", ".join(fixed(value, 4) for value in r2)),
             ("Scatter of one run", observed(response, anova["sigma"])),
         ]
@@ -69,6 +70,20 @@ def acting(result: Plain) -> str:
     margin = analysis["lenth"]["margin"]
     beyond = [e["name"] for e in analysis["effects"] if e["effect"] is not None and abs(e["effect"]) > margin]
     return f"beyond Lenth's margin {number(margin)}: {enumeration(beyond)}"
+
+
+def terms_that_act(anova: Plain) -> str:
+    """Terms of the model with p < 0.05, each alone."""
+    whole = ("model", "residual", "lack_of_fit", "pure_error", "total")
+    terms = [row for row in anova["rows"] if row["source"] not in whole]
+    acting = [
+        row["source"].replace("*", " × ").replace("^2", "²")
+        for row in terms
+        if row["p"] is not None and row["p"] < 0.05
+    ]
+    if all(row["p"] is None for row in terms):
+        return "cannot be told without scatter"
+    return f"{enumeration(acting)} (p < 0.05 each alone, of {len(terms)} terms)"
 
 
 def factor_table(result: Plain) -> Table:
@@ -111,11 +126,8 @@ def repeat(result: Plain) -> Section:
         "numbers; `result.json` holds all of them."
     )
     versions = tuple((name, version or "not installed") for name, version in result["versions"].items())
-    units = [f"{f['name']} in {unit_of_parameter(f['path']).symbol}" for f in result["factors"] if f["unit"]]
-    blocks: list[Block] = [Text(text), Code(shlex.join(result["command"]))]
-    if units:
-        blocks.append(Bullets((f"Units of the equation: {', '.join(units)}.",)))
-    return Section("How to repeat", (*blocks, Table(("program", "version"), versions)))
+    command = Code(shlex.join(result["command"]))
+    return Section("How to repeat", (Text(text), command, Table(("program", "version"), versions)))
 
 
 SECTIONS: tuple[Callable[[Plain], Section | None], ...] = (

@@ -18,6 +18,9 @@ from explorer.report.units_for_people import (
     percent,
 )
 
+MOST_PANELS = 3
+"""Factors up to which every pair of them has a panel."""
+
 
 def target(result: Plain) -> Section | None:
     """The settings that give the target; None where none was asked for, or found."""
@@ -41,7 +44,7 @@ def target(result: Plain) -> Section | None:
     if surface is not None:
         blocks.append(Figure("solutions", surface, "Every setting on the green surface gives the target."))
     blocks.append(Figure("ranges", ranges(result), "Thin inside thick: the narrower the bar, the better known."))
-    if len(result["factors"]) > 1:
+    if 1 < len(result["factors"]) <= MOST_PANELS:
         caption = (
             f"{len(found['bootstrap_points'])} refits to resampled {found['resampling']}; each dot is the solution "
             f"nearest the reference. {percent(found['share_reached'])} of the refits reach the target."

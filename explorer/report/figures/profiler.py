@@ -86,8 +86,9 @@ def _goal(row: int, goal: float, margin: float) -> list[Json]:
 
 
 def _row(row: int, rows: int, title: str, limits: list[float]) -> Json:
-    height = (1.0 - ROW_GAP * (rows - 1)) / rows
-    top = 1.0 - row * (height + ROW_GAP)
+    gap = min(ROW_GAP, 0.5 / rows)  # the rows keep at least half of the height, however many
+    height = (1.0 - gap * (rows - 1)) / rows
+    top = 1.0 - row * (height + gap)
     return {
         f"xaxis{suffix(row)}": axis(title, anchor=f"y{suffix(row)}"),
         f"yaxis{suffix(row)}": axis("", anchor=f"x{suffix(row)}", domain=[max(0.0, top - height), top], range=limits),
