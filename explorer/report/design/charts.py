@@ -27,7 +27,7 @@ from explorer.report.figures.style import (
 from explorer.report.findings import Plain
 from explorer.report.units_for_people import observable_title, parameter_label
 
-COLOURS = (FACTOR, CHOSEN, ASSUMPTION, TARGET, DUMMY)
+COLOURS = (FACTOR, CHOSEN, ASSUMPTION)
 DASHES = ("solid", "dash", "dot")
 
 
@@ -50,10 +50,9 @@ def single_runs(result: Plain) -> Spec:
     limit = found["outlier_limit"]
     if limit is not None:
         layout["shapes"] += [horizontal_line(sign * limit, CHOSEN, 0, "dash") for sign in (-1, 1)]
-    layout["shapes"] += [
-        horizontal_line(1.0, CHOSEN, 1, "dash"),
-        horizontal_line(found["leverage_limit"], CHOSEN, 2, "dash"),
-    ]
+    layout["shapes"].append(horizontal_line(1.0, CHOSEN, 1, "dash"))
+    if found["leverage_limit"] < 1.0:
+        layout["shapes"].append(horizontal_line(found["leverage_limit"], CHOSEN, 2, "dash"))
     return chart(traces, layout, 340)
 
 
@@ -82,7 +81,7 @@ def ridge(result: Plain) -> Spec:
     df = result["surface"]["models"][0]["df_residual"]
     left, right = side_by_side(2, 0.12)
     traces: list[Json] = []
-    for key, name, colour in (("highest", "highest", FACTOR), ("lowest", "lowest", CHOSEN)):
+    for key, name, colour in (("highest", "highest", TARGET), ("lowest", "lowest", DUMMY)):
         path = model[key]
         mean = np.array(path["predicted"])
         half = float(stats.t.ppf(0.975, df)) * np.array(path["standard_error"])

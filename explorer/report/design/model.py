@@ -99,7 +99,7 @@ def diagnostics(result: Plain) -> Section | None:
         ("Outliers", _which(found["outliers"], labels, f"|studentised residual| > {number(found['outlier_limit'])}, "
                                                        "p = 0.05 for the largest of all")),
         ("Influence", _which(found["influential"], labels, "Cook's distance > 1")),
-        ("Leverage", _which(found["leveraged"], labels, f"above 2p/n = {number(found['leverage_limit'])}")),
+        ("Leverage", _leverage(found, labels)),
         ("Normality of the residuals", f"Shapiro–Wilk p = {p_value(found['shapiro_p'])}"),
         ("Box–Cox", box_cox_words(result["model"]["box_cox"])),
     ]  # fmt: skip
@@ -170,6 +170,14 @@ def _charts(result: Plain) -> list[Block]:
     elif len(factors) > MOST_PANELS:
         blocks.append(Text(f"Contours are drawn for up to {MOST_PANELS} factors; `--only` keeps the ones that act."))
     return blocks
+
+
+def _leverage(found: Plain, labels: list[str]) -> str:
+    limit = found["leverage_limit"]
+    if limit >= 1.0:
+        # A leverage is at most one; with so many terms for the runs the rule has nothing to say.
+        return f"at most {number(max(found['leverage']))}; too few runs per term for the rule 2p/n"
+    return _which(found["leveraged"], labels, f"above 2p/n = {number(limit)}")
 
 
 def _which(positions: list[int], labels: list[str], rule: str) -> str:

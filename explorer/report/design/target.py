@@ -65,7 +65,7 @@ def shape(result: Plain) -> Section | None:
         blocks += [Facts(tuple(_stationary(result, canonical))), axes_table(result, canonical)]
     for key, words in (("highest", "highest"), ("lowest", "lowest")):
         blocks.append(path_table(result, result["model"][key], words, response))
-    caption = "Band: 95 % of the mean. The path ends at the distance of the furthest run."
+    caption = "Band: 95 % of the mean. The path ends at the distance of the furthest run and may leave low … high."
     return Section("Shape and ridge", (*blocks, Figure("ridge", ridge(result), caption)))
 
 
