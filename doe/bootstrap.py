@@ -28,7 +28,9 @@ def bootstrap_coefficients(surface: Surface, refits: int, seed: int) -> tuple[Fl
         resampled, method = _within_points(surface, refits, generator), "replicates within points"
     else:
         resampled, method = _residuals(surface, refits, generator), "residuals"
-    coefficients = fitted_coefficients(second_order_terms(surface.points), resampled).T
+    coefficients = np.zeros((refits, surface.coefficients.size))
+    model = second_order_terms(surface.points)[:, surface.included]
+    coefficients[:, surface.included] = fitted_coefficients(model, resampled).T
     return coefficients, method  # type: ignore[return-value]
 
 

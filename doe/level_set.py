@@ -21,8 +21,12 @@ FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
 COARSE_LINES = 15
+COARSE_LINES_4 = 9
+"""The same for four factors and more, whose lines stand on a grid of three dimensions and more."""
 FINE_LINES = 7
 REFINEMENTS = 19
+BLOCK = 5_000_000
+"""Coordinates that are held at once; more models are worked off in blocks."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +68,11 @@ def extremes(coefficients: FloatArray, k: int) -> Extremes:
 
 
 def nearest_points(
-    coefficients: FloatArray, target: float | FloatArray, reference: FloatArray, scale: FloatArray
+    coefficients: FloatArray,
+    target: float | FloatArray,
+    reference: FloatArray,
+    scale: FloatArray,
+    refinements: int = REFINEMENTS,
 ) -> tuple[FloatArray, BoolArray]:
     """Return, per model, the point of {model = target} nearest to the reference, and whether the target is
     reached.
@@ -72,16 +80,35 @@ def nearest_points(
     coefficients: shape (models, p). target: one for all models, or shape (models,). reference: coded, shape
     (k,), may lie outside the cube. scale: shape (k,); the distance is sum ((x_i - reference_i)/scale_i)^2.
     Where the model cannot reach the target the point is its extreme nearest in value. Returns shapes (models,
-    k) and (models,). Accuracy about 1e-6 in coded units.
+    k) and (models,). Accuracy about 1e-6 in coded units; every refinement less doubles that.
     """
+    k = reference.size
+    block = max(1, BLOCK // (2 * k * k * _coarse_lines(k) ** (k - 1)))
+    targets = np.broadcast_to(np.asarray(target, dtype=np.float64), len(coefficients))
+    parts = [
+        _nearest_of_block(
+            coefficients[start : start + block], targets[start : start + block], reference, scale, refinements
+        )
+        for start in range(0, len(coefficients), block)
+    ]
+    return np.concatenate([points for points, _ in parts]), np.concatenate([reached for _, reached in parts])
+
+
+def _coarse_lines(k: int) -> int:
+    return COARSE_LINES if k < 4 else COARSE_LINES_4
+
+
+def _nearest_of_block(
+    coefficients: FloatArray, target: FloatArray, reference: FloatArray, scale: FloatArray, refinements: int
+) -> tuple[FloatArray, BoolArray]:
     k = reference.size
     bounds = extremes(coefficients, k)
     reached = (bounds.low <= target) & (target <= bounds.high)
     low_is_nearer = np.abs(bounds.low - target) < np.abs(bounds.high - target)
     best = np.where(low_is_nearer[:, None], bounds.low_at, bounds.high_at)
     distance = np.full(len(best), np.inf)
-    centre, radius, lines = np.zeros_like(best), 1.0, COARSE_LINES
-    for _ in range(REFINEMENTS):
+    centre, radius, lines = np.zeros_like(best), 1.0, _coarse_lines(k)
+    for _ in range(refinements):
         points, valid = crossings(coefficients, target, centre, radius, lines)
         lengths = np.where(valid, (((points - reference) / scale) ** 2).sum(axis=-1), np.inf)
         nearest = lengths.argmin(axis=1)

@@ -19,7 +19,7 @@ from scipy import stats
 
 from doe.bootstrap import Resampling, bootstrap_coefficients
 from doe.errors import StatisticsError
-from doe.level_set import crossings, extremes, nearest_points
+from doe.level_set import REFINEMENTS, crossings, extremes, nearest_points
 from doe.record import Record
 from doe.surface import Surface
 from doe.surface_anova import analyse_surface
@@ -27,6 +27,11 @@ from doe.surface_anova import analyse_surface
 FloatArray = npt.NDArray[np.float64]
 
 WIDTH_LINES = 81
+WIDTH_LINES_4 = 31
+CLOUD_REFINEMENTS_4 = 9
+"""The same for four factors and more, whose lines stand on a grid of three dimensions and more, and the refinements of
+a refit's point there, to about 1e-3 half-widths.
+"""
 SHARE_LEVELS = 21
 
 
@@ -106,7 +111,8 @@ def find_optimum(
     resampled, resampling = bootstrap_coefficients(surface, refits, seed)
     # A stream of its own: the refits stay the same whether or not the target is uncertain.
     drawn = target + target_standard_error * np.random.default_rng([seed, 1]).standard_normal(refits)
-    cloud, cloud_reached = nearest_points(resampled, drawn, coded_reference, coded_scale)
+    refinements = REFINEMENTS if k < 4 else CLOUD_REFINEMENTS_4
+    cloud, cloud_reached = nearest_points(resampled, drawn, coded_reference, coded_scale, refinements)
     low, high = np.percentile(cloud, [2.5, 97.5], axis=0)
     bounds = extremes(fitted, k)
     solution_low, solution_high = solution_range(surface, target)
@@ -150,10 +156,11 @@ def find_optimum(
 def solution_range(surface: Surface, target: float) -> tuple[FloatArray, FloatArray]:
     """Return the least and greatest coded value of each factor on {model = target}, each of shape (factors,).
 
-    Sampled by axis-parallel lines 2/80 apart; NaN where the cube holds no such point.
+    Sampled by axis-parallel lines 2/80 apart (2/30 from four factors on); NaN where the cube holds no such point.
     """
     k = len(surface.names)
-    points, valid = crossings(surface.coefficients[None, :], target, np.zeros((1, k)), 1.0, WIDTH_LINES)
+    lines = WIDTH_LINES if k < 4 else WIDTH_LINES_4
+    points, valid = crossings(surface.coefficients[None, :], target, np.zeros((1, k)), 1.0, lines)
     found = points[0][valid[0]]
     if not len(found):
         return np.full(k, np.nan), np.full(k, np.nan)

@@ -2,7 +2,8 @@
 squares.
 
 Factors are coded, x = (value - centre)/half_width, so that the region is the cube [-1, 1]^k. Term order:
-intercept, linear, products (i < j), squares. p = number of terms, n = number of valid runs. Source: Box and
+intercept, linear, products (i < j), squares. p = number of these terms, n = number of valid runs. A model with fewer
+terms keeps this layout, with zeros for what it leaves out. Source: Box and
 Wilson 1951; Myers, Montgomery and Anderson-Cook 2016, Response Surface Methodology, ch. 6.
 """
 
@@ -23,6 +24,7 @@ from doe.replicates import require_matrix
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -30,13 +32,15 @@ class Surface(Record):
     """A fitted second-order model with the runs behind it.
 
     coefficients: coded, shape (p,), unit of the response. coefficients_natural: the same polynomial in
-    natural units. information_inverse: (X'X)^-1, shape (p, p). mse: residual mean square with df_residual
+    natural units. included: which terms are in the model, shape (p,); the others have coefficient and variance zero.
+    information_inverse: (X'X)^-1, shape (p, p). mse: residual mean square with df_residual
     degrees of freedom. Per run, shape (n,): points (n, k) coded, row_of_run (row of the design), point_of_run
     (index of the distinct point), observed, predicted, leverage.
     """
 
     region: Region
     terms: tuple[str, ...]
+    included: BoolArray
     coefficients: FloatArray
     coefficients_natural: FloatArray
     information_inverse: FloatArray
@@ -70,14 +74,17 @@ class Surface(Record):
         return self.predict(coded) - half, self.predict(coded) + half
 
 
-def fit_surface(coded: npt.ArrayLike, responses: npt.ArrayLike, region: Region) -> Surface:
-    """Fit the full second-order model to every valid run.
+def fit_surface(
+    coded: npt.ArrayLike, responses: npt.ArrayLike, region: Region, terms: Sequence[str] | None = None
+) -> Surface:
+    """Fit the second-order model, or those of its terms that are named, to every valid run.
 
     coded: design points, shape (points, k); rows may repeat. responses: shape (points, replicates), NaN where
-    a run is missing. region: names and natural scale of the k factors.
+    a run is missing. region: names and natural scale of the k factors. terms: names as of `term_names`, all if None;
+    the intercept is always in.
 
-    Raises StatisticsError when shapes disagree, the points left cannot separate the terms, or no degree of
-    freedom is left for the error.
+    Raises StatisticsError for an unknown term, when shapes disagree, the points left cannot separate the terms, or no
+    degree of freedom is left for the error.
     """
     design = np.asarray(coded, dtype=np.float64)
     if design.ndim != 2 or design.shape[1] != len(region.names):
@@ -85,26 +92,31 @@ def fit_surface(coded: npt.ArrayLike, responses: npt.ArrayLike, region: Region) 
     values = require_matrix("responses", responses, rows=design.shape[0])
     row, replicate = np.nonzero(~np.isnan(values))
     points, observed = design[row], values[row, replicate]
-    model = second_order_terms(points)
-    terms = term_names(region.names)
+    included = included_terms(region.names, terms)
+    model = second_order_terms(points)[:, included]
+    size = int(included.sum())
     distinct, point_of_run = np.unique(points, axis=0, return_inverse=True)
-    if np.linalg.matrix_rank(model) < len(terms):
+    if np.linalg.matrix_rank(model) < size:
+        order = "second-order model" if terms is None else "model"
         raise StatisticsError(
             f"responses: the {len(distinct)} distinct points with a valid run cannot separate the "
-            f"{len(terms)} terms of the second-order model"
+            f"{size} terms of the {order}"
         )
-    df = observed.size - len(terms)
+    df = observed.size - size
     if df < 1:
-        raise StatisticsError(f"responses: {observed.size} valid runs leave no error; {len(terms) + 1} are needed")
-    coefficients = fitted_coefficients(model, observed)
-    predicted = model @ coefficients
+        raise StatisticsError(f"responses: {observed.size} valid runs leave no error; {size + 1} are needed")
+    fitted = fitted_coefficients(model, observed)
+    predicted = model @ fitted
     inverse: FloatArray = np.linalg.inv(model.T @ model).astype(np.float64)
+    coefficients, padded = np.zeros(included.size), np.zeros((included.size, included.size))
+    coefficients[included], padded[np.ix_(included, included)] = fitted, inverse
     return Surface(
         region=region,
-        terms=terms,
+        terms=term_names(region.names),
+        included=included,
         coefficients=coefficients,
         coefficients_natural=natural_coefficients(coefficients, region),
-        information_inverse=inverse,
+        information_inverse=padded,
         mse=float(((observed - predicted) ** 2).sum()) / df,
         df_residual=df,
         points=points,
@@ -115,6 +127,20 @@ def fit_surface(coded: npt.ArrayLike, responses: npt.ArrayLike, region: Region) 
         leverage=np.einsum("ni,ij,nj->n", model, inverse, model),
         missing_runs=int(values.size - observed.size),
     )
+
+
+def included_terms(names: Sequence[str], terms: Sequence[str] | None) -> BoolArray:
+    """Return which of the second-order terms of `names` are among `terms`, shape (p,); all of them for None.
+
+    Raises StatisticsError for a term that the model does not have.
+    """
+    known = term_names(names)
+    if terms is None:
+        return np.ones(len(known), dtype=np.bool_)
+    for term in terms:
+        if term not in known:
+            raise StatisticsError(f"terms: '{term}' is no term of the model; allowed are {', '.join(known[1:])}")
+    return np.array([k == 0 or term in terms for k, term in enumerate(known)])
 
 
 def fitted_coefficients(model: FloatArray, observed: FloatArray) -> FloatArray:

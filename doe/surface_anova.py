@@ -72,19 +72,20 @@ def analyse_surface(surface: Surface) -> SurfaceAnova:
     A response without variation gives NaN for every ratio, and a note.
     """
     residuals = surface.observed - surface.predicted
-    n, p = surface.observed.size, surface.coefficients.size
+    n, p = surface.observed.size, int(surface.included.sum())
     mean = float(surface.observed.mean())
     residual_ss = float(residuals @ residuals)
     total_ss = _total_sum_of_squares(surface.observed)
     model_ss = max(0.0, total_ss - residual_ss)
     mse = surface.mse if total_ss > 0 else 0.0
     model_row = _tested("model", model_ss, p - 1, mse, surface.df_residual)
-    term_ss = surface.coefficients**2 / np.diag(surface.information_inverse)
+    chosen = np.flatnonzero(surface.included)[1:]
+    term_ss = surface.coefficients[chosen] ** 2 / np.diag(surface.information_inverse)[chosen]
     term_rows = [
-        _tested(term, float(ss) if total_ss > 0 else 0.0, 1, mse, surface.df_residual)
-        for term, ss in zip(surface.terms[1:], term_ss[1:], strict=True)
+        _tested(surface.terms[k], float(ss) if total_ss > 0 else 0.0, 1, mse, surface.df_residual)
+        for k, ss in zip(chosen, term_ss, strict=True)
     ]
-    press = float((_left_out(residuals, surface.leverage) ** 2).sum())
+    press = _press(surface.leverage, residuals)
     predicted_r2 = _ratio(total_ss - press, total_ss)
     rows = (
         model_row,
@@ -108,7 +109,7 @@ def analyse_surface(surface: Surface) -> SurfaceAnova:
         coefficient_standard_errors=np.sqrt(mse * np.diag(surface.information_inverse)),
         studentized_residuals=_externally_studentized(residuals, surface.leverage, mse, surface.df_residual),
         better_than_noise=better,
-        notes=_notes(rows, total_ss, predicted_r2, better),
+        notes=_notes(rows, total_ss, predicted_r2, better, bool(surface.included.all())),
     )
 
 
@@ -135,7 +136,7 @@ def _lack_of_fit(surface: Surface, residual_ss: float) -> tuple[AnovaRow, ...]:
     within = surface.observed - means[surface.point_of_run]
     within[np.abs(within) <= 8 * np.finfo(np.float64).eps * np.abs(surface.observed)] = 0.0
     pure_ss, pure_df = float(within @ within), int(surface.observed.size - counts.size)
-    lack_ss, lack_df = max(0.0, residual_ss - pure_ss), int(counts.size - surface.coefficients.size)
+    lack_ss, lack_df = max(0.0, residual_ss - pure_ss), int(counts.size - surface.included.sum())
     rows = []
     if lack_df > 0 and pure_df > 0:
         rows.append(_tested("lack_of_fit", lack_ss, lack_df, pure_ss / pure_df, pure_df))
@@ -144,10 +145,11 @@ def _lack_of_fit(surface: Surface, residual_ss: float) -> tuple[AnovaRow, ...]:
     return tuple(rows)
 
 
-def _left_out(residuals: FloatArray, leverage: FloatArray) -> FloatArray:
-    """Return e_i/(1 - h_i), the error of a run predicted by all others; NaN where the fit cannot do without it."""
-    spare = 1 - leverage
-    return np.divide(residuals, spare, out=np.full(residuals.shape, np.nan), where=spare > 1e-9)
+def _press(leverage: FloatArray, residuals: FloatArray) -> float:
+    """Return sum (e_i/(1 - h_i))^2; infinite when a run is indispensable to the fit (h_i = 1)."""
+    if (leverage > 1 - 1e-9).any():
+        return math.inf
+    return float(((residuals / (1 - leverage)) ** 2).sum())
 
 
 def _press_by_row(surface: Surface, residuals: FloatArray) -> float:
@@ -174,13 +176,13 @@ def _externally_studentized(residuals: FloatArray, leverage: FloatArray, mse: fl
     """
     if mse == 0 or df < 2:
         return np.full(residuals.shape, np.nan)
-    without = (df * mse - residuals * _left_out(residuals, leverage)) / (df - 1)
     with np.errstate(invalid="ignore", divide="ignore"):
+        without = (df * mse - residuals**2 / (1 - leverage)) / (df - 1)
         return np.asarray(residuals / np.sqrt(without * (1 - leverage)))
 
 
 def _notes(
-    rows: tuple[AnovaRow, ...], total_ss: float, predicted_r2: float, better_than_noise: bool
+    rows: tuple[AnovaRow, ...], total_ss: float, predicted_r2: float, better_than_noise: bool, is_quadratic: bool
 ) -> tuple[str, ...]:
     """Return what a reader of the table must know, as sentences."""
     by_source = {row.source: row for row in rows}
@@ -197,7 +199,8 @@ def _notes(
     elif by_source["pure_error"].sum_of_squares == 0:
         notes.append("All replicates agree exactly (was the seed varied?); lack of fit cannot be tested.")
     elif "lack_of_fit" in by_source and by_source["lack_of_fit"].p < 0.05:
+        form = "quadratic" if is_quadratic else "of the form of this model"
         notes.append(
-            f"Lack of fit is significant (p = {by_source['lack_of_fit'].p:.3g}); the true surface is not quadratic."
+            f"Lack of fit is significant (p = {by_source['lack_of_fit'].p:.3g}); the true surface is not {form}."
         )
     return tuple(notes)

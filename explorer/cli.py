@@ -13,9 +13,11 @@ import typer
 from typer.core import TyperGroup
 
 from explorer.commands import (
+    analyse,
     audit,
     bench,
     calibrate,
+    design,
     diagnose,
     export,
     lab,
@@ -113,6 +115,8 @@ app.command()(serve.serve)
 app.command()(simulate.simulate)
 app.command()(calibrate.calibrate)
 app.command()(diagnose.diagnose)
+app.command()(design.design)
+app.command()(analyse.analyse)
 app.command()(runs.runs)
 app.command()(parameters.parameters)
 app.command()(new.new)

@@ -3,7 +3,9 @@
 from pathlib import Path
 from typing import Literal, get_args
 
-AssetKind = Literal["materials", "studies", "benchmarks", "presets", "meshes", "source_tables", "laboratory"]
+AssetKind = Literal[
+    "materials", "studies", "benchmarks", "presets", "meshes", "source_tables", "laboratory", "designs", "runs"
+]
 
 _SUFFIX: dict[AssetKind, str] = {
     "materials": ".toml",
@@ -13,6 +15,8 @@ _SUFFIX: dict[AssetKind, str] = {
     "meshes": ".stl",
     "source_tables": ".csv",
     "laboratory": ".csv",
+    "designs": ".toml",
+    "runs": ".csv",
 }
 
 
@@ -24,7 +28,12 @@ _SINGULAR: dict[AssetKind, str] = {
     "meshes": "mesh",
     "source_tables": "source table",
     "laboratory": "laboratory file",
+    "designs": "factors file",
+    "runs": "sheet of runs",
 }
+
+_FOLDER = {"runs": "designs"}
+"""Kinds whose folder is that of another one: a filled sheet lies beside its factors."""
 
 
 class AssetNotFoundError(ValueError):
@@ -96,4 +105,4 @@ def _folder(kind: str) -> Path:
     """Folder of one kind: inside this package in a wheel, in the repository's root in a checkout."""
     packaged = Path(__file__).with_suffix("")
     root = packaged if packaged.is_dir() else Path(__file__).parents[1] / "assets"
-    return root / kind
+    return root / _FOLDER.get(kind, kind)

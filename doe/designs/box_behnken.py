@@ -1,8 +1,9 @@
 """Box–Behnken designs: three levels per factor, no corners of the cube, enough for a full second-order model.
 
 Source: Box and Behnken 1960, Technometrics 2:455. For 3, 4 and 5 factors the design is the 2 x 2 factorial on
-every pair of factors with the others at zero, plus centre runs. From 6 factors on the published blocks are
-not all pairs.
+every pair of factors with the others at zero, plus centre runs. For 6 and 7 factors it is the 2 x 2 x 2 factorial
+on the published triples: for 7 the balanced blocks in which every pair stands once, for 6 the partially balanced
+ones in which every factor stands three times.
 """
 
 from __future__ import annotations
@@ -14,22 +15,27 @@ import numpy.typing as npt
 
 from doe.errors import StatisticsError
 
+TRIPLES = {
+    6: ((0, 1, 3), (1, 2, 4), (2, 3, 5), (0, 3, 4), (1, 4, 5), (0, 2, 5)),
+    7: ((3, 4, 5), (0, 5, 6), (1, 4, 6), (0, 1, 3), (2, 3, 6), (0, 2, 4), (1, 2, 5)),
+}
+"""Number of factors → the factors that are moved together."""
+
 
 def box_behnken(factors: int = 3, centre: int = 5) -> npt.NDArray[np.int64]:
-    """Return the design as levels -1, 0, +1, shape (2 factors (factors - 1) + centre, factors); centre runs
-    come last.
+    """Return the design as levels -1, 0, +1, shape (edges + centre, factors); centre runs come last.
 
-    Raises StatisticsError for factors outside 3..5 or centre < 1 (without a centre run the squares are
-    singular).
+    12, 24, 40, 48 and 56 edge points for 3 to 7 factors. Raises StatisticsError for factors outside 3..7 or
+    centre < 1 (without a centre run the squares are singular).
     """
-    if factors not in (3, 4, 5):
-        raise StatisticsError(f"factors = {factors}: Box–Behnken designs are made for 3, 4 or 5 factors")
+    if factors not in range(3, 8):
+        raise StatisticsError(f"factors = {factors}: Box–Behnken designs are made for 3 to 7 factors")
     if centre < 1:
         raise StatisticsError(f"centre = {centre}: at least one centre run is needed")
     edges = []
-    for i, j in combinations(range(factors), 2):
-        for level_i, level_j in product((-1, 1), repeat=2):
+    for moved in TRIPLES.get(factors, tuple(combinations(range(factors), 2))):
+        for levels in product((-1, 1), repeat=len(moved)):
             point = np.zeros(factors, dtype=np.int64)
-            point[i], point[j] = level_i, level_j
+            point[list(moved)] = levels
             edges.append(point)
     return np.vstack([*edges, np.zeros((centre, factors), dtype=np.int64)])

@@ -1,10 +1,10 @@
-"""Plackett–Burman two-level screening designs with 12 and 28 runs.
+"""Plackett–Burman two-level screening designs with 8, 12, 16, … 48 runs.
 
-Source: Plackett and Burman 1946, Biometrika 33:305. The 28-run table is the one of that paper (nine generator
-rows in three blocks A | B | C); R's FrF2 package and the transcription github.com/paulo-raca/plackett-burman
-print the same. Every column is orthogonal to every other and sums to zero, so N runs estimate N - 1 main
-effects independently of each other. Main effects are not free of two-factor interactions: see
-`interaction_aliases`.
+Source: Plackett and Burman 1946, Biometrika 33:305. Cyclic shifts of one printed row, except for 28 runs (nine
+generator rows in three blocks A | B | C; R's FrF2 package and the transcription
+github.com/paulo-raca/plackett-burman print the same) and 40 (the 20-run table doubled). Every column is orthogonal to
+every other and sums to zero, so N runs estimate N - 1 main effects independently of each other. Main effects are not
+free of two-factor interactions: see `interaction_aliases`.
 """
 
 from __future__ import annotations
@@ -19,7 +19,18 @@ from doe.errors import StatisticsError
 IntArray = npt.NDArray[np.int64]
 FloatArray = npt.NDArray[np.float64]
 
-GENERATOR_12 = "++-+++---+-"
+GENERATORS = {
+    8: "+++-+--",
+    12: "++-+++---+-",
+    16: "++++-+-++--+---",
+    20: "++--++++-+-+----++-",
+    24: "+++++-+-++--++--+-+----",
+    32: "----+-+-+++-++---+++++--++-+--+",
+    36: "-+-+++---+++++-+++--+----+-+-++--+-",
+    44: "++--+-+--+++-+++++---+-+++-----+---++-+-++-",
+    48: "+++++-++++--+-+-+++--+--++-++---+-+-++----+----",
+}
+"""Number of runs → first row of the cyclic designs."""
 GENERATOR_ROWS_28 = (
     "+-++++----+---+--+++-+-++-+",
     "++-+++-----++--+---++++-++-",
@@ -31,18 +42,32 @@ GENERATOR_ROWS_28 = (
     "+++---++-+--+----+++-++--++",
     "+++----++-+--+-+---++-+++-+",
 )
+SIZES = tuple(range(8, 49, 4))
+"""Numbers of runs that have a table."""
 
 
 def plackett_burman(runs: int) -> IntArray:
     """Return the Plackett–Burman design as levels -1 and +1, shape (runs, runs - 1), last row all -1.
 
-    Raises StatisticsError unless runs is 12 or 28.
+    Raises StatisticsError unless runs is a multiple of 4 from 8 to 48.
     """
-    if runs == 12:
-        return _cyclic(_levels(GENERATOR_12))
+    if runs in GENERATORS:
+        return _cyclic(_levels(GENERATORS[runs]))
     if runs == 28:
         return _block_cyclic(np.array([_levels(row) for row in GENERATOR_ROWS_28]))
-    raise StatisticsError(f"runs = {runs} has no Plackett–Burman table here; allowed are 12 and 28")
+    if runs == 40:
+        return _doubled(plackett_burman(20))
+    raise StatisticsError(f"runs = {runs} has no Plackett–Burman table here; allowed are {', '.join(map(str, SIZES))}")
+
+
+def smallest_size(factors: int) -> int:
+    """Return the least number of runs whose table has a column for each of `factors`.
+
+    Raises StatisticsError outside 1..47 factors.
+    """
+    if not 1 <= factors < SIZES[-1]:
+        raise StatisticsError(f"{factors} factors: Plackett–Burman designs here take 1 to {SIZES[-1] - 1}")
+    return next(size for size in SIZES if size > factors)
 
 
 def fold_over(design: IntArray) -> IntArray:
@@ -73,6 +98,16 @@ def _cyclic(generator: IntArray) -> IntArray:
     """Return the generator, its successive right shifts and a row of -1."""
     rows = [np.roll(generator, shift) for shift in range(generator.size)]
     return np.vstack([*rows, -np.ones_like(generator)])
+
+
+def _doubled(design: IntArray) -> IntArray:
+    """Return the design of twice the runs, with one more column that tells the halves apart: [X X -1], [X -X +1].
+
+    The rows are turned so that the one of all -1 stands last.
+    """
+    apart = np.ones((design.shape[0], 1), dtype=np.int64)
+    upper, lower = np.hstack([design, design, -apart]), np.hstack([design, -design, apart])
+    return np.vstack([lower, upper])
 
 
 def _block_cyclic(generators: IntArray) -> IntArray:

@@ -24,6 +24,8 @@ OBSERVABLE_LABELS = {
 SYMBOLS = {"deg": "°", "kg/m3": "kg/m³", "m/s2": "m/s²", "kJ/m3": "kJ/m³", "mJ/m2": "mJ/m²", "1": ""}
 READING_UNIT = SCREEN_UNIT | {"J/m3": "kJ/m3", "J/m2": "mJ/m2", "N/m": "mN/m"}
 """What is written instead of the SI unit."""
+OWN = "own:"
+"""Beginning of the path of a quantity that no scene declares: "own:NAME [UNIT]", its values in that unit already."""
 
 
 @dataclass(frozen=True)
@@ -51,13 +53,22 @@ def parameter_units() -> dict[str, str]:
     return {path.rsplit(".", 1)[-1]: parameter.unit for path, parameter in declared.items()}
 
 
+def own_path(name: str, unit: str) -> str:
+    """Path of a quantity of someone's own, read in ``unit``; "" for a plain number."""
+    return f"{OWN}{name} [{unit}]"
+
+
 def unit_of_parameter(path: str) -> ReadingUnit:
     """Unit in which the parameter ``path`` is read; without symbol for a plain number."""
+    if path.startswith(OWN):
+        return ReadingUnit(_own(path)[1], 1.0)
     return reading_unit(parameter_units().get(path.rsplit(".", 1)[-1], "1"))
 
 
 def unit_of_observable(name: str) -> ReadingUnit:
     """Unit in which the observable ``name`` is read."""
+    if name.startswith(OWN):
+        return ReadingUnit(_own(name)[1], 1.0)
     return reading_unit(REGISTRY[name].unit if name in REGISTRY else "1")
 
 
@@ -87,6 +98,8 @@ def observed(name: str, value: float | None) -> str:
 
 def parameter_label(path: str) -> str:
     """Words for a path, e.g. "pair.seed.seed.static_friction" → "static friction seed–seed"."""
+    if path.startswith(OWN):
+        return _own(path)[0]
     kind, *names, last = path.split(".")
     words = last.replace("_", " ")
     if kind == "pair":
@@ -104,6 +117,8 @@ def axis_title(path: str, name: str) -> str:
 
 def observable_label(name: str) -> str:
     """Words for an observable."""
+    if name.startswith(OWN):
+        return _own(name)[0]
     return OBSERVABLE_LABELS.get(name, name.replace("_", " "))
 
 
@@ -111,6 +126,12 @@ def observable_title(name: str) -> str:
     """Title of an axis over an observable."""
     unit = unit_of_observable(name).symbol
     return observable_label(name) + (f" [{unit}]" if unit else "")
+
+
+def _own(path: str) -> tuple[str, str]:
+    """Words and unit of a quantity of someone's own."""
+    name, _, unit = path.removeprefix(OWN).rpartition(" [")
+    return name.replace("_", " "), unit.removesuffix("]")
 
 
 def number(value: float | None, digits: int = 3) -> str:

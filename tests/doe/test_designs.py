@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from doe.designs import box_behnken, fold_over, interaction_aliases, plackett_burman
+from doe.designs.plackett_burman import smallest_size
 from doe.errors import StatisticsError
+from doe.surface import second_order_terms
 
 # Rows 1, 10, 19 and 28 as R's FrF2 prints them: [A B C], [C A B], [B C A], all minus.
 PRINTED_ROWS_28 = {
@@ -15,7 +17,7 @@ PRINTED_ROWS_28 = {
 }
 
 
-@pytest.mark.parametrize("runs", [12, 28])
+@pytest.mark.parametrize("runs", range(8, 49, 4))
 def test_plackett_burman_is_orthogonal_and_balanced(runs):
     design = plackett_burman(runs)
     assert design.shape == (runs, runs - 1)
@@ -54,10 +56,50 @@ def test_fold_over_frees_main_effects_from_interactions():
     assert not interaction_aliases(folded)[0].any()
 
 
-@pytest.mark.parametrize("runs", [8, 24, 27])
+@pytest.mark.parametrize("runs", [8, 12, 20, 24, 44, 48])
+def test_plackett_burman_generators_are_quadratic_residues(runs):
+    """Paley 1933: for a prime q = runs - 1 = 3 mod 4, +1 at the squares mod q and -1 elsewhere makes such a row. The
+    printed rows are that one, its shifts, or its mirror image. (The printed row of 32 is another one, an m-sequence.)
+    """
+    q = runs - 1
+    squares = {k * k % q for k in range(1, q)}
+    paley = np.array([1 if k in squares else -1 for k in range(q)])
+    kinds = [sign * turn for sign in (1, -1) for turn in (paley, paley[::-1])]
+    printed = plackett_burman(runs)[0]
+    assert any(np.array_equal(np.roll(kind, shift), printed) for kind in kinds for shift in range(q))
+
+
+def test_plackett_burman_40_is_the_20_run_table_doubled():
+    half = plackett_burman(20)
+    table = plackett_burman(40)
+    assert np.array_equal(table[20:, :19], half)
+    assert np.array_equal(table[:20, 19:38], -half)
+    assert (table[-1] == -1).all()
+
+
+@pytest.mark.parametrize("runs", [4, 10, 27, 52])
 def test_plackett_burman_names_the_sizes_it_has(runs):
-    with pytest.raises(StatisticsError, match=f"runs = {runs} .* allowed are 12 and 28"):
+    with pytest.raises(StatisticsError, match=f"runs = {runs} .* allowed are 8, 12, 16, .* 48"):
         plackett_burman(runs)
+
+
+@pytest.mark.parametrize("factors, runs", [(7, 8), (8, 12), (24, 28), (28, 32), (47, 48)])
+def test_smallest_table_has_a_column_for_every_factor(factors, runs):
+    assert smallest_size(factors) == runs
+
+
+@pytest.mark.parametrize("factors", [0, 48])
+def test_more_factors_than_columns_are_refused(factors):
+    with pytest.raises(StatisticsError, match="take 1 to 47"):
+        smallest_size(factors)
+
+
+def test_plackett_burman_12_leaks_a_third_of_every_interaction():
+    """Montgomery 2017, section 8.6.3: every main effect is aliased with every interaction of others at ±1/3."""
+    aliases, pairs = interaction_aliases(plackett_burman(12))
+    for column in range(11):
+        others = [column not in pair for pair in pairs]
+        assert np.allclose(np.abs(aliases[column, others]), 1 / 3)
 
 
 def test_box_behnken_3_is_the_17_run_design_of_the_paper():
@@ -78,7 +120,21 @@ def test_box_behnken_has_the_published_size_and_is_balanced(factors, runs):
     assert np.array_equal(design.T @ design, np.eye(factors) * 4 * (factors - 1))
 
 
-@pytest.mark.parametrize("factors, centre", [(2, 5), (6, 5), (3, 0)])
+@pytest.mark.parametrize("factors, centre, runs", [(6, 6, 54), (7, 6, 62)])
+def test_box_behnken_on_triples_has_the_published_size_and_blocks(factors, centre, runs):
+    """Box and Behnken 1960, table 4: 48 + 6 runs for 6 factors, 56 + 6 for 7, every factor moved in 24 of them; with 7,
+    two factors move together in 8 of them, whichever the two (a balanced block design).
+    """
+    design = box_behnken(factors, centre)
+    assert design.shape == (runs, factors)
+    assert len(np.unique(design, axis=0)) == runs - centre + 1
+    assert np.array_equal(design.T @ design, 24 * np.eye(factors))
+    together = (np.abs(design).T @ np.abs(design))[~np.eye(factors, dtype=bool)]
+    assert set(together.tolist()) == ({8} if factors == 7 else {8, 16})
+    assert np.linalg.matrix_rank(second_order_terms(design.astype(float))) == (factors + 1) * (factors + 2) // 2
+
+
+@pytest.mark.parametrize("factors, centre", [(2, 5), (8, 5), (3, 0)])
 def test_box_behnken_refuses_what_it_is_not_made_for(factors, centre):
     with pytest.raises(StatisticsError):
         box_behnken(factors, centre)

@@ -71,6 +71,11 @@ def chosen_point(result: Plain) -> list[float] | None:
     return None if not found else [found["values"][factor["path"]] for factor in result["surface"]["factors"]]
 
 
+def reference_name(result: Plain) -> str:
+    """What the reference values of the factors are called."""
+    return str(result["study"].get("reference_name", "measured parameters"))
+
+
 def section_point(result: Plain) -> list[float]:
     """Where sections through the surface are laid (natural): the optimum, or the middle of the region before it."""
     chosen = chosen_point(result)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import combinations
 
 from explorer.report.content import Spec
+from explorer.report.figures.model import reference_name
 from explorer.report.figures.style import (
     CHOSEN,
     CLOUD,
@@ -44,7 +45,7 @@ def cloud(result: Plain) -> Spec:
         )
         traces += [
             points([p[i] for p in refits], [p[j] for p in refits], "bootstrap refits", FACTOR, marker=dots, **shown),
-            points([measured[i]], [measured[j]], "measured parameters", DUMMY, marker=cross, **shown),
+            points([measured[i]], [measured[j]], reference_name(result), DUMMY, marker=cross, **shown),
             points([chosen[i]], [chosen[j]], "optimum", CHOSEN, marker=star, **shown),
         ]
         for direction, k, other in (("x", i, "y"), ("y", j, "x")):
@@ -87,7 +88,7 @@ def ranges(result: Plain) -> Spec:
             )
     chosen = [result["optimum"]["values"][factor["path"]] for factor in factors]
     for name, values, colour, symbol in (
-        ("measured parameters", found["reference"], "#ffffff", "diamond"),
+        (reference_name(result), found["reference"], "#ffffff", "diamond"),
         ("optimum", chosen, CHOSEN, "star"),
     ):
         shares = [_share(factor, value) for factor, value in zip(factors, values, strict=True)]

@@ -44,8 +44,8 @@ def profiler(result: Plain, index: int, natural: Sequence[float]) -> Spec:
     height = unit.of(float(model.mean(here)))
     traces: list[Json] = []
     layout: Json = {"showlegend": False, "shapes": []}
-    goal, margin = unit.of(target["mean"]), unit.of(target["margin"])
-    ends = [float(np.min(means - widths)), float(np.max(means + widths)), goal]
+    goal = None if target["mean"] is None else unit.of(target["mean"])
+    ends = [float(np.min(means - widths)), float(np.max(means + widths)), *([] if goal is None else [goal])]
     room = 0.05 * (max(ends) - min(ends))
     for row, factor in enumerate(factors):
         size = unit_of_parameter(factor["path"]).size
@@ -62,12 +62,8 @@ def profiler(result: Plain, index: int, natural: Sequence[float]) -> Spec:
             points([at], [height], "here", CHOSEN, marker={"size": 10}, **place),
         ]
         layout |= _row(row, k, axis_title(factor["path"], factor["name"]), [min(ends) - room, max(ends) + room])
-        domain = {"xref": f"x{suffix(row)} domain", "yref": f"y{suffix(row)}", "x0": 0, "x1": 1}
-        layout["shapes"] += [
-            {"type": "rect", **domain, "y0": goal - margin, "y1": goal + margin, "fillcolor": MARGIN_BAND}
-            | {"line": {"width": 0}, "layer": "below"},
-            {"type": "line", **domain, "y0": goal, "y1": goal, "line": line(TARGET, "dash")},
-        ]
+        if goal is not None:
+            layout["shapes"] += _goal(row, goal, unit.of(target["margin"]))
     layout["yaxis"]["title"] = {"text": observable_title(target["observable"])}
     return chart(traces, layout, 170 * k)
 
@@ -79,9 +75,20 @@ def prediction(result: Plain, index: int, natural: Sequence[float]) -> tuple[flo
     return unit.of(float(model.mean(here))), unit.of(float(model.half_interval(here)))
 
 
+def _goal(row: int, goal: float, margin: float) -> list[Json]:
+    """The target across a row, with its margin."""
+    domain = {"xref": f"x{suffix(row)} domain", "yref": f"y{suffix(row)}", "x0": 0, "x1": 1}
+    return [
+        {"type": "rect", **domain, "y0": goal - margin, "y1": goal + margin, "fillcolor": MARGIN_BAND}
+        | {"line": {"width": 0}, "layer": "below"},
+        {"type": "line", **domain, "y0": goal, "y1": goal, "line": line(TARGET, "dash")},
+    ]
+
+
 def _row(row: int, rows: int, title: str, limits: list[float]) -> Json:
-    height = (1.0 - ROW_GAP * (rows - 1)) / rows
-    top = 1.0 - row * (height + ROW_GAP)
+    gap = min(ROW_GAP, 0.5 / rows)  # the rows keep at least half of the height, however many
+    height = (1.0 - gap * (rows - 1)) / rows
+    top = 1.0 - row * (height + gap)
     return {
         f"xaxis{suffix(row)}": axis(title, anchor=f"y{suffix(row)}"),
         f"yaxis{suffix(row)}": axis("", anchor=f"x{suffix(row)}", domain=[max(0.0, top - height), top], range=limits),

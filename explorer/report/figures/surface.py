@@ -9,7 +9,7 @@ from scipy import stats
 
 from doe.surface import second_order_terms
 from explorer.report.content import Spec
-from explorer.report.figures.model import chosen_point, section_point
+from explorer.report.figures.model import chosen_point, reference_name, section_point
 from explorer.report.figures.style import (
     BELOW_TO_ABOVE,
     CHOSEN,
@@ -34,7 +34,8 @@ GRID = 41
 def contours(result: Plain, index: int) -> Spec:
     """The surface of target ``index`` over each pair of factors, the others at the optimum (before it: the middle).
 
-    Runs of the design are projected on each panel; the thick line is where the model gives the target.
+    Runs of the design are projected on each panel; the thick line is where the model gives the target, where there is
+    one.
     """
     surface, target = result["surface"], result["study"]["targets"][index]
     unit = unit_of_observable(target["observable"])
@@ -45,7 +46,8 @@ def contours(result: Plain, index: int) -> Spec:
     fixed = (np.array(section_point(result)) - centre) / half_width
     pairs = list(combinations(range(len(factors)), 2))
     grids = [_slice(np.array(model["coefficients"]), fixed, i, j) / unit.size for i, j in pairs]
-    level = unit.of(target["mean"])
+    has_target = target["mean"] is not None
+    level = unit.of(target["mean"]) if has_target else float(np.mean(grids))
     reach = max(float(np.abs(grid - level).max()) for grid in grids) or 1.0
     domains = side_by_side(len(pairs), 0.1)
     traces: list[Json] = []
@@ -69,12 +71,13 @@ def contours(result: Plain, index: int) -> Spec:
             }
         )
         at_target = {"start": level, "end": level, "size": 1.0, "coloring": "none"}
-        traces.append(
+        line_at_target = (
             shared
             | {"contours": at_target, "line": {"color": TARGET, "width": 4}, "showscale": False, "hoverinfo": "skip"}
             | {"name": "model = target", "showlegend": panel == 0}
         )
-        traces += _marks(surface, optimum, factors, (i, j), scale, axes, panel == 0)
+        traces += [line_at_target] if has_target else []
+        traces += _marks(surface, optimum, factors, (i, j), scale, axes, panel == 0, reference_name(result))
         layout[f"xaxis{suffix(panel)}"] = axis(
             axis_title(factors[i]["path"], factors[i]["name"]), domain=domains[panel], anchor=f"y{suffix(panel)}"
         )
@@ -103,7 +106,7 @@ def fit(result: Plain, index: int) -> Spec:
             "name": "predicted = observed",
             "line": line(DUMMY, "dash"),
         },
-        points(observed, predicted, "pours of the design", FACTOR, marker={"opacity": 0.75}),
+        points(observed, predicted, "runs of the design", FACTOR, marker={"opacity": 0.75}),
         points(predicted, anova["studentized_residuals"], "residual", FACTOR, marker={"opacity": 0.75}, **residuals),
     ]
     title = observable_title(observable)
@@ -126,7 +129,7 @@ def residual_quantiles(result: Plain, index: int) -> Spec:
     ends = [min(wanted, default=-1.0), max(wanted, default=1.0)]
     traces = [
         {"type": "scatter", "mode": "lines", "x": ends, "y": ends, "name": "as expected", "line": line(DUMMY, "dash")},
-        points(wanted, known, "pours of the design", FACTOR, marker={"opacity": 0.75}),
+        points(wanted, known, "runs of the design", FACTOR, marker={"opacity": 0.75}),
     ]
     layout = {
         "xaxis": axis(f"quantile of t ({max(1, df - 1)} degrees of freedom)"),
@@ -151,6 +154,7 @@ def _marks(
     scale: list[float],
     axes: Json,
     in_legend: bool,
+    reference_is: str,
 ) -> list[Json]:
     """Runs of the design, the measured parameters where they lie in the region, and the optimum if there is one."""
     i, j = pair
@@ -165,7 +169,7 @@ def _marks(
     marks = [points(natural[:, 0].tolist(), natural[:, 1].tolist(), "points of the design", INK, marker=runs, **shown)]
     if ((low <= reference) & (reference <= high)).all():
         x, y = (float(value) for value in reference)
-        marks.append(points([x], [y], "measured parameters", INK, marker=diamond, **shown))
+        marks.append(points([x], [y], reference_is, INK, marker=diamond, **shown))
     if optimum is None:
         return marks
     at = np.array([optimum[i], optimum[j]]) / scale

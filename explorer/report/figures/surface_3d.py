@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from explorer.report.content import Spec
-from explorer.report.figures.model import chosen_point, model_of, section_point
+from explorer.report.figures.model import chosen_point, model_of, reference_name, section_point
 from explorer.report.figures.style import (
     BELOW_TO_ABOVE,
     CHOSEN,
@@ -36,7 +36,7 @@ def height_over(result: Plain, index: int, pair: tuple[int, int]) -> Spec:
     coded = np.broadcast_to(model.coded(section_point(result)), (GRID, GRID, model.centre.size)).copy()
     coded[..., i], coded[..., j] = np.meshgrid(sides, sides)
     heights = model.mean(coded) / unit.size
-    level = unit.of(target["mean"])
+    level = float(heights.mean()) if target["mean"] is None else unit.of(target["mean"])
     reach = max(float(np.abs(heights - level).max()), 1e-9)
     sizes = [unit_of_parameter(surface["factors"][k]["path"]).size for k in pair]
     x, y = (((model.centre[k] + model.half_width[k] * sides) / s).tolist() for k, s in zip(pair, sizes, strict=True))
@@ -53,7 +53,7 @@ def height_over(result: Plain, index: int, pair: tuple[int, int]) -> Spec:
                 (at[:, j] / sizes[1]).tolist(),
                 [unit.of(value) for value in observed["observed"]],
             ],
-            "pours",
+            "runs",
             {"size": 3.5, "color": FACTOR},
         ),
     ]
@@ -69,12 +69,13 @@ def height_over(result: Plain, index: int, pair: tuple[int, int]) -> Spec:
 def solutions(result: Plain, index: int) -> Spec | None:
     """All settings of three factors at which the model gives target ``index``, with the chosen one and its refits.
 
-    None unless there are three factors.
+    None unless there are three factors and a target.
     """
     factors = result["surface"]["factors"]
-    if len(factors) != 3:
+    target = result["study"]["targets"][index]
+    if len(factors) != 3 or target["mean"] is None:
         return None
-    model, target = model_of(result, index), result["study"]["targets"][index]
+    model = model_of(result, index)
     side = np.linspace(-1.0, 1.0, CUBE)
     coded = np.stack(np.meshgrid(side, side, side, indexing="ij"), axis=-1).reshape(-1, 3)
     sizes = np.array([unit_of_parameter(factor["path"]).size for factor in factors])
@@ -93,7 +94,7 @@ def solutions(result: Plain, index: int) -> Spec | None:
         traces.append(_dots(refits.T.tolist(), "bootstrap refits", {"size": 2, "color": CLOUD}))
         measured, chosen = np.array(found["single"]["reference"]) / sizes, np.array(chosen_point(result)) / sizes
         open_diamond = {"size": 6, "color": "#ffffff", "symbol": "diamond", "line": {"color": INK, "width": 2}}
-        traces.append(_dots([[float(v)] for v in measured], "measured parameters", open_diamond))
+        traces.append(_dots([[float(v)] for v in measured], reference_name(result), open_diamond))
         star = {"size": 7, "color": CHOSEN, "symbol": "diamond"}
         traces.append(_dots([[float(v)] for v in chosen], "optimum", star))
     return _in_space(traces, [axis_title(factor["path"], factor["name"]) for factor in factors])

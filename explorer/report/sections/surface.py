@@ -42,13 +42,16 @@ def surface(result: Plain) -> Section:
 
 def equation(part: Plain, index: int) -> tuple[str, str]:
     """The model as text, coded (x from −1 to +1) and in the units that people read."""
-    model, names = part["models"][index], [factor["name"] for factor in part["factors"]]
+    model, letters = part["models"][index], [factor["name"] for factor in part["factors"]]
     sizes = [unit_of_parameter(factor["path"]).size for factor in part["factors"]]
     unit = unit_of_observable(part["observables"][index])
-    terms, scales = _terms(names, sizes)
+    terms, scales = _terms(letters, sizes)
     coded = [unit.of(value) for value in model["coefficients"]]
     actual = [unit.of(value) * scale for value, scale in zip(model["coefficients_natural"], scales, strict=True)]
-    return _sum(coded, terms, 4), _sum(actual, terms, 5)
+    # Results from before models could leave terms out have them all.
+    kept = [k for k, is_in in enumerate(model.get("included", [True] * len(terms))) if is_in]
+    names = [terms[k] for k in kept]
+    return _sum([coded[k] for k in kept], names, 4), _sum([actual[k] for k in kept], names, 5)
 
 
 def anova_table(anova: Plain) -> Table:

@@ -1,0 +1,183 @@
+"""The whole analysis of a design that was run in any laboratory or engine, from its runs to the settings for a target.
+
+Two-level designs are screened (effects, Lenth, error by replicates or by columns that carry no factor); every design
+whose runs can bear it gets a polynomial model with its analysis of variance, diagnostics and the path of steepest
+ascent; a full second-order model its canonical analysis as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.analysis.box_cox import BoxCox, box_cox
+from doe.analysis.contrasts import Contrasts, Curvature, curvature, is_regular, regular_contrasts, screening_contrasts
+from doe.analysis.diagnostics import Diagnostics, diagnose_fit
+from doe.analysis.models import Order, OrderFit, bearable, fit_summary, hierarchical, highest_order, terms_of
+from doe.analysis.ridge import RidgePath, ridge_analysis
+from doe.ascent import Region
+from doe.canonical import Canonical, canonical_analysis
+from doe.optimum import Optimum, find_optimum
+from doe.record import Record
+from doe.screening import Screening, analyse_screening
+from doe.surface import Surface, fit_surface, term_names
+from doe.surface_anova import SurfaceAnova, analyse_surface
+
+FloatArray = npt.NDArray[np.float64]
+
+MOST_SOLVED = 4
+"""Factors up to which the settings that give a target are searched for."""
+REFITS = 1000
+"""Bootstrap refits of the solution; half of them where the search takes long."""
+
+
+@dataclass(frozen=True)
+class Model(Record):
+    """A fitted polynomial and what it says. canonical: only with all squares."""
+
+    surface: Surface
+    anova: SurfaceAnova
+    diagnostics: Diagnostics
+    box_cox: BoxCox
+    canonical: Canonical | None
+    highest: RidgePath
+    lowest: RidgePath
+
+
+@dataclass(frozen=True)
+class Effects(Record):
+    """The contrasts of a two-level design, their effects, and the centre runs against the corners."""
+
+    contrasts: Contrasts
+    screening: Screening
+    curvature: Curvature | None
+
+
+@dataclass(frozen=True)
+class DesignAnalysis(Record):
+    """What the runs of a design say. effects: None unless every level is low, high or (all factors) middle. model: None
+    where the runs leave no error for any model. notes: sentences that a reader must know.
+    """
+
+    fits: tuple[OrderFit, ...]
+    effects: Effects | None
+    model: Model | None
+    optimum: Optimum | None
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Target(Record):
+    """What the response should be, the standard error of that value, and the setting to stay near (natural, (k,))."""
+
+    value: float
+    standard_error: float
+    reference: FloatArray
+
+
+def analyse_design(
+    coded: FloatArray,
+    responses: FloatArray,
+    region: Region,
+    order: Order | None = None,
+    terms: Sequence[str] = (),
+    target: Target | None = None,
+) -> DesignAnalysis:
+    """Analyse one response.
+
+    coded: settings, shape (rows, k), low = -1, high = +1. responses: (rows, replicates), NaN where a run is missing.
+    order: "linear", "interactions" or "quadratic"; None for the highest that the runs bear with 3 degrees of freedom
+    for the error. terms: instead of an order, the terms of the model; what they stand on is added.
+    Raises StatisticsError where nothing can be estimated, or an order or term is asked for that the runs cannot bear.
+    """
+    notes: list[str] = []
+    effects = _effects(coded, responses, region.names, notes)
+    chosen = _terms(coded, responses, region.names, order, terms, saturated_is_fine=effects is not None)
+    model = None if chosen is None else _model(fit_surface(coded, responses, region, chosen), region.names)
+    if model is None:
+        notes.append("The runs leave no error for a model: effects stand beside Lenth's margin only.")
+    optimum = None
+    if target is not None and model is not None:
+        if len(region.names) > MOST_SOLVED:
+            notes.append(
+                f"The settings that give a target are searched for up to {MOST_SOLVED} factors, not "
+                f"{len(region.names)}: analyse the factors that act alone."
+            )
+        else:
+            optimum = find_optimum(
+                model.surface,
+                target.value,
+                target.reference,
+                refits=REFITS if len(region.names) < MOST_SOLVED else REFITS // 2,
+                target_standard_error=target.standard_error,
+            )
+            notes += _extrapolation(optimum, model.surface)
+    fits = () if chosen is None else fit_summary(coded, responses, region)
+    return DesignAnalysis(fits, effects, model, optimum, tuple(notes))
+
+
+def _terms(
+    coded: FloatArray,
+    responses: FloatArray,
+    names: Sequence[str],
+    order: Order | None,
+    terms: Sequence[str],
+    saturated_is_fine: bool,
+) -> tuple[str, ...] | None:
+    """Return the terms of the model; None where the runs bear none and their effects are known without."""
+    if terms:
+        return hierarchical(names, terms)
+    if order is not None:
+        return terms_of(names, order)
+    if saturated_is_fine and not bearable(coded, responses, names, terms_of(names, "linear")):
+        return None
+    return terms_of(names, highest_order(coded, responses, names))
+
+
+def _model(surface: Surface, names: Sequence[str]) -> Model:
+    anova = analyse_surface(surface)
+    squares = surface.included[len(term_names(names)) - len(names) :]
+    highest, lowest = ridge_analysis(surface)
+    return Model(
+        surface=surface,
+        anova=anova,
+        diagnostics=diagnose_fit(surface, anova),
+        box_cox=box_cox(surface),
+        canonical=canonical_analysis(surface) if squares.all() else None,
+        highest=highest,
+        lowest=lowest,
+    )
+
+
+def _extrapolation(optimum: Optimum, surface: Surface) -> list[str]:
+    """Return a warning where the chosen setting is further from the centre than any run, as the corners are from a
+    Box–Behnken design.
+    """
+    distance = float(np.linalg.norm(optimum.point_coded))
+    furthest = float(np.linalg.norm(surface.points, axis=1).max())
+    if distance <= furthest + 1e-6:
+        return []
+    return [
+        f"The chosen setting is {distance:.2f} half-widths from the centre, further than any run ({furthest:.2f}): "
+        "there the model is an extrapolation; run it before it is used."
+    ]
+
+
+def _effects(coded: FloatArray, responses: FloatArray, names: Sequence[str], notes: list[str]) -> Effects | None:
+    """Return the effects of a two-level design; None for another one."""
+    corner, centre = (np.abs(coded) == 1).all(axis=1), ~coded.any(axis=1)
+    if not corner.any() or not (corner | centre).all():
+        return None
+    levels, values = coded[corner].astype(np.int64), responses[corner]
+    if np.linalg.matrix_rank(np.column_stack([np.ones(len(levels)), levels])) <= len(names):
+        return None
+    contrasts = regular_contrasts(levels, names) if is_regular(levels) else screening_contrasts(levels, names)
+    if np.isnan(values).all(axis=1).any() or len(contrasts.names) < len(names):
+        # A lost row ends orthogonality: only what is fitted by least squares can still be told apart.
+        contrasts = Contrasts(levels, tuple(names), (), {})
+        notes.append("Rows without a valid run: interactions and unused columns are left out of the effects.")
+    screening = analyse_screening(contrasts.levels, contrasts.names, values, contrasts.dummies)
+    return Effects(contrasts, screening, curvature(coded, responses))

@@ -1,0 +1,145 @@
+"""Which polynomial the runs of a design can bear: linear, with interactions of two, or full second order.
+
+The fit summary adds one order after the other: SS of an order is what it takes from the residual of the one before,
+tested against its own residual. Source: Myers, Montgomery and Anderson-Cook 2016, Response Surface Methodology, ch. 2.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from doe.ascent import Region
+from doe.errors import StatisticsError
+from doe.record import Record
+from doe.replicates import require_matrix
+from doe.surface import fit_surface, included_terms, second_order_terms
+from doe.surface_anova import analyse_surface
+
+FloatArray = npt.NDArray[np.float64]
+Order = Literal["linear", "interactions", "quadratic"]
+ORDERS: tuple[Order, ...] = get_args(Order)
+
+
+@dataclass(frozen=True)
+class OrderFit(Record):
+    """One order of polynomial on these runs. f, p: of what it adds to the order before; NaN where nothing tests it.
+
+    estimable: False where the runs cannot separate its terms or leave no error; the numbers are then NaN.
+    sigma: residual standard deviation, unit of the response. lack_of_fit_p: NaN without replicates.
+    """
+
+    order: Order
+    terms: int
+    estimable: bool
+    df_residual: int
+    f: float
+    p: float
+    sigma: float
+    r_squared: float
+    r_squared_adjusted: float
+    r_squared_predicted: float
+    lack_of_fit_p: float
+
+
+def terms_of(names: Sequence[str], order: Order) -> tuple[str, ...]:
+    """Return the terms of an order without the intercept: "A", "A*B", "A^2"."""
+    linear = tuple(names)
+    if order == "linear":
+        return linear
+    products = tuple(f"{a}*{b}" for a, b in combinations(names, 2))
+    squares = tuple(f"{name}^2" for name in names) if order == "quadratic" else ()
+    return (*linear, *products, *squares)
+
+
+def hierarchical(names: Sequence[str], terms: Sequence[str]) -> tuple[str, ...]:
+    """Return `terms` with the linear terms that their products and squares stand on, in the order of the model.
+
+    A product or square without them would change its meaning with the origin of the coding (Nelder 1977).
+    """
+    wanted = set(terms)
+    for term in terms:
+        wanted |= set(term.removesuffix("^2").split("*"))
+    included = included_terms(names, sorted(wanted))
+    every = ("intercept", *terms_of(names, "quadratic"))
+    return tuple(term for term, is_in in zip(every, included, strict=True) if is_in and term != "intercept")
+
+
+def fit_summary(coded: FloatArray, responses: FloatArray, region: Region) -> tuple[OrderFit, ...]:
+    """Return the three orders on the valid runs; shapes as in `doe.surface.fit_surface`."""
+    found: list[OrderFit] = []
+    before = _mean_only(responses)
+    for order in ORDERS:
+        terms = terms_of(region.names, order)
+        if not bearable(coded, responses, region.names, terms):
+            nothing = (math.nan,) * 7
+            found.append(OrderFit(order, len(terms), False, 0, *nothing))
+            continue
+        surface = fit_surface(coded, responses, region, terms)
+        anova = analyse_surface(surface)
+        residual = anova.row("residual")
+        f, p = _added(before, (residual.sum_of_squares, residual.df))
+        lack = next((row.p for row in anova.rows if row.source == "lack_of_fit"), math.nan)
+        found.append(
+            OrderFit(
+                order=order,
+                terms=len(terms),
+                estimable=True,
+                df_residual=residual.df,
+                f=f,
+                p=p,
+                sigma=anova.sigma,
+                r_squared=anova.r_squared,
+                r_squared_adjusted=anova.r_squared_adjusted,
+                r_squared_predicted=anova.r_squared_predicted,
+                lack_of_fit_p=lack,
+            )
+        )
+        before = (residual.sum_of_squares, residual.df)
+    return tuple(found)
+
+
+def bearable(coded: FloatArray, responses: FloatArray, names: Sequence[str], terms: Sequence[str]) -> bool:
+    """Return whether the valid runs separate `terms` and leave an error."""
+    values = require_matrix("responses", responses, rows=len(coded))
+    row, _ = np.nonzero(~np.isnan(values))
+    model = second_order_terms(coded[row])[:, included_terms(names, terms)]
+    return bool(len(row) > model.shape[1] and np.linalg.matrix_rank(model) == model.shape[1])
+
+
+def highest_order(coded: FloatArray, responses: FloatArray, names: Sequence[str], least_df: int = 3) -> Order:
+    """Return the highest order that the runs bear with at least `least_df` degrees of freedom for the error.
+
+    Without one, the highest that they bear at all. Raises StatisticsError where not even the linear one is.
+    """
+    runs = int((~np.isnan(responses)).sum())
+    able = [order for order in ORDERS if bearable(coded, responses, names, terms_of(names, order))]
+    if not able:
+        raise StatisticsError(
+            f"responses: {runs} valid runs cannot bear a linear model of {len(names)} factors with an error; "
+            f"at least {len(names) + 2} runs at different settings are needed"
+        )
+    roomy = [order for order in able if runs - 1 - len(terms_of(names, order)) >= least_df]
+    return (roomy or able)[-1]
+
+
+def _mean_only(responses: FloatArray) -> tuple[float, int]:
+    """Return sum of squares about the mean and its degrees of freedom."""
+    values = responses[~np.isnan(responses)]
+    return float(((values - values.mean()) ** 2).sum()), values.size - 1
+
+
+def _added(before: tuple[float, int], after: tuple[float, int]) -> tuple[float, float]:
+    """Return F and p of the terms between two nested fits, each as (residual sum of squares, df)."""
+    df = before[1] - after[1]
+    if df < 1 or not after[0] > 0:
+        return math.nan, math.nan
+    f = max(0.0, before[0] - after[0]) / df / (after[0] / after[1])
+    return f, float(stats.f.sf(f, df, after[1]))

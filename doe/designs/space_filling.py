@@ -1,0 +1,43 @@
+"""Designs that fill the cube: Latin hypercube and Sobol' sequence, for surrogate models and simulations.
+
+Source: McKay, Beckman and Conover 1979, Technometrics 21:239; Sobol' 1967, scrambled after Owen 1998 (both by
+scipy.stats.qmc). The hypercube is optimised against the centred discrepancy by random exchanges.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from scipy.stats import qmc
+
+from doe.errors import StatisticsError
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def latin_hypercube(factors: int, runs: int, seed: int) -> FloatArray:
+    """Return coded points in (-1, 1), shape (runs, factors): one point in each of `runs` slices of every factor.
+
+    Raises StatisticsError for fewer than one factor or two runs.
+    """
+    _require(factors, runs)
+    sampler = qmc.LatinHypercube(factors, optimization="random-cd", rng=np.random.default_rng(seed))
+    return np.asarray(2 * sampler.random(runs) - 1)
+
+
+def sobol(factors: int, runs: int, seed: int) -> FloatArray:
+    """Return the first `runs` points of a scrambled Sobol' sequence, coded, shape (runs, factors).
+
+    Only a power of two of them is balanced. Raises StatisticsError for fewer than one factor or two runs.
+    """
+    _require(factors, runs)
+    power = int(np.ceil(np.log2(runs)))
+    sampler = qmc.Sobol(factors, scramble=True, rng=np.random.default_rng(seed))
+    return np.asarray(2 * sampler.random_base2(power)[:runs] - 1)
+
+
+def _require(factors: int, runs: int) -> None:
+    if factors < 1:
+        raise StatisticsError(f"factors = {factors}; at least one is needed")
+    if runs < 2:
+        raise StatisticsError(f"runs = {runs}; at least two are needed")

@@ -1,0 +1,53 @@
+"""``explorer analyse``: what the filled sheet of a designed experiment says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+from explorer.design.kinds import ModelOrder
+
+
+def analyse(
+    sheet: str = typer.Argument(metavar="RUNS.csv", help="Filled sheet of `explorer design`, or a shipped one's name."),
+    response: str = typer.Option("", metavar="NAME", help="Column to analyse; needed where there are several."),
+    target: float | None = typer.Option(None, help="Value that the response should have: which settings give it?"),
+    target_error: float = typer.Option(0.0, min=0.0, help="Standard error of the target, in its unit."),
+    model: ModelOrder | None = typer.Option(None, help="By default the highest order that the runs can bear."),
+    terms: str = typer.Option("", metavar="A,B,A*B,…", help="Instead of an order, the terms; what they need is added."),
+    only: str = typer.Option("", metavar="NAME,…", help="Only these factors; the others count as scatter."),
+    factors: str | None = typer.Option(None, metavar="FILE", help="Factors file, for a sheet that declares none."),
+    out: Path | None = typer.Option(None, metavar="DIR", help="New folder for report.html, report.md and result.json."),
+    json: bool = typer.Option(False, "--json", help="Print the result as JSON, and nothing else."),
+) -> None:
+    """Effects, model, analysis of variance, diagnostics, canonical analysis, and the settings that give a target."""
+    from explorer.design.analysis import AnalyseOrder, run_analyse
+    from explorer.design.analysis_text import analysis_text
+    from explorer.errors import CommandError
+    from explorer.files.run_folder import json_text
+
+    for option, value in (("--target", target), ("--target-error", target_error)):
+        if value is not None and not abs(value) < float("inf"):
+            raise CommandError(f"{option} {value:g}: allowed: a finite number")
+    if model is not None and terms:
+        raise CommandError("--terms: stands instead of --model; allowed: one of them")
+    order = AnalyseOrder(
+        sheet=sheet,
+        response=response,
+        target=target,
+        target_error=target_error,
+        factors=factors,
+        order=model,
+        terms=_names(terms),
+        only=_names(only),
+        out=out,
+    )
+    result = run_analyse(order)
+    typer.echo(json_text(result) if json else analysis_text(result))
+    if out is not None and not json:
+        typer.echo(f"\nwrote {out / 'report.html'}, report.md, result.json")
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(name.strip() for name in text.split(",") if name.strip())

@@ -1,0 +1,59 @@
+"""``explorer design``: the runs of a designed experiment, as a sheet to fill in anywhere."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+from explorer.design.kinds import Alpha, Kind
+
+
+def design(
+    kind: Kind = typer.Argument(help="Which design."),
+    factors: str = typer.Option(
+        ..., metavar="FILE", help="TOML with name, low, high and unit of every factor, or a shipped one's name."
+    ),
+    out: Path = typer.Option(..., metavar="FILE.csv", help="New sheet, one line per run in the order to run them."),
+    runs: int | None = typer.Option(
+        None, min=2, help="plackett-burman: size of the table, 8 … 48; lhs, sobol: points."
+    ),
+    replicates: int | None = typer.Option(None, min=1, max=1000, help="Runs of each row; 1 if not given."),
+    centre: int | None = typer.Option(None, min=0, max=1000, help="Runs with every factor in the middle."),
+    fold: bool = typer.Option(False, "--fold", help="plackett-burman: add the mirror image of every row."),
+    generator: list[str] = typer.Option([], metavar="E=ABC", help="factorial: a fraction; may be repeated."),
+    fraction: int = typer.Option(0, min=0, help="factorial: 2^(k−P) by the usual generators.", metavar="P"),
+    alpha: Alpha = typer.Option(Alpha.ROTATABLE, help="central-composite: where the axial points stand."),
+    seed: int | None = typer.Option(
+        None, min=0, help="Of the order of the runs, and of lhs and sobol; 1 if not given."
+    ),
+    standard_order: bool = typer.Option(False, "--standard-order", help="Do not shuffle the runs."),
+    sigma: float | None = typer.Option(None, help="Standard deviation of one run: what will the design see?"),
+    effect: float | None = typer.Option(None, help="With which chance will it see a change so large?"),
+    json: bool = typer.Option(False, "--json", help="Print plain data."),
+) -> None:
+    """Write the runs of a design; says what is confused with what, and which effects it will be able to see."""
+    from explorer.design.factors_file import read_factors
+    from explorer.design.plan import PlanOrder, make_plan
+    from explorer.design.plan_text import plan_result, plan_text
+    from explorer.design.sheet import sheet_text
+    from explorer.errors import CommandError
+    from explorer.files.run_folder import json_text
+    from explorer.files.whole_file import write_whole
+    from solver.assets import asset_path
+
+    if out.exists():
+        raise CommandError(f"--out {out}: is there already; name a new file")
+    if not out.absolute().parent.is_dir():
+        raise CommandError(f"--out {out}: no folder {out.absolute().parent}")
+    for option, value in (("--sigma", sigma), ("--effect", effect)):
+        if value is not None and not 0 < value < float("inf"):
+            raise CommandError(f"{option} {value:g}: allowed: a positive number")
+    file = read_factors(asset_path("designs", factors))
+    order = PlanOrder(kind, runs, replicates, centre, seed, fold, tuple(generator), fraction, alpha, standard_order)
+    plan = make_plan(order, file)
+    said = json_text(plan_result(plan, file, sigma, effect)) if json else plan_text(plan, file, sigma, effect)
+    write_whole(out, sheet_text(plan, file))
+    typer.echo(
+        said if json else f"{said}\n\nwrote {out}; fill in {', '.join(file.responses)}, then: explorer analyse {out}"
+    )

@@ -1,0 +1,232 @@
+"""A filled sheet from its order to its analysis, and to files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from doe.analysis.analyse import DesignAnalysis, Target, analyse_design
+from doe.analysis.models import ORDERS, Order
+from doe.designs.factorial import factor_letters
+from doe.errors import StatisticsError
+from doe.record import plain
+from explorer.design.factors_file import read_factors, region_of
+from explorer.design.kinds import ModelOrder
+from explorer.design.runs_file import Runs, read_sheet, runs_of
+from explorer.errors import CommandError
+from explorer.files.run_folder import appearing, json_text
+from explorer.files.run_result import versions
+from explorer.report.units_for_people import own_path
+from solver.assets import asset_path
+
+SCHEMA = 1
+
+
+@dataclass(frozen=True)
+class AnalyseOrder:
+    """What a user asked for."""
+
+    sheet: str
+    response: str = ""
+    target: float | None = None
+    target_error: float = 0.0
+    factors: str | None = None
+    order: ModelOrder | None = None
+    terms: tuple[str, ...] = ()
+    only: tuple[str, ...] = ()
+    out: Path | None = field(default=None)
+
+
+def run_analyse(order: AnalyseOrder) -> dict[str, Any]:
+    """Read, analyse and, with ``out``, write result.json, report.html and report.md. Returns the result."""
+    from explorer.report.design import write_design_report
+
+    path = asset_path("runs", order.sheet)
+    factors = read_factors(asset_path("designs", order.factors)).factors if order.factors else ()
+    sheet = read_sheet(path, factors)
+    runs = runs_of(sheet, order.response or _only_response(sheet.path, sheet.responses), order.only)
+    result = analyse_runs(runs, order)
+    if order.out is not None:
+        with appearing(order.out) as folder:
+            (folder / "result.json").write_text(json_text(result) + "\n", encoding="utf-8")
+            write_design_report(result, folder)
+    return result
+
+
+def analyse_runs(runs: Runs, order: AnalyseOrder) -> dict[str, Any]:
+    """The analysis of one response as JSON types, in the shape that the charts of a study read.
+
+    surface, optimum: as in a study's result, with one target; None where there is no model, or no solution asked for.
+    """
+    region = region_of(runs.factors)
+    reference = np.array([factor.reference for factor in runs.factors])
+    target = None if order.target is None else Target(order.target, order.target_error, reference)
+    try:
+        found = analyse_design(
+            runs.coded, runs.responses, region, _order(runs, order), _symbols(runs, order.terms), target
+        )
+    except StatisticsError as error:
+        raise CommandError(f"{order.sheet}, column {runs.response}: {error}") from None
+    factors = _factors(runs)
+    response = _response_path(runs)
+    return {
+        "schema": SCHEMA,
+        "kind": "design analysis",
+        "sheet": order.sheet,
+        "design": runs.design,
+        "response": {"name": runs.response, "path": response, "unit": runs.unit},
+        "runs": {"rows": len(runs.coded), "valid": int((~np.isnan(runs.responses)).sum()), "missing": runs.missing},
+        "labels": _labels(runs),
+        "factors": factors,
+        "study": {
+            "targets": [{"observable": response, "mean": order.target, "margin": 0.0}],
+            "reference_name": "reference",
+        },
+        "fits": plain(found.fits),
+        "effects": _effects(found, factors, response),
+        "surface": _surface(found, runs, factors, response),
+        "model": _model(found),
+        "optimum": _optimum(found, factors),
+        "notes": list(found.notes),
+        "command": _command(order),
+        "versions": versions(),
+    }
+
+
+def _order(runs: Runs, order: AnalyseOrder) -> Order | None:
+    """The order of the model; a Plackett–Burman design was made for the linear one."""
+    if order.order is not None:
+        return next(one for one in ORDERS if one == order.order)
+    if order.terms or runs.design != "plackett-burman":
+        return None
+    valid = int((~np.isnan(runs.responses)).sum())
+    return "linear" if valid > len(runs.factors) + 1 else None
+
+
+def _symbols(runs: Runs, terms: tuple[str, ...]) -> tuple[str, ...]:
+    """Terms in letters; a term may be written with letters or with the names of the factors."""
+    letters = factor_letters(len(runs.factors))
+    known = {factor.name: letter for letter, factor in zip(letters, runs.factors, strict=True)}
+    known |= {letter: letter for letter in letters}
+
+    def symbol(part: str) -> str:
+        if part not in known:
+            raise CommandError(f"--terms: no factor {part!r}; allowed: {', '.join(known)}, as in A,B,A*B,A^2")
+        return known[part]
+
+    found = []
+    for term in terms:
+        parts = term.replace("²", "^2").removesuffix("^2").split("*")
+        names = sorted({symbol(part.strip()) for part in parts}, key=letters.index)
+        square = term.endswith(("^2", "²")) or len(parts) > len(names)
+        if len(parts) > 2 or (square and len(names) > 1):
+            raise CommandError(f"--terms {term}: allowed are factors, products of two and squares, as in A,B,A*B,A^2")
+        found.append(f"{names[0]}^2" if square else "*".join(names))
+    return tuple(found)
+
+
+def _factors(runs: Runs) -> list[dict[str, Any]]:
+    """name: the letter that equations use; path: name and unit; values in that unit."""
+    return [
+        {
+            "name": letter,
+            "factor": factor.name,
+            "path": own_path(factor.name, factor.unit),
+            "unit": factor.unit,
+            "low": factor.low,
+            "high": factor.high,
+            "reference": factor.reference,
+        }
+        for letter, factor in zip(factor_letters(len(runs.factors)), runs.factors, strict=True)
+    ]
+
+
+def _response_path(runs: Runs) -> str:
+    """Name and unit; an angle without a stated unit is one by its name."""
+    if not runs.unit and runs.response.endswith("_deg"):
+        return own_path(runs.response.removesuffix("_deg"), "°")
+    return own_path(runs.response, {"1": "", "deg": "°"}.get(runs.unit, runs.unit))
+
+
+def _labels(runs: Runs) -> list[str]:
+    """What the valid runs are called, in the order of the surface's runs."""
+    row, replicate = np.nonzero(~np.isnan(runs.responses))
+    return [runs.labels[i][j] for i, j in zip(row, replicate, strict=True)]
+
+
+def _effects(found: DesignAnalysis, factors: list[dict[str, Any]], response: str) -> dict[str, Any] | None:
+    if found.effects is None:
+        return None
+    contrasts = found.effects.contrasts
+    return {
+        "analysis": plain(found.effects.screening),
+        "columns": list(contrasts.names),
+        "aliases": plain(contrasts.aliases),
+        "curvature": plain(found.effects.curvature),
+        "factors": factors,
+        "response": response,
+    }
+
+
+def _surface(found: DesignAnalysis, runs: Runs, factors: list[dict[str, Any]], response: str) -> dict[str, Any] | None:
+    if found.model is None:
+        return None
+    region = region_of(runs.factors)
+    return {
+        "design": runs.coded.tolist(),
+        "natural": region.natural(runs.coded).tolist(),
+        "factors": factors,
+        "region": plain(region),
+        "observables": [response],
+        "models": [plain(found.model.surface)],
+        "anova": [plain(found.model.anova)],
+        "canonical": [plain(found.model.canonical)],
+    }
+
+
+def _model(found: DesignAnalysis) -> dict[str, Any] | None:
+    if found.model is None:
+        return None
+    return {
+        "diagnostics": plain(found.model.diagnostics),
+        "box_cox": plain(found.model.box_cox),
+        "highest": plain(found.model.highest),
+        "lowest": plain(found.model.lowest),
+    }
+
+
+def _optimum(found: DesignAnalysis, factors: list[dict[str, Any]]) -> dict[str, Any] | None:
+    if found.optimum is None:
+        return None
+    values = {factor["path"]: value for factor, value in zip(factors, found.optimum.point.tolist(), strict=True)}
+    return {"single": plain(found.optimum), "factors": factors, "values": values, "compromise": None}
+
+
+def _only_response(path: Path, responses: list[str]) -> str:
+    if len(responses) == 1:
+        return responses[0]
+    raise CommandError(
+        f"{path}: --response NAME is needed; the responses are {', '.join(responses) or 'none: add a column'}"
+    )
+
+
+def _command(order: AnalyseOrder) -> list[str]:
+    """The order as words of a command line, without where it was written to."""
+    words = ["explorer", "analyse", order.sheet]
+    options: list[tuple[str, Any, Callable[[Any], str]]] = [
+        ("--response", order.response, str),
+        ("--target", order.target, repr),
+        ("--target-error", order.target_error or None, repr),
+        ("--factors", order.factors, str),
+        ("--model", order.order, str),
+        ("--terms", order.terms, ",".join),
+        ("--only", order.only, ",".join),
+    ]
+    for option, value, write in options:
+        if value is not None and value not in ("", ()):
+            words += [option, write(value)]
+    return words

@@ -1,0 +1,164 @@
+"""What `explorer design` says about a design: its size, aliases, and what it will be able to see."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from doe.analysis.models import Order, bearable, highest_order, terms_of
+from doe.analysis.precision import TermPrecision, precision
+from doe.designs.factorial import alias_chains, defining_relation, factor_letters, generator_words
+from doe.designs.plackett_burman import interaction_aliases
+from doe.record import plain
+from explorer.design.factors_file import FactorsFile, region_of
+from explorer.design.kinds import Kind
+from explorer.design.plan import Plan
+from explorer.report.units_for_people import enumeration, number
+from explorer.tables.text_table import text_table
+
+MOST_ALIASES = 12
+"""Interactions that are listed per factor of a Plackett–Burman design; the others are counted."""
+
+
+def plan_result(plan: Plan, file: FactorsFile, sigma: float | None, effect: float | None) -> dict[str, Any]:
+    """A design as JSON types."""
+    return {
+        "design": plan.kind.value,
+        "traits": list(plan.traits),
+        "generators": list(plan.generators),
+        "rows": len(plan.coded),
+        "replicates": plan.replicates,
+        "runs": len(plan.sequence),
+        "seed": plan.seed,
+        "factors": [
+            {"symbol": letter} | factor.to_dict()
+            for letter, factor in zip(factor_letters(len(file.factors)), file.factors, strict=True)
+        ],
+        "coded": plan.coded.tolist(),
+        "aliases": aliases(plan),
+        "model": planned_order(plan),
+        "power": plain(list(_power(plan, sigma, effect))),
+    }
+
+
+def plan_text(plan: Plan, file: FactorsFile, sigma: float | None, effect: float | None) -> str:
+    """A design in words and tables."""
+    letters = factor_letters(len(file.factors))
+    parts = [
+        f"{plan.kind}{''.join(f', {trait}' for trait in plan.traits)}: {len(plan.coded)} rows × {plan.replicates} "
+        f"= {len(plan.sequence)} runs",
+        text_table(
+            ["", "factor", "low", "high", "unit"],
+            [
+                [letter, f.name, number(f.low, 6), number(f.high, 6), f.unit or "1"]
+                for letter, f in zip(letters, file.factors, strict=True)
+            ],
+        ),
+        *_beyond(plan, file),
+    ]
+    chains = aliases(plan)
+    if chains:
+        parts.append("aliases (what is on the left also holds what is on the right):\n" + "\n".join(chains))
+    return "\n\n".join([*parts, _power_text(plan, sigma, effect)])
+
+
+def aliases(plan: Plan) -> list[str]:
+    """One line per confused column; empty where main effects and interactions of two are apart."""
+    k = plan.coded.shape[1]
+    letters = factor_letters(k)
+    if plan.kind == Kind.FACTORIAL and plan.generators:
+        words = [word for _, word in generator_words(k, plan.generators)]
+        relation = " = ".join(word.text() for word in defining_relation(words))
+        chains = [" = ".join(word.text() or "mean" for word in chain) for chain in alias_chains(k, words)]
+        return [f"I = {relation}", *(chain for chain in chains if "=" in chain)]
+    if plan.kind != Kind.PLACKETT_BURMAN:
+        return []
+    corners = plan.coded[plan.coded.any(axis=1)].astype(np.int64)
+    shares, pairs = interaction_aliases(corners)
+    lines = []
+    for j, letter in enumerate(letters):
+        leaks = [(shares[j, p], "".join(letters[i] for i in pair)) for p, pair in enumerate(pairs)]
+        leaks = sorted((leak for leak in leaks if abs(leak[0]) > 1e-9), key=lambda leak: -abs(leak[0]))
+        if leaks:
+            shown = "".join(
+                f" {'−' if share < 0 else '+'} {_share(share)}{name}" for share, name in leaks[:MOST_ALIASES]
+            )
+            more = len(leaks) - MOST_ALIASES
+            lines.append(f"{letter}{shown}" + (f" and {more} more" if more > 0 else ""))
+    return lines
+
+
+def planned_order(plan: Plan) -> Order | None:
+    """The model that the runs will bear; None where they leave no error even for the linear one."""
+    letters = factor_letters(plan.coded.shape[1])
+    values = np.zeros((len(plan.coded), plan.replicates))
+    if plan.kind == Kind.PLACKETT_BURMAN or not bearable(plan.coded, values, letters, terms_of(letters, "linear")):
+        return "linear" if bearable(plan.coded, values, letters, terms_of(letters, "linear")) else None
+    return highest_order(plan.coded, values, letters)
+
+
+def _power(plan: Plan, sigma: float | None, effect: float | None) -> tuple[TermPrecision, ...]:
+    order = planned_order(plan)
+    if order is None:
+        return ()
+    letters = factor_letters(plan.coded.shape[1])
+    runs = plan.coded[plan.sequence[:, 0]]
+    # Without a sigma everything is counted in it.
+    return precision(runs, letters, terms_of(letters, order), sigma or 1.0, effect or math.nan)
+
+
+def _power_text(plan: Plan, sigma: float | None, effect: float | None) -> str:
+    found = _power(plan, sigma, effect)
+    if not found:
+        return (
+            "As many effects as runs: nothing is left for the error. Effects can be held against Lenth's margin alone; "
+            "--replicates 2 or centre runs give an error."
+        )
+    unit = "the response's unit" if sigma else "units of σ, the standard deviation of one run"
+    header = ["change, low → high", "terms", "standard error", "seen with chance 0.8", "for all at once"]
+    rows = [
+        [
+            {"factor": "of a factor", "interaction": "of an interaction", "square": "curvature, centre → end"}[
+                one.kind
+            ],
+            str(one.terms),
+            *(_cell(value) for value in (one.standard_error, one.smallest, one.smallest_of_all)),
+            *([_cell(one.power)] if effect else []),
+        ]
+        for one in found
+    ]
+    table = text_table([*header, f"chance to see {number(effect)}"] if effect else header, rows)
+    return (
+        f"what the {planned_order(plan)} model will see at p < 0.05, in {unit} "
+        f"({found[0].df} degrees of freedom for the error):\n{table}"
+    )
+
+
+def _beyond(plan: Plan, file: FactorsFile) -> list[str]:
+    """A sentence about runs beyond low … high, which a laboratory may not be able to make."""
+    if np.abs(plan.coded).max() <= 1 + 1e-9:
+        return []
+    natural = region_of(file.factors).natural(plan.coded)
+    ends = [
+        f"{factor.name} {number(low, 6)} … {number(high, 6)}"
+        for factor, low, high in zip(file.factors, natural.min(axis=0), natural.max(axis=0), strict=True)
+    ]
+    return [f"The axial runs go beyond low … high: {enumeration(ends)}. --alpha inscribed keeps them within."]
+
+
+def _share(value: float) -> str:
+    """A leak as a fraction: Plackett–Burman designs have them in thirds, fifths, sevenths."""
+    size = abs(float(value))
+    if abs(size - 1) < 1e-9:
+        return ""
+    for denominator in range(2, 13):
+        numerator = size * denominator
+        if abs(numerator - round(numerator)) < 1e-9:
+            return f"{round(numerator)}/{denominator} "
+    return f"{size:.3f} "
+
+
+def _cell(value: float) -> str:
+    return number(value)

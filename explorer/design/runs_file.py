@@ -1,0 +1,269 @@
+"""Reading a filled sheet: from this program, from a spreadsheet that saved it, or from any CSV with a factors file.
+
+Comma, semicolon or tab between cells; with the last two also a decimal comma. A cell that cannot be read is named by
+its line in the file (the row of a spreadsheet) and its column.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.errors import StudyFileError
+from explorer.design.factors_file import RESERVED, Factor, make_factor, no_repeats, region_of
+from explorer.errors import CommandError
+
+Array = npt.NDArray[np.float64]
+DELIMITERS = (",", ";", "\t")
+MISSING = ("", "NA", "-", "–")
+MOST_BYTES = 10_000_000
+HEADER_CELL = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<unit>[^\]]*)\])?$")
+WORDS = re.compile(r"[^<>&\"'`\x00-\x1f]{0,60}")
+SNAP = 1e-6
+"""A coded level this near to low, middle or high is that level: what twelve digits and a spreadsheet leave."""
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """A sheet as it stands: cells by line, before one response is chosen. ``lines``: their numbers in the file."""
+
+    path: Path
+    design: str
+    factors: tuple[Factor, ...]
+    columns: dict[str, int]
+    units: dict[str, str]
+    cells: tuple[tuple[str, ...], ...]
+    lines: tuple[int, ...]
+    decimal_comma: bool
+
+    @property
+    def responses(self) -> list[str]:
+        """Columns that are neither factors nor the sheet's own."""
+        return [name for name in self.columns if name not in {*(f.name for f in self.factors), *RESERVED}]
+
+    def number(self, position: int, column: str) -> float:
+        """A cell as a number, NaN where it is empty; raises CommandError with line and column."""
+        text = self.cells[position][self.columns[column]].strip()
+        if text in MISSING:
+            return math.nan
+        plain = text.replace(",", ".") if self.decimal_comma else text
+        try:
+            value = float(plain.replace("−", "-"))
+        except ValueError:
+            value = math.inf
+        if "_" in plain or not math.isfinite(value):
+            raise CommandError(
+                f"{self.path}, line {self.lines[position]}, column {column}: {_short(text)} is not a number; "
+                "allowed: a number, or an empty cell for a missing run"
+            )
+        return value
+
+
+@dataclass(frozen=True)
+class Runs:
+    """One response of a sheet. coded (rows, k); responses, labels (rows, replicates): NaN and "" where missing."""
+
+    design: str
+    factors: tuple[Factor, ...]
+    response: str
+    unit: str
+    coded: Array
+    responses: Array
+    labels: tuple[tuple[str, ...], ...]
+    missing: int
+
+
+def read_sheet(path: Path, factors: Sequence[Factor] = ()) -> Sheet:
+    """Read a sheet; ``factors`` take the place of those that its comments declare.
+
+    Raises CommandError with one line: file, line, column, what is allowed.
+    """
+    design, declared, rest = _comments(path, _text(path))
+    known = tuple(factors) or declared
+    if not known:
+        raise CommandError(f"{path}: no line '# factor | name | low | high | unit'; allowed: with --factors FILE")
+    if not rest:
+        raise CommandError(f"{path}: no header line with the names of the columns")
+    delimiter = max(DELIMITERS, key=rest[0][1].count)
+    parsed = [(line, next(csv.reader([text], delimiter=delimiter), [])) for line, text in rest]
+    header = [HEADER_CELL.match(cell.strip()) for cell in parsed[0][1]]
+    titles = [(match["name"], match["unit"] or "") for match in header if match is not None]
+    columns = _columns(path, titles)
+    units = dict(titles)
+    for factor in known:
+        if factor.name not in columns:
+            raise CommandError(f"{path}: no column {factor.name!r}; the columns are {', '.join(columns)}")
+        if units[factor.name] and units[factor.name] != (factor.unit or "1"):
+            raise CommandError(
+                f"{path}: column {factor.name} is in [{units[factor.name]}], the factor in [{factor.unit or '1'}]; "
+                "allowed: one unit"
+            )
+    cells, lines = [], []
+    for line, row in parsed[1:]:
+        if any(cell.strip() for cell in row[len(titles) :]):
+            raise CommandError(f"{path}, line {line}: {len(row)} cells; allowed: {len(titles)} as in the header")
+        if any(cell.strip() for cell in row):
+            cells.append(tuple([*row, *[""] * len(titles)][: len(titles)]))
+            lines.append(line)
+    if not cells:
+        raise CommandError(f"{path}: no line with a run below the header")
+    return Sheet(path, design, known, columns, units, tuple(cells), tuple(lines), delimiter != ",")
+
+
+def runs_of(sheet: Sheet, response: str, only: Sequence[str] = ()) -> Runs:
+    """The runs of one response, with all factors or with ``only`` some; raises CommandError as `read_sheet` does."""
+    factors = _kept(sheet, only)
+    _check_words(sheet, response)
+    if response not in sheet.responses:
+        offered = ", ".join(sheet.responses) or "none"
+        raise CommandError(f"{sheet.path}: --response {response}: no such column; the responses are {offered}")
+    values = [sheet.number(position, response) for position in range(len(sheet.cells))]
+    if all(map(math.isnan, values)):
+        raise CommandError(f"{sheet.path}, column {response}: every cell is empty; fill in what came out of the runs")
+    natural = np.array([_levels(sheet, factors, k, not math.isnan(value)) for k, value in enumerate(values)])
+    used = np.flatnonzero(~np.isnan(natural).any(axis=1))
+    coded = _snapped(region_of(factors).coded(natural[used]))
+    rows = _rows(sheet, used, coded)
+    width = max(map(len, rows))
+    responses = np.full((len(rows), width), np.nan)
+    labels = [[""] * width for _ in rows]
+    for row, members in enumerate(rows):
+        for replicate, member in enumerate(members):
+            responses[row, replicate] = values[used[member]]
+            labels[row][replicate] = _label(sheet, int(used[member]))
+    return Runs(
+        design=sheet.design,
+        factors=factors,
+        response=response,
+        unit=sheet.units[response],
+        coded=coded[[members[0] for members in rows]],
+        responses=responses,
+        labels=tuple(map(tuple, labels)),
+        missing=sum(map(math.isnan, values)),
+    )
+
+
+def _check_words(sheet: Sheet, response: str) -> None:
+    """Name and unit of a response go into titles of charts, which read a little HTML."""
+    for what, text in (("name", response), ("unit", sheet.units.get(response, ""))):
+        if not WORDS.fullmatch(text):
+            raise CommandError(
+                f"{sheet.path}: {what} {_short(text)} of a response; allowed: up to 60 characters, no < > & or quotes"
+            )
+
+
+def _text(path: Path) -> str:
+    if path.stat().st_size > MOST_BYTES:
+        raise CommandError(f"{path}: {path.stat().st_size / 1e6:.0f} MB; allowed: a sheet of up to 10 MB")
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise CommandError(f"{path}: is not text in UTF-8; save the sheet as 'CSV UTF-8'") from None
+    if "\0" in text:
+        raise CommandError(f"{path}: is not a text file; save the sheet as CSV")
+    return text
+
+
+def _comments(path: Path, text: str) -> tuple[str, tuple[Factor, ...], list[tuple[int, str]]]:
+    """Design and factors of the comments, and all other lines with their numbers."""
+    design, factors, rest = "", [], []
+    for line, content in enumerate(text.splitlines(), 1):
+        bare = content.strip().strip('"').rstrip(",;\t\"' ")
+        if not bare.startswith("#"):
+            if content.strip():
+                rest.append((line, content))
+            continue
+        parts = [part.strip() for part in bare.lstrip("# ").split("|")]
+        if parts[0] == "design" and len(parts) > 1:
+            design = parts[1]
+        if parts[0] == "factor":
+            factors.append(_declared(path, line, parts[1:]))
+    try:
+        no_repeats(tuple(factors), ())
+    except StudyFileError as error:
+        raise CommandError(f"{path}: {error}") from None
+    return design, tuple(factors), rest
+
+
+def _declared(path: Path, line: int, parts: list[str]) -> Factor:
+    where = f"{path}, line {line}"
+    if len(parts) not in (3, 4, 5):
+        raise CommandError(f"{where}: allowed is '# factor | name | low | high | unit | reference'")
+    numbers: list[float] = []
+    for text in (*parts[1:3], *parts[4:]):
+        try:
+            numbers.append(float(text.replace(",", ".")))
+        except ValueError:
+            raise CommandError(f"{where}: {_short(text)} is not a number; allowed: low, high, reference") from None
+    reference = numbers[2] if len(numbers) == 3 else None
+    try:
+        return make_factor(parts[0], numbers[0], numbers[1], parts[3] if len(parts) > 3 else "", reference, "factor")
+    except StudyFileError as error:
+        raise CommandError(f"{where}: {error}") from None
+
+
+def _columns(path: Path, titles: list[tuple[str, str]]) -> dict[str, int]:
+    names = [name for name, _ in titles]
+    for name in names:
+        if name and names.count(name) > 1:
+            raise CommandError(f"{path}: column {_short(name)} stands twice; allowed: each name once")
+    return {name: position for position, name in enumerate(names) if name}
+
+
+def _kept(sheet: Sheet, only: Sequence[str]) -> tuple[Factor, ...]:
+    names = [factor.name for factor in sheet.factors]
+    for name in only:
+        if name not in names:
+            raise CommandError(f"--only {name}: no such factor; the factors are {', '.join(names)}")
+    return tuple(factor for factor in sheet.factors if not only or factor.name in only)
+
+
+def _levels(sheet: Sheet, factors: Sequence[Factor], position: int, needed: bool) -> list[float]:
+    """Levels of a run; an empty one is refused where the run has a response."""
+    levels = [sheet.number(position, factor.name) for factor in factors]
+    for factor, level in zip(factors, levels, strict=True):
+        if needed and math.isnan(level):
+            raise CommandError(
+                f"{sheet.path}, line {sheet.lines[position]}, column {factor.name}: is empty; "
+                "allowed: the level at which the run was made"
+            )
+    return levels
+
+
+def _snapped(coded: Array) -> Array:
+    nearest = np.clip(np.rint(coded), -1, 1)
+    return np.asarray(np.where(np.abs(coded - nearest) < SNAP, nearest, coded))
+
+
+def _rows(sheet: Sheet, used: npt.NDArray[np.int64], coded: Array) -> list[list[int]]:
+    """Runs that repeat one row of the design, by the column "row"; every run by itself where levels or numbers differ.
+
+    Rows of the design come in their order, so that a two-level design is found again in its table.
+    """
+    if "row" not in sheet.columns:
+        return [[k] for k in range(len(used))]
+    numbers = [sheet.number(int(position), "row") for position in used]
+    members: dict[float, list[int]] = {}
+    for k, number in enumerate(numbers):
+        members.setdefault(number, []).append(k)
+    rows = [members[number] for number in sorted(members)] if not any(map(math.isnan, numbers)) else []
+    same = all((coded[row] == coded[row[0]]).all() for row in rows)
+    return rows if rows and same else [[k] for k in range(len(used))]
+
+
+def _label(sheet: Sheet, position: int) -> str:
+    """What a run is called: its number in the sheet, else its line."""
+    if "run" in sheet.columns:
+        return sheet.cells[position][sheet.columns["run"]].strip()[:20] or f"line {sheet.lines[position]}"
+    return f"line {sheet.lines[position]}"
+
+
+def _short(text: str) -> str:
+    return repr(text if len(text) <= 40 else text[:37] + "…")

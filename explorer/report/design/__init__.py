@@ -1,0 +1,39 @@
+"""The report of a design that was run anywhere: its ``result.json`` as a page with charts and as Markdown."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from explorer.files.whole_file import write_whole
+from explorer.report.design.sections import sections_of
+from explorer.report.html import page
+from explorer.report.markdown import document
+
+__all__ = ["design_html", "design_markdown", "write_design_report"]
+
+
+def write_design_report(result: dict[str, Any], folder: Path) -> None:
+    """Write ``report.html`` and ``report.md`` into ``folder``; each appears complete or not at all.
+
+    ``result`` is the content of ``result.json`` (see `explorer.design.analysis.analyse_runs`).
+    """
+    texts = {"report.html": design_html(result), "report.md": design_markdown(result)}
+    for name, text in texts.items():
+        write_whole(folder / name, text)
+
+
+def design_html(result: dict[str, Any]) -> str:
+    """The page: self-contained, with charts."""
+    return page(*_headings(result), sections_of(result))
+
+
+def design_markdown(result: dict[str, Any]) -> str:
+    """The same facts without charts."""
+    return document(*_headings(result), sections_of(result))
+
+
+def _headings(result: dict[str, Any]) -> tuple[str, str]:
+    kind = f"{result['design']} design" if result["design"] else "Design"
+    sheet = Path(result["sheet"]).name
+    return f"{result['response']['name']}", f"{kind} of {len(result['factors'])} factors, analysed from {sheet}"

@@ -1,0 +1,134 @@
+"""Where the model leads: its stationary point, the path of its extremes, and the settings that give the target."""
+
+from __future__ import annotations
+
+from explorer.report.content import Block, Facts, Figure, Section, Table, Text
+from explorer.report.design.charts import ridge
+from explorer.report.figures.optimum import cloud, ranges
+from explorer.report.figures.surface_3d import solutions
+from explorer.report.findings import Plain
+from explorer.report.units_for_people import (
+    MISSING,
+    enumeration,
+    number,
+    observed,
+    parameter_label,
+    parameter_range,
+    parameter_value,
+    percent,
+)
+
+MOST_PANELS = 3
+"""Factors up to which every pair of them has a panel."""
+
+
+def target(result: Plain) -> Section | None:
+    """The settings that give the target; None where none was asked for, or found."""
+    if result["optimum"] is None:
+        return None
+    found, response = result["optimum"]["single"], result["response"]["path"]
+
+    def between(name: str) -> str:
+        return f"{observed(response, found[f'{name}_low'])} … {observed(response, found[f'{name}_high'])}"
+
+    facts = [
+        ("Answer", found["statement"]),
+        ("Model there", f"{observed(response, found['predicted'])}, 95 % of the mean {between('predicted')}"),
+        ("Reachable in the region", between("reachable")),
+        ("Compatible with the target", f"{percent(found['compatible_share'])} of the region, at 95 %"),
+    ]  # fmt: skip
+    if not found["target_standard_error"]:
+        facts.append(("The target itself", "taken as exact; `--target-error` states its standard error"))
+    blocks: list[Block] = [Facts(tuple(facts)), _settings(result)]
+    surface = solutions(result, 0)
+    if surface is not None:
+        blocks.append(Figure("solutions", surface, "Every setting on the green surface gives the target."))
+    blocks.append(Figure("ranges", ranges(result), "Thin inside thick: the narrower the bar, the better known."))
+    if 1 < len(result["factors"]) <= MOST_PANELS:
+        caption = (
+            f"{len(found['bootstrap_points'])} refits to resampled {found['resampling']}; each dot is the solution "
+            f"nearest the reference. {percent(found['share_reached'])} of the refits reach the target."
+        )
+        blocks.append(Figure("cloud", cloud(result), caption))
+    return Section("Target", tuple(blocks))
+
+
+def shape(result: Plain) -> Section | None:
+    """Canonical analysis of a full second-order model, and the path of steepest ascent of any model."""
+    if result["model"] is None:
+        return None
+    canonical, response = result["surface"]["canonical"][0], result["response"]["path"]
+    blocks: list[Block] = []
+    if canonical is None:
+        blocks.append(Text("The model has not all squares, and so no stationary point of its own."))
+    else:
+        blocks += [Facts(tuple(_stationary(result, canonical))), axes_table(result, canonical)]
+    for key, words in (("highest", "highest"), ("lowest", "lowest")):
+        blocks.append(path_table(result, result["model"][key], words, response))
+    caption = "Band: 95 % of the mean. The path ends at the distance of the furthest run and may leave low … high."
+    return Section("Shape and ridge", (*blocks, Figure("ridge", ridge(result), caption)))
+
+
+def axes_table(result: Plain, canonical: Plain) -> Table:
+    """Eigenvalues with the directions along which the surface curves so."""
+    rows = tuple(
+        (number(value, 4), *(number(direction[k], 3) for direction in canonical["eigenvectors"]))
+        for k, value in enumerate(canonical["eigenvalues"])
+    )
+    header = ("eigenvalue", *(factor["name"] for factor in result["factors"]))
+    return Table(header, rows, "Canonical axes, coded: y = y_s + Σ eigenvalue · w².")
+
+
+def path_table(result: Plain, path: Plain, words: str, response: str) -> Table:
+    """The extreme on spheres of growing radius."""
+    rows = tuple(
+        (
+            number(radius),
+            *(parameter_value(f["path"], value) for f, value in zip(result["factors"], natural, strict=True)),
+            observed(response, mean),
+            "–" if error is None else f"± {number(error)}",
+        )
+        for radius, natural, mean, error in zip(
+            path["radius"], path["natural"], path["predicted"], path["standard_error"], strict=True
+        )
+    )
+    header = ("distance", *(factor["name"] for factor in result["factors"]), "model", "standard error")
+    return Table(header, rows, f"Ridge: the {words} response at a distance from the centre [half-widths].")
+
+
+def _stationary(result: Plain, canonical: Plain) -> list[tuple[str, str]]:
+    kind = canonical["kind"]
+    if kind == "ridge":
+        return [("Stationary point", "none: a ridge, at least one eigenvalue is zero")]
+    place = "inside" if canonical["inside"] else "outside"
+    at = [
+        f"{f['name']} = {parameter_value(f['path'], value)}"
+        for f, value in zip(result["factors"], canonical["stationary_natural"], strict=True)
+    ]
+    coded = ", ".join(number(value, 4) for value in canonical["stationary_coded"])
+    return [
+        ("Stationary point", f"a {kind} {place} the region: {enumeration(at)} (coded {coded})"),
+        ("Model there", observed(result["response"]["path"], canonical["stationary_response"])),
+    ]
+
+
+def _settings(result: Plain) -> Table:
+    found = result["optimum"]["single"]
+    rows = tuple(
+        (
+            factor["name"],
+            parameter_label(factor["path"]),
+            parameter_value(factor["path"], found["point"][k]),
+            parameter_range(factor["path"], found["point_low"][k], found["point_high"][k]),
+            parameter_range(factor["path"], found["solution_low"][k], found["solution_high"][k]),
+            MISSING if found["solution_low"][k] is None else percent(found["solution_share"][k]),
+            "no" if factor["name"] in found["unidentified"] else "yes",
+            parameter_value(factor["path"], factor["reference"]),
+        )
+        for k, factor in enumerate(result["factors"])
+    )
+    header = (
+        *("letter", "factor", "setting", "95 % set", "range while the model gives the target", "of low … high"),
+        *("identified", "reference"),
+    )
+    return Table(header, rows, "Of all settings that give the target, the one nearest the reference.")

@@ -1,0 +1,236 @@
+"""`explorer design` and `explorer analyse` from the command line to their files."""
+
+import json
+
+import numpy as np
+import pytest
+
+from solver.assets import asset_path
+from tests.explorer.command_line import explorer, refused
+
+PROCESS = """
+responses = ["yield"]
+[[factor]]
+name = "time"
+low = 80
+high = 90
+unit = "min"
+[[factor]]
+name = "temperature"
+low = 170
+high = 180
+unit = "°F"
+"""
+FILTRATION_RATE = (45, 71, 48, 65, 68, 60, 80, 65, 43, 100, 45, 104, 75, 86, 70, 96)
+
+
+@pytest.fixture
+def process(tmp_path):
+    path = tmp_path / "process.toml"
+    path.write_text(PROCESS, encoding="utf-8")
+    return path
+
+
+def many_factors(folder, number):
+    path = folder / "factors.toml"
+    entries = (f'[[factor]]\nname = "f{k + 1}"\nlow = -1\nhigh = 1\n' for k in range(number))
+    path.write_text("".join(entries), encoding="utf-8")
+    return path
+
+
+def fill(path, values):
+    """Writes ``values`` into the last column, line by line."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    first = next(k for k, line in enumerate(lines) if not line.startswith("#")) + 1
+    for k, value in enumerate(values):
+        lines[first + k] += str(value)
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def made(folder, *options):
+    path = folder / "runs.csv"
+    result = explorer("design", *options, "--out", path)
+    assert result.exit_code == 0, result.output
+    return path, result.stdout
+
+
+def analysed(*options):
+    result = explorer("analyse", *options, "--json")
+    assert result.exit_code == 0, result.output
+    return json.loads(result.stdout)
+
+
+def test_table_8_gives_table_9_the_papers_equation_and_a_solution(tmp_path):
+    """Processes 2022, 10, 185: Table 9 (sums of squares, p), R² 0.983, adjusted 0.9612, CV 1.59 %; equation 8."""
+    result = analysed("sunflower_extract", "--target", 24.68)
+    anova = result["surface"]["anova"][0]
+    rows = {row["source"]: row for row in anova["rows"]}
+    table = np.genfromtxt(asset_path("source_tables", "table9_box_behnken_anova"), delimiter=",", dtype=str)[1:]
+    ours = ("model", "A", "B", "C", "A*B", "A*C", "B*C", "A^2", "B^2", "C^2", "residual", "lack_of_fit", "pure_error")
+    for name, printed in zip(ours, table, strict=False):
+        # Four significant digits at most are printed.
+        assert rows[name]["sum_of_squares"] == pytest.approx(float(printed[3]), rel=2e-3), name
+    assert rows["lack_of_fit"]["p"] == pytest.approx(0.2805, abs=5e-5)
+    assert anova["r_squared"] == pytest.approx(0.983, abs=5e-4)
+    assert anova["r_squared_adjusted"] == pytest.approx(0.9612, abs=5e-5)
+    assert anova["cv_percent"] == pytest.approx(1.59, abs=5e-3)
+    printed = [18.31, 0.14, 149.7, -219.08, 3.01, 1.85, 22.22, -0.026, -249, 113.81]
+    natural = result["surface"]["models"][0]["coefficients_natural"]
+    assert natural == pytest.approx(printed, rel=0.03)  # 0.14 and -0.026 are printed with two digits
+    single = result["optimum"]["single"]
+    assert single["reached"]
+    assert single["predicted"] == pytest.approx(24.68, abs=1e-5)
+    assert single["unidentified"] == ["A", "B", "C"]
+    assert single["reachable_high"] == pytest.approx(28.34, abs=5e-3)
+
+
+def test_report_is_written_complete_and_holds_the_same_numbers(tmp_path):
+    out = tmp_path / "report"
+    result = explorer("analyse", "sunflower_extract", "--target", 24.68, "--out", out)
+    assert result.exit_code == 0, result.output
+    assert {path.name for path in out.iterdir()} == {"report.html", "report.md", "result.json"}
+    markdown = (out / "report.md").read_text(encoding="utf-8")
+    for words in ("## Target", "## Model", "## Diagnostics", "## Shape and ridge", "a saddle outside the region"):
+        assert words in markdown
+    assert "18.309 + 0.13632 A + 149.7 B − 219.08 C" in markdown
+    page = (out / "report.html").read_text(encoding="utf-8")
+    for name in (
+        "contours",
+        "surface",
+        "profiler",
+        "fit",
+        "residual-quantiles",
+        "single-runs",
+        "box-cox",
+        "ridge",
+        "cloud",
+    ):
+        assert f'<figure id="{name}">' in page
+    stored = json.loads((out / "result.json").read_text(encoding="utf-8"))
+    assert stored["optimum"]["single"]["statement"] in result.stdout
+    assert "explorer analyse sunflower_extract --target 24.68" in markdown
+    assert "is not empty" in refused(explorer("analyse", "sunflower_extract", "--target", 24.68, "--out", out))
+
+
+def test_factorial_from_factors_to_the_textbooks_effects(tmp_path):
+    """Montgomery 2017, example 6.2, through the files: A = 21.625, AC = -18.125, AD = 16.625."""
+    factors = many_factors(tmp_path, 4)
+    path, said = made(tmp_path, "factorial", "--factors", factors, "--standard-order")
+    assert "2^4: 16 rows × 1 = 16 runs" in said
+    result = analysed(fill(path, FILTRATION_RATE), "--terms", "f1,f3,f4,f1*f3,A*D")
+    effects = {effect["name"]: effect["effect"] for effect in result["effects"]["analysis"]["effects"]}
+    assert effects["A"] == pytest.approx(21.625)
+    assert effects["A*C"] == pytest.approx(-18.125)
+    included = [
+        term
+        for term, is_in in zip(*(result["surface"]["models"][0][key] for key in ("terms", "included")), strict=True)
+        if is_in
+    ]
+    assert included == ["intercept", "A", "C", "D", "A*C", "A*D"]
+    assert result["surface"]["anova"][0]["r_squared"] == pytest.approx(0.966, abs=5e-4)
+    text = explorer("analyse", path, "--terms", "f1,f3,f4,f1*f3,A*D").stdout
+    assert "70.06 + 10.81 A + 4.938 C + 7.312 D − 9.062 A·C + 8.312 A·D" in text
+
+
+def test_central_composite_finds_a_planted_maximum(tmp_path, process):
+    """y = 80 - 1.4 (x1 - 0.4)² - (x2 - 0.3)², x coded: the maximum lies at 87 min and 176.5 °F."""
+    path, said = made(tmp_path, "central-composite", "--factors", process, "--sigma", 0.3)
+    assert "beyond low … high: time 77.9289 … 92.0711" in said
+    rows = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
+    x1, x2 = np.array([[(float(row[4]) - 85) / 5, (float(row[5]) - 175) / 5] for row in rows]).T
+    noise = 1e-3 * np.random.default_rng(3).standard_normal(len(rows))
+    result = analysed(fill(path, 80 - 1.4 * (x1 - 0.4) ** 2 - (x2 - 0.3) ** 2 + noise))
+    canonical = result["surface"]["canonical"][0]
+    assert canonical["kind"] == "maximum"
+    assert canonical["inside"]
+    assert canonical["stationary_natural"] == pytest.approx([87.0, 176.5], abs=0.02)
+    assert result["optimum"] is None
+
+
+def test_screening_with_a_fold_over_says_what_it_confuses(tmp_path):
+    factors = many_factors(tmp_path, 11)
+    path, said = made(tmp_path, "plackett-burman", "--factors", factors)
+    assert "12 runs, 0 columns without a factor" in said
+    assert "As many effects as runs" in said
+    assert "1/3 " in said
+    assert "and 33 more" in said
+    folded = explorer("design", "plackett-burman", "--factors", factors, "--fold", "--out", tmp_path / "folded.csv")
+    assert "aliases" not in folded.stdout
+    result = analysed(fill(path, np.random.default_rng(1).standard_normal(12)))
+    assert result["surface"] is None
+    assert len(result["effects"]["analysis"]["effects"]) == 11
+
+
+def test_fraction_prints_its_defining_relation_and_alias_chains(tmp_path):
+    _, said = made(tmp_path, "factorial", "--factors", many_factors(tmp_path, 6), "--fraction", 2)
+    assert "2^(6−2): 16 rows" in said
+    assert "I = ABCE = ADEF = BCDF" in said
+    assert "AE = BC = DF" in said
+
+
+def test_power_is_in_the_plain_data(tmp_path, process):
+    result = explorer("design", "factorial", "--factors", process, "--replicates", 4, "--sigma", 2, "--effect", 3,
+                      "--out", tmp_path / "runs.csv", "--json")  # fmt: skip
+    factor = next(one for one in json.loads(result.stdout)["power"] if one["kind"] == "factor")
+    assert factor["standard_error"] == pytest.approx(2 * 2 / 16**0.5)
+    assert 0.5 < factor["power"] < 1
+
+
+def test_only_some_factors_leave_the_others_to_the_scatter(tmp_path):
+    path, _ = made(tmp_path, "factorial", "--factors", many_factors(tmp_path, 4), "--standard-order")
+    result = analysed(fill(path, FILTRATION_RATE), "--only", "f1,f3,f4", "--model", "interactions")
+    assert [factor["factor"] for factor in result["factors"]] == ["f1", "f3", "f4"]
+    rows = {row["source"]: row for row in result["surface"]["anova"][0]["rows"]}
+    assert rows["pure_error"]["df"] == 8
+
+
+def test_missing_runs_are_told(tmp_path, process):
+    path, _ = made(tmp_path, "box-behnken", "--factors", many_factors(tmp_path, 3))
+    result = analysed(fill(path, np.arange(16) ** 1.3))
+    assert result["runs"] == {"rows": 17, "valid": 16, "missing": 1}
+
+
+@pytest.mark.parametrize(
+    "arguments, message",
+    [
+        (("design", "box-behnken", "--factors", "nowhere"), "neither a file"),
+        (("design", "box-behnken", "--factors", "sunflower_extract", "--sigma", "-1"), "--sigma -1: allowed"),
+        (("design", "factorial", "--factors", "sunflower_extract", "--generator", "C=A"), "generator 'C=A'"),
+        (("design", "plackett-burman", "--factors", "sunflower_extract", "--runs", "10"), "allowed are 8, 12"),
+    ],
+)
+def test_bad_orders_of_a_design_leave_no_file(tmp_path, arguments, message):
+    out = tmp_path / "runs.csv"
+    assert message in refused(explorer(*arguments, "--out", out))
+    assert not out.exists()
+
+
+def test_a_sheet_is_not_written_over(tmp_path):
+    path, _ = made(tmp_path, "box-behnken", "--factors", "sunflower_extract")
+    before = path.read_text(encoding="utf-8")
+    assert "is there already" in refused(
+        explorer("design", "box-behnken", "--factors", "sunflower_extract", "--out", path)
+    )
+    assert path.read_text(encoding="utf-8") == before
+    assert "every cell is empty" in refused(explorer("analyse", path))
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        (("--response", "angle"), "no such column; the responses are angle_of_repose_deg"),
+        (("--model", "linear", "--terms", "A"), "--terms: stands instead of --model"),
+        (("--terms", "A,Q"), "--terms: no factor 'Q'"),
+        (("--terms", "A*B*C"), "--terms A*B*C: allowed are"),
+        (("--only", "x"), "--only x: no such factor"),
+        (("--target", "nan"), "--target nan: allowed"),
+    ],
+)
+def test_bad_orders_of_an_analysis_get_one_line(options, message):
+    assert message in refused(explorer("analyse", "sunflower_extract", *options))
+
+
+def test_runs_that_can_bear_nothing_are_named_with_their_file(tmp_path, process):
+    path, _ = made(tmp_path, "box-behnken", "--factors", many_factors(tmp_path, 3))
+    assert "runs.csv, column response: responses: 3 valid runs" in refused(explorer("analyse", fill(path, (1, 2, 3))))
