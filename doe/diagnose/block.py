@@ -1,10 +1,12 @@
 """The regression of one condition: coefficients, noise of a pour, and where the polynomial or an effect's runs stray.
 
-    excess_e: variance beyond noise with which the runs of effect e miss the polynomial at full amplitude (a threshold,
-              pours that jam now and then). It grows with the square of the amplitude, so that an effect that is off
-              brings none; zero where the F test of its left-out errors sees nothing.
+    excess_e: variance beyond noise with which the runs of effect e miss the polynomial at full amplitude. It grows with
+              the square of the amplitude, so that an effect that is off brings none.
 
-An effect whose runs stray does not teach the base: its rows weigh ``APART`` in the coefficients that they share.
+A summary that strays by an F test of its left-out errors (a threshold, pours that jam now and then) gets its own; the
+others share their mean, for a bias that is half a pour's deviation is two standard errors of a data set and no test of
+one summary sees it. An effect with a summary that strays does not teach the base: its rows weigh ``APART`` in the
+coefficients that they share.
 """
 
 from __future__ import annotations
@@ -82,11 +84,9 @@ class _Regression:
 def fit_block(rows: Rows, effects: int, floor: FloatArray) -> Block:
     """Fit one condition; ``floor``: (d,), least standard deviation of one pour."""
     fit = _regression(rows, np.ones(len(rows.values)), floor)
-    excess = _excess(rows, fit, effects)
-    strays = np.flatnonzero(excess.any(axis=1))
+    strays = np.flatnonzero(_straying(rows, fit, effects).any(axis=1))
     if len(strays):
         fit = _regression(rows, np.where(np.isin(rows.effect, strays), APART, 1.0), floor)
-        excess = _excess(rows, fit, effects)
     scatter = ((rows.values - rows.values.mean(axis=0)) ** 2).sum(axis=0)
     base = rows.effect == BASE
     basis = _basis(rows, fit.leverage)
@@ -97,7 +97,7 @@ def fit_block(rows: Rows, effects: int, floor: FloatArray) -> Block:
         lack_of_fit=lack_of_fit_variance(
             rows.settings[basis], rows.values[basis], fit.residuals[basis], fit.leverage[basis]
         ),
-        excess=excess,
+        excess=_excess(rows, fit, _straying(rows, fit, effects)),
         r2=1 - np.divide((fit.left_out**2).sum(axis=0), scatter, out=np.ones(len(scatter)), where=scatter > 0),
         standardised_error=np.sqrt(_standardised_squares(fit)[base].mean(axis=0)),
     )
@@ -139,18 +139,30 @@ def _standardised_squares(fit: _Regression) -> FloatArray:
     return np.asarray(fit.left_out**2 / np.diag(fit.noise.covariance) / fit.spread[:, None])
 
 
-def _excess(rows: Rows, fit: _Regression, effects: int) -> FloatArray:
-    """Return the variance beyond noise at full amplitude, (effects, d)."""
+def _straying(rows: Rows, fit: _Regression, effects: int) -> npt.NDArray[np.bool_]:
+    """Return which summaries of an effect's runs miss the polynomial by more than noise, (effects, d)."""
     d = rows.values.shape[1]
-    found, variance = np.zeros((effects, d)), np.diag(fit.noise.covariance)
-    standardised = _standardised_squares(fit)
+    found, standardised = np.zeros((effects, d), dtype=bool), _standardised_squares(fit)
     for e in range(effects):
+        own = rows.effect == e
+        if own.any():
+            limit = stats.f.isf(STRAY_LEVEL / (effects * d), own.sum(), fit.noise.df)
+            found[e] = standardised[own].mean(axis=0) > limit
+    return found
+
+
+def _excess(rows: Rows, fit: _Regression, straying: npt.NDArray[np.bool_]) -> FloatArray:
+    """Return the variance beyond noise at full amplitude, (effects, d)."""
+    found, variance = np.zeros(straying.shape), np.diag(fit.noise.covariance)
+    # One that never varies in the base runs has a variance by agreement, and misses nothing.
+    varies = (fit.residuals[rows.effect == BASE] ** 2).mean(axis=0) > 0.1 * variance
+    for e, stray in enumerate(straying):
         own = rows.effect == e
         if not own.any():
             continue
         level = rows.level_square[own, None]
         beyond = fit.left_out[own] ** 2 / variance - fit.spread[own, None]
-        at_full = np.maximum(0.0, (level * beyond).sum(axis=0) / (level**2).sum(axis=0))
-        limit = stats.f.isf(STRAY_LEVEL / (effects * d), own.sum(), fit.noise.df)
-        found[e] = np.where(standardised[own].mean(axis=0) > limit, at_full * variance, 0.0)
+        at_full = (level * beyond).sum(axis=0) / (level**2).sum()
+        together = at_full[varies & ~stray].mean() if (varies & ~stray).any() else 0.0
+        found[e] = np.maximum(0.0, np.where(stray, at_full, np.where(varies, together, 0.0))) * variance
     return found
