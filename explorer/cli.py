@@ -17,6 +17,7 @@ from explorer.commands import (
     calibrate,
     diagnose,
     export,
+    measure,
     measurements,
     new,
     parameters,
@@ -115,6 +116,7 @@ app.command()(runs.runs)
 app.command()(parameters.parameters)
 app.command()(new.new)
 app.command()(shape.shape)
+app.command()(measure.measure)
 app.command()(export.export)
 app.command()(replay.replay)
 app.command()(verify.verify)

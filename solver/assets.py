@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Literal, get_args
 
-AssetKind = Literal["materials", "studies", "benchmarks", "presets", "meshes", "source_tables"]
+AssetKind = Literal["materials", "studies", "benchmarks", "presets", "meshes", "source_tables", "photographs"]
 
 _SUFFIX: dict[AssetKind, str] = {
     "materials": ".toml",
@@ -12,6 +12,7 @@ _SUFFIX: dict[AssetKind, str] = {
     "presets": ".toml",
     "meshes": ".stl",
     "source_tables": ".csv",
+    "photographs": ".jpg",
 }
 
 
@@ -22,6 +23,7 @@ _SINGULAR: dict[AssetKind, str] = {
     "presets": "preset",
     "meshes": "mesh",
     "source_tables": "source table",
+    "photographs": "photograph",
 }
 
 

@@ -6,6 +6,17 @@ command line read pictures by the same function. NumPy, SciPy and Pillow; no ker
 
 from solver.photograph.picture import PhotographError, Picture, open_picture
 from solver.photograph.read import PhotographedPile, read_pile
-from solver.photograph.refusal import Reason, Refusal
+from solver.photograph.reference_bar import reference_pixels
+from solver.photograph.refusal import NotAPile, Reason, Refusal
 
-__all__ = ["PhotographError", "PhotographedPile", "Picture", "Reason", "Refusal", "open_picture", "read_pile"]
+__all__ = [
+    "NotAPile",
+    "PhotographError",
+    "PhotographedPile",
+    "Picture",
+    "Reason",
+    "Refusal",
+    "open_picture",
+    "read_pile",
+    "reference_pixels",
+]

@@ -29,6 +29,7 @@ REACH = 6
 MOST_SAG = 0.05
 """Depth of a bulging foot over its width; a round pile seen from 5° above has 0.044, which lowers 25° by 0.5°."""
 MOST_TILT_DEG = 7.0
+BLOCK = 8.0
 
 
 @dataclass(frozen=True)
@@ -182,8 +183,9 @@ def _fitted(x: Array, y: Array, kind: Kind, left: float, right: float) -> BaseLi
             break
     keep = keep if keep.sum() >= 5 else np.ones(x.size, dtype=bool)
     miss = y[keep] - slope * x[keep] - offset
-    # Neighbouring columns miss alike: as many independent ones as the misses change sign, at least.
-    n = max(4, min(keep.sum(), 1 + int(np.count_nonzero(np.diff(np.signbit(miss - miss.mean()))))))
+    # Neighbouring columns miss alike: no more independent ones than the misses change sign, and than there are blocks
+    # of a JPEG.
+    n = max(4, min(keep.sum() / BLOCK, 1 + int(np.count_nonzero(np.diff(np.signbit(miss - miss.mean()))))))
     across = float(np.std(x[keep])) or 1.0
     error = float(np.sqrt(np.mean(miss**2) + 0.1**2) / np.sqrt(n))
     return BaseLine(float(offset), float(slope), error / across, error, kind, left, right)

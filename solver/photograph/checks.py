@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
+from scipy import ndimage
 
 from solver.observables.repose import FlankLine
 from solver.photograph.base_line import BaseLine
@@ -17,14 +18,16 @@ Image = npt.NDArray[np.bool_]
 LEAST_HEIGHT = 12.0
 """Pixels of the picture."""
 SECOND_HEAP = 0.35
-"""A second heap is at least so high, over the first; the valley between two is at least so deep, over the lower one."""
+"""A second heap is at least so high, over the first."""
+VALLEY, VALLEY_DEPTH = 0.05, 0.25
+"""A valley between two heaps takes so much from the outline, over its area, and is so deep, over the lower top."""
 SECOND_AREA = 0.10
 STEEPEST_DEG, FLATTEST_DEG = 75.0, 2.0
 LEAST_EDGE = 6.0
 """Grey levels between both sides of the edge."""
 WIDEST_EDGE = 0.25
-MOST_LEVEL_SHIFT_DEG = 3.0
-"""Change of an angle when the edge is put at 35 % or 65 % of the way: beyond it there is no edge but a haze."""
+FAINT = 0.3
+"""Contrast of the edge where it is faintest, over the usual one."""
 MOST_ROUGHNESS = 0.30
 """Root mean square distance of the outline from its line, over the height of the window: nothing heaped is rougher."""
 
@@ -56,12 +59,17 @@ def check_uncut(part: Image, line: BaseLine) -> None:
 
 
 def check_one_heap(tops: Array) -> None:
-    """NotAPile where an outline of heights ``tops`` has a valley as deep as between two heaps."""
+    """NotAPile where an outline of heights ``tops`` has a valley as large as between two heaps: gaps between bodies are
+    as deep, but narrow."""
     left, right = np.maximum.accumulate(tops), np.maximum.accumulate(tops[::-1])[::-1]
     lower = np.minimum(left, right)
-    deep = (lower - tops > SECOND_HEAP * lower) & (lower > SECOND_HEAP * tops.max())
-    # A gap between two bodies is narrow.
-    if deep.sum() > 0.04 * tops.size:
+    labels, n = ndimage.label(lower - tops > 0.0)
+    if n == 0:
+        return
+    valleys = np.arange(1, n + 1)
+    missing = ndimage.sum_labels(lower - tops, labels, valleys)
+    depth = ndimage.maximum((lower - tops) / np.maximum(lower, 1.0), labels, valleys)
+    if ((missing > VALLEY * tops.sum()) & (depth > VALLEY_DEPTH)).any():
         raise NotAPile(Reason.TWO_PILES, "the outline has two tops with a valley between them; show one pile")
 
 
@@ -73,8 +81,14 @@ def check_size(height: float) -> None:
         )
 
 
-def check_edge(contrast: float, noise: float) -> None:
-    """NotAPile where both sides of the flanks differ by ``contrast`` grey levels only."""
+def check_edge(contrast: float, faintest: float, noise: float) -> None:
+    """NotAPile where both sides of the flanks differ by ``contrast`` grey levels only, or by ``faintest`` somewhere."""
+    if faintest < FAINT * contrast:
+        raise NotAPile(
+            Reason.NO_CLEAR_SILHOUETTE,
+            f"somewhere the edge fades into the backdrop: {faintest:.0f} of 255 grey levels where {contrast:.0f} are "
+            "usual; use an even backdrop and light",
+        )
     if contrast < max(LEAST_EDGE, 1.5 * noise):
         raise NotAPile(
             Reason.NO_CLEAR_SILHOUETTE,
@@ -115,12 +129,11 @@ def check_flanks(
     return left, right
 
 
-def check_level_shift(shift_deg: float) -> None:
-    """NotAPile where an angle hangs on the threshold by ``shift_deg`` [°]."""
-    if shift_deg > MOST_LEVEL_SHIFT_DEG:
+def check_levels(shift_deg: float) -> None:
+    """NotAPile where a flank that is there at one threshold cannot be read at the next (``shift_deg`` infinite)."""
+    if not np.isfinite(shift_deg):
         raise NotAPile(
-            Reason.NO_CLEAR_SILHOUETTE,
-            f"the angle changes by {shift_deg:.1f}° with the threshold: the edge is blurred or shaded away",
+            Reason.NO_CLEAR_SILHOUETTE, "a flank comes and goes with the threshold: the edge is blurred or shaded away"
         )
 
 

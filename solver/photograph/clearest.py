@@ -15,7 +15,7 @@ from scipy import ndimage
 
 from solver.photograph import checks
 from solver.photograph.base_line import BaseLine, rough_base_line
-from solver.photograph.illumination import illumination
+from solver.photograph.illumination import Illumination, illumination
 from solver.photograph.parts import Candidate, candidates, stands_out
 from solver.photograph.refusal import NotAPile, Reason
 
@@ -33,6 +33,8 @@ class Found:
     candidate: Candidate
     line: BaseLine
     sharpness: float
+    difference: float
+    """Grey levels between the middle of the pile and the backdrop behind it."""
 
 
 def find_pile(grey: npt.NDArray[np.float32], given: BaseLine | None) -> tuple[Found, float]:
@@ -41,7 +43,7 @@ def find_pile(grey: npt.NDArray[np.float32], given: BaseLine | None) -> tuple[Fo
     ``given``: the base line, where it is known.
     """
     scale = max(max(grey.shape) / ROUGH, 1.0)
-    small = _reduced(grey, scale)
+    small = reduced_grey(grey, scale)
     light = illumination(small)
     if not stands_out(small, light):
         raise NotAPile(
@@ -49,10 +51,10 @@ def find_pile(grey: npt.NDArray[np.float32], given: BaseLine | None) -> tuple[Fo
         )
     smooth = ndimage.gaussian_filter(small, 0.8)
     line = None if given is None else _in_mask(given, scale)
-    return _clearest(small, list(candidates(smooth, illumination(smooth))), line), scale
+    return _clearest(small, light, list(candidates(smooth, illumination(smooth))), line), scale
 
 
-def _clearest(small: Array, found: Sequence[Candidate], given: BaseLine | None) -> Found:
+def _clearest(small: Array, light: Illumination, found: Sequence[Candidate], given: BaseLine | None) -> Found:
     """The candidate with the sharpest flanks among those that stand; the first one's reason where none does."""
     reasons: list[tuple[int, NotAPile]] = []
     standing: list[Found] = []
@@ -61,7 +63,8 @@ def _clearest(small: Array, found: Sequence[Candidate], given: BaseLine | None) 
             line = given or rough_base_line(candidate.part)
             checks.check_uncut(candidate.part, line)
             checks.check_alone(candidate.part, candidate.others, line)
-            standing.append(Found(candidate, line, _sharpness(small, candidate.part, line)))
+            difference = float(np.median(np.abs(small - light.surface)[candidate.part]))
+            standing.append(Found(candidate, line, _sharpness(small, candidate.part, line), difference))
         except NotAPile as reason:
             reasons.append((int(candidate.part.sum()), reason))
     if standing:
@@ -88,7 +91,8 @@ def _sharpness(small: Array, part: Bool, line: BaseLine) -> float:
     return min(float(np.median(side)) for side in sides)
 
 
-def _reduced(grey: npt.NDArray[np.float32], scale: float) -> Array:
+def reduced_grey(grey: npt.NDArray[np.float32], scale: float) -> Array:
+    """``grey`` with one pixel for ``scale`` × ``scale``."""
     if scale == 1.0:
         return grey.astype(np.float64)
     size = (round(grey.shape[1] / scale), round(grey.shape[0] / scale))

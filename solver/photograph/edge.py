@@ -96,8 +96,10 @@ def silhouettes(patch: Patch, noise: float) -> Silhouettes:
     depth = ndimage.distance_transform_edt(np.pad(patch.rough, ((1, 0), (0, 0)), mode="edge"))[1:]
     distance = np.where(patch.rough, depth, -ndimage.distance_transform_edt(~patch.rough))
     side = max(5, round(NEIGHBOURHOOD * patch.grey.shape[1]))
-    inside = _mean_where(patch.grey, (distance > patch.band / 2) & (distance < side), side)
-    outside = _mean_where(patch.grey, (distance < -patch.band / 2) & (distance > -side), side)
+    # Beyond the blur of the edge; that of the foot as well, or a thin foot seems paler than it is.
+    within = ndimage.distance_transform_edt(np.pad(patch.rough, ((1, 0), (0, 0))))[1:]
+    inside = _mean_where(patch.grey, (within > patch.band) & (within < side), side)
+    outside = _mean_where(patch.grey, (distance < -patch.band) & (distance > -side), side)
     contrast = float(np.median(np.abs(inside - outside)[np.abs(distance) < patch.band]))
     smooth = ndimage.gaussian_filter(patch.grey, _blur(noise, contrast, patch.step))
     # 0 outside, 1 inside.

@@ -7,7 +7,7 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from solver.observables.outline import Outline
-from solver.observables.repose import FlankLine
+from solver.observables.repose import FLOOR, FlankLine
 from solver.photograph.edge import Patch, Silhouettes
 from solver.photograph.illumination import NORMAL
 from solver.photograph.refusal import NotAPile, Reason
@@ -33,12 +33,23 @@ def edge_contrast(patch: Patch, seen: Silhouettes, tops: Array) -> float:
     return float(np.median(np.abs(seen.inside - seen.outside)[rows, columns]))
 
 
-def edge_width(patch: Patch, tops: Array) -> float:
-    """Pixels of the patch over which the grey changes sides along the flanks: the difference between the middle of the
-    pile and what is far above it, over the steepest change about the edge (median along the flanks)."""
+def faintest(patch: Patch, seen: Silhouettes, tops: Array) -> float:
+    """The same at its faintest stretch, a twentieth of the pile wide, from the top down to the ends of the window."""
+    columns = np.flatnonzero(tops >= FLOOR * tops.max())
+    share = max(3, columns.size // 20)
+    faint = []
+    for side in (columns[columns <= tops.argmax()][::-1], columns[columns >= tops.argmax()]):
+        rows = np.clip(tops[side].astype(np.int64) - 1, 0, patch.grey.shape[0] - 1)
+        contrast = np.abs(seen.inside - seen.outside)[rows, side]
+        # At its very end the side of a pile may be a drop: the levels there are of what stands before and behind it.
+        faint.append(float(ndimage.median_filter(contrast, share, mode="nearest").min()))
+    return min(faint)
+
+
+def edge_width(patch: Patch, tops: Array, difference: float) -> float:
+    """Pixels of the patch over which the grey changes sides along the flanks: the ``difference`` between the middle of
+    the pile and the backdrop, over the steepest change about the edge (median along the flanks)."""
     columns = _flank_columns(tops)
-    deep = patch.grey[:, columns][np.arange(patch.grey.shape[0])[:, None] < 0.6 * tops[columns]]
-    difference = abs(float(np.median(deep)) - float(np.median(patch.grey[-3:])))
     change = ndimage.gaussian_gradient_magnitude(patch.grey, 1.0 / patch.step)
     reach = np.arange(-round(patch.band), round(patch.band) + 1)
     rows = np.clip(tops[columns].astype(np.int64)[None, :] + reach[:, None], 0, patch.grey.shape[0] - 1)

@@ -1,7 +1,7 @@
 """The light on the backdrop: a quadratic surface through what surrounds the pile, and the noise about it.
 
-It starts from the upper rim of the picture, where a whole pile cannot be, and grows over every pixel that follows the
-surface, so that a slanting or falling-off light is no threshold's business any more.
+It starts from the upper rim of the picture, where a whole pile cannot be, and grows downward over every pixel that
+follows the surface, so that a slanting or falling-off light is no threshold's business any more.
 """
 
 from __future__ import annotations
@@ -14,7 +14,8 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.bool_]
 
-ROUNDS = 6
+DOWN_TO = (0.0, 0.0, 0.4, 0.55, 0.7, 0.85, 1.0, 1.0)
+"""Share of the rows, from the top, over which the surface is fitted, round by round; 0: the rim alone."""
 FEWEST_LEVELS = 4.0
 """Grey levels by which backdrop may miss the surface, however little noise there is."""
 NORMAL = 1.4826
@@ -36,16 +37,16 @@ def illumination(grey: Array) -> Illumination:
     terms = _terms(grey.shape)
     flat, seen = grey.ravel(), _rim(grey.shape).ravel()
     surface = np.full(flat.shape, np.median(flat[seen]))
-    for round_ in range(ROUNDS):
-        residual = flat - surface
-        inside = seen if round_ < 2 else np.ones_like(seen)
-        scale = NORMAL * float(np.median(np.abs(residual[seen])))
-        reach = max(3.0 * scale, FEWEST_LEVELS)
-        chosen = inside & (np.abs(residual) <= reach)
-        # First a plane: a curved surface through the rim alone may run away over the rest.
-        k = 3 if round_ < 2 else terms.shape[1]
+    rows = np.repeat(np.arange(grey.shape[0]) / grey.shape[0], grey.shape[1])
+    scale = np.inf
+    for round_, share in enumerate(DOWN_TO):
+        residual = np.abs(flat - surface)
+        # The first constant follows no slanting light: every pixel of the rim counts then.
+        chosen = (seen | (rows < share)) & (residual <= max(3.0 * scale, FEWEST_LEVELS))
+        k = 3 if round_ == 0 else terms.shape[1]
         coefficients = np.linalg.lstsq(terms[chosen, :k], flat[chosen], rcond=None)[0]
         surface = terms[:, :k] @ coefficients
+        scale = NORMAL * float(np.median(np.abs(flat - surface)[chosen]))
     residual = np.abs(flat - surface)
     noise = NORMAL * float(np.median(residual[residual <= max(4.0 * scale, FEWEST_LEVELS)]))
     return Illumination(surface.reshape(grey.shape), noise)

@@ -14,14 +14,14 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from solver.observables.outline import Outline, outline_of
+from solver.observables.outline import Outline, flank_feet, outline_of
 from solver.observables.repose import FlankLine
 from solver.observables.silhouette import column_tops
 from solver.photograph import checks
 from solver.photograph.base_line import BaseLine, check_tilt, given_base_line, sharp_base_line
 from solver.photograph.clearest import find_pile
 from solver.photograph.edge import Patch, silhouettes, upright
-from solver.photograph.edge_quality import edge_contrast, edge_width, pixel_noise, roughness
+from solver.photograph.edge_quality import edge_contrast, edge_width, faintest, pixel_noise, roughness
 from solver.photograph.picture import Picture
 from solver.photograph.reading_error import Angles, angles_of
 from solver.photograph.refusal import NotAPile, Reason, Refusal
@@ -95,11 +95,16 @@ def _read(picture: Picture, metres_per_pixel: float | None, base_line: tuple[flo
     line = given or sharp_base_line(grey, found.line, scale)
     check_tilt(line)
     patch = upright(grey, found.candidate.part, line, scale)
-    return _measured(picture, patch, line, pixel_noise(grey), metres_per_pixel)
+    return _measured(picture, patch, line, pixel_noise(grey), found.difference, metres_per_pixel)
 
 
 def _measured(
-    picture: Picture, patch: Patch, line: BaseLine, noise: float, metres_per_pixel: float | None
+    picture: Picture,
+    patch: Patch,
+    line: BaseLine,
+    noise: float,
+    difference: float,
+    metres_per_pixel: float | None,
 ) -> PhotographedPile:
     seen = silhouettes(patch, noise)
     image = seen.images[1]
@@ -110,15 +115,15 @@ def _measured(
     side = patch.step * picture.reduced
     checks.check_size(float(tops.max()) * side)
     contrast = edge_contrast(patch, seen, tops)
-    checks.check_edge(contrast, noise)
-    checks.check_sharp(edge_width(patch, tops), float(tops.max()))
+    checks.check_edge(contrast, faintest(patch, seen, tops), noise)
+    checks.check_sharp(edge_width(patch, tops, difference), float(tops.max()))
     checks.check_one_heap(tops)
     in_patch = outline_of(image, 0.0, 0.0, 1.0)
     rough = (roughness(in_patch, in_patch.flanks[0]), roughness(in_patch, in_patch.flanks[1]))
     flanks = checks.check_flanks(in_patch.flanks, rough, float(tops.max()))
     angles = angles_of(seen, flanks, patch.step, line, min(noise / max(contrast, 1.0), 0.125))
-    checks.check_level_shift(angles.level_shift_deg)
-    feet = [flank.u[1] + direction * flank.z[1] / flank.slope for flank, direction in zip(flanks, (-1, 1), strict=True)]
+    checks.check_levels(angles.level_shift_deg)
+    feet = flank_feet(flanks)
     middle = 0.5 * (feet[0] + feet[1])
     place = np.array(patch.foot) + np.array(patch.along) * middle * patch.step
     origin = picture.place(place)

@@ -12,6 +12,7 @@ from PIL import Image
 from scipy import ndimage
 
 from solver.observables.repose import flank_angles_deg
+from solver.photograph.picture import LONGEST, Picture
 
 
 @dataclass(frozen=True)
@@ -110,6 +111,13 @@ def save(path, grey):
     """``grey`` as the PNG ``path``, which is given back."""
     Image.fromarray(grey).save(path)
     return path
+
+
+def picture_of(grey, name="rendered"):
+    """``grey`` as if it had been opened from a file."""
+    reduced = max(1, -(-max(grey.shape) // LONGEST))
+    small = Image.fromarray(grey.astype(np.float32)).reduce(reduced)
+    return Picture(name, np.array(small, dtype=np.float32), grey.shape[1], grey.shape[0], reduced)
 
 
 def fitted(image):
