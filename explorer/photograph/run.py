@@ -10,7 +10,15 @@ from explorer.files.whole_file import write_whole, write_whole_bytes
 from explorer.photograph.order import MeasureOrder
 from explorer.photograph.panels import sheet
 from explorer.photograph.simulated import SimulatedPiles, simulated_piles
-from solver.photograph import NotAPile, PhotographedPile, Picture, Refusal, open_picture, read_pile, reference_pixels
+from solver.photograph import (
+    NotAPile,
+    PhotographedPile,
+    Picture,
+    Refusal,
+    open_picture,
+    read_photograph,
+    reference_pixels,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +69,7 @@ def _reading(picture: Picture, order: MeasureOrder) -> PhotographedPile | Refusa
         scale = _metres_per_pixel(picture, order)
     except NotAPile as reason:
         return Refusal(picture.name, reason.reason, reason.detail)
-    return read_pile(picture, scale, order.base_line)
+    return read_photograph(picture, scale, order.base_line)
 
 
 def _metres_per_pixel(picture: Picture, order: MeasureOrder) -> float | None:

@@ -5,7 +5,7 @@ command line read pictures by the same function. NumPy, SciPy and Pillow; no ker
 """
 
 from solver.photograph.picture import PhotographError, Picture, open_picture
-from solver.photograph.read import PhotographedPile, read_pile
+from solver.photograph.read import PhotographedPile, read_photograph
 from solver.photograph.reference_bar import reference_pixels
 from solver.photograph.refusal import NotAPile, Reason, Refusal
 
@@ -17,6 +17,6 @@ __all__ = [
     "Reason",
     "Refusal",
     "open_picture",
-    "read_pile",
+    "read_photograph",
     "reference_pixels",
 ]

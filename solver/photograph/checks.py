@@ -19,7 +19,7 @@ LEAST_HEIGHT = 12.0
 """Pixels of the picture."""
 SECOND_HEAP = 0.35
 """A second heap is at least so high, over the first."""
-VALLEY, VALLEY_DEPTH = 0.05, 0.25
+VALLEY, VALLEY_DEPTH = 0.08, 0.25
 """A valley between two heaps takes so much from the outline, over its area, and is so deep, over the lower top."""
 SECOND_AREA = 0.10
 STEEPEST_DEG, FLATTEST_DEG = 75.0, 2.0

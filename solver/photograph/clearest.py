@@ -14,7 +14,7 @@ from PIL import Image as PillowImage
 from scipy import ndimage
 
 from solver.photograph import checks
-from solver.photograph.base_line import BaseLine, rough_base_line
+from solver.photograph.base_line import BaseLine, check_tilt, rough_base_line
 from solver.photograph.illumination import Illumination, illumination
 from solver.photograph.parts import Candidate, candidates, stands_out
 from solver.photograph.refusal import NotAPile, Reason
@@ -61,6 +61,7 @@ def _clearest(small: Array, light: Illumination, found: Sequence[Candidate], giv
     for candidate in found:
         try:
             line = given or rough_base_line(candidate.part)
+            check_tilt(line)
             checks.check_uncut(candidate.part, line)
             checks.check_alone(candidate.part, candidate.others, line)
             difference = float(np.median(np.abs(small - light.surface)[candidate.part]))

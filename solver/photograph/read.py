@@ -71,7 +71,7 @@ class PhotographedPile:
         return x, y
 
 
-def read_pile(
+def read_photograph(
     picture: Picture, metres_per_pixel: float | None = None, base_line: tuple[float, float] | None = None
 ) -> PhotographedPile | Refusal:
     """The pile in ``picture``, or why there is none.

@@ -10,7 +10,7 @@ import numpy as np
 from solver.assets import measurement_folder
 from solver.observables.made_up import seeds_in_cone
 from solver.observables.silhouette import largest_part, silhouette
-from solver.photograph import PhotographedPile, read_pile
+from solver.photograph import PhotographedPile, read_photograph
 from solver.record import Spheres
 from tests.solver.photograph.rendered import Look, fitted, image_cover, photograph, picture_of, solid_cover
 
@@ -101,7 +101,7 @@ def scanned_spheres(rng):
 
 
 def _trial(cover, look, truth):
-    read = read_pile(picture_of(photograph(cover, look)))
+    read = read_photograph(picture_of(photograph(cover, look)))
     return Trial(look, truth, read if isinstance(read, PhotographedPile) else None)
 
 
