@@ -48,12 +48,15 @@ def faintest(patch: Patch, seen: Silhouettes, tops: Array) -> float:
 
 def edge_width(patch: Patch, tops: Array, difference: float) -> float:
     """Pixels of the patch over which the grey changes sides along the flanks: the ``difference`` between the middle of
-    the pile and the backdrop, over the steepest change about the edge (median along the flanks)."""
+    the pile and the backdrop, over the steepest change of the grey across the edge.
+
+    The grey is averaged along the flanks at equal distance from the outline, so that noise is no steep change.
+    """
     columns = _flank_columns(tops)
-    change = ndimage.gaussian_gradient_magnitude(patch.grey, 1.0 / patch.step)
-    reach = np.arange(-round(patch.band), round(patch.band) + 1)
+    reach = np.arange(-round(3.0 * patch.band), round(3.0 * patch.band) + 1)
     rows = np.clip(tops[columns].astype(np.int64)[None, :] + reach[:, None], 0, patch.grey.shape[0] - 1)
-    return difference / max(float(np.median(change[rows, columns].max(axis=0))), 1e-9)
+    profile = ndimage.gaussian_filter1d(patch.grey[rows, columns].mean(axis=1), 0.5 / patch.step)
+    return difference / max(float(np.abs(np.diff(profile)).max()), 1e-9)
 
 
 def roughness(outline: Outline, flank: FlankLine | None) -> float:

@@ -1,7 +1,8 @@
 """A bar of known length in the picture: the one part that fills a long rectangle.
 
 From the second moments of a part's pixels: a rectangle of length L and width W has variances L²/12 and W²/12 along its
-axes, so that L, W and the share of L · W that is covered follow without its outline.
+axes, so that L, W and the share of L · W that is covered follow without its outline. Its ends are then placed in the
+picture itself, where the grey along its middle is half-way between the bar and what lies beyond that end.
 """
 
 from __future__ import annotations
@@ -37,6 +38,10 @@ class Bar:
     width: float
     x: float
     y: float
+    along: tuple[float, float]
+    """Unit vector of its length (y down)."""
+    sharpness: float
+    """Change of grey per pixel about its rim."""
 
 
 def reference_pixels(picture: Picture) -> float:
@@ -50,25 +55,28 @@ def reference_pixels(picture: Picture) -> float:
             f"{len(bars) or 'no'} straight bar{'s' * (len(bars) != 1)} stand out, one is needed: at least "
             f"{LEAST_ASPECT:g} times as long as wide, apart from pile and frame; or state its ends by --reference",
         )
-    return bars[0].length * scale * picture.reduced
+    return _between_ends(picture.grey.astype(np.float64), bars[0], scale) * picture.reduced
 
 
 def bars_in(grey: Array) -> list[Bar]:
-    """Every bar in ``grey``, in whichever mask it shows first."""
+    """Every bar in ``grey``, in the mask that shows it sharpest: with its shadow it is a bar as well."""
     light = illumination(grey)
+    change = ndimage.gaussian_gradient_magnitude(grey, 1.0)
     found: list[Bar] = []
     for sign in (1, -1):
         excess = np.clip(sign * (light.surface - grey), 0.0, None)
         for threshold in thresholds(excess):
             if threshold < max(LEAST_CONTRAST, LEAST_SIGNAL * light.noise):
                 continue
-            for bar in _bars(excess > threshold):
-                if all(np.hypot(bar.x - other.x, bar.y - other.y) > 3.0 for other in found):
-                    found.append(bar)
-    return found
+            found += _bars(excess > threshold, change)
+    separate: list[Bar] = []
+    for bar in sorted(found, key=lambda bar: -bar.sharpness):
+        if all(np.hypot(bar.x - other.x, bar.y - other.y) > 0.25 * other.length for other in separate):
+            separate.append(bar)
+    return separate
 
 
-def _bars(mask: Image) -> list[Bar]:
+def _bars(mask: Image, change: Array) -> list[Bar]:
     labels, _ = ndimage.label(mask, structure=EIGHT_NEIGHBOURS)
     at_frame = set(np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]]).tolist())
     found = []
@@ -76,15 +84,39 @@ def _bars(mask: Image) -> list[Bar]:
         rows, columns = np.nonzero(labels[where] == k)
         if k in at_frame or max(np.ptp(rows), np.ptp(columns)) < LEAST_LENGTH * max(mask.shape):
             continue
-        variance, _ = np.linalg.eigh(np.cov(np.stack([columns, rows]), bias=True))
+        variance, axes = np.linalg.eigh(np.cov(np.stack([columns, rows]), bias=True))
         width, length = np.sqrt(12.0 * np.maximum(variance, 1e-9))
         if length >= LEAST_ASPECT * width and FILLED[0] <= rows.size / (length * width) <= FILLED[1]:
+            part = labels[where] == k
+            rim = part & ~ndimage.binary_erosion(part)
             found.append(
                 Bar(
                     float(length),
                     float(width),
                     float(columns.mean() + where[1].start),
                     float(rows.mean() + where[0].start),
+                    (float(axes[0, 1]), float(axes[1, 1])),
+                    float(change[where][rim].mean()),
                 )
             )
     return found
+
+
+def _between_ends(grey: Array, bar: Bar, scale: float) -> float:
+    """Distance of the ends of ``bar`` [pixels of ``grey``], which has ``scale`` of them along one of the bar's."""
+    half, width = 0.5 * bar.length * scale, bar.width * scale
+    t = np.arange(-half - 6.0 * scale, half + 6.0 * scale, 0.25)
+    across = np.linspace(-0.25, 0.25, 5)[:, None] * width
+    x = (bar.x + 0.5) * scale - 0.5 + bar.along[0] * t - bar.along[1] * across
+    y = (bar.y + 0.5) * scale - 0.5 + bar.along[1] * t + bar.along[0] * across
+    profile = ndimage.map_coordinates(grey, [y, x], order=1, mode="nearest").mean(axis=0)
+    ends = []
+    for direction in (-1, 1):
+        out = direction * t - half
+        inside = float(np.median(profile[(out < -3.0 * scale) & (out > -0.3 * half)]))
+        outside = float(np.median(profile[out > 3.0 * scale]))
+        share = (profile - outside) / (inside - outside)
+        near = (np.abs(out) <= 3.0 * scale) & (share >= 0.5)
+        ends.append(float(out[near].max()) if near.any() else 0.0)
+    # The last place inside; half a step further on lies the edge.
+    return 2.0 * half + sum(ends) + 0.25

@@ -32,7 +32,7 @@ class Refusal:
 
 
 class NotAPile(Exception):
-    """Ends the reading of a picture; :func:`~solver.photograph.read.read_photograph` turns it into a :class:`Refusal`."""
+    """Ends the reading of a picture; :func:`~solver.photograph.read.read_photograph` makes it a :class:`Refusal`."""
 
     def __init__(self, reason: Reason, detail: str) -> None:
         super().__init__(f"{reason}: {detail}")

@@ -30,7 +30,7 @@ def read(look, left=LEFT, right=RIGHT, height=0.18, **options):
     [
         Look(),
         Look(width=400),
-        Look(width=4000),
+        Look(width=2600),
         Look(tilt_deg=5, width=640),
         Look(tilt_deg=-5, width=640, plate=70),
         Look(pile=220, backdrop=60),

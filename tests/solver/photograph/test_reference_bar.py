@@ -23,8 +23,14 @@ def test_the_length_of_a_bar(look, turn_deg):
     def cover(u, z):
         return np.maximum(PILE(u, z), bar(u, z, length=200.0, turn_deg=turn_deg))
 
-    # A pixel of the picture that masks are looked for in, 1000/600.
-    assert reference_pixels(picture_of(photograph(cover, look))) == pytest.approx(200.0, abs=1.7)
+    assert reference_pixels(picture_of(photograph(cover, look))) == pytest.approx(200.0, abs=0.6)
+
+
+def test_a_bar_with_its_shadow_is_one_bar():
+    def cover(u, z):
+        return np.maximum(PILE(u, z), bar(u, z, x=-100.0, length=240.0))
+
+    assert reference_pixels(picture_of(photograph(cover, Look(shadow=0.3)))) == pytest.approx(240.0, abs=0.6)
 
 
 @pytest.mark.parametrize(

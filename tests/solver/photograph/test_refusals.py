@@ -55,7 +55,7 @@ def from_above(degrees, base_radius=250):
         (moved(-220), replace(LOOK, plate=70), Reason.CUT_BY_FRAME),
         (PILE, replace(LOOK, base=1.05), Reason.CUT_BY_FRAME),
         (PILE, replace(LOOK, tilt_deg=10), Reason.TILTED_CAMERA),
-        (PILE, replace(LOOK, tilt_deg=-20), Reason.TILTED_CAMERA),
+        (PILE, replace(LOOK, tilt_deg=-20, base=0.7), Reason.TILTED_CAMERA),
         (from_above(8), replace(LOOK, base=0.7), Reason.CAMERA_LOOKS_DOWN),
         (from_above(20), replace(LOOK, base=0.7), Reason.CAMERA_LOOKS_DOWN),
         (PILE, replace(LOOK, blur=40), Reason.NO_CLEAR_SILHOUETTE),
