@@ -16,6 +16,7 @@ from scipy import ndimage
 
 from solver.observables.silhouette import largest_part
 from solver.photograph.base_line import BaseLine
+from solver.photograph.refusal import NotAPile, Reason
 
 Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.bool_]
@@ -24,6 +25,8 @@ COLUMNS = 1000
 """Columns that a pile is resampled to where the picture has fewer."""
 FOOT = 0.03
 """Share of the height above which the width of the pile is looked for."""
+LEAST_COLUMNS = 5.0
+"""Pixels of the mask that a pile is wide."""
 MARGIN = 0.1
 """Share of that width that is resampled on either side of it."""
 BAND = 2.5
@@ -62,7 +65,8 @@ class Silhouettes:
 
 
 def upright(grey: Array, part: Image, line: BaseLine, scale: float) -> Patch:
-    """``grey`` about the ``part`` of a mask that has 1/``scale`` of its resolution, above the base ``line``."""
+    """``grey`` about the ``part`` of a mask that has 1/``scale`` of its resolution, above the base ``line``; NotAPile where next to
+    nothing is there."""
     rows, columns = np.nonzero(part)
     # In the picture's own pixels: along the line, and up from it.
     along = np.array([1.0, line.slope]) / np.hypot(1.0, line.slope)
@@ -73,6 +77,8 @@ def upright(grey: Array, part: Image, line: BaseLine, scale: float) -> Patch:
     # Not the plate's own edge, which a pixel of noise lifts above the line.
     above = z >= min(max(FOOT * top, 1.5 * scale), z.max())
     left, right = float(u[above].min()), float(u[above].max())
+    if right - left < LEAST_COLUMNS * scale:
+        raise NotAPile(Reason.NO_FLANK, "what stands above the base line is a few pixels wide")
     margin = 8.0 * scale + MARGIN * (right - left)
     step = min(1.0, (right - left) / COLUMNS)
     n_columns = int(np.ceil((right - left + 2.0 * margin) / step))
