@@ -65,8 +65,10 @@ class Silhouettes:
 
 
 def upright(grey: Array, part: Image, line: BaseLine, scale: float) -> Patch:
-    """``grey`` about the ``part`` of a mask that has 1/``scale`` of its resolution, above the base ``line``; NotAPile where next to
-    nothing is there."""
+    """``grey`` about the ``part`` of a mask that has 1/``scale`` of its resolution, above the base ``line``.
+
+    NotAPile where next to nothing is there.
+    """
     rows, columns = np.nonzero(part)
     # In the picture's own pixels: along the line, and up from it.
     along = np.array([1.0, line.slope]) / np.hypot(1.0, line.slope)
