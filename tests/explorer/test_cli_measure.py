@@ -78,7 +78,7 @@ def test_the_table_plot_and_outline(pile, tmp_path):
     assert {(230, 159, 0), (86, 180, 233), (255, 255, 255)} <= colours  # flanks, base line, outline
     # The page takes the outline in: u over the middle of the pile, 45 mm high.
     curve = measured_file("outline.csv", outline.read_bytes())
-    assert curve.top.max() == pytest.approx(0.045, abs=0.001)
+    assert curve.z.max() == pytest.approx(0.045, abs=0.001)
     rows = list(csv.reader(outline.read_text(encoding="utf-8").splitlines()[1:]))
     assert rows[0] == ["u_m", "z_m"]
 
