@@ -21,6 +21,7 @@ from explorer.commands import (
     diagnose,
     export,
     lab,
+    measure,
     measurements,
     new,
     parameters,
@@ -123,6 +124,7 @@ app.command()(new.new)
 app.command()(shape.shape)
 app.command()(lab.lab)
 app.command()(audit.audit)
+app.command()(measure.measure)
 app.command()(export.export)
 app.command()(replay.replay)
 app.command()(verify.verify)

@@ -15,6 +15,7 @@ from solver.observables import Value, observable_names, observe
 from solver.observables.free_surface import slope_angle_deg
 from solver.observables.named import Named, all_names, named, observe_named, observe_scan
 from solver.params import Parameter, ParameterError, parse_quantity
+from solver.photograph import PhotographedPile, PhotographError, open_picture, read_photograph
 from solver.record import Bodies, Entries, Outcome, Phase, Pile, Record, Spheres, Trace
 from solver.scan import scanned_pile
 from solver.scene import Scene, body_counts, canonical, parameters, pour_rig, value, with_rig, with_values
@@ -54,6 +55,8 @@ __all__ = [
     "Parameter",
     "ParameterError",
     "Phase",
+    "PhotographError",
+    "PhotographedPile",
     "Pile",
     "Record",
     "Scene",
@@ -72,9 +75,11 @@ __all__ = [
     "observe",
     "observe_named",
     "observe_scan",
+    "open_picture",
     "parameters",
     "parse_quantity",
     "pour_rig",
+    "read_photograph",
     "read_toml",
     "run_pour",
     "run_pours",

@@ -4,7 +4,16 @@ from pathlib import Path
 from typing import Literal, get_args
 
 AssetKind = Literal[
-    "materials", "studies", "benchmarks", "presets", "meshes", "source_tables", "laboratory", "designs", "runs"
+    "materials",
+    "studies",
+    "benchmarks",
+    "presets",
+    "meshes",
+    "source_tables",
+    "laboratory",
+    "designs",
+    "runs",
+    "photographs",
 ]
 
 _SUFFIX: dict[AssetKind, str] = {
@@ -17,6 +26,7 @@ _SUFFIX: dict[AssetKind, str] = {
     "laboratory": ".csv",
     "designs": ".toml",
     "runs": ".csv",
+    "photographs": ".jpg",
 }
 
 
@@ -30,6 +40,7 @@ _SINGULAR: dict[AssetKind, str] = {
     "laboratory": "laboratory file",
     "designs": "factors file",
     "runs": "sheet of runs",
+    "photographs": "photograph",
 }
 
 _FOLDER = {"runs": "designs"}

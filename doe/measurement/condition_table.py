@@ -1,6 +1,7 @@
 """A ``[[condition]]`` → the scene that repeats it.
 
 name, role, rig, data              role: fit (calibrated against) or holdout (only predicted)
+images                             photographs of its piles (`photographs`)
 mean_of                            every value of the table is the mean of so many pours (1 where it is not stated)
 [condition.rig_parameters]         last parts of the rig's parameter paths
 [condition.insertion]              protocol, rate, region_radius, region_z, velocity, batch_interval, duration;

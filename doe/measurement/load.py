@@ -21,6 +21,7 @@ from doe.measurement.feasible import narrowed
 from doe.measurement.measurement import Condition, CrossCheck, MeasuredParameter, Measurement, Role
 from doe.measurement.observations import read_observations
 from doe.measurement.parameter_table import read_parameters
+from doe.measurement.photographs import photograph_entries, photograph_values
 from doe.measurement.piles import pile_files
 from doe.study_table import Table, entries, one_of, only, required, section, whole
 from solver import AssetNotFoundError, ParameterError, Scene, all_names, load_material, named, parse_quantity, read_toml
@@ -66,14 +67,14 @@ def _read(folder: Path, table: Table) -> Measurement:
         with _within(entry):
             scene = condition_scene(base, entry, measured)
             mean_of = whole(entry.get("mean_of", 1), "mean_of", 1)
+            photographed, unread = photograph_values(folder, photograph_entries(entry.get("images", [])))
         replicates, observations, checked, unused = read_observations(
-            name, folder / str(entry["data"]), piles[name], scene, uncertainty
+            name, folder / str(entry["data"]), piles[name], photographed, scene, uncertainty
         )
         conditions.append(Condition(name, entry["role"], scene, replicates, observations, mean_of))
         checks += checked
         ignored += unused
-        if "images" in entry:
-            ignored.append(f"condition {name}: images: photographs are not read yet")
+        ignored += [f"condition {name}: images: {line}" for line in unread]
     suited = tuple(narrowed(parameter, [condition.scene for condition in conditions]) for parameter in measured)
     return Measurement(
         folder=folder,

@@ -40,8 +40,8 @@ class Observation(Record):
     """One row per replicate, shape (r,) or (r, k); NaN where nothing was measured."""
     uncertainty: float | None
     """Standard deviation of one value where replicates cannot give it."""
-    origin: Literal["table", "piles", "profile"] = "table"
-    """Where the values come from: the file, the scanned piles, or the surface profile beside them."""
+    origin: Literal["table", "piles", "photographs", "profile"] = "table"
+    """Where the values come from: the file, the scanned or photographed piles, or the surface profile beside them."""
 
 
 @dataclass(frozen=True, eq=False)

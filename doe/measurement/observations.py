@@ -1,7 +1,8 @@
 """Table and scanned piles of one condition → its observations.
 
-What raw data give is computed from them, by the functions that read our runs: pile observables from scanned piles, the
-slopes in a drum from the listed surface profile. The table's values of those only serve as a cross-check.
+What raw data give is computed from them, by the functions that read our runs: pile observables from scanned piles, and
+where there are none from photographs; the slopes in a drum from the listed surface profile. The table's values of those
+only serve as a cross-check.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.errors import MeasurementError
-from doe.measurement.long_form import LongForm, read_long_form
+from doe.measurement.long_form import read_long_form
 from doe.measurement.measurement import CrossCheck, Observation
 from doe.measurement.piles import pile_values, read_piles
 from doe.measurement.readings import PROFILE, SLOPES, slope_of_profile
@@ -22,36 +23,48 @@ from solver import Scene, named
 
 Array = npt.NDArray[np.float64]
 Values = dict[str, tuple[Array | None, Array]]
-Origin = Literal["table", "piles", "profile"]
+Origin = Literal["table", "piles", "photographs", "profile"]
 
 
 def read_observations(
-    name: str, table_path: Path, pile_paths: Mapping[int, Path], scene: Scene, uncertainty: Mapping[str, float]
+    name: str,
+    table_path: Path,
+    pile_paths: Mapping[int, Path],
+    photographed: Values,
+    scene: Scene,
+    uncertainty: Mapping[str, float],
 ) -> tuple[int, tuple[Observation, ...], tuple[CrossCheck, ...], tuple[str, ...]]:
-    """Replicates, observations, cross-checks, and what was ignored, of the condition ``name``."""
+    """Replicates, observations, cross-checks, and what was ignored, of the condition ``name``; ``photographed``: what
+    was read off its pictures."""
     table = read_long_form(table_path)
     ignored = [f"{table_path.name}: {unknown}: no such observable" for unknown in table.unknown]
-    replicates = max(table.replicates, *pile_paths, 0)
-    for replicate in range(table.replicates + 1, replicates + 1):
+    scanned = max(table.replicates, *pile_paths, 0)
+    replicates = max(scanned, *(values.size for _, values in photographed.values()), 0)
+    for replicate in range(table.replicates + 1, scanned + 1):
         if replicate not in pile_paths:
             raise MeasurementError(
-                f"{pile_paths[replicates]}: replicate {replicate} is missing of {replicates}; allowed: from 1 on"
+                f"{pile_paths[replicates]}: replicate {replicate} is missing of {scanned}; allowed: from 1 on"
             )
-    stated = _padded(table, replicates)
+    stated = _padded(table.values, replicates)
     piles: Values = {}
     if pile_paths and len(scene.bodies) == 1:
         listed = {key: x for key, (x, _) in stated.items()}
         piles = pile_values(read_piles(pile_paths, scene), scene, replicates, listed)
     elif pile_paths:
         ignored.append(f"piles of {name}: a scan does not say which component a body is; one component is read")
+    photographs = _padded({key: value for key, value in photographed.items() if key not in piles}, replicates)
     profile = _slopes(stated)
     checks = [
         _cross_check(name, observable, values, stated[observable][1])
-        for observable, (_, values) in (piles | profile).items()
+        for observable, (_, values) in (piles | photographs | profile).items()
         if observable in stated
     ]
     observations = []
-    raw: tuple[tuple[Origin, Values], ...] = (("piles", piles), ("profile", profile))
+    raw: tuple[tuple[Origin, Values], ...] = (
+        ("piles", piles),
+        ("photographs", photographs),
+        ("profile", profile),
+    )
     for origin, values_by_name in raw:
         for observable, (x, values) in values_by_name.items():
             observation = _observation(observable, x, values, uncertainty, origin)
@@ -60,7 +73,7 @@ def read_observations(
             else:
                 ignored.append(f"{name}: {observable} from {origin}: one replicate and no [uncertainty]")
     for observable, (x, values) in stated.items():
-        if observable not in piles and observable not in profile:
+        if observable not in piles | photographs | profile:
             observation = _observation(observable, x, values, uncertainty, "table")
             if not _has_spread(observation):
                 raise MeasurementError(
@@ -72,12 +85,14 @@ def read_observations(
     return replicates, ordered, tuple(checks), tuple(ignored)
 
 
-def _padded(table: LongForm, replicates: int) -> Values:
-    """Values with rows of NaN for replicates that only have a scan."""
-    missing = replicates - table.replicates
+def _padded(given: Mapping[str, tuple[Array | None, Array]], replicates: int) -> Values:
+    """Values with rows of NaN for replicates that ``given`` does not reach."""
     return {
-        name: (x, np.pad(values, [(0, missing)] + [(0, 0)] * (values.ndim - 1), constant_values=np.nan))
-        for name, (x, values) in table.values.items()
+        name: (
+            x,
+            np.pad(values, [(0, replicates - len(values))] + [(0, 0)] * (values.ndim - 1), constant_values=np.nan),
+        )
+        for name, (x, values) in given.items()
     }
 
 

@@ -45,6 +45,12 @@ def measured_file(name: str, content: bytes) -> MeasuredCurve:
 
 
 def _scan(name: str, content: bytes) -> MeasuredCurve:
+    seen = outline(scanned_spheres(content), AZIMUTHS_DEG[0])
+    return MeasuredCurve(name, seen.u, seen.top, seen.flanks)
+
+
+def scanned_spheres(content: bytes) -> Spheres:
+    """The spheres in an .npz file ``content``, all as one body; CommandError in one line for a bad one."""
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             size = sum(member.file_size for member in archive.infolist())
@@ -66,8 +72,7 @@ def _scan(name: str, content: bytes) -> MeasuredCurve:
     _check_places(radius, "radius")
     if (radius <= 0.0).any():
         raise CommandError("radius: one is not positive")
-    seen = outline(Spheres(centre, radius, np.zeros(len(radius), dtype=np.int32)), AZIMUTHS_DEG[0])
-    return MeasuredCurve(name, seen.u, seen.top, seen.flanks)
+    return Spheres(centre, radius, np.zeros(len(radius), dtype=np.int32))
 
 
 def _points(name: str, content: bytes) -> MeasuredCurve:

@@ -54,5 +54,11 @@ def outline_of(image: Image, left: float, azimuth_deg: float, pixel: float = PIX
     )
 
 
+def flank_feet(flanks: tuple[FlankLine, FlankLine]) -> tuple[float, float]:
+    """Where the lines of the left and the right flank reach the plate, on the axis of their ``u``."""
+    left, right = flanks
+    return left.u[1] - left.z[1] / left.slope, right.u[1] + right.z[1] / right.slope
+
+
 def _moved(line: FlankLine | None, left: float) -> FlankLine | None:
     return line and FlankLine((line.u[0] + left, line.u[1] + left), line.z, line.slope)

@@ -71,14 +71,12 @@ def test_means_are_in_the_scene_of_every_condition_that_has_the_parameter(tmp_pa
     assert [c.scene.rig.inlet_diameter for c in measurement.conditions] == [0.12, 0.12]
 
 
-def test_unknown_observables_photographs_and_stray_piles_are_listed(tmp_path):
-    text = changed(MEASUREMENT, 'data = "slow.csv"', 'data = "slow.csv"\nimages = [{ file = "a.png" }]')
-    folder = write(tmp_path, {"measurement.toml": text, "slow.csv": TABLE + "1,colour,,3\n"})
+def test_unknown_observables_and_stray_piles_are_listed(tmp_path):
+    folder = write(tmp_path, {"slow.csv": TABLE + "1,colour,,3\n"})
     write_pile(folder / "piles/other_1.npz")
     assert load_measurement(folder).ignored == (
         "piles/other_1.npz: of no condition",
         "slow.csv: colour: no such observable",
-        "condition slow: images: photographs are not read yet",
     )
 
 

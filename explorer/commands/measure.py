@@ -1,0 +1,55 @@
+"""``explorer measure``: the angle of repose from photographs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import typer
+
+FAILURE = 1
+
+
+def measure(
+    photos: list[str] = typer.Argument(
+        metavar="PHOTO...", help="JPEG, PNG, TIFF, BMP or WebP of one pile from the side; or a shipped one's name."
+    ),
+    scale: float | None = typer.Option(None, metavar="MM_PER_PX", help="Length of a pixel in mm."),
+    reference_length: float | None = typer.Option(
+        None, metavar="MM", help="Length in mm of the one straight bar in the picture, or between --reference."
+    ),
+    reference: str | None = typer.Option(
+        None, metavar="X0,Y0,X1,Y1", help="Ends of the reference length in px, from the top left corner."
+    ),
+    baseline: str = typer.Option(
+        "auto", metavar="auto|Y0,Y1", help="Plate in px from the top, at the left and the right edge of the picture."
+    ),
+    json: bool = typer.Option(False, "--json", help="Print plain data, with the profiles, and nothing else."),
+    plot: Path | None = typer.Option(None, metavar="FILE.png", help="New file: the pictures with what was read."),
+    outline: Path | None = typer.Option(
+        None, metavar="FILE.csv", help="New file: the outline, for the page to lay over a simulated pile."
+    ),
+    from_simulation: str | None = typer.Option(
+        None,
+        metavar="SOURCE",
+        help="Beside it a simulated pile, read alike: pile_*.npz, a folder of simulate --out, or what simulate takes.",
+    ),
+) -> None:
+    """Read the angle of repose off photographs of a pile.
+
+    Exit code 1 where a picture shows no pile that could be read; the line says why.
+    """
+    from explorer.files.run_folder import json_text
+    from explorer.photograph.order import measure_order
+    from explorer.photograph.run import run_measure
+    from explorer.tables.photograph import measure_result, measure_text, refusal_lines
+
+    order = measure_order(photos, scale, reference_length, reference, baseline, plot, outline, from_simulation)
+    measured = run_measure(order)
+    if json:
+        typer.echo(json_text(measure_result(measured)))
+    else:
+        typer.echo(measure_text(measured))
+    for line in refusal_lines(measured.refusals):
+        typer.echo(line, err=True)
+    if measured.refusals:
+        raise typer.Exit(FAILURE)

@@ -1,0 +1,85 @@
+"""A simulated pile beside a photographed one: the same outline and flank lines, from every view of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from explorer.errors import CommandError
+from explorer.scene.file import load_scene
+from solver.observables.outline import Outline, flank_feet, outline
+from solver.observables.repose import AZIMUTHS_DEG
+from solver.record import Spheres
+
+Array = npt.NDArray[np.float64]
+SEED = 1
+
+
+@dataclass(frozen=True, eq=False)
+class SimulatedPiles:
+    """Views of the piles of one source. Lengths [m]."""
+
+    source: str
+    piles: int
+    left_deg: Array
+    """One per pile and azimuth, as all the following; views in which a flank cannot be fitted are left out."""
+    right_deg: Array
+    height: Array
+    half_width: Array
+    front: Outline
+    """The first view, to be drawn."""
+
+
+def simulated_piles(source: str) -> SimulatedPiles:
+    """Piles of a ``pile_*.npz``, of a folder of them (`simulate --out`), or of a fresh pour of what ``source`` names.
+
+    CommandError in one line where there is no pile to see; what is wrong with a scene raises as in `simulate`.
+    """
+    views = [outline(spheres, azimuth) for spheres in _spheres(source) for azimuth in AZIMUTHS_DEG]
+    fitted = [(view, left, right) for view in views for left, right in [view.flanks] if left and right]
+    sloping = [(view, (left, right)) for view, left, right in fitted if min(left.slope, right.slope) > 0.0]
+    if not sloping:
+        raise CommandError(f"--from-simulation {source}: no view of it has two flanks to fit")
+    feet = np.array([flank_feet(flanks) for _, flanks in sloping])
+    return SimulatedPiles(
+        source=source,
+        piles=len(views) // len(AZIMUTHS_DEG),
+        left_deg=np.array([left.angle_deg for _, (left, _) in sloping]),
+        right_deg=np.array([right.angle_deg for _, (_, right) in sloping]),
+        height=np.array([view.top.max() for view, _ in sloping]),
+        half_width=0.5 * (feet[:, 1] - feet[:, 0]),
+        front=sloping[0][0],
+    )
+
+
+def _spheres(source: str) -> list[Spheres]:
+    path = Path(source)
+    if path.is_dir():
+        files = sorted(path.glob("*.npz")) or sorted((path / "piles").glob("*.npz"))
+        if not files:
+            raise CommandError(f"--from-simulation {source}: no pile (*.npz) in this folder")
+        return [_read(file) for file in files]
+    if path.suffix == ".npz":
+        return [_read(path)]
+    scene = load_scene(source)
+    # Taichi takes a second to import, and a scene that cannot be read needs none of it.
+    from solver import run_pour
+
+    record = run_pour(scene, SEED)
+    if not record.outcome.valid:
+        raise CommandError(f"--from-simulation {source}: the pour gave no pile: {record.outcome}: {record.message}")
+    return [record.pile.spheres]
+
+
+def _read(path: Path) -> Spheres:
+    from explorer.files.measured_file import scanned_spheres
+
+    if not path.is_file():
+        raise CommandError(f"--from-simulation: {path}: no such file")
+    try:
+        return scanned_spheres(path.read_bytes())
+    except CommandError as error:
+        raise CommandError(f"--from-simulation: {path}: {error}") from None

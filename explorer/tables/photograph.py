@@ -1,0 +1,208 @@
+"""What was read off photographs of piles, as text for a terminal and as plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from explorer.tables.text_table import text_table
+from solver.photograph import PhotographedPile, Refusal
+from solver.photograph.reading_error import COVERAGE, Angle
+
+if TYPE_CHECKING:
+    from explorer.photograph.run import Measured
+    from explorer.photograph.simulated import SimulatedPiles
+
+Array = npt.NDArray[np.float64]
+MOST_POINTS = 400
+"""Of a profile in plain data."""
+BASES = {"plate": "the plate beside the pile", "foot": "the foot of the pile", "given": "--baseline"}
+
+
+def measure_text(measured: Measured) -> str:
+    """A table of the pictures, of the simulation below it, and what the numbers mean."""
+    rows = [_row(pile) for pile in measured.piles]
+    if measured.simulated is not None:
+        rows.append(_simulated_row(measured.simulated))
+    parts = []
+    if rows:
+        head = (
+            "picture",
+            "left °",
+            "right °",
+            "mean °",
+            "height",
+            "half-width",
+            "roughness",
+            "unit",
+            "tilt °",
+            "base line",
+        )
+        parts.append(text_table(head, rows))
+    if measured.piles:
+        parts.append(
+            "±: 95 % of reading this silhouette; another pour differs by far more. Roughness: RMS distance of the "
+            "outline from its lines."
+        )
+    if len(measured.piles) > 1:
+        parts.append(_over_pictures(measured.piles))
+    if measured.simulated is not None:
+        parts.append(_comparison(measured))
+    return "\n\n".join(parts)
+
+
+def refusal_lines(refusals: Sequence[Refusal]) -> list[str]:
+    """One line for each picture without an angle."""
+    return [f"{refusal.name}: no angle: {refusal.reason}: {refusal.detail}" for refusal in refusals]
+
+
+def angle_text(angle: Angle) -> str:
+    """An angle with half its interval [°]."""
+    return f"{angle.value_deg:.2f} ± {COVERAGE * angle.error_deg:.2f}"
+
+
+def measure_result(measured: Measured) -> dict[str, Any]:
+    """The same as JSON types, with the profiles."""
+    return {
+        "pictures": [
+            _pile_result(reading) if isinstance(reading, PhotographedPile) else _refusal_result(reading)
+            for reading in measured.readings
+        ],
+        "over_pictures": _over_result(measured.piles),
+        "simulation": None if measured.simulated is None else _simulated_result(measured.simulated),
+    }
+
+
+def _row(pile: PhotographedPile) -> tuple[str, ...]:
+    shown, unit = _lengths(pile)
+    angles = pile.angles
+    rough = shown(float(np.sqrt(np.mean(np.square(pile.roughness)))))
+    return (
+        pile.name,
+        angle_text(angles.left),
+        angle_text(angles.right),
+        angle_text(angles.mean),
+        shown(pile.height),
+        shown(pile.half_width),
+        rough,
+        unit,
+        f"{pile.base.tilt_deg:+.2f}",
+        BASES[pile.base.kind],
+    )
+
+
+def _simulated_row(simulated: SimulatedPiles) -> tuple[str, ...]:
+    return (
+        f"simulated: {simulated.source}",
+        _spread(simulated.left_deg),
+        _spread(simulated.right_deg),
+        _spread(0.5 * (simulated.left_deg + simulated.right_deg)),
+        f"{1e3 * simulated.height.mean():.2f}",
+        f"{1e3 * simulated.half_width.mean():.2f}",
+        "-",
+        "mm",
+        "-",
+        f"mean and SD of {simulated.height.size} views of {simulated.piles} pile{'s' * (simulated.piles > 1)}",
+    )
+
+
+def _spread(values: Array) -> str:
+    return f"{values.mean():.2f} (SD {values.std(ddof=1):.2f})" if values.size > 1 else f"{values.mean():.2f}"
+
+
+def _over_pictures(piles: Sequence[PhotographedPile]) -> str:
+    found = _over_result(piles)
+    assert found is not None
+    low, high = found["interval_deg"]
+    return (
+        f"{found['n']} pictures: mean {found['mean_deg']:.2f}°, SD {found['sd_deg']:.2f}°, "
+        f"95 % {low:.2f} … {high:.2f}° (Student's t over the pictures)"
+    )
+
+
+def _over_result(piles: Sequence[PhotographedPile]) -> dict[str, Any] | None:
+    """Mean angle over pictures, and the interval of that mean; None below two pictures."""
+    if len(piles) < 2:
+        return None
+    means = np.array([pile.angles.mean.value_deg for pile in piles])
+    sd = float(means.std(ddof=1))
+    reach = float(stats.t.ppf(0.975, means.size - 1)) * sd / np.sqrt(means.size)
+    mean = float(means.mean())
+    return {"n": means.size, "mean_deg": mean, "sd_deg": sd, "interval_deg": [mean - reach, mean + reach]}
+
+
+def _comparison(measured: Measured) -> str:
+    assert measured.simulated is not None
+    simulated = 0.5 * (measured.simulated.left_deg + measured.simulated.right_deg)
+    if not measured.piles:
+        return "no photographed pile to compare with"
+    photographed = float(np.mean([pile.angles.mean.value_deg for pile in measured.piles]))
+    return (
+        f"photographed less simulated: {photographed - simulated.mean():+.2f}°, both by the same fit; one view of the "
+        f"simulated pile differs from the next by {simulated.std(ddof=1):.2f}° (SD)"
+    )
+
+
+def _lengths(pile: PhotographedPile) -> tuple[Any, str]:
+    """How a length is written, and its unit."""
+    return (
+        ((lambda length: f"{1e3 * length:.2f}"), "mm") if pile.unit == "m" else ((lambda length: f"{length:.1f}"), "px")
+    )
+
+
+def _pile_result(pile: PhotographedPile) -> dict[str, Any]:
+    factor, unit = (1e3, "mm") if pile.unit == "m" else (1.0, "px")
+    angles = {name: getattr(pile.angles, name) for name in ("left", "right", "mean")}
+    step = max(1, -(-pile.outline.u.size // MOST_POINTS))
+    return {
+        "picture": pile.name,
+        "pile": True,
+        "angles": {
+            name: {"value_deg": angle.value_deg, "interval_deg": list(angle.interval_deg), "error_deg": angle.error_deg}
+            for name, angle in angles.items()
+        },
+        "length_unit": unit,
+        "height": factor * pile.height,
+        "half_width": factor * pile.half_width,
+        "roughness": {"left": factor * pile.roughness[0], "right": factor * pile.roughness[1]},
+        "length_of_pixel": factor * pile.pixel,
+        "base_line": {
+            "found_by": pile.base.kind,
+            "tilt_deg": pile.base.tilt_deg,
+            "y_at_x0_px": pile.base.offset,
+            "slope": pile.base.slope,
+        },
+        "contrast_levels": pile.contrast,
+        "noise_levels": pile.noise,
+        "profile": {
+            "x": (factor * pile.outline.u[::step]).tolist(),
+            "height": (factor * pile.outline.top[::step]).tolist(),
+        },
+    }
+
+
+def _refusal_result(refusal: Refusal) -> dict[str, Any]:
+    return {"picture": refusal.name, "pile": False, "reason": str(refusal.reason), "detail": refusal.detail}
+
+
+def _simulated_result(simulated: SimulatedPiles) -> dict[str, Any]:
+    views = {
+        "left_deg": simulated.left_deg,
+        "right_deg": simulated.right_deg,
+        "mean_deg": 0.5 * (simulated.left_deg + simulated.right_deg),
+        "height_mm": 1e3 * simulated.height,
+        "half_width_mm": 1e3 * simulated.half_width,
+    }
+    return {
+        "source": simulated.source,
+        "piles": simulated.piles,
+        "views": int(simulated.height.size),
+        **{
+            name: {"mean": float(of.mean()), "sd": float(of.std(ddof=1)) if of.size > 1 else None}
+            for name, of in views.items()
+        },
+    }

@@ -1,0 +1,214 @@
+"""The line on which the pile stands: the plate's upper edge beside the pile, or the foot of the pile itself.
+
+Lines are y = offset + slope · x in pixels, y down. Where the part that holds the pile ends, on both sides, in a level
+stretch (a plate of the pile's grey), that is the plate; elsewhere the pile's lower boundary is taken. Either is found
+in the mask first and then placed between pixels, where the grey passes half-way between both sides of the edge.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+from scipy import ndimage
+
+from solver.photograph.refusal import NotAPile, Reason
+
+Array = npt.NDArray[np.float64]
+Image = npt.NDArray[np.bool_]
+Kind = Literal["plate", "foot", "given"]
+
+SHOULDER = 0.04
+"""Share of the part's width, at either end, that is level where a plate shows beside the pile."""
+INNER = 0.10
+"""Share of the part's width at either end where the pile is too thin to tell its foot."""
+REACH = 6
+"""Pixels of the mask on either side of the rough line within which the edge is looked for."""
+MOST_SAG = 0.05
+"""Depth of a bulging foot over its width; a round pile seen from 5° above has 0.044, which lowers 25° by 0.5°."""
+MOST_TILT_DEG = 7.0
+BLOCK = 8.0
+
+
+@dataclass(frozen=True)
+class BaseLine:
+    """Where the pile stands."""
+
+    offset: float
+    """y at x = 0 [px]."""
+    slope: float
+    slope_error: float
+    """Standard error of ``slope``; 0 for a given line."""
+    offset_error: float
+    """Standard error of the line's height in the middle [px]."""
+    kind: Kind
+    left: float
+    """x of the outermost columns that it was fitted to [px]."""
+    right: float
+
+    def at(self, x: Array) -> Array:
+        """y [px] at ``x`` [px]."""
+        return self.offset + self.slope * x
+
+    @property
+    def tilt_deg(self) -> float:
+        """Angle against the picture's rows [°], positive where the right end is lower."""
+        return float(np.degrees(np.arctan(self.slope)))
+
+
+def rough_base_line(part: Image) -> BaseLine:
+    """The base line of a mask's ``part``, to a pixel or so; NotAPile where it has none."""
+    columns = np.flatnonzero(part.any(axis=0))
+    rows, x = part.shape[0], columns.astype(np.float64)
+    tops = part.argmax(axis=0)[columns].astype(np.float64) - 0.5
+    bottoms = rows - part[::-1].argmax(axis=0)[columns] - 0.5
+    plate = _shoulders(x, tops, bottoms)
+    if plate is not None:
+        return plate
+    at_side = [side for side, column in (("left", 0), ("right", -1)) if part[:, column].any()]
+    if at_side or part[-1].any():
+        where = " and ".join([*at_side, *(["lower"] if part[-1].any() else [])])
+        raise NotAPile(
+            Reason.CUT_BY_FRAME,
+            f"what stands out reaches the {where} edge of the picture, with no level plate on both sides of it; "
+            "show the whole pile, or state --baseline",
+        )
+    return _foot(x, bottoms)
+
+
+def sharp_base_line(grey: Array, rough: BaseLine, scale: float) -> BaseLine:
+    """``rough`` placed between the pixels of ``grey``, which has ``scale`` pixels along one of the mask's."""
+    start = BaseLine(
+        (rough.offset + 0.5 - 0.5 * rough.slope) * scale - 0.5 + 0.5 * rough.slope,
+        rough.slope,
+        0.0,
+        0.0,
+        rough.kind,
+        (rough.left + 0.5) * scale - 0.5,
+        (rough.right + 0.5) * scale - 0.5,
+    )
+    width = start.right - start.left
+    if rough.kind == "foot":
+        x = np.arange(start.left + INNER * width, start.right - INNER * width)
+    else:
+        edge = np.arange(SHOULDER * width)
+        x = np.concatenate([start.left + edge, start.right - edge[::-1]])
+    depth = np.arange(-REACH * scale, REACH * scale + 0.5, 0.5)
+    y = start.at(x)[None, :] + depth[:, None]
+    strip = ndimage.map_coordinates(grey, [y, np.broadcast_to(x, y.shape)], order=1, mode="nearest")
+    # From outside the pile inward: outside is above a plate, and below a foot.
+    found = _crossings(*((strip, depth) if rough.kind == "plate" else (strip[::-1], depth[::-1])))
+    seen = np.isfinite(found)
+    if seen.sum() < 8:
+        # No edge of its own there: the rough line, to a pixel of the mask.
+        return replace(start, slope_error=scale / width, offset_error=scale)
+    return _fitted(x[seen], (y[0] - depth[0])[seen] + found[seen], rough.kind, start.left, start.right)
+
+
+def given_base_line(left: float, right: float, columns: int) -> BaseLine:
+    """The line through y = ``left`` and ``right`` [px] at the left and the right edge of ``columns`` columns."""
+    slope = (right - left) / max(columns - 1, 1)
+    return BaseLine(left, slope, 0.0, 0.0, "given", 0.0, columns - 1.0)
+
+
+def check_tilt(line: BaseLine) -> None:
+    """NotAPile where the picture is turned so far that the camera cannot have stood level."""
+    if abs(line.tilt_deg) > MOST_TILT_DEG:
+        raise NotAPile(
+            Reason.TILTED_CAMERA,
+            f"the base line slopes by {line.tilt_deg:+.1f}°, allowed up to {MOST_TILT_DEG:g}°; level the camera, or "
+            "state --baseline where the line found is wrong",
+        )
+
+
+def _shoulders(x: Array, tops: Array, bottoms: Array) -> BaseLine | None:
+    """The line through the tops of both ends, if these are level stretches of one line; None otherwise."""
+    n = max(5, round(SHOULDER * x.size))
+    if x.size < 6 * n:
+        return None
+    ends = np.r_[0:n, x.size - n : x.size]
+    slope, offset = np.polyfit(x[ends], tops[ends], 1)
+    own = [np.polyfit(x[side], tops[side], 1)[0] for side in (slice(0, n), slice(-n, None))]
+    misses = np.abs(tops[ends] - slope * x[ends] - offset)
+    # A level stretch misses by pixel steps and noise; a flank's foot slopes one way on the left, another on the right.
+    level = np.median(misses) < 1.0 and np.percentile(misses, 90) < 2.5 and abs(own[0] - own[1]) < 0.08
+    thick = np.median((bottoms - tops)[ends]) >= 3.0
+    if not (level and thick):
+        return None
+    return BaseLine(float(offset), float(slope), 0.0, 0.0, "plate", float(x[0]), float(x[-1]))
+
+
+def _foot(x: Array, bottoms: Array) -> BaseLine:
+    inner = slice(round(INNER * x.size), x.size - round(INNER * x.size))
+    if x[inner].size < 5:
+        raise NotAPile(Reason.TOO_SMALL, f"what stands out is {x.size} pixels wide in the reduced picture")
+    fitted = _fitted(x[inner], bottoms[inner], "foot", float(x[0]), float(x[-1]))
+    _check_sag(x, bottoms)
+    return fitted
+
+
+def _check_sag(x: Array, bottoms: Array) -> None:
+    """NotAPile where the foot bulges downward like the near half of a round base seen from above."""
+    u = (x - x.mean()) / (0.5 * max(x[-1] - x[0], 1.0))
+    inner = np.abs(u) < 1.0 - INNER
+    # Near half of an ellipse: y = line + sag √(1 − u²).
+    terms = np.stack([np.ones_like(u), u, np.sqrt(np.clip(1.0 - u * u, 0.0, None))], axis=1)[inner]
+    coefficients = np.linalg.lstsq(terms, bottoms[inner], rcond=None)[0]
+    straight = np.linalg.lstsq(terms[:, :2], bottoms[inner], rcond=None)[0]
+    bent_miss = np.std(bottoms[inner] - terms @ coefficients)
+    sag = float(coefficients[2] / (x[-1] - x[0]))
+    if sag > MOST_SAG and bent_miss < 0.6 * np.std(bottoms[inner] - terms[:, :2] @ straight):
+        degrees = np.degrees(np.arcsin(min(1.0, 2.0 * sag)))
+        raise NotAPile(
+            Reason.CAMERA_LOOKS_DOWN,
+            f"the foot of the pile bulges by {sag:.0%} of its width, as seen from {degrees:.0f}° above; "
+            "bring the camera down to the plate",
+        )
+
+
+def _fitted(x: Array, y: Array, kind: Kind, left: float, right: float) -> BaseLine:
+    """Least squares, again without what lies off; of a foot the lower half counts: bodies touch the plate here and
+    there and leave gaps above it."""
+    keep = np.ones(x.size, dtype=bool)
+    slope = offset = 0.0
+    for _ in range(8):
+        slope, offset = np.polyfit(x[keep], y[keep], 1)
+        miss = y - slope * x - offset
+        spread = 1.4826 * float(np.median(np.abs(miss[keep] - np.median(miss[keep]))))
+        slack = max(1.5 * spread, 0.5)
+        keep = (miss > -slack) & (miss < (3.0 * slack if kind == "foot" else slack))
+        if keep.sum() < 5:
+            break
+    keep = keep if keep.sum() >= 5 else np.ones(x.size, dtype=bool)
+    miss = y[keep] - slope * x[keep] - offset
+    # Neighbouring columns miss alike: no more independent ones than the misses change sign, and than there are blocks
+    # of a JPEG.
+    n = max(4, min(keep.sum() / BLOCK, 1 + int(np.count_nonzero(np.diff(np.signbit(miss - miss.mean()))))))
+    across = float(np.std(x[keep])) or 1.0
+    error = float(np.sqrt(np.mean(miss**2) + 0.1**2) / np.sqrt(n))
+    return BaseLine(float(offset), float(slope), error / across, error, kind, left, right)
+
+
+def _crossings(into: Array, steps: Array) -> Array:
+    """Place among ``steps`` (depths,) where each column of ``into`` is first half-way; NaN where it never is.
+
+    ``into`` (depths, columns) are grey levels from outside to inside. The levels of both sides are means over
+    neighbouring columns.
+    """
+    edge = max(2, len(steps) // 6)
+    width = max(3, into.shape[1] // 20)
+    outside = ndimage.uniform_filter1d(into[:edge].mean(axis=0), width)
+    inside = ndimage.uniform_filter1d(into[-edge:].mean(axis=0), width)
+    if np.median(outside) < np.median(inside):
+        into, outside, inside = -into, -outside, -inside
+    half = 0.5 * (outside + inside)
+    below = into < half
+    k = below.argmax(axis=0)
+    column = np.arange(into.shape[1])
+    seen = below.any(axis=0) & (k > 0) & (outside > inside)
+    before, after = into[np.maximum(k - 1, 0), column], into[k, column]
+    part = (before - half) / np.where(seen, before - after, 1.0)
+    place = steps[np.maximum(k - 1, 0)] + part * (steps[k] - steps[np.maximum(k - 1, 0)])
+    return np.where(seen, place, np.nan)

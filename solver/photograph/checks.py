@@ -1,0 +1,143 @@
+"""Is it a pile, one pile, whole, and clearly seen? Each check ends the reading by its reason or lets it pass."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+from scipy import ndimage
+
+from solver.observables.repose import FlankLine
+from solver.photograph.base_line import BaseLine
+from solver.photograph.refusal import NotAPile, Reason
+
+Array = npt.NDArray[np.float64]
+Image = npt.NDArray[np.bool_]
+
+LEAST_HEIGHT = 12.0
+"""Pixels of the picture."""
+SECOND_HEAP = 0.35
+"""A second heap is at least so high, over the first."""
+VALLEY, VALLEY_DEPTH = 0.08, 0.25
+"""A valley between two heaps takes so much from the outline, over its area, and is so deep, over the lower top."""
+SECOND_AREA = 0.10
+STEEPEST_DEG, FLATTEST_DEG = 75.0, 2.0
+LEAST_EDGE = 6.0
+"""Grey levels between both sides of the edge."""
+WIDEST_EDGE = 0.25
+FAINT = 0.3
+"""Contrast of the edge where it is faintest, over the usual one."""
+MOST_ROUGHNESS = 0.30
+"""Root mean square distance of the outline from its line, over the height of the window: nothing heaped is rougher."""
+
+
+def check_alone(part: Image, others: Sequence[Image], line: BaseLine) -> None:
+    """NotAPile where another part of the mask stands beside ``part`` like a second pile."""
+    height, area = _height(part, line), int(part.sum())
+    for other in others:
+        low = np.flatnonzero(other.any(axis=1))[-1] - line.at(np.flatnonzero(other.any(axis=0)).astype(float)).mean()
+        stands = abs(low) < 0.25 * height
+        if stands and other.sum() >= SECOND_AREA * area and _height(other, line) >= SECOND_HEAP * height:
+            raise NotAPile(
+                Reason.TWO_PILES,
+                f"beside the largest part stands another of {other.sum() / area:.0%} of its area; show one pile",
+            )
+
+
+def check_uncut(part: Image, line: BaseLine) -> None:
+    """NotAPile where the pile goes on beyond the frame: above its base line it may not touch it."""
+    height = _height(part, line)
+    columns = part.shape[1]
+    margin = 0.08 * height
+    for side, x in (("left", 0), ("right", columns - 1)):
+        rows = np.flatnonzero(part[:, x])
+        if rows.size and line.at(np.array([float(x)]))[0] - rows[0] > margin + 2.0:
+            raise NotAPile(Reason.CUT_BY_FRAME, f"the pile reaches the {side} edge of the picture; show all of it")
+    if part[0].any():
+        raise NotAPile(Reason.CUT_BY_FRAME, "the pile reaches the upper edge of the picture; show all of it")
+
+
+def check_one_heap(tops: Array) -> None:
+    """NotAPile where an outline of heights ``tops`` has a valley as large as between two heaps: gaps between bodies are
+    as deep, but narrow."""
+    left, right = np.maximum.accumulate(tops), np.maximum.accumulate(tops[::-1])[::-1]
+    lower = np.minimum(left, right)
+    labels, n = ndimage.label(lower - tops > 0.0)
+    if n == 0:
+        return
+    valleys = np.arange(1, n + 1)
+    missing = ndimage.sum_labels(lower - tops, labels, valleys)
+    depth = ndimage.maximum((lower - tops) / np.maximum(lower, 1.0), labels, valleys)
+    if ((missing > VALLEY * tops.sum()) & (depth > VALLEY_DEPTH)).any():
+        raise NotAPile(Reason.TWO_PILES, "the outline has two tops with a valley between them; show one pile")
+
+
+def check_size(height: float) -> None:
+    """NotAPile for a pile of ``height`` [pixels of the picture] of which nothing can be read."""
+    if height < LEAST_HEIGHT:
+        raise NotAPile(
+            Reason.TOO_SMALL, f"the pile is {height:.0f} pixels high, at least {LEAST_HEIGHT:g} are needed; go nearer"
+        )
+
+
+def check_edge(contrast: float, faintest: float, noise: float) -> None:
+    """NotAPile where both sides of the flanks differ by ``contrast`` grey levels only, or by ``faintest`` somewhere."""
+    if faintest < FAINT * contrast:
+        raise NotAPile(
+            Reason.NO_CLEAR_SILHOUETTE,
+            f"somewhere the edge fades into the backdrop: {faintest:.0f} of 255 grey levels where {contrast:.0f} are "
+            "usual; use an even backdrop and light",
+        )
+    if contrast < max(LEAST_EDGE, 1.5 * noise):
+        raise NotAPile(
+            Reason.NO_CLEAR_SILHOUETTE,
+            f"along the flanks pile and backdrop differ by {contrast:.0f} of 255 grey levels (noise {noise:.1f}); "
+            "use a backdrop that stands out",
+        )
+
+
+def check_sharp(width: float, height: float) -> None:
+    """NotAPile where the grey levels take ``width`` to change sides on a pile of ``height`` (the same unit)."""
+    if width > WIDEST_EDGE * height:
+        raise NotAPile(
+            Reason.NO_CLEAR_SILHOUETTE,
+            f"the edge of the pile is blurred over {width / height:.0%} of its height; focus on the pile's middle",
+        )
+
+
+def check_flanks(
+    lines: tuple[FlankLine | None, FlankLine | None], roughness: tuple[float, float], height: float
+) -> tuple[FlankLine, FlankLine]:
+    """Both flanks; NotAPile where one could not be fitted or is no slope of a pile."""
+    for side, line, rough in zip(("left", "right"), lines, roughness, strict=True):
+        if line is None:
+            raise NotAPile(Reason.NO_FLANK, f"the {side} side has no slope between 20 % and 80 % of the height")
+        if not FLATTEST_DEG <= line.angle_deg <= STEEPEST_DEG:
+            raise NotAPile(
+                Reason.NO_FLANK,
+                f"the {side} side slopes by {line.angle_deg:.0f}°; a pile's by {FLATTEST_DEG:g} … {STEEPEST_DEG:g}°",
+            )
+        if rough > MOST_ROUGHNESS * 0.6 * height:
+            raise NotAPile(
+                Reason.NO_FLANK,
+                f"the {side} side is no slope: it misses its line by {rough / height:.0%} of the height",
+            )
+    left, right = lines
+    assert left is not None
+    assert right is not None
+    return left, right
+
+
+def check_levels(shift_deg: float) -> None:
+    """NotAPile where a flank that is there at one threshold cannot be read at the next (``shift_deg`` infinite)."""
+    if not np.isfinite(shift_deg):
+        raise NotAPile(
+            Reason.NO_CLEAR_SILHOUETTE, "a flank comes and goes with the threshold: the edge is blurred or shaded away"
+        )
+
+
+def _height(part: Image, line: BaseLine) -> float:
+    """Of the highest pixel above the line [pixels of the mask]."""
+    columns = np.flatnonzero(part.any(axis=0))
+    return float((line.at(columns.astype(float)) - part.argmax(axis=0)[columns]).max())

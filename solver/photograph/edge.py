@@ -1,0 +1,138 @@
+"""The pile upright on its base line, and its silhouette at the place where grey is half-way between both sides.
+
+The rough part of a mask says within a few pixels where the edge is. There the mean grey just inside and just outside
+are taken along the edge, and a pixel belongs to the pile where it is nearer to the inside (regions of local extent as
+in Lankton & Tannenbaum 2008, here without a moving contour). A shadow or a slanting light changes both means alike and
+the half-way place little; noise and the texture of bodies cancel in the means.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import ndimage
+
+from solver.observables.silhouette import largest_part
+from solver.photograph.base_line import BaseLine
+from solver.photograph.refusal import NotAPile, Reason
+
+Array = npt.NDArray[np.float64]
+Image = npt.NDArray[np.bool_]
+
+COLUMNS = 1000
+"""Columns that a pile is resampled to where the picture has fewer."""
+FOOT = 0.03
+"""Share of the height above which the width of the pile is looked for."""
+LEAST_COLUMNS = 5.0
+"""Pixels of the mask that a pile is wide."""
+MARGIN = 0.1
+"""Share of that width that is resampled on either side of it."""
+BAND = 2.5
+"""Half width of the band about the rough edge, in pixels of the mask."""
+NEIGHBOURHOOD = 0.06
+"""Side of the square, over the width of the patch, in which the means of both sides are taken."""
+LEVELS = (0.35, 0.5, 0.65)
+"""Where between outside (0) and inside (1) the edge is put: the middle one counts, the others show how sharp it is."""
+
+
+@dataclass(frozen=True, eq=False)
+class Patch:
+    """The pile's surroundings resampled upright: row 0 on the base line, rows up, columns to the right."""
+
+    grey: Array
+    rough: Image
+    """The part of the mask there, filled down to the base line."""
+    step: float
+    """Side of a pixel of the patch [pixels of the resampled picture]."""
+    band: float
+    """Half width of the band in which the edge lies [pixels of the patch]."""
+    foot: tuple[float, float]
+    """x, y in the resampled picture of the lower left corner of the patch."""
+    along: tuple[float, float]
+    """Unit vector of the columns in the resampled picture (y down)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Silhouettes:
+    """The pile at each of ``LEVELS``, and how its edge shows."""
+
+    images: tuple[Image, ...]
+    inside: Array
+    """Mean grey inside, near the edge, per pixel."""
+    outside: Array
+
+
+def upright(grey: Array, part: Image, line: BaseLine, scale: float) -> Patch:
+    """``grey`` about the ``part`` of a mask that has 1/``scale`` of its resolution, above the base ``line``.
+
+    NotAPile where next to nothing is there.
+    """
+    rows, columns = np.nonzero(part)
+    # In the picture's own pixels: along the line, and up from it.
+    along = np.array([1.0, line.slope]) / np.hypot(1.0, line.slope)
+    up = np.array([along[1], -along[0]])
+    place = np.stack([(columns + 0.5) * scale - 0.5, (rows + 0.5) * scale - 0.5 - line.offset])
+    u, z = along @ place, up @ place
+    top = max(float(z.max()), scale)
+    # Not the plate's own edge, which a pixel of noise lifts above the line.
+    above = z >= min(max(FOOT * top, 1.5 * scale), z.max())
+    left, right = float(u[above].min()), float(u[above].max())
+    if right - left < LEAST_COLUMNS * scale:
+        raise NotAPile(Reason.NO_FLANK, "what stands above the base line is a few pixels wide")
+    margin = 8.0 * scale + MARGIN * (right - left)
+    step = min(1.0, (right - left) / COLUMNS)
+    n_columns = int(np.ceil((right - left + 2.0 * margin) / step))
+    n_rows = max(4, int(np.ceil((top + 8.0 * scale) / step)))
+    foot = np.array([0.0, line.offset]) + along * (left - margin)
+    c, r = (np.arange(n_columns) + 0.5) * step, (np.arange(n_rows) + 0.5) * step
+    x = foot[0] + along[0] * c[None, :] + up[0] * r[:, None]
+    y = foot[1] + along[1] * c[None, :] + up[1] * r[:, None]
+    patch = ndimage.map_coordinates(grey, [y, x], order=1, mode="nearest")
+    there = [(y + 0.5) / scale - 0.5, (x + 0.5) / scale - 0.5]
+    rough = ndimage.map_coordinates(part.astype(np.float32), there, order=1, mode="nearest") > 0.5
+    # Below its topmost pixel a pile is full, whatever shines through between bodies.
+    rough = np.logical_or.accumulate(rough[::-1], axis=0)[::-1]
+    return Patch(
+        patch, rough, step, BAND * scale / step, (float(foot[0]), float(foot[1])), (float(along[0]), float(along[1]))
+    )
+
+
+def silhouettes(patch: Patch, noise: float) -> Silhouettes:
+    """The pile at each level; ``noise``: standard deviation of a pixel of the resampled picture."""
+    depth = ndimage.distance_transform_edt(np.pad(patch.rough, ((1, 0), (0, 0)), mode="edge"))[1:]
+    distance = np.where(patch.rough, depth, -ndimage.distance_transform_edt(~patch.rough))
+    side = max(5, round(NEIGHBOURHOOD * patch.grey.shape[1]))
+    # Beyond the blur of the edge; that of the foot as well, or a thin foot seems paler than it is.
+    within = ndimage.distance_transform_edt(np.pad(patch.rough, ((1, 0), (0, 0))))[1:]
+    inside = _mean_where(patch.grey, (within > patch.band) & (within < side), side)
+    outside = _mean_where(patch.grey, (distance < -patch.band) & (distance > -side), side)
+    contrast = float(np.median(np.abs(inside - outside)[np.abs(distance) < patch.band]))
+    smooth = ndimage.gaussian_filter(patch.grey, _blur(noise, contrast, patch.step))
+    # 0 outside, 1 inside.
+    gap = inside - outside
+    gap = np.where(np.abs(gap) < 1.0, np.where(gap < 0.0, -1.0, 1.0), gap)
+    share = (smooth - outside) / gap
+    images = []
+    for level in LEVELS:
+        image = (distance > patch.band) | ((np.abs(distance) <= patch.band) & (share > level))
+        images.append(largest_part(image))
+    return Silhouettes(tuple(images), inside, outside)
+
+
+def _blur(noise: float, contrast: float, step: float) -> float:
+    """Width of the smoothing [pixels of the patch] that leaves noise of an eighth of the contrast, 0.5 … 3 pixels of
+    the picture: a Gaussian of width s leaves noise/(2 s √π)."""
+    wanted = 8.0 * noise / max(contrast, 1.0) / (2.0 * np.sqrt(np.pi))
+    return float(np.clip(wanted, 0.5, 3.0)) / step
+
+
+def _mean_where(values: Array, where: Image, side: int) -> Array:
+    """Mean of ``values`` over a square of ``side`` where ``where`` holds; over all of ``where`` if it holds nowhere
+    near."""
+    weight = ndimage.uniform_filter(where.astype(np.float64), side, mode="nearest")
+    total = ndimage.uniform_filter(np.where(where, values, 0.0), side, mode="nearest")
+    overall = float(values[where].mean()) if where.any() else float(values.mean())
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(weight > 1e-3, total / weight, overall)

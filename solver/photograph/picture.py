@@ -1,0 +1,106 @@
+"""A picture file → grey levels, decoded no larger than is needed and never larger than is safe.
+
+Grey is the luma of Rec. 601, 0.299 R + 0.587 G + 0.114 B, of the gamma-coded values, 0 … 255; what is transparent is
+white. The orientation that a camera notes beside the picture is applied. Coordinates are those of the picture as it is
+then seen: x to the right, y down, in its own pixels, (0, 0) the middle of the top left one.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image, ImageOps, UnidentifiedImageError
+
+Grey = npt.NDArray[np.float32]
+
+FORMATS = ("JPEG", "PNG", "TIFF", "BMP", "WEBP")
+MOST_PIXELS = 60_000_000
+MOST_BYTES = 150_000_000
+LEAST_SIDE = 32
+LONGEST = 2400
+"""Longest side [px] that is worked on: an angle gains nothing from more."""
+WHITE = 255.0
+
+
+class PhotographError(ValueError):
+    """A picture, or an option about it, that cannot be used; the message is one line."""
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """Grey levels, reduced by a whole number."""
+
+    name: str
+    grey: Grey
+    """0 … 255, shape (rows, columns), row 0 on top."""
+    width: int
+    """Of the picture itself [px]."""
+    height: int
+    reduced: int
+    """Pixels of the picture along a side of one of ``grey``."""
+
+    def place(self, index: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """Coordinates in the picture of coordinates in ``grey`` (middles of pixels at whole numbers)."""
+        return (index + 0.5) * self.reduced - 0.5
+
+    def index(self, place: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        """The inverse of :meth:`place`."""
+        return (place + 0.5) / self.reduced - 0.5
+
+
+def open_picture(path: Path) -> Picture:
+    """The picture in ``path``; PhotographError for a file that is missing, none of ``FORMATS``, broken or too large."""
+    if not path.is_file():
+        raise PhotographError(f"{path}: no such file")
+    size = path.stat().st_size
+    if not 0 < size <= MOST_BYTES:
+        raise PhotographError(f"{path}: {size} bytes; allowed: 1 … {MOST_BYTES}")
+    try:
+        with warnings.catch_warnings():
+            # Pillow warns of large pictures and of odd metadata; the limit is checked here, before decoding.
+            warnings.simplefilter("ignore")
+            with Image.open(path, formats=FORMATS) as image:
+                return _decoded(path, image)
+    except UnidentifiedImageError:
+        raise PhotographError(f"{path}: not a picture; allowed: {', '.join(FORMATS)}") from None
+    except Image.DecompressionBombError:
+        raise PhotographError(f"{path}: {_too_many()}") from None
+    except PhotographError:
+        raise
+    except (OSError, ValueError, SyntaxError, EOFError, OverflowError, MemoryError) as error:
+        raise PhotographError(f"{path}: cannot be decoded: {' '.join(str(error).split())[:120]}") from None
+
+
+def _decoded(path: Path, image: Image.Image) -> Picture:
+    columns, rows = image.size
+    if columns * rows > MOST_PIXELS:
+        raise PhotographError(f"{path}: {columns} × {rows} px = {columns * rows / 1e6:.0f} megapixels; {_too_many()}")
+    if min(columns, rows) < LEAST_SIDE:
+        raise PhotographError(f"{path}: {columns} × {rows} px; allowed: sides of {LEAST_SIDE} px or more")
+    reduced = max(1, -(-max(columns, rows) // LONGEST))
+    seen = Image.fromarray(_grey(ImageOps.exif_transpose(image), path))
+    small = seen.reduce(reduced) if reduced > 1 else seen
+    return Picture(path.name, np.array(small, dtype=np.float32), seen.width, seen.height, reduced)
+
+
+def _grey(image: Image.Image, path: Path) -> Grey:
+    """Grey levels of ``image``, 0 … 255."""
+    if image.mode in ("I", "F") or image.mode.startswith("I;"):
+        levels = np.array(image, dtype=np.float32)
+        if not np.isfinite(levels).all():
+            raise PhotographError(f"{path}: a grey level is not finite")
+        # Sixteen bits have a known white; levels of any other range are stretched over theirs.
+        low, high = (0.0, 65535.0) if image.mode.startswith("I;16") else (float(levels.min()), float(levels.max()))
+        return (levels - low) * np.float32(WHITE / max(high - low, 1e-9))
+    if image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info:
+        clear = image.convert("RGBA")
+        image = Image.alpha_composite(Image.new("RGBA", image.size, "white"), clear)
+    return np.array(image.convert("L"), dtype=np.float32)
+
+
+def _too_many() -> str:
+    return f"allowed: up to {MOST_PIXELS // 1_000_000} megapixels; scale the picture down"
