@@ -1,7 +1,8 @@
-"""One measured file as a curve in the picture of a pile: a scan (.npz) or the points of an outline (.csv).
+"""One measured file as a curve in the picture of a pile: a scan (.npz), the points of an outline (.csv), a photograph.
 
 .npz   xyz (n, 3) [m], radius (n,) [m]: spheres of the bodies on the plate, as in a measured data set
 .csv   a line u_m,z_m, then one point per line: to the right and above the plate [m]; # starts a comment
+.jpg   (.jpeg, .png) a photograph along the plate, read like `explorer measure` does; it needs the length of a pixel
 """
 
 from __future__ import annotations
@@ -9,7 +10,9 @@ from __future__ import annotations
 import csv
 import io
 import zipfile
+from functools import partial
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 
 import numpy as np
 import numpy.typing as npt
@@ -18,11 +21,13 @@ from explorer.errors import CommandError
 from explorer.files.measured_curves import MeasuredCurve
 from solver.observables.outline import outline
 from solver.observables.repose import AZIMUTHS_DEG
+from solver.photograph import PhotographError, Refusal, open_picture, read_photograph
 from solver.record import Spheres
 
 Array = npt.NDArray[np.float64]
 
-SUFFIXES = (".npz", ".csv")
+PICTURES = (".jpg", ".jpeg", ".png")
+SUFFIXES = (".npz", ".csv", *PICTURES)
 MOST_BYTES = 50_000_000
 MOST_SPHERES, MOST_POINTS = 1_000_000, 100_000
 FARTHEST = 2.0
@@ -30,11 +35,14 @@ FARTHEST = 2.0
 COLUMNS = ["u_m", "z_m"]
 
 
-def measured_file(name: str, content: bytes) -> MeasuredCurve:
-    """The curve in the file ``content`` that is called ``name``; CommandError in one line for a bad file."""
+def measured_file(name: str, content: bytes, pixel: float | None = None) -> MeasuredCurve:
+    """The curve in the file ``content`` that is called ``name``; CommandError in one line for a bad file.
+
+    ``pixel``: length [m] of a pixel of a photograph.
+    """
     if not 0 < len(content) <= MOST_BYTES:
         raise CommandError(f"{name[:80]}: {len(content)} bytes; allowed: up to {MOST_BYTES}")
-    readers = {".npz": _scan, ".csv": _points}
+    readers = {".npz": _scan, ".csv": _points} | dict.fromkeys(PICTURES, partial(_photograph, pixel=pixel))
     read = readers.get(Path(name).suffix.lower())
     if read is None:
         raise CommandError(f"{name[:80]}: allowed are files ending in {', '.join(SUFFIXES)}")
@@ -42,6 +50,22 @@ def measured_file(name: str, content: bytes) -> MeasuredCurve:
         return read(name[:80], content)
     except CommandError as error:
         raise CommandError(f"{name[:80]}: {error}") from None
+
+
+def _photograph(name: str, content: bytes, pixel: float | None) -> MeasuredCurve:
+    if pixel is None:
+        raise CommandError("a photograph needs its scale: give the millimetres per pixel, then upload it again")
+    with NamedTemporaryFile(suffix=Path(name).suffix) as file:
+        file.write(content)
+        file.flush()
+        try:
+            seen = read_photograph(open_picture(Path(file.name)), pixel)
+        except PhotographError as error:
+            raise CommandError(str(error).replace(f"{file.name}: ", "")) from None
+    if isinstance(seen, Refusal):
+        raise CommandError(f"{seen.reason}: {seen.detail}")
+    angle = seen.angles.mean.value_deg
+    return MeasuredCurve(f"{name}: {angle:.1f}°", seen.outline.u, seen.outline.top, seen.outline.flanks)
 
 
 def _scan(name: str, content: bytes) -> MeasuredCurve:

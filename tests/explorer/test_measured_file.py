@@ -8,7 +8,7 @@ import pytest
 from explorer.errors import CommandError
 from explorer.files.measured_curves import measured_curves
 from explorer.files.measured_file import FARTHEST, measured_file
-from solver.assets import measurement_folder
+from solver.assets import asset_path, measurement_folder
 
 SCAN = measurement_folder("trefoil_1") / "piles" / "fit_1.npz"
 
@@ -63,3 +63,17 @@ def test_a_bad_file_is_refused_in_one_line(name, content, words):
         measured_file(name, content)
     assert str(refused.value).startswith(f"{name}: ")
     assert "\n" not in str(refused.value)
+
+
+def test_a_photograph_lies_over_the_pile_in_metres():
+    """A rendered cone of 25° on the left and 30° on the right, 200 px high."""
+    picture = asset_path("photographs", "cone_25_30").read_bytes()
+    curve = measured_file("cone.jpg", picture, 0.25e-3)
+    left, right = (flank.angle_deg for flank in curve.flanks)
+    assert (left, right) == (pytest.approx(25.0, abs=0.5), pytest.approx(30.0, abs=0.5))
+    assert curve.name.startswith("cone.jpg: 27.")
+    assert curve.z.max() == pytest.approx(0.25e-3 * 200, rel=0.03)
+    with pytest.raises(CommandError, match=r"^cone\.jpg: a photograph needs its scale"):
+        measured_file("cone.jpg", picture)
+    with pytest.raises(CommandError, match=r"^bad\.png: not a picture"):
+        measured_file("bad.png", b"nothing", 1e-3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -48,11 +49,15 @@ class OutlinePanel:
                 self._folder = server.gui.add_text(
                     "Folder", "", hint="Folder with measurement.toml, on the machine that serves this page."
                 )
+                self._pixel = server.gui.add_number(
+                    "Photograph [mm per pixel]", 0.0, min=0.0, max=10.0, step=0.001, hint="Scale of a picture to come."
+                )
                 self._upload = server.gui.add_upload_button(
                     "Upload measured data",
                     mime_type=",".join((".zip", *SUFFIXES)),
                     hint="A folder with measurement.toml as .zip, which is kept and can be diagnosed too; a scanned "
-                    "pile (.npz: xyz, radius) or the points of an outline (.csv: u_m,z_m), which are drawn only.",
+                    "pile (.npz: xyz, radius), the points of an outline (.csv: u_m,z_m) or a photograph (.jpg, .png), "
+                    "which are drawn only.",
                 )
                 self._curve = server.gui.add_dropdown("Curve", (NONE,), disabled=True, hint="Which of its curves.")
 
@@ -93,7 +98,9 @@ class OutlinePanel:
     def _take(self, name: str, content: bytes) -> None:
         """Lay what was sent over the pile: a data set, which is kept, or a single curve."""
         if Path(name).suffix.lower() in SUFFIXES:
-            self._background.start("reading the file", lambda: measured_file(name, content), self._offer_one)
+            scale = float(self._pixel.value)
+            pixel = 1e-3 * scale if math.isfinite(scale) and scale > 0.0 else None
+            self._background.start("reading the file", lambda: measured_file(name, content, pixel), self._offer_one)
         else:
             self._background.start("reading the measured data", lambda: self._kept(name, content), self._offer_kept)
 
