@@ -53,7 +53,7 @@ class Block:
 
     coefficients: (P, d). information_inverse: covariance of the coefficients in units of the noise, (P, P). noise: of
     one simulated pour. lack_of_fit: (d,) variance of the emulator's bias, found from replicated points (zero without).
-    excess: (effects, d), see above. r2: (d,) cross-validated. standardised_error: (d,) root mean square of the base
+    straying, excess: (effects, d), see above. r2: (d,) cross-validated. standardised_error: (d,) root mean square of the base
     runs' left-out errors over their standard error (1 where both agree).
     """
 
@@ -61,6 +61,7 @@ class Block:
     information_inverse: FloatArray
     noise: PourNoise
     lack_of_fit: FloatArray
+    straying: npt.NDArray[np.bool_]
     excess: FloatArray
     r2: FloatArray
     standardised_error: FloatArray
@@ -87,6 +88,7 @@ def fit_block(rows: Rows, effects: int, floor: FloatArray) -> Block:
     strays = np.flatnonzero(_straying(rows, fit, effects).any(axis=1))
     if len(strays):
         fit = _regression(rows, np.where(np.isin(rows.effect, strays), APART, 1.0), floor)
+    straying = _straying(rows, fit, effects)
     scatter = ((rows.values - rows.values.mean(axis=0)) ** 2).sum(axis=0)
     base = rows.effect == BASE
     basis = _basis(rows, fit.leverage)
@@ -97,7 +99,8 @@ def fit_block(rows: Rows, effects: int, floor: FloatArray) -> Block:
         lack_of_fit=lack_of_fit_variance(
             rows.settings[basis], rows.values[basis], fit.residuals[basis], fit.leverage[basis]
         ),
-        excess=_excess(rows, fit, _straying(rows, fit, effects)),
+        straying=straying,
+        excess=_excess(rows, fit, straying),
         r2=1 - np.divide((fit.left_out**2).sum(axis=0), scatter, out=np.ones(len(scatter)), where=scatter > 0),
         standardised_error=np.sqrt(_standardised_squares(fit)[base].mean(axis=0)),
     )

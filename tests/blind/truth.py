@@ -3,8 +3,8 @@ acts that the declared model lacks.
 
 A truth's strength is the length of its projected, whitened shift of the summaries (`doe.diagnose.signatures`), in
 standard errors of a data set of ``REPLICATES`` pours. The emulator's own error is no part of that standard error, so
-that a strength means the same however much was simulated; how much an effect's own pours stray is, for nobody can say
-beforehand how far they go in one data set.
+that a strength means the same however much was simulated. Where an effect's own pours stray (`doe.diagnose.block`),
+that is noise, for nobody can say beforehand how far they go in one data set.
 """
 
 from collections.abc import Sequence
@@ -74,7 +74,8 @@ class Ruler:
 
     def shift(self, effect: int, theta: FloatArray, amplitude: FloatArray) -> float:
         """Shift [σ] by an effect at coded amplitudes (m,), freed from what the emulator's error adds on average."""
-        stray = self.emulator.predictor((effect,)).bias_variance(np.concatenate([theta, amplitude]))
+        level = float(amplitude @ amplitude)
+        stray = [level * np.where(b.straying[effect], b.excess[effect], 0.0) for b in self.emulator.blocks]
         frame = self.frame(theta, stray)
         z = projected(frame, shift_of(self.emulator, effect, theta, amplitude))
         return float(np.sqrt(max(0.0, z @ z - noise_square(self.emulator, effect, frame, theta, amplitude))))

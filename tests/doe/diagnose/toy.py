@@ -71,6 +71,11 @@ def make_toy(summaries, seed):
     return Toy(declared, jacobian, off, FULL * SIGMA * off + along.T, complement)
 
 
+def _still(d):
+    """No summary strays, none has an excess."""
+    return np.zeros((EFFECTS, d), dtype=bool), np.zeros((EFFECTS, d))
+
+
 def known_emulator(toy, generator, df=40):
     """The emulator that knows the model and has estimated only the covariance of a pour, with `df` degrees of
     freedom.
