@@ -53,8 +53,8 @@ class Block:
 
     coefficients: (P, d). information_inverse: covariance of the coefficients in units of the noise, (P, P). noise: of
     one simulated pour. lack_of_fit: (d,) variance of the emulator's bias, found from replicated points (zero without).
-    straying, excess: (effects, d), see above. r2: (d,) cross-validated. standardised_error: (d,) root mean square of the base
-    runs' left-out errors over their standard error (1 where both agree).
+    straying, excess: (effects, d), see above. r2: (d,) cross-validated. standardised_error: (d,) root mean square of
+    the base runs' left-out errors over their standard error (1 where both agree).
     """
 
     coefficients: FloatArray
