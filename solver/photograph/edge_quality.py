@@ -14,6 +14,9 @@ from solver.photograph.refusal import NotAPile, Reason
 
 Array = npt.NDArray[np.float64]
 
+SPAN = 0.06
+"""Share of the height."""
+
 
 def pixel_noise(grey: Array) -> float:
     """Standard deviation of a pixel of ``grey``, from second differences along the rows, which slanting light does not
@@ -50,13 +53,15 @@ def edge_width(patch: Patch, tops: Array, difference: float) -> float:
     """Pixels of the patch over which the grey changes sides along the flanks: the ``difference`` between the middle of
     the pile and the backdrop, over the steepest change of the grey across the edge.
 
-    The grey is averaged along the flanks at equal distance from the outline, so that noise is no steep change.
+    The grey is averaged along the flanks at equal distance from the outline, and its change taken over ``SPAN`` of the
+    height: the outline follows the noise of a hazy edge, which looks like a step there.
     """
     columns = _flank_columns(tops)
-    reach = np.arange(-round(3.0 * patch.band), round(3.0 * patch.band) + 1)
+    span = max(1, round(SPAN * float(tops.max())))
+    reach = np.arange(-2 * span, 2 * span + 1)
     rows = np.clip(tops[columns].astype(np.int64)[None, :] + reach[:, None], 0, patch.grey.shape[0] - 1)
-    profile = ndimage.gaussian_filter1d(patch.grey[rows, columns].mean(axis=1), 0.5 / patch.step)
-    return difference / max(float(np.abs(np.diff(profile)).max()), 1e-9)
+    profile = patch.grey[rows, columns].mean(axis=1)
+    return difference * span / max(float(np.abs(profile[span:] - profile[:-span]).max()), 1e-9)
 
 
 def roughness(outline: Outline, flank: FlankLine | None) -> float:

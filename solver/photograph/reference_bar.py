@@ -71,9 +71,16 @@ def bars_in(grey: Array) -> list[Bar]:
             found += _bars(excess > threshold, change)
     separate: list[Bar] = []
     for bar in sorted(found, key=lambda bar: -bar.sharpness):
-        if all(np.hypot(bar.x - other.x, bar.y - other.y) > 0.25 * other.length for other in separate):
+        if not any(_same(bar, other) for other in separate):
             separate.append(bar)
     return separate
+
+
+def _same(one: Bar, other: Bar) -> bool:
+    """True if both are seen about the same place, beside each other by less than their widths."""
+    x, y = one.x - other.x, one.y - other.y
+    along, across = x * other.along[0] + y * other.along[1], y * other.along[0] - x * other.along[1]
+    return abs(along) < 0.25 * other.length and abs(across) < one.width + other.width
 
 
 def _bars(mask: Image, change: Array) -> list[Bar]:
