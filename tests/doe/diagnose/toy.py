@@ -71,11 +71,6 @@ def make_toy(summaries, seed):
     return Toy(declared, jacobian, off, FULL * SIGMA * off + along.T, complement)
 
 
-def _still(d):
-    """No summary strays, none has an excess."""
-    return np.zeros((EFFECTS, d), dtype=bool), np.zeros((EFFECTS, d))
-
-
 def known_emulator(toy, generator, df=40):
     """The emulator that knows the model and has estimated only the covariance of a pour, with `df` degrees of
     freedom.
@@ -89,7 +84,14 @@ def known_emulator(toy, generator, df=40):
     noise = PourNoise(covariance, float(df), LEAST_SHRINKAGE, np.empty((0, d)))
     terms = len(coefficients)
     block = Block(
-        coefficients, np.zeros((terms, terms)), noise, np.zeros(d), np.zeros((EFFECTS, d)), np.ones(d), np.ones(d)
+        coefficients=coefficients,
+        information_inverse=np.zeros((terms, terms)),
+        noise=noise,
+        lack_of_fit=np.zeros(d),
+        straying=np.zeros((EFFECTS, d), dtype=bool),
+        excess=np.zeros((EFFECTS, d)),
+        r2=np.ones(d),
+        standardised_error=np.ones(d),
     )
     return Emulator(
         declared=toy.declared,
