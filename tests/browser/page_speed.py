@@ -207,7 +207,7 @@ def main():
         material.write_text(SPHERES, encoding="utf-8")
         server, port = serve("--material", str(material))
         try:
-            print(f"{MANY:<18} %5.1f frames/s   real time %6.4f" % asyncio.run(measure_many(port)))
+            print(f"{MANY:<18} %5.1f frames/s   real time %4.2f" % asyncio.run(measure_many(port)))
         finally:
             server.terminate()
             server.wait(20)
