@@ -62,8 +62,7 @@ def check_surface(study: SurfaceStudy) -> Iterator[Finding]:
 
 def _analysed(study: SurfaceStudy, responses: FloatArray | None = None) -> SurfaceAnova:
     """The analysis of variance of a refit; what a run that nothing can replace leaves undefined is NaN or infinite."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return analyse_surface(refit(study, responses))
+    return analyse_surface(refit(study, responses))
 
 
 def equation_terms(equation: Equation, factors: tuple[str, ...]) -> FloatArray:

@@ -19,7 +19,7 @@ from scipy import stats
 
 from doe.diagnose.lack_of_fit import lack_of_fit_variance
 from doe.diagnose.noise import AMPLE_DF, PourNoise, pour_noise
-from doe.diagnose.runs import BASE
+from doe.diagnose.runs import BASE, dust
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -116,7 +116,7 @@ def _regression(rows: Rows, weights: FloatArray, floor: FloatArray) -> _Regressi
     leverage = np.minimum(2 * own - np.einsum("np,pr,nr->n", x, inverse, x), 1 - 1e-9)
     basis = _basis(rows, leverage)
     overall = np.sqrt((residuals**2).sum(axis=0) / (1 - leverage).sum())
-    same = np.ptp(y[basis], axis=0) <= 8 * np.finfo(np.float64).eps * np.abs(y).max(axis=0)
+    same = np.ptp(y[basis], axis=0) <= dust(y)
     return _Regression(
         coefficients=coefficients,
         information_inverse=inverse,

@@ -95,12 +95,15 @@ def fit_emulator(declared: Declared, runs: Runs, floors: tuple[FloatArray, ...])
 
     Raises StatisticsError when the base runs cannot carry a linear model of the parameters.
     """
-    theta = np.stack([p.coded(runs.theta[:, i]) for i, p in enumerate(declared.parameters)], axis=-1)
+    theta = declared.coded(runs.theta)
     points = [np.concatenate([theta, runs.amplitude[:, : e.amplitudes] / e.scale], axis=1) for e in declared.effects]
     base = _choose_base(theta, runs)
     effects = tuple(_choose_effect(e, theta, points[e], base, runs, declared) for e in range(len(points)))
     design = _design(theta, points, base, effects, runs)
     own = [points[e][runs.effect == e][:, theta.shape[1] :] for e in range(len(points))]
+    level = np.zeros(len(theta))
+    for e, amplitude in enumerate(own):
+        level[runs.effect == e] = (amplitude**2).sum(axis=1)
     zero = [np.zeros((1, e.amplitudes)) for e in declared.effects]
     used = np.any([runs.simulated(c) for c in range(len(runs.blocks))], axis=0)
     return Emulator(
@@ -108,8 +111,7 @@ def fit_emulator(declared: Declared, runs: Runs, floors: tuple[FloatArray, ...])
         base_exponents=base,
         effect_exponents=effects,
         blocks=tuple(
-            fit_block(_rows(design, runs, c, declared), len(declared.effects), floors[c])
-            for c in range(len(runs.blocks))
+            fit_block(_rows(design, level, runs, c), len(declared.effects), floors[c]) for c in range(len(runs.blocks))
         ),
         theta_low=np.maximum(-1.0, theta[used].min(axis=0)),
         theta_high=np.minimum(1.0, theta[used].max(axis=0)),
@@ -118,15 +120,11 @@ def fit_emulator(declared: Declared, runs: Runs, floors: tuple[FloatArray, ...])
     )
 
 
-def _rows(design: FloatArray, runs: Runs, condition: int, declared: Declared) -> Rows:
+def _rows(design: FloatArray, level_square: FloatArray, runs: Runs, condition: int) -> Rows:
     """Return the complete runs of a condition."""
     kept = runs.simulated(condition) & np.isfinite(design).all(axis=1)
-    level = np.zeros(len(kept))
-    for e, effect in enumerate(declared.effects):
-        own = runs.effect == e
-        level[own] = ((runs.amplitude[own, : effect.amplitudes] / effect.scale) ** 2).sum(axis=1)
     settings = np.column_stack([runs.theta, runs.effect, runs.amplitude])
-    return Rows(design[kept], runs.effect[kept], level[kept], settings[kept], runs.blocks[condition][kept])
+    return Rows(design[kept], runs.effect[kept], level_square[kept], settings[kept], runs.blocks[condition][kept])
 
 
 def _choose_base(theta: FloatArray, runs: Runs) -> IntArray:

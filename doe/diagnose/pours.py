@@ -38,12 +38,22 @@ ROOT = 0
 
 @dataclass(frozen=True)
 class Ended:
-    """How one pour ended. ``label``: point and condition."""
+    """How one pour ended. ``label``: point and condition.
+
+    No seed is tried again: the other points carry the emulator.
+    """
 
     label: str
     seed: int
     outcome: Outcome
     message: str
+    replicate: int = 0
+    attempt: int = 0
+
+    @property
+    def valid(self) -> bool:
+        """Whether the run came to its end."""
+        return self.outcome.valid
 
 
 OnPour = Callable[[str, int, Ended], None]

@@ -101,6 +101,10 @@ class Declared(Record):
     effects: tuple[Effect, ...]
     conditions: tuple[Condition, ...]
 
+    def coded(self, theta: FloatArray) -> FloatArray:
+        """Return parameters in natural units, (..., k), coded."""
+        return np.stack([p.coded(theta[..., i]) for i, p in enumerate(self.parameters)], axis=-1)
+
     @property
     def labels(self) -> tuple[str, ...]:
         """Return "condition: summary" of every summary, in the order of the residual vector."""
@@ -205,8 +209,8 @@ def select_summaries(declared: Declared, runs: Runs, observed: Observed) -> Sele
         simulated, measured = runs.blocks[c][runs.simulated(c)], observed.complete(c)
         if not len(simulated):
             raise StatisticsError(f"{condition.name}: no complete pour among the runs")
-        constant = np.ptp(simulated, axis=0) <= _dust(simulated)
-        same = constant & (np.abs(measured - simulated[0]) <= _dust(simulated)).all(axis=0)
+        constant = np.ptp(simulated, axis=0) <= dust(simulated)
+        same = constant & (np.abs(measured - simulated[0]) <= dust(simulated)).all(axis=0)
         spread = measured.std(axis=0, ddof=1) if len(measured) > 1 else np.zeros(measured.shape[1])
         largest = np.maximum(np.abs(measured).max(axis=0), np.abs(simulated[0]))
         floor = np.where(constant, np.where(spread > 0, spread, CONSTANT_FLOOR * largest), 0.0)
@@ -237,6 +241,6 @@ def select_summaries(declared: Declared, runs: Runs, observed: Observed) -> Sele
     )
 
 
-def _dust(values: FloatArray) -> FloatArray:
+def dust(values: FloatArray) -> FloatArray:
     """Return what rounding alone may add, per column."""
     return 8 * math.ulp(1.0) * np.abs(values).max(axis=0)

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from scipy import stats
 
 from doe.diagnose.runs import BASE, Declared, Observed, Runs
+from doe.diagnose.terms import base_candidates, monomials
 from doe.diagnose.verdict import Residual
 
 FloatArray = npt.NDArray[np.float64]
@@ -54,15 +55,11 @@ class Tails:
 
     def natural(self, residuals: tuple[Residual, ...]) -> tuple[Residual, ...]:
         """Return the table with values as they are read: h^-1 of a mean of h."""
-        centre, scale = np.concatenate(self.centre), np.concatenate(self.scale)
-
-        def back(i: int, value: float) -> float:
-            return float(centre[i] + scale[i] * np.sinh((value - centre[i]) / scale[i])) if finite[i] else value
-
-        finite = np.isfinite(scale)
+        values = np.array([(row.measured, row.before, row.after) for row in residuals]).T
+        natural = put_back(values, np.concatenate(self.centre), np.concatenate(self.scale)).T.tolist()
         return tuple(
-            replace(row, measured=back(i, row.measured), before=back(i, row.before), after=back(i, row.after))
-            for i, row in enumerate(residuals)
+            replace(row, measured=measured, before=before, after=after)
+            for row, (measured, before, after) in zip(residuals, natural, strict=True)
         )
 
     def labels(self, declared: Declared) -> tuple[str, ...]:
@@ -73,8 +70,9 @@ class Tails:
 
 def heavy_tails(declared: Declared, runs: Runs, observed: Observed) -> Tails:
     """Return what the base model's runs ask for. Published means of several pours are left alone: h needs each pour."""
-    theta = np.stack([p.coded(runs.theta[:, i]) for i, p in enumerate(declared.parameters)], axis=-1)
-    terms = np.column_stack([np.ones(len(theta)), theta, theta**2])
+    theta = declared.coded(runs.theta)
+    _, with_squares, *_ = base_candidates(theta.shape[1])
+    terms = monomials(theta, with_squares)
     centres, scales = [], []
     for c, block in enumerate(runs.blocks):
         rows = (runs.effect == BASE) & runs.simulated(c)
@@ -99,3 +97,11 @@ def draw_in(values: FloatArray, centre: FloatArray, scale: FloatArray) -> FloatA
     drawn = np.array(values, dtype=np.float64)
     drawn[:, finite] = centre[finite] + scale[finite] * np.arcsinh((values[:, finite] - centre[finite]) / scale[finite])
     return drawn
+
+
+def put_back(values: FloatArray, centre: FloatArray, scale: FloatArray) -> FloatArray:
+    """Return h^-1 of values (n, d)."""
+    finite = np.isfinite(scale)
+    read = np.array(values, dtype=np.float64)
+    read[:, finite] = centre[finite] + scale[finite] * np.sinh((values[:, finite] - centre[finite]) / scale[finite])
+    return read

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from doe.diagnose.pours import Ended
+from explorer.study.progress import told_run
 
 EVERY = 20.0
 """Seconds between two lines of progress where there is no terminal."""
@@ -52,17 +53,8 @@ class PourProgress:
             "eta_s": eta,
             "line": line,
         }
-        if ended is not None and not ended.outcome.valid:
-            # No seed is tried again: the other points carry the emulator.
-            event["run"] = {
-                "label": ended.label,
-                "replicate": 0,
-                "attempt": 0,
-                "seed": ended.seed,
-                "outcome": str(ended.outcome),
-                "message": ended.message,
-                "valid": False,
-            }
+        if ended is not None and not ended.valid:
+            event["run"] = told_run(ended)
         with self._file.open("a", encoding="utf-8") as file:
             file.write(json.dumps(event, ensure_ascii=False) + "\n")
         about = "" if eta is None else f", about {eta:.0f} s"

@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from doe.diagnose.pours import Ended
 from doe.runner import Run
 
 EVERY = 2.0
@@ -93,8 +94,8 @@ class Progress:
             self._say(f"[{self.elapsed:6.0f} s] {stage}: {done} of {planned} runs{left}")
 
 
-def told_run(run: Run) -> dict[str, Any]:
-    """What the page is told of a run that has ended."""
+def told_run(run: Run | Ended) -> dict[str, Any]:
+    """What the page is told of a run, or of a pour of a diagnosis, that has ended."""
     return {
         "label": run.label,
         "replicate": run.replicate,

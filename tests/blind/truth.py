@@ -65,8 +65,7 @@ class Ruler:
 
     def coded(self, theta: Sequence[float]) -> FloatArray:
         """Parameters in natural units → coded, within the sampled box."""
-        coded = [float(p.coded(x)) for p, x in zip(self.declared.parameters, theta, strict=True)]
-        return np.clip(coded, self.emulator.theta_low, self.emulator.theta_high)
+        return np.clip(self.declared.coded(np.array(theta)), self.emulator.theta_low, self.emulator.theta_high)
 
     def within(self, effect: int, amplitude: FloatArray) -> FloatArray:
         """Coded amplitudes (m,) within what was simulated."""

@@ -207,7 +207,8 @@ def main():
         material.write_text(SPHERES, encoding="utf-8")
         server, port = serve("--material", str(material))
         try:
-            print(f"{MANY:<18} %5.1f frames/s   real time %4.2f" % asyncio.run(measure_many(port)))
+            frames, factor = asyncio.run(measure_many(port))
+            print(f"{MANY:<18} {frames:5.1f} frames/s   real time {factor:4.2f}")
         finally:
             server.terminate()
             server.wait(20)

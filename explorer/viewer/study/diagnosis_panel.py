@@ -46,12 +46,11 @@ class DiagnosisPanel:
         gui = server.gui
         self._diagnosis, self._file = diagnosis, ResultFile(RESULT)
         self._shipped, self._uploads = tuple(shipped), uploads
-        kept = tuple(kept_measurements(uploads))
         self._shown: Hashable = None
         gui.add_markdown("Which physical effect do measured data ask for that the declared model lacks?")
         self._data = gui.add_dropdown(
             "Measured data",
-            (*shipped, *kept, OWN),
+            self._offered(),
             initial_value=FIRST if FIRST in shipped else OWN,
             hint="Data sets that come with the program, those uploaded in the tab Pour, or a folder of your own.",
         )
@@ -90,6 +89,10 @@ class DiagnosisPanel:
         else:
             self._diagnosis.pause()
 
+    def _offered(self) -> tuple[str, ...]:
+        """What the list of data sets holds now."""
+        return (*self._shipped, *kept_measurements(self._uploads), OWN)
+
     def _chosen(self) -> str:
         chosen = str(self._folder.value if self._data.value == OWN else self._data.value)
         return str(kept_measurements(self._uploads).get(chosen, chosen))
@@ -99,9 +102,9 @@ class DiagnosisPanel:
 
         Call it inside ``server.atomic()``, about twice a second.
         """
-        data = (*self._shipped, *kept_measurements(self._uploads), OWN)
-        if tuple(self._data.options) != data:
-            self._data.options = data
+        offered = self._offered()
+        if tuple(self._data.options) != offered:
+            self._data.options = offered
         status = self._diagnosis.status()
         self._view.show(status, stages_markdown(status, "diagnosis", "Pours", notice))
         self._chooser.offer(self._diagnosis.finished())

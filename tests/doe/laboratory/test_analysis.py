@@ -13,12 +13,7 @@ from doe.laboratory.derive import derived
 from doe.laboratory.elastic import poisson_ratio, poisson_ratios
 from doe.laboratory.table import Table
 from solver.assets import asset_path
-
-
-def written(tmp_path, text, name="readings.csv"):
-    path = tmp_path / name
-    path.write_text(text, encoding="utf-8")
-    return path
+from tests.doe.laboratory.readings import assert_one_line, written
 
 
 def published(name):
@@ -209,11 +204,7 @@ def test_readings_that_give_nothing_are_refused_in_one_line(test, text, words, t
     path = written(tmp_path, text)
     with pytest.raises(LaboratoryError) as caught:
         analyse(test, path)
-    line = str(caught.value)
-    assert line.startswith(str(path))
-    assert "\n" not in line
-    for word in words:
-        assert word in line
+    assert_one_line(caught.value, path, words)
 
 
 def test_leaving_out_what_is_not_there_is_refused(tmp_path):

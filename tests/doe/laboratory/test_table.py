@@ -6,14 +6,9 @@ import pytest
 
 from doe.laboratory.columns import DROP, FORCE_DISPLACEMENT, INCLINED_PLANE
 from doe.laboratory.table import LaboratoryError, read_table
+from tests.doe.laboratory.readings import assert_one_line, written
 
 PLANE = "a,b,replicate,angle_deg\n"
-
-
-def written(tmp_path, content, name="readings.csv"):
-    path = tmp_path / name
-    path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    return path
 
 
 def test_units_of_the_names_are_turned_into_si(tmp_path):
@@ -74,11 +69,7 @@ def test_a_bad_file_gets_one_line(content, words, tmp_path):
     path = written(tmp_path, content)
     with pytest.raises(LaboratoryError) as caught:
         read_table(path, INCLINED_PLANE)
-    line = str(caught.value)
-    assert line.startswith(str(path))
-    assert "\n" not in line
-    for word in words:
-        assert word in line
+    assert_one_line(caught.value, path, words)
 
 
 def test_a_missing_file_and_a_folder_are_named(tmp_path):
