@@ -111,7 +111,7 @@ def calibrate(emulator: Emulator, members: tuple[int, ...], evidence: Evidence) 
     Sigma and fit follow each other REWEIGHTINGS times; deterministic.
     """
     predictor = emulator.predictor(members)
-    sigma = residual_covariance(predictor, _nowhere(predictor), evidence)
+    sigma = residual_covariance(predictor, _first(predictor), evidence)
     for _ in range(REWEIGHTINGS):
         fit = fit_with_covariance(predictor, members, evidence, sigma)
         sigma = residual_covariance(predictor, fit.x, evidence)
@@ -171,8 +171,10 @@ def _starts(predictor: Predictor) -> FloatArray:
     return np.concatenate([[(low + high) / 2], low + spread * (high - low)])
 
 
-def _nowhere(predictor: Predictor) -> FloatArray:
-    """Return the middle of the parameters with every effect off."""
+def _first(predictor: Predictor) -> FloatArray:
+    """Return where Sigma is first taken: at the anchor, else the middle of the parameters with every effect off."""
+    if predictor.anchor is not None:
+        return predictor.anchor.x
     k = predictor.parameters
     x = np.zeros(len(predictor.low))
     x[:k] = (predictor.low[:k] + predictor.high[:k]) / 2

@@ -6,19 +6,19 @@ race.
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from doe.diagnose.calibrate import Evidence, Fit, calibrate, fit_with_covariance, gather_evidence
+from doe.diagnose.effect_table import effect_rows
 from doe.diagnose.emulator import Emulator, fit_emulator
 from doe.diagnose.freed import freed_parameters
-from doe.diagnose.gates import Adequacy, Detection, Gate, Limits, adequate, detect, evidence_weights, unambiguous
+from doe.diagnose.fresh_pours import FreshPours
+from doe.diagnose.gates import Adequacy, Gate, Limits, adequate, detect, unambiguous
 from doe.diagnose.race import Race, race_pairs, race_singles
 from doe.diagnose.rivals import told_apart
 from doe.diagnose.runs import Declared, Observed, Runs, select_summaries
-from doe.diagnose.signatures import Reach, Whitening, reach, whitening
+from doe.diagnose.signatures import Whitening, reach, whitening
 from doe.diagnose.specificity import specific
 from doe.diagnose.tables import (
     amplitude_estimates,
@@ -30,11 +30,10 @@ from doe.diagnose.tables import (
     where_the_residual_sits,
 )
 from doe.diagnose.tails import heavy_tails
-from doe.diagnose.verdict import EffectRow, FittedModel, Signature, Verdict
+from doe.diagnose.verdict import FittedModel, Signature, Verdict
 from doe.errors import StatisticsError
 
 STANDARD_LIMITS = Limits()
-NAN = math.nan
 
 
 @dataclass(frozen=True)
@@ -59,15 +58,21 @@ def diagnose(
     bootstrap: int = 1000,
     seed: int = 0,
     limits: Limits = STANDARD_LIMITS,
+    fresh: Sequence[FreshPours] = (),
 ) -> Verdict:
     """Return the verdict on measured data from simulated runs of the declared model.
 
     observed: the conditions to be fitted only, in the order of declared.conditions; a holdout is judged in holdout.py.
+    fresh: pours at best fits of an earlier verdict with the same runs.
     Raises StatisticsError for shapes that disagree, too few runs or bootstrap < 500.
     """
     selected = select_summaries(declared, runs, observed)
     tails = heavy_tails(selected.declared, selected.runs, selected.observed)
     emulator = fit_emulator(selected.declared, tails.of_runs(selected.runs), selected.floors)
+    kept = [[block[:, keep] for block, keep in zip(one.blocks, selected.kept, strict=True)] for one in fresh]
+    emulator = replace(
+        emulator, fresh=tuple(replace(one, blocks=tails.of_pours(b)) for one, b in zip(fresh, kept, strict=True))
+    )
     measured = tails.of_observed(selected.observed)
     verdict = judge(emulator, measured, bootstrap, seed, limits, selected.dropped, selected.floored)
     return replace(verdict, residuals=tails.natural(verdict.residuals), drawn_in=tails.labels(selected.declared))
@@ -82,18 +87,23 @@ def judge(
     dropped: tuple[str, ...] = (),
     floored: tuple[str, ...] = (),
 ) -> Verdict:
-    """Return the verdict from a fitted emulator, which serves any number of data sets of the same conditions."""
+    """Return the verdict from a fitted emulator, which serves any number of data sets of the same conditions.
+
+    Fresh pours at best fits count in the race only. Gate 1 compares effects at amplitudes near zero, where each of them
+    is the base model: that holds for the emulator without them.
+    """
     if bootstrap < 500:
         raise StatisticsError(f"bootstrap = {bootstrap}; p values near 0.005 need at least 500 sets")
     declared, evidence = emulator.declared, gather_evidence(emulator, observed)
-    base = calibrate(emulator, (), evidence)
+    bare = replace(emulator, fresh=())
+    base = calibrate(bare, (), evidence)
     frame = whitening(base, evidence)
     theta = base.x
-    reaches = {e: reach(emulator, e, frame, theta) for e in emulator.simulated_effects}
+    reaches = {e: reach(bare, e, frame, theta) for e in bare.simulated_effects}
     raced = [e for e, found in reaches.items() if found.shift >= limits.reach]
-    singles = {e: fit_with_covariance(emulator.predictor((e,)), (e,), evidence, base.sigma) for e in raced}
-    detection = detect(emulator, evidence, base, singles, limits, bootstrap, seed)
-    signatures = signature_table(emulator, base, singles, reaches, frame)
+    singles = {e: fit_with_covariance(bare.predictor((e,)), (e,), evidence, base.sigma) for e in raced}
+    detection = detect(bare, evidence, base, singles, limits, bootstrap, seed)
+    signatures = signature_table(bare, base, singles, reaches, frame)
     race = race_singles(emulator, evidence, base, raced) if detection.passed else None
     conclusion = (
         _conclude(emulator, evidence, base, race, raced, signatures, frame, limits, bootstrap, seed)
@@ -113,7 +123,7 @@ def judge(
         amplitudes=amplitude_estimates(declared, final, refits),
         models=_models(declared, base, race, conclusion.pairs),
         gates=(detection.overall, detection.directed, *conclusion.gates),
-        effects=_effect_rows(declared, reaches, singles, detection, race, signatures),
+        effects=effect_rows(declared, reaches, singles, detection, race, signatures),
         parameters=parameter_changes(declared, base, final),
         freed=freed_parameters(declared, base, evidence),
         residuals=residual_table(declared, evidence, base, final),
@@ -205,49 +215,3 @@ def _models(declared: Declared, base: Fit, *races: Race | None) -> tuple[FittedM
         if race is not None:
             rows += [fitted_model(declared, label, fit, race.criteria[label]) for label, fit in race.fits.items()]
     return tuple(sorted(rows, key=lambda row: row.criterion))
-
-
-def _effect_rows(
-    declared: Declared,
-    reaches: dict[int, Reach],
-    singles: dict[int, Fit],
-    detection: Detection,
-    race: Race | None,
-    signatures: Signature,
-) -> tuple[EffectRow, ...]:
-    """Return the table of effects in their declared order."""
-    weights = evidence_weights(list(race.criteria.values())) if race and race.criteria else np.array([])
-    weight_of = dict(zip(race.criteria, weights, strict=True)) if race else {}
-    best = race.best if race and race.fits else None
-    rows = []
-    for e, effect in enumerate(declared.effects):
-        if e not in singles:
-            found = reaches.get(e)
-            status = "not simulated" if found is None else "not identifiable here"
-            shift = NAN if found is None else found.shift
-            rows.append(EffectRow(effect.name, status, shift, (), *(NAN,) * 7))  # type: ignore[arg-type]
-            continue
-        fit = race.fits[effect.name] if race else singles[e]
-        criterion = race.criteria[effect.name] if race else NAN
-        rows.append(
-            EffectRow(
-                name=effect.name,
-                status="raced",
-                reach=reaches[e].shift,
-                amplitudes=amplitude_estimates(declared, fit),
-                t2=fit.t2,
-                drop=detection.drops[e],
-                p_drop=detection.drop_p[e],
-                criterion=criterion,
-                delta=criterion - race.criteria[best] if race and best else NAN,
-                weight=float(weight_of.get(effect.name, NAN)),
-                cosine=_cosine_to(signatures, effect.name, best),
-            )
-        )
-    return tuple(rows)
-
-
-def _cosine_to(signatures: Signature, name: str, best: str | None) -> float:
-    if best is None:
-        return NAN
-    return float(signatures.cosines[signatures.names.index(name), signatures.names.index(best)])

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from doe.diagnose.closer import LOOKS, poured, to_be_poured
 from doe.diagnose.confirm import Confirmed, Model, confirm, fitted
 from doe.diagnose.decide import diagnose
+from doe.diagnose.fresh_pours import FreshPours
 from doe.diagnose.holdout import HoldoutCondition, HoldoutError, holdout_errors
 from doe.diagnose.menu import Suggestion, next_experiment
 from doe.diagnose.pours import ModelPours, OnPour, effect_values
@@ -77,6 +79,14 @@ def run_diagnosis(
         verdict = diagnose(screened.declared, screened.runs, observed)
         if cramped:
             say(f"wider range of {', '.join(cramped)}: {verdict.kind}")
+    fresh: tuple[FreshPours, ...] = ()
+    for _ in range(LOOKS):
+        closer = to_be_poured(verdict, screened.declared, fresh)
+        if not closer:
+            break
+        fresh += poured(verdict, closer, model)
+        verdict = diagnose(screened.declared, screened.runs, observed, fresh=fresh)
+        say(f"poured at the best fits of {', '.join(one.label for one in closer)}: {verdict.kind}")
     say(f"verdict: {verdict.kind}")
     before, after = models(verdict)
     fresh = max(FRESH, *(2 * condition.replicates for condition in measurement.conditions))

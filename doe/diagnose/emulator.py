@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.diagnose.block import Block, Rows, fit_block
+from doe.diagnose.fresh_pours import FreshPours, anchored
 from doe.diagnose.predictor import Predictor
 from doe.diagnose.runs import BASE, Declared, Runs
 from doe.diagnose.terms import base_candidates, effect_candidates, monomials
@@ -37,7 +38,8 @@ the prediction's standard error does not know of."""
 class Emulator:
     """All conditions with the same terms. effect_exponents: per declared effect (terms, k + amplitudes), no rows where
     the effect was not simulated enough. low, high: per effect, the sampled range of its coded amplitudes, zero
-    included. theta_low, theta_high: (k,) sampled range of the coded parameters.
+    included. theta_low, theta_high: (k,) sampled range of the coded parameters. fresh: pours at best fits, each
+    of which holds the predictions of its own model.
     """
 
     declared: Declared
@@ -48,6 +50,7 @@ class Emulator:
     theta_high: FloatArray
     low: tuple[FloatArray, ...]
     high: tuple[FloatArray, ...]
+    fresh: tuple[FreshPours, ...] = ()
 
     @property
     def simulated_effects(self) -> tuple[int, ...]:
@@ -76,7 +79,7 @@ class Emulator:
             columns.append(np.arange(starts[e], starts[e + 1]))
             first += size
         chosen = np.concatenate(columns)
-        return Predictor(
+        predictor = Predictor(
             parameters=k,
             exponents=np.concatenate(exponents),
             coefficients=tuple(b.coefficients[chosen] for b in self.blocks),
@@ -88,6 +91,9 @@ class Emulator:
             low=np.concatenate([self.theta_low, *(self.low[e] for e in members)]),
             high=np.concatenate([self.theta_high, *(self.high[e] for e in members)]),
         )
+        for fresh in self.fresh:
+            predictor = anchored(predictor, fresh) if fresh.members == members else predictor
+        return predictor
 
 
 def fit_emulator(declared: Declared, runs: Runs, floors: tuple[FloatArray, ...]) -> Emulator:

@@ -14,6 +14,22 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 
+BIAS_LENGTH = 0.25
+"""Share of the sampled box over which the bias of a polynomial keeps its value: what a quadratic leaves has three
+changes of sign in it."""
+
+
+@dataclass(frozen=True)
+class Anchor:
+    """Point x (q,) at which pours of the model itself hold the prediction (fresh_pours.py), and its variance there, per
+    condition: shares of a pour's covariance, and bias (d_c,).
+    """
+
+    x: FloatArray
+    shares: tuple[float, ...]
+    bias: tuple[FloatArray, ...]
+
+
 @dataclass(frozen=True)
 class Predictor:
     """y_c(x) = terms(x) @ coefficients_c; x: (..., q) coded parameters, then coded amplitudes.
@@ -33,6 +49,7 @@ class Predictor:
     amplitudes: tuple[int, ...]
     low: FloatArray
     high: FloatArray
+    anchor: Anchor | None = None
 
     def mean(self, x: FloatArray) -> FloatArray:
         """Return the predicted means of all conditions side by side, (..., q) -> (..., D).
@@ -59,15 +76,29 @@ class Predictor:
         )
 
     def variance_shares(self, x: FloatArray) -> tuple[float, ...]:
-        """Return per condition terms' (X'X)^-1 terms at x (q,): variance of the predicted mean in pours."""
+        """Return per condition terms' (X'X)^-1 terms at x (q,): variance of the predicted mean in pours.
+
+        With an anchor, that of the anchor and of the step from it.
+        """
         terms = monomials(x, self.exponents)
-        return tuple(float(terms @ inverse @ terms) for inverse in self.information_inverse)
+        if self.anchor is None:
+            return tuple(float(terms @ inverse @ terms) for inverse in self.information_inverse)
+        step = terms - monomials(self.anchor.x, self.exponents)
+        return tuple(
+            share + float(step @ inverse @ step)
+            for share, inverse in zip(self.anchor.shares, self.information_inverse, strict=True)
+        )
 
     def bias_variance(self, x: FloatArray) -> tuple[FloatArray, ...]:
         """Return per condition the variance of what no number of runs would mend at x (q,): (d_c,)."""
         ends = np.cumsum([self.parameters, *self.amplitudes])
         squares = np.array([(part**2).sum() for part in np.split(x, ends[:-1])[1:]])
-        return tuple(lack + squares @ excess for lack, excess in zip(self.lack_of_fit, self.excess, strict=True))
+        bias = tuple(lack + squares @ excess for lack, excess in zip(self.lack_of_fit, self.excess, strict=True))
+        if self.anchor is None:
+            return bias
+        step = (x - self.anchor.x) / (self.high - self.low)
+        loose = 1.0 - np.exp(-(step**2).sum() / BIAS_LENGTH**2)
+        return tuple(held + loose * far for held, far in zip(self.anchor.bias, bias, strict=True))
 
     def require_inside(self, x: FloatArray) -> None:
         """Raise StatisticsError unless every point lies in the sampled box (rounding aside)."""

@@ -165,7 +165,8 @@ class Selected:
     """The summaries that can be compared. dropped: constant and equal in runs and data, by label.
 
     floors: per condition (d_c,), standard deviation of one pour assumed for a summary that is constant in the runs
-    but not equal in the data (then named in `floored`); zero elsewhere.
+    but not equal in the data (then named in `floored`); zero elsewhere. kept: per condition the places of the summaries
+    that are left.
     """
 
     declared: Declared
@@ -174,6 +175,7 @@ class Selected:
     dropped: tuple[str, ...]
     floored: tuple[str, ...]
     floors: tuple[FloatArray, ...]
+    kept: tuple[IntArray, ...]
 
 
 def require_agreement(declared: Declared, runs: Runs, observed: Observed) -> None:
@@ -238,6 +240,7 @@ def select_summaries(declared: Declared, runs: Runs, observed: Observed) -> Sele
         dropped=tuple(dropped),
         floored=tuple(floored),
         floors=tuple(floors),
+        kept=tuple(kept),
     )
 
 

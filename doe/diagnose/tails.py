@@ -10,6 +10,7 @@ Gaussian noise. Source: Johnson 1949, Biometrika 36:149 (S_U); the test: Anscomb
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -41,17 +42,19 @@ class Tails:
 
     def of_runs(self, runs: Runs) -> Runs:
         """Return the runs with h of every summary."""
-        blocks = (draw_in(*one) for one in zip(runs.blocks, self.centre, self.scale, strict=True))
-        return replace(runs, blocks=tuple(blocks))
+        return replace(runs, blocks=self.of_pours(runs.blocks))
+
+    def of_pours(self, blocks: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
+        """Return h of summaries, per condition (n, d_c)."""
+        return tuple(draw_in(*one) for one in zip(blocks, self.centre, self.scale, strict=True))
 
     def of_observed(self, observed: Observed) -> Observed:
         """Return the measured side with h of every reading; an instrument's error shrinks by the slope of h."""
-        blocks = [draw_in(*one) for one in zip(observed.blocks, self.centre, self.scale, strict=True)]
         instrument = [
             sd / np.sqrt(1.0 + ((observed.complete(c).mean(axis=0) - self.centre[c]) / self.scale[c]) ** 2)
             for c, sd in enumerate(observed.instrument)
         ]
-        return Observed(tuple(blocks), tuple(instrument), observed.mean_of)
+        return Observed(self.of_pours(observed.blocks), tuple(instrument), observed.mean_of)
 
     def natural(self, residuals: tuple[Residual, ...]) -> tuple[Residual, ...]:
         """Return the table with values as they are read: h^-1 of a mean of h."""

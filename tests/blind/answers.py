@@ -1,15 +1,17 @@
 """From cases to rows: truths are drawn, poured, judged, and right names are tried on what was held out."""
 
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
+from doe.diagnose.closer import LOOKS, points_of, poured, to_be_poured
 from doe.diagnose.confirm import confirm
 from doe.diagnose.diagnosis import FRESH, models
+from doe.diagnose.fresh_pours import FreshPours
 from doe.diagnose.holdout import HoldoutCondition, holdout_errors
 from doe.diagnose.plan import Point
 from doe.diagnose.pours import ModelPours
@@ -49,12 +51,9 @@ class Answers:
         began = time.monotonic()
         truths = [truth_of(case, self.ruler) for case in cases]
         data = self.measured(truths, self.measurement.fit)
-        told = [k for k, found in enumerate(data) if found is not None]
-        runs = self.screened.runs
-        questions = [Question(self.screened.declared, runs, self.model, found) for found in data if found is not None]
-        verdicts = dict(zip(told, self.place.map(judged, questions), strict=True))
+        verdicts, fresh = self.judged({k: found for k, found in enumerate(data) if found is not None})
         cosines = {k: least_cosine(verdict, label_of(truths[k])) for k, verdict in verdicts.items()}
-        right = [k for k in told if answer_to(verdicts[k].kind, label_of(truths[k]), cosines[k]) == "right"]
+        right = [k for k in verdicts if answer_to(verdicts[k].kind, label_of(truths[k]), cosines[k]) == "right"]
         errors = dict(zip(right, self.holdout([truths[k] for k in right], [verdicts[k] for k in right]), strict=True))
         seconds = (time.monotonic() - began) / len(cases)
         rows = []
@@ -62,6 +61,7 @@ class Answers:
             verdict, found = verdicts.get(k), data[k]
             before, after = errors.get(k, (NAN, NAN))
             pours = 0 if found is None else REPLICATES * len(self.measurement.fit)
+            pours += sum(len(block) for one in fresh.get(k, ()) for block in one.blocks)
             pours += (REPLICATES + 2 * FRESH) * len(self.measurement.holdout) if k in errors else 0
             rows.append(
                 Row(
@@ -81,6 +81,23 @@ class Answers:
                 )
             )
         return rows
+
+    def judged(self, data: Mapping[int, Data]) -> tuple[dict[int, Verdict], dict[int, tuple[FreshPours, ...]]]:
+        """Verdicts, and the fresh pours at best fits that each of them rests on, as in a diagnosis."""
+        declared, runs = self.screened.declared, self.screened.runs
+        questions = {k: Question(declared, runs, self.model, found) for k, found in data.items()}
+        verdicts = dict(zip(questions, self.place.map(judged, list(questions.values())), strict=True))
+        pours = self.model_pours(self.measurement.fit)
+        for _ in range(LOOKS):
+            closer = {k: found for k, v in verdicts.items() if (found := to_be_poured(v, declared, questions[k].fresh))}
+            # All of them at once, so that no worker waits for the last pour of a set.
+            pours.run("best fits", [p for k, found in closer.items() for m in found for p in points_of(verdicts[k], m)])
+            for k, found in closer.items():
+                known = questions[k].fresh
+                questions[k] = replace(questions[k], fresh=(*known, *poured(verdicts[k], found, pours)))
+            again = self.place.map(judged, [questions[k] for k in closer])
+            verdicts |= dict(zip(closer, again, strict=True))
+        return verdicts, {k: question.fresh for k, question in questions.items()}
 
     def measured(self, truths: Sequence[Truth], conditions: Sequence[Condition]) -> list[Data | None]:
         """Readings of the laboratories' pours; None where there is no such truth, or pours keep breaking off."""
@@ -108,6 +125,12 @@ class Answers:
         paths = [parameter.path for parameter in self.measurement.parameters]
         return ModelPours(conditions, paths, self.place.store, self.place.crew.run_queue, root=ROOT)
 
+    def model_pours(self, conditions: Sequence[Condition]) -> ModelPours:
+        """Pours of the declared model, as a diagnosis makes them."""
+        paths = [parameter.path for parameter in self.measurement.parameters]
+        clock = self.place.look_at_the_clock
+        return ModelPours(conditions, paths, self.place.store, self.place.crew.run_queue, clock)
+
     def means(self, data: Data) -> FloatArray:
         """Means of the summaries that the ruler knows, (D,)."""
         found = []
@@ -121,8 +144,7 @@ class Answers:
     def holdout(self, truths: Sequence[Truth], verdicts: Sequence[Verdict]) -> list[tuple[float, float]]:
         """Error ÷ noise floor on the held-out conditions, of the calibrated base model and of the named one."""
         conditions = self.measurement.holdout
-        paths = [parameter.path for parameter in self.measurement.parameters]
-        pours = ModelPours(conditions, paths, self.place.store, self.place.crew.run_queue, self.place.look_at_the_clock)
+        pours = self.model_pours(conditions)
         widths = [len(summary_names(condition)) for condition in conditions]
         ratios = []
         for data, verdict in zip(self.measured(truths, conditions), verdicts, strict=True):

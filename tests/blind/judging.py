@@ -9,6 +9,7 @@ import numpy as np
 
 from doe.diagnose.decide import diagnose
 from doe.diagnose.diagnosis import observe
+from doe.diagnose.fresh_pours import FreshPours
 from doe.diagnose.runs import Declared, Runs
 from doe.diagnose.verdict import Verdict
 from doe.measurement import load_measurement
@@ -17,24 +18,27 @@ from tests.blind.laboratory import Reading, write_folder
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked of the diagnosis: the emulator's runs, and the readings of the fitted conditions."""
+    """What is asked of the diagnosis: the emulator's runs, the readings of the fitted conditions, fresh pours at the
+    fits of an earlier verdict.
+    """
 
     declared: Declared
     runs: Runs
     model: Path
     measured: Mapping[str, Sequence[Reading]]
+    fresh: tuple[FreshPours, ...] = ()
 
 
 def judged(question: Question) -> Verdict:
     """The verdict on a data set that is written to a folder and read like any other."""
     with TemporaryDirectory() as folder:
         write_folder(Path(folder), question.model, question.measured)
-        return judged_folder(Path(folder), question.declared, question.runs)
+        return judged_folder(Path(folder), question.declared, question.runs, question.fresh)
 
 
-def judged_folder(folder: Path, declared: Declared, runs: Runs) -> Verdict:
+def judged_folder(folder: Path, declared: Declared, runs: Runs, fresh: Sequence[FreshPours] = ()) -> Verdict:
     """The verdict on the data set in ``folder``."""
-    return diagnose(declared, runs, observe(load_measurement(folder).fit))
+    return diagnose(declared, runs, observe(load_measurement(folder).fit), fresh=fresh)
 
 
 def cosine_between(verdict: Verdict, one: str, other: str) -> float:
