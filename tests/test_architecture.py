@@ -30,10 +30,13 @@ DOE_PARTS_THAT_MAY_USE_THE_SOLVER = {
     "doe/study.py": "reads a study file: its material, rig and insertion make a scene",
     "doe/measurement/": "a condition is a scene, and data and runs are read by the same functions",
     "doe/diagnose/diagnosis.py": "turns declared parameters and effects into those of the decision",
-    "doe/diagnose/pours.py": "turns a point of a plan into a simulated world",
-    "doe/diagnose/menu.py": "set-ups that a rig can do",
-    "doe/diagnose/profiles.py": "pictures of simulated piles by the function that reads measured ones",
+    "doe/diagnose/simulation/pours.py": "turns a point of a plan into a simulated world",
+    "doe/diagnose/follow_up/menu.py": "set-ups that a rig can do",
+    "doe/diagnose/simulation/profiles.py": "pictures of simulated piles by the function that reads measured ones",
 }
+
+# In the order of the data: each room may import from those before it.
+DIAGNOSIS_ROOMS = ("simulation", "emulation", "fitting", "decision", "follow_up")
 
 TI_INIT_HOME = "solver/backend.py"
 MAX_LINES = 400
@@ -183,6 +186,15 @@ def doe_uses_public_solver_names(source: Source) -> list[str]:
     ]
 
 
+def diagnosis_flows_one_way(source: Source) -> list[str]:
+    parts = source.path.split("/")
+    if parts[:2] != ["doe", "diagnose"] or parts[2] not in DIAGNOSIS_ROOMS:
+        return []
+    later = DIAGNOSIS_ROOMS[DIAGNOSIS_ROOMS.index(parts[2]) + 1 :]
+    used = {one.module.split(".")[2] for one in imports(source) if one.module.startswith("doe.diagnose.")}
+    return [f"{source.path}: {parts[2]} comes before {room}" for room in later if room in used]
+
+
 def files_stay_short(source: Source) -> list[str]:
     lines = len(source.text.splitlines())
     return [f"{source.path}: {lines} lines, more than {MAX_LINES}; split by concept"] if lines > MAX_LINES else []
@@ -201,6 +213,7 @@ PACKAGE_RULES: tuple[Rule, ...] = (
     only_the_backend_starts_taichi,
     no_future_annotations_beside_taichi,
     doe_uses_public_solver_names,
+    diagnosis_flows_one_way,
 )
 EVERYWHERE_RULES: tuple[Rule, ...] = (files_stay_short, names_say_something)
 
@@ -236,6 +249,7 @@ VIOLATIONS: tuple[tuple[Rule, str, str], ...] = (
     (doe_uses_public_solver_names, "doe/runner.py", "from solver.world import World"),
     (doe_uses_public_solver_names, "doe/runner.py", "import solver"),
     (doe_uses_public_solver_names, "doe/runner.py", "from solver import _not_a_public_name"),
+    (diagnosis_flows_one_way, "doe/diagnose/emulation/tails.py", "from doe.diagnose.decision.verdict import Residual"),
     (files_stay_short, "doe/anova.py", "x = 1\n" * (MAX_LINES + 1)),
     (names_say_something, "solver/utils.py", ""),
     (names_say_something, "tests/doe/helpers.py", ""),
@@ -258,6 +272,7 @@ ALLOWED: tuple[tuple[Rule, str, str], ...] = (
         "from __future__ import annotations\nimport numpy",
     ),
     (doe_uses_public_solver_names, "explorer/session.py", "from solver.world import World"),
+    (diagnosis_flows_one_way, "doe/diagnose/decision/gates.py", "from doe.diagnose.fitting.calibrate import Fit"),
     (files_stay_short, "doe/anova.py", "x = 1\n" * MAX_LINES),
     (names_say_something, "solver/shape.py", ""),
 )

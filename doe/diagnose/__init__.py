@@ -1,4 +1,4 @@
-"""Diagnosis: from measured summaries and simulated runs to what the model lacks, if anything.
+"""Diagnosis: from measured summaries and simulated runs to what the model lacks, if anything (README.md).
 
-`diagnose` (decide.py) is the whole chain. Pure NumPy and SciPy: simulations are made elsewhere.
+`diagnosis.py` is the whole loop with its pours, `decision/decide.py` the judgement on pours that are there.
 """

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from doe.diagnose.closer import LOOKS, poured, to_be_poured
-from doe.diagnose.confirm import Confirmed, Model, confirm, fitted
-from doe.diagnose.decide import diagnose
-from doe.diagnose.fresh_pours import FreshPours
-from doe.diagnose.holdout import HoldoutCondition, HoldoutError, holdout_errors
-from doe.diagnose.menu import Suggestion, next_experiment
-from doe.diagnose.pours import ModelPours, OnPour, effect_values
+from doe.diagnose.decision.decide import diagnose
+from doe.diagnose.decision.verdict import Verdict
+from doe.diagnose.emulation.fresh_pours import FreshPours
+from doe.diagnose.follow_up.closer import LOOKS, poured, to_be_poured
+from doe.diagnose.follow_up.confirm import Confirmed, Model, confirm, fitted
+from doe.diagnose.follow_up.holdout import HoldoutCondition, HoldoutError, holdout_errors
+from doe.diagnose.follow_up.menu import Suggestion, next_experiment
 from doe.diagnose.runs import Condition, Declared, Effect, Observed, Parameter
-from doe.diagnose.screen import Budget, Say, further, screen, widened
-from doe.diagnose.verdict import Verdict
+from doe.diagnose.simulation.pours import ModelPours, OnPour, effect_values
+from doe.diagnose.simulation.screen import Budget, Say, Screened, further, screen, widened
 from doe.measurement.measurement import Condition as MeasuredCondition
 from doe.measurement.measurement import MeasuredParameter, Measurement
 from doe.measurement.summaries import summaries_of_data, summary_names, summary_uncertainties
@@ -79,20 +79,13 @@ def run_diagnosis(
         verdict = diagnose(screened.declared, screened.runs, observed)
         if cramped:
             say(f"wider range of {', '.join(cramped)}: {verdict.kind}")
-    fresh: tuple[FreshPours, ...] = ()
-    for _ in range(LOOKS):
-        closer = to_be_poured(verdict, screened.declared, fresh)
-        if not closer:
-            break
-        fresh += poured(verdict, closer, model)
-        verdict = diagnose(screened.declared, screened.runs, observed, fresh=fresh)
-        say(f"poured at the best fits of {', '.join(one.label for one in closer)}: {verdict.kind}")
+    verdict = looked_closer(verdict, screened, observed, model, say)
     say(f"verdict: {verdict.kind}")
     before, after = models(verdict)
-    fresh = max(FRESH, *(2 * condition.replicates for condition in measurement.conditions))
+    number = max(FRESH, *(2 * condition.replicates for condition in measurement.conditions))
     widths = [len(summary_names(condition)) for condition in measurement.conditions]
-    one = confirm(before, everywhere, fresh, widths)
-    other = one if after == before else confirm(after, everywhere, fresh, widths)
+    one = confirm(before, everywhere, number, widths)
+    other = one if after == before else confirm(after, everywhere, number, widths)
     menu = next_experiment(verdict, measurement.fit[0], paths, store, pours, on_pour)
     return Diagnosis(
         declared=screened.declared,
@@ -105,6 +98,19 @@ def run_diagnosis(
         pours=model.run_now + everywhere.run_now + menu.run_now,
         settings=len(screened.points),
     )
+
+
+def looked_closer(verdict: Verdict, screened: Screened, observed: Observed, model: ModelPours, say: Say) -> Verdict:
+    """The verdict once the contending models have been poured at their best fits."""
+    fresh: tuple[FreshPours, ...] = ()
+    for _ in range(LOOKS):
+        contenders = to_be_poured(verdict, screened.declared, fresh)
+        if not contenders:
+            break
+        fresh += poured(verdict, contenders, model)
+        verdict = diagnose(screened.declared, screened.runs, observed, fresh=fresh)
+        say(f"poured at the best fits of {', '.join(one.label for one in contenders)}: {verdict.kind}")
+    return verdict
 
 
 def declare(measurement: Measurement, effects: Sequence[str]) -> Declared:

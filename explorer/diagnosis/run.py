@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from doe.diagnose.confirm import Confirmed
 from doe.diagnose.diagnosis import Diagnosis, run_diagnosis
-from doe.diagnose.holdout import HoldoutError
-from doe.diagnose.profiles import measured_profile
-from doe.diagnose.screen import Budget
+from doe.diagnose.follow_up.confirm import Confirmed
+from doe.diagnose.follow_up.holdout import HoldoutError
+from doe.diagnose.simulation.profiles import measured_profile
+from doe.diagnose.simulation.screen import Budget
 from doe.measurement.load import load_measurement
 from doe.measurement.measurement import Measurement
 from doe.measurement.summaries import summaries

@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from doe.diagnose.closer import LOOKS, points_of, poured, to_be_poured
-from doe.diagnose.confirm import confirm
+from doe.diagnose.decision.verdict import Verdict
 from doe.diagnose.diagnosis import FRESH, models
-from doe.diagnose.fresh_pours import FreshPours
-from doe.diagnose.holdout import HoldoutCondition, holdout_errors
-from doe.diagnose.plan import Point
-from doe.diagnose.pours import ModelPours
-from doe.diagnose.screen import Screened
-from doe.diagnose.verdict import Verdict
+from doe.diagnose.emulation.fresh_pours import FreshPours
+from doe.diagnose.follow_up.closer import LOOKS, points_of, poured, to_be_poured
+from doe.diagnose.follow_up.confirm import confirm
+from doe.diagnose.follow_up.holdout import HoldoutCondition, holdout_errors
+from doe.diagnose.simulation.plan import Point
+from doe.diagnose.simulation.pours import ModelPours
+from doe.diagnose.simulation.screen import Screened
 from doe.measurement import Condition, Measurement, summary_names
 from doe.measurement.summaries import summaries
 from tests.blind.judging import Question, judged, least_cosine

@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 
 from doe.diagnose.diagnosis import declare
-from doe.diagnose.plan import directions
-from doe.diagnose.pours import Ended, ModelPours
 from doe.diagnose.runs import Declared
-from doe.diagnose.screen import Budget, Screened, further, screen, widened
+from doe.diagnose.simulation.plan import directions
+from doe.diagnose.simulation.pours import Ended, ModelPours
+from doe.diagnose.simulation.screen import Budget, Screened, further, screen, widened
 from doe.measurement import Measurement
 from doe.store import Store, default_store
 from solver import EFFECTS

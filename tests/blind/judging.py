@@ -7,11 +7,11 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from doe.diagnose.decide import diagnose
+from doe.diagnose.decision.decide import diagnose
+from doe.diagnose.decision.verdict import Verdict
 from doe.diagnose.diagnosis import observe
-from doe.diagnose.fresh_pours import FreshPours
+from doe.diagnose.emulation.fresh_pours import FreshPours
 from doe.diagnose.runs import Declared, Runs
-from doe.diagnose.verdict import Verdict
 from doe.measurement import load_measurement
 from tests.blind.laboratory import Reading, write_folder
 

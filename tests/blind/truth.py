@@ -1,9 +1,9 @@
 """What is true of one made-up laboratory, drawn by its number: parameters within their measured uncertainty, and what
 acts that the declared model lacks.
 
-A truth's strength is the length of its projected, whitened shift of the summaries (`doe.diagnose.signatures`), in
+A truth's strength is the length of its projected, whitened shift of the summaries (`fitting/signatures.py`), in
 standard errors of a data set of ``REPLICATES`` pours. The emulator's own error is no part of that standard error, so
-that a strength means the same however much was simulated. Where an effect's own pours stray (`doe.diagnose.block`),
+that a strength means the same however much was simulated. Where an effect's own pours stray (`emulation/block.py`),
 that is noise, for nobody can say beforehand how far they go in one data set.
 """
 
@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from doe.diagnose.calibrate import priors
-from doe.diagnose.emulator import Emulator, fit_emulator
-from doe.diagnose.plan import directions
+from doe.diagnose.emulation.emulator import Emulator, fit_emulator
+from doe.diagnose.fitting.calibrate import priors
+from doe.diagnose.fitting.signatures import Whitening, cosine, noise_square, projected, shift_of, whitening_at
 from doe.diagnose.runs import BASE, Declared, Effect, Observed, Runs, select_summaries
-from doe.diagnose.signatures import Whitening, cosine, noise_square, projected, shift_of, whitening_at
+from doe.diagnose.simulation.plan import directions
 from tests.blind.schedule import Case
 
 FloatArray = npt.NDArray[np.float64]

@@ -13,11 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
-from doe.diagnose.confirm import Confirmed
-from doe.diagnose.decide import diagnose
+from doe.diagnose.decision.decide import diagnose
 from doe.diagnose.diagnosis import Diagnosis, declare, errors_of, models, observe
-from doe.diagnose.menu import Suggestion
-from doe.diagnose.next_experiment import MenuItem, Prediction, rank_experiments
+from doe.diagnose.follow_up.confirm import Confirmed
+from doe.diagnose.follow_up.menu import Suggestion
+from doe.diagnose.follow_up.next_experiment import MenuItem, Prediction, rank_experiments
 from doe.diagnose.runs import BASE, Runs
 from doe.measurement.measurement import Condition, MeasuredParameter, Measurement, Observation
 from explorer.diagnosis.run import DiagnoseOrder, result_of

@@ -8,7 +8,7 @@ standard deviations before, 1.20 after, noise floor 0.52.
 import pytest
 
 from doe.diagnose.diagnosis import run_diagnosis
-from doe.diagnose.screen import Budget
+from doe.diagnose.simulation.screen import Budget
 from doe.measurement.load import load_measurement
 from doe.store import Store
 from solver import Crew

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from doe.diagnose import diagnosis, menu
-from doe.diagnose.pours import Pour
 from doe.diagnose.runs import Effect, Observed
-from doe.diagnose.screen import REPLICATES, TOO_FAR, Budget, scaled_range, whitened_shift
+from doe.diagnose.simulation.pours import Pour
+from doe.diagnose.simulation.screen import REPLICATES, TOO_FAR, Budget, scaled_range, whitened_shift
 from doe.measurement.load import load_measurement
 from doe.measurement.summaries import summaries_of_data, summary_names
 from solver import EFFECTS
@@ -154,7 +154,7 @@ def test_a_range_that_goes_too_far_is_drawn_in(measurement):
 
 
 def diagnosis_middle(declared):
-    from doe.diagnose.plan import middle_points
+    from doe.diagnose.simulation.plan import middle_points
 
     return middle_points(declared.parameters, 40)
 

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from doe.diagnose.decide import judge
-from doe.diagnose.emulator import Block, Emulator, fit_emulator
-from doe.diagnose.noise import LEAST_SHRINKAGE, PourNoise
+from doe.diagnose.decision.decide import judge
+from doe.diagnose.emulation.emulator import Block, Emulator, fit_emulator
+from doe.diagnose.emulation.noise import LEAST_SHRINKAGE, PourNoise
+from doe.diagnose.emulation.terms import base_candidates
 from doe.diagnose.runs import BASE, Condition, Declared, Effect, Observed, Parameter, Runs
-from doe.diagnose.terms import base_candidates
 
 PARAMETERS, EFFECTS, REPLICATES, FULL = 3, 8, 6, 20.0
 SIGMA = 1 / np.sqrt(REPLICATES)

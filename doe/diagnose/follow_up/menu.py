@@ -1,0 +1,105 @@
+"""What to measure next: the feasible changes of the rig, each poured with every model that is still in the race."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from doe.diagnose.decision.verdict import Verdict
+from doe.diagnose.follow_up.confirm import confirm, fitted
+from doe.diagnose.follow_up.next_experiment import MenuItem, Prediction, RankedExperiment, rank_experiments
+from doe.diagnose.simulation.pours import ModelPours, OnPour
+from doe.measurement.measurement import Condition
+from doe.measurement.summaries import summary_names
+from doe.record import Record
+from doe.runner import Pours
+from doe.store import Store
+from solver import EFFECTS, ParameterError, Scene, parameters, value, with_values
+
+POURS = 8
+"""Per model and set-up of the menu."""
+PLANNED = 6
+
+CHANGES: dict[str, dict[str, float]] = {
+    "as it is, poured again": {},
+    "half the mass": {"rig.mass": 0.5},
+    "twice the mass": {"rig.mass": 2.0},
+    "outlet at twice the height": {"rig.outlet_height": 2.0},
+    "outlet 1.3 times as wide": {"rig.outlet_diameter": 1.3},
+    "fed four times as fast": {"insertion.rate": 4.0},
+    "dropped four times as fast": {"insertion.drop_speed": 4.0},
+}
+"""Set-ups by the factors on the parameters of the first fitted condition."""
+
+
+@dataclass(frozen=True)
+class Suggestion(Record):
+    """An experiment, and the levers of the effects that it is to tell apart."""
+
+    experiment: RankedExperiment
+    levers: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Menu:
+    """Set-ups in order, and how many pours had to be run for them."""
+
+    suggestions: tuple[Suggestion, ...]
+    run_now: int
+
+
+def next_experiment(
+    verdict: Verdict,
+    condition: Condition,
+    paths: Sequence[str],
+    store: Store,
+    pours: Pours,
+    on_pour: OnPour | None,
+) -> Menu:
+    """The menu, most discriminating first; empty unless the verdict is ambiguous."""
+    if not verdict.kind.startswith("ambiguous"):
+        return Menu((), 0)
+    rivals = {name: fitted(verdict, name) for name in verdict.names}
+    items, run_now = [], 0
+    width = len(summary_names(condition))
+    for name, scene in feasible(condition.scene).items():
+        model = ModelPours([replace(condition, name=name, scene=scene)], paths, store, pours, on_pour)
+        found = {label: confirm(one, model, POURS, [width]).blocks[0] for label, one in rivals.items()}
+        run_now += model.run_now
+        if min(len(block) for block in found.values()) < POURS // 2:
+            continue  # a set-up that jams tells nothing
+        spread = np.mean([np.cov(block, rowvar=False) for block in found.values()], axis=0)
+        varies = np.diag(spread) > 0.0
+        # Few pours: half of the way to the diagonal.
+        pour = 0.5 * (spread + np.diag(np.diag(spread)))[np.ix_(varies, varies)]
+        items.append(
+            MenuItem(
+                name,
+                {label: Prediction(b.mean(axis=0)[varies], pour / len(b)) for label, b in found.items()},
+                pour,
+            )
+        )
+    if not items or len(rivals) < 2:
+        return Menu((), run_now)
+    best = min(model.criterion for model in verdict.models)
+    weights = {m.label: math.exp((best - m.criterion) / 2.0) for m in verdict.models if m.label in rivals}
+    asked = dict.fromkeys(name for rival in rivals for name in rival.split("+"))
+    levers = tuple(f"{name}: {EFFECTS[name].lever}" for name in asked)
+    return Menu(tuple(Suggestion(one, levers) for one in rank_experiments(items, weights, PLANNED)), run_now)
+
+
+def feasible(scene: Scene) -> dict[str, Scene]:
+    """Set-ups of ``CHANGES`` that the rig can do."""
+    found = {}
+    known = parameters(scene)
+    for name, factors in CHANGES.items():
+        if not set(factors) <= set(known):
+            continue
+        try:
+            found[name] = with_values(scene, {path: f * float(value(scene, path)) for path, f in factors.items()})
+        except ParameterError:
+            continue  # beyond what the rig allows
+    return found

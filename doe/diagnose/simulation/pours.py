@@ -1,0 +1,206 @@
+"""Pours of the declared model: points of a plan in, summaries per condition out; every pour is kept in the store."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.diagnose.runs import BASE, Declared, Runs
+from doe.diagnose.simulation.plan import Point
+from doe.diagnose.simulation.profiles import profile_names, profile_of_record
+from doe.measurement.measurement import Condition
+from doe.measurement.summaries import summaries_of_record, summary_names
+from doe.runner import Pours, seed_of, stored_run
+from doe.store import Store, StoredRun, run_key
+from solver import (
+    EFFECTS,
+    Job,
+    Outcome,
+    ParameterError,
+    Record,
+    Scene,
+    SetUpEffect,
+    code_version,
+    with_values,
+)
+
+FloatArray = npt.NDArray[np.float64]
+
+ROOT = 0
+"""Root of the seeds: the same for every data set of a model, so that its pours are found again."""
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How one pour ended. ``label``: point and condition.
+
+    No seed is tried again: the other points carry the emulator.
+    """
+
+    label: str
+    seed: int
+    outcome: Outcome
+    message: str
+    replicate: int = 0
+    attempt: int = 0
+
+    @property
+    def valid(self) -> bool:
+        """Whether the run came to its end."""
+        return self.outcome.valid
+
+
+OnPour = Callable[[str, int, Ended], None]
+"""Called with (what is being run, pours still to come, how this one ended)."""
+
+
+@dataclass(frozen=True)
+class Pour:
+    """What one pour of a point in a condition gave; NaN where nothing could be read."""
+
+    summaries: tuple[float, ...]
+    outcome: str
+    profile: tuple[float, ...] = ()
+    """Mean heights [m] for a picture (`profiles`); nothing is decided by them."""
+
+    @property
+    def valid(self) -> bool:
+        """Whether the run came to its end."""
+        return Outcome(self.outcome).valid
+
+
+class ModelPours:
+    """Runs points of one declared model under its conditions. Points asked for before are not run again."""
+
+    def __init__(
+        self,
+        conditions: Sequence[Condition],
+        paths: Sequence[str],
+        store: Store,
+        pours: Pours,
+        on_pour: OnPour | None = None,
+        root: int = ROOT,
+    ) -> None:
+        self._conditions, self._paths, self._store = tuple(conditions), tuple(paths), store
+        self._pours, self._on_pour, self._root = pours, on_pour, root
+        self._known: dict[tuple[Point, int], Pour] = {}
+        self.run_now = 0
+        """Pours that were really run, not found in the store."""
+
+    def run(self, what: str, points: Sequence[Point]) -> list[list[Pour]]:
+        """Pours of every point, one per condition."""
+        places = [(point, c) for point in points for c in range(len(self._conditions))]
+        wanted = [(point, c) for point, c in places if not self._find(point, c)]
+        left = len(wanted)
+        # Two kinds of arrays, with and without effects compiled in; each is compiled once for all points.
+        for acting in (False, True):
+            queue = deque(
+                Job(self.scene(point, c), self.seed(point, c), tag=tag)
+                for tag, (point, c) in enumerate(wanted)
+                if any(acts(name) for name, _ in point.effects) == acting
+            )
+            room = self.room(acting) + [job.scene for job in queue]
+            for job, record in self._pours(queue, room) if queue else ():
+                point, c = wanted[job.tag]
+                self._known[point, c] = self._keep(what, point, c, job, record)
+                self.run_now += 1
+                left -= 1
+                if self._on_pour is not None:
+                    label = f"{point.sequence} {point.number}, {self._conditions[c].name}"
+                    self._on_pour(what, left, Ended(label, job.seed, record.outcome, record.message))
+        return [[self._known[point, c] for c in range(len(self._conditions))] for point in points]
+
+    def scene(self, point: Point, condition: int) -> Scene:
+        """The scene of ``point`` in a condition."""
+        values: dict[str, float | str] = dict(zip(self._paths, point.theta, strict=True))
+        for effect, amplitude in point.effects:
+            values |= effect_values(effect, amplitude)
+        return with_values(self._conditions[condition].scene, values)
+
+    def seed(self, point: Point, condition: int) -> int:
+        """Seed of the pour of ``point`` in a condition."""
+        return seed_of(self._root, point.sequence, point.number, condition, 0)
+
+    def room(self, acting: bool) -> list[Scene]:
+        """Scenes that need as much room as most points: every condition at the ends of each effect, where it can be."""
+        room: list[Scene] = []
+        for condition in self._conditions:
+            for name, kind in EFFECTS.items():
+                if acts(name) != acting:
+                    continue
+                for share in (-1.0, 1.0):
+                    ends = effect_values(name, [share * kind.strongest for _ in kind.amplitudes])
+                    with contextlib.suppress(ParameterError):
+                        room.append(with_values(condition.scene, ends))
+        return room
+
+    def _find(self, point: Point, condition: int) -> bool:
+        """Whether the pour is known, here or in the store."""
+        place = point, condition
+        if place not in self._known:
+            stored = self._store.find(
+                run_key(self.scene(point, condition), self.seed(point, condition), code_version())
+            )
+            found = None if stored is None else self._stored(stored, condition)
+            if found is not None:
+                self._known[place] = found
+        return place in self._known
+
+    def _stored(self, stored: StoredRun, condition: int) -> Pour | None:
+        names = summary_names(self._conditions[condition])
+        if any(name not in stored.observables for name in names):
+            return None
+        return Pour(
+            _numbers(stored, names), stored.outcome, _numbers(stored, profile_names(self._conditions[condition]))
+        )
+
+    def _keep(self, what: str, point: Point, condition: int, job: Job, record: Record) -> Pour:
+        asked = self._conditions[condition]
+        numbers = tuple(float(x) for x in summaries_of_record(asked, record))
+        heights = profile_of_record(asked, record)
+        pour = Pour(numbers, str(record.outcome), heights)
+        seen = dict(zip((*profile_names(asked), *summary_names(asked)), (*heights, *numbers), strict=True))
+        self._store.add(stored_run(job, record, "diagnose", what, f"{point.sequence} {point.number}", seen))
+        return pour
+
+
+def _numbers(stored: StoredRun, names: Sequence[str]) -> tuple[float, ...]:
+    """What a stored run holds under ``names``; NaN for what it could not read, or does not hold."""
+    found = (stored.observables.get(name) for name in names)
+    return tuple(math.nan if x is None else x for x in found)
+
+
+def effect_values(effect: str, amplitude: Sequence[float]) -> dict[str, float]:
+    """Parameter path → value of an effect's amplitudes."""
+    names = EFFECTS[effect].amplitudes
+    return {f"effect.{effect}.{name}": one for name, one in zip(names, amplitude, strict=True)}
+
+
+def acts(effect: str) -> bool:
+    """Whether an effect acts in the kernels, rather than on material or set-up before a run."""
+    return not issubclass(EFFECTS[effect], SetUpEffect)
+
+
+def as_runs(declared: Declared, points: Sequence[Point], pours: Sequence[Sequence[Pour]]) -> Runs:
+    """Points with at most one effect and their pours as arrays; a pour that broke off counts as not simulated."""
+    names = [effect.name for effect in declared.effects]
+    effect = np.full(len(points), BASE, dtype=np.int64)
+    amplitude = np.zeros((len(points), 2))
+    for k, point in enumerate(points):
+        for name, values in point.effects:
+            effect[k] = names.index(name)
+            amplitude[k, : len(values)] = values
+    blocks = []
+    for c, condition in enumerate(declared.conditions):
+        block = np.full((len(points), len(condition.summaries)), np.nan)
+        for k, row in enumerate(pours):
+            if row[c].valid:
+                block[k] = row[c].summaries
+        blocks.append(block)
+    return Runs(np.array([p.theta for p in points]), effect, amplitude, tuple(blocks))

@@ -1,0 +1,117 @@
+"""Fresh pours at a best fit: the Gaussian update in closed form, and a truth that no polynomial of the box follows."""
+
+import numpy as np
+import pytest
+
+from doe.diagnose.decision.decide import diagnose
+from doe.diagnose.emulation.emulator import fit_emulator
+from doe.diagnose.emulation.fresh_pours import FreshPours, anchored
+from doe.diagnose.emulation.predictor import BIAS_LENGTH
+from doe.diagnose.runs import BASE, Condition, Declared, Effect, Observed, Parameter, Runs
+
+DECLARED = Declared(
+    (Parameter("a", -1.0, 1.0),),
+    (Effect("steep", (0.0,), (1.0,)), Effect("flat", (0.0,), (1.0,))),
+    (Condition("one", ("x", "y")), Condition("two", ("z",))),
+)
+NOISE = 0.1
+
+
+def truth(a, steep, flat):
+    """`steep` acts from half its range on, as a pour that begins to hang does."""
+    step = 1.0 / (1.0 + np.exp(-(steep - 0.5) / 0.08))
+    return np.column_stack([a + step, 1.0 - a + 0.4 * flat]), (2.0 * a + 0.2 * steep + 0.2 * flat)[:, None]
+
+
+def poured(generator, n, a, steep=0.0, flat=0.0):
+    blocks = truth(*np.broadcast_arrays(np.full(n, a), steep, flat))
+    return tuple(block + NOISE * generator.standard_normal(block.shape) for block in blocks)
+
+
+def make_runs(generator):
+    effect = np.repeat([BASE, 0, 1], [40, 30, 30])
+    a, amplitude = generator.uniform(-1, 1, 100), generator.uniform(0, 1, 100)
+    blocks = truth(a, amplitude * (effect == 0), amplitude * (effect == 1))
+    noisy = tuple(block + NOISE * generator.standard_normal(block.shape) for block in blocks)
+    return Runs(a[:, None], effect, np.column_stack([amplitude * (effect != BASE), np.zeros(100)]), noisy)
+
+
+def emulated(generator):
+    return fit_emulator(DECLARED, make_runs(generator), (np.zeros(2), np.zeros(1)))
+
+
+def test_the_update_is_that_of_two_gaussian_measurements():
+    generator = np.random.default_rng(0)
+    bare = emulated(generator).predictor((0,))
+    x, n = np.array([0.2, 0.6]), 9
+    blocks = poured(generator, n, *x)
+    blocks = tuple(b - b.mean(axis=0) + 0.9 * b / b for b in blocks)  # mean 0.9, the scatter is that of the pours
+    held = anchored(bare, FreshPours((0,), x, blocks))
+    cuts = np.cumsum([b.shape[1] for b in blocks])[:-1]
+    for c, (before, after) in enumerate(zip(np.split(bare.mean(x), cuts), np.split(held.mean(x), cuts), strict=True)):
+        v = np.diag(bare.mean_covariance(x)[c])
+        w = np.maximum(np.diag(bare.pour_covariance[c]), blocks[c].var(axis=0, ddof=1)) / n
+        assert after == pytest.approx((before / v + 0.9 / w) / (1 / v + 1 / w))
+        assert np.diag(held.mean_covariance(x)[c]) == pytest.approx(1 / (1 / v + 1 / w))
+
+
+def test_what_the_pours_say_fades_with_the_distance():
+    generator = np.random.default_rng(1)
+    bare = emulated(generator).predictor((0,))
+    x = np.array([0.0, 0.6])
+    held = anchored(bare, FreshPours((0,), x, poured(generator, 12, *x)))
+    assert bare.bias_variance(x)[0][0] > 5 * held.bias_variance(x)[0][0]
+    far = np.array([-0.9, 0.95])
+    distance = (((far - x) / (bare.high - bare.low)) ** 2).sum() / BIAS_LENGTH**2
+    expected = held.bias_variance(x)[0] + (1 - np.exp(-distance)) * bare.bias_variance(far)[0]
+    assert held.bias_variance(far)[0] == pytest.approx(expected)
+    assert held.variance_shares(far)[0] > held.variance_shares(x)[0]
+
+
+def test_one_pour_is_no_mean():
+    generator = np.random.default_rng(2)
+    bare = emulated(generator).predictor((0,))
+    x = np.array([0.0, 0.6])
+    blocks = poured(generator, 12, *x)
+    held = anchored(bare, FreshPours((0,), x, (blocks[0], blocks[1][:1])))
+    assert held.mean(x)[2] == bare.mean(x)[2]
+    assert held.mean_covariance(x)[1] == pytest.approx(bare.mean_covariance(x)[1])
+    assert held.mean(x)[0] != bare.mean(x)[0]
+
+
+def test_stated_errors_hold_about_the_fit():
+    squares = {"bare": [], "held": []}
+    for seed in range(40):
+        generator = np.random.default_rng([3, seed])
+        bare = emulated(generator).predictor((0,))
+        x = np.array([generator.uniform(-0.5, 0.5), generator.uniform(0.3, 0.9)])
+        held = anchored(bare, FreshPours((0,), x, poured(generator, 12, *x)))
+        near = x + generator.uniform(-0.1, 0.1, 2)
+        for name, model in (("bare", bare), ("held", held)):
+            error = model.mean(near)[0] - truth(near[:1], near[1:], 0.0)[0][0, 0]
+            squares[name].append((error**2, model.mean_covariance(near)[0][0, 0]))
+    error, stated = np.array(squares["held"]).T
+    assert error.mean() < 0.6 * np.array(squares["bare"])[:, 0].mean()
+    # Mean of 40 squares of unit normals: 1 ± 0.22; the step is no Gaussian process, so a factor of two.
+    assert (error / stated).mean() < 2.0
+
+
+def test_pours_at_the_best_fit_decide_what_the_emulator_could_not():
+    """At the true amplitude the emulator misses the step by a third of it, and calls the truth unfit."""
+    generator = np.random.default_rng(4)
+    runs, members = make_runs(generator), [(0,), (1,)]
+    data = Observed(poured(generator, 6, 0.1, 0.62), (np.zeros(2), np.zeros(1)))
+    first = diagnose(DECLARED, runs, data, bootstrap=500)
+    fresh = tuple(
+        FreshPours(
+            m, found.coded, poured(generator, 12, found.coded[0], **{DECLARED.effects[m[0]].name: found.coded[1]})
+        )
+        for m in members
+        for found in first.models
+        if found.members == m
+    )
+    second = diagnose(DECLARED, runs, data, bootstrap=500, fresh=fresh)
+    spread = [v.effects[0].amplitudes[0].standard_error for v in (first, second)]
+    assert second.kind == "effect:steep"
+    assert spread[1] < spread[0]
+    assert [g.statistic for g in first.gates[:2]] == [g.statistic for g in second.gates[:2]]

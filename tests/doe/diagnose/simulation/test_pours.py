@@ -1,0 +1,60 @@
+"""Which pours are the same: model, number and condition, not the number alone."""
+
+import math
+from contextlib import closing
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from doe.diagnose import pours as module
+from doe.diagnose.follow_up.confirm import Model, confirm
+from doe.diagnose.runs import Condition, Declared
+from doe.diagnose.simulation.pours import ModelPours, Pour
+from doe.diagnose.simulation.screen import whitened_shift
+from doe.store import Store
+from solver import Outcome, value
+from tests.blind.laboratory import OBSERVABLES, declared_model
+
+FRICTION = "pair.grain.grain.static_friction"
+
+
+@pytest.fixture
+def poured(monkeypatch, tmp_path):
+    """A model of one parameter whose every summary is that parameter, and the jobs that were run."""
+    condition = declared_model().fit[0]
+    jobs = []
+
+    def run(queue, room):
+        while queue:
+            jobs.append(queue.popleft())
+            yield (
+                jobs[-1],
+                SimpleNamespace(
+                    scene=jobs[-1].scene, outcome=Outcome.MEASURED, message="", dt=1e-6, steps=1, wall_s=0.0
+                ),
+            )
+
+    def summaries(asked, record):
+        return np.full(len(module.summary_names(asked)), float(value(record.scene, FRICTION)))
+
+    monkeypatch.setattr(module, "summaries_of_record", summaries)
+    with closing(Store(tmp_path / "runs.sqlite")) as store:
+        yield ModelPours([condition], [FRICTION], store, run), jobs
+
+
+def test_two_models_are_confirmed_by_pours_of_their_own(poured):
+    pours, jobs = poured
+    width = len(OBSERVABLES) - 1
+    for friction in (0.5, 0.6, 0.5):
+        (block,) = confirm(Model((friction,)), pours, 3, [width]).blocks
+        assert block.tolist() == [[friction] * width] * 3
+    # The third asks for what the first has poured.
+    assert len(jobs) == 6
+
+
+def test_an_effect_under_which_no_pour_ends_is_infinitely_far():
+    declared = Declared((), (), (Condition("one", ("a", "b")),))
+    centre = [(Pour(tuple(row), "measured"),) for row in np.random.default_rng(0).normal(size=(8, 2))]
+    for moved in (Pour((math.nan, 1.0), "measured"), Pour((1.0, 1.0), "jammed")):
+        assert whitened_shift(declared, centre, [(moved,)]) == math.inf

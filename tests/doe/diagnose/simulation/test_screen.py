@@ -1,0 +1,59 @@
+"""How far an effect's range is drawn in, on made-up answers of known size."""
+
+import numpy as np
+import pytest
+
+from doe.diagnose.runs import Condition, Declared, Effect, Parameter
+from doe.diagnose.simulation.pours import Pour
+from doe.diagnose.simulation.screen import REPLICATES, TOO_FAR, TOO_LITTLE, scaled_range
+
+SUMMARIES = ("a", "b")
+DECLARED = Declared((Parameter("p", 0.0, 1.0),), (), (Condition("one", SUMMARIES),))
+STANDARD_ERROR = 1 / np.sqrt(REPLICATES)
+
+
+class Answering:
+    """Pours of which the first summary is ``answer`` (amplitude), in standard errors, the second nothing."""
+
+    def __init__(self, answer):
+        self.answer, self.tried = answer, []
+
+    def run(self, what, points):
+        ((_, (amplitude,)),) = points[0].effects
+        self.tried.append(amplitude)
+        return [[Pour((self.answer(amplitude) * STANDARD_ERROR, 0.0), "measured")] for _ in points]
+
+
+@pytest.fixture
+def centre():
+    rows = np.random.default_rng(1).normal(size=(400, 2))
+    rows = (rows - rows.mean(axis=0)) / rows.std(axis=0, ddof=1)
+    return [[Pour(tuple(row), "measured")] for row in rows]
+
+
+@pytest.mark.parametrize(
+    ("answer", "share"),
+    [
+        (lambda a: 5.0 * a, (1.0, 1.0)),  # too weak for more: all that the literature allows
+        (lambda a: 20.0 * a, (1.0, 1.0)),
+        (lambda a: 100.0 * a, (0.12, 0.24)),
+        (lambda a: 1000.0 * a**2, (0.109, 0.155)),  # the step inward goes too far, and is taken back
+        (lambda a: 30.0 * min(1.0, 10.0 * a), (0.04, 0.08)),  # saturates
+    ],
+)
+def test_the_range_ends_where_the_shift_is_about_the_wanted_one(centre, answer, share):
+    """The shares follow from answer(share) = TOO_LITTLE … TOO_FAR; 20 % for what noise takes off the square."""
+    model = Answering(answer)
+    found, shift = scaled_range(DECLARED, Effect("e", (0.0,), (1.0,)), model, 3, centre)
+    low, high = share
+    assert 0.8 * low <= found.high[0] <= 1.2 * high
+    assert shift <= TOO_FAR
+    assert shift >= TOO_LITTLE or found.high == (1.0,)
+    assert model.tried[-1] == found.high[0]
+
+
+def test_an_effect_that_is_too_strong_everywhere_is_drawn_in_as_far_as_it_goes(centre):
+    found, shift = scaled_range(DECLARED, Effect("e", (-1.0,), (1.0,)), Answering(lambda a: 100.0), 3, centre)
+    assert 0.0 < found.high[0] < 0.01
+    assert found.low == (-found.high[0],)
+    assert shift > TOO_FAR
