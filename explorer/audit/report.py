@@ -22,15 +22,22 @@ WHAT = (
 
 def write_audit(audit: Audit, folder: Path) -> None:
     """Write ``audit.json``, ``report.html`` and ``report.md`` into ``folder``; each appears complete or not at all."""
-    sections = audit_sections(audit)
-    headings = f"Audit: {audit.title}", audit.source or "A published study, recomputed from its own tables"
     texts = {
         "audit.json": json_text(audit.to_dict()) + "\n",
-        "report.html": page(*headings, sections),
-        "report.md": document(*headings, sections),
+        "report.html": audit_html(audit),
+        "report.md": document(*_headings(audit), audit_sections(audit)),
     }
     for name, text in texts.items():
         write_whole(folder / name, text)
+
+
+def audit_html(audit: Audit) -> str:
+    """The page."""
+    return page(*_headings(audit), audit_sections(audit))
+
+
+def _headings(audit: Audit) -> tuple[str, str]:
+    return f"Audit: {audit.title}", audit.source or "A published study, recomputed from its own tables"
 
 
 def audit_sections(audit: Audit) -> tuple[Section, ...]:

@@ -13,7 +13,7 @@ import shutil
 import stat
 import tempfile
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
@@ -29,6 +29,7 @@ from solver.scene import Scene, check
 from solver.shape import Solid, surface_mesh
 
 MOST_MESH_BYTES = 30_000_000
+MOST_FILE_BYTES = 30_000_000
 MOST_ZIP_BYTES, MOST_UNPACKED_BYTES, MOST_MEMBERS = 50_000_000, 200_000_000, 1000
 LABEL = re.compile(r"[^A-Za-z0-9_-]+")
 PART = re.compile(r"[A-Za-z0-9_. -]+")
@@ -87,10 +88,31 @@ def _check_faces(solid: Solid) -> None:
         )
 
 
+def kept_file(name: str, content: bytes, folder: Path, suffixes: Sequence[str]) -> Path:
+    """The file ``content`` as it came, kept in ``folder``; CommandError in one line for another kind or size."""
+    suffix = Path(name).suffix.lower()
+    if suffix not in suffixes:
+        raise CommandError(f"{label(name)}: allowed are files ending in {', '.join(suffixes)}")
+    if not 0 < len(content) <= MOST_FILE_BYTES:
+        raise CommandError(f"{name[:80]}: {len(content)} bytes; allowed: up to {MOST_FILE_BYTES}")
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{label(Path(name).stem)}-{_digest(content)}{suffix}"
+    write_whole_bytes(path, content)
+    return path
+
+
 def unpacked_measurement(name: str, content: bytes, folder: Path) -> Path:
     """The measured data set in the archive ``content``, unpacked into a folder within ``folder`` and read once.
 
     Raises CommandError in one line, with nothing left behind.
+    """
+    return unpacked_folder(name, content, folder, MEASUREMENT_FILE, load_measurement)
+
+
+def unpacked_folder(name: str, content: bytes, folder: Path, marker: str, read: Callable[[Path], object]) -> Path:
+    """The folder that holds the file ``marker`` in an archive, unpacked within ``folder`` and tried by ``read``.
+
+    Raises what ``read`` raises, as CommandError in one line, with nothing left behind.
     """
     if not 0 < len(content) <= MOST_ZIP_BYTES:
         raise CommandError(f"{name[:80]}: {len(content)} bytes; allowed: up to {MOST_ZIP_BYTES}")
@@ -101,8 +123,8 @@ def unpacked_measurement(name: str, content: bytes, folder: Path) -> Path:
     apart = Path(tempfile.mkdtemp(prefix=".unpacking-", dir=folder))
     try:
         with _named(name, apart):
-            _unpack(content, apart)
-            load_measurement(apart)
+            _unpack(content, apart, marker)
+            read(apart)
         apart.replace(kept)
     finally:
         shutil.rmtree(apart, ignore_errors=True)
@@ -119,13 +141,13 @@ def label(text: str) -> str:
     return LABEL.sub("_", text)[:40].strip("_") or "unnamed"
 
 
-def _unpack(content: bytes, folder: Path) -> None:
-    """All files of the archive below the folder that holds ``measurement.toml``."""
+def _unpack(content: bytes, folder: Path, marker: str) -> None:
+    """All files of the archive below the folder that holds ``marker``."""
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             members = [member for member in archive.infolist() if not member.is_dir()]
             _check_members(members)
-            top = _top(members)
+            top = _top(members, marker)
             for member in members:
                 path = PurePosixPath(member.filename)
                 if not path.is_relative_to(top):
@@ -152,11 +174,11 @@ def _check_members(members: list[zipfile.ZipInfo]) -> None:
             raise CommandError(f"{member.filename[:80]!r}: allowed are plain files in folders below the archive's top")
 
 
-def _top(members: list[zipfile.ZipInfo]) -> PurePosixPath:
-    """The folder with ``measurement.toml``: the archive's top, or one within it."""
-    found = [path for member in members if (path := PurePosixPath(member.filename)).name == MEASUREMENT_FILE]
+def _top(members: list[zipfile.ZipInfo], marker: str) -> PurePosixPath:
+    """The folder with ``marker``: the archive's top, or one within it."""
+    found = [path for member in members if (path := PurePosixPath(member.filename)).name == marker]
     if len(found) != 1:
-        raise CommandError(f"holds {len(found)} files {MEASUREMENT_FILE}; allowed: one (see doe/measurement/README.md)")
+        raise CommandError(f"holds {len(found)} files {marker}; allowed: one, beside the files that it names")
     return found[0].parent
 
 

@@ -69,8 +69,12 @@ def _write(order: LabOrder, result: LabResult, part: dict[str, Any]) -> None:
 
         write_curves(order.figure, result)
     if order.out:
-        heading = f"{order.test}: measured, from {Path(result.file).name}. SI. Written by explorer lab."
-        order.out.write_text(part_text(part, heading), encoding="utf-8")
+        order.out.write_text(part_file(result, part), encoding="utf-8")
+
+
+def part_file(result: LabResult, part: dict[str, Any]) -> str:
+    """The text of PART.toml."""
+    return part_text(part, f"{result.test}: measured, from {Path(result.file).name}. SI. Written by explorer lab.")
 
 
 def analysed(order: LabOrder) -> LabResult:

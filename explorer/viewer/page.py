@@ -16,6 +16,7 @@ from explorer.scene.meshes import scene_height
 from explorer.session import Session
 from explorer.study.process import StudyProcess
 from explorer.viewer.actions import Actions
+from explorer.viewer.laboratory.laboratory_tab import LaboratoryTab
 from explorer.viewer.look.look_tab import LookTab
 from explorer.viewer.output.recording_switch import Recorder
 from explorer.viewer.people import People
@@ -88,12 +89,15 @@ class Page:
                 self._study = StudyPanel(server, study, study_name, post, session)
         with tabs.add_tab("Diagnose", viser.Icon.STETHOSCOPE):
             self._diagnosis = DiagnosisPanel(server, diagnosis, shipped_measurements(), uploads_folder(), post)
+        with tabs.add_tab("Laboratory", viser.Icon.FLASK):
+            self._laboratory = LaboratoryTab(server, session, uploads_folder(), post)
         ThemeSwitch(server, post, self._follow_theme)
 
     def _follow_theme(self, dark: bool) -> None:
         for panel in (self._study, self._diagnosis):
             if panel is not None:
                 panel.dark = dark
+        self._laboratory.set_dark(dark)
 
     def close(self) -> None:
         """End what the page itself has started: a second pour, and a recording, with its file whole."""
@@ -157,6 +161,7 @@ class Page:
         self._chart.show(status, self._events)
         self._panels.show(status, self._events, self._notice)
         self._second.show(status)
+        self._laboratory.show(self._notice)
 
     def _show_background(self) -> None:
         if self._study is not None:

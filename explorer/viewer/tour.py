@@ -44,6 +44,11 @@ STOPS = (
         "The tab **Diagnose** takes measured data and asks which physical effect the declared model lacks, or whether "
         "nothing is missing. The answer comes with the error on data that were not fitted, before and after.",
     ),
+    Stop(
+        "Laboratory",
+        "The tab **Laboratory** works on what you have measured: readings of bench tests, photographs of a pile, a filled "
+        "sheet of runs, the tables of a publication. Shipped examples stand in each list.",
+    ),
 )
 
 
@@ -51,7 +56,7 @@ class Tour:
     """A button that starts the tour."""
 
     def __init__(self, server: viser.ViserServer) -> None:
-        button = server.gui.add_button("Tour: one minute", icon=viser.Icon.MAP_2, hint="What is where, in five steps.")
+        button = server.gui.add_button("Tour: one minute", icon=viser.Icon.MAP_2, hint="What is where, in six steps.")
 
         @button.on_click
         def _(event: viser.GuiEvent[Any]) -> None:

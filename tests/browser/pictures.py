@@ -1,10 +1,12 @@
 """The README's pictures, taken from the running program in headless Chromium: `make pictures`.
 
-A quick study is run first, so that its tab has something to show; everything is written to a data folder of its own.
+A quick study is run first, so that its tab has something to show, and the diagnosis that `make diagnose` has left is
+taken where there is one; everything is written to a data folder of its own.
 """
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -19,6 +21,7 @@ from tests.browser.test_page import FLAGS
 from tests.conftest import find_chromium
 
 FOLDER = Path("assets/pictures")
+DIAGNOSIS = Path("results/diagnosis")
 SIZE = {"width": 1500, "height": 1000}
 PATIENCE_MS = 120_000
 SETTLED = ("at rest", "ended", "jammed")
@@ -61,6 +64,13 @@ def shot(page: Page, name: str) -> None:
     print(FOLDER / f"{name}.png", flush=True)
 
 
+def answered(page: Page, folder: str, button: str, answer: str) -> None:
+    """Open a folder of the laboratory's tab, press a button in it and wait for its answer."""
+    page.get_by_text(folder).click()
+    page.get_by_role("button", name=button, exact=True).click()
+    page.get_by_text(answer).first.wait_for()
+
+
 def settled(page: Page) -> None:
     """Wait until the pile lies."""
     end = time.monotonic() + PATIENCE_MS / 1000
@@ -91,11 +101,20 @@ def live_pictures(browser: object, home: str) -> None:
             tab(page, name)
             time.sleep(4.0)
             shot(page, f"{file}_dark")
+        tab(page, "Laboratory")
+        answered(page, "Photograph → angle of repose", "Read the angle", "explorer measure")
+        shot(page, "laboratory_dark")
+        page.get_by_text("Photograph → angle of repose").click()
         page.get_by_text("Dark page").click()
         for name, file in (("Pour", "pour"), ("Calibrate", "calibrate"), ("Diagnose", "diagnose")):
             tab(page, name)
             time.sleep(4.0)
             shot(page, f"{file}_light")
+        tab(page, "Laboratory")
+        answered(page, "Filled sheet → model and optimum", "Analyse", "explorer analyse")
+        page.get_by_text("On the command line:").last.scroll_into_view_if_needed()
+        time.sleep(4.0)
+        shot(page, "laboratory_light")
         page.close()
 
 
@@ -127,6 +146,8 @@ def main() -> None:
             str(study),
         ]
         subprocess.run([*command, "--store", f"{home}/runs.sqlite"], check=False, stdout=subprocess.DEVNULL)
+        if (DIAGNOSIS / "diagnosis.json").is_file():
+            shutil.copytree(DIAGNOSIS, Path(home) / "repose-explorer" / "diagnoses" / "trefoil_2-20260101-000000")
         browser = playwright.chromium.launch(executable_path=find_chromium(), args=FLAGS)
         live_pictures(browser, home)
         replay_picture(browser, home)

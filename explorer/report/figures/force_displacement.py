@@ -18,18 +18,21 @@ def write_curves(path: Path, result: LabResult) -> None:
     """Write one chart per component and quantity to a page that needs nothing else; CommandError without curves."""
     if not result.curves:
         raise CommandError("--plot: single readings only, no curve to draw")
-    groups: dict[tuple[str, str], list[CurveFit]] = {}
-    for curve in result.curves:
-        groups.setdefault((curve.quantity, "-".join(curve.of)), []).append(curve)
     charts = [
-        go.Figure(force_displacement(curves, f"{name}, {quantity}")).to_html(
-            full_html=False, include_plotlyjs=k == 0, config={"displaylogo": False}
-        )
-        for k, ((quantity, name), curves) in enumerate(groups.items())
+        go.Figure(spec).to_html(full_html=False, include_plotlyjs=k == 0, config={"displaylogo": False})
+        for k, spec in enumerate(curve_charts(result).values())
     ]
     title = label(f"{result.test}: {Path(result.file).name}")
     head = f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{title}</title></head>'
     path.write_text(f"{head}<body><h1>{title}</h1>{''.join(charts)}</body></html>\n", encoding="utf-8")
+
+
+def curve_charts(result: LabResult) -> dict[str, Spec]:
+    """Title → chart per component and quantity; none where the readings are no curves."""
+    groups: dict[str, list[CurveFit]] = {}
+    for curve in result.curves:
+        groups.setdefault(f"{'-'.join(curve.of)}, {curve.quantity}", []).append(curve)
+    return {title: force_displacement(curves, title) for title, curves in groups.items()}
 
 
 def force_displacement(curves: list[CurveFit], title: str) -> Spec:

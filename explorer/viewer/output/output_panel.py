@@ -98,22 +98,24 @@ class OutputPanel:
         heading = (
             f"{status.scene.title}, as on the page at {status.time:.3f} s of the pour with seed {status.seed}. SI."
         )
-        _send(client, "scene.toml", material_toml(status.scene, heading).encode())
+        send_file(client, "scene.toml", material_toml(status.scene, heading).encode())
 
     def _bodies(self, client: Any) -> None:
         frame, scene = self._drawn()
-        _send(client, f"bodies_{frame.time:.3f}s.csv", bodies_csv(frame, scene).encode())
+        send_file(client, f"bodies_{frame.time:.3f}s.csv", bodies_csv(frame, scene).encode())
 
     def _mesh(self, client: Any) -> None:
         frame, scene = self._drawn()
         name = f"bodies_{frame.time:.3f}s_mm.stl"
         self._background.start(
-            "making the mesh", lambda: bodies_stl(frame, scene), lambda made: _send(client, name, made)
+            "making the mesh", lambda: bodies_stl(frame, scene), lambda made: send_file(client, name, made)
         )
 
     def _picture(self, client: Any) -> None:
         name = f"picture_{self._session.status().time:.3f}s.png"
-        self._background.start("taking the picture", lambda: picture(client), lambda made: _send(client, name, made))
+        self._background.start(
+            "taking the picture", lambda: picture(client), lambda made: send_file(client, name, made)
+        )
 
     def _drawn(self) -> tuple[Frame, Scene]:
         frame = self._session.frame()
@@ -132,7 +134,7 @@ class OutputPanel:
             if size > MOST_SENT:
                 raise CommandError(f"recording: {size / 1e6:.0f} MB are too much to send; fetch {files[0]}")
             for file in files:
-                _send(client, file.name, file.read_bytes())
+                send_file(client, file.name, file.read_bytes())
 
 
 def picture(client: Any) -> bytes:
@@ -168,6 +170,7 @@ def recording_html(recording: RecordingSwitch, busy_with: str, notice: str) -> s
     return small_html("<br>".join(escape(line) for line in lines if line))
 
 
-def _send(client: Any, name: str, content: bytes) -> None:
+def send_file(client: Any, name: str, content: bytes) -> None:
+    """Have a browser keep ``content`` as a file called ``name``."""
     # At once: otherwise a person gets a link in a notification, and has to press it.
     client.send_file_download(name, content, save_immediately=True)

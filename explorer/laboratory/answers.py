@@ -1,0 +1,106 @@
+"""What the laboratory's commands give on the page: the text of the terminal, the line that repeats it, charts, files.
+
+Each function does what the command of its name does, from files that are there. None of them knows the page.
+"""
+
+from __future__ import annotations
+
+import io
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.audit import audit_study
+from explorer.audit.read_study import read_study
+from explorer.audit.report import audit_html
+from explorer.audit.sentences import audit_text
+from explorer.design.analysis import AnalyseOrder, run_analyse
+from explorer.design.analysis_text import analysis_text
+from explorer.design.factors_file import read_factors
+from explorer.design.plan import PlanOrder, make_plan
+from explorer.design.plan_text import plan_text
+from explorer.design.sheet import sheet_text
+from explorer.laboratory.part import part_table
+from explorer.laboratory.run import LabOrder, analysed, part_file
+from explorer.photograph.order import measure_order
+from explorer.photograph.panels import sheet
+from explorer.photograph.run import outline_text, run_measure
+from explorer.report.design import design_html
+from explorer.report.design.plots import design_plots
+from explorer.report.figures.force_displacement import curve_charts
+from explorer.report.plot import Plot, Plots
+from explorer.tables.laboratory import lab_text
+from explorer.tables.photograph import measure_text, refusal_lines
+from solver.assets import asset_path
+from solver.photograph import open_picture
+
+STRAIGHT = "Points of every replicate; the line is the part taken as straight, drawn on to zero force."
+SHIPPED_STUDY = "table1_physical"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """``files``: name → content, to be taken along. ``picture``: RGB, (height, width, 3), where there is one."""
+
+    text: str
+    command: str
+    plots: Plots = field(default_factory=dict)
+    files: Mapping[str, bytes] = field(default_factory=dict)
+    picture: npt.NDArray[np.uint8] | None = None
+
+
+def bench_answer(order: LabOrder) -> Answer:
+    """`explorer lab`: readings → parameters."""
+    result = analysed(order)
+    words = ["explorer", "lab", order.test, str(order.file)]
+    words += ["--compression", order.compression] if order.compression else []
+    words += [word for name in order.left_out for word in ("--leave-out", name)]
+    plots: Plots = {title: Plot(partial(dict, spec), STRAIGHT) for title, spec in curve_charts(result).items()}
+    part = part_file(result, part_table(result)).encode()
+    return Answer(lab_text(result), shlex.join(words), plots, {f"{order.test}.toml": part})
+
+
+def photograph_answer(photo: Path, scale_mm: float | None) -> Answer:
+    """`explorer measure`: the angle of repose on a photograph, or why there is none."""
+    order = measure_order([str(photo)], scale_mm, None, None, "auto", None, None, None)
+    measured = run_measure(order)
+    words = ["explorer", "measure", str(photo), *(["--scale", f"{scale_mm:g}"] if scale_mm else [])]
+    drawn = sheet([open_picture(photo)], measured.readings, None)
+    file = io.BytesIO()
+    drawn.save(file, "PNG")
+    files = {f"{photo.stem}_read.png": file.getvalue()}
+    if measured.piles and scale_mm:
+        files[f"{photo.stem}_outline.csv"] = outline_text(measured.piles[0]).encode()
+    text = "\n".join([measure_text(measured), *refusal_lines(measured.refusals)]).strip()
+    return Answer(text, shlex.join(words), {}, files, np.asarray(drawn, dtype=np.uint8))
+
+
+def sheet_answer(order: PlanOrder, factors: str, sigma: float | None) -> Answer:
+    """`explorer design`: the runs of a design as a sheet to fill in."""
+    file = read_factors(asset_path("designs", factors))
+    plan = make_plan(order, file)
+    words = ["explorer", "design", order.kind.value, "--factors", factors, "--out", "runs.csv"]
+    for option, number in (("--replicates", order.replicates), ("--centre", order.centre), ("--sigma", sigma)):
+        words += [] if number is None else [option, f"{number:g}"]
+    return Answer(
+        plan_text(plan, file, sigma, None), shlex.join(words), {}, {"runs.csv": sheet_text(plan, file).encode()}
+    )
+
+
+def analysis_answer(order: AnalyseOrder) -> Answer:
+    """`explorer analyse`: what a filled sheet says."""
+    result = run_analyse(order)
+    files = {"report.html": design_html(result).encode()}
+    return Answer(analysis_text(result), shlex.join(result["command"]), design_plots(result), files)
+
+
+def audit_answer(folder: Path | None) -> Answer:
+    """`explorer audit`: a published study recomputed from its own tables; None: the shipped article."""
+    found = audit_study(read_study(folder or asset_path("source_tables", SHIPPED_STUDY).parent))
+    words = ["explorer", "audit", *([str(folder)] if folder else [])]
+    return Answer(audit_text(found), shlex.join(words), {}, {"audit.html": audit_html(found).encode()})

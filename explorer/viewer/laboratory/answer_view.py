@@ -1,0 +1,73 @@
+"""An answer on the page: the terminal's text, a picture, charts, the line that repeats it, files to take along."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import Any
+
+import viser
+
+from explorer.errors import CommandError
+from explorer.laboratory.answers import Answer
+from explorer.viewer.actions import Post
+from explorer.viewer.output.output_panel import send_file
+from explorer.viewer.small_text import small_html
+from explorer.viewer.study.plot_view import PlotView
+
+NO_CHARTS = "Charts come with an answer that has any."
+
+
+class AnswerView:
+    """Shows one :class:`Answer` at a time; ``waiting`` (plain text) stands there before the first."""
+
+    def __init__(self, server: viser.ViserServer, waiting: str, post: Post, charts: bool = False) -> None:
+        self._gui, self._answer, self._versions = server.gui, None, 0
+        self._text = server.gui.add_html(small_html(escape(waiting)))
+        self._place = server.gui.add_folder(None)
+        self._picture: Any = None
+        self._plots = PlotView(server, "Chart of it", NO_CHARTS, post) if charts else None
+        self._take = server.gui.add_button(
+            "Take the files along", disabled=True, hint="What the command would have written, as files of this browser."
+        )
+
+        @self._take.on_click
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client is not None:
+                client = event.client
+                post(lambda: self._send(client))
+
+    def show(self, answer: Answer) -> None:
+        """Show ``answer`` in place of the one before."""
+        self._answer: Answer | None = answer
+        self._versions += 1
+        self._text.content = answer_html(answer)
+        self._take.disabled = not answer.files
+        if self._plots is not None:
+            self._plots.offer(answer.plots, self._versions)
+        if self._picture is not None:
+            self._picture.remove()
+            self._picture = None
+        if answer.picture is not None:
+            with self._place:
+                self._picture = self._gui.add_image(answer.picture, label=None)
+
+    def set_dark(self, dark: bool) -> None:
+        """Charts for a dark page, or a light one."""
+        if self._plots is not None:
+            self._plots.dark = dark
+
+    def _send(self, client: Any) -> None:
+        if self._answer is None:
+            raise CommandError("there is no answer yet")
+        for name, content in self._answer.files.items():
+            send_file(client, name, content)
+
+
+def answer_html(answer: Answer) -> str:
+    """Text in columns, which a narrow panel scrolls, and the command line, which one click selects as a whole."""
+    box = "padding:0.4em; margin:0.3em 0; background:rgba(128,150,170,0.14)"
+    return small_html(
+        f"<pre style='{box}; overflow-x:auto; max-height:26em; white-space:pre; user-select:text'>"
+        f"{escape(answer.text)}</pre>On the command line:"
+        f"<code style='{box}; display:block; user-select:all; white-space:pre-wrap'>{escape(answer.command)}</code>"
+    )

@@ -1,0 +1,87 @@
+"""Readings of a bench test become parameters, and the pile is poured with them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import viser
+
+from explorer.laboratory.answers import bench_answer
+from explorer.laboratory.measured_pour import measured_source
+from explorer.laboratory.run import LabOrder, analysed
+from explorer.scene.source import SceneSource
+from explorer.session import Session
+from explorer.viewer.actions import Post
+from explorer.viewer.background_work import BackgroundWork
+from explorer.viewer.laboratory.answer_view import AnswerView
+from explorer.viewer.laboratory.upload_slot import UploadSlot
+from solver.assets import shipped_assets
+
+NO_COMPRESSION = "none"
+WAITING = "Choose a test; its readings are those of the shipped example until you upload yours. Then: Evaluate."
+
+
+class BenchPanel:
+    """Test, readings, answer; ``folder`` keeps uploads."""
+
+    def __init__(
+        self, server: viser.ViserServer, session: Session, folder: Path, post: Post, background: BackgroundWork
+    ) -> None:
+        self._session, self._folder, self._background = session, folder, background
+        tests, gui = shipped_assets("laboratory"), server.gui
+        with gui.add_folder("Bench test → parameters", expand_by_default=False):
+            self._test = gui.add_dropdown("Test", tests, hint="What was measured; columns: doe/laboratory/README.md.")
+            self._readings = UploadSlot(
+                server, "Readings", (tests[0],), (".csv",), folder, post, "One row per replicate or point of a curve."
+            )
+            self._compression = UploadSlot(
+                server,
+                "Compression readings",
+                (NO_COMPRESSION, "compression"),
+                (".csv",),
+                folder,
+                post,
+                "With shear: of the same components, for Poisson's ratio.",
+            )
+            self._left_out = gui.add_text(
+                "Leave out", "", hint="With composition: components that are not poured; the rest is scaled to one."
+            )
+            evaluate = gui.add_button("Evaluate", hint="Mean, spread, interval, normality, outliers, parameters.")
+            pour = gui.add_button(
+                "Pour with these parameters", hint="The present material with what was measured, as a file of its own."
+            )
+            self.view = AnswerView(server, WAITING, post, charts=True)
+        evaluate.on_click(lambda _: post(self._evaluate))
+        pour.on_click(lambda _: post(self._pour))
+
+        @self._test.on_update
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None:
+                test = str(event.target.value)
+                post(lambda: self._readings.offer((test,)))
+
+    def _order(self) -> LabOrder:
+        test, beside = str(self._test.value), self._compression.chosen
+        given = beside if test == "shear" and beside != NO_COMPRESSION else None
+        left_out = tuple(name for part in str(self._left_out.value).split(",") if (name := part.strip()))
+        return LabOrder(test, self._readings.chosen, given, left_out if test == "composition" else ())
+
+    def _evaluate(self) -> None:
+        order = self._order()
+        self._background.start(
+            "evaluating the readings",
+            lambda: bench_answer(order),
+            self.view.show,
+        )
+
+    def _pour(self) -> None:
+        order, present, folder = self._order(), self._session.status().scene, self._folder
+        self._background.start(
+            "making a material of the readings",
+            lambda: measured_source(present, analysed(order), folder),
+            self._start,
+        )
+
+    def _start(self, source: SceneSource) -> None:
+        self._session.start(source.scene, self._session.status().seed, source)

@@ -1,0 +1,79 @@
+"""A design of one's own: the sheet of its runs, and what the filled sheet says."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import viser
+
+from explorer.design.analysis import AnalyseOrder
+from explorer.design.kinds import Kind
+from explorer.design.plan import PlanOrder
+from explorer.errors import CommandError
+from explorer.laboratory.answers import analysis_answer, sheet_answer
+from explorer.viewer.actions import Post
+from explorer.viewer.background_work import BackgroundWork
+from explorer.viewer.laboratory.answer_view import AnswerView
+from explorer.viewer.laboratory.upload_slot import UploadSlot
+from solver.assets import shipped_assets
+
+SHEET = "Name the factors in a TOML file (explorer/design/README.md), or take the shipped one, then: Make the sheet."
+FILLED = "Fill the responses into the sheet, upload it, then: Analyse."
+
+
+class DesignPanel:
+    """Factors → sheet, and filled sheet → effects, model, optimum; ``folder`` keeps uploads."""
+
+    def __init__(self, server: viser.ViserServer, folder: Path, post: Post, background: BackgroundWork) -> None:
+        self._background, gui = background, server.gui
+        with gui.add_folder("Your own design → runs", expand_by_default=False):
+            self._kind = gui.add_dropdown(
+                "Design", tuple(kind.value for kind in Kind), initial_value="box-behnken", hint="Which runs are made."
+            )
+            self._factors = UploadSlot(
+                server, "Factors", shipped_assets("designs"), (".toml",), folder, post, "Name, low, high, unit of each."
+            )
+            self._replicates = gui.add_number("Runs of each row", 1, min=1, max=1000, step=1)
+            self._sigma = gui.add_number(
+                "Standard deviation of a run", 0.0, min=0.0, hint="In the response's unit; 0: unknown. For the power."
+            )
+            make = gui.add_button("Make the sheet", hint="Says what is confused with what, and what it will see.")
+            self.sheet = AnswerView(server, SHEET, post)
+        with gui.add_folder("Filled sheet → model and optimum", expand_by_default=False):
+            self._filled = UploadSlot(
+                server, "Sheet", shipped_assets("runs"), (".csv",), folder, post, "From any laboratory or engine."
+            )
+            self._response = gui.add_text("Response", "", hint="Column to analyse; empty where there is only one.")
+            self._target = gui.add_text("Target", "", hint="Value that the response should have; empty: none.")
+            analyse = gui.add_button("Analyse", hint="Effects, equations, ANOVA, diagnostics, canonical analysis.")
+            self.analysis = AnswerView(server, FILLED, post, charts=True)
+        make.on_click(lambda _: post(self._make))
+        analyse.on_click(lambda _: post(self._analyse))
+
+    def _make(self) -> None:
+        kind = str(self._kind.value)
+        if kind not in tuple(Kind):
+            raise CommandError(f"design {kind[:40]!r}: allowed are {', '.join(Kind)}")
+        order, factors = PlanOrder(Kind(kind), replicates=int(self._replicates.value)), self._factors.chosen
+        sigma = float(self._sigma.value)
+        known = sigma if math.isfinite(sigma) and sigma > 0.0 else None
+        self._background.start("making the sheet", lambda: sheet_answer(order, factors, known), self.sheet.show)
+
+    def _analyse(self) -> None:
+        target = number_or_none(str(self._target.value), "target")
+        order = AnalyseOrder(self._filled.chosen, str(self._response.value).strip(), target)
+        self._background.start("analysing the sheet", lambda: analysis_answer(order), self.analysis.show)
+
+
+def number_or_none(text: str, what: str) -> float | None:
+    """A number that a person typed, None for nothing; CommandError for anything else."""
+    if not text.strip():
+        return None
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise CommandError(f"{what} {text.strip()[:40]!r}: allowed is a number, or nothing")
+    return number

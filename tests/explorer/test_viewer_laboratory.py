@@ -1,0 +1,165 @@
+"""The tab "Laboratory": a press shows the answer, uploads are offered and kept, what is wrong is one line."""
+
+import io
+import zipfile
+
+import pytest
+from viser import UploadedFile
+
+from explorer.scene.source import material_source
+from explorer.viewer.actions import Actions
+from explorer.viewer.background_work import BackgroundWork
+from explorer.viewer.guarded_server import guarded_server
+from explorer.viewer.laboratory.answer_view import answer_html
+from explorer.viewer.laboratory.audit_panel import AuditPanel
+from explorer.viewer.laboratory.bench_panel import BenchPanel
+from explorer.viewer.laboratory.design_panel import DesignPanel
+from explorer.viewer.laboratory.laboratory_tab import LaboratoryTab
+from explorer.viewer.laboratory.photograph_panel import PhotographPanel
+from solver.assets import asset_path
+from tests.explorer.page_session import PageSession, finished
+from tests.explorer.test_viewer_controls import event
+
+
+@pytest.fixture(scope="module")
+def server():
+    server = guarded_server("127.0.0.1", 0, "test")
+    yield server
+    server.stop()
+
+
+class Bench:
+    """Panels over one background, as in the tab."""
+
+    def __init__(self, server, folder):
+        self.actions, self.folder = Actions(), folder
+        self.background = BackgroundWork(self.actions.post)
+        self.session = PageSession(material_source("sunflower_extract"))
+        post = self.actions.post
+        self.bench = BenchPanel(server, self.session, folder, post, self.background)
+        self.photograph = PhotographPanel(server, folder, post, self.background)
+        self.design = DesignPanel(server, folder, post, self.background)
+        self.audit = AuditPanel(server, folder, post, self.background)
+
+    def do(self, act):
+        self.actions.post(act)
+        return finished(self.actions, self.background)
+
+
+@pytest.fixture
+def bench(server, tmp_path):
+    return Bench(server, tmp_path / "uploads")
+
+
+def text_of(view):
+    return view._text.content
+
+
+def test_every_shipped_bench_test_is_a_choice_and_an_answer(bench):
+    for test in bench.bench._test.options:
+        bench.bench._test.value = test
+        bench.bench._readings.offer((test,))
+        assert bench.do(bench.bench._evaluate) == ""
+        assert f"explorer lab {test} {test}" in text_of(bench.bench.view)
+        assert not bench.bench.view._take.disabled
+
+
+def test_a_pour_starts_with_what_was_measured(bench):
+    bench.bench._test.value = "inclined_plane"
+    bench.bench._readings.offer(("inclined_plane",))
+    assert bench.do(bench.bench._pour) == ""
+    assert bench.session.asked == ["start"]
+    assert bench.session.source.material.endswith(".toml")
+
+
+def test_bad_readings_are_one_line_and_the_pour_stays(bench):
+    slot = bench.bench._readings
+    bench.actions.post(lambda: slot._take("mine.csv", b"a,b,replicate,angle_deg\nx,y,1,steep\n"))
+    assert finished(bench.actions, bench.background) == ""
+    bench.bench._test.value = "inclined_plane"
+    for act in (bench.bench._evaluate, bench.bench._pour):
+        notice = bench.do(act)
+        assert "steep" in notice
+        assert "\n" not in notice
+    assert bench.session.asked == []
+
+
+@pytest.mark.parametrize(("name", "content"), [("readings.exe", b"x"), ("readings.csv", b"")])
+def test_what_cannot_be_kept_is_refused(bench, name, content):
+    notice = bench.do(lambda: bench.bench._readings._take(name, content))
+    assert "allowed" in notice
+    assert not bench.folder.exists() or not list(bench.folder.iterdir())
+
+
+def test_a_photograph_from_the_browser_is_read_and_shown(bench):
+    content = asset_path("photographs", "cone_25_30").read_bytes()
+    assert bench.do(lambda: bench.photograph._photo._take("my pile.JPG", content)) == ""
+    assert bench.do(bench.photograph._read) == ""
+    assert "explorer measure" in text_of(bench.photograph.view)
+    assert bench.photograph.view._picture is not None
+    assert bench.do(lambda: bench.photograph._photo._take("text.jpg", b"no picture")) == ""
+    assert "text" in bench.do(bench.photograph._read)
+
+
+def test_a_sheet_is_made_and_a_filled_one_analysed(bench):
+    assert bench.do(bench.design._make) == ""
+    assert "explorer design box-behnken" in text_of(bench.design.sheet)
+    bench.design._target.value = "24.68"
+    assert bench.do(bench.design._analyse) == ""
+    assert "--target 24.68" in text_of(bench.design.analysis)
+    assert "Contours" in bench.design.analysis._plots._choice.options
+    bench.design._target.value = "steep"
+    assert "target 'steep'" in bench.do(bench.design._analyse)
+
+
+def test_an_audit_of_the_shipped_article_and_of_an_archive(bench):
+    folder = asset_path("source_tables", "table1_physical").parent
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w") as archive:
+        for file in folder.iterdir():
+            archive.write(file, f"mine/{file.name}")
+    assert bench.do(lambda: bench.audit._audit("mine.zip", packed.getvalue())) == ""
+    assert "124 reproduced" in text_of(bench.audit.view)
+    assert "cannot be unpacked" in bench.do(lambda: bench.audit._audit("mine.zip", b"nothing"))
+    assert "124 reproduced" in text_of(bench.audit.view)
+
+
+def test_text_from_files_is_shown_as_text(bench):
+    slot = bench.bench._readings
+    readings = b"a,b,replicate,angle_deg\n" + b"".join(b"<b>x</b>,y,%d,%d.0\n" % (k, 20 + k) for k in range(4))
+    assert bench.do(lambda: slot._take("mine.csv", readings)) == ""
+    bench.bench._test.value = "inclined_plane"
+    bench.do(bench.bench._evaluate)
+    assert "<b>x" not in text_of(bench.bench.view)
+
+
+def test_the_tab_tells_what_is_done_and_what_was_refused(server, tmp_path):
+    actions = Actions()
+    tab = LaboratoryTab(server, PageSession(material_source("sunflower_extract")), tmp_path, actions.post)
+    tab.show("mine.csv: line 2: <steep>")
+    assert "&lt;steep&gt;" in tab._state.content
+    tab.set_dark(False)
+    tab._background.start("auditing", lambda: None, lambda _: None)
+    tab.show("")
+    assert "Busy auditing" in tab._state.content
+    finished(actions, tab._background)
+
+
+def test_a_command_line_is_selected_as_a_whole():
+    from explorer.laboratory.answers import Answer
+
+    html = answer_html(Answer("one & two", "explorer audit"))
+    assert "one &amp; two" in html
+    assert "user-select:all" in html
+
+
+def test_another_test_offers_its_own_example(bench):
+    event(bench.bench._test, "drop")
+    assert finished(bench.actions, bench.background) == ""
+    assert bench.bench._readings.chosen == "drop"
+    event(bench.bench._readings.upload, UploadedFile("mine.csv", b"x"))
+    finished(bench.actions, bench.background)
+    assert bench.bench._readings.chosen.endswith(".csv")
+    event(bench.bench._test, "shear")
+    finished(bench.actions, bench.background)
+    assert bench.bench._readings.chosen.endswith(".csv")  # what was sent stays chosen
