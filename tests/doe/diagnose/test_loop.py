@@ -5,7 +5,8 @@ import hashlib
 import numpy as np
 import pytest
 
-from doe.diagnose import diagnosis, menu
+from doe.diagnose import diagnosis
+from doe.diagnose.follow_up import menu
 from doe.diagnose.runs import Effect, Observed
 from doe.diagnose.simulation.pours import Pour
 from doe.diagnose.simulation.screen import REPLICATES, TOO_FAR, Budget, scaled_range, whitened_shift
