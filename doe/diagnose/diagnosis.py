@@ -10,7 +10,7 @@ import numpy as np
 from doe.diagnose.decision.decide import diagnose
 from doe.diagnose.decision.verdict import Verdict
 from doe.diagnose.emulation.fresh_pours import FreshPours
-from doe.diagnose.follow_up.closer import LOOKS, poured, to_be_poured
+from doe.diagnose.follow_up.closer import LEAD_POURS, LOOKS, POURS, contenders, leads, poured
 from doe.diagnose.follow_up.confirm import Confirmed, Model, confirm, fitted
 from doe.diagnose.follow_up.holdout import HoldoutCondition, HoldoutError, holdout_errors
 from doe.diagnose.follow_up.menu import Suggestion, next_experiment
@@ -25,14 +25,14 @@ from doe.store import Store
 from solver import EFFECTS, ParameterError, Scene, parameters, with_values
 
 SURVIVORS = 5
-"""Effects that are simulated further: the best of the race so far."""
+"""Effects whose range may be widened: the best of the race so far,"""
 SURVIVING_GAP = 12.0
-"""Distance in the criterion to the best beyond which an effect is not simulated further."""
+"""as far as their criterion is no farther behind the best."""
 BOX = 3.0
 """Standard deviations about an independently measured mean."""
 DRAWN_IN = 0.8
-ROUNDS = 3
-"""Times that survivors are simulated further, beyond once only while one of them needs a wider range."""
+WIDENINGS = 3
+"""Times that a range may be doubled before the next look."""
 FRESH = 12
 """Pours per model and condition in the confirmation, at least."""
 
@@ -68,18 +68,7 @@ def run_diagnosis(
     model = ModelPours(measurement.fit, paths, store, pours, on_pour)
     everywhere = ModelPours(measurement.conditions, paths, store, pours, on_pour)
     observed = observe(measurement.fit)
-    screened = screen(declared, model, budget, say)
-    verdict = diagnose(screened.declared, screened.runs, observed)
-    say(f"after screening: {verdict.kind}")
-    for turn in range(ROUNDS):
-        names, cramped = survivors(verdict), at_edge(verdict, screened.declared, declared)
-        if not names or (turn > 0 and not cramped):
-            break
-        screened = further(widened(screened, cramped, declared), names, model, budget, say)
-        verdict = diagnose(screened.declared, screened.runs, observed)
-        if cramped:
-            say(f"wider range of {', '.join(cramped)}: {verdict.kind}")
-    verdict = looked_closer(verdict, screened, observed, model, say)
+    screened, verdict = pursued(screen(declared, model, budget, say), declared, observed, model, budget, say)
     say(f"verdict: {verdict.kind}")
     before, after = models(verdict)
     number = max(FRESH, *(2 * condition.replicates for condition in measurement.conditions))
@@ -100,17 +89,29 @@ def run_diagnosis(
     )
 
 
-def looked_closer(verdict: Verdict, screened: Screened, observed: Observed, model: ModelPours, say: Say) -> Verdict:
-    """The verdict once the contending models have been poured at their best fits."""
+def pursued(
+    screened: Screened, widest: Declared, observed: Observed, model: ModelPours, budget: Budget, say: Say
+) -> tuple[Screened, Verdict]:
+    """The verdict once its leads have been followed: poured at their best fits, over wider ranges where one ends."""
+    verdict = diagnose(screened.declared, screened.runs, observed)
+    say(f"after screening: {verdict.kind}")
     fresh: tuple[FreshPours, ...] = ()
-    for _ in range(LOOKS):
-        contenders = to_be_poured(verdict, screened.declared, fresh)
-        if not contenders:
+    closer, number = leads(verdict), LEAD_POURS
+    for _ in range(1 + LOOKS):
+        if not closer:
             break
-        fresh += poured(verdict, contenders, model)
+        fresh += poured(verdict, closer, model, number)
         verdict = diagnose(screened.declared, screened.runs, observed, fresh=fresh)
-        say(f"poured at the best fits of {', '.join(one.label for one in contenders)}: {verdict.kind}")
-    return verdict
+        say(f"poured at the best fits of {', '.join(one.label for one in closer)}: {verdict.kind}")
+        for _ in range(WIDENINGS):
+            cramped = at_edge(verdict, screened.declared, widest)
+            if not cramped:
+                break
+            screened = further(widened(screened, cramped, widest), cramped, model, budget, say)
+            verdict = diagnose(screened.declared, screened.runs, observed, fresh=fresh)
+            say(f"wider range of {', '.join(cramped)}: {verdict.kind}")
+        closer, number = contenders(verdict, screened.declared, fresh), POURS
+    return screened, verdict
 
 
 def declare(measurement: Measurement, effects: Sequence[str]) -> Declared:

@@ -46,8 +46,8 @@ STOPS = (
     ),
     Stop(
         "Laboratory",
-        "The tab **Laboratory** works on what you have measured: readings of bench tests, photographs of a pile, a filled "
-        "sheet of runs, the tables of a publication. Shipped examples stand in each list.",
+        "The tab **Laboratory** works on what you have measured: readings of bench tests, photographs of a pile, a "
+        "filled sheet of runs, the tables of a publication. Shipped examples stand in each list.",
     ),
 )
 

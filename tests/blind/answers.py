@@ -11,7 +11,7 @@ import numpy.typing as npt
 from doe.diagnose.decision.verdict import Verdict
 from doe.diagnose.diagnosis import FRESH, models
 from doe.diagnose.emulation.fresh_pours import FreshPours
-from doe.diagnose.follow_up.closer import LOOKS, points_of, poured, to_be_poured
+from doe.diagnose.follow_up.closer import LOOKS, contenders, points_of, poured
 from doe.diagnose.follow_up.confirm import confirm
 from doe.diagnose.follow_up.holdout import HoldoutCondition, holdout_errors
 from doe.diagnose.simulation.plan import Point
@@ -89,7 +89,7 @@ class Answers:
         verdicts = dict(zip(questions, self.place.map(judged, list(questions.values())), strict=True))
         pours = self.model_pours(self.measurement.fit)
         for _ in range(LOOKS):
-            closer = {k: found for k, v in verdicts.items() if (found := to_be_poured(v, declared, questions[k].fresh))}
+            closer = {k: found for k, v in verdicts.items() if (found := contenders(v, declared, questions[k].fresh))}
             # All of them at once, so that no worker waits for the last pour of a set.
             pours.run("best fits", [p for k, found in closer.items() for m in found for p in points_of(verdicts[k], m)])
             for k, found in closer.items():

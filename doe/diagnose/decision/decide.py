@@ -27,7 +27,7 @@ from doe.diagnose.decision.tables import (
 )
 from doe.diagnose.decision.verdict import FittedModel, Signature, Verdict
 from doe.diagnose.emulation.emulator import Emulator, fit_emulator
-from doe.diagnose.emulation.fresh_pours import FreshPours
+from doe.diagnose.emulation.fresh_pours import FreshPours, newest, taught
 from doe.diagnose.emulation.tails import heavy_tails
 from doe.diagnose.fitting.calibrate import Evidence, Fit, calibrate, fit_with_covariance, gather_evidence
 from doe.diagnose.fitting.signatures import Whitening, reach, whitening
@@ -67,12 +67,13 @@ def diagnose(
     fresh: pours at best fits of an earlier verdict with the same runs.
     Raises StatisticsError for shapes that disagree, too few runs or bootstrap < 500.
     """
-    selected = select_summaries(declared, runs, observed)
+    selected = select_summaries(declared, taught(runs, fresh), observed)
     tails = heavy_tails(selected.declared, selected.runs, selected.observed)
     emulator = fit_emulator(selected.declared, tails.of_runs(selected.runs), selected.floors)
-    kept = [[block[:, keep] for block, keep in zip(one.blocks, selected.kept, strict=True)] for one in fresh]
+    holding = newest(fresh)
+    kept = [[block[:, keep] for block, keep in zip(one.blocks, selected.kept, strict=True)] for one in holding]
     emulator = replace(
-        emulator, fresh=tuple(replace(one, blocks=tails.of_pours(b)) for one, b in zip(fresh, kept, strict=True))
+        emulator, fresh=tuple(replace(one, blocks=tails.of_pours(b)) for one, b in zip(holding, kept, strict=True))
     )
     measured = tails.of_observed(selected.observed)
     verdict = judge(emulator, measured, bootstrap, seed, limits, selected.dropped, selected.floored)

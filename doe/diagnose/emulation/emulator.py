@@ -91,9 +91,8 @@ class Emulator:
             low=np.concatenate([self.theta_low, *(self.low[e] for e in members)]),
             high=np.concatenate([self.theta_high, *(self.high[e] for e in members)]),
         )
-        for fresh in self.fresh:
-            predictor = anchored(predictor, fresh) if fresh.members == members else predictor
-        return predictor
+        held = [one for one in self.fresh if one.members == members]
+        return anchored(predictor, held[-1].coded(self.declared), held[-1].blocks) if held else predictor
 
 
 def fit_emulator(declared: Declared, runs: Runs, floors: tuple[FloatArray, ...]) -> Emulator:

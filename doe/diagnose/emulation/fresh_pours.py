@@ -14,6 +14,7 @@ Only simulated pours come in here.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,25 +22,63 @@ import numpy.typing as npt
 
 from doe.diagnose.emulation.predictor import Anchor, Predictor
 from doe.diagnose.emulation.terms import monomials
+from doe.diagnose.runs import Declared, Runs
 
 FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class FreshPours:
-    """Pours of the model with the effects ``members`` at the coded point x (q,). blocks: per condition (n, d_c)."""
+    """Pours of the model with the effects ``members`` on, at parameters theta (k,) and amplitudes, natural units.
+
+    amplitudes: those of the first member, then of the second. blocks: per condition (n, d_c), NaN for a pour that broke
+    off.
+    """
 
     members: tuple[int, ...]
-    x: FloatArray
+    theta: tuple[float, ...]
+    amplitudes: tuple[float, ...]
     blocks: tuple[FloatArray, ...]
 
+    def coded(self, declared: Declared) -> FloatArray:
+        """Return the point (q,) as the emulator counts."""
+        scale = np.concatenate([np.empty(0), *(declared.effects[e].scale for e in self.members)])
+        return np.concatenate([declared.coded(np.array(self.theta)), np.array(self.amplitudes) / scale])
 
-def anchored(predictor: Predictor, fresh: FreshPours) -> Predictor:
-    """Return the predictor that knows the fresh pours. A condition with fewer than two of them stays as it was.
+
+def newest(fresh: Sequence[FreshPours]) -> tuple[FreshPours, ...]:
+    """Return the last pours of every model: those that hold its prediction."""
+    return tuple({one.members: one for one in fresh}.values())
+
+
+def taught(runs: Runs, fresh: Sequence[FreshPours]) -> Runs:
+    """Return the runs with the earlier pours of every single effect: they teach the emulator like any others.
+
+    The newest do not, for they hold a prediction already; pairs have no terms of their own.
+    """
+    held = newest(fresh)
+    for one in fresh:
+        if len(one.members) != 1 or any(one is last for last in held):
+            continue
+        n = len(one.blocks[0])
+        amplitudes = (*one.amplitudes, 0.0)[:2]
+        runs = Runs(
+            np.vstack([runs.theta, np.tile(one.theta, (n, 1))]),
+            np.concatenate([runs.effect, np.full(n, one.members[0])]),
+            np.vstack([runs.amplitude, np.tile(amplitudes, (n, 1))]),
+            tuple(np.vstack(pair) for pair in zip(runs.blocks, one.blocks, strict=True)),
+        )
+    return runs
+
+
+def anchored(predictor: Predictor, x: FloatArray, blocks: Sequence[FloatArray]) -> Predictor:
+    """Return the predictor that knows pours at x (q,), per condition (n, d_c).
+
+    A condition with fewer than two complete ones stays as it was.
 
     Pours that scatter more than those of the base model (an effect that lets bodies hang) count for as much less.
     """
-    x = np.clip(fresh.x, predictor.low, predictor.high)
+    x = np.clip(x, predictor.low, predictor.high)
     constant = int(np.flatnonzero((predictor.exponents == 0).all(axis=1))[0])
     terms = monomials(x, predictor.exponents)
     coefficients, shares, biases = [], [], []
@@ -48,15 +87,16 @@ def anchored(predictor: Predictor, fresh: FreshPours) -> Predictor:
         predictor.variance_shares(x),
         predictor.bias_variance(x),
         predictor.pour_covariance,
-        fresh.blocks,
+        blocks,
         strict=True,
     ):
-        n, moved = len(values), own.copy()
+        complete, moved = values[np.isfinite(values).all(axis=1)], own.copy()
+        n = len(complete)
         if n >= 2:
             pour = np.diag(noise)
-            emulated, poured = share * pour + bias, np.maximum(pour, values.var(axis=0, ddof=1)) / n
+            emulated, poured = share * pour + bias, np.maximum(pour, complete.var(axis=0, ddof=1)) / n
             gain = emulated / (emulated + poured)
-            moved[constant] += gain * (values.mean(axis=0) - terms @ own)
+            moved[constant] += gain * (complete.mean(axis=0) - terms @ own)
             share = share / (1.0 + n * share)
             bias = np.maximum(gain * poured - share * pour, 0.0)
         coefficients.append(moved)

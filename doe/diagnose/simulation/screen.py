@@ -41,8 +41,8 @@ class Budget:
     scaling: int = 2
     screening: int = 10
     """Per effect with one amplitude; half as many again with two."""
-    further: int = 20
-    """More for each survivor."""
+    further: int = 12
+    """More for each effect whose range is widened."""
 
     def scaled(self, runs: int, effects: int, conditions: int) -> Budget:
         """The same shares in about ``runs`` pours."""

@@ -21,7 +21,8 @@ class AnswerView:
     """Shows one :class:`Answer` at a time; ``waiting`` (plain text) stands there before the first."""
 
     def __init__(self, server: viser.ViserServer, waiting: str, post: Post, charts: bool = False) -> None:
-        self._gui, self._answer, self._versions = server.gui, None, 0
+        self._gui, self._versions = server.gui, 0
+        self._answer: Answer | None = None
         self._text = server.gui.add_html(small_html(escape(waiting)))
         self._place = server.gui.add_folder(None)
         self._picture: Any = None
@@ -38,7 +39,7 @@ class AnswerView:
 
     def show(self, answer: Answer) -> None:
         """Show ``answer`` in place of the one before."""
-        self._answer: Answer | None = answer
+        self._answer = answer
         self._versions += 1
         self._text.content = answer_html(answer)
         self._take.disabled = not answer.files

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from doe.diagnose.simulation import pours as module
 from doe.diagnose.follow_up.confirm import Model, confirm
 from doe.diagnose.runs import Condition, Declared
+from doe.diagnose.simulation import pours as module
 from doe.diagnose.simulation.pours import ModelPours, Pour
 from doe.diagnose.simulation.screen import whitened_shift
 from doe.store import Store
