@@ -26,6 +26,9 @@ from doe.diagnose.runs import Declared, Runs
 
 FloatArray = npt.NDArray[np.float64]
 
+BASE_DF = 5.0
+"""Weight of the base model's variance in that of the fresh pours [degrees of freedom]: a few pours say little of it."""
+
 
 @dataclass(frozen=True)
 class FreshPours:
@@ -76,12 +79,14 @@ def anchored(predictor: Predictor, x: FloatArray, blocks: Sequence[FloatArray]) 
 
     A condition with fewer than two complete ones stays as it was.
 
-    Pours that scatter more than those of the base model (an effect that lets bodies hang) count for as much less.
+    Pours may scatter more than those of the base model (piles that rolling resistance keeps steep, bodies that hang).
+    Their variance is taken as that of both together, the base model's with the weight of ``BASE_DF`` degrees of
+    freedom; less than the base model's is not believed. It is the noise of measured pours too, were this model true.
     """
     x = np.clip(x, predictor.low, predictor.high)
     constant = int(np.flatnonzero((predictor.exponents == 0).all(axis=1))[0])
     terms = monomials(x, predictor.exponents)
-    coefficients, shares, biases = [], [], []
+    coefficients, shares, biases, spreads = [], [], [], []
     for own, share, bias, noise, values in zip(
         predictor.coefficients,
         predictor.variance_shares(x),
@@ -91,10 +96,13 @@ def anchored(predictor: Predictor, x: FloatArray, blocks: Sequence[FloatArray]) 
         strict=True,
     ):
         complete, moved = values[np.isfinite(values).all(axis=1)], own.copy()
+        spread = np.ones(len(noise))
         n = len(complete)
         if n >= 2:
             pour = np.diag(noise)
-            emulated, poured = share * pour + bias, np.maximum(pour, complete.var(axis=0, ddof=1)) / n
+            own_variance = (BASE_DF * pour + (n - 1) * complete.var(axis=0, ddof=1)) / (BASE_DF + n - 1)
+            spread = np.sqrt(np.maximum(1.0, own_variance / pour))
+            emulated, poured = share * pour + bias, spread**2 * pour / n
             gain = emulated / (emulated + poured)
             moved[constant] += gain * (complete.mean(axis=0) - terms @ own)
             share = share / (1.0 + n * share)
@@ -102,4 +110,6 @@ def anchored(predictor: Predictor, x: FloatArray, blocks: Sequence[FloatArray]) 
         coefficients.append(moved)
         shares.append(share)
         biases.append(bias)
-    return replace(predictor, coefficients=tuple(coefficients), anchor=Anchor(x, tuple(shares), tuple(biases)))
+        spreads.append(spread)
+    anchor = Anchor(x, tuple(shares), tuple(biases), tuple(spreads))
+    return replace(predictor, coefficients=tuple(coefficients), anchor=anchor)

@@ -22,12 +22,14 @@ changes of sign in it."""
 @dataclass(frozen=True)
 class Anchor:
     """Point x (q,) at which pours of the model itself hold the prediction (fresh_pours.py), and its variance there, per
-    condition: shares of a pour's covariance, and bias (d_c,).
+    condition: shares of a pour's covariance, and bias (d_c,). spread: (d_c,) standard deviation of a pour there over
+    that of the base model, at least one.
     """
 
     x: FloatArray
     shares: tuple[float, ...]
     bias: tuple[FloatArray, ...]
+    spread: tuple[FloatArray, ...]
 
 
 @dataclass(frozen=True)
@@ -99,6 +101,11 @@ class Predictor:
         step = (x - self.anchor.x) / (self.high - self.low)
         loose = 1.0 - np.exp(-(step**2).sum() / BIAS_LENGTH**2)
         return tuple(held + loose * far for held, far in zip(self.anchor.bias, bias, strict=True))
+
+    @property
+    def spread(self) -> tuple[FloatArray, ...]:
+        """Return per condition the standard deviation of one pour over that of the base model's, (d_c,)."""
+        return tuple(np.ones(len(s)) for s in self.pour_covariance) if self.anchor is None else self.anchor.spread
 
     def require_inside(self, x: FloatArray) -> None:
         """Raise StatisticsError unless every point lies in the sampled box (rounding aside)."""

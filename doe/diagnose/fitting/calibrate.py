@@ -100,9 +100,25 @@ def residual_covariance(predictor: Predictor, x: FloatArray, evidence: Evidence)
     return tuple(
         pour / count + emulated + np.diag(systematic)
         for pour, count, emulated, systematic in zip(
-            evidence.pour, evidence.counts, predictor.mean_covariance(x), evidence.systematic, strict=True
+            measured_noise(predictor, evidence),
+            evidence.counts,
+            predictor.mean_covariance(x),
+            evidence.systematic,
+            strict=True,
         )
     )
+
+
+def measured_noise(predictor: Predictor, evidence: Evidence) -> tuple[FloatArray, ...]:
+    """Return the covariance of one measured pour per condition, were this model the truth.
+
+    Where the measured replicates have their own standard deviation, that stays.
+    """
+    factors = (
+        np.where(compared.differs, 1.0, spread)
+        for spread, compared in zip(predictor.spread, evidence.variances, strict=True)
+    )
+    return tuple(pour * np.outer(f, f) for pour, f in zip(evidence.pour, factors, strict=True))
 
 
 def calibrate(emulator: Emulator, members: tuple[int, ...], evidence: Evidence) -> Fit:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from doe.diagnose.emulation.emulator import Emulator
 from doe.diagnose.emulation.noise import shrink
-from doe.diagnose.fitting.calibrate import Evidence, Fit
+from doe.diagnose.fitting.calibrate import Evidence, Fit, measured_noise
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -35,9 +35,10 @@ def draw_pseudo_data(emulator: Emulator, evidence: Evidence, truth: Fit, sets: i
     fitted = np.split(predictor.mean(truth.x), np.cumsum([m.size for m in evidence.means])[:-1])
     emulated, shares = predictor.mean_covariance(truth.x), predictor.variance_shares(truth.x)
     biases = predictor.bias_variance(truth.x)
+    noise = measured_noise(predictor, evidence)
     means, weights = [], []
     for c, block in enumerate(emulator.blocks):
-        systematic, count, pour = np.diag(evidence.systematic[c]), evidence.counts[c], evidence.pour[c]
+        systematic, count, pour = np.diag(evidence.systematic[c]), evidence.counts[c], noise[c]
         simulated = block.noise.covariance
         error = gaussian(emulated[c] + systematic, sets, generator)
         means.append(fitted[c] + _mean_of_pours(block.noise.rows, pour, count, sets, generator) + error)

@@ -63,7 +63,7 @@ def contenders(verdict: Verdict, declared: Declared, fresh: Sequence[FreshPours]
 
 
 def _holds(fresh: FreshPours, model: FittedModel, declared: Declared) -> bool:
-    if fresh.members != model.members:
+    if fresh.members != model.members or len(fresh.blocks[0]) < POURS:
         return False
     effects = [declared.effects[e] for e in model.members]
     amplitudes = [(np.array(e.high) - np.array(e.low)) / e.scale for e in effects]

@@ -5,7 +5,7 @@ import pytest
 
 from doe.diagnose.decision.decide import diagnose
 from doe.diagnose.emulation.emulator import fit_emulator
-from doe.diagnose.emulation.fresh_pours import FreshPours, anchored
+from doe.diagnose.emulation.fresh_pours import FreshPours, anchored, newest, taught
 from doe.diagnose.emulation.predictor import BIAS_LENGTH
 from doe.diagnose.runs import BASE, Condition, Declared, Effect, Observed, Parameter, Runs
 
@@ -46,7 +46,7 @@ def test_the_update_is_that_of_two_gaussian_measurements():
     x, n = np.array([0.2, 0.6]), 9
     blocks = poured(generator, n, *x)
     blocks = tuple(b - b.mean(axis=0) + 0.9 * b / b for b in blocks)  # mean 0.9, the scatter is that of the pours
-    held = anchored(bare, FreshPours((0,), x, blocks))
+    held = anchored(bare, x, blocks)
     cuts = np.cumsum([b.shape[1] for b in blocks])[:-1]
     for c, (before, after) in enumerate(zip(np.split(bare.mean(x), cuts), np.split(held.mean(x), cuts), strict=True)):
         v = np.diag(bare.mean_covariance(x)[c])
@@ -59,7 +59,7 @@ def test_what_the_pours_say_fades_with_the_distance():
     generator = np.random.default_rng(1)
     bare = emulated(generator).predictor((0,))
     x = np.array([0.0, 0.6])
-    held = anchored(bare, FreshPours((0,), x, poured(generator, 12, *x)))
+    held = anchored(bare, x, poured(generator, 12, *x))
     assert bare.bias_variance(x)[0][0] > 5 * held.bias_variance(x)[0][0]
     far = np.array([-0.9, 0.95])
     distance = (((far - x) / (bare.high - bare.low)) ** 2).sum() / BIAS_LENGTH**2
@@ -73,7 +73,7 @@ def test_one_pour_is_no_mean():
     bare = emulated(generator).predictor((0,))
     x = np.array([0.0, 0.6])
     blocks = poured(generator, 12, *x)
-    held = anchored(bare, FreshPours((0,), x, (blocks[0], blocks[1][:1])))
+    held = anchored(bare, x, (blocks[0], np.where(np.arange(12)[:, None] == 0, blocks[1], np.nan)))
     assert held.mean(x)[2] == bare.mean(x)[2]
     assert held.mean_covariance(x)[1] == pytest.approx(bare.mean_covariance(x)[1])
     assert held.mean(x)[0] != bare.mean(x)[0]
@@ -85,7 +85,7 @@ def test_stated_errors_hold_about_the_fit():
         generator = np.random.default_rng([3, seed])
         bare = emulated(generator).predictor((0,))
         x = np.array([generator.uniform(-0.5, 0.5), generator.uniform(0.3, 0.9)])
-        held = anchored(bare, FreshPours((0,), x, poured(generator, 12, *x)))
+        held = anchored(bare, x, poured(generator, 12, *x))
         near = x + generator.uniform(-0.1, 0.1, 2)
         for name, model in (("bare", bare), ("held", held)):
             error = model.mean(near)[0] - truth(near[:1], near[1:], 0.0)[0][0, 0]
@@ -96,22 +96,37 @@ def test_stated_errors_hold_about_the_fit():
     assert (error / stated).mean() < 2.0
 
 
+def fresh_at(generator, model, n=12):
+    (a,), (amplitude,) = model.parameters, (one.value for one in model.amplitudes)
+    blocks = poured(generator, n, a, **{model.label: amplitude})
+    return FreshPours(model.members, (a,), (amplitude,), blocks)
+
+
 def test_pours_at_the_best_fit_decide_what_the_emulator_could_not():
     """At the true amplitude the emulator misses the step by a third of it, and calls the truth unfit."""
     generator = np.random.default_rng(4)
-    runs, members = make_runs(generator), [(0,), (1,)]
+    runs = make_runs(generator)
     data = Observed(poured(generator, 6, 0.1, 0.62), (np.zeros(2), np.zeros(1)))
     first = diagnose(DECLARED, runs, data, bootstrap=500)
-    fresh = tuple(
-        FreshPours(
-            m, found.coded, poured(generator, 12, found.coded[0], **{DECLARED.effects[m[0]].name: found.coded[1]})
-        )
-        for m in members
-        for found in first.models
-        if found.members == m
-    )
+    fresh = [fresh_at(generator, found) for found in first.models if found.members]
     second = diagnose(DECLARED, runs, data, bootstrap=500, fresh=fresh)
     spread = [v.effects[0].amplitudes[0].standard_error for v in (first, second)]
     assert second.kind == "effect:steep"
     assert spread[1] < spread[0]
     assert [g.statistic for g in first.gates[:2]] == [g.statistic for g in second.gates[:2]]
+
+
+def test_the_newest_pours_hold_and_the_earlier_ones_teach():
+    generator = np.random.default_rng(5)
+    runs = make_runs(generator)
+    first, second, other = (
+        FreshPours((e,), (0.1 * k,), (0.5,), poured(generator, 4, 0.1 * k)) for k, e in enumerate((0, 0, 1))
+    )
+    assert newest([first, second, other]) == (second, other)
+    grown = taught(runs, [first, second, other])
+    assert len(grown.theta) == len(runs.theta) + 4
+    assert (grown.effect[-4:] == 0).all()
+    assert grown.theta[-1] == first.theta
+    assert grown.amplitude[-1] == pytest.approx([0.5, 0.0])
+    assert grown.blocks[0][-4:] == pytest.approx(first.blocks[0])
+    assert taught(runs, [FreshPours((0, 1), (0.0,), (0.1, 0.1), first.blocks)] * 2) is runs
