@@ -32,6 +32,10 @@ class FormulaPours:
     def __init__(self, conditions, paths, store, pours, on_pour=None, root=0):
         self.conditions, self.paths, self.run_now = conditions, paths, 0
 
+    @staticmethod
+    def formula(*arguments):
+        return expected(*arguments)
+
     def run(self, what, points):
         self.run_now += len(points) * len(self.conditions)
         return [[self.pour(point, condition) for condition in self.conditions] for point in points]
@@ -40,7 +44,7 @@ class FormulaPours:
         width = len(summary_names(condition))
         text = f"{point} {condition.name}"
         noise = np.random.default_rng(int.from_bytes(hashlib.sha256(text.encode()).digest()[:8])).normal(size=width)
-        return Pour(tuple(expected(point.theta, point.effects, condition.name, width) + noise), "measured")
+        return Pour(tuple(self.formula(point.theta, point.effects, condition.name, width) + noise), "measured")
 
 
 def expected(theta, effects, condition, width):
@@ -60,14 +64,14 @@ def measurement(monkeypatch):
     return load_measurement(measurement_folder("trefoil_1"))
 
 
-def data_of(measurement, effects, seed):
+def data_of(measurement, effects, seed, formula=expected):
     """Replicates of the formula at the declared means, with ``effects``."""
     rng = np.random.default_rng(seed)
     theta = [p.mean for p in measurement.parameters]
     blocks = []
     for condition in measurement.fit:
         width = len(summary_names(condition))
-        blocks.append(expected(theta, effects, condition.name, width) + rng.normal(size=(REPLICATES, width)))
+        blocks.append(formula(theta, effects, condition.name, width) + rng.normal(size=(REPLICATES, width)))
     return Observed(tuple(blocks), tuple(np.zeros(block.shape[1]) for block in blocks))
 
 
@@ -97,6 +101,28 @@ def test_an_effect_beyond_the_first_range_is_followed(measurement, monkeypatch):
     assert found.verdict.kind == "effect:rolling_resistance", said
     assert found.verdict.amplitudes[0].value > 0.9 * planted
     assert any("wider range of" in line and "rolling_resistance" in line for line in said)
+
+
+def bent(theta, effects, condition, width):
+    """As :func:`expected`, with a full wave over the range of every effect, which ten settings cannot follow."""
+    mean = expected(theta, effects, condition, width)
+    for name, amplitude in effects:
+        for value in amplitude:
+            wave = np.sin(2.0 * np.pi * value / EFFECTS[name].strongest)
+            mean += 5.0 * wave * direction(f"{condition} {name} bent", width)
+    return mean
+
+
+@pytest.mark.parametrize(("seed", "at_first"), [(1, "unexplained"), (2, "effects:rolling_resistance+plate_tilt")])
+def test_pours_at_the_best_fits_put_right_what_a_thin_screening_says(measurement, monkeypatch, seed, at_first):
+    planted = (("rolling_resistance", (0.7 * EFFECTS["rolling_resistance"].strongest,)),)
+    monkeypatch.setattr(diagnosis, "observe", lambda conditions: data_of(measurement, planted, seed, bent))
+    said = []
+    thin = Budget(base=48, middle=16, scaling=2, screening=10)
+    monkeypatch.setattr(FormulaPours, "formula", staticmethod(bent))
+    found = diagnosis.run_diagnosis(measurement, None, None, NAMES, thin, said.append)
+    assert f"after screening: {at_first}" in said
+    assert found.verdict.kind == "effect:rolling_resistance", said
 
 
 def test_nothing_planted_is_nothing_found(measurement, monkeypatch):

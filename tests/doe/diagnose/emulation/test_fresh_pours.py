@@ -5,7 +5,7 @@ import pytest
 
 from doe.diagnose.decision.decide import diagnose
 from doe.diagnose.emulation.emulator import fit_emulator
-from doe.diagnose.emulation.fresh_pours import FreshPours, anchored, newest, taught
+from doe.diagnose.emulation.fresh_pours import BASE_DF, FreshPours, anchored, newest, taught
 from doe.diagnose.emulation.predictor import BIAS_LENGTH
 from doe.diagnose.runs import BASE, Condition, Declared, Effect, Observed, Parameter, Runs
 
@@ -50,7 +50,9 @@ def test_the_update_is_that_of_two_gaussian_measurements():
     cuts = np.cumsum([b.shape[1] for b in blocks])[:-1]
     for c, (before, after) in enumerate(zip(np.split(bare.mean(x), cuts), np.split(held.mean(x), cuts), strict=True)):
         v = np.diag(bare.mean_covariance(x)[c])
-        w = np.maximum(np.diag(bare.pour_covariance[c]), blocks[c].var(axis=0, ddof=1)) / n
+        pour = np.diag(bare.pour_covariance[c])
+        pooled = (BASE_DF * pour + (n - 1) * blocks[c].var(axis=0, ddof=1)) / (BASE_DF + n - 1)
+        w = np.maximum(pour, pooled) / n
         assert after == pytest.approx((before / v + 0.9 / w) / (1 / v + 1 / w))
         assert np.diag(held.mean_covariance(x)[c]) == pytest.approx(1 / (1 / v + 1 / w))
 
@@ -130,3 +132,16 @@ def test_the_newest_pours_hold_and_the_earlier_ones_teach():
     assert grown.amplitude[-1] == pytest.approx([0.5, 0.0])
     assert grown.blocks[0][-4:] == pytest.approx(first.blocks[0])
     assert taught(runs, [FreshPours((0, 1), (0.0,), (0.1, 0.1), first.blocks)] * 2) is runs
+
+
+def test_a_wider_scatter_at_the_fit_is_noise_of_the_data_too():
+    generator = np.random.default_rng(6)
+    bare = emulated(generator).predictor((0,))
+    x = np.array([0.0, 0.6])
+    wide = [3.0 * (b - b.mean(axis=0)) + b.mean(axis=0) for b in poured(generator, 200, *x)]
+    spread = np.concatenate(anchored(bare, x, wide).spread)
+    # 200 pours: the standard deviation to 5 %, and the base model's own to 10 %.
+    assert spread == pytest.approx(3.0, rel=0.25)
+    calm = anchored(bare, x, [0.1 * (b - b.mean(axis=0)) + b.mean(axis=0) for b in wide])
+    assert np.concatenate(calm.spread) == pytest.approx(1.0)
+    assert np.concatenate(bare.spread) == pytest.approx(1.0)
