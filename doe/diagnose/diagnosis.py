@@ -16,7 +16,7 @@ from doe.diagnose.follow_up.holdout import HoldoutCondition, HoldoutError, holdo
 from doe.diagnose.follow_up.menu import Suggestion, next_experiment
 from doe.diagnose.runs import Condition, Declared, Effect, Observed, Parameter
 from doe.diagnose.simulation.pours import ModelPours, OnPour, effect_values
-from doe.diagnose.simulation.screen import Budget, Say, Screened, further, screen, widened
+from doe.diagnose.simulation.screen import Budget, Say, Screened, over_wider_ranges, screen
 from doe.measurement.measurement import Condition as MeasuredCondition
 from doe.measurement.measurement import MeasuredParameter, Measurement
 from doe.measurement.summaries import summaries_of_data, summary_names, summary_uncertainties
@@ -100,14 +100,14 @@ def pursued(
     for _ in range(1 + LOOKS):
         if not closer:
             break
-        fresh += poured(verdict, closer, model, number)
+        fresh += poured(closer, screened.declared, model, number)
         verdict = diagnose(screened.declared, screened.runs, observed, fresh=fresh)
         say(f"poured at the best fits of {', '.join(one.label for one in closer)}: {verdict.kind}")
         for _ in range(WIDENINGS):
             cramped = at_edge(verdict, screened.declared, widest)
             if not cramped:
                 break
-            screened = further(widened(screened, cramped, widest), cramped, model, budget, say)
+            screened = over_wider_ranges(screened, cramped, widest, model, budget, say)
             verdict = diagnose(screened.declared, screened.runs, observed, fresh=fresh)
             say(f"wider range of {', '.join(cramped)}: {verdict.kind}")
         closer, number = contenders(verdict, screened.declared, fresh), POURS

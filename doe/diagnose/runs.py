@@ -61,12 +61,14 @@ class Parameter(Record):
 class Effect(Record):
     """A candidate effect with one or two amplitudes, each within [low, high] around or above zero (off).
 
+    unseen: shift [standard errors] by the whole range, where that was too small to simulate more of it; else None.
     Raises StatisticsError for another number of amplitudes or a range without zero.
     """
 
     name: str
     low: tuple[float, ...]
     high: tuple[float, ...]
+    unseen: float | None = None
 
     def __post_init__(self) -> None:
         if len(self.low) != len(self.high) or len(self.low) not in (1, 2):

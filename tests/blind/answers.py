@@ -11,7 +11,7 @@ import numpy.typing as npt
 from doe.diagnose.decision.verdict import Verdict
 from doe.diagnose.diagnosis import FRESH, models
 from doe.diagnose.emulation.fresh_pours import FreshPours
-from doe.diagnose.follow_up.closer import LOOKS, contenders, points_of, poured
+from doe.diagnose.follow_up.closer import LOOKS, contenders, poured
 from doe.diagnose.follow_up.confirm import confirm
 from doe.diagnose.follow_up.holdout import HoldoutCondition, holdout_errors
 from doe.diagnose.simulation.plan import Point
@@ -90,11 +90,10 @@ class Answers:
         pours = self.model_pours(self.measurement.fit)
         for _ in range(LOOKS):
             closer = {k: found for k, v in verdicts.items() if (found := contenders(v, declared, questions[k].fresh))}
-            # All of them at once, so that no worker waits for the last pour of a set.
-            pours.run("best fits", [p for k, found in closer.items() for m in found for p in points_of(verdicts[k], m)])
+            fresh = iter(poured([model for found in closer.values() for model in found], declared, pours))
             for k, found in closer.items():
                 known = questions[k].fresh
-                questions[k] = replace(questions[k], fresh=(*known, *poured(verdicts[k], found, pours)))
+                questions[k] = replace(questions[k], fresh=(*known, *(next(fresh) for _ in found)))
             again = self.place.map(judged, [questions[k] for k in closer])
             verdicts |= dict(zip(closer, again, strict=True))
         return verdicts, {k: question.fresh for k, question in questions.items()}

@@ -1,8 +1,8 @@
 """The blind campaign: laboratories pour, the diagnosis answers, and the answers are kept.
 
-The declared model is screened once, every effect as far as survivors are; each data set is judged from those runs. A
-set takes ``REPLICATES`` pours per fitted condition. Where the name is right, the held-out condition is measured too,
-and predicted by fresh pours of the calibrated base model and of the named one.
+The declared model is screened once, six times as far as in a diagnosis; each data set is judged from those runs and
+from pours at the best fits of its own contenders. A set takes ``REPLICATES`` pours per fitted condition. Where the name
+is right, the held-out condition is measured too, and predicted by fresh pours of the calibrated base model and of the named one.
 """
 
 import os
@@ -19,7 +19,7 @@ from doe.diagnose.diagnosis import declare
 from doe.diagnose.runs import Declared
 from doe.diagnose.simulation.plan import directions
 from doe.diagnose.simulation.pours import Ended, ModelPours
-from doe.diagnose.simulation.screen import Budget, Screened, further, screen, widened
+from doe.diagnose.simulation.screen import Budget, Screened, over_wider_ranges, screen
 from doe.measurement import Measurement
 from doe.store import Store, default_store
 from solver import EFFECTS
@@ -40,7 +40,7 @@ CHUNK = 6
 SAID_EVERY = 100
 """Pours of the emulator between two lines of progress."""
 
-BUDGET = Budget(base=160, middle=32, scaling=2, screening=24, further=36)
+BUDGET = Budget(base=160, middle=32, scaling=2, screening=60, widened=60)
 """The runs belong to the declared model and are made once for all its data sets: a campaign affords about twice those
 of one diagnosis per effect, and three times those of the base model."""
 
@@ -89,7 +89,7 @@ def run_campaign(order: CampaignOrder, say: Say) -> list[Row]:
 
 
 def emulated(order: CampaignOrder, measurement: Measurement, place: WorkPlace, say: Say) -> Screened:
-    """The declared model with every effect screened as far as survivors are; from the store where it is there."""
+    """The declared model with every effect screened; from the store where it is there."""
     paths = [parameter.path for parameter in measurement.parameters]
 
     def on_pour(what: str, left: int, _: Ended) -> None:
@@ -100,10 +100,8 @@ def emulated(order: CampaignOrder, measurement: Measurement, place: WorkPlace, s
     model = ModelPours(measurement.fit, paths, place.store, place.crew.run_queue, on_pour)
     widest = declare(measurement, order.effects)
     screened = screen(widest, model, order.budget, say)
-    screened = further(screened, order.effects, model, order.budget, say)
     weak = short_of(max(STRENGTHS), screened, widest)
-    say(f"wider range of {', '.join(weak) or 'nothing'}")
-    return further(widened(screened, weak, widest), weak, model, order.budget, say)
+    return over_wider_ranges(screened, weak, widest, model, order.budget, say) if weak else screened
 
 
 def short_of(strength: float, screened: Screened, widest: Declared) -> list[str]:

@@ -58,7 +58,7 @@ def order(model, tmp_path_factory):
         workers=2,
         model=model,
         effects=("rolling_resistance", "plate_tilt"),
-        budget=Budget(base=16, middle=8, scaling=2, screening=8, further=0),
+        budget=Budget(base=16, middle=8, scaling=2, screening=8, widened=8),
         cases=CASES,
     )
 

@@ -134,7 +134,7 @@ def amplitude_for(
     """
     effect = ruler.declared.effects[e]
     if e not in ruler.emulator.simulated_effects:
-        return "not simulated"
+        return "not simulated" if effect.unseen is None else "bounds"
     ways = directions(effect)
     for k in rng.permutation(len(ways)):
         direction = ruler.within(e, np.array(ways[k]) / effect.scale)

@@ -33,8 +33,9 @@ def effect_rows(
     for e, effect in enumerate(declared.effects):
         if e not in singles:
             found = reaches.get(e)
-            status = "not simulated" if found is None else "not identifiable here"
-            shift = NAN if found is None else found.shift
+            shift = effect.unseen if found is None else found.shift
+            status = "not simulated" if shift is None else "not identifiable here"
+            shift = NAN if shift is None else shift
             rows.append(EffectRow(effect.name, status, shift, (), *(NAN,) * 7))  # type: ignore[arg-type]
             continue
         fit = race.fits[effect.name] if race else singles[e]

@@ -1,15 +1,15 @@
-"""Pours of a model at its own best fit, and what they say of the emulator there.
+"""Pours of a model about its own best fit, and what they say of the emulator there.
 
 An emulator of the whole box is off wherever its polynomial cannot follow, most of all near the edges and where an
-effect changes the number of bodies. Where it matters, n pours tell the mean directly. Summary by summary, with
-v = share s^2 + bias, the variance of the emulated mean at the fitted point x0, and w = s^2/n, that of the poured one:
+effect changes the number of bodies. Where it matters, n pours about the fitted point tell. They teach the polynomial
+its slopes like any other runs; its level there is theirs alone, summary by summary, with s^2 the variance of a pour:
 
-    mean(x)     = emulated(x) + g (poured mean - emulated(x0)),   g = v/(v + w)
-    variance(x) = g w + variance of the emulated step from x0 to x + (1 - rho^2) bias(x),   rho = exp(-|x - x0|^2/2 L^2)
+    mean(x)     = emulated(x) + mean over the pours of (poured - emulated)
+    variance(x) = s^2/n + variance of the emulated step from their centre x0 to x + (1 - rho^2) bias(x),
+    rho         = exp(-|x - x0|^2/2 L^2)
 
-the update of a Gaussian state by an observation (Kalman 1960, J. Basic Eng. 82:35), carried into the neighbourhood over
-the length L in which a bias keeps its value (Rasmussen and Williams 2006, ch. 2), with x in units of the sampled box.
-Only simulated pours come in here.
+the bias of the polynomial as a Gaussian process that is known at x0 (Rasmussen and Williams 2006, ch. 2), with x in
+units of the sampled box. Only simulated pours come in here.
 """
 
 from __future__ import annotations
@@ -32,21 +32,21 @@ BASE_DF = 5.0
 
 @dataclass(frozen=True)
 class FreshPours:
-    """Pours of the model with the effects ``members`` on, at parameters theta (k,) and amplitudes, natural units.
+    """Pours of the model with the effects ``members`` on, at parameters theta (n, k) and amplitudes (n, m), natural.
 
     amplitudes: those of the first member, then of the second. blocks: per condition (n, d_c), NaN for a pour that broke
     off.
     """
 
     members: tuple[int, ...]
-    theta: tuple[float, ...]
-    amplitudes: tuple[float, ...]
+    theta: FloatArray
+    amplitudes: FloatArray
     blocks: tuple[FloatArray, ...]
 
     def coded(self, declared: Declared) -> FloatArray:
-        """Return the point (q,) as the emulator counts."""
+        """Return the points (n, q) as the emulator counts."""
         scale = np.concatenate([np.empty(0), *(declared.effects[e].scale for e in self.members)])
-        return np.concatenate([declared.coded(np.array(self.theta)), np.array(self.amplitudes) / scale])
+        return np.concatenate([declared.coded(self.theta), self.amplitudes / scale], axis=1)
 
 
 def newest(fresh: Sequence[FreshPours]) -> tuple[FreshPours, ...]:
@@ -55,27 +55,21 @@ def newest(fresh: Sequence[FreshPours]) -> tuple[FreshPours, ...]:
 
 
 def taught(runs: Runs, fresh: Sequence[FreshPours]) -> Runs:
-    """Return the runs with the earlier pours of every single effect: they teach the emulator like any others.
-
-    The newest do not, for they hold a prediction already; pairs have no terms of their own.
-    """
-    held = newest(fresh)
+    """Return the runs with the pours of every single effect; a pair has no terms of its own to be taught."""
     for one in fresh:
-        if len(one.members) != 1 or any(one is last for last in held):
-            continue
-        n = len(one.blocks[0])
-        amplitudes = (*one.amplitudes, 0.0)[:2]
-        runs = Runs(
-            np.vstack([runs.theta, np.tile(one.theta, (n, 1))]),
-            np.concatenate([runs.effect, np.full(n, one.members[0])]),
-            np.vstack([runs.amplitude, np.tile(amplitudes, (n, 1))]),
-            tuple(np.vstack(pair) for pair in zip(runs.blocks, one.blocks, strict=True)),
-        )
+        if len(one.members) == 1:
+            n = len(one.theta)
+            runs = Runs(
+                np.vstack([runs.theta, one.theta]),
+                np.concatenate([runs.effect, np.full(n, one.members[0])]),
+                np.vstack([runs.amplitude, np.column_stack([one.amplitudes, np.zeros(n)])[:, :2]]),
+                tuple(np.vstack(pair) for pair in zip(runs.blocks, one.blocks, strict=True)),
+            )
     return runs
 
 
-def anchored(predictor: Predictor, x: FloatArray, blocks: Sequence[FloatArray]) -> Predictor:
-    """Return the predictor that knows pours at x (q,), per condition (n, d_c).
+def anchored(predictor: Predictor, points: FloatArray, blocks: Sequence[FloatArray]) -> Predictor:
+    """Return the predictor that knows pours at points (n, q), per condition (n, d_c).
 
     A condition with fewer than two complete ones stays as it was.
 
@@ -83,33 +77,29 @@ def anchored(predictor: Predictor, x: FloatArray, blocks: Sequence[FloatArray]) 
     Their variance is taken as that of both together, the base model's with the weight of ``BASE_DF`` degrees of
     freedom; less than the base model's is not believed. It is the noise of measured pours too, were this model true.
     """
-    x = np.clip(x, predictor.low, predictor.high)
+    points = np.clip(points, predictor.low, predictor.high)
+    centre = points.mean(axis=0)
     constant = int(np.flatnonzero((predictor.exponents == 0).all(axis=1))[0])
-    terms = monomials(x, predictor.exponents)
     coefficients, shares, biases, spreads = [], [], [], []
     for own, share, bias, noise, values in zip(
         predictor.coefficients,
-        predictor.variance_shares(x),
-        predictor.bias_variance(x),
+        predictor.variance_shares(centre),
+        predictor.bias_variance(centre),
         predictor.pour_covariance,
         blocks,
         strict=True,
     ):
-        complete, moved = values[np.isfinite(values).all(axis=1)], own.copy()
-        spread = np.ones(len(noise))
-        n = len(complete)
+        complete = np.isfinite(values).all(axis=1)
+        n, moved, spread = int(complete.sum()), own.copy(), np.ones(len(noise))
         if n >= 2:
-            pour = np.diag(noise)
-            own_variance = (BASE_DF * pour + (n - 1) * complete.var(axis=0, ddof=1)) / (BASE_DF + n - 1)
-            spread = np.sqrt(np.maximum(1.0, own_variance / pour))
-            emulated, poured = share * pour + bias, spread**2 * pour / n
-            gain = emulated / (emulated + poured)
-            moved[constant] += gain * (complete.mean(axis=0) - terms @ own)
-            share = share / (1.0 + n * share)
-            bias = np.maximum(gain * poured - share * pour, 0.0)
+            off, pour = values[complete] - monomials(points[complete], predictor.exponents) @ own, np.diag(noise)
+            together = (BASE_DF * pour + (n - 1) * off.var(axis=0, ddof=1)) / (BASE_DF + n - 1)
+            spread = np.sqrt(np.maximum(1.0, together / pour))
+            moved[constant] += off.mean(axis=0)
+            share, bias = 1.0 / n, (spread**2 - 1.0) * pour / n
         coefficients.append(moved)
         shares.append(share)
         biases.append(bias)
         spreads.append(spread)
-    anchor = Anchor(x, tuple(shares), tuple(biases), tuple(spreads))
+    anchor = Anchor(centre, tuple(shares), tuple(biases), tuple(spreads))
     return replace(predictor, coefficients=tuple(coefficients), anchor=anchor)

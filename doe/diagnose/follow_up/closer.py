@@ -1,8 +1,8 @@
 """Closer looks: the models that the answer hangs on are poured where they were fitted, and judged again.
 
 An emulator of the whole box finds where a model fits best, well or badly by the number of runs that it was made from;
-pours at that point tell what the model gives there. A model whose fit then moves away from its pours is poured again,
-as in a Gauss-Newton search in which the emulator only has to know the slopes.
+pours about that point tell what the model gives there. A model whose fit then moves away from its pours is poured
+again, as in a sequential search over response surfaces (Box and Wilson 1951, J. R. Stat. Soc. B 13:1).
 """
 
 from __future__ import annotations
@@ -10,13 +10,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from doe.diagnose.decision.verdict import FittedModel, Verdict
 from doe.diagnose.emulation.fresh_pours import FreshPours
-from doe.diagnose.follow_up.confirm import fitted
 from doe.diagnose.runs import Declared
-from doe.diagnose.simulation.plan import Point
+from doe.diagnose.simulation.plan import Point, sobol
 from doe.diagnose.simulation.pours import ModelPours
+
+FloatArray = npt.NDArray[np.float64]
 
 LOOKS = 3
 MODELS = 4
@@ -27,9 +29,13 @@ CLOSE = 0.2
 """Distance of a fit from its pours, as a share of the box, within which they hold it."""
 POURS = 12
 """Per model and condition: with twice the pours of a usual data set, what they add to its error is half of that."""
+SCATTER = 0.15
+"""Share of the box to either side of a fit over which its pours are scattered, so that they tell slopes as well."""
+STREAM = 2000
+"""Seed of that sequence."""
 LEAD_SHARE = 0.5
 """Share of the largest drop of T^2 from which on an effect counts as a lead after the screening."""
-LEADS, LEAD_POURS = 8, 6
+LEADS, LEAD_POURS = 8, 8
 
 
 def leads(verdict: Verdict) -> tuple[FittedModel, ...]:
@@ -63,33 +69,54 @@ def contenders(verdict: Verdict, declared: Declared, fresh: Sequence[FreshPours]
 
 
 def _holds(fresh: FreshPours, model: FittedModel, declared: Declared) -> bool:
-    if fresh.members != model.members or len(fresh.blocks[0]) < POURS:
+    if fresh.members != model.members or len(fresh.theta) < POURS:
         return False
-    effects = [declared.effects[e] for e in model.members]
-    amplitudes = [(np.array(e.high) - np.array(e.low)) / e.scale for e in effects]
-    width = np.concatenate([np.full(len(declared.parameters), 2.0), *amplitudes])
-    return bool(np.linalg.norm((fresh.coded(declared) - model.coded) / width) <= CLOSE)
+    step = (fresh.coded(declared).mean(axis=0) - model.coded) / np.subtract(*_box(declared, model.members)[::-1])
+    return bool(np.linalg.norm(step) <= CLOSE)
 
 
-def points_of(verdict: Verdict, model: FittedModel, number: int = POURS) -> list[Point]:
-    """The settings of a model's fresh pours."""
-    at = fitted(verdict, model.label)
-    return [Point("fit", k, at.theta, at.effects) for k in range(number)]
+def _box(declared: Declared, members: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
+    """Lower and upper ends of parameters and amplitudes, (q,), coded."""
+    k = len(declared.parameters)
+    effects = [declared.effects[e] for e in members]
+    low = np.concatenate([np.full(k, -1.0), *(np.array(e.low) / e.scale for e in effects)])
+    high = np.concatenate([np.full(k, 1.0), *(np.array(e.high) / e.scale for e in effects)])
+    return low, high
+
+
+def about(model: FittedModel, declared: Declared, number: int) -> list[Point]:
+    """``number`` points about a model's fit, within the box: a Sobol sequence over ``SCATTER`` of it on either side."""
+    low, high = _box(declared, model.members)
+    reach = SCATTER * (high - low)
+    ends = np.clip([model.coded - reach, model.coded + reach], low, high)
+    k, points = len(declared.parameters), []
+    for n, row in enumerate(np.array(sobol(list(zip(*ends.tolist(), strict=True)), number, STREAM))):
+        theta = tuple(p.natural(float(x)) for p, x in zip(declared.parameters, row[:k], strict=True))
+        effects, first = [], k
+        for e in model.members:
+            effect = declared.effects[e]
+            coded = row[first : first + effect.amplitudes]
+            effects.append((effect.name, tuple((coded * effect.scale).tolist())))
+            first += effect.amplitudes
+        points.append(Point(f"about {model.label}", n, theta, tuple(effects)))
+    return points
 
 
 def poured(
-    verdict: Verdict, models: Sequence[FittedModel], pours: ModelPours, number: int = POURS
+    models: Sequence[FittedModel], declared: Declared, pours: ModelPours, number: int = POURS
 ) -> tuple[FreshPours, ...]:
-    """``number`` fresh pours of each of ``models`` in every condition of ``pours``."""
-    asked = {model.label: points_of(verdict, model, number) for model in models}
-    pours.run("best fits", [point for points in asked.values() for point in points])
+    """``number`` fresh pours about the fit of each of ``models`` in every condition of ``pours``."""
+    asked = [about(model, declared, number) for model in models]
+    # All of them at once, so that no worker waits for the last pour of a model.
+    rows = iter(pours.run("best fits", [point for points in asked for point in points]))
     found = []
-    for model in models:
-        rows = pours.run("best fits", asked[model.label])
+    for model, points in zip(models, asked, strict=True):
+        own = [next(rows) for _ in points]
         blocks = tuple(
-            np.array([row[c].summaries if row[c].valid else np.full(len(row[c].summaries), np.nan) for row in rows])
-            for c in range(len(rows[0]))
+            np.array([row[c].summaries if row[c].valid else np.full(len(row[c].summaries), np.nan) for row in own])
+            for c in range(len(own[0]))
         )
-        amplitudes = tuple(one.value for one in model.amplitudes)
-        found.append(FreshPours(model.members, model.parameters, amplitudes, blocks))
+        theta = np.array([point.theta for point in points])
+        amplitudes = np.array([[x for _, a in point.effects for x in a] for point in points])
+        found.append(FreshPours(model.members, theta, amplitudes, blocks))
     return tuple(found)

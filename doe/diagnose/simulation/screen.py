@@ -1,8 +1,8 @@
-"""What is simulated, in order: the base model, how far each effect may go, all effects, then the survivors again.
+"""What is simulated, in order: the base model, how far each effect may go, all effects, wider ranges where asked.
 
 An effect's amplitude is scaled before it is screened: its range ends where, with the parameters in the middle, it
 shifts the summaries by ``WANTED`` standard errors of a data set of ``REPLICATES`` pours, or at the end of what the
-literature supports if that comes first. Measured values come in only to choose the survivors, and whose range has to
+literature supports if that comes first. Measured values come in only where a range has to
 be wider; all the pours belong to the declared model.
 """
 
@@ -30,6 +30,11 @@ TOO_LITTLE, TOO_FAR = 12.0, 24.0
 LEAST_STEP = 0.05
 """A range shrinks by no more than this factor at once: the answer to a strong effect may saturate."""
 ROUNDS = 6
+UNSEEN = 3.0
+"""Shift [standard errors] by the whole range below which an effect is not simulated further: the race would not admit
+it (`Limits.reach`)."""
+SECOND_LOOK = 8
+"""Pours by which that is decided."""
 
 
 @dataclass(frozen=True)
@@ -41,13 +46,13 @@ class Budget:
     scaling: int = 2
     screening: int = 10
     """Per effect with one amplitude; half as many again with two."""
-    further: int = 12
-    """More for each effect whose range is widened."""
+    widened: int = 12
+    """Of an effect over a wider range than the first."""
 
     def scaled(self, runs: int, effects: int, conditions: int) -> Budget:
         """The same shares in about ``runs`` pours."""
         total = conditions * (
-            self.base + self.middle + effects * (1.5 * self.scaling + self.screening) + 3 * self.further
+            self.base + self.middle + effects * (1.5 * self.scaling + self.screening) + 2 * self.widened
         )
         share = runs / total
         return Budget(
@@ -55,7 +60,7 @@ class Budget:
             middle=max(10, round(share * self.middle)),
             scaling=max(2, round(share * self.scaling)),
             screening=max(8, round(share * self.screening)),
-            further=max(8, round(share * self.further)),
+            widened=max(8, round(share * self.widened)),
         )
 
 
@@ -82,47 +87,55 @@ def screen(declared: Declared, model: ModelPours, budget: Budget, say: Say) -> S
     effects = []
     for effect in declared.effects:
         found, shift = scaled_range(declared, effect, model, budget.scaling, centre)
-        say(f"{effect.name}: up to {found.high[0]:.3g}, which shifts the summaries by {shift:.1f} standard errors")
+        if shift < UNSEEN and found.high == effect.high:
+            found, shift = looked_twice(declared, effect, model, centre)
+        seen = "" if found.unseen is None else "; too little to be told from noise"
+        say(
+            f"{effect.name}: up to {found.high[0]:.3g}, which shifts the summaries by {shift:.1f} standard errors{seen}"
+        )
         effects.append(found)
     declared = replace(declared, effects=tuple(effects))
     asked = [
         point
         for stream, effect in enumerate(effects)
-        for point in effect_points(declared.parameters, effect, stream, screening_number(effect, budget))
+        if effect.unseen is None
+        for point in effect_points(declared.parameters, effect, stream, screening_number(effect, budget.screening))
     ]
     found_pours = model.run("screening", asked)
-    say(f"screening: {len(asked)} settings of {len(effects)} effects")
+    say(f"screening: {len(asked)} settings of {sum(effect.unseen is None for effect in effects)} effects")
     return Screened(declared, (*points, *asked), tuple(map(tuple, (*pours, *found_pours))))
 
 
-def further(screened: Screened, names: Sequence[str], model: ModelPours, budget: Budget, say: Say) -> Screened:
-    """More settings of the effects ``names``, on in their sequences."""
-    declared = screened.declared
-    known = {(point.sequence, point.number) for point in screened.points}
-    asked: list[Point] = []
-    for stream, effect in enumerate(declared.effects):
-        if effect.name in names:
-            number = screening_number(effect, budget) + budget.further
-            grown = effect_points(declared.parameters, effect, stream, number)
-            asked += [point for point in grown if (point.sequence, point.number) not in known]
-    pours = model.run("survivors", asked)
-    say(f"survivors: {len(asked)} more settings of {', '.join(names)}")
+def over_wider_ranges(
+    screened: Screened, names: Sequence[str], widest: Declared, model: ModelPours, budget: Budget, say: Say
+) -> Screened:
+    """The ranges of the effects ``names`` twice as wide, up to those of ``widest``; their runs so far still count."""
+    effects, asked = list(screened.declared.effects), []
+    for e, limit in enumerate(widest.effects):
+        if effects[e].name in names:
+            effects[e] = replace(
+                effects[e],
+                low=tuple(max(2.0 * low, end) for low, end in zip(effects[e].low, limit.low, strict=True)),
+                high=tuple(min(2.0 * high, end) for high, end in zip(effects[e].high, limit.high, strict=True)),
+            )
+            number = screening_number(effects[e], budget.widened)
+            asked += effect_points(screened.declared.parameters, effects[e], e, number)
+    pours = model.run("wider range", asked)
+    say(f"wider range: {len(asked)} more settings of {', '.join(names)}")
+    declared = replace(screened.declared, effects=tuple(effects))
     return Screened(declared, (*screened.points, *asked), (*screened.pours, *map(tuple, pours)))
 
 
-def widened(screened: Screened, names: Sequence[str], widest: Declared) -> Screened:
-    """The ranges of the effects ``names`` twice as wide, up to those of ``widest``; their runs so far still count."""
-    effects = tuple(
-        replace(
-            effect,
-            low=tuple(max(2.0 * low, end) for low, end in zip(effect.low, limit.low, strict=True)),
-            high=tuple(min(2.0 * high, end) for high, end in zip(effect.high, limit.high, strict=True)),
-        )
-        if effect.name in names
-        else effect
-        for effect, limit in zip(screened.declared.effects, widest.effects, strict=True)
-    )
-    return replace(screened, declared=replace(screened.declared, effects=effects))
+def looked_twice(
+    declared: Declared, effect: Effect, model: ModelPours, centre: Sequence[Sequence[Pour]]
+) -> tuple[Effect, float]:
+    """``effect`` by ``SECOND_LOOK`` pours at its whole range, named unseen where they shift too little, and the shift.
+
+    Two pours may hide five standard errors; so many do not hide much more than the three that could be told at all.
+    """
+    pours = model.run(f"range of {effect.name}", scaling_points(declared.parameters, effect, SECOND_LOOK))
+    shift = whitened_shift(declared, centre, pours)
+    return (replace(effect, unseen=shift) if shift < UNSEEN else effect), shift
 
 
 def scaled_range(
@@ -178,9 +191,9 @@ def whitened_shift(declared: Declared, centre: Sequence[Sequence[Pour]], moved: 
     return float(np.sqrt(square))
 
 
-def screening_number(effect: Effect, budget: Budget) -> int:
-    """Points of an effect in the screening."""
-    return budget.screening * (1 + effect.amplitudes) // 2
+def screening_number(effect: Effect, points: int) -> int:
+    """Points of an effect where one with a single amplitude gets ``points``."""
+    return points * (1 + effect.amplitudes) // 2
 
 
 def _valid(pours: Sequence[Sequence[Pour]], condition: int) -> FloatArray:

@@ -40,28 +40,30 @@ def emulated(generator):
     return fit_emulator(DECLARED, make_runs(generator), (np.zeros(2), np.zeros(1)))
 
 
-def test_the_update_is_that_of_two_gaussian_measurements():
+def test_about_the_fit_the_pours_alone_tell_the_level():
+    """Mean of nine pours with its standard error; scattered about the fit, they are first brought there."""
     generator = np.random.default_rng(0)
     bare = emulated(generator).predictor((0,))
     x, n = np.array([0.2, 0.6]), 9
-    blocks = poured(generator, n, *x)
-    blocks = tuple(b - b.mean(axis=0) + 0.9 * b / b for b in blocks)  # mean 0.9, the scatter is that of the pours
-    held = anchored(bare, x, blocks)
-    cuts = np.cumsum([b.shape[1] for b in blocks])[:-1]
-    for c, (before, after) in enumerate(zip(np.split(bare.mean(x), cuts), np.split(held.mean(x), cuts), strict=True)):
-        v = np.diag(bare.mean_covariance(x)[c])
+    points = x + 0.1 * generator.uniform(-1, 1, (n, 2))
+    points += x - points.mean(axis=0)
+    at_points, at_fit = np.array([bare.mean(p) for p in points]), bare.mean(x)
+    off = 0.3 + NOISE * generator.standard_normal((n, 3))
+    values = at_points + off
+    held = anchored(bare, points, (values[:, :2], values[:, 2:]))
+    assert held.mean(x) == pytest.approx(at_fit + off.mean(axis=0))
+    cuts = [2]
+    for c, part in enumerate(np.split(off, cuts, axis=1)):
         pour = np.diag(bare.pour_covariance[c])
-        pooled = (BASE_DF * pour + (n - 1) * blocks[c].var(axis=0, ddof=1)) / (BASE_DF + n - 1)
-        w = np.maximum(pour, pooled) / n
-        assert after == pytest.approx((before / v + 0.9 / w) / (1 / v + 1 / w))
-        assert np.diag(held.mean_covariance(x)[c]) == pytest.approx(1 / (1 / v + 1 / w))
+        pooled = (BASE_DF * pour + (n - 1) * part.var(axis=0, ddof=1)) / (BASE_DF + n - 1)
+        assert np.diag(held.mean_covariance(x)[c]) == pytest.approx(np.maximum(pour, pooled) / n)
 
 
 def test_what_the_pours_say_fades_with_the_distance():
     generator = np.random.default_rng(1)
     bare = emulated(generator).predictor((0,))
     x = np.array([0.0, 0.6])
-    held = anchored(bare, x, poured(generator, 12, *x))
+    held = anchored(bare, np.tile(x, (12, 1)), poured(generator, 12, *x))
     assert bare.bias_variance(x)[0][0] > 5 * held.bias_variance(x)[0][0]
     far = np.array([-0.9, 0.95])
     distance = (((far - x) / (bare.high - bare.low)) ** 2).sum() / BIAS_LENGTH**2
@@ -75,7 +77,7 @@ def test_one_pour_is_no_mean():
     bare = emulated(generator).predictor((0,))
     x = np.array([0.0, 0.6])
     blocks = poured(generator, 12, *x)
-    held = anchored(bare, x, (blocks[0], np.where(np.arange(12)[:, None] == 0, blocks[1], np.nan)))
+    held = anchored(bare, np.tile(x, (12, 1)), (blocks[0], np.where(np.arange(12)[:, None] == 0, blocks[1], np.nan)))
     assert held.mean(x)[2] == bare.mean(x)[2]
     assert held.mean_covariance(x)[1] == pytest.approx(bare.mean_covariance(x)[1])
     assert held.mean(x)[0] != bare.mean(x)[0]
@@ -87,7 +89,7 @@ def test_stated_errors_hold_about_the_fit():
         generator = np.random.default_rng([3, seed])
         bare = emulated(generator).predictor((0,))
         x = np.array([generator.uniform(-0.5, 0.5), generator.uniform(0.3, 0.9)])
-        held = anchored(bare, x, poured(generator, 12, *x))
+        held = anchored(bare, np.tile(x, (12, 1)), poured(generator, 12, *x))
         near = x + generator.uniform(-0.1, 0.1, 2)
         for name, model in (("bare", bare), ("held", held)):
             error = model.mean(near)[0] - truth(near[:1], near[1:], 0.0)[0][0, 0]
@@ -101,7 +103,7 @@ def test_stated_errors_hold_about_the_fit():
 def fresh_at(generator, model, n=12):
     (a,), (amplitude,) = model.parameters, (one.value for one in model.amplitudes)
     blocks = poured(generator, n, a, **{model.label: amplitude})
-    return FreshPours(model.members, (a,), (amplitude,), blocks)
+    return FreshPours(model.members, np.full((n, 1), a), np.full((n, 1), amplitude), blocks)
 
 
 def test_pours_at_the_best_fit_decide_what_the_emulator_could_not():
@@ -115,23 +117,24 @@ def test_pours_at_the_best_fit_decide_what_the_emulator_could_not():
     spread = [v.effects[0].amplitudes[0].standard_error for v in (first, second)]
     assert second.kind == "effect:steep"
     assert spread[1] < spread[0]
-    assert [g.statistic for g in first.gates[:2]] == [g.statistic for g in second.gates[:2]]
 
 
-def test_the_newest_pours_hold_and_the_earlier_ones_teach():
+def test_all_pours_of_single_effects_teach_and_the_newest_hold():
     generator = np.random.default_rng(5)
     runs = make_runs(generator)
     first, second, other = (
-        FreshPours((e,), (0.1 * k,), (0.5,), poured(generator, 4, 0.1 * k)) for k, e in enumerate((0, 0, 1))
+        FreshPours((e,), np.full((4, 1), 0.1 * k), np.full((4, 1), 0.5), poured(generator, 4, 0.1 * k))
+        for k, e in enumerate((0, 0, 1))
     )
     assert newest([first, second, other]) == (second, other)
     grown = taught(runs, [first, second, other])
-    assert len(grown.theta) == len(runs.theta) + 4
-    assert (grown.effect[-4:] == 0).all()
-    assert grown.theta[-1] == first.theta
+    assert grown.effect[-12:].tolist() == [0] * 8 + [1] * 4
+    assert grown.theta[-12:, 0] == pytest.approx(np.repeat([0.0, 0.1, 0.2], 4))
     assert grown.amplitude[-1] == pytest.approx([0.5, 0.0])
-    assert grown.blocks[0][-4:] == pytest.approx(first.blocks[0])
-    assert taught(runs, [FreshPours((0, 1), (0.0,), (0.1, 0.1), first.blocks)] * 2) is runs
+    assert grown.blocks[0][-4:] == pytest.approx(other.blocks[0])
+    pair = FreshPours((0, 1), np.zeros((4, 1)), np.full((4, 2), 0.1), first.blocks)
+    assert taught(runs, [pair]) is runs
+    assert pair.coded(DECLARED).tolist() == [[0.0, 0.1, 0.1]] * 4
 
 
 def test_a_wider_scatter_at_the_fit_is_noise_of_the_data_too():
@@ -139,9 +142,9 @@ def test_a_wider_scatter_at_the_fit_is_noise_of_the_data_too():
     bare = emulated(generator).predictor((0,))
     x = np.array([0.0, 0.6])
     wide = [3.0 * (b - b.mean(axis=0)) + b.mean(axis=0) for b in poured(generator, 200, *x)]
-    spread = np.concatenate(anchored(bare, x, wide).spread)
+    spread = np.concatenate(anchored(bare, np.tile(x, (200, 1)), wide).spread)
     # 200 pours: the standard deviation to 5 %, and the base model's own to 10 %.
     assert spread == pytest.approx(3.0, rel=0.25)
-    calm = anchored(bare, x, [0.1 * (b - b.mean(axis=0)) + b.mean(axis=0) for b in wide])
+    calm = anchored(bare, np.tile(x, (200, 1)), [0.1 * (b - b.mean(axis=0)) + b.mean(axis=0) for b in wide])
     assert np.concatenate(calm.spread) == pytest.approx(1.0)
     assert np.concatenate(bare.spread) == pytest.approx(1.0)
