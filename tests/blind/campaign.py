@@ -2,7 +2,8 @@
 
 The declared model is screened once, six times as far as in a diagnosis; each data set is judged from those runs and
 from pours at the best fits of its own contenders. A set takes ``REPLICATES`` pours per fitted condition. Where the name
-is right, the held-out condition is measured too, and predicted by fresh pours of the calibrated base model and of the named one.
+is right, the held-out condition is measured too, and predicted by fresh pours of the calibrated base model and of the
+named one.
 """
 
 import os

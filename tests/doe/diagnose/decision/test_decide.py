@@ -98,11 +98,12 @@ def test_an_effect_that_cannot_reach_three_sigma_is_not_raced():
 
 def test_an_effect_without_runs_is_listed_as_not_simulated():
     toy = make_toy(12, 0)
-    effects = (*toy.declared.effects, Effect("later", (0.0,), (1.0,)))
+    effects = (*toy.declared.effects, Effect("later", (0.0,), (1.0,)), Effect("faint", (0.0,), (1.0,), unseen=1.5))
     runs = simulated_runs(toy, np.random.default_rng(0), base=60, per_effect=16)
     data = toy.measured(np.random.default_rng(1), toy.listed(5, 10.0))
     verdict = diagnose(replace(toy.declared, effects=effects), runs, data, bootstrap=500)
     assert verdict.effects[8].status == "not simulated"
+    assert (verdict.effects[9].status, verdict.effects[9].reach) == ("not identifiable here", 1.5)
 
 
 def test_two_conditions_count_as_one_vector():
