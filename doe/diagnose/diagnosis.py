@@ -6,12 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from doe.diagnose.decision.decide import diagnose
 from doe.diagnose.decision.verdict import Verdict
 from doe.diagnose.emulation.fresh_pours import FreshPours
 from doe.diagnose.follow_up.closer import LEAD_POURS, LOOKS, POURS, contenders, leads, poured
 from doe.diagnose.follow_up.confirm import Confirmed, Model, confirm, fitted
+from doe.diagnose.follow_up.held_out import HeldOut, compared, contenders_for, upheld
 from doe.diagnose.follow_up.holdout import HoldoutCondition, HoldoutError, holdout_errors
 from doe.diagnose.follow_up.menu import Suggestion, next_experiment
 from doe.diagnose.runs import Condition, Declared, Effect, Observed, Parameter
@@ -23,6 +25,8 @@ from doe.measurement.summaries import summaries_of_data, summary_names, summary_
 from doe.runner import Pours
 from doe.store import Store
 from solver import EFFECTS, ParameterError, Scene, parameters, with_values
+
+FloatArray = npt.NDArray[np.float64]
 
 SURVIVORS = 5
 """Effects whose range may be widened: the best of the race so far,"""
@@ -48,6 +52,8 @@ class Diagnosis:
     """The same as ``before`` where no effect is named."""
     fit_error: tuple[HoldoutError, ...]
     holdout_error: tuple[HoldoutError, ...]
+    held_out: tuple[HeldOut, ...]
+    """Contenders beside the named model on held-out data; empty without a name or without such data."""
     suggestions: tuple[Suggestion, ...]
     pours: int
     """Pours that were really run; the others were found in the store."""
@@ -70,8 +76,12 @@ def run_diagnosis(
     observed = observe(measurement.fit)
     screened, verdict = pursued(screen(declared, model, budget, say), declared, observed, model, budget, say)
     say(f"verdict: {verdict.kind}")
-    before, after = models(verdict)
     number = max(FRESH, *(2 * condition.replicates for condition in measurement.conditions))
+    held_out = contenders_held_out(verdict, measurement, everywhere, number)
+    if held_out:
+        verdict = upheld(verdict, held_out)
+        say(f"with held-out data: {verdict.kind}")
+    before, after = models(verdict)
     widths = [len(summary_names(condition)) for condition in measurement.conditions]
     one = confirm(before, everywhere, number, widths)
     other = one if after == before else confirm(after, everywhere, number, widths)
@@ -83,6 +93,7 @@ def run_diagnosis(
         after=other,
         fit_error=errors_of(measurement, "fit", one, other),
         holdout_error=errors_of(measurement, "holdout", one, other),
+        held_out=held_out,
         suggestions=menu.suggestions,
         pours=model.run_now + everywhere.run_now + menu.run_now,
         settings=len(screened.points),
@@ -112,6 +123,23 @@ def pursued(
             say(f"wider range of {', '.join(cramped)}: {verdict.kind}")
         closer, number = contenders(verdict, screened.declared, fresh), POURS
     return screened, verdict
+
+
+def contenders_held_out(
+    verdict: Verdict, measurement: Measurement, pours: ModelPours, number: int
+) -> tuple[HeldOut, ...]:
+    """The named model and its rivals on the held-out conditions of ``pours``, by ``number`` pours of each."""
+    places = [c for c, condition in enumerate(measurement.conditions) if condition.role == "holdout"]
+    conditions = [measurement.conditions[c] for c in places]
+    data = [complete_rows(condition) for condition in conditions]
+    widths = [len(summary_names(condition)) for condition in conditions]
+    if not data or min(map(len, data)) < 2:
+        return ()
+    poured = {
+        model.label: confirm(fitted(verdict, model.label), pours, number, widths, places).blocks
+        for model in contenders_for(verdict)
+    }
+    return compared(verdict, data, poured)
 
 
 def declare(measurement: Measurement, effects: Sequence[str]) -> Declared:
@@ -187,8 +215,13 @@ def errors_of(measurement: Measurement, role: str, before: Confirmed, after: Con
     """Errors over the conditions of ``role``; those with fewer than two readable pours on any side are left out."""
     conditions = []
     for c, condition in enumerate(measurement.conditions):
-        data = summaries_of_data(condition)
-        rows = data[np.isfinite(data).all(axis=1)], before.blocks[c], after.blocks[c]
+        rows = complete_rows(condition), before.blocks[c], after.blocks[c]
         if condition.role == role and min(map(len, rows)) >= 2:
             conditions.append(HoldoutCondition(condition.name, summary_names(condition), *rows))
     return holdout_errors(conditions) if conditions else ()
+
+
+def complete_rows(condition: MeasuredCondition) -> FloatArray:
+    """The measured replicates of which everything could be read, (r, d)."""
+    data = summaries_of_data(condition)
+    return np.asarray(data[np.isfinite(data).all(axis=1)], dtype=np.float64)

@@ -103,6 +103,7 @@ def result_of(measurement: Measurement, order: DiagnoseOrder, found: Diagnosis, 
                 role: [_error(row, units) for row in rows]
                 for role, rows in (("fit", found.fit_error), ("holdout", found.holdout_error))
             },
+            "held_out": found.held_out,
             "next_experiment": found.suggestions,
             "residuals": verdict.residuals,
             "where": verdict.where,

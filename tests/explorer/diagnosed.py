@@ -172,6 +172,7 @@ def diagnosed(effects=(), outside=0.0, theta=(0.57, 0.7), holdout=True, carries_
         other,
         errors_of(measurement, "fit", one, other),
         errors_of(measurement, "holdout", one, other),
+        (),
         suggestions(verdict),
         321,
         240,

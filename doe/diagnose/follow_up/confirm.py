@@ -57,10 +57,12 @@ class Confirmed:
     profiles: tuple[FloatArray, ...] = ()
 
 
-def confirm(model: Model, pours: ModelPours, number: int, widths: Sequence[int]) -> Confirmed:
-    """Pour ``model`` ``number`` times in every condition of ``pours``; ``widths``: summaries per condition."""
+def confirm(
+    model: Model, pours: ModelPours, number: int, widths: Sequence[int], where: Sequence[int] | None = None
+) -> Confirmed:
+    """Pour ``model`` ``number`` times in every condition of ``pours``, or ``where``; ``widths``: summaries of each."""
     points = [Point(f"confirm {number}", k, model.theta, model.effects) for k in range(number)]
-    rows = pours.run(f"confirmation of {model.name}", points)
+    rows = pours.run(f"confirmation of {model.name}", points, where)
     blocks, profiles, broken = [], [], 0
     for c, width in enumerate(widths):
         valid = [row[c] for row in rows if row[c].valid and np.isfinite(row[c].summaries).all()]

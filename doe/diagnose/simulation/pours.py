@@ -93,9 +93,10 @@ class ModelPours:
         self.run_now = 0
         """Pours that were really run, not found in the store."""
 
-    def run(self, what: str, points: Sequence[Point]) -> list[list[Pour]]:
-        """Pours of every point, one per condition."""
-        places = [(point, c) for point in points for c in range(len(self._conditions))]
+    def run(self, what: str, points: Sequence[Point], where: Sequence[int] | None = None) -> list[list[Pour]]:
+        """Pours of every point, one per condition, or per condition ``where``."""
+        asked = range(len(self._conditions)) if where is None else where
+        places = [(point, c) for point in points for c in asked]
         wanted = [(point, c) for point, c in places if not self._find(point, c)]
         left = len(wanted)
         # Two kinds of arrays, with and without effects compiled in; each is compiled once for all points.
@@ -114,7 +115,7 @@ class ModelPours:
                 if self._on_pour is not None:
                     label = f"{point.sequence} {point.number}, {self._conditions[c].name}"
                     self._on_pour(what, left, Ended(label, job.seed, record.outcome, record.message))
-        return [[self._known[point, c] for c in range(len(self._conditions))] for point in points]
+        return [[self._known[point, c] for c in asked] for point in points]
 
     def scene(self, point: Point, condition: int) -> Scene:
         """The scene of ``point`` in a condition."""

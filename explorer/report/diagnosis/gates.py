@@ -23,6 +23,7 @@ QUESTIONS = {
     "adequate": Question("p ≥", "fits", "does not fit"),
     "unambiguous": Question("gap ≥", "stands alone", "others come near"),
     "told apart": Question("p ≤", "every rival rejected", "a rival may be the truth"),
+    "held out": Question("gap ≥", "bears the name out", "does not bear the name out"),
     "pair gain": Question("gain >", "worth a pair", "not worth a pair"),
     "specific": Question("chance ≤", "not by chance", "a pair fits almost anything"),
 }
@@ -40,7 +41,8 @@ def gates(result: Plain) -> Section:
         f"{fixed(limits['gap'], 0)} behind in B and every rival, taken as the truth, would let the best one lead by as "
         f"much in no more than {100 * limits['rival']:.0f} % of made-up data sets. A pair is asked only where no "
         f"single effect is adequate, and has to gain more than {fixed(limits['pair_gain'], 0)}, and be specific: "
-        "few random shifts may be explained as well."
+        "few random shifts may be explained as well. Held-out data can take a name back: every rival near it predicts "
+        "them by its own pours, and has to stay as far behind with them."
     )
     rows = tuple(
         (

@@ -1,0 +1,109 @@
+"""Gate 5: do data that were not fitted agree with the name? They can take a name back, and never give one.
+
+Every contender (the named model, and others that the fit leaves near it) predicts the held-out conditions by fresh
+pours. With r measured and m poured means, S the covariance of the model's own pours, half shrunk to its diagonal:
+
+    T^2 = (measured - poured)' Sigma^-1 (measured - poured),   Sigma = S/r + S/m
+    D   = (m - 1 + d) ln(1 + T^2/(m - 1)) + ln|Sigma|,
+
+-2 ln of a multivariate t density, which does not take a rare pour for a refutation (Lange, Little and Taylor 1989,
+JASA 84:881). A name stands if every rival stays the gap of gate 3 behind in the criterion of the fit plus D.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.diagnose.decision.gates import Gate
+from doe.diagnose.decision.tables import listed
+from doe.diagnose.decision.verdict import FittedModel, Verdict
+from doe.diagnose.follow_up.closer import MODELS, WITHIN
+from doe.record import Record
+
+FloatArray = npt.NDArray[np.float64]
+
+LEAST = 6
+"""Pours of a model in a condition from which their scatter is known well enough."""
+
+
+@dataclass(frozen=True)
+class HeldOut(Record):
+    """What a contender's fresh pours say of the held-out data: D (see above), and how far it is behind the best in the
+    criterion of the fit plus D.
+    """
+
+    label: str
+    deviance: float
+    behind: float
+
+
+def contenders_for(verdict: Verdict) -> tuple[FittedModel, ...]:
+    """The named model first, then those that the fit leaves near it; none unless exactly one is named."""
+    if not verdict.kind.startswith(("effect:", "effects:")):
+        return ()
+    named = next(model for model in verdict.models if model.label == verdict.names[0])
+    rivals = [model for model in verdict.models if model.members and model.label != named.label]
+    near = [model for model in rivals if model.criterion - named.criterion <= WITHIN]
+    return (named, *near[: MODELS - 1])
+
+
+def deviance(measured: FloatArray, poured: FloatArray) -> float:
+    """Return D of one condition: measured (r, d), poured (m, d). Summaries that vary in neither are left out."""
+    r, m = len(measured), len(poured)
+    varies = np.ptp(np.concatenate([measured, poured]), axis=0) > 0.0
+    spread = np.where(poured.std(axis=0, ddof=1) > 0.0, poured.std(axis=0, ddof=1), measured.std(axis=0, ddof=1))
+    unit = spread[varies & (spread > 0.0)]
+    known = varies & (spread > 0.0)
+    z = poured[:, known] / unit
+    correlation = np.corrcoef(z, rowvar=False) if len(unit) > 1 else np.ones((1, 1))
+    correlation = np.where(np.isfinite(correlation), correlation, 0.0)
+    sigma = 0.5 * (correlation + np.eye(len(unit))) * (1.0 / r + 1.0 / m)
+    np.fill_diagonal(sigma, 1.0 / r + 1.0 / m)
+    off = (measured[:, known].mean(axis=0) - poured[:, known].mean(axis=0)) / unit
+    t2, df, d = float(off @ np.linalg.solve(sigma, off)), m - 1, len(unit)
+    determinant = float(np.linalg.slogdet(sigma)[1] + 2.0 * np.log(unit).sum())
+    return (df + d) * float(np.log1p(t2 / df)) + determinant
+
+
+def compared(
+    verdict: Verdict, measured: Sequence[FloatArray], poured: Mapping[str, Sequence[FloatArray]]
+) -> tuple[HeldOut, ...]:
+    """Contenders in order of the criterion of the fit plus D. poured: label -> per held-out condition (m, d_c).
+
+    A model of which fewer than ``LEAST`` pours could be read says nothing; without the named one nothing is compared.
+    """
+    found = {
+        label: sum(deviance(data, block) for data, block in zip(measured, blocks, strict=True))
+        for label, blocks in poured.items()
+        if min(map(len, blocks)) >= LEAST
+    }
+    if not found or verdict.names[0] not in found:
+        return ()
+    criteria = {model.label: model.criterion for model in verdict.models}
+    total = {label: criteria[label] + value for label, value in found.items()}
+    best = min(total.values())
+    return tuple(
+        HeldOut(label, found[label], total[label] - best) for label in sorted(total, key=lambda label: total[label])
+    )
+
+
+def upheld(verdict: Verdict, rows: Sequence[HeldOut]) -> Verdict:
+    """The verdict with gate 5: a name that held-out data do not bear out becomes one among several."""
+    if not rows:
+        return verdict
+    gap = verdict.limits.gap
+    near = tuple(row.label for row in rows if row.behind < gap)
+    stands = near == (verdict.names[0],)
+    behind = min((row.behind for row in rows if row.label != rows[0].label), default=float("inf"))
+    others = f"{rows[1].label} is {behind:.1f} behind {rows[0].label}" if len(rows) > 1 else "no rival was near"
+    gate = Gate("held out: gap with data that were not fitted", behind, None, gap, stands, others)
+    gates = (*verdict.gates, gate)
+    if stands:
+        return replace(verdict, gates=gates)
+    names = near if verdict.names[0] in near else (*near, verdict.names[0])
+    statement = f"{listed(names)}: the fitted data name {verdict.names[0]}, the held-out data do not bear it out."
+    return replace(verdict, kind=f"ambiguous:{','.join(names)}", names=names, statement=statement, gates=gates)

@@ -1,0 +1,95 @@
+"""Gate 5 on made-up pours: it finds the model that predicts, bears a right name out, and takes a wrong one back."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from doe.diagnose.decision.decide import judge
+from doe.diagnose.follow_up.held_out import WITHIN, HeldOut, compared, contenders_for, deviance, upheld
+from tests.doe.diagnose.toy import known_emulator, make_toy
+
+R, M, D = 6, 12, 4
+
+
+def pours(generator, n, mean=0.0):
+    return generator.standard_normal((n, D)) + mean
+
+
+def named_verdict():
+    toy = make_toy(12, 0)
+    emulator = known_emulator(toy, np.random.default_rng([0, 1]))
+    verdict = judge(emulator, toy.measured(np.random.default_rng([0, 2]), toy.listed(5, 10.0)), bootstrap=500)
+    assert verdict.kind == "effect:e5"
+    return verdict
+
+
+def test_one_summary_is_a_t_density():
+    """D = -2 ln t_{m-1}(off/se) - ln n-terms that all models share, with the scale of the poured standard deviation."""
+    generator = np.random.default_rng(0)
+    measured, poured = pours(generator, R)[:, :1], pours(generator, M, 0.4)[:, :1]
+    se = poured.std(ddof=1) * np.sqrt(1 / R + 1 / M)
+    off = measured.mean() - poured.mean()
+    constant = -2 * stats.t.logpdf(0.0, M - 1)
+    expected = -2 * stats.t.logpdf(off / se, M - 1) + 2 * np.log(se) - constant
+    assert deviance(measured, poured) == pytest.approx(expected)
+
+
+def test_the_model_that_predicts_is_ahead():
+    ahead = 0
+    for seed in range(60):
+        generator = np.random.default_rng([1, seed])
+        measured = pours(generator, R)
+        ahead += deviance(measured, pours(generator, M)) < deviance(measured, pours(generator, M, [1.5, 0, 0, 0]))
+    # A shift of 1.5 in one summary is three standard errors of the difference of both means.
+    assert ahead >= 51
+
+
+def test_constant_summaries_say_nothing():
+    generator = np.random.default_rng(2)
+    measured, poured = pours(generator, R), pours(generator, M)
+    flat = [np.column_stack([block, np.zeros(len(block))]) for block in (measured, poured)]
+    assert deviance(*flat) == pytest.approx(deviance(measured, poured))
+
+
+def test_only_a_single_name_has_contenders():
+    verdict = named_verdict()
+    assert contenders_for(verdict)[0].label == "e5"
+    assert all(m.criterion - contenders_for(verdict)[0].criterion <= WITHIN for m in contenders_for(verdict))
+    assert contenders_for(replace(verdict, kind="unexplained", names=())) == ()
+    assert contenders_for(replace(verdict, kind="ambiguous:e5,e6", names=("e5", "e6"))) == ()
+
+
+@pytest.mark.parametrize(
+    ("off", "kind"), [({"e5": 0.0, "e6": 3.0}, "effect:e5"), ({"e5": 3.0, "e6": 0.0}, "ambiguous")]
+)
+def test_a_name_is_borne_out_or_taken_back(off, kind):
+    verdict = named_verdict()
+    # The rival is brought within reach: what is tested is the gate, not the race.
+    criterion = {model.label: model.criterion for model in verdict.models}
+    models = tuple(
+        replace(model, criterion=criterion["e5"] + 5.0) if model.label == "e6" else model for model in verdict.models
+    )
+    verdict = replace(verdict, models=models)
+    generator = np.random.default_rng(3)
+    measured = pours(generator, R)
+    poured = {label: [pours(generator, M, mean)] for label, mean in off.items()}
+    rows = compared(verdict, [measured], poured)
+    found = upheld(verdict, rows)
+    assert found.kind.startswith(kind)
+    assert found.names[0] in ("e5", "e6")
+    assert ("e6" in found.names) == (kind == "ambiguous")
+    assert "e5" in found.names
+    assert found.gates[-1].passed == (kind == "effect:e5")
+
+
+def test_without_a_rival_or_readable_pours_nothing_changes():
+    verdict = named_verdict()
+    generator = np.random.default_rng(4)
+    alone = upheld(verdict, compared(verdict, [pours(generator, R)], {"e5": [pours(generator, M)]}))
+    assert alone.kind == verdict.kind
+    assert alone.gates[-1].passed
+    assert compared(verdict, [pours(generator, R)], {"e5": [pours(generator, 3)], "e6": [pours(generator, M)]}) == ()
+    assert upheld(verdict, ()) is verdict
+    assert HeldOut("e5", 1.0, 0.0).to_dict()["label"] == "e5"
