@@ -11,14 +11,14 @@ import numpy.typing as npt
 from doe.diagnose.decision.decide import diagnose
 from doe.diagnose.decision.verdict import Verdict
 from doe.diagnose.emulation.fresh_pours import FreshPours
-from doe.diagnose.follow_up.closer import LEAD_POURS, LOOKS, POURS, contenders, leads, poured
+from doe.diagnose.follow_up.closer import LOOKS, contenders, leads, poured
 from doe.diagnose.follow_up.confirm import Confirmed, Model, confirm, fitted
 from doe.diagnose.follow_up.held_out import HeldOut, compared, contenders_for, upheld
 from doe.diagnose.follow_up.holdout import HoldoutCondition, HoldoutError, holdout_errors
 from doe.diagnose.follow_up.menu import Suggestion, next_experiment
 from doe.diagnose.runs import Condition, Declared, Effect, Observed, Parameter
 from doe.diagnose.simulation.pours import ModelPours, OnPour, effect_values
-from doe.diagnose.simulation.screen import Budget, Say, Screened, over_wider_ranges, screen
+from doe.diagnose.simulation.screen import Budget, Say, Screened, continued, over_wider_ranges, screen
 from doe.measurement.measurement import Condition as MeasuredCondition
 from doe.measurement.measurement import MeasuredParameter, Measurement
 from doe.measurement.summaries import summaries_of_data, summary_names, summary_uncertainties
@@ -103,17 +103,15 @@ def run_diagnosis(
 def pursued(
     screened: Screened, widest: Declared, observed: Observed, model: ModelPours, budget: Budget, say: Say
 ) -> tuple[Screened, Verdict]:
-    """The verdict once its leads have been followed: poured at their best fits, over wider ranges where one ends."""
+    """The verdict once its leads have been followed, over wider ranges where one ends, and poured about their fits."""
     verdict = diagnose(screened.declared, screened.runs, observed)
     say(f"after screening: {verdict.kind}")
+    if followed := leads(verdict):
+        screened = continued(screened, followed, model, budget, say)
+        verdict = diagnose(screened.declared, screened.runs, observed)
+        say(f"leads followed: {verdict.kind}")
     fresh: tuple[FreshPours, ...] = ()
-    closer, number = leads(verdict), LEAD_POURS
-    for _ in range(1 + LOOKS):
-        if not closer:
-            break
-        fresh += poured(closer, screened.declared, model, number)
-        verdict = diagnose(screened.declared, screened.runs, observed, fresh=fresh)
-        say(f"poured at the best fits of {', '.join(one.label for one in closer)}: {verdict.kind}")
+    for look in range(1 + LOOKS):
         for _ in range(WIDENINGS):
             cramped = at_edge(verdict, screened.declared, widest)
             if not cramped:
@@ -121,7 +119,12 @@ def pursued(
             screened = over_wider_ranges(screened, cramped, widest, model, budget, say)
             verdict = diagnose(screened.declared, screened.runs, observed, fresh=fresh)
             say(f"wider range of {', '.join(cramped)}: {verdict.kind}")
-        closer, number = contenders(verdict, screened.declared, fresh), POURS
+        closer = contenders(verdict, screened.declared, fresh)
+        if look == LOOKS or not closer:
+            break
+        fresh += poured(closer, screened.declared, model)
+        verdict = diagnose(screened.declared, screened.runs, observed, fresh=fresh)
+        say(f"poured about the best fits of {', '.join(one.label for one in closer)}: {verdict.kind}")
     return screened, verdict
 
 

@@ -35,10 +35,10 @@ STREAM = 2000
 """Seed of that sequence."""
 LEAD_SHARE = 0.5
 """Share of the largest drop of T^2 from which on an effect counts as a lead after the screening."""
-LEADS, LEAD_POURS = 8, 8
+LEADS = 8
 
 
-def leads(verdict: Verdict) -> tuple[FittedModel, ...]:
+def leads(verdict: Verdict) -> tuple[str, ...]:
     """Effects that take up a good part of the residual, after a screening too thin to say how much they leave.
 
     The criterion of a fit is not asked yet: from ten runs of an effect it may be off by more than what it has to tell.
@@ -47,9 +47,7 @@ def leads(verdict: Verdict) -> tuple[FittedModel, ...]:
     most = max(drops.values(), default=0.0)
     if verdict.kind == "no_missing_effect" or most <= 0.0:
         return ()
-    named = sorted((name for name in drops if drops[name] >= LEAD_SHARE * most), key=lambda name: -drops[name])
-    models = {model.label: model for model in verdict.models}
-    return tuple(models[name] for name in named[:LEADS])
+    return tuple(sorted((name for name in drops if drops[name] >= LEAD_SHARE * most), key=lambda n: -drops[n])[:LEADS])
 
 
 def contenders(verdict: Verdict, declared: Declared, fresh: Sequence[FreshPours]) -> tuple[FittedModel, ...]:

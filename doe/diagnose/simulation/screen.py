@@ -1,9 +1,9 @@
-"""What is simulated, in order: the base model, how far each effect may go, all effects, wider ranges where asked.
+"""What is simulated, in order: the base model, how far each effect may go, all effects, leads, wider ranges.
 
 An effect's amplitude is scaled before it is screened: its range ends where, with the parameters in the middle, it
 shifts the summaries by ``WANTED`` standard errors of a data set of ``REPLICATES`` pours, or at the end of what the
-literature supports if that comes first. Measured values come in only where a range has to
-be wider; all the pours belong to the declared model.
+literature supports if that comes first. Measured values come in only in
+the choice of leads and of ranges to be widened; all the pours belong to the declared model.
 """
 
 from __future__ import annotations
@@ -46,13 +46,15 @@ class Budget:
     scaling: int = 2
     screening: int = 10
     """Per effect with one amplitude; half as many again with two."""
+    leads: int = 10
+    """More of each lead, over its whole range."""
     widened: int = 12
     """Of an effect over a wider range than the first."""
 
     def scaled(self, runs: int, effects: int, conditions: int) -> Budget:
         """The same shares in about ``runs`` pours."""
         total = conditions * (
-            self.base + self.middle + effects * (1.5 * self.scaling + self.screening) + 2 * self.widened
+            self.base + self.middle + effects * (1.5 * self.scaling + self.screening) + 4 * self.leads
         )
         share = runs / total
         return Budget(
@@ -60,6 +62,7 @@ class Budget:
             middle=max(10, round(share * self.middle)),
             scaling=max(2, round(share * self.scaling)),
             screening=max(8, round(share * self.screening)),
+            leads=max(8, round(share * self.leads)),
             widened=max(8, round(share * self.widened)),
         )
 
@@ -104,6 +107,19 @@ def screen(declared: Declared, model: ModelPours, budget: Budget, say: Say) -> S
     found_pours = model.run("screening", asked)
     say(f"screening: {len(asked)} settings of {sum(effect.unseen is None for effect in effects)} effects")
     return Screened(declared, (*points, *asked), tuple(map(tuple, (*pours, *found_pours))))
+
+
+def continued(screened: Screened, names: Sequence[str], model: ModelPours, budget: Budget, say: Say) -> Screened:
+    """More settings of the effects ``names`` over their whole range, on in their sequences."""
+    asked: list[Point] = []
+    for stream, effect in enumerate(screened.declared.effects):
+        if effect.name in names:
+            first = screening_number(effect, budget.screening)
+            number = first + screening_number(effect, budget.leads)
+            asked += effect_points(screened.declared.parameters, effect, stream, number, first)
+    pours = model.run("leads", asked)
+    say(f"leads: {len(asked)} more settings of {', '.join(names)}")
+    return Screened(screened.declared, (*screened.points, *asked), (*screened.pours, *map(tuple, pours)))
 
 
 def over_wider_ranges(
