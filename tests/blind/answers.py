@@ -12,7 +12,8 @@ from doe.diagnose.decision.verdict import Verdict
 from doe.diagnose.diagnosis import FRESH, models
 from doe.diagnose.emulation.fresh_pours import FreshPours
 from doe.diagnose.follow_up.closer import LOOKS, contenders, poured
-from doe.diagnose.follow_up.confirm import confirm
+from doe.diagnose.follow_up.confirm import confirm, fitted
+from doe.diagnose.follow_up.held_out import compared, contenders_for, upheld
 from doe.diagnose.follow_up.holdout import HoldoutCondition, holdout_errors
 from doe.diagnose.simulation.plan import Point
 from doe.diagnose.simulation.pours import ModelPours
@@ -52,6 +53,8 @@ class Answers:
         truths = [truth_of(case, self.ruler) for case in cases]
         data = self.measured(truths, self.measurement.fit)
         verdicts, fresh = self.judged({k: found for k, found in enumerate(data) if found is not None})
+        rivals = {k: contenders_for(verdict)[1:] for k, verdict in verdicts.items()}
+        verdicts = self.held_out(truths, verdicts)
         cosines = {k: least_cosine(verdict, label_of(truths[k])) for k, verdict in verdicts.items()}
         right = [k for k in verdicts if answer_to(verdicts[k].kind, label_of(truths[k]), cosines[k]) == "right"]
         errors = dict(zip(right, self.holdout([truths[k] for k in right], [verdicts[k] for k in right]), strict=True))
@@ -62,6 +65,7 @@ class Answers:
             before, after = errors.get(k, (NAN, NAN))
             pours = 0 if found is None else REPLICATES * len(self.measurement.fit)
             pours += sum(len(block) for one in fresh.get(k, ()) for block in one.blocks)
+            pours += FRESH * len(rivals.get(k, ())) * len(self.measurement.holdout)
             pours += (REPLICATES + 2 * FRESH) * len(self.measurement.holdout) if k in errors else 0
             rows.append(
                 Row(
@@ -97,6 +101,19 @@ class Answers:
             again = self.place.map(judged, [questions[k] for k in closer])
             verdicts |= dict(zip(closer, again, strict=True))
         return verdicts, {k: question.fresh for k, question in questions.items()}
+
+    def held_out(self, truths: Sequence[Truth], verdicts: Mapping[int, Verdict]) -> dict[int, Verdict]:
+        """The verdicts, with names that the held-out condition does not bear out taken back, as in a diagnosis."""
+        asked = {k: models for k, verdict in verdicts.items() if (models := contenders_for(verdict))}
+        conditions = self.measurement.holdout
+        pours, widths = self.model_pours(conditions), [len(summary_names(condition)) for condition in conditions]
+        found = dict(verdicts)
+        for (k, models), data in zip(asked.items(), self.measured([truths[k] for k in asked], conditions), strict=True):
+            if data is not None:
+                poured = {m.label: confirm(fitted(found[k], m.label), pours, FRESH, widths).blocks for m in models}
+                rows = compared(found[k], [vectors(c, data[c.name]) for c in conditions], poured)
+                found[k] = upheld(found[k], rows)
+        return found
 
     def measured(self, truths: Sequence[Truth], conditions: Sequence[Condition]) -> list[Data | None]:
         """Readings of the laboratories' pours; None where there is no such truth, or pours keep breaking off."""
