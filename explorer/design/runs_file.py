@@ -92,7 +92,7 @@ def read_sheet(path: Path, factors: Sequence[Factor] = ()) -> Sheet:
     if not rest:
         raise CommandError(f"{path}: no header line with the names of the columns")
     delimiter = max(DELIMITERS, key=rest[0][1].count)
-    parsed = [(line, next(csv.reader([text], delimiter=delimiter), [])) for line, text in rest]
+    parsed = [(line, _row(path, line, text, delimiter)) for line, text in rest]
     header = [HEADER_CELL.match(cell.strip()) for cell in parsed[0][1]]
     titles = [(match["name"], match["unit"] or "") for match in header if match is not None]
     columns = _columns(path, titles)
@@ -115,6 +115,13 @@ def read_sheet(path: Path, factors: Sequence[Factor] = ()) -> Sheet:
     if not cells:
         raise CommandError(f"{path}: no line with a run below the header")
     return Sheet(path, design, known, columns, units, tuple(cells), tuple(lines), delimiter != ",")
+
+
+def _row(path: Path, line: int, text: str, delimiter: str) -> list[str]:
+    try:
+        return next(csv.reader([text], delimiter=delimiter), [])
+    except csv.Error as error:
+        raise CommandError(f"{path}, line {line}: cannot be read as cells: {error}") from None
 
 
 def runs_of(sheet: Sheet, response: str, only: Sequence[str] = ()) -> Runs:

@@ -208,6 +208,7 @@ def test_a_cell_that_cannot_be_read_is_named_by_line_and_column(tmp_path, old, n
         (b"", "no line '# factor"),
         (b"# factor | x | 0 | 1\n", "no header line"),
         (b"# factor | x | 0 | 1\nx,y\n", "no line with a run"),
+        (b"# factor | x | 0 | 1\nx,y\n" + b"1" * 140_000 + b",2\n", "line 3: cannot be read as cells"),
         (b"# factor | x | 0 | 1\nx,y\n0,\n1,\n", "column y: every cell is empty"),
         (b"\xff\xfe\x00", "UTF-8"),
         (b"PK\x00\x03", "not a text file"),
