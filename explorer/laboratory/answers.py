@@ -65,17 +65,18 @@ def bench_answer(order: LabOrder) -> Answer:
     return Answer(lab_text(result), shlex.join(words), plots, {f"{order.test}.toml": part})
 
 
-def photograph_answer(photo: Path, scale_mm: float | None) -> Answer:
-    """`explorer measure`: the angle of repose on a photograph, or why there is none."""
-    order = measure_order([str(photo)], scale_mm, None, None, "auto", None, None, None)
+def photograph_answer(photo: str, scale_mm: float | None) -> Answer:
+    """`explorer measure`: the angle of repose on a photograph (file, or a shipped one's name), or why there is none."""
+    order = measure_order([photo], scale_mm, None, None, "auto", None, None, None)
     measured = run_measure(order)
-    words = ["explorer", "measure", str(photo), *(["--scale", f"{scale_mm:g}"] if scale_mm else [])]
-    drawn = sheet([open_picture(photo)], measured.readings, None)
+    words = ["explorer", "measure", photo, *(["--scale", f"{scale_mm:g}"] if scale_mm else [])]
+    drawn = sheet([open_picture(order.pictures[0])], measured.readings, None)
     file = io.BytesIO()
     drawn.save(file, "PNG")
-    files = {f"{photo.stem}_read.png": file.getvalue()}
+    stem = order.pictures[0].stem
+    files = {f"{stem}_read.png": file.getvalue()}
     if measured.piles and scale_mm:
-        files[f"{photo.stem}_outline.csv"] = outline_text(measured.piles[0]).encode()
+        files[f"{stem}_outline.csv"] = outline_text(measured.piles[0]).encode()
     text = "\n".join([measure_text(measured), *refusal_lines(measured.refusals)]).strip()
     return Answer(text, shlex.join(words), {}, files, np.asarray(drawn, dtype=np.uint8))
 

@@ -66,6 +66,7 @@ def shot(page: Page, name: str) -> None:
 
 def answered(page: Page, folder: str, button: str, answer: str) -> None:
     """Open a folder of the laboratory's tab, press a button in it and wait for its answer."""
+    time.sleep(1.0)  # a folder that is closing still takes the click
     page.get_by_text(folder).click()
     page.get_by_role("button", name=button, exact=True).click()
     page.get_by_text(answer).first.wait_for()

@@ -52,20 +52,19 @@ def test_options_are_part_of_the_command_line():
 
 
 def test_a_photograph_is_read_and_drawn():
-    path = asset_path("photographs", "cone_25_30")
-    answer = photograph_answer(path, 0.2)
+    answer = photograph_answer("cone_25_30", 0.2)
     assert answer.text == told(answer)
     assert answer.picture.ndim == 3
     assert np.ptp(answer.picture) > 100
     assert {name.split(".")[-1] for name in answer.files} == {"png", "csv"}
-    assert "outline" not in "".join(photograph_answer(path, None).files)
+    assert "outline" not in "".join(photograph_answer(str(asset_path("photographs", "cone_25_30")), None).files)
 
 
 def test_a_picture_of_nothing_says_so(tmp_path):
     from PIL import Image
 
     Image.new("L", (640, 480), 128).save(tmp_path / "nothing.png")
-    answer = photograph_answer(tmp_path / "nothing.png", None)
+    answer = photograph_answer(str(tmp_path / "nothing.png"), None)
     assert answer.text.startswith("nothing.png: no angle: ")
 
 

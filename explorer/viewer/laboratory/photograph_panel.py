@@ -13,7 +13,7 @@ from explorer.viewer.actions import Post
 from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.laboratory.answer_view import AnswerView
 from explorer.viewer.laboratory.upload_slot import UploadSlot
-from solver.assets import asset_path, shipped_assets
+from solver.assets import shipped_assets
 
 WAITING = "Camera level, the plate's edge in view. Choose a shipped picture or upload one, then: Read the angle."
 
@@ -35,6 +35,6 @@ class PhotographPanel:
         read.on_click(lambda _: post(self._read))
 
     def _read(self) -> None:
-        path, scale = asset_path("photographs", self._photo.chosen), float(self._scale.value)
+        photo, scale = self._photo.chosen, float(self._scale.value)
         given = scale if math.isfinite(scale) and scale > 0.0 else None
-        self._background.start("reading the photograph", lambda: photograph_answer(path, given), self.view.show)
+        self._background.start("reading the photograph", lambda: photograph_answer(photo, given), self.view.show)
