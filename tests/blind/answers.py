@@ -53,7 +53,7 @@ class Answers:
         truths = [truth_of(case, self.ruler) for case in cases]
         data = self.measured(truths, self.measurement.fit)
         verdicts, fresh = self.judged({k: found for k, found in enumerate(data) if found is not None})
-        rivals = {k: contenders_for(verdict)[1:] for k, verdict in verdicts.items()}
+        rivals = {k: contenders_for(verdict)[1:] for k, verdict in verdicts.items() if len(verdict.names) == 1}
         verdicts = self.held_out(truths, verdicts)
         cosines = {k: least_cosine(verdict, label_of(truths[k])) for k, verdict in verdicts.items()}
         right = [k for k in verdicts if answer_to(verdicts[k].kind, label_of(truths[k]), cosines[k]) == "right"]
@@ -104,13 +104,14 @@ class Answers:
 
     def held_out(self, truths: Sequence[Truth], verdicts: Mapping[int, Verdict]) -> dict[int, Verdict]:
         """The verdicts, with names that the held-out condition does not bear out taken back, as in a diagnosis."""
-        asked = {k: models for k, verdict in verdicts.items() if (models := contenders_for(verdict))}
+        asked = {k: contenders_for(verdict) for k, verdict in verdicts.items() if len(verdict.names) == 1}
         conditions = self.measurement.holdout
         pours, widths = self.model_pours(conditions), [len(summary_names(condition)) for condition in conditions]
         found = dict(verdicts)
-        for (k, models), data in zip(asked.items(), self.measured([truths[k] for k in asked], conditions), strict=True):
+        for k, data in zip(asked, self.measured([truths[k] for k in asked], conditions), strict=True):
             if data is not None:
-                poured = {m.label: confirm(fitted(found[k], m.label), pours, FRESH, widths).blocks for m in models}
+                models = {model.label: fitted(found[k], model.label) for model in asked[k]}
+                poured = {label: confirm(model, pours, FRESH, widths).blocks for label, model in models.items()}
                 rows = compared(found[k], [vectors(c, data[c.name]) for c in conditions], poured)
                 found[k] = upheld(found[k], rows)
         return found

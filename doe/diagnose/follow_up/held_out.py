@@ -42,8 +42,8 @@ class HeldOut(Record):
 
 
 def contenders_for(verdict: Verdict) -> tuple[FittedModel, ...]:
-    """The named model first, then those that the fit leaves near it; none unless exactly one is named."""
-    if not verdict.kind.startswith(("effect:", "effects:")):
+    """The model named first, then those that the fit leaves near it; none where nothing is named."""
+    if not verdict.names:
         return ()
     named = next(model for model in verdict.models if model.label == verdict.names[0])
     rivals = [model for model in verdict.models if model.members and model.label != named.label]
@@ -92,18 +92,21 @@ def compared(
 
 
 def upheld(verdict: Verdict, rows: Sequence[HeldOut]) -> Verdict:
-    """The verdict with gate 5: a name that held-out data do not bear out becomes one among several."""
+    """The verdict with gate 5: a name that held-out data do not bear out becomes one among several.
+
+    Where several are named already they stay, and the gate says whom the held-out data favour.
+    """
     if not rows:
         return verdict
-    gap = verdict.limits.gap
+    gap, first = verdict.limits.gap, rows[0].label
     near = tuple(row.label for row in rows if row.behind < gap)
+    behind = rows[1].behind if len(rows) > 1 else float("inf")
     stands = near == (verdict.names[0],)
-    behind = min((row.behind for row in rows if row.label != rows[0].label), default=float("inf"))
-    others = f"{rows[1].label} is {behind:.1f} behind {rows[0].label}" if len(rows) > 1 else "no rival was near"
-    gate = Gate("held out: gap with data that were not fitted", behind, None, gap, stands, others)
+    words = f"{rows[1].label} is {behind:.1f} behind {first}" if len(rows) > 1 else "no rival was near"
+    gate = Gate("held out: gap with data that were not fitted", behind, None, gap, stands, words)
     gates = (*verdict.gates, gate)
-    if stands:
+    if stands or len(verdict.names) > 1:
         return replace(verdict, gates=gates)
-    names = near if verdict.names[0] in near else (*near, verdict.names[0])
+    names = (verdict.names[0], *(name for name in near if name != verdict.names[0]))
     statement = f"{listed(names)}: the fitted data name {verdict.names[0]}, the held-out data do not bear it out."
     return replace(verdict, kind=f"ambiguous:{','.join(names)}", names=names, statement=statement, gates=gates)

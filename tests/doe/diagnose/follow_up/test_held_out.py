@@ -53,12 +53,19 @@ def test_constant_summaries_say_nothing():
     assert deviance(*flat) == pytest.approx(deviance(measured, poured))
 
 
-def test_only_a_single_name_has_contenders():
+def test_only_what_is_named_has_contenders():
     verdict = named_verdict()
     assert contenders_for(verdict)[0].label == "e5"
     assert all(m.criterion - contenders_for(verdict)[0].criterion <= WITHIN for m in contenders_for(verdict))
     assert contenders_for(replace(verdict, kind="unexplained", names=())) == ()
-    assert contenders_for(replace(verdict, kind="ambiguous:e5,e6", names=("e5", "e6"))) == ()
+
+
+def test_several_names_stay_and_are_told_apart():
+    verdict = replace(named_verdict(), kind="ambiguous:e5,e6", names=("e5", "e6"))
+    found = upheld(verdict, (HeldOut("e6", 1.0, 0.0), HeldOut("e5", 9.0, 9.0)))
+    assert (found.kind, found.names) == (verdict.kind, verdict.names)
+    assert found.gates[-1].statement == "e5 is 9.0 behind e6"
+    assert not found.gates[-1].passed
 
 
 @pytest.mark.parametrize(
