@@ -29,7 +29,7 @@ def colours(page):  # noqa: F811
 
 def test_the_left_arrow_leads_back_to_the_same_positions(page):  # noqa: F811
     press(page, "r")
-    wait_for(lambda: state(page) == "running" and 0.3 < simulated_time(page) < 1.0)
+    wait_for(lambda: state(page) == "running" and simulated_time(page) > 0.3)
     press(page, "Space")
     wait_for(lambda: state(page) == "paused")
     time.sleep(1.0)
