@@ -184,7 +184,8 @@ def _asked_for(result: Plain) -> str:
     best = result["next_experiment"][0]["experiment"]
     if best["replicates"] is None:
         return f"Most telling would be {code(best['name'])}, though no hundred pours of it settle the question."
-    return f"Measure {code(best['name'])} with {best['replicates']} pours to tell."
+    pours = best["replicates"]
+    return f"Measure {code(best['name'])} with {pours} pour{'s' * (pours > 1)} to tell."
 
 
 def _facts(result: Plain) -> list[tuple[str, str]]:
