@@ -11,9 +11,9 @@ import numpy.typing as npt
 from doe.diagnose.decision.decide import diagnose
 from doe.diagnose.decision.verdict import Verdict
 from doe.diagnose.emulation.fresh_pours import FreshPours
-from doe.diagnose.follow_up.closer import LOOKS, contenders, leads, poured
+from doe.diagnose.follow_up.closer import LOOKS, contenders, leads, near_best, poured
 from doe.diagnose.follow_up.confirm import Confirmed, Model, confirm, fitted
-from doe.diagnose.follow_up.held_out import HeldOut, compared, contenders_for, upheld
+from doe.diagnose.follow_up.held_out import HeldOut, compared, predictions, upheld
 from doe.diagnose.follow_up.holdout import HoldoutCondition, HoldoutError, holdout_errors
 from doe.diagnose.follow_up.menu import Suggestion, next_experiment
 from doe.diagnose.runs import Condition, Declared, Effect, Observed, Parameter
@@ -28,10 +28,8 @@ from solver import EFFECTS, ParameterError, Scene, parameters, with_values
 
 FloatArray = npt.NDArray[np.float64]
 
-SURVIVORS = 5
-"""Effects whose range may be widened: the best of the race so far,"""
-SURVIVING_GAP = 12.0
-"""as far as their criterion is no farther behind the best."""
+CRAMPED = 5
+"""At most so many effects get a wider range: the best of the race."""
 BOX = 3.0
 """Standard deviations about an independently measured mean."""
 DRAWN_IN = 0.8
@@ -138,11 +136,7 @@ def contenders_held_out(
     widths = [len(summary_names(condition)) for condition in conditions]
     if not data or min(map(len, data)) < 2:
         return ()
-    poured = {
-        model.label: confirm(fitted(verdict, model.label), pours, number, widths, places).blocks
-        for model in contenders_for(verdict)
-    }
-    return compared(verdict, data, poured)
+    return compared(verdict, data, predictions(verdict, pours, number, widths, places))
 
 
 def declare(measurement: Measurement, effects: Sequence[str]) -> Declared:
@@ -193,19 +187,13 @@ def observe(conditions: Sequence[MeasuredCondition]) -> Observed:
     return Observed(blocks, tuple(stated), tuple(condition.mean_of for condition in conditions))
 
 
-def survivors(verdict: Verdict) -> tuple[str, ...]:
-    """Effects worth more pours: the best of the race, as far as they are within reach of it."""
-    raced = [row for row in verdict.effects if row.status == "raced" and np.isfinite(row.criterion)]
-    near = sorted((row for row in raced if row.delta <= SURVIVING_GAP), key=lambda row: row.criterion)
-    return tuple(row.name for row in near[:SURVIVORS])
-
-
 def at_edge(verdict: Verdict, now: Declared, widest: Declared) -> tuple[str, ...]:
-    """Survivors that are driven to an end of the range simulated so far, where the literature supports more."""
-    ends = {effect.name: effect for effect in widest.effects}
-    cramped = {row.name for row in verdict.effects if any(a.at_edge for a in row.amplitudes)}
-    room = {effect.name for effect in now.effects if max(effect.high) < max(ends[effect.name].high)}
-    return tuple(name for name in survivors(verdict) if name in cramped & room)
+    """Effects near the best that are driven to an end of the range simulated so far, with more in the literature."""
+    room = {
+        effect.name for effect, end in zip(now.effects, widest.effects, strict=True) if max(effect.high) < max(end.high)
+    }
+    near = near_best([model for model in verdict.models if len(model.members) == 1], CRAMPED)
+    return tuple(m.label for m in near if m.label in room and any(amplitude.at_edge for amplitude in m.amplitudes))
 
 
 def models(verdict: Verdict) -> tuple[Model, Model]:

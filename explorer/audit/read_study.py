@@ -13,9 +13,15 @@ from doe.errors import AuditError
 from explorer.audit.entries import Entries, read_entries
 from explorer.audit.read_stages import read_ascent, read_optimum, read_screening, read_surface, read_verified
 from explorer.audit.tables import Table, read_table
+from solver.assets import asset_path
 
 FORMAT = 1
 Part = TypeVar("Part")
+
+
+def shipped_study() -> Path:
+    """Folder of the article that is shipped."""
+    return asset_path("source_tables", "table1_physical").parent
 
 
 def read_study(folder: Path) -> PublishedStudy:

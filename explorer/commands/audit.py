@@ -23,14 +23,12 @@ def audit(
     reason). Exit code 0 whatever was found.
     """
     from doe.audit import audit_study
-    from explorer.audit.read_study import read_study
+    from explorer.audit.read_study import read_study, shipped_study
     from explorer.audit.report import write_audit
     from explorer.audit.sentences import audit_text
     from explorer.files.run_folder import appearing, json_text
-    from solver.assets import asset_path
 
-    shipped = asset_path("source_tables", "table1_physical").parent
-    found = audit_study(read_study(shipped if folder is None else folder))
+    found = audit_study(read_study(shipped_study() if folder is None else folder))
     if out is not None:
         with appearing(out) as temporary:
             write_audit(found, temporary)

@@ -28,7 +28,6 @@ from solver.mesh_file import SUFFIXES
 from solver.scene import Scene, check
 from solver.shape import Solid, surface_mesh
 
-MOST_MESH_BYTES = 30_000_000
 MOST_FILE_BYTES = 30_000_000
 MOST_ZIP_BYTES, MOST_UNPACKED_BYTES, MOST_MEMBERS = 50_000_000, 200_000_000, 1000
 LABEL = re.compile(r"[^A-Za-z0-9_-]+")
@@ -52,14 +51,8 @@ def shaped_source(present: Scene, body: str, name: str, content: bytes, unit: st
     """
     if body not in [one.name for one in present.bodies]:
         raise CommandError(f"body {body[:60]!r}: there is none of that name")
-    suffix = Path(name).suffix.lower()
-    if suffix not in SUFFIXES:
-        raise CommandError(f"{label(name)}: allowed are files ending in {', '.join(SUFFIXES)}")
-    if not 0 < len(content) <= MOST_MESH_BYTES:
-        raise CommandError(f"{name[:80]}: {len(content)} bytes; allowed: up to {MOST_MESH_BYTES}")
-    folder.mkdir(parents=True, exist_ok=True)
-    stem = f"{label(Path(name).stem)}-{_digest(content)}"
-    mesh, material = folder / f"{stem}{suffix}", folder / f"{stem}-{label(body)}.toml"
+    mesh = _place(name, content, folder, SUFFIXES)
+    material = folder / f"{mesh.stem}-{label(body)}.toml"
     new = not mesh.exists()
     with _named(name, mesh):
         try:
@@ -90,13 +83,7 @@ def _check_faces(solid: Solid) -> None:
 
 def kept_file(name: str, content: bytes, folder: Path, suffixes: Sequence[str]) -> Path:
     """The file ``content`` as it came, kept in ``folder``; CommandError in one line for another kind or size."""
-    suffix = Path(name).suffix.lower()
-    if suffix not in suffixes:
-        raise CommandError(f"{label(name)}: allowed are files ending in {', '.join(suffixes)}")
-    if not 0 < len(content) <= MOST_FILE_BYTES:
-        raise CommandError(f"{name[:80]}: {len(content)} bytes; allowed: up to {MOST_FILE_BYTES}")
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / f"{label(Path(name).stem)}-{_digest(content)}{suffix}"
+    path = _place(name, content, folder, suffixes)
     write_whole_bytes(path, content)
     return path
 
@@ -180,6 +167,17 @@ def _top(members: list[zipfile.ZipInfo], marker: str) -> PurePosixPath:
     if len(found) != 1:
         raise CommandError(f"holds {len(found)} files {marker}; allowed: one, beside the files that it names")
     return found[0].parent
+
+
+def _place(name: str, content: bytes, folder: Path, suffixes: Sequence[str]) -> Path:
+    """Where an upload is put in ``folder``, which is there afterwards; CommandError for another kind or size."""
+    suffix = Path(name).suffix.lower()
+    if suffix not in suffixes:
+        raise CommandError(f"{label(name)}: allowed are files ending in {', '.join(suffixes)}")
+    if not 0 < len(content) <= MOST_FILE_BYTES:
+        raise CommandError(f"{name[:80]}: {len(content)} bytes; allowed: up to {MOST_FILE_BYTES}")
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder / f"{label(Path(name).stem)}-{_digest(content)}{suffix}"
 
 
 def _digest(content: bytes) -> str:

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.audit import audit_study
-from explorer.audit.read_study import read_study
+from explorer.audit.read_study import read_study, shipped_study
 from explorer.audit.report import audit_html
 from explorer.audit.sentences import audit_text
 from explorer.design.analysis import AnalyseOrder, run_analyse
@@ -40,7 +40,6 @@ from solver.assets import asset_path
 from solver.photograph import open_picture
 
 STRAIGHT = "Points of every replicate; the line is the part taken as straight, drawn on to zero force."
-SHIPPED_STUDY = "table1_physical"
 
 
 @dataclass(frozen=True)
@@ -102,6 +101,6 @@ def analysis_answer(order: AnalyseOrder) -> Answer:
 
 def audit_answer(folder: Path | None) -> Answer:
     """`explorer audit`: a published study recomputed from its own tables; None: the shipped article."""
-    found = audit_study(read_study(folder or asset_path("source_tables", SHIPPED_STUDY).parent))
+    found = audit_study(read_study(folder or shipped_study()))
     words = ["explorer", "audit", *([str(folder)] if folder else [])]
     return Answer(audit_text(found), shlex.join(words), {}, {"audit.html": audit_html(found).encode()})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import viser
@@ -27,6 +27,16 @@ def add_keys(gui: viser.GuiApi, acts: Mapping[str, Action], keys: Mapping[str, A
     """A command per entry of ``keys`` (label → key), which posts the action of that label; in viser's palette too."""
     for label, key in keys.items():
         gui.add_command(label, hotkey=key).on_trigger(_posting(acts[label], post))
+
+
+def on_upload(button: viser.GuiUploadButtonHandle, take: Callable[[str, bytes], None], post: Post) -> None:
+    """Post ``take`` (name, content) for every file that a browser sends by viser's upload ``button``."""
+
+    @button.on_upload
+    def _(event: viser.GuiEvent[Any]) -> None:
+        if event.client_id is not None:
+            sent = event.target.value
+            post(lambda: take(str(sent.name), bytes(sent.content)))
 
 
 def _posting(action: Action, post: Post) -> Any:

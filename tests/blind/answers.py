@@ -12,8 +12,8 @@ from doe.diagnose.decision.verdict import Verdict
 from doe.diagnose.diagnosis import FRESH, models
 from doe.diagnose.emulation.fresh_pours import FreshPours
 from doe.diagnose.follow_up.closer import LOOKS, contenders, poured
-from doe.diagnose.follow_up.confirm import confirm, fitted
-from doe.diagnose.follow_up.held_out import compared, contenders_for, upheld
+from doe.diagnose.follow_up.confirm import confirm
+from doe.diagnose.follow_up.held_out import compared, contenders_for, predictions, upheld
 from doe.diagnose.follow_up.holdout import HoldoutCondition, holdout_errors
 from doe.diagnose.simulation.plan import Point
 from doe.diagnose.simulation.pours import ModelPours
@@ -104,14 +104,13 @@ class Answers:
 
     def held_out(self, truths: Sequence[Truth], verdicts: Mapping[int, Verdict]) -> dict[int, Verdict]:
         """The verdicts, with names that the held-out condition does not bear out taken back, as in a diagnosis."""
-        asked = {k: contenders_for(verdict) for k, verdict in verdicts.items() if len(verdict.names) == 1}
+        asked = [k for k, verdict in verdicts.items() if len(verdict.names) == 1]
         conditions = self.measurement.holdout
         pours, widths = self.model_pours(conditions), [len(summary_names(condition)) for condition in conditions]
         found = dict(verdicts)
         for k, data in zip(asked, self.measured([truths[k] for k in asked], conditions), strict=True):
             if data is not None:
-                models = {model.label: fitted(found[k], model.label) for model in asked[k]}
-                poured = {label: confirm(model, pours, FRESH, widths).blocks for label, model in models.items()}
+                poured = predictions(found[k], pours, FRESH, widths)
                 rows = compared(found[k], [vectors(c, data[c.name]) for c in conditions], poured)
                 found[k] = upheld(found[k], rows)
         return found

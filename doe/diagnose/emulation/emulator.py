@@ -38,8 +38,8 @@ the prediction's standard error does not know of."""
 class Emulator:
     """All conditions with the same terms. effect_exponents: per declared effect (terms, k + amplitudes), no rows where
     the effect was not simulated enough. low, high: per effect, the sampled range of its coded amplitudes, zero
-    included. theta_low, theta_high: (k,) sampled range of the coded parameters. fresh: pours at best fits, each
-    of which holds the predictions of its own model.
+    included. theta_low, theta_high: (k,) sampled range of the coded parameters. fresh: the newest
+    pours at the best fit of each model that has some; they hold its predictions.
     """
 
     declared: Declared
@@ -91,8 +91,8 @@ class Emulator:
             low=np.concatenate([self.theta_low, *(self.low[e] for e in members)]),
             high=np.concatenate([self.theta_high, *(self.high[e] for e in members)]),
         )
-        held = [one for one in self.fresh if one.members == members]
-        return anchored(predictor, held[-1].coded(self.declared), held[-1].blocks) if held else predictor
+        held = next((one for one in self.fresh if one.members == members), None)
+        return predictor if held is None else anchored(predictor, held.coded(self.declared), held.blocks)
 
 
 def fit_emulator(declared: Declared, runs: Runs, floors: tuple[FloatArray, ...]) -> Emulator:

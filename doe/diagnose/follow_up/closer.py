@@ -50,6 +50,11 @@ def leads(verdict: Verdict) -> tuple[str, ...]:
     return tuple(sorted((name for name in drops if drops[name] >= LEAD_SHARE * most), key=lambda n: -drops[n])[:LEADS])
 
 
+def near_best(race: Sequence[FittedModel], number: int) -> tuple[FittedModel, ...]:
+    """The first of a race, in order of the criterion, and at most ``number`` in all that are not far behind it."""
+    return tuple(model for model in race if model.criterion - race[0].criterion <= WITHIN)[:number]
+
+
 def contenders(verdict: Verdict, declared: Declared, fresh: Sequence[FreshPours]) -> tuple[FittedModel, ...]:
     """Models near the best of the race whose fit no pours of their own hold; none where nothing is missing.
 
@@ -59,7 +64,7 @@ def contenders(verdict: Verdict, declared: Declared, fresh: Sequence[FreshPours]
         return ()
     singles = [model for model in verdict.models if len(model.members) == 1]
     for race in (singles, [model for model in verdict.models if model.members]):
-        near = [model for model in race if model.criterion - race[0].criterion <= WITHIN][:MODELS]
+        near = near_best(race, MODELS)
         loose = tuple(model for model in near if not any(_holds(one, model, declared) for one in fresh))
         if loose:
             return loose

@@ -21,7 +21,9 @@ import numpy.typing as npt
 from doe.diagnose.decision.gates import Gate
 from doe.diagnose.decision.tables import listed
 from doe.diagnose.decision.verdict import FittedModel, Verdict
-from doe.diagnose.follow_up.closer import MODELS, WITHIN
+from doe.diagnose.follow_up.closer import MODELS, near_best
+from doe.diagnose.follow_up.confirm import confirm, fitted
+from doe.diagnose.simulation.pours import ModelPours
 from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
@@ -42,13 +44,18 @@ class HeldOut(Record):
 
 
 def contenders_for(verdict: Verdict) -> tuple[FittedModel, ...]:
-    """The model named first, then those that the fit leaves near it; none where nothing is named."""
-    if not verdict.names:
-        return ()
-    named = next(model for model in verdict.models if model.label == verdict.names[0])
-    rivals = [model for model in verdict.models if model.members and model.label != named.label]
-    near = [model for model in rivals if model.criterion - named.criterion <= WITHIN]
-    return (named, *near[: MODELS - 1])
+    """The model named first, the best of its race, then those that the fit leaves near it; none without a name."""
+    return near_best([model for model in verdict.models if model.members], MODELS) if verdict.names else ()
+
+
+def predictions(
+    verdict: Verdict, pours: ModelPours, number: int, widths: Sequence[int], where: Sequence[int] | None = None
+) -> dict[str, tuple[FloatArray, ...]]:
+    """Label -> fresh pours of every contender in the conditions of ``pours``, or ``where``, per condition (m, d_c)."""
+    return {
+        model.label: confirm(fitted(verdict, model.label), pours, number, widths, where).blocks
+        for model in contenders_for(verdict)
+    }
 
 
 def deviance(measured: FloatArray, poured: FloatArray) -> float:
@@ -56,8 +63,8 @@ def deviance(measured: FloatArray, poured: FloatArray) -> float:
     r, m = len(measured), len(poured)
     varies = np.ptp(np.concatenate([measured, poured]), axis=0) > 0.0
     spread = np.where(poured.std(axis=0, ddof=1) > 0.0, poured.std(axis=0, ddof=1), measured.std(axis=0, ddof=1))
-    unit = spread[varies & (spread > 0.0)]
     known = varies & (spread > 0.0)
+    unit = spread[known]
     z = poured[:, known] / unit
     correlation = np.corrcoef(z, rowvar=False) if len(unit) > 1 else np.ones((1, 1))
     correlation = np.where(np.isfinite(correlation), correlation, 0.0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import viser
 
@@ -13,6 +12,7 @@ from explorer.files.uploads import unpacked_folder
 from explorer.laboratory.answers import audit_answer
 from explorer.viewer.actions import Post
 from explorer.viewer.background_work import BackgroundWork
+from explorer.viewer.buttons import on_upload
 from explorer.viewer.laboratory.answer_view import AnswerView
 
 WAITING = "Every figure of a published study that can be recomputed: reproduced, differs, or cannot be checked."
@@ -33,11 +33,7 @@ class AuditPanel:
             lambda _: post(lambda: self._background.start("auditing", lambda: audit_answer(None), self.view.show))
         )
 
-        @upload.on_upload
-        def _(event: viser.GuiEvent[Any]) -> None:
-            if event.client_id is not None:
-                sent = event.target.value
-                post(lambda: self._audit(str(sent.name), bytes(sent.content)))
+        on_upload(upload, self._audit, post)
 
     def _audit(self, name: str, content: bytes) -> None:
         folder = self._folder

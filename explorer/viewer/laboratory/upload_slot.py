@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import viser
 
 from explorer.files.uploads import kept_file
 from explorer.viewer.actions import Post
+from explorer.viewer.buttons import on_upload
 
 
 class UploadSlot:
@@ -33,11 +33,7 @@ class UploadSlot:
             f"Upload: {label.lower()}", mime_type=",".join(suffixes), hint=f"A file ending in {', '.join(suffixes)}."
         )
 
-        @self.upload.on_upload
-        def _(event: viser.GuiEvent[Any]) -> None:
-            if event.client_id is not None:
-                sent = event.target.value
-                post(lambda: self._take(str(sent.name), bytes(sent.content)))
+        on_upload(self.upload, self._take, post)
 
     @property
     def chosen(self) -> str:

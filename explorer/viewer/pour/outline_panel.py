@@ -15,6 +15,7 @@ from explorer.files.uploads import unpacked_measurement
 from explorer.live.messages import Status
 from explorer.viewer.actions import Post
 from explorer.viewer.background_work import BackgroundWork
+from explorer.viewer.buttons import on_upload
 from explorer.viewer.pour.outline_nodes import OutlineNodes
 from explorer.viewer.pour.outline_svg import outline_html
 from solver.observables.outline import Outline
@@ -78,11 +79,7 @@ class OutlinePanel:
                 chosen = str(event.target.value)
                 post(lambda: self._choose_curve(chosen))
 
-        @self._upload.on_upload
-        def _(event: viser.GuiEvent[Any]) -> None:
-            if event.client_id is not None:
-                sent = event.target.value
-                post(lambda: self._take(str(sent.name), bytes(sent.content)))
+        on_upload(self._upload, self._take, post)
 
     def show(self, status: Status) -> None:
         """Draw what is new; call it inside ``server.atomic()``."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import viser
 
@@ -15,6 +14,7 @@ from explorer.scene.source import SceneSource, rig_source
 from explorer.session import Session
 from explorer.viewer.actions import Post
 from explorer.viewer.background_work import BackgroundWork
+from explorer.viewer.buttons import on_upload
 from explorer.viewer.small_text import small_html
 from solver.assets import shipped_assets
 from solver.mesh_file import LENGTH_UNITS, SUFFIXES
@@ -62,11 +62,7 @@ class ScenePanel:
             self._doing = gui.add_html("")
         pour.on_click(lambda _: post(self._pour))
 
-        @self._upload.on_upload
-        def _(event: viser.GuiEvent[Any]) -> None:
-            if event.client_id is not None:
-                sent = event.target.value
-                post(lambda: self._take_shape(str(sent.name), bytes(sent.content)))
+        on_upload(self._upload, self._take_shape, post)
 
     def show(self, status: Status) -> None:
         """Follow a pour that somebody else started; call it inside ``server.atomic()``."""

@@ -7,7 +7,8 @@ import pytest
 from scipy import stats
 
 from doe.diagnose.decision.decide import judge
-from doe.diagnose.follow_up.held_out import WITHIN, HeldOut, compared, contenders_for, deviance, upheld
+from doe.diagnose.follow_up.closer import WITHIN
+from doe.diagnose.follow_up.held_out import HeldOut, compared, contenders_for, deviance, upheld
 from tests.doe.diagnose.toy import known_emulator, make_toy
 
 R, M, D = 6, 12, 4
