@@ -21,14 +21,14 @@ from solver.params import param
 
 @kernel_function
 def bridge(p, m, c):
-    """p: γ, V, θ [rad]."""
+    """p: γ cos θ, V, 1 + θ/2."""
     radius, volume = 2.0 * c.reduced_radius, p[1]
-    share = (volume / radius**3) ** (1.0 / 3.0)
-    rupture = (1.0 + 0.5 * p[2]) * (share + 0.1 * share * share) * radius
     gap = ti.max(0.0, -c.overlap)
-    if gap < rupture:
+    # s < s_c, solved for V*^⅓ so that no cube root is taken: v + 0.1 v² = s/((1 + θ/2) R), and v³ < V*.
+    needed = 5.0 * (ti.sqrt(1.0 + 0.4 * gap / (p[2] * radius)) - 1.0) * radius
+    if needed * needed * needed < volume:
         s = 0.5 * gap * ti.sqrt(radius / volume)
-        pull = 2.0 * math.pi * radius * p[0] * ti.cos(p[2]) / (1.0 + 2.1 * s + 10.0 * s * s)
+        pull = 2.0 * math.pi * radius * p[0] / (1.0 + 2.1 * s + 10.0 * s * s)
         c.elastic -= pull
         c.pull += pull
         c.floor -= pull
@@ -55,6 +55,11 @@ class CapillaryBridge(ContactEffect):
     lever = "a moisture series; soap in the water lowers γ; the pull outlasts the touch"
     stage = Stage.ADHESION
     act = staticmethod(bridge)
+
+    def row(self, at_wall: bool) -> tuple[float, ...]:
+        """What the kernel reads: γ cos θ, V, 1 + θ/2."""
+        wetting = self.surface_tension * math.cos(self.contact_angle)
+        return wetting, self.bridge_volume, 1.0 + 0.5 * self.contact_angle
 
     def grip(self, e_star: float, reduced_radius: float) -> float:
         """Distance [m] at which a bridge breaks."""

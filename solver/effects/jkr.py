@@ -7,53 +7,71 @@ w is the work of adhesion [J/m²] (twice the surface energy of one surface). Sur
 largest distance that the contact bridges, δ = −3 a_c²/R* with a_c = (2π w R*²/(16 E*))^⅓. The pull-off force is
 3/2 π w R*, the largest tension on the way; it is what the Coulomb limit takes twice (Thornton 1991, Journal of
 Physics D 24:1942: μ (F + 2 F_c)). Damping is that of the Hertzian contact of the same overlap: none at a gap.
+
+In terms of x = √a the overlap is the convex polynomial x⁴/R* − k x with k = √(2π w/E*); its right branch is the stable
+one. A contact moves little in a step, so Newton's method from the last radius finds x in two or three divisions, and
+whether the surfaces part is asked of cubes: no root but a square one in a step.
 """
 
 import math
 
 from solver.effects.kernel import kernel_function, ti
 
+CLOSE = 1e-7
+"""Newton's method ends with a step of this share: the next one would be its square."""
+ITERATIONS = 60
+"""At most; towards parting, where the root is a double one, each step halves what is left."""
+
 
 @kernel_function
-def parting_radius(w, e_star, reduced_radius):
-    """a_c [m], the contact radius at which the surfaces part: (2π w R*²/(16 E*))^⅓."""
-    return (math.pi * w * reduced_radius * reduced_radius / (8.0 * e_star)) ** (1.0 / 3.0)
+def pulls(k, reduced_radius, overlap):
+    """Whether the contact is still there: δ > −3 a_c²/R*, where a_c³ = (k R*/4)²."""
+    gap = ti.max(0.0, -overlap * reduced_radius)
+    least = 0.25 * k * reduced_radius
+    return gap * gap * gap < 27.0 * least * least * least * least
 
 
 @kernel_function
-def root(d):
-    """y = √(a/a_c) on the stable branch for the overlap d ≥ −3 in units of a_c²/R*: y⁴ − 4 y = d.
+def root(k, reduced_radius, overlap, before):
+    """x = √a [√m] on the stable branch of x⁴/R* − k x = δ; ``before`` is the last contact radius [m], or 0.
 
-    Ferrari: the resolvent is m³ + d m − 2 = 0, and y = ½ (√(2m) + √(4 √(2/m) − 2m)). Cardano's root m cancels for
-    large d; two Newton steps mend it.
+    From the right of the polynomial's minimum Newton's method overshoots once at most, to the right. Where the last
+    radius is not on the right (a first step, a slider moved), it begins at (k R*)^⅓ + (R* δ₊)^¼, beyond the root.
     """
-    u = (1.0 + ti.sqrt(ti.max(0.0, 1.0 + d * d * d / 27.0))) ** (1.0 / 3.0)
-    m = u - d / (3.0 * u)
-    for _ in ti.static(range(2)):
-        m = (2.0 * m * m * m + 2.0) / (3.0 * m * m + d)
-    return 0.5 * (ti.sqrt(2.0 * m) + ti.sqrt(ti.max(0.0, 4.0 * ti.sqrt(2.0 / m) - 2.0 * m)))
+    curvature = 1.0 / reduced_radius
+    x = ti.sqrt(before)
+    if 4.0 * x * x * x * curvature <= k:
+        x = (k * reduced_radius) ** (1.0 / 3.0) + ti.sqrt(ti.sqrt(reduced_radius * ti.max(0.0, overlap)))
+    left = ITERATIONS
+    while left > 0:
+        cube = x * x * x * curvature
+        move = (x * (cube - k) - overlap) / (4.0 * cube - k)
+        x -= move
+        left -= 1
+        if ti.abs(move) <= CLOSE * x:
+            left = 0
+    return x
 
 
 @kernel_function
 def adhere(w, c):
     """Let contact ``c`` be adhesive with the work of adhesion ``w`` [J/m²], in addition to what it has already.
 
-    In terms of y the force is π w R* y³ (y³/6 − 1).
+    In terms of x = √a the force is E* x³ (4 x³/(3 R*) − 2 k).
     """
     c.work += w
-    least = parting_radius(c.work, c.e_star, c.reduced_radius)
-    d = c.overlap * c.reduced_radius / (least * least)
-    if d > -3.0:
-        y = root(d)
-        cube = y * y * y
-        force = math.pi * c.work * c.reduced_radius * cube * (cube / 6.0 - 1.0)
+    k = ti.sqrt(2.0 * math.pi * c.work / c.e_star)
+    if pulls(k, c.reduced_radius, c.overlap):
+        x = root(k, c.reduced_radius, c.overlap, c.before)
+        cube = x * x * x
+        force = c.e_star * cube * (4.0 / 3.0 * cube / c.reduced_radius - 2.0 * k)
         # What earlier stages have made of the Hertzian force stays beside the adhesive one.
         c.elastic += force - c.adhesive
         c.adhesive = force
         pull_off = 1.5 * math.pi * w * c.reduced_radius
         c.pull += 2.0 * pull_off
         c.floor -= pull_off
-        c.radius = least * y * y
+        c.radius = x * x
         c.held = 1
     return c
 

@@ -13,7 +13,7 @@ Touch = ti.types.struct(
     v_t=Vec3,  # and across it [m/s]
     omega=Vec3,  # relative angular velocity ω_i − ω_j [rad/s]
     dt=ti.f64,  # [s]
-    fresh=ti.i32,  # 1: the first step of this contact
+    before=ti.f64,  # contact radius a at the last step [m]; 0: the first step of this contact
     # Constants of the pair
     e_star=ti.f64,  # E* [Pa]
     g_star=ti.f64,  # G* [Pa]

@@ -46,7 +46,7 @@ def damping_of(restitution):
 @kernel_function
 def damp_by_speed(p, m, c):
     """p: q, v₀; m: by how much the damper is off from that of e, as a fraction; found when the contact began."""
-    if c.fresh == 1:
+    if c.before == 0.0:
         speed = ti.max(1e-4, -c.v_n) / p[1]
         loss = (1.0 - c.restitution) * (1.0 + p[0] * (speed**0.2 - 1.0))
         now = ti.max(0.05, ti.min(1.0, 1.0 - loss))

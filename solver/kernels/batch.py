@@ -73,6 +73,6 @@ def take_out(s: ti.template(), world_index: ti.i32) -> ti.i32:
                     lost += 1
                 if outside:
                     s.body.alive[w, b] = 0
-                    s.world.taken_out[w] += body_energy(s, w, b)
+                    s.world.taken_out[w] = s.world.taken_out[w] + body_energy(s, w, b)
                     s.world.moved[w] = s.world.skin[w]
     return lost

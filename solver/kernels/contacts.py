@@ -67,7 +67,8 @@ def meet(s: ti.template(), w, k):
 @ti.func
 def lose(s: ti.template(), w, k, law):
     """Entry ``k`` has come apart: its spring is gone, and so is the energy in it."""
-    s.world.dissipated[w] += spring_energy(law, s.contact.spring[w, k].norm_sqr(), s.contact.radius[w, k])
+    energy = spring_energy(law, s.contact.spring[w, k].norm_sqr(), s.contact.radius[w, k])
+    s.world.dissipated[w] = s.world.dissipated[w] + energy
     s.contact.radius[w, k] = 0.0
     s.contact.spring[w, k] = Vec3(0.0, 0.0, 0.0)
     s.contact.loss[w, k] = Vec3(0.0, 0.0, 0.0)
@@ -79,14 +80,14 @@ def lose(s: ti.template(), w, k, law):
 def push_wall(s: ti.template(), w, k, point, force, couple, held):
     """Take the reaction to ``force`` [N] and ``couple`` [N m] on a body at ``point`` into wall ``k``, and its work."""
     torque = (point - s.wall.origin[w, k]).cross(force) + couple
-    s.wall.force[w, k] -= force
-    s.wall.torque[w, k] -= torque
+    s.wall.force[w, k] = s.wall.force[w, k] - force
+    s.wall.torque[w, k] = s.wall.torque[w, k] - torque
     if held:
-        s.wall.held[w, k] -= force
-        s.wall.held_torque[w, k] -= torque
+        s.wall.held[w, k] = s.wall.held[w, k] - force
+        s.wall.held_torque[w, k] = s.wall.held_torque[w, k] - torque
     elif s.wall.moving[w, k] == 1:
         work = force.dot(surface_velocity(s, w, k, point)) + couple.dot(s.wall.omega[w, k])
-        s.world.wall_work[w] += s.world.dt[w] * work
+        s.world.wall_work[w] = s.world.wall_work[w] + s.world.dt[w] * work
 
 
 @ti.func
@@ -104,7 +105,7 @@ def touch_of(s: ti.template(), w, k, n, overlap, velocity, omega, a, elastic, da
         v_t=velocity - v_n * n,
         omega=omega,
         dt=s.world.dt[w],
-        fresh=ti.cast(s.contact.radius[w, k] == 0.0, ti.i32),
+        before=s.contact.radius[w, k],
         e_star=law[0],
         g_star=law[1],
         restitution=s.effect.row[w, row, ti.static(COLUMNS[-1])],
@@ -241,31 +242,31 @@ def push(s: ti.template(), w):
             if b < 0:
                 push_wall(s, w, -1 - b, point, force, torque, item >= live)
             if item >= live:
-                s.body.held[w, a] += force
-                s.body.held_torque[w, a] += arm.cross(force) + torque
+                s.body.held[w, a] = s.body.held[w, a] + force
+                s.body.held_torque[w, a] = s.body.held_torque[w, a] + (arm.cross(force) + torque)
                 if b >= 0:
-                    s.body.held[w, b] -= force
-                    s.body.held_torque[w, b] -= other_arm.cross(force) + torque
+                    s.body.held[w, b] = s.body.held[w, b] - force
+                    s.body.held_torque[w, b] = s.body.held_torque[w, b] - (other_arm.cross(force) + torque)
                 force, torque = Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0)
             if a != present:
                 if present >= 0:
-                    s.body.force[w, present] += force_sum
-                    s.body.torque[w, present] += torque_sum
+                    s.body.force[w, present] = s.body.force[w, present] + force_sum
+                    s.body.torque[w, present] = s.body.torque[w, present] + torque_sum
                 present = a
                 force_sum, torque_sum = Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0)
             force_sum += force
             torque_sum += arm.cross(force)
             if b >= 0:
-                s.body.force[w, b] -= force
-                s.body.torque[w, b] -= other_arm.cross(force)
+                s.body.force[w, b] = s.body.force[w, b] - force
+                s.body.torque[w, b] = s.body.torque[w, b] - other_arm.cross(force)
             if ti.static(s.effects):
                 torque_sum += torque
                 if b >= 0:
-                    s.body.torque[w, b] -= torque
+                    s.body.torque[w, b] = s.body.torque[w, b] - torque
         elif s.contact.radius[w, k] > 0.0:
             lose(s, w, k, s.law.row[w, s.contact.law[w, k]])
     if present >= 0:
-        s.body.force[w, present] += force_sum
-        s.body.torque[w, present] += torque_sum
+        s.body.force[w, present] = s.body.force[w, present] + force_sum
+        s.body.torque[w, present] = s.body.torque[w, present] + torque_sum
     s.world.overlap[w] = largest
-    s.world.dissipated[w] += dissipated
+    s.world.dissipated[w] = s.world.dissipated[w] + dissipated

@@ -153,7 +153,7 @@ def load_effects(s: ti.template(), w: ti.i32, table: Table, grip: ti.f64):
     """Parameters of the effects of every pair of kinds, row a · kinds + b, and how far apart [m] a pull may hold."""
     rouse_all(s, w)
     # A cell is as long as the largest body, the skin and the grip.
-    s.world.cell[w] += grip - s.world.grip[w]
+    s.world.cell[w] = s.world.cell[w] + (grip - s.world.grip[w])
     s.world.grip[w] = grip
     s.world.moved[w] = s.world.skin[w]
     for k in range(table.shape[0]):
@@ -231,7 +231,7 @@ def set_sleep(s: ti.template(), w: ti.i32, speed: ti.f64, time: ti.f64):
 def scale_springs(s: ti.template(), w: ti.i32, ratio: Row):
     """Multiply tangential springs by the ``ratio`` of their row of the law table: a spring keeps its displacement."""
     for k in range(s.world.contacts[w]):
-        s.contact.spring[w, k] *= ratio[s.contact.law[w, k]]
+        s.contact.spring[w, k] = s.contact.spring[w, k] * ratio[s.contact.law[w, k]]
 
 
 @ti.kernel

@@ -56,11 +56,11 @@ def move(s: ti.template(), w, b):
     if ti.static(s.effects):
         force = body_force(s, w, b)
         velocity += dt * s.body.inverse_mass[w, b] * force
-        s.world.dissipated[w] -= 0.5 * dt * force.dot(velocity + s.body.velocity[w, b])
+        s.world.dissipated[w] = s.world.dissipated[w] - 0.5 * dt * force.dot(velocity + s.body.velocity[w, b])
     spin = spun(s.body.spin[w, b], s.body.inertia[w, b], s.body.inverse_inertia[w, b], torque, dt)
     s.body.velocity[w, b] = velocity
     s.body.spin[w, b] = spin
-    s.body.position[w, b] += dt * velocity
+    s.body.position[w, b] = s.body.position[w, b] + dt * velocity
     s.body.quaternion[w, b] = turned(s.body.quaternion[w, b], spin, dt)
     speed = ti.sqrt(velocity.dot(velocity))
     if s.body.swing[w, b] > 0.0:

@@ -259,7 +259,7 @@ def rebuild(s: ti.template(), w):
     s.world.contacts[w] = 0
     s.world.candidates[w] = 0
     s.world.moved[w] = 0.0
-    s.world.rebuilds[w] += 1
+    s.world.rebuilds[w] = s.world.rebuilds[w] + 1
     s.world.stirred[w] = 1
     for k in range(s.world.walls[w]):
         s.wall.travel[w, k] = 0.0

@@ -31,12 +31,12 @@ def fall_asleep(s: ti.template(), w, b):
     if energy > s.world.sleep_speed[w] ** 2:
         s.body.quiet[w, b] = 0.0
     else:
-        s.body.quiet[w, b] += s.world.dt[w]
+        s.body.quiet[w, b] = s.body.quiet[w, b] + s.world.dt[w]
         still = s.body.quiet[w, b] >= s.world.sleep_time[w]
         if still and imbalance(s, w, b, s.body.force[w, b], s.body.torque[w, b]) < BALANCE:
             s.body.asleep[w, b] = 1
             s.world.stirred[w] = 1
-            s.world.dissipated[w] += 0.5 * s.body.mass[w, b] * energy
+            s.world.dissipated[w] = s.world.dissipated[w] + 0.5 * s.body.mass[w, b] * energy
             s.body.velocity[w, b] = Vec3(0.0, 0.0, 0.0)
             s.body.spin[w, b] = Vec3(0.0, 0.0, 0.0)
             s.body.omega[w, b] = Vec3(0.0, 0.0, 0.0)

@@ -46,11 +46,11 @@ def sum_contacts(s: ti.template(), w):
                 hertz = s.memory.number[w, k, HERTZ]
             overlap = hertz * hertz / s.contact.reduced_radius[w, k]
             energy = hertz_energy(law, hertz, overlap) + spring_energy(law, s.contact.spring[w, k].norm_sqr(), radius)
-            s.summary.elastic[w] += energy
-            s.summary.touching[w] += 1
+            s.summary.elastic[w] = s.summary.elastic[w] + energy
+            s.summary.touching[w] = s.summary.touching[w] + 1
             if s.contact.b[w, k] >= 0:
-                s.body.touching[w, s.contact.a[w, k]] += 1
-                s.body.touching[w, s.contact.b[w, k]] += 1
+                s.body.touching[w, s.contact.a[w, k]] = s.body.touching[w, s.contact.a[w, k]] + 1
+                s.body.touching[w, s.contact.b[w, k]] = s.body.touching[w, s.contact.b[w, k]] + 1
 
 
 @ti.func
@@ -69,20 +69,20 @@ def summarise(s: ti.template(), w):
     for b in range(s.world.bodies[w]):
         mass, x = s.body.mass[w, b], s.body.position[w, b]
         if s.body.alive[w, b] == 0:
-            s.summary.discharged[w] += mass
+            s.summary.discharged[w] = s.summary.discharged[w] + mass
         else:
             energy = energy_per_mass(s, w, b)
-            s.summary.kinetic[w] += 0.5 * mass * energy
-            s.summary.potential[w] -= mass * s.world.gravity[w].dot(x)
-            s.summary.asleep[w] += s.body.asleep[w, b]
+            s.summary.kinetic[w] = s.summary.kinetic[w] + 0.5 * mass * energy
+            s.summary.potential[w] = s.summary.potential[w] - mass * s.world.gravity[w].dot(x)
+            s.summary.asleep[w] = s.summary.asleep[w] + s.body.asleep[w, b]
             if not (energy < 1e30 and x.dot(x) < 1e30):
                 s.summary.finite[w] = 0
             speed = ti.sqrt(energy)
             if x[2] > s.world.outlet[w] and x[0] * x[0] + x[1] * x[1] < s.world.inlet_radius[w] ** 2:
-                s.summary.in_funnel[w] += mass
-                s.summary.hanging[w] += 1
+                s.summary.in_funnel[w] = s.summary.in_funnel[w] + mass
+                s.summary.hanging[w] = s.summary.hanging[w] + 1
                 s.summary.funnel_speed[w] = ti.max(s.summary.funnel_speed[w], speed)
             else:
-                s.summary.discharged[w] += mass
+                s.summary.discharged[w] = s.summary.discharged[w] + mass
                 if rolls_away(s, w, b) == 0:
                     s.summary.speed[w] = ti.max(s.summary.speed[w], speed)

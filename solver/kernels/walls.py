@@ -30,13 +30,13 @@ def move_walls(s: ti.template(), w):
     for k in range(s.world.walls[w]):
         if s.wall.moving[w, k] == 1:
             dt, omega = s.world.dt[w], s.wall.omega[w, k]
-            s.wall.origin[w, k] += dt * s.wall.velocity[w, k]
+            s.wall.origin[w, k] = s.wall.origin[w, k] + dt * s.wall.velocity[w, k]
             # The spin of ``turned`` is in the local frame.
             local = s.wall.turn[w, k].transpose() @ omega
             s.wall.quaternion[w, k] = turned(s.wall.quaternion[w, k], local, dt)
             s.wall.turn[w, k] = rotation(s.wall.quaternion[w, k])
             speed = s.wall.velocity[w, k].norm() + omega.norm() * s.wall.extent[w, k]
-            s.wall.travel[w, k] += dt * speed
+            s.wall.travel[w, k] = s.wall.travel[w, k] + dt * speed
             s.world.moved[w] = ti.max(s.world.moved[w], s.wall.travel[w, k])
 
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import brentq
 
 from solver.backend import ti
-from solver.effects.jkr import grip, parting_radius, root
+from solver.effects.jkr import grip, pulls, root
 from solver.laboratory import GRAIN, RADIUS, WALL, Laboratory, sphere
 from solver.material import effective_youngs_modulus
 from tests.solver.effects.cases import felt, heavy, scene_with
@@ -36,30 +36,44 @@ def force_at(overlap):
 
 @ti.kernel
 def radii(inputs: ti.types.ndarray(dtype=ti.f64, ndim=2), out: ti.types.ndarray(dtype=ti.f64, ndim=1)):
-    """Contact radius for rows of w, E*, R*, overlap."""
-    for k in range(out.shape[0]):
-        least = parting_radius(inputs[k, 0], inputs[k, 1], inputs[k, 2])
-        out[k] = least * root(inputs[k, 3] * inputs[k, 2] / least**2) ** 2
+    """Contact radius for rows of w, E*, R*, overlap, last contact radius; 0 where the surfaces have parted."""
+    for j in range(out.shape[0]):
+        k = ti.sqrt(2.0 * np.pi * inputs[j, 0] / inputs[j, 1])
+        out[j] = 0.0
+        if pulls(k, inputs[j, 2], inputs[j, 3]):
+            out[j] = root(k, inputs[j, 2], inputs[j, 3], inputs[j, 4]) ** 2
 
 
-def test_contact_radius_against_root_finding():
-    """Works 1e-6 … 50 J/m², moduli 1e5 … 1e11 Pa, radii 10 µm … 50 mm; overlaps from parting to 1e5 of that."""
+@pytest.mark.parametrize("before", [0.0, 0.1, 0.99, 1.0, 1.01, 10.0])
+def test_contact_radius_against_root_finding(before):
+    """Works 1e-6 … 50 J/m², moduli 1e5 … 1e11 Pa, radii 10 µm … 50 mm; overlaps from parting to 1e5 of that.
+
+    ``before`` is the last contact radius as a share of the present one: whence the root is found may not matter.
+    """
     rng = np.random.default_rng(1)
     n = 400
     w, e, r = (10.0 ** rng.uniform(*ends, n) for ends in ((-6, 1.7), (5, 11), (-5, -1.3)))
     units = (2.0 * np.pi * w * r**2 / (16.0 * e)) ** (2.0 / 3.0) / r
     share = np.concatenate([rng.uniform(-2.9999, 3.0, n // 2), 10.0 ** rng.uniform(0, 5, n // 2)])
+
+    def expected(d):  # dimensionless: a/a_c
+        return brentq(lambda x: x**2 - 4.0 * np.sqrt(x) - d, 1.0, 2.0 * np.sqrt(abs(d)) + 4.0, xtol=1e-15, rtol=1e-15)
+
+    a = np.sqrt(units * r) * [expected(d) for d in share]
     out = np.zeros(n)
-    radii(np.column_stack([w, e, r, share * units]), out)
-    for k in range(n):
-        least = np.sqrt(units[k] * r[k])
+    radii(np.column_stack([w, e, r, share * units, before * a]), out)
+    # Towards parting the root is a double one: rounding 1e-16 moves it by up to 1e-8/√(3 + d).
+    assert out == pytest.approx(a, rel=1e-9)
 
-        def excess(x, k=k):  # dimensionless: x = a/a_c
-            return x**2 - 4.0 * np.sqrt(x) - share[k]
 
-        # Towards parting the root is a double one: rounding 1e-16 moves it by up to 1e-8/√(3 + d).
-        expected = brentq(excess, 1.0, 2.0 * np.sqrt(abs(share[k])) + 4.0, xtol=1e-15, rtol=1e-15)
-        assert out[k] / least == pytest.approx(expected, rel=1e-9)
+def test_surfaces_part_at_three_units():
+    """The units a_c²/R* are exact to rounding, so a hair on either side of −3 decides."""
+    w, e, r = WORK, E_STAR, RADIUS
+    rows = [(w, e, r, -share * LEAST**2 / r, LEAST) for share in (2.999999, 3.000001, 30.0)]
+    out = np.zeros(3)
+    radii(np.array(rows), out)
+    assert out[0] > LEAST
+    assert not out[1:].any()
 
 
 @pytest.fixture(scope="module")
