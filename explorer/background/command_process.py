@@ -77,6 +77,7 @@ class CommandProcess:
         self._what, self._endings, self._program = what, dict(endings), tuple(program)
         self._process: subprocess.Popen[bytes] | None = None
         self._command = ""
+        self._waker: subprocess.Popen[bytes] | None = None
         self._cancelled_at: float | None = None
         self._read = 0
         self._status = CommandStatus("idle")
@@ -109,12 +110,15 @@ class CommandProcess:
         """Let the command stand still, workers and all; it keeps its memory and gives the cores free."""
         if self.status().state == "running" and self._process is not None:
             os.killpg(self._process.pid, signal.SIGSTOP)
+            self._waker = _waker(self._process.pid)
             self._status = replace(self._status, state="paused")
 
     def go_on(self) -> None:
         """Let a paused command go on."""
         if self._status.state == "paused" and self._process is not None:
             os.killpg(self._process.pid, signal.SIGCONT)
+            if self._waker is not None:
+                self._waker.communicate()
             self._status = replace(self._status, state="running")
 
     def close(self) -> None:
@@ -188,6 +192,15 @@ class CommandProcess:
             for line in _whole_lines(stream):
                 self._read += len(line)
                 self._status = advanced(self._status, line)
+
+
+def _waker(group: int) -> subprocess.Popen[bytes]:
+    """A process that lets the processes of ``group`` go on when its input ends: when this process does, however.
+
+    Otherwise a page that is killed would leave a paused command behind that nobody can wake.
+    """
+    wait = ("sh", "-c", 'read -r nothing; kill -s CONT -- "-$1"', "waker", str(group))
+    return subprocess.Popen(wait, stdin=subprocess.PIPE, stderr=subprocess.DEVNULL, start_new_session=True)
 
 
 def new_folder(folder: Path, stem: str) -> Path:

@@ -36,7 +36,8 @@ from solver.scene import Scene
 
 EVENTS_REMEMBERED = 1000
 
-FRAME_INTERVAL = 1.0 / 30.0
+FRAME_INTERVAL = 1.0 / 36.0
+"""Seconds between two looks at the newest frame: 30 a second are promised, and some come late or bring nothing new."""
 PANEL_INTERVAL = 0.2
 BACKGROUND_INTERVAL = 0.5
 """Seconds between two looks at studies and diagnoses."""
@@ -107,6 +108,7 @@ class Page:
     def run(self, stop: threading.Event) -> None:
         """Keep the page up to date until ``stop`` is set."""
         panels_due = background_due = 0.0
+        frame_due = time.monotonic()
         while not stop.is_set():
             began = time.monotonic()
             notice = self._actions.carry_out()
@@ -127,7 +129,9 @@ class Page:
                 if began >= background_due:
                     background_due = began + BACKGROUND_INTERVAL
                     self._show_background()
-            stop.wait(max(0.0, FRAME_INTERVAL - (time.monotonic() - began)))
+            # Counted from when the last frame was due, so that what waits too long does not add up.
+            frame_due = max(frame_due + FRAME_INTERVAL, time.monotonic())
+            stop.wait(frame_due - time.monotonic())
 
     def _forget_what_comes_later(self, status: Status) -> None:
         if status.time < self._time:  # brought back, or another pour
