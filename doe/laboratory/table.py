@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from doe.laboratory.columns import Column, Layout
+from doe.text_file import read_text
 
 MOST_BYTES = 50_000_000
 NAME = re.compile(r"[A-Za-z0-9_-]{1,60}")
@@ -74,16 +75,7 @@ def read_table(path: Path, layout: Layout) -> Table:
 
 def _numbered_cells(path: Path) -> Iterator[tuple[int, list[str]]]:
     """Rows that are neither empty nor a comment, with their numbers."""
-    try:
-        if path.stat().st_size > MOST_BYTES:
-            raise LaboratoryError(f"{path}: {path.stat().st_size} bytes; allowed: up to {MOST_BYTES}")
-        text = path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise LaboratoryError(f"{path}: no such file") from None
-    except UnicodeDecodeError:
-        raise LaboratoryError(f"{path}: not a text file in UTF-8 (a spreadsheet? save it as CSV)") from None
-    except OSError as error:
-        raise LaboratoryError(f"{path}: {error.strerror}") from None
+    text = read_text(path, MOST_BYTES, LaboratoryError)
     for number, line in enumerate(text.splitlines(), start=1):
         bare = line.partition("#")[0].strip()
         if not bare.strip(","):

@@ -16,9 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.errors import MeasurementError
+from doe.text_file import read_text
 from solver import ParameterError, all_names, named, parse_quantity
 
 Array = npt.NDArray[np.float64]
+MOST_BYTES = 50_000_000
 COLUMNS = ["replicate", "observable", "x", "value"]
 UNIT_SUFFIXES = ("m", "cm", "mm", "um", "s", "ms", "kg", "g", "mg", "deg", "rad")
 """Endings by which a name is recognised as an observable in another unit."""
@@ -47,12 +49,7 @@ class LongForm:
 
 def read_long_form(path: Path) -> LongForm:
     """The table in ``path``; MeasurementError in one line naming file, line and what is allowed."""
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except FileNotFoundError:
-        raise MeasurementError(f"{path}: no such file") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise MeasurementError(f"{path}: cannot be read as text: {error}") from None
+    lines = read_text(path, MOST_BYTES, MeasurementError).splitlines()
     rows, unknown = [], set()
     for row in _rows(path, lines):
         if isinstance(row, str):

@@ -10,8 +10,9 @@ from pathlib import Path
 
 from doe.audit import Printed, printed
 from doe.errors import AuditError
+from doe.text_file import read_text
 
-LARGEST = 2_000_000
+MOST_BYTES = 2_000_000
 """Bytes of one file; published tables hold thousands."""
 
 
@@ -55,14 +56,7 @@ def read_table(folder: Path, name: str) -> Table:
     if Path(name).name != name or not name:
         raise AuditError(f"{name!r} is not the name of a file beside study.toml")
     path = folder / name
-    if not path.is_file():
-        raise AuditError(f"{path}: no such file")
-    if path.stat().st_size > LARGEST:
-        raise AuditError(f"{path}: {path.stat().st_size} bytes; allowed are up to {LARGEST}")
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise AuditError(f"{path}: not a text file in UTF-8") from None
+    text = read_text(path, MOST_BYTES, AuditError)
     try:
         rows = [(number, row) for number, row in _lines(text) if any(cell.strip() for cell in row)]
     except csv.Error as error:

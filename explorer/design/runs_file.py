@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.errors import StudyFileError
+from doe.text_file import read_text
 from explorer.design.factors_file import RESERVED, Factor, make_factor, no_repeats, region_of
 from explorer.errors import CommandError
 
@@ -85,7 +86,7 @@ def read_sheet(path: Path, factors: Sequence[Factor] = ()) -> Sheet:
 
     Raises CommandError with one line: file, line, column, what is allowed.
     """
-    design, declared, rest = _comments(path, _text(path))
+    design, declared, rest = _comments(path, read_text(path, MOST_BYTES, CommandError))
     known = tuple(factors) or declared
     if not known:
         raise CommandError(f"{path}: no line '# factor | name | low | high | unit'; allowed: with --factors FILE")
@@ -164,18 +165,6 @@ def _check_words(sheet: Sheet, response: str) -> None:
             raise CommandError(
                 f"{sheet.path}: {what} {_short(text)} of a response; allowed: up to 60 characters, no < > & or quotes"
             )
-
-
-def _text(path: Path) -> str:
-    if path.stat().st_size > MOST_BYTES:
-        raise CommandError(f"{path}: {path.stat().st_size / 1e6:.0f} MB; allowed: a sheet of up to 10 MB")
-    try:
-        text = path.read_bytes().decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise CommandError(f"{path}: is not text in UTF-8; save the sheet as 'CSV UTF-8'") from None
-    if "\0" in text:
-        raise CommandError(f"{path}: is not a text file; save the sheet as CSV")
-    return text
 
 
 def _comments(path: Path, text: str) -> tuple[str, tuple[Factor, ...], list[tuple[int, str]]]:
