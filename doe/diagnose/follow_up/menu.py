@@ -63,12 +63,13 @@ def next_experiment(
     if not verdict.kind.startswith("ambiguous"):
         return Menu((), 0)
     rivals = {name: fitted(verdict, name) for name in verdict.names}
-    items, run_now = [], 0
-    width = len(summary_names(condition))
-    for name, scene in feasible(condition.scene).items():
-        model = ModelPours([replace(condition, name=name, scene=scene)], paths, store, pours, on_pour)
-        found = {label: confirm(one, model, POURS, [width]).blocks[0] for label, one in rivals.items()}
-        run_now += model.run_now
+    set_ups = [replace(condition, name=name, scene=scene) for name, scene in feasible(condition.scene).items()]
+    # All set-ups at once, so that no core waits for the last pour of one of them.
+    model, widths = ModelPours(set_ups, paths, store, pours, on_pour), [len(summary_names(one)) for one in set_ups]
+    blocks = {label: confirm(one, model, POURS, widths).blocks for label, one in rivals.items()}
+    items = []
+    for k, set_up in enumerate(set_ups):
+        found = {label: block[k] for label, block in blocks.items()}
         if min(len(block) for block in found.values()) < POURS // 2:
             continue  # a set-up that jams tells nothing
         spread = np.mean([np.cov(block, rowvar=False) for block in found.values()], axis=0)
@@ -77,18 +78,18 @@ def next_experiment(
         pour = 0.5 * (spread + np.diag(np.diag(spread)))[np.ix_(varies, varies)]
         items.append(
             MenuItem(
-                name,
+                set_up.name,
                 {label: Prediction(b.mean(axis=0)[varies], pour / len(b)) for label, b in found.items()},
                 pour,
             )
         )
     if not items or len(rivals) < 2:
-        return Menu((), run_now)
+        return Menu((), model.run_now)
     best = min(model.criterion for model in verdict.models)
     weights = {m.label: math.exp((best - m.criterion) / 2.0) for m in verdict.models if m.label in rivals}
     asked = dict.fromkeys(name for rival in rivals for name in rival.split("+"))
     levers = tuple(f"{name}: {EFFECTS[name].lever}" for name in asked)
-    return Menu(tuple(Suggestion(one, levers) for one in rank_experiments(items, weights, PLANNED)), run_now)
+    return Menu(tuple(Suggestion(one, levers) for one in rank_experiments(items, weights, PLANNED)), model.run_now)
 
 
 def feasible(scene: Scene) -> dict[str, Scene]:

@@ -9,7 +9,8 @@ from doe.diagnose import diagnosis
 from doe.diagnose.follow_up import menu
 from doe.diagnose.runs import Effect, Observed
 from doe.diagnose.simulation.pours import Pour
-from doe.diagnose.simulation.screen import REPLICATES, TOO_FAR, Budget, scaled_range, whitened_shift
+from doe.diagnose.simulation.ranges import REPLICATES, TOO_FAR, answered, scaled_range, whitened_shift
+from doe.diagnose.simulation.screen import Budget
 from doe.measurement.load import load_measurement
 from doe.measurement.summaries import summaries_of_data, summary_names
 from solver import EFFECTS
@@ -176,7 +177,9 @@ def test_a_range_that_goes_too_far_is_drawn_in(measurement):
 
     model = Strong([condition], [], None, None)
     centre = model.run("middle", diagnosis_middle(declared))
-    effect, shift = scaled_range(declared, Effect("rolling_resistance", (0.0,), (1.0,)), model, 4, centre)
+    ((effect, shift),) = answered(
+        [scaled_range(declared, Effect("rolling_resistance", (0.0,), (1.0,)), 4, centre)], model
+    )
     assert 0.0 < effect.high[0] < 0.5
     assert shift <= TOO_FAR
 

@@ -11,7 +11,7 @@ from doe.diagnose.follow_up.confirm import Model, confirm
 from doe.diagnose.runs import Condition, Declared
 from doe.diagnose.simulation import pours as module
 from doe.diagnose.simulation.pours import ModelPours, Pour
-from doe.diagnose.simulation.screen import whitened_shift
+from doe.diagnose.simulation.ranges import whitened_shift
 from doe.store import Store
 from solver import Outcome, value
 from tests.blind.laboratory import OBSERVABLES, declared_model

@@ -1,0 +1,135 @@
+"""How far each effect is simulated: from zero to where it shifts the summaries clearly.
+
+With the parameters in the middle, a range ends where the effect shifts the summaries by ``WANTED`` standard errors of a
+data set of ``REPLICATES`` pours, or at the end of what the literature supports if that comes first. The searches of all
+effects go on side by side, a round of each at a time, so that no core waits for the last pour of one of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Generator, Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.diagnose.runs import Declared, Effect
+from doe.diagnose.simulation.plan import Point, scaling_points
+from doe.diagnose.simulation.pours import ModelPours, Pour
+
+FloatArray = npt.NDArray[np.float64]
+Rows = Sequence[Sequence[Pour]]
+"""Pours per point and condition."""
+Search = Generator[list[Point], Rows, tuple[Effect, float]]
+"""Asks for pours of points, as often as it needs, and ends with the effect over its range and the shift [σ] there."""
+
+REPLICATES = 6
+WANTED = 16.0
+"""Shift [standard errors] at the end of a range: beyond the 10 at which an effect has to be told for certain."""
+TOO_LITTLE, TOO_FAR = 12.0, 24.0
+"""Shifts [standard errors] that will do; less only where the literature's bounds allow no more."""
+LEAST_STEP = 0.05
+"""A range shrinks by no more than this factor at once: the answer to a strong effect may saturate."""
+ROUNDS = 6
+UNSEEN = 3.0
+"""Shift [standard errors] by the whole range below which an effect is not simulated further: the race would not admit
+it (`Limits.reach`)."""
+SECOND_LOOK = 8
+"""Pours by which that is decided."""
+
+
+def ranges(declared: Declared, model: ModelPours, number: int, centre: Rows) -> list[tuple[Effect, float]]:
+    """The effects over their ranges, and the shift [σ] at the end, by ``number`` pours per trial and condition."""
+    return answered([search(declared, effect, number, centre) for effect in declared.effects], model)
+
+
+def answered(searches: Sequence[Search], model: ModelPours) -> list[tuple[Effect, float]]:
+    """What ``searches`` find; what they ask for in a round is poured together."""
+    found: dict[int, tuple[Effect, float]] = {}
+    asked = {k: next(one) for k, one in enumerate(searches)}
+    while asked:
+        rows = iter(model.run("ranges of the effects", [point for points in asked.values() for point in points]))
+        answers = {k: [next(rows) for _ in points] for k, points in asked.items()}
+        asked = {}
+        for k, pours in answers.items():
+            try:
+                asked[k] = searches[k].send(pours)
+            except StopIteration as end:
+                found[k] = end.value
+    return [found[k] for k in range(len(searches))]
+
+
+def search(declared: Declared, effect: Effect, number: int, centre: Rows) -> Search:
+    """The range of one effect, which is looked at twice where all of it seems to shift too little."""
+    found, shift = yield from scaled_range(declared, effect, number, centre)
+    if shift < UNSEEN and found.high == effect.high:
+        found, shift = yield from looked_twice(declared, effect, centre)
+    return found, shift
+
+
+def looked_twice(declared: Declared, effect: Effect, centre: Rows) -> Search:
+    """``effect`` by ``SECOND_LOOK`` pours at its whole range, named unseen where they shift too little, and the shift.
+
+    Two pours may hide five standard errors; so many do not hide much more than the three that could be told at all.
+    """
+    pours = yield scaling_points(declared.parameters, effect, SECOND_LOOK)
+    shift = whitened_shift(declared, centre, pours)
+    return (replace(effect, unseen=shift) if shift < UNSEEN else effect), shift
+
+
+def scaled_range(declared: Declared, effect: Effect, number: int, centre: Rows) -> Search:
+    """``effect`` with its bounds drawn in to where the summaries shift by about ``WANTED``, and the shift [σ].
+
+    From the whole range inward; back out, halfway on a logarithmic scale, where a step inward went too far.
+    """
+    found, share, inside, beyond = (effect, 0.0), 1.0, 0.0, math.inf
+    for _ in range(ROUNDS):
+        trial = _drawn_in(effect, share)
+        pours = yield scaling_points(declared.parameters, trial, number)
+        shift = whitened_shift(declared, centre, pours)
+        if shift > TOO_FAR:
+            beyond = share
+            share = max(share * max(LEAST_STEP, WANTED / shift), math.sqrt(inside * beyond))
+            if inside == 0.0:
+                found = _drawn_in(effect, share), shift
+            continue
+        inside, found = share, (trial, shift)
+        if shift >= TOO_LITTLE or math.isinf(beyond):
+            break
+        share = math.sqrt(inside * beyond)
+    return found
+
+
+def _drawn_in(effect: Effect, share: float) -> Effect:
+    low, high = (tuple(share * bound for bound in bounds) for bounds in (effect.low, effect.high))
+    return replace(effect, low=low, high=high)
+
+
+def whitened_shift(declared: Declared, centre: Rows, moved: Rows) -> float:
+    """Distance of the means of two sets of pours in standard errors of ``REPLICATES`` pours, all conditions together.
+
+    The covariance is that of ``centre``, shrunk halfway to its diagonal (they are few). Pours that broke off are left
+    out; infinite if a condition has none left.
+    """
+    square = 0.0
+    for c in range(len(declared.conditions)):
+        still = _valid(centre, c)
+        there = _valid(moved, c)
+        if len(there) == 0:
+            return float("inf")
+        spread = still.std(axis=0, ddof=1)
+        varies = spread > 0.0
+        covariance = np.cov(still[:, varies], rowvar=False)
+        covariance = 0.5 * (np.atleast_2d(covariance) + np.diag(spread[varies] ** 2))
+        step = (there.mean(axis=0) - still.mean(axis=0))[varies]
+        # What noise alone adds to the square, on average.
+        noise = REPLICATES * varies.sum() * (1.0 / len(there) + 1.0 / len(still))
+        square += max(0.0, REPLICATES * float(step @ np.linalg.solve(covariance, step)) - noise)
+    return float(np.sqrt(square))
+
+
+def _valid(pours: Rows, condition: int) -> FloatArray:
+    rows = [row[condition].summaries for row in pours if row[condition].valid]
+    complete = [row for row in rows if np.isfinite(row).all()]
+    return np.array(complete) if complete else np.empty((0, 0))

@@ -1,0 +1,92 @@
+"""How far an effect's range is drawn in, on made-up answers of known size."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from doe.diagnose.runs import Effect
+from doe.diagnose.simulation.pours import Pour
+from doe.diagnose.simulation.ranges import TOO_FAR, TOO_LITTLE, answered, looked_twice, ranges, scaled_range
+from tests.doe.diagnose.simulation.made_up_pours import DECLARED, STANDARD_ERROR, Noisy
+
+
+class Answering:
+    """Pours of which the first summary is ``answer`` (amplitude), in standard errors, the second nothing."""
+
+    def __init__(self, answer):
+        self.answer, self.tried = answer, []
+
+    def run(self, what, points):
+        ((_, (amplitude,)),) = points[0].effects
+        self.tried.append(amplitude)
+        return [[Pour((self.answer(amplitude) * STANDARD_ERROR, 0.0), "measured")] for _ in points]
+
+
+@pytest.fixture
+def centre():
+    rows = np.random.default_rng(1).normal(size=(400, 2))
+    rows = (rows - rows.mean(axis=0)) / rows.std(axis=0, ddof=1)
+    return [[Pour(tuple(row), "measured")] for row in rows]
+
+
+@pytest.mark.parametrize(
+    ("answer", "share"),
+    [
+        (lambda a: 5.0 * a, (1.0, 1.0)),  # too weak for more: all that the literature allows
+        (lambda a: 20.0 * a, (1.0, 1.0)),
+        (lambda a: 100.0 * a, (0.12, 0.24)),
+        (lambda a: 1000.0 * a**2, (0.109, 0.155)),  # the step inward goes too far, and is taken back
+        (lambda a: 30.0 * min(1.0, 10.0 * a), (0.04, 0.08)),  # saturates
+    ],
+)
+def test_the_range_ends_where_the_shift_is_about_the_wanted_one(centre, answer, share):
+    """The shares follow from answer(share) = TOO_LITTLE … TOO_FAR; 20 % for what noise takes off the square."""
+    model = Answering(answer)
+    found, shift = _found(scaled_range(DECLARED, Effect("e", (0.0,), (1.0,)), 3, centre), model)
+    low, high = share
+    assert 0.8 * low <= found.high[0] <= 1.2 * high
+    assert shift <= TOO_FAR
+    assert shift >= TOO_LITTLE or found.high == (1.0,)
+    assert model.tried[-1] == found.high[0]
+
+
+def test_an_effect_that_is_too_strong_everywhere_is_drawn_in_as_far_as_it_goes(centre):
+    found, shift = _found(scaled_range(DECLARED, Effect("e", (-1.0,), (1.0,)), 3, centre), Answering(lambda a: 100.0))
+    assert 0.0 < found.high[0] < 0.01
+    assert found.low == (-found.high[0],)
+    assert shift > TOO_FAR
+
+
+def test_an_effect_of_five_standard_errors_is_not_given_up(centre):
+    effect, kept = Effect("e", (0.0,), (1.0,)), 0
+    for seed in range(40):
+        model = Noisy(e=5.0)
+        model.rng = np.random.default_rng(seed)
+        kept += _found(looked_twice(DECLARED, effect, centre), model)[0].unseen is None
+    # Eight pours: the shift of 5 is measured with a standard error of 0.9.
+    assert kept >= 36
+
+
+def test_searches_side_by_side_find_what_each_finds_alone(centre):
+    """One that ends at once beside one of several rounds: the answers are not mixed up, and a round is one queue."""
+    declared = replace(DECLARED, effects=(Effect("weak", (0.0,), (1.0,)), Effect("strong", (0.0,), (1.0,))))
+
+    class Both(Noisy):
+        def run(self, what, points):
+            self.asked.append({name for point in points for name, _ in point.effects})
+            (shifts,) = [[sum(self.answers[n] * a for n, (a,) in p.effects) * STANDARD_ERROR for p in points]]
+            return [[Pour((shift, 0.0), "measured")] for shift in shifts]
+
+    model = Both(weak=14.0, strong=100.0)
+    (weak, _), (strong, _) = ranges(declared, model, 3, centre)
+    assert model.asked == [{"weak", "strong"}, {"strong"}]
+    assert weak.high == (1.0,)
+    alone = _found(scaled_range(DECLARED, declared.effects[1], 3, centre), Both(strong=100.0))[0]
+    assert strong == alone
+    assert 0.1 < strong.high[0] < 0.25
+
+
+def _found(search, model):
+    (found,) = answered([search], model)
+    return found
