@@ -21,7 +21,7 @@ Array = npt.NDArray[np.float64]
 
 LOADED_ONCE = frozenset(
     (
-        *("mass", "inertia", "inverse_mass", "inverse_inertia", "reach", "semi_axes", "diameter", "sphericity"),
+        *("mass", "inertia", "inverse_mass", "inverse_inertia", "reach", "semi_axes", "diameter", "drag_factors"),
         *("swing", "first", "members", "kind", "local", "radius", "body"),
     )
 )

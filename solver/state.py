@@ -65,7 +65,7 @@ BODY = {
     "reach": ti.f64,  # radius of the bounding sphere [m]
     "semi_axes": Vec3,  # half the outer dimensions along the principal axes [m]
     "diameter": ti.f64,  # of the sphere of the same volume [m]
-    "sphericity": ti.f64,  # surface of that sphere over the body's
+    "drag_factors": Vec4,  # a, b, c, d of its drag coefficient (`effects/air_drag.py`)
     "swing": ti.f64,  # largest distance of a member's centre from the centre of mass [m]
     "travel": ti.f64,  # bound on the motion of any of its members' centres since the list was built [m]
     "first": ti.i32,  # index of the first member sphere

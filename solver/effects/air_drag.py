@@ -26,13 +26,20 @@ AIR_VISCOSITY = 1.825e-5
 
 
 @kernel_function
-def drag_coefficient(reynolds, phi):
-    """C_D of Haider & Levenspiel (1989)."""
+def shape_factors(phi):
+    """a, b, c, d of a body of sphericity φ; they are worked out once, when it is loaded."""
     a = ti.exp(2.3288 - 6.4581 * phi + 2.4486 * phi * phi)
     b = 0.0964 + 0.5565 * phi
     c = ti.exp(4.905 - 13.8944 * phi + 18.4222 * phi**2 - 10.2599 * phi**3)
     d = ti.exp(1.4681 + 12.2584 * phi - 20.7322 * phi**2 + 15.8855 * phi**3)
-    return 24.0 / reynolds * (1.0 + a * reynolds**b) + c / (1.0 + d / reynolds)
+    return ti.Vector([a, b, c, d])
+
+
+@kernel_function
+def drag_coefficient(reynolds, factors):
+    """C_D of Haider & Levenspiel (1989); ``factors`` by :func:`shape_factors`."""
+    viscous = 24.0 / reynolds * (1.0 + factors[0] * reynolds ** factors[1])
+    return viscous + factors[2] / (1.0 + factors[3] / reynolds)
 
 
 @kernel_function
@@ -52,7 +59,7 @@ def drag(p, b):
     if speed > 1e-6:
         reynolds = AIR_DENSITY * speed * b.diameter / AIR_VISCOSITY
         area = shown_area(b.semi_axes, b.rotation.transpose() @ (b.velocity / speed))
-        coefficient = drag_coefficient(reynolds, b.sphericity)
+        coefficient = drag_coefficient(reynolds, b.drag_factors)
         force = -p[0] * 0.5 * AIR_DENSITY * coefficient * area * speed * b.velocity
     return force
 

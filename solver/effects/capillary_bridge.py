@@ -23,12 +23,16 @@ from solver.params import param
 def bridge(p, m, c):
     """p: γ cos θ, V, 1 + θ/2."""
     radius, volume = 2.0 * c.reduced_radius, p[1]
-    gap = ti.max(0.0, -c.overlap)
-    # s < s_c, solved for V*^⅓ so that no cube root is taken: v + 0.1 v² = s/((1 + θ/2) R), and v³ < V*.
-    needed = 5.0 * (ti.sqrt(1.0 + 0.4 * gap / (p[2] * radius)) - 1.0) * radius
-    if needed * needed * needed < volume:
-        s = 0.5 * gap * ti.sqrt(radius / volume)
-        pull = 2.0 * math.pi * radius * p[0] / (1.0 + 2.1 * s + 10.0 * s * s)
+    pull = 2.0 * math.pi * radius * p[0]
+    held = 1
+    if c.overlap < 0.0:
+        # s < s_c, solved for V*^⅓ so that no cube root is taken: v + 0.1 v² = s/((1 + θ/2) R), and v³ < V*.
+        needed = 5.0 * (ti.sqrt(1.0 - 0.4 * c.overlap / (p[2] * radius)) - 1.0) * radius
+        s = -0.5 * c.overlap * ti.sqrt(radius / volume)
+        pull /= 1.0 + 2.1 * s + 10.0 * s * s
+        if needed * needed * needed >= volume:
+            held = 0
+    if held == 1:
         c.elastic -= pull
         c.pull += pull
         c.floor -= pull

@@ -1,7 +1,7 @@
 """What an effect sees of one contact and of one body, inside a kernel."""
 
 from solver.backend import ti
-from solver.state import Vec3
+from solver.state import Vec3, Vec4
 
 Touch = ti.types.struct(
     # Geometry and motion: body i is pushed by j along the normal, from j to i.
@@ -40,6 +40,6 @@ Flight = ti.types.struct(
     rotation=ti.types.matrix(3, 3, ti.f64),  # principal frame → world
     semi_axes=Vec3,  # half the outer dimensions along the principal axes [m]
     diameter=ti.f64,  # of the sphere of the same volume [m]
-    sphericity=ti.f64,  # surface of that sphere over the body's
+    drag_factors=Vec4,  # a, b, c, d of its drag coefficient (`air_drag.py`)
 )
 """One body."""

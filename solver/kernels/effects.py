@@ -70,7 +70,7 @@ def body_force(s: ti.template(), w, b):
                 rotation=rotation(s.body.quaternion[w, b]),
                 semi_axes=s.body.semi_axes[w, b],
                 diameter=s.body.diameter[w, b],
-                sphericity=s.body.sphericity[w, b],
+                drag_factors=s.body.drag_factors[w, b],
             )
             force += BODY_ACTS[index](p, flight)
     return force

@@ -1,6 +1,7 @@
 """Everything that crosses between NumPy and the arrays of a batch: one small kernel per errand."""
 
 from solver.backend import ti
+from solver.effects.air_drag import shape_factors
 from solver.kernels.geometry import rotation
 from solver.kernels.sleep import rouse_all
 from solver.state import Ints3, Mat3, Vec3, Vec4, Vec5
@@ -67,7 +68,7 @@ def load_bodies(s: ti.template(), w: ti.i32, numbers: Table, places: IntTable, s
         s.body.reach[w, b] = numbers[b, 4]
         s.body.semi_axes[w, b] = triple(numbers, b, 5)
         s.body.diameter[w, b] = numbers[b, 8]
-        s.body.sphericity[w, b] = numbers[b, 9]
+        s.body.drag_factors[w, b] = shape_factors(numbers[b, 9])
         s.body.swing[w, b] = 0.0
         s.body.first[w, b] = places[b, 0]
         s.body.members[w, b] = places[b, 1]

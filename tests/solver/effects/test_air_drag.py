@@ -5,7 +5,7 @@ import pytest
 
 from solver.backend import ti
 from solver.body import Body, Members
-from solver.effects.air_drag import AIR_DENSITY, AIR_VISCOSITY, drag_coefficient, shown_area
+from solver.effects.air_drag import AIR_DENSITY, AIR_VISCOSITY, drag_coefficient, shape_factors, shown_area
 from solver.laboratory import EARTH, RADIUS, Laboratory, sphere
 from solver.layout import outline
 from solver.material import Material
@@ -21,7 +21,7 @@ FOAM = Material("grain", density=30.0, shear_modulus=1e7, poisson_ratio=0.25)
 def coefficients(inputs: ti.types.ndarray(dtype=ti.f64, ndim=2), out: ti.types.ndarray(dtype=ti.f64, ndim=1)):
     """C_D for rows of Re, φ."""
     for k in range(out.shape[0]):
-        out[k] = drag_coefficient(inputs[k, 0], inputs[k, 1])
+        out[k] = drag_coefficient(inputs[k, 0], shape_factors(inputs[k, 1]))
 
 
 @ti.kernel
