@@ -19,7 +19,7 @@ from doe.runner import Pours
 from doe.store import Store
 from solver import EFFECTS, ParameterError, Scene, parameters, value, with_values
 
-POURS = 8
+POURS = 6
 """Per model and set-up of the menu."""
 PLANNED = 6
 
