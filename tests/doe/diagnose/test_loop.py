@@ -106,7 +106,7 @@ def test_an_effect_beyond_the_first_range_is_followed(measurement, monkeypatch):
 
 
 def bent(theta, effects, condition, width):
-    """As :func:`expected`, with a full wave over the range of every effect, which ten settings cannot follow."""
+    """As :func:`expected`, with a full wave over the range of every effect, which a thin screening cannot follow."""
     mean = expected(theta, effects, condition, width)
     for name, amplitude in effects:
         for value in amplitude:
