@@ -31,8 +31,10 @@ CHANGES: dict[str, dict[str, float]] = {
     "fed four times as fast": {"insertion.rate": 4.0},
     "dropped four times as fast": {"insertion.drop_speed": 4.0},
 }
-"""Set-ups by the factors on the parameters of the first fitted condition. More mass would tell what less of it tells, at
-four times the cost."""
+"""Set-ups by the factors on the parameters of the first fitted condition.
+
+More mass would tell what less of it tells, at four times the cost.
+"""
 
 
 @dataclass(frozen=True)
