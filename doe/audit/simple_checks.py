@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -84,18 +85,36 @@ def check_total(total: Total) -> Figure:
 def check_quote(quote: Quote) -> Figure:
     """A value said again against the value in its table."""
     check, said = "values said twice", f" (“{quote.text}”)" if quote.text else ""
+    if quote.original is None and quote.among:
+        return _one_of_a_column(check, quote, said)
     if quote.original is None:
         why = f"the text does not say which value of {quote.original_where} this is{said}"
         return unchecked(check, quote.where, quote.quantity, why, quote.value.text)
     how = f"{quote.original_where} prints {quote.original.text}{said}"
-    return compared(check, quote.where, quote.quantity, quote.value, quote.original.value, how, _finer(quote))
+    found = compared(check, quote.where, quote.quantity, quote.value, quote.original.value, how, _finer(quote))
+    return replace(found, how=how + _elsewhere(quote)) if found.status == "differs" else found
+
+
+def _one_of_a_column(check: str, quote: Quote, said: str) -> Figure:
+    """A value of which the text says no more than what kind it is: there must be one like it in that column."""
+    nearest = min(quote.among, key=lambda cell: abs(cell.value - quote.value.value))
+    how = f"the nearest {quote.kind} in {quote.original_where} is {nearest.text}{said}"
+    found = compared(check, quote.where, quote.quantity, quote.value, nearest.value, how)
+    return replace(found, how=how + _elsewhere(quote)) if found.status == "differs" else found
+
+
+def _elsewhere(quote: Quote) -> str:
+    """What the table prints with the number that the text gives to something else."""
+    if not quote.elsewhere:
+        return ""
+    return f"; it prints {quote.value.text} as {' and as '.join(quote.elsewhere)}"
 
 
 def check_quotes_among_themselves(quotes: tuple[Quote, ...]) -> Iterator[Figure]:
     """Values that the same text gives differently for one quantity which no table settles."""
     by_quantity: dict[tuple[str, str], list[Quote]] = {}
     for quote in quotes:
-        if quote.original is None:
+        if quote.original is None and not quote.among:
             by_quantity.setdefault((quote.where, quote.quantity), []).append(quote)
     for (where, quantity), said in by_quantity.items():
         first = said[0].value

@@ -67,7 +67,12 @@ class Total:
 
 @dataclass(frozen=True)
 class Quote:
-    """A value of a table said again elsewhere; `original` is None where the text does not say which value it means."""
+    """A value of a table said again elsewhere.
+
+    original: the value in the table, None where the text does not say which one it means. kind: the column of the table
+    that the text names all the same, "" where it names none. among: all values in that column. elsewhere: what else the
+    table prints with this number, in words.
+    """
 
     where: str
     quantity: str
@@ -75,6 +80,9 @@ class Quote:
     original: Printed | None
     original_where: str
     text: str = ""
+    kind: str = ""
+    among: tuple[Printed, ...] = ()
+    elsewhere: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -90,6 +90,16 @@ def interaction_aliases(design: IntArray) -> tuple[FloatArray, tuple[tuple[int, 
     return (design.T @ products) / design.shape[0], pairs
 
 
+def interaction_overlap(design: IntArray) -> float:
+    """Return the largest |correlation| of two two-factor interactions, 0 … 1; 0 with fewer than three columns."""
+    if design.shape[1] < 3:
+        return 0.0
+    pairs = combinations(range(design.shape[1]), 2)
+    products = np.stack([design[:, i] * design[:, j] for i, j in pairs], axis=1)
+    shared = np.abs(products.T @ products) / len(design)
+    return float(np.max(shared - np.eye(len(shared)), initial=0.0))
+
+
 def _levels(signs: str) -> IntArray:
     return np.array([1 if sign == "+" else -1 for sign in signs], dtype=np.int64)
 

@@ -12,7 +12,7 @@ from doe.audit.study import Derived, DropTest, Measured, Quote, Target, Total
 from doe.errors import AuditError
 from explorer.audit.entries import Entries, read_entries
 from explorer.audit.read_stages import read_ascent, read_optimum, read_screening, read_surface, read_verified
-from explorer.audit.tables import Table, read_table
+from explorer.audit.tables import Table, places, read_table
 from solver.assets import asset_path
 
 FORMAT = 1
@@ -133,15 +133,20 @@ def _total(entries: Entries, folder: Path) -> Total:
 
 def _quote(entries: Entries, folder: Path) -> Quote:
     quantity, value = entries.text("quantity"), entries.figure("value")
-    original, said = None, entries.text("table")
+    where, said, text = entries.text("where"), entries.text("table"), entries.text("text", " ").strip()
+    if "file" not in entries:
+        return Quote(where, quantity, value, None, said, text)
+    table, column = read_table(folder, entries.text("file")), entries.text("column")
+    among = table.numbers(column)
+    original, elsewhere = None, places(table, value)
     if "row" in entries:
-        table, row, column = read_table(folder, entries.text("file")), entries.table("row"), entries.text("column")
+        row = entries.table("row")
         wanted = {key: row.text(key) for key in row.names()}
         found = [k for k in range(table.rows) if all(table.texts(key)[k] == text for key, text in wanted.items())]
         if len(found) != 1:
             raise entries.error("row", f"{len(found)} rows of {table.name} fit; exactly one is needed")
-        original = table.number(column, found[0])
-    return Quote(entries.text("where"), quantity, value, original, said, entries.text("text", " ").strip())
+        original = among[found[0]]
+    return Quote(where, quantity, value, original, said, text, column, among, elsewhere)
 
 
 def _drop_test(entries: Entries, folder: Path) -> DropTest:

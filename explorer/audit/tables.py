@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ from doe.audit import Printed, printed
 from doe.errors import AuditError
 from doe.text_file import read_text
 
+NUMBER = re.compile(r"-?\d+(\.\d+)?")
 MOST_BYTES = 2_000_000
 """Bytes of one file; published tables hold thousands."""
 
@@ -49,6 +51,18 @@ class Table:
     def number_or_none(self, column: str, row: int) -> Printed | None:
         """One cell, None where it is empty or the column is not there."""
         return self.number(column, row) if self.columns.get(column, ())[row : row + 1] not in ((), ("",)) else None
+
+
+def places(table: Table, value: Printed) -> tuple[str, ...]:
+    """Where the table prints ``value``, in words: "restitution of petiole–petiole"; a row is named by its words."""
+    found = []
+    for row in range(table.rows):
+        cells = {column: texts[row] for column, texts in table.columns.items()}
+        numbers = {column: NUMBER.fullmatch(text) for column, text in cells.items()}
+        name = "–".join(text for column, text in cells.items() if not numbers[column]) or f"row {row + 1}"
+        like = [c for c, is_number in numbers.items() if is_number and value.agrees(float(cells[c]))]
+        found += [f"{column} of {name}" for column in like]
+    return tuple(found)
 
 
 def read_table(folder: Path, name: str) -> Table:

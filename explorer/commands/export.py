@@ -69,7 +69,7 @@ def export(
             write_paraview(temporary, record.scene, seen, seed, str(record.outcome))
         typer.echo(f"{folder}: {len(seen)} moment(s), the last at {seen[-1].time:.4g} s; what is in them: README.txt")
         return
-    check_exportable(scene)
+    check_exportable(scene, to)
     with appearing(folder, "DIR") as temporary:
         deck = deck_of(run_pour(scene, seed), time)
         WRITERS[to](temporary, deck)

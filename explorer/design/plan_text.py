@@ -10,7 +10,7 @@ import numpy as np
 from doe.analysis.models import Order, bearable, highest_order, terms_of
 from doe.analysis.precision import TermPrecision, precision
 from doe.designs.factorial import alias_chains, defining_relation, factor_letters, generator_words
-from doe.designs.plackett_burman import interaction_aliases
+from doe.designs.plackett_burman import interaction_aliases, interaction_overlap
 from doe.record import plain
 from explorer.design.factors_file import FactorsFile, region_of
 from explorer.design.kinds import Kind
@@ -61,7 +61,7 @@ def plan_text(plan: Plan, file: FactorsFile, sigma: float | None, effect: float 
     chains = aliases(plan)
     if chains:
         parts.append("aliases (what is on the left also holds what is on the right):\n" + "\n".join(chains))
-    return "\n\n".join([*parts, _power_text(plan, sigma, effect)])
+    return "\n\n".join([*parts, *_interactions_text(plan), _power_text(plan, sigma, effect)])
 
 
 def aliases(plan: Plan) -> list[str]:
@@ -88,6 +88,19 @@ def aliases(plan: Plan) -> list[str]:
             more = len(leaks) - MOST_ALIASES
             lines.append(f"{letter}{shown}" + (f" and {more} more" if more > 0 else ""))
     return lines
+
+
+def _interactions_text(plan: Plan) -> list[str]:
+    """A sentence where main effects are clear of interactions of two, which are not clear of each other."""
+    if plan.kind != Kind.PLACKETT_BURMAN or aliases(plan):
+        return []
+    shared = interaction_overlap(plan.coded[plan.coded.any(axis=1)].astype(np.int64))
+    if shared < 1e-9:
+        return []
+    return [
+        "Main effects are clear of interactions of two factors; those share columns with each other, "
+        f"up to {_share(shared) or 'the whole '}of one. Three-factor interactions are not looked at."
+    ]
 
 
 def planned_order(plan: Plan) -> Order | None:

@@ -18,12 +18,15 @@ import numpy.typing as npt
 from explorer.errors import CommandError
 from explorer.export.triangles import revolved_triangles
 from solver import Body, Entries, Record, Scene
+from solver.effects.rolling_resistance import RollingResistance
 from solver.effects.set_up import actual
 from solver.rigs import Funnel, Plane, Revolved
 from solver.scene import pour_rig
 
 Array = npt.NDArray[np.float64]
 FILE = "deck.json"
+HOLDS = {"liggghts": (RollingResistance.name,), "yade": ()}
+"""Effects that an engine's deck can hold: its law has the same one."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,8 @@ class Deck:
     """μ, shape (classes, classes)."""
     restitution: Array
     """e of a single contact, shape (classes, classes)."""
+    rolling_friction: float
+    """μ_r of all contacts: a torque spring k_t R*² with its cap at μ_r R* F_n; 0: nothing resists rolling."""
     entries: Entries
     plate: float | None
     """Height of the infinite plate [m]; None: there is none."""
@@ -102,7 +107,7 @@ def deck_of(record: Record, time: float | None = None) -> Deck:
         CommandError: the scene has something that no exported deck can hold.
     """
     scene = record.scene
-    check_exportable(scene)
+    check_exportable(scene, *HOLDS)
     steps = record.steps if time is None else math.ceil(time / record.dt)
     return assembled(
         scene,
@@ -115,16 +120,21 @@ def deck_of(record: Record, time: float | None = None) -> Deck:
     )
 
 
-def check_exportable(scene: Scene) -> None:
-    """Raise :class:`CommandError` if ``scene`` has something that no exported deck can hold.
+def check_exportable(scene: Scene, *engines: str) -> None:
+    """Raise :class:`CommandError` if ``scene`` has something that the deck of none of ``engines`` can hold.
 
-    Effects of material and set-up are carried out in a deck; those of contacts and flight have no equal there.
+    Effects of material and set-up are carried out in a deck; of those of contacts and flight ``HOLDS`` says which have
+    an equal there.
     """
     scene = actual(scene)
     for effect in scene.effects:
-        if effect.on:
-            amplitude = f"effect.{effect.name}.{effect.amplitudes[0]}"
-            raise CommandError(f"{amplitude}: {effect.numbers[0]:g} cannot be exported; allowed: 0")
+        held = any(effect.name in HOLDS[engine] for engine in engines)
+        if effect.on and not held:
+            amplitude, where = f"effect.{effect.name}.{effect.amplitudes[0]}", " or ".join(engines)
+            raise CommandError(f"{amplitude}: {effect.numbers[0]:g} cannot be exported to {where}; allowed: 0")
+    damping = rolling(scene).rolling_damping
+    if rolling(scene).on and damping > 0.0:
+        raise CommandError(f"effect.rolling_resistance.rolling_damping: {damping:g} cannot be exported; allowed: 0")
     if not isinstance(scene.rig, Funnel):
         raise CommandError(f"rig {getattr(scene.rig, 'name', '?')!r} cannot be exported; allowed: funnel")
     for body in scene.bodies:
@@ -133,6 +143,11 @@ def check_exportable(scene: Scene) -> None:
                 f"body.{body.name}.size_distribution: {body.sizes.kind!r} cannot be exported, a deck has one clump per "
                 "component; allowed: none"
             )
+
+
+def rolling(scene: Scene) -> RollingResistance:
+    """The scene's rolling resistance, which may be off."""
+    return cast(RollingResistance, scene.effect(RollingResistance.name))
 
 
 def assembled(
@@ -158,6 +173,7 @@ def assembled(
         wall_poisson_ratio=wall.poisson_ratio,
         friction=friction,
         restitution=restitution,
+        rolling_friction=rolling(scene).rolling_friction,
         entries=entries,
         plate=plate,
         meshes=meshes,

@@ -45,6 +45,8 @@ SKIN, CELL = 0.9, 6.0
 were found for the seed pour. By default the box is cut into cells of half a contact distance, and to empty millions of
 them takes longer than everything else."""
 MODEL = "model hertz tangential history"
+ROLLING = " rolling_friction epsd2"
+"""Added to the model where something resists rolling: the law of our ``rolling_resistance``, without a dashpot."""
 
 
 def unclamped_restitution(restitution: float) -> float:
@@ -72,12 +74,19 @@ def write_liggghts(folder: Path, deck: Deck) -> None:
     write_readme(folder, "liggghts", deck)
 
 
-def model_lines(moduli: list[float], ratios: list[float], restitution: Array, friction: Array) -> list[str]:
+def model(rolling_friction: float) -> str:
+    """The contact law, in words of LIGGGHTS."""
+    return MODEL + (ROLLING if rolling_friction > 0.0 else "")
+
+
+def model_lines(
+    moduli: list[float], ratios: list[float], restitution: Array, friction: Array, rolling_friction: float = 0.0
+) -> list[str]:
     """Materials by class and pairs of classes, and the contact law between particles.
 
     Raises :class:`CommandError` where a restitution is too low for LIGGGHTS.
     """
-    n = len(moduli)
+    n, rolling = len(moduli), [rolling_friction] * len(moduli) ** 2
     replaced = np.vectorize(unclamped_restitution, otypes=[float])(restitution)
     if replaced.min() <= LEAST_RESTITUTION:
         raise CommandError(
@@ -93,7 +102,12 @@ def model_lines(moduli: list[float], ratios: list[float], restitution: Array, fr
         f"fix poisson all property/global poissonsRatio peratomtype {_row(ratios)}",
         f"fix restitution all property/global coefficientRestitution peratomtypepair {n} {_row(replaced.ravel())}",
         f"fix friction all property/global coefficientFriction peratomtypepair {n} {_row(friction.ravel())}",
-        f"pair_style gran {MODEL} limitForce on",
+        *(
+            [f"fix rolling all property/global coefficientRollingFriction peratomtypepair {n} {_row(rolling)}"]
+            if rolling_friction > 0.0
+            else []
+        ),
+        f"pair_style gran {model(rolling_friction)} limitForce on",
         "pair_coeff * *",
     ]
 
@@ -133,9 +147,10 @@ def run_lines(steps: int, dt: float) -> list[str]:
     ]
 
 
-def plane_line(name: str, wall: int, axis: str, place: float) -> str:
+def plane_line(name: str, wall: int, axis: str, place: float, rolling_friction: float = 0.0) -> str:
     """An infinite plane of material ``wall`` across ``axis`` (x, y, z) at ``place`` [m]; R* is the sphere's radius."""
-    return f"fix {name} all wall/gran {MODEL} primitive type {wall} {axis}plane {place!r} limitForce on"
+    plane = f"primitive type {wall} {axis}plane {place!r}"
+    return f"fix {name} all wall/gran {model(rolling_friction)} {plane} limitForce on"
 
 
 COLUMNS = "id radius x y z vx vy vz omegax omegay omegaz"
@@ -152,11 +167,11 @@ def _input(deck: Deck) -> list[str]:
         f"# {deck.title}, seed {deck.seed}: {deck.bodies} bodies, {deck.steps} steps of {deck.dt:.6g} s",
         *settings_lines(deck.box, wall, SKIN * largest),
         f"neigh_modify binsize {CELL * largest:.12g}",
-        *model_lines(moduli, ratios, deck.restitution, deck.friction),
+        *model_lines(moduli, ratios, deck.restitution, deck.friction, deck.rolling_friction),
         *gravity_lines(deck.gravity),
-        *([] if deck.plate is None else [plane_line("plate", wall, "z", deck.plate)]),
+        *([] if deck.plate is None else [plane_line("plate", wall, "z", deck.plate, deck.rolling_friction)]),
         *(f"fix {mesh.name} all mesh/surface file {mesh.name}.stl type {wall}" for mesh in deck.meshes),
-        *_mesh_wall_lines([mesh.name for mesh in deck.meshes]),
+        *_mesh_wall_lines([mesh.name for mesh in deck.meshes], deck.rolling_friction),
         *(line for k, clump in enumerate(deck.clumps, start=1) for line in _template_lines(k, clump)),
         "fix motion all multisphere",
         *run_lines(deck.steps, deck.dt),
@@ -166,11 +181,12 @@ def _input(deck: Deck) -> list[str]:
     ]
 
 
-def _mesh_wall_lines(names: list[str]) -> list[str]:
+def _mesh_wall_lines(names: list[str], rolling_friction: float) -> list[str]:
     """All meshes as one wall; LIGGGHTS allows no more than one of this kind."""
     if not names:
         return []
-    return [f"fix walls all wall/gran {MODEL} mesh n_meshes {len(names)} meshes {' '.join(names)} limitForce on"]
+    law, meshes = model(rolling_friction), f"n_meshes {len(names)} meshes {' '.join(names)}"
+    return [f"fix walls all wall/gran {law} mesh {meshes} limitForce on"]
 
 
 def _template_lines(k: int, clump: Clump) -> list[str]:
@@ -205,7 +221,7 @@ def _runs(deck: Deck) -> list[str]:
         if 0 <= mesh.until_step < deck.steps:
             there.remove(mesh.name)
             lines += [f"run {mesh.until_step + 1 - done}", "unfix walls", f"unfix {mesh.name}"]
-            lines += _mesh_wall_lines(there)
+            lines += _mesh_wall_lines(there, deck.rolling_friction)
             done = mesh.until_step + 1
     return [*lines, f"run {deck.steps + 1 - done}"]
 

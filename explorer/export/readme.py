@@ -37,6 +37,26 @@ DIFFERENCES = {
         Normal force and both dampings: the same functions. Tangential force: YADE does not scale the spring down while
         a contact unloads. A sphere on an edge between two triangles of the cone is pushed by both.""",
 }
+MODULI = """\
+        moduli            Young's modulus and Poisson's ratio; 1/E* = sum of (1 - nu^2)/E, G from both: as here"""
+COMMON = """\
+        rolling friction  {rolling}
+        mass, inertia     of the true shape, not of overlapping spheres: as here
+        R*, m*            reduced radius of two member spheres (a wall: infinite) and mass of two bodies: as here"""
+CONVENTIONS = {
+    "liggghts": f"""\
+{MODULI}
+        restitution       in.liggghts holds those of the same damping, each lower than the one declared, which comes out
+        static friction   Coulomb, |F_t| <= mu F_n: as here
+{COMMON}""",
+    "yade": f"""\
+{MODULI}
+        restitution       law.json holds damping ratios instead, half of our c_n and c_t: as here
+        static friction   law.json holds the angle, atan mu; Coulomb, |F_t| <= mu F_n: as here
+{COMMON}""",
+}
+NO_ROLLING = "none: nothing resists rolling, here or there"
+EPSD2 = "{mu:g}, epsd2: a spring k_t R*^2, torque up to mu_r R* F_n, as here; elsewhere the number means something else"
 TEXT = """\
 {title}
 {bodies} bodies, {spheres} member spheres, seed {seed}; {steps} steps of {dt:.6g} s = {time:.6g} s simulated.
@@ -56,6 +76,9 @@ Read
                   one after the other in the order of its clump (deck.json: clumps, entries.component).
                   The form is that of a LAMMPS dump; OVITO opens it.
 
+Conventions
+{conventions}
+
 Not as in explorer
 {differences}
     The cone is a polygon of the same area with 96 sides; bodies that roll far away stay in the calculation.
@@ -74,10 +97,15 @@ def write_readme(folder: Path, engine: str, deck: Deck) -> None:
         time=deck.steps * deck.dt,
         run=_block(RUN[engine]),
         files=_block(FILES[engine]),
+        conventions=_block(CONVENTIONS[engine].format(rolling=_rolling(deck.rolling_friction))),
         differences=_block(DIFFERENCES[engine]),
         plate="" if deck.plate is None else f" z = {deck.plate:g} m",
     )
     (folder / "README.txt").write_text(text, encoding="utf-8")
+
+
+def _rolling(friction: float) -> str:
+    return EPSD2.format(mu=friction) if friction > 0.0 else NO_ROLLING
 
 
 def _block(text: str) -> str:

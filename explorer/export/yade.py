@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from explorer.errors import CommandError
 from explorer.export.deck import Deck, write_deck
 from explorer.export.readme import write_readme
 from explorer.export.triangles import write_stl
@@ -29,7 +30,9 @@ LAW = "law.json"
 
 
 def write_yade(folder: Path, deck: Deck) -> None:
-    """Write the deck into ``folder``."""
+    """Write the deck into ``folder``; :class:`CommandError` for what YADE's law does not have."""
+    if deck.rolling_friction > 0.0:
+        raise CommandError(f"rolling friction {deck.rolling_friction:g}: not in the deck for YADE; allowed: 0")
     write_deck(folder, deck)
     write_law(folder, deck.restitution, deck.friction)
     for mesh in deck.meshes:

@@ -55,6 +55,8 @@ def run_lab(order: LabOrder, say: Callable[[str], None]) -> bool:
     if order.json:
         say(json_text(lab_data(result, rows, bias)))
     else:
+        if bias and scene and order.test == "shear":
+            say("\nThe bias of this formula is a closed form; it is shown as it is, and not simulated.")
         for text in filter(None, (bias and bias_text(bias), rows and twin_text(rows))):
             say(f"\n{text}")
         for path in filter(None, (order.out, order.figure)):

@@ -20,7 +20,8 @@ STOPS = (
     Stop(
         "The pour",
         "Bodies fall through the funnel and pile up, computed while you watch. **Space** pauses and plays, the **right "
-        "arrow** goes on by 10 ms, **R** pours anew. Drag to turn the view, scroll to come closer.\n\n"
+        "arrow** goes on by 10 ms and the **left arrow** back, **R** pours anew. Drag to turn the view, scroll to come "
+        "closer.\n\n"
         "The big number is the angle of repose of the pile as it lies, ± its spread over the flanks. The lines below "
         "it say what the solver is doing, and how fast compared with real time.",
     ),
@@ -33,6 +34,12 @@ STOPS = (
         "Change the set-up",
         "What stands under *on restart* (mass, outlet, feed, sizes) waits for **Restart with this set-up**. The same "
         "seed gives the same pour, to the last bit.",
+    ),
+    Stop(
+        "Look closer, and take along",
+        "The tab **Look** colours the bodies by speed, force or neighbours (**C**), draws force chains (**K**), cuts "
+        "the pile open, and tells about a body that you click. **Take along** has the command that repeats what you "
+        "see, tables, pictures, meshes and recordings.",
     ),
     Stop(
         "Calibrate",
@@ -56,7 +63,7 @@ class Tour:
     """A button that starts the tour."""
 
     def __init__(self, server: viser.ViserServer) -> None:
-        button = server.gui.add_button("Tour: one minute", icon=viser.Icon.MAP_2, hint="What is where, in six steps.")
+        button = server.gui.add_button("Tour: one minute", icon=viser.Icon.MAP_2, hint="What is where, in seven steps.")
 
         @button.on_click
         def _(event: viser.GuiEvent[Any]) -> None:

@@ -153,6 +153,23 @@ def test_space_pauses_and_plays_and_the_arrow_steps(page):
     assert (positions(page) != still).any()
 
 
+def test_an_arrow_on_a_slider_moves_the_slider_only(page):
+    page.keyboard.press("Space")
+    wait_for(lambda: state(page) == "paused")
+    time.sleep(1.0)
+    paused_at = simulated_time(page)
+    slider(page, "Static friction").focus()
+    page.keyboard.press("ArrowRight")
+    page.get_by_text(re.compile(r"In the solver: Static friction 0\.0\d")).wait_for()
+    page.keyboard.press("ArrowLeft")
+    page.get_by_text(re.compile(r"In the solver: Static friction 0\s")).wait_for()
+    time.sleep(1.0)
+    assert (state(page), simulated_time(page)) == ("paused", paused_at)
+    page.evaluate("document.activeElement?.blur()")
+    page.keyboard.press("Space")
+    wait_for(lambda: state(page) == "running")
+
+
 def test_the_r_key_pours_anew_with_the_parameters_in_force(page):
     before = simulated_time(page)
     page.keyboard.press("r")

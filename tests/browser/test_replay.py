@@ -47,6 +47,10 @@ def page(chromium, tmp_path_factory):
     assert server.wait(20) == 0
 
 
+AXES = "() => Object.values(window.__viserTestpoints.uplots).map(one => one.chart.axes.map(axis => axis._found[1]))"
+"""Pixels between two numbers of each axis of each chart; 0: the axis was never laid out."""
+
+
 def height(page):
     """Of body 0 [mm]: the number of the frame that is drawn."""
     return 1e3 * positions(page)[0, 2]
@@ -66,6 +70,13 @@ def test_the_slider_scrubs_through_the_recording(page):
     wait_for(lambda: height(page) == pytest.approx(0.0, abs=1e-3))
     page.keyboard.press("End")
     wait_for(lambda: height(page) == pytest.approx(FRAMES - 1, abs=1e-3))
+
+
+def test_the_chart_has_numbers_at_its_axes(page):
+    at_rest(page)
+    (spaces,) = page.evaluate(AXES)
+    assert len(spaces) == 2
+    assert min(spaces) > 0
 
 
 def test_keys_step_and_play(page):

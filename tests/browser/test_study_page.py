@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from tests.browser.test_page import FLAGS, PATIENCE, SMALL_POUR, slider, wait_for
+from tests.browser.test_page import FLAGS, PATIENCE, SMALL_POUR, positions, slider, wait_for
 from tests.explorer import reported_studies
 
 pytestmark = pytest.mark.browser
@@ -95,6 +95,12 @@ def test_a_study_is_started_paused_cancelled_and_resumed(page):
     page.get_by_role("button", name="Start", exact=True).first.click()
     page.get_by_text("Running at low priority").wait_for()
     wait_for(lambda: re.search(r"[1-9]\d* of \d+ runs, time left", page.inner_text("body")), COMPILED)
+    # The pile pours on beside it: anew by key, and the bodies fall.
+    page.evaluate("document.activeElement?.blur()")
+    page.keyboard.press("r")
+    time.sleep(1.0)
+    before = positions(page)
+    wait_for(lambda: len(positions(page)) > len(before) or (positions(page) != before).any())
     page.get_by_role("button", name="Pause / go on").first.click()
     page.get_by_text("Paused: it stands still").wait_for()
     standing = re.search(r"(\d+) of \d+ runs", page.inner_text("body"))[1]

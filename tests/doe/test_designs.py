@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from doe.designs import box_behnken, fold_over, interaction_aliases, plackett_burman
-from doe.designs.plackett_burman import smallest_size
+from doe.designs.plackett_burman import interaction_overlap, smallest_size
 from doe.errors import StatisticsError
 from doe.surface import second_order_terms
 
@@ -54,6 +54,9 @@ def test_fold_over_frees_main_effects_from_interactions():
     folded = fold_over(plackett_burman(28))
     assert folded.shape == (56, 27)
     assert not interaction_aliases(folded)[0].any()
+    # Products of four different columns of a twelve-run design sum to ±4 of 12 (Draper and Smith 1998, ch. 15).
+    assert interaction_overlap(fold_over(plackett_burman(12))) == pytest.approx(1 / 3)
+    assert interaction_overlap(plackett_burman(12)[:, :2]) == 0.0
 
 
 @pytest.mark.parametrize("runs", [8, 12, 20, 24, 44, 48])

@@ -162,6 +162,7 @@ def test_screening_with_a_fold_over_says_what_it_confuses(tmp_path):
     assert "and 33 more" in said
     folded = explorer("design", "plackett-burman", "--factors", factors, "--fold", "--out", tmp_path / "folded.csv")
     assert "aliases" not in folded.stdout
+    assert "those share columns with each other, up to 1/3 of one" in folded.stdout
     result = analysed(fill(path, np.random.default_rng(1).standard_normal(12)))
     assert result["surface"] is None
     assert len(result["effects"]["analysis"]["effects"]) == 11

@@ -22,15 +22,28 @@ def test_bodies_of_unequal_size_are_not_exported():
 
 def test_effects_on_contacts_and_flight_are_not_exported():
     scene = record_of(cone(20.0, 0.05), np.zeros(1), np.zeros(1), 0.03).scene
-    check_exportable(scene)
-    for name, amplitude in (("rolling_resistance", "rolling_friction"), ("air_drag", "strength")):
-        path = f"effect.{name}.{amplitude}"
-        with pytest.raises(CommandError, match=rf"{path}: 0\.3 cannot be exported; allowed: 0"):
-            check_exportable(scene.with_effect(EFFECTS[name](**{amplitude: 0.3})))
+    check_exportable(scene, "yade")
+    drag = scene.with_effect(EFFECTS["air_drag"](strength=0.3))
+    for engine in ("liggghts", "yade"):
+        refusal = rf"effect\.air_drag\.strength: 0\.3 cannot be exported to {engine}; allowed: 0"
+        with pytest.raises(CommandError, match=refusal):
+            check_exportable(drag, engine)
+
+
+def test_rolling_resistance_goes_where_the_same_law_is():
+    scene = record_of(cone(20.0, 0.05), np.zeros(1), np.zeros(1), 0.03).scene
+    rolls = scene.with_effect(EFFECTS["rolling_resistance"](rolling_friction=0.3))
+    check_exportable(rolls, "liggghts")
+    path = r"effect\.rolling_resistance\.rolling_friction"
+    with pytest.raises(CommandError, match=rf"{path}: 0\.3 cannot be exported to yade; allowed: 0"):
+        check_exportable(rolls, "yade")
+    damped = scene.with_effect(EFFECTS["rolling_resistance"](rolling_friction=0.3, rolling_damping=0.1))
+    with pytest.raises(CommandError, match=r"rolling_damping: 0\.1 cannot be exported; allowed: 0"):
+        check_exportable(damped, "liggghts")
 
 
 def test_effects_of_the_set_up_are_carried_out_first():
     scene = record_of(cone(20.0, 0.05), np.zeros(1), np.zeros(1), 0.03).scene
-    check_exportable(scene.with_effect(EFFECTS["plate_tilt"](tilt_x=2.0)))
+    check_exportable(scene.with_effect(EFFECTS["plate_tilt"](tilt_x=2.0)), "yade")
     with pytest.raises(CommandError, match=r"size_distribution: 'log_normal' cannot be exported"):
-        check_exportable(scene.with_effect(EFFECTS["size_dispersion"](spread=0.1)))
+        check_exportable(scene.with_effect(EFFECTS["size_dispersion"](spread=0.1)), "yade")

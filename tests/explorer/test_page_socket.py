@@ -19,6 +19,7 @@ from explorer.session import Session
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.look.camera import view_of
 from explorer.viewer.page import Page
+from explorer.viewer.pour.run_panel import BACK, PLAY_PAUSE, STEP
 from tests.explorer.beads import bead_scene
 from tests.explorer.test_session import wait_for
 
@@ -130,18 +131,18 @@ def test_left_arrow_goes_back_and_space_goes_on(page, browser):
     wait_for(lambda: status(page).state in (SessionState.RUNNING, SessionState.ENDED))
     wait_for(lambda: status(page).time > 0.3)
     if status(page).state == SessionState.RUNNING:
-        browser.press("Play / pause")
+        browser.press(PLAY_PAUSE)
     wait_for(lambda: status(page).state in (SessionState.PAUSED, SessionState.ENDED))
     time.sleep(0.3)
     before = status(page).time
-    browser.press("◀ Back")
+    browser.press(BACK)
     wait_for(lambda: status(page).time < before)
     back = status(page)
     assert (back.state, back.earliest < 1e-3) == (SessionState.PAUSED, True)
     assert back.time == pytest.approx(before - 0.01, abs=0.002)
     wait_for(lambda: page.look._drawn[1].time == back.time)
     wait_for(lambda: f"{back.time:.3f} s" in readout(page))
-    browser.press("Step ▶")
+    browser.press(STEP)
     wait_for(lambda: status(page).time > back.time)
 
 

@@ -100,7 +100,12 @@ def test_the_moment_is_told_and_texts_of_the_file_are_escaped(recording):
 
 
 def test_the_curve_is_marked_where_time_stands():
-    times, values, marked = columns(np.array([0.0, 0.1, 0.2]), np.array([1.0, 2.0, 3.0]), 0.15)
-    assert (len(times), values.tolist()) == (3, [1.0, 2.0, 3.0])
+    moments, angles = np.array([0.0, 0.1, 0.2]), np.array([1.0, 2.0, 3.0])
+    times, values, marked = columns(moments, angles, 0.15)
+    assert values[:3].tolist() == [1.0, 2.0, 3.0]
     assert np.nansum(marked) == 2.0
-    assert np.isnan(columns(times, values, -1.0)[2]).all()
+    assert np.isnan(columns(moments, angles, -1.0)[2]).all()
+    # The row behind the curve: no point of it, and never at the same place twice running.
+    assert np.isnan([values[3], marked[3]]).all()
+    assert times[2] < times[3] < times[2] + 1e-5
+    assert columns(moments, angles, 0.15, turn=1)[0][3] != times[3]

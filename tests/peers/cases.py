@@ -13,6 +13,7 @@ from explorer.export.liggghts import INPUT
 from explorer.export.run import run_liggghts, run_yade
 from explorer.export.yade import LAW
 from explorer.scene.file import load_scene
+from solver.effects import EFFECTS
 from solver.insertion import rotation_matrix
 from solver.laboratory import Laboratory
 from solver.record import Entries
@@ -37,6 +38,7 @@ class Case:
     friction: float
     tangential_damping: bool = True
     plate: bool = True
+    rolling_friction: float = 0.0
 
     @property
     def scene(self):
@@ -45,6 +47,7 @@ class Case:
         scene = with_values(
             load_scene("seed_pour"), dict.fromkeys(paths, self.friction) | {"numerics.sleep_speed": 0.0}
         )
+        scene = scene.with_effect(EFFECTS["rolling_resistance"](rolling_friction=self.rolling_friction))
         return scene if self.plate else dataclasses.replace(scene, gravity=(0.0, 0.0, 0.0))
 
     @property

@@ -52,6 +52,17 @@ def test_without_friction_the_motion_is_the_same(engine, tmp_path):
     assert max(found.place, found.velocity, found.spin) < PER_CENT
 
 
+@pytest.mark.peers("liggghts")
+def test_with_rolling_resistance_alone_the_motion_is_the_same(tmp_path):
+    """Its epsd2 and our ``rolling_resistance``, without friction: a torque takes part of the spin that impacts give."""
+    case, free = falling(0.0, rolling_friction=0.3), falling(0.0)
+    own = ours(case)
+    found = compared(case, own, theirs(case, "liggghts", tmp_path))
+    assert max(found.place, found.velocity, found.spin) < PER_CENT
+    # And it does act: the same fall without it spins otherwise.
+    assert compared(case, own, ours(free)).spin > 5 * PER_CENT
+
+
 @pytest.mark.parametrize(
     ("engine", "friction"),
     [

@@ -24,9 +24,9 @@ class Budget:
     base: int = 48
     middle: int = 16
     scaling: int = 2
-    screening: int = 8
+    screening: int = 10
     """Per effect with one amplitude; half as many again with two."""
-    leads: int = 8
+    leads: int = 10
     """More of each lead, over its whole range."""
     widened: int = 12
     """Of an effect over a wider range than the first."""

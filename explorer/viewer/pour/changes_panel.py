@@ -20,7 +20,7 @@ from explorer.viewer.buttons import add_keys, button_group
 from explorer.viewer.small_text import small_html
 from solver.scene import Scene, parameters, with_values
 
-UNDO, REDO, BACK, POUR = "Undo", "Redo", "All back", "Pour the default"
+UNDO, REDO, BACK, POUR = "Undo (Z)", "Redo (Y)", "All back", "Pour the default"
 KEYS: dict[str, Any] = {UNDO: "Z", REDO: "Y"}
 MOST_SHOWN = 40
 ONE = "one parameter …"
@@ -43,8 +43,8 @@ class ChangesPanel:
                 "Changes",
                 acts,
                 post,
-                hint="Keys: Z undoes and Y redoes a change of what acts now. All back: those return to the default. "
-                "Pour the default: everything does, with a new pour.",
+                hint="Undo and redo: changes of what acts now, not of what needs a new pour. All back: those return to "
+                "the default. Pour the default: everything does, with a new pour.",
             )
             self._list = gui.add_html("")
             self._one = gui.add_dropdown("Back to default", (ONE,), hint="One parameter returns to its default.")

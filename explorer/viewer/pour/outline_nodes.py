@@ -31,8 +31,8 @@ class OutlineNodes:
 
     def show(self, outline: Outline | None, measured: MeasuredCurve | None, wanted: bool) -> None:
         """Draw what there is, or nothing unless ``wanted``; call it inside ``server.atomic()``."""
-        _draw(self._flanks, flank_segments(outline) if wanted else NOWHERE[:0], FLANK)
-        _draw(self._measured, measured_segments(measured) if wanted else NOWHERE[:0], MEASURED)
+        _draw(self._flanks, flank_segments(outline) if wanted else NOWHERE[:0])
+        _draw(self._measured, measured_segments(measured) if wanted else NOWHERE[:0])
 
 
 def flank_segments(outline: Outline | None) -> Array:
@@ -61,13 +61,12 @@ def _node(server: viser.ViserServer, name: str, colour: Colour) -> Any:
     return server.scene.add_line_segments(name, NOWHERE, colour, thickness=THICKNESS, visible=False)
 
 
-def _draw(node: Any, segments: Array, colour: Colour) -> None:
+def _draw(node: Any, segments: Array) -> None:
     visible = len(segments) > 0
     if visible and (
         node.points.shape != segments.shape or not np.array_equal(node.points, segments.astype(np.float32))
     ):
-        # Both together: points alone with the colours of fewer segments come out in wrong colours.
+        # The node keeps its one colour: colours per point, sent later, come out white.
         node.points = segments.astype(np.float32)
-        node.colors = np.broadcast_to(np.array(colour, dtype=np.uint8), segments.shape).copy()
     if node.visible != visible:
         node.visible = visible

@@ -11,9 +11,11 @@ from explorer.screen_units import checked
 from explorer.session import Session
 from explorer.viewer.actions import Post
 from explorer.viewer.buttons import add_keys, button_group
+from explorer.viewer.slider_hands import SliderHands
 
-PLAY_PAUSE, BACK, STEP, RESTART = "Play / pause", "◀ Back", "Step ▶", "Restart"
-KEYS: dict[str, Any] = {PLAY_PAUSE: "space", BACK: "arrowleft", STEP: "arrowright", RESTART: "R"}
+PLAY_PAUSE, BACK, STEP, RESTART = "Play / pause (space)", "◀ Back (←)", "Step ▶ (→)", "Restart (R)"
+KEYS: dict[str, Any] = {PLAY_PAUSE: "space", RESTART: "R"}
+ARROWS: dict[str, Any] = {BACK: "arrowleft", STEP: "arrowright"}
 SLOWEST, FASTEST = 0.05, 2.0
 """Range of the speed slider: simulated seconds per second."""
 
@@ -29,11 +31,12 @@ class RunPanel:
             "Pour",
             acts,
             post,
-            hint="Keys: space plays and pauses; left arrow goes back by a sample interval (10 ms), to the parameters "
-            "of that time as well; right arrow goes on by one; R restarts with the same seed.",
+            hint="Back goes by a sample interval (10 ms), to the parameters of that time as well; step goes on by one; "
+            "restart pours anew with the same seed. Arrows on a slider move the slider only.",
         )
 
         add_keys(server.gui, acts, KEYS, post)
+        add_keys(server.gui, acts, ARROWS, SliderHands(server).unless_on_a_slider(post))
         speed = server.gui.add_slider(
             "Speed",
             SLOWEST,

@@ -23,11 +23,15 @@ from explorer.viewer.pour.chart import LEAST_TOP_DEG, axis
 from explorer.viewer.pour.run_panel import FASTEST, SLOWEST
 from explorer.viewer.replay.replay_nodes import ReplayNodes, highest
 from explorer.viewer.replay.timeline import Timeline
+from explorer.viewer.slider_hands import SliderHands
 from explorer.viewer.theme import DARK, apply_theme
 from explorer.viewer.view import light, look_at_height
 
 FRAME_INTERVAL = 1.0 / 30.0
 EVENTS_SHOWN = 6
+PLAY_PAUSE, TO_START, BACK, STEP = "Play / pause (space)", "To start (R)", "◀ frame (←)", "frame ▶ (→)"
+HAIR = 1e-6
+"""Time [s] by which the end of a chart moves to and fro."""
 SLIDER_STEP = 1e-3
 """[s]; about as fine as frames lie."""
 CURVES = (("angle_of_repose_deg", "angle [°]", ANGLE_LINE), ("discharged_mass_g", "mass below [g]", MASS_LINE))
@@ -45,7 +49,7 @@ class ReplayPage:
         light(server)
         look_at_height(server, highest(recording))
         self._nodes = ReplayNodes(server, recording)
-        self._shown = math.nan
+        self._shown, self._turn = math.nan, 0
         apply_theme(server, DARK)
         server.gui.main_panel.dock_right()
         server.gui.add_markdown(f"**Replay** of `{name.replace('`', '')}`")
@@ -61,21 +65,16 @@ class ReplayPage:
     def _controls(self) -> None:
         gui, timeline = self._server.gui, self._timeline
         acts: dict[str, Action] = {
-            "Play / pause": timeline.toggle,
-            "◀ frame": partial(timeline.step, -1),
-            "frame ▶": partial(timeline.step, 1),
-            "To start": partial(timeline.go_to, timeline.first),
+            PLAY_PAUSE: timeline.toggle,
+            TO_START: partial(timeline.go_to, timeline.first),
+            BACK: partial(timeline.step, -1),
+            STEP: partial(timeline.step, 1),
         }
-        keys: dict[str, Any] = dict(zip(acts, ("space", "arrowleft", "arrowright", "R"), strict=True))
-        button_group(
-            gui,
-            "Time",
-            acts,
-            self._actions.post,
-            hint="Keys: space plays and pauses, arrows step a frame, R goes to the start.",
-        )
-
-        add_keys(gui, acts, keys, self._actions.post)
+        post = self._actions.post
+        button_group(gui, "Time", acts, post, hint="Arrows on a slider move the slider only.")
+        add_keys(gui, acts, {PLAY_PAUSE: "space", TO_START: "R"}, post)
+        arrows = {BACK: "arrowleft", STEP: "arrowright"}
+        add_keys(gui, acts, arrows, SliderHands(self._server).unless_on_a_slider(post))
         last = max(timeline.last, timeline.first + SLIDER_STEP)
         self._slider = gui.add_slider("Time [s]", timeline.first, last, SLIDER_STEP, timeline.first)
 
@@ -112,8 +111,9 @@ class ReplayPage:
             with self._server.atomic():
                 self._nodes.show(time)
                 self._slider.value = round(time, 6)  # type: ignore[misc]
+                self._turn += 1
                 for name, plot in self._plots:
-                    plot.data = columns(*self._recording.curves[name], time)
+                    plot.data = columns(*self._recording.curves[name], time, self._turn)
         text = moment_html(self._recording, time, self._timeline.playing)
         if self._text.content != text:
             self._text.content = text
@@ -137,13 +137,18 @@ def _plot(server: viser.ViserServer, recording: Recording, name: str, label: str
     return name, plot
 
 
-def columns(times: Array, values: Array, now: float) -> tuple[Array, Array, Array]:
-    """Times, values, and the value at ``now`` [s] alone, NaN elsewhere."""
-    marked = np.full(len(times), np.nan)
+def columns(times: Array, values: Array, now: float, turn: int = 0) -> tuple[Array, Array, Array]:
+    """Times, values, and the value at ``now`` [s] alone, NaN elsewhere; the last row is no point of the curve.
+
+    A chart lays its axes out anew only when the range of its times changes. The first data may come before the chart
+    knows its size, and would leave it without numbers; so the end moves by a hair at every ``turn``.
+    """
+    marked = np.full(len(times) + 1, np.nan)
     k = int(np.searchsorted(times, now, side="right")) - 1
     if k >= 0:
         marked[k] = values[k]
-    return times, values, marked
+    end = times[-1] + HAIR * (1 + turn % 2) if len(times) else 0.0
+    return np.append(times, end), np.append(values, np.nan), marked
 
 
 def moment_html(recording: Recording, time: float, playing: bool) -> str:

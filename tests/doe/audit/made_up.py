@@ -60,7 +60,7 @@ def clean_study(seed=7):
     )
     point = nearest_points(fitted.coefficients[None], target.mean.value, np.zeros(3), np.ones(3))[0][0]
     natural = fitted.region.natural(point)
-    screening = _screening(rng)
+    screening, restitutions = _screening(rng), shown([0.4, 0.55, 0.7], 2)
     return PublishedStudy(
         title="A made-up study",
         source="nowhere",
@@ -68,8 +68,8 @@ def clean_study(seed=7):
         derived=(_elastic(),),
         measured=(_density(),),
         totals=(Total("Table 2", "share [%]", shown([71.25, 18.5, 10.25], 2), printed("100.00")),),
-        quotes=(Quote("section 4", "restitution", printed("0.40"), printed("0.40"), "Table 3", "restitution is 0.40"),),
-        drop_test=DropTest("Equation 4", "(vx + vy) / v", 45.0, 0.2, None, shown([0.4, 0.55, 0.7], 2)),
+        quotes=(_quote(restitutions),),
+        drop_test=DropTest("Equation 4", "(vx + vy) / v", 45.0, 0.2, None, restitutions),
         screening=screening,
         ascent=_ascent(rng, target),
         surface=surface,
@@ -180,6 +180,11 @@ def _verified(target):
     ).pvalue
     error = 100 * abs(mean - target.mean.value) / target.mean.value
     return Verified("Table 9", runs, show(mean, 2), show(error, 3), show(p, 3))
+
+
+def _quote(restitutions):
+    said = ("Table 3", "restitution is 0.40", "e", restitutions, ("e of row 1",))
+    return Quote("section 4", "restitution", printed("0.40"), restitutions[0], *said)
 
 
 def _elastic():

@@ -307,7 +307,20 @@ def test_a_surface_that_cannot_be_fitted_is_said_once(clean):
 
 
 def test_two_values_of_one_unnamed_quantity_are_found(clean):
-    first = replace(clean.quotes[0], original=None)
+    first = replace(clean.quotes[0], original=None, among=())
     study = replace(clean, quotes=(first, replace(first, value=printed("0.55"))))
     (figure,) = audit_study(study).having("differs")
     assert (figure.printed, figure.recomputed) == ("0.55", 0.4)
+
+
+def test_a_number_that_the_table_prints_as_something_else_is_told():
+    """A quote without its row has to be one of the column; one that is not is looked for in the rest of the table."""
+    study = clean_study()
+    among = study.quotes[0].among
+    free = replace(study.quotes[0], original=None, value=printed("0.55"))
+    (found,) = [f for f in audit_study(replace(study, quotes=(free,))).figures if f.check == "values said twice"]
+    assert found.status == "reproduced"
+    lost = replace(free, value=printed("0.31"), elsewhere=("nu of seed",))
+    (found,) = [f for f in audit_study(replace(study, quotes=(lost,))).figures if f.check == "values said twice"]
+    assert (found.status, found.recomputed) == ("differs", among[0].value)
+    assert found.how.endswith("it prints 0.31 as nu of seed")
