@@ -85,21 +85,20 @@ def check_total(total: Total) -> Figure:
 def check_quote(quote: Quote) -> Figure:
     """A value said again against the value in its table."""
     check, said = "values said twice", f" (“{quote.text}”)" if quote.text else ""
-    if quote.original is None and quote.among:
-        return _one_of_a_column(check, quote, said)
-    if quote.original is None:
+    if quote.original is not None:
+        original, slack, how = (
+            quote.original,
+            _finer(quote),
+            f"{quote.original_where} prints {quote.original.text}{said}",
+        )
+    elif quote.among:
+        # The text says no more than what kind of value it is: there must be one like it in that column.
+        original, slack = min(quote.among, key=lambda cell: abs(cell.value - quote.value.value)), 0.0
+        how = f"the nearest {quote.kind} in {quote.original_where} is {original.text}{said}"
+    else:
         why = f"the text does not say which value of {quote.original_where} this is{said}"
         return unchecked(check, quote.where, quote.quantity, why, quote.value.text)
-    how = f"{quote.original_where} prints {quote.original.text}{said}"
-    found = compared(check, quote.where, quote.quantity, quote.value, quote.original.value, how, _finer(quote))
-    return replace(found, how=how + _elsewhere(quote)) if found.status == "differs" else found
-
-
-def _one_of_a_column(check: str, quote: Quote, said: str) -> Figure:
-    """A value of which the text says no more than what kind it is: there must be one like it in that column."""
-    nearest = min(quote.among, key=lambda cell: abs(cell.value - quote.value.value))
-    how = f"the nearest {quote.kind} in {quote.original_where} is {nearest.text}{said}"
-    found = compared(check, quote.where, quote.quantity, quote.value, nearest.value, how)
+    found = compared(check, quote.where, quote.quantity, quote.value, original.value, how, slack)
     return replace(found, how=how + _elsewhere(quote)) if found.status == "differs" else found
 
 

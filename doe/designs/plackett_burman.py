@@ -85,8 +85,7 @@ def interaction_aliases(design: IntArray) -> tuple[FloatArray, tuple[tuple[int, 
     expectation effect_j + sum over pairs of A[j, pair] x effect_pair. Returns A, shape (columns, pairs), and
     the pairs of column indices.
     """
-    pairs = tuple(combinations(range(design.shape[1]), 2))
-    products = np.stack([design[:, i] * design[:, j] for i, j in pairs], axis=1)
+    products, pairs = _interactions(design)
     return (design.T @ products) / design.shape[0], pairs
 
 
@@ -94,10 +93,15 @@ def interaction_overlap(design: IntArray) -> float:
     """Return the largest |correlation| of two two-factor interactions, 0 … 1; 0 with fewer than three columns."""
     if design.shape[1] < 3:
         return 0.0
-    pairs = combinations(range(design.shape[1]), 2)
-    products = np.stack([design[:, i] * design[:, j] for i, j in pairs], axis=1)
+    products, _ = _interactions(design)
     shared = np.abs(products.T @ products) / len(design)
     return float(np.max(shared - np.eye(len(shared)), initial=0.0))
+
+
+def _interactions(design: IntArray) -> tuple[IntArray, tuple[tuple[int, int], ...]]:
+    """Return the columns of all two-factor interactions, shape (runs, pairs), and the pairs of column indices."""
+    pairs = tuple(combinations(range(design.shape[1]), 2))
+    return np.stack([design[:, i] * design[:, j] for i, j in pairs], axis=1), pairs
 
 
 def _levels(signs: str) -> IntArray:
