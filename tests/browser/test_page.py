@@ -83,8 +83,9 @@ def positions(page):
 
 
 def simulated_time(page):
-    """The solver's time as the page shows it [s]."""
-    return float(re.search(r"Simulated time\s*([\d.]+) s", page.locator(".pour").inner_text())[1])
+    """The solver's time as the page shows it [s]; NaN while a pour starts, when the page shows a dash."""
+    shown = re.search(r"Simulated time\s*(?:([\d.]+) s|–)", page.locator(".pour").inner_text())[1]
+    return float(shown or "nan")
 
 
 def state(page):
