@@ -13,7 +13,7 @@ from doe.diagnose.decision.verdict import Verdict
 from doe.diagnose.emulation.fresh_pours import FreshPours
 from doe.diagnose.follow_up.closer import LOOKS, contenders, leads, near_best, poured
 from doe.diagnose.follow_up.confirm import Confirmed, Model, confirm, fitted
-from doe.diagnose.follow_up.held_out import HeldOut, compared, predictions, upheld
+from doe.diagnose.follow_up.held_out import HeldOut, compared, predictions, ruled_out, upheld
 from doe.diagnose.follow_up.holdout import HoldoutCondition, HoldoutError, holdout_errors
 from doe.diagnose.follow_up.menu import Suggestion, next_experiment
 from doe.diagnose.runs import Condition, Declared, Effect, Observed, Parameter
@@ -72,11 +72,13 @@ def run_diagnosis(
     model = ModelPours(measurement.fit, paths, store, pours, on_pour)
     everywhere = ModelPours(measurement.conditions, paths, store, pours, on_pour)
     observed = observe(measurement.fit)
-    screened, verdict = pursued(screen(declared, model, budget, say), declared, observed, model, budget, say)
+    screened, verdict, fresh = pursued(screen(declared, model, budget, say), declared, observed, model, budget, say)
     say(f"verdict: {verdict.kind}")
     number = max(FRESH, *(2 * condition.replicates for condition in measurement.conditions))
     held_out = contenders_held_out(verdict, measurement, everywhere, number)
     if held_out:
+        if gone := ruled_out(verdict, held_out):
+            verdict = diagnose(screened.declared, screened.runs, observed, fresh=fresh, ruled_out=gone)
         verdict = upheld(verdict, held_out)
         say(f"with held-out data: {verdict.kind}")
     before, after = models(verdict)
@@ -100,8 +102,11 @@ def run_diagnosis(
 
 def pursued(
     screened: Screened, widest: Declared, observed: Observed, model: ModelPours, budget: Budget, say: Say
-) -> tuple[Screened, Verdict]:
-    """The verdict once its leads have been followed, over wider ranges where one ends, and poured about their fits."""
+) -> tuple[Screened, Verdict, tuple[FreshPours, ...]]:
+    """The verdict once its leads have been followed, over wider ranges where one ends, and poured about their fits.
+
+    With the runs and the pours that it rests on.
+    """
     verdict = diagnose(screened.declared, screened.runs, observed)
     say(f"after screening: {verdict.kind}")
     if followed := leads(verdict):
@@ -123,13 +128,13 @@ def pursued(
         fresh += poured(closer, screened.declared, model)
         verdict = diagnose(screened.declared, screened.runs, observed, fresh=fresh)
         say(f"poured about the best fits of {', '.join(one.label for one in closer)}: {verdict.kind}")
-    return screened, verdict
+    return screened, verdict, fresh
 
 
 def contenders_held_out(
     verdict: Verdict, measurement: Measurement, pours: ModelPours, number: int
 ) -> tuple[HeldOut, ...]:
-    """The named model and its rivals on the held-out conditions of ``pours``, by ``number`` pours of each."""
+    """The named models and their rivals on the held-out conditions of ``pours``, by ``number`` pours of each."""
     places = [c for c, condition in enumerate(measurement.conditions) if condition.role == "holdout"]
     conditions = [measurement.conditions[c] for c in places]
     data = [complete_rows(condition) for condition in conditions]

@@ -104,6 +104,7 @@ def result_of(measurement: Measurement, order: DiagnoseOrder, found: Diagnosis, 
                 for role, rows in (("fit", found.fit_error), ("holdout", found.holdout_error))
             },
             "held_out": found.held_out,
+            "ruled_out": verdict.ruled_out,
             "next_experiment": found.suggestions,
             "residuals": verdict.residuals,
             "where": verdict.where,

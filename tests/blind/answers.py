@@ -10,10 +10,9 @@ import numpy.typing as npt
 
 from doe.diagnose.decision.verdict import Verdict
 from doe.diagnose.diagnosis import FRESH, models
-from doe.diagnose.emulation.fresh_pours import FreshPours
 from doe.diagnose.follow_up.closer import LOOKS, contenders, poured
 from doe.diagnose.follow_up.confirm import confirm
-from doe.diagnose.follow_up.held_out import compared, contenders_for, predictions, upheld
+from doe.diagnose.follow_up.held_out import compared, contenders_for, predictions, ruled_out, upheld
 from doe.diagnose.follow_up.holdout import HoldoutCondition, holdout_errors
 from doe.diagnose.simulation.plan import Point
 from doe.diagnose.simulation.pours import ModelPours
@@ -52,9 +51,9 @@ class Answers:
         began = time.monotonic()
         truths = [truth_of(case, self.ruler) for case in cases]
         data = self.measured(truths, self.measurement.fit)
-        verdicts, fresh = self.judged({k: found for k, found in enumerate(data) if found is not None})
-        rivals = {k: contenders_for(verdict)[1:] for k, verdict in verdicts.items() if len(verdict.names) == 1}
-        verdicts = self.held_out(truths, verdicts)
+        verdicts, questions = self.judged({k: found for k, found in enumerate(data) if found is not None})
+        contending = {k: contenders_for(verdict) for k, verdict in verdicts.items()}
+        verdicts = self.held_out(truths, verdicts, questions)
         cosines = {k: least_cosine(verdict, label_of(truths[k])) for k, verdict in verdicts.items()}
         right = [k for k in verdicts if answer_to(verdicts[k].kind, label_of(truths[k]), cosines[k]) == "right"]
         errors = dict(zip(right, self.holdout([truths[k] for k in right], [verdicts[k] for k in right]), strict=True))
@@ -64,9 +63,10 @@ class Answers:
             verdict, found = verdicts.get(k), data[k]
             before, after = errors.get(k, (NAN, NAN))
             pours = 0 if found is None else REPLICATES * len(self.measurement.fit)
-            pours += sum(len(block) for one in fresh.get(k, ()) for block in one.blocks)
-            pours += FRESH * len(rivals.get(k, ())) * len(self.measurement.holdout)
-            pours += (REPLICATES + 2 * FRESH) * len(self.measurement.holdout) if k in errors else 0
+            pours += sum(len(block) for one in questions[k].fresh for block in one.blocks) if found else 0
+            models = len(contending.get(k, ()))
+            pours += (REPLICATES + FRESH * models) * len(self.measurement.holdout) if models else 0
+            pours += FRESH * len(self.measurement.holdout) if k in errors else 0
             rows.append(
                 Row(
                     number=truth.case.number,
@@ -86,8 +86,8 @@ class Answers:
             )
         return rows
 
-    def judged(self, data: Mapping[int, Data]) -> tuple[dict[int, Verdict], dict[int, tuple[FreshPours, ...]]]:
-        """Verdicts, and the fresh pours at best fits that each of them rests on, as in a diagnosis."""
+    def judged(self, data: Mapping[int, Data]) -> tuple[dict[int, Verdict], dict[int, Question]]:
+        """Verdicts, and the questions with the pours at best fits that they answer, as in a diagnosis."""
         declared, runs = self.screened.declared, self.screened.runs
         questions = {k: Question(declared, runs, self.model, found) for k, found in data.items()}
         verdicts = dict(zip(questions, self.place.map(judged, list(questions.values())), strict=True))
@@ -100,20 +100,24 @@ class Answers:
                 questions[k] = replace(questions[k], fresh=(*known, *(next(fresh) for _ in found)))
             again = self.place.map(judged, [questions[k] for k in closer])
             verdicts |= dict(zip(closer, again, strict=True))
-        return verdicts, {k: question.fresh for k, question in questions.items()}
+        return verdicts, questions
 
-    def held_out(self, truths: Sequence[Truth], verdicts: Mapping[int, Verdict]) -> dict[int, Verdict]:
+    def held_out(
+        self, truths: Sequence[Truth], verdicts: Mapping[int, Verdict], questions: Mapping[int, Question]
+    ) -> dict[int, Verdict]:
         """The verdicts, with names that the held-out condition does not bear out taken back, as in a diagnosis."""
-        asked = [k for k, verdict in verdicts.items() if len(verdict.names) == 1]
+        asked = [k for k, verdict in verdicts.items() if verdict.names]
         conditions = self.measurement.holdout
         pours, widths = self.model_pours(conditions), [len(summary_names(condition)) for condition in conditions]
-        found = dict(verdicts)
+        found, rows, again = dict(verdicts), {}, {}
         for k, data in zip(asked, self.measured([truths[k] for k in asked], conditions), strict=True):
             if data is not None:
                 poured = predictions(found[k], pours, FRESH, widths)
-                rows = compared(found[k], [vectors(c, data[c.name]) for c in conditions], poured)
-                found[k] = upheld(found[k], rows)
-        return found
+                rows[k] = compared(found[k], [vectors(c, data[c.name]) for c in conditions], poured)
+                if gone := ruled_out(found[k], rows[k]):
+                    again[k] = replace(questions[k], ruled_out=gone)
+        found |= dict(zip(again, self.place.map(judged, list(again.values())), strict=True))
+        return found | {k: upheld(found[k], one) for k, one in rows.items()}
 
     def measured(self, truths: Sequence[Truth], conditions: Sequence[Condition]) -> list[Data | None]:
         """Readings of the laboratories' pours; None where there is no such truth, or pours keep breaking off."""

@@ -19,7 +19,7 @@ from tests.blind.laboratory import Reading, write_folder
 @dataclass(frozen=True)
 class Question:
     """What is asked of the diagnosis: the emulator's runs, the readings of the fitted conditions, fresh pours at the
-    fits of an earlier verdict.
+    fits of an earlier verdict, names of that verdict that held-out data rule out.
     """
 
     declared: Declared
@@ -27,18 +27,20 @@ class Question:
     model: Path
     measured: Mapping[str, Sequence[Reading]]
     fresh: tuple[FreshPours, ...] = ()
+    ruled_out: tuple[str, ...] = ()
 
 
 def judged(question: Question) -> Verdict:
     """The verdict on a data set that is written to a folder and read like any other."""
     with TemporaryDirectory() as folder:
         write_folder(Path(folder), question.model, question.measured)
-        return judged_folder(Path(folder), question.declared, question.runs, question.fresh)
+        return judged_folder(Path(folder), question)
 
 
-def judged_folder(folder: Path, declared: Declared, runs: Runs, fresh: Sequence[FreshPours] = ()) -> Verdict:
-    """The verdict on the data set in ``folder``."""
-    return diagnose(declared, runs, observe(load_measurement(folder).fit), fresh=fresh)
+def judged_folder(folder: Path, question: Question) -> Verdict:
+    """The verdict on the data set in ``folder``, whatever else ``question`` says was measured."""
+    observed = observe(load_measurement(folder).fit)
+    return diagnose(question.declared, question.runs, observed, fresh=question.fresh, ruled_out=question.ruled_out)
 
 
 def cosine_between(verdict: Verdict, one: str, other: str) -> float:

@@ -16,7 +16,7 @@ from doe.diagnose.simulation.screen import Budget
 from doe.store import Store
 from tests.blind.answers import Answers
 from tests.blind.campaign import CampaignOrder, emulated, run_campaign
-from tests.blind.judging import judged_folder
+from tests.blind.judging import Question, judged_folder
 from tests.blind.laboratory import MODEL, declared_model, write_folder
 from tests.blind.schedule import Case
 from tests.blind.truth import ruler, truth_of
@@ -126,7 +126,8 @@ def test_the_verdict_depends_on_numbers_only(order, rows, tmp_path):
         folder.mkdir()
         write_folder(folder, order.model, data)
     disguise(second, np.random.default_rng(0))
-    one, other = (judged_folder(folder, declared, runs) for folder in (first, second))
+    question = Question(declared, runs, order.model, data)
+    one, other = (judged_folder(folder, question) for folder in (first, second))
     assert one.kind == "effect:rolling_resistance"
     assert other.to_dict() == one.to_dict()
 

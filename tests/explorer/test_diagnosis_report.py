@@ -11,7 +11,7 @@ from scipy import stats
 from explorer.report.content import Figure, Folded, Table
 from explorer.report.diagnosis import diagnosis_html, diagnosis_markdown, write_diagnosis_report
 from explorer.report.diagnosis.findings import fall_beyond, summary_label
-from explorer.report.diagnosis.in_short import verdict_sentence
+from explorer.report.diagnosis.in_short import cautions, verdict_sentence
 from explorer.report.diagnosis.residuals import bands
 from explorer.report.diagnosis.sections import sections_of
 from explorer.report.diagnosis.seen import visible_shift
@@ -194,6 +194,15 @@ def test_what_each_verdict_says(results):
     assert "none of the 5 effects" in says["unexplained"]
     assert results["unexplained"]["where"][0] in says["unexplained"]
     assert "needs static friction grain–steel at the end of the measured range" in says["at the edge"]
+
+
+def test_a_choice_in_which_held_out_data_took_part_is_called_so(results):
+    alone = results["effect"]
+    assert "no other effect in the list comes near" in verdict_sentence(alone)
+    chosen = alone | {"ruled_out": ["twisting"]}
+    assert "as `twisting` would; the held-out data rule that out" in verdict_sentence(chosen)
+    assert any("took part in the choice" in text for text in cautions(chosen))
+    assert not any("took part in the choice" in text for text in cautions(alone))
 
 
 def test_cautions_say_what_the_numbers_cannot(results):

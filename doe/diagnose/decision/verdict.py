@@ -149,7 +149,8 @@ class Verdict(Record):
 
     models: the base and all that were raced, best first. where: per condition its share of T^2 that is left by the
     final model, and its worst summary. dropped, floored: see runs.py. drawn_in: see tails.py. variances: per
-    condition. seed and bootstrap make it repeatable.
+    condition. ruled_out: effects that the fitted data left beside the named ones and held-out data did not. seed and
+    bootstrap make it repeatable.
     """
 
     kind: str
@@ -175,3 +176,4 @@ class Verdict(Record):
     bootstrap: int
     seed: int
     drawn_in: tuple[str, ...] = ()
+    ruled_out: tuple[str, ...] = ()

@@ -1,13 +1,14 @@
-"""Gate 5: do data that were not fitted agree with the name? They can take a name back, and never give one.
+"""Gate 5: do data that were not fitted agree with the name? They take names back, and never give a new one alone.
 
-Every contender (the named model, and others that the fit leaves near it) predicts the held-out conditions by fresh
+Every contender (the named models, and others that the fit leaves near them) predicts the held-out conditions by fresh
 pours. With r measured and m poured means, S the covariance of the model's own pours, half shrunk to its diagonal:
 
     T^2 = (measured - poured)' Sigma^-1 (measured - poured),   Sigma = S/r + S/m
     D   = (m - 1 + d) ln(1 + T^2/(m - 1)) + ln|Sigma|,
 
 -2 ln of a multivariate t density, which does not take a rare pour for a refutation (Lange, Little and Taylor 1989,
-JASA 84:881). A name stands if every rival stays the gap of gate 3 behind in the criterion of the fit plus D.
+JASA 84:881). A name that stands alone keeps doing so if every rival stays the gap of gate 3 behind in the criterion of
+the fit plus D; else they join it. Of several names those go that are WITHIN or more behind the first of them.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ import numpy.typing as npt
 from doe.diagnose.decision.gates import Gate
 from doe.diagnose.decision.tables import listed
 from doe.diagnose.decision.verdict import FittedModel, Verdict
-from doe.diagnose.follow_up.closer import MODELS, near_best
+from doe.diagnose.follow_up.closer import MODELS, WITHIN, near_best
 from doe.diagnose.follow_up.confirm import confirm, fitted
 from doe.diagnose.simulation.pours import ModelPours
 from doe.record import Record
@@ -44,8 +45,12 @@ class HeldOut(Record):
 
 
 def contenders_for(verdict: Verdict) -> tuple[FittedModel, ...]:
-    """The model named first, the best of its race, then those that the fit leaves near it; none without a name."""
-    return near_best([model for model in verdict.models if model.members], MODELS) if verdict.names else ()
+    """The models that are named or that the fit leaves near the best of the race, in its order; none without a name."""
+    if not verdict.names:
+        return ()
+    race = [model for model in verdict.models if model.members]
+    near = near_best(race, MODELS)
+    return tuple(model for model in race if model in near or model.label in verdict.names)
 
 
 def predictions(
@@ -98,10 +103,22 @@ def compared(
     )
 
 
+def ruled_out(verdict: Verdict, rows: Sequence[HeldOut]) -> tuple[str, ...]:
+    """Of several names those that held-out data put ``WITHIN`` or more behind the first of them.
+
+    That is the distance at which a contender leaves the race: D knows nothing of the error of a fit, so a smaller one
+    decides nothing.
+    """
+    if len(verdict.names) < 2:
+        return ()
+    behind = {row.label: row.behind for row in rows if row.label in verdict.names}
+    return tuple(name for name in behind if behind[name] - min(behind.values()) >= WITHIN)
+
+
 def upheld(verdict: Verdict, rows: Sequence[HeldOut]) -> Verdict:
     """The verdict with gate 5: a name that held-out data do not bear out becomes one among several.
 
-    Where several are named already they stay, and the gate says whom the held-out data favour.
+    Where several are named they stay, and the gate says whom the held-out data favour.
     """
     if not rows:
         return verdict

@@ -58,7 +58,7 @@ def verdict_sentence(result: Plain) -> str:
             )
             return (
                 f"{opening} {code(names[0])}: with {amplitudes_of(result['amplitudes'])} it agrees with "
-                f"the fitted data, and no other effect in the list comes near. {confirmation_sentence(result)}"
+                f"the fitted data, {_rivals(result)}. {confirmation_sentence(result)}"
             )
         case "effects":
             return (
@@ -76,6 +76,13 @@ def verdict_sentence(result: Plain) -> str:
             seen = len(raced(result))
             which = f"none of the {seen} effects that these data can see" if seen else "no effect that was simulated"
             return f"The declared model lacks something that {which} explains.{sits}"
+
+
+def _rivals(result: Plain) -> str:
+    gone = result["ruled_out"]
+    if not gone:
+        return "and no other effect in the list comes near"
+    return f"as {enumeration([code(name) for name in gone])} would; the held-out data rule that out"
 
 
 def confirmation_sentence(result: Plain) -> str:
@@ -104,6 +111,11 @@ def cautions(result: Plain) -> list[str]:
         found.append(
             "Without held-out data the error after is counted on the data that chose the model; it is smaller than on "
             "new ones."
+        )
+    if result["ruled_out"]:
+        found.append(
+            "The held-out data took part in the choice of the effect, among those that the fitted data left; the error "
+            "after is that much less independent, and smaller than on new data."
         )
     if state == "contradicted" and named(result):
         found.append(

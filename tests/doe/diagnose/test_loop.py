@@ -127,6 +127,44 @@ def test_pours_at_the_best_fits_put_right_what_a_thin_screening_says(measurement
     assert found.verdict.kind == "effect:rolling_resistance", said
 
 
+FITTED = {condition.name for condition in load_measurement(measurement_folder("trefoil_1")).fit}
+
+
+def twins(theta, effects, condition, width):
+    """As :func:`expected`, but the fitted conditions cannot tell drag from rolling resistance."""
+    mean = expected(theta, (), condition, width)
+    for name, amplitude in effects:
+        as_read = "rolling_resistance" if condition in FITTED and name == "air_drag" else name
+        for k, value in enumerate(amplitude):
+            mean += 14.0 * value / EFFECTS[name].strongest * direction(f"{condition} {as_read} {k}", width)
+    return mean
+
+
+def test_held_out_data_rule_out_a_twin(measurement, monkeypatch):
+    """What the fitted conditions cannot tell, a held-out one that is far off does; without it both names stay."""
+    planted = (("air_drag", (0.5,)),)
+    monkeypatch.setattr(FormulaPours, "formula", staticmethod(twins))
+    monkeypatch.setattr(diagnosis, "observe", lambda conditions: data_of(measurement, planted, 7, twins))
+    rng, theta = np.random.default_rng(3), [p.mean for p in measurement.parameters]
+
+    def held_out(condition):
+        width = len(summary_names(condition))
+        return twins(theta, planted, condition.name, width) + rng.normal(size=(REPLICATES, width))
+
+    monkeypatch.setattr(diagnosis, "complete_rows", held_out)
+    said = []
+    found = diagnosis.run_diagnosis(measurement, None, None, NAMES, BUDGET, said.append)
+    # The fitted data even favour the wrong one.
+    assert said[-2] == "verdict: ambiguous:rolling_resistance,air_drag"
+    assert (found.verdict.kind, found.verdict.ruled_out) == ("effect:air_drag", ("rolling_resistance",)), said
+    assert found.after.model.effects[0][0] == "air_drag"
+    assert next(row.skill for row in found.holdout_error if row.observable == "overall") > 0.9
+
+    monkeypatch.setattr(diagnosis, "contenders_held_out", lambda *_: ())
+    left = diagnosis.run_diagnosis(measurement, None, None, NAMES, BUDGET, said.append)
+    assert left.verdict.names == ("rolling_resistance", "air_drag")
+
+
 def test_nothing_planted_is_nothing_found(measurement, monkeypatch):
     found, said = run(measurement, monkeypatch, ())
     assert found.verdict.kind == "no_missing_effect", said

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from doe.diagnose.decision.decide import diagnose, judge
+from doe.diagnose.decision.gates import Limits
 from doe.diagnose.follow_up.confirm import fitted
 from doe.diagnose.runs import Condition, Effect, Observed
 from doe.errors import StatisticsError
@@ -59,13 +60,17 @@ def test_an_effect_outside_the_list_stays_unexplained():
     assert verdict.where[0].startswith("one: T2")
 
 
-def test_twins_are_not_told_apart():
+def between_twins(**options):
     """Halfway between two signatures at cosine 0.9, at 6 sigma, with replicates whose mean is exact."""
     toy = make_toy(12, 0)
     data = toy.measured(np.random.default_rng(0), np.zeros(12)).blocks[0]
     exact = data - data.mean(axis=0) + (toy.listed(0, 6.0) + toy.listed(1, 6.0)) / 2
     emulator = known_emulator(toy, np.random.default_rng([0, 1]), df=200)
-    verdict = judge(emulator, Observed((exact,), (np.zeros(12),)), bootstrap=500)
+    return judge(emulator, Observed((exact,), (np.zeros(12),)), bootstrap=500, **options)
+
+
+def test_twins_are_not_told_apart():
+    verdict = between_twins()
     assert verdict.kind.startswith("ambiguous:")
     assert set(verdict.names) == {"e0", "e1"}
     # Each rival goes into the next experiment as it fits the data by itself, not with the parameters of the other.
@@ -73,6 +78,39 @@ def test_twins_are_not_told_apart():
     assert [name for name, _ in (*one.effects, *other.effects)] == list(verdict.names)
     assert np.abs(np.subtract(one.theta, other.theta)).max() > 1e-3
     assert one.theta == tuple(p.after for p in verdict.parameters)
+
+
+def test_a_twin_that_is_ruled_out_leaves_the_answer_to_the_other():
+    both = between_twins()
+    best, other = both.names
+    verdict = between_twins(ruled_out=(best,))
+    assert (verdict.kind, verdict.names, verdict.ruled_out) == (f"effect:{other}", (other,), (best,))
+    # Everything that the verdict says of its final model is said of the one that is left.
+    left = fitted(both, other)
+    assert [a.effect for a in verdict.amplitudes] == [other]
+    assert left.theta == tuple(p.after for p in verdict.parameters)
+    assert left.effects[0][1] == tuple(a.value for a in verdict.amplitudes)
+    assert verdict.t2_after == next(m.t2 for m in both.models if m.label == other)
+    assert verdict.residuals != both.residuals
+    # What the fitted data say of the race stays, and the one that is left is asked whether it fits.
+    assert [(m.label, m.criterion) for m in verdict.models] == [(m.label, m.criterion) for m in both.models]
+    assert [(g.name, g.passed) for g in verdict.gates if g.name.startswith("adequate")] == [
+        (f"adequate: {best}", True),
+        (f"adequate: {other}", True),
+    ]
+    assert between_twins(ruled_out=(other,)).names == (best,)
+    assert between_twins(ruled_out=both.names).kind == both.kind
+
+
+def test_what_is_left_must_fit_by_itself():
+    best, other = between_twins().names
+    p = {g.name: g.p for g in between_twins(ruled_out=(best,)).gates if g.name.startswith("adequate")}
+    # The limit between the p values of the two: the best one fits, the other does not.
+    between = (p[f"adequate: {best}"] + p[f"adequate: {other}"]) / 2
+    assert p[f"adequate: {other}"] < between < p[f"adequate: {best}"]
+    verdict = between_twins(ruled_out=(best,), limits=Limits(adequate=between))
+    assert (set(verdict.names), verdict.ruled_out) == ({best, other}, ())
+    assert [a.effect for a in verdict.amplitudes] == [best]
 
 
 def test_two_strong_effects_are_named_as_a_pair():

@@ -8,7 +8,7 @@ from scipy import stats
 
 from doe.diagnose.decision.decide import judge
 from doe.diagnose.follow_up.closer import WITHIN
-from doe.diagnose.follow_up.held_out import HeldOut, compared, contenders_for, deviance, upheld
+from doe.diagnose.follow_up.held_out import HeldOut, compared, contenders_for, deviance, ruled_out, upheld
 from tests.doe.diagnose.toy import known_emulator, make_toy
 
 R, M, D = 6, 12, 4
@@ -59,6 +59,19 @@ def test_only_what_is_named_has_contenders():
     assert contenders_for(verdict)[0].label == "e5"
     assert all(m.criterion - contenders_for(verdict)[0].criterion <= WITHIN for m in contenders_for(verdict))
     assert contenders_for(replace(verdict, kind="unexplained", names=())) == ()
+    # A rival that gate 4 leaves in the answer is asked however far behind it is.
+    far = next(m.label for m in reversed(verdict.models) if m.members and m not in contenders_for(verdict))
+    both = replace(verdict, kind=f"ambiguous:e5,{far}", names=("e5", far))
+    assert {model.label for model in contenders_for(both)} >= {"e5", far}
+
+
+def test_of_several_names_those_go_that_are_far_behind():
+    verdict = replace(named_verdict(), kind="ambiguous:e5,e6,e7", names=("e5", "e6", "e7"))
+    rows = tuple(HeldOut(name, 1.0, behind) for name, behind in (("e4", 0.0), ("e6", 3.0), ("e7", 14.9), ("e5", 15.0)))
+    # e4 is not among the names: what is ahead of all of them rules none out and is not named itself.
+    assert ruled_out(verdict, rows) == ("e5",)
+    assert ruled_out(replace(verdict, kind="effect:e5", names=("e5",)), rows) == ()
+    assert ruled_out(verdict, ()) == ()
 
 
 def test_several_names_stay_and_are_told_apart():
