@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from doe.diagnose.runs import Declared, Effect, Runs
-from doe.diagnose.simulation.plan import Point, base_points, effect_points, middle_points
+from doe.diagnose.simulation.plan import Point, base_points, effect_points, middle_points, scaling_points
 from doe.diagnose.simulation.pours import ModelPours, Pour, as_runs
 from doe.diagnose.simulation.ranges import ranges
 
@@ -24,9 +24,10 @@ class Budget:
     base: int = 48
     middle: int = 16
     scaling: int = 2
-    screening: int = 10
+    """At each end that the search for a range tries; those at the end that it finds count like the screening."""
+    screening: int = 8
     """Per effect with one amplitude; half as many again with two."""
-    leads: int = 10
+    leads: int = 8
     """More of each lead, over its whole range."""
     widened: int = 12
     """Of an effect over a wider range than the first."""
@@ -78,7 +79,10 @@ def screen(declared: Declared, model: ModelPours, budget: Budget, say: Say) -> S
         point
         for stream, effect in enumerate(effects)
         if effect.unseen is None
-        for point in effect_points(declared.parameters, effect, stream, screening_number(effect, budget.screening))
+        for point in (
+            *scaling_points(declared.parameters, effect, budget.scaling),
+            *effect_points(declared.parameters, effect, stream, screening_number(effect, budget.screening)),
+        )
     ]
     found_pours = model.run("screening", asked)
     say(f"screening: {len(asked)} settings of {sum(effect.unseen is None for effect in effects)} effects")
