@@ -41,7 +41,7 @@ LEADS = 6
 def leads(verdict: Verdict) -> tuple[str, ...]:
     """Effects that take up a good part of the residual, after a screening too thin to say how much they leave.
 
-    The criterion of a fit is not asked yet: from some ten runs of an effect it may be off by more than what it has to tell.
+    The criterion of a fit is not asked yet: from ten runs of an effect it may be off by more than what it has to tell.
     """
     drops = {row.name: row.drop for row in verdict.effects if row.status == "raced"}
     most = max(drops.values(), default=0.0)
