@@ -1,8 +1,12 @@
-"""A diagnosis in the background: the command line's ``diagnose`` (see `explorer.background.command_process`)."""
+"""Diagnoses in the background: the command line's ``diagnose``, run by `explorer.background.command_process`.
+
+One runs at a time; others wait (`explorer.background.waiting_line`).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -15,16 +19,42 @@ from explorer.background.command_process import (
     new_folder,
     newest_unfinished,
 )
+from explorer.background.waiting_line import WaitingLine
+from solver import EFFECTS
 from solver.assets import measurement_folder
 
 RESULT = "diagnosis.json"
 
 
-class DiagnosisProcess(Protocol):
-    """What the page needs of a diagnosis that runs somewhere. ``data``: folder of measured data, or a shipped name."""
+LEAST_BUDGET = 60
+"""Pours that ``--budget`` may ask for at least."""
 
-    def start(self, data: str) -> None:
-        """Start a new diagnosis. Raises a ValueError where one runs already, or there are no such data."""
+
+@dataclass(frozen=True)
+class Question:
+    """What a diagnosis is asked. ``data``: folder of measured data, or a shipped name; ``effects``: the candidates, all
+    if empty; ``budget``: about so many pours for the emulator, None for as many as the program takes by itself.
+    """
+
+    data: str
+    effects: tuple[str, ...] = ()
+    budget: int | None = None
+
+
+class DiagnosisProcess(Protocol):
+    """What the page needs of diagnoses that run somewhere."""
+
+    def start(self, question: Question) -> None:
+        """Start a new diagnosis. Raises a ValueError where one runs already, or the question cannot be asked."""
+
+    def queue(self, question: Question) -> None:
+        """Start it after those before it; at once if none runs and none waits."""
+
+    def clear_queue(self) -> None:
+        """Forget the diagnoses that wait."""
+
+    def waiting(self) -> tuple[str, ...]:
+        """The diagnoses that wait, next one first, in words."""
 
     def cancel(self) -> None:
         """Stop the diagnosis that runs; finished pours are kept."""
@@ -35,8 +65,8 @@ class DiagnosisProcess(Protocol):
     def go_on(self) -> None:
         """Let it go on."""
 
-    def resume(self, data: str) -> None:
-        """Go on with the newest one of ``data`` that was stopped. Raises a ValueError where there is none."""
+    def resume(self, question: Question) -> None:
+        """Go on with the newest one of its data that was stopped. Raises a ValueError where there is none."""
 
     def status(self) -> CommandStatus:
         """State, progress and what the parts have found."""
@@ -61,24 +91,42 @@ class DiagnoseProcess:
     def __init__(self, folder: Path, store: Path | None = None, program: Sequence[str] = PROGRAM) -> None:
         self._folder, self._store = folder, store
         self._process = CommandProcess("diagnosis", {0: "report"}, program)
-        self.cancel, self.close, self.status = self._process.cancel, self._process.close, self._process.status
-        self.pause, self.go_on = self._process.pause, self._process.go_on
+        self._line: WaitingLine[Question] = WaitingLine(self._process, self._begin, "diagnoses")
+        self.status, self.clear_queue = self._line.status, self._line.clear
+        self.cancel, self.pause, self.go_on = self._process.cancel, self._process.pause, self._process.go_on
 
-    def start(self, data: str) -> None:
-        """Start a new diagnosis of ``data``."""
-        measured = _checked(data)
+    def start(self, question: Question) -> None:
+        """Start a new diagnosis."""
+        checked = _checked(question)
         self._process.refuse_while_running()
-        out = new_folder(self._folder, measured.name)
-        self._process.start(out, self._arguments(measured, out))
+        self._begin(checked)
 
-    def resume(self, data: str) -> None:
-        """Go on with the newest diagnosis of ``data`` that was stopped, be it one of an earlier session of the page."""
-        measured = _checked(data)
+    def queue(self, question: Question) -> None:
+        """Start it when those before it have ended."""
+        self._line.add(_checked(question))
+
+    def waiting(self) -> tuple[str, ...]:
+        """Name of the data of every diagnosis that waits, and what was asked otherwise than by itself."""
+        return tuple(_in_words(question) for question in self._line.waiting)
+
+    def resume(self, question: Question) -> None:
+        """Go on with the newest diagnosis of these data that was stopped, be it one of an earlier session of the page.
+
+        Effects and budget are those of ``question``; what has been poured for others stays in the store.
+        """
+        checked = _checked(question)
         self._process.refuse_while_running()
-        found = newest_unfinished(self._folder, (measured.name,), RESULT)
+        name = Path(checked.data).name
+        found = newest_unfinished(self._folder, (name,), RESULT)
         if found is None:
-            raise BackgroundError(f"no diagnosis of {measured.name} has been stopped before its end")
-        self._process.resume(found[0], self._arguments(measured, found[0]))
+            raise BackgroundError(f"no diagnosis of {name} has been stopped before its end")
+        self._process.resume(found[0], self._arguments(checked, found[0]))
+        self._line.begun()
+
+    def close(self) -> None:
+        """Cancel what runs and wait for its end."""
+        self.clear_queue()
+        self._process.close()
 
     @property
     def out(self) -> Path | None:
@@ -89,13 +137,32 @@ class DiagnoseProcess:
         """Output folders of finished diagnoses, of any data, newest first."""
         return finished(self._folder, RESULT)
 
-    def _arguments(self, measured: Path, out: Path) -> list[str]:
+    def _begin(self, question: Question) -> None:
+        out = new_folder(self._folder, Path(question.data).name)
+        self._process.start(out, self._arguments(question, out))
+        self._line.begun()
+
+    def _arguments(self, question: Question, out: Path) -> list[str]:
         """The command line that is run, as a person would type it."""
         store = () if self._store is None else ("--store", str(self._store))
-        return ["diagnose", str(measured), "--out", str(out), "--apply", *store]
+        effects = ("--effects", ",".join(question.effects)) if question.effects else ()
+        budget = () if question.budget is None else ("--budget", str(question.budget))
+        return ["diagnose", question.data, "--out", str(out), "--apply", *effects, *budget, *store]
 
 
-def _checked(data: str) -> Path:
-    if not data.strip():
+def _checked(question: Question) -> Question:
+    """The question with the folder of its data; raises a ValueError for what cannot be asked."""
+    if not question.data.strip():
         raise BackgroundError("choose measured data, or name their folder")
-    return measurement_folder(data.strip()).absolute()
+    for name in question.effects:
+        if name not in EFFECTS:
+            raise BackgroundError(f"effects: {name!r} is not one of {', '.join(EFFECTS)}")
+    if question.budget is not None and question.budget < LEAST_BUDGET:
+        raise BackgroundError(f"budget: {question.budget} pours; allowed are {LEAST_BUDGET} and more")
+    return replace(question, data=str(measurement_folder(question.data.strip()).absolute()))
+
+
+def _in_words(question: Question) -> str:
+    few = f", {len(question.effects)} effects" if question.effects else ""
+    pours = "" if question.budget is None else f", about {question.budget} pours"
+    return f"{Path(question.data).name}{few}{pours}"

@@ -1,13 +1,11 @@
 """Calibrations in the background: the command line's ``calibrate --headless``, run by
 `explorer.background.command_process`.
 
-One runs at a time. Others wait in a queue: the next one starts when the one before has come to its end, be that a
-report or a failure; a study that was cancelled leaves the queue waiting for the next start.
+One runs at a time; others wait (`explorer.background.waiting_line`).
 """
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +22,7 @@ from explorer.background.command_process import (
     newest_unfinished,
 )
 from explorer.background.stage_progress import given_up
+from explorer.background.waiting_line import WaitingLine
 from explorer.files.whole_file import write_whole
 from explorer.study.edit import StudyEdits, edited_study
 
@@ -32,7 +31,6 @@ ENDINGS = {0: "report", 3: "above the error limit; report"}
 """Exit codes of ``calibrate`` after a complete chain."""
 RESULT, PARTIAL = "result.json", "partial.json"
 NO_EDITS = StudyEdits()
-MOST_WAITING = 5
 
 
 class StudyProcess(Protocol):
@@ -106,8 +104,8 @@ class CalibrationProcess:
         self.study_file, self._folder, self._store = study_file, folder, store
         self._process = CommandProcess("study", ENDINGS, program)
         self._profile, self._tries = "", TRIES
-        self._waiting: deque[Order] = deque()
-        self._follow_up = False
+        self._line: WaitingLine[Order] = WaitingLine(self._process, self._begin, "studies")
+        self.status, self.clear_queue = self._line.status, self._line.clear
         self.cancel, self.pause, self.go_on = self._process.cancel, self._process.pause, self._process.go_on
 
     @property
@@ -123,19 +121,11 @@ class CalibrationProcess:
 
     def queue(self, profile: str, edits: StudyEdits = NO_EDITS) -> None:
         """Start it when those before it have ended."""
-        if len(self._waiting) >= MOST_WAITING:
-            raise BackgroundError(f"{MOST_WAITING} studies wait already; more are not kept")
-        self._waiting.append(self._order(profile, edits))
-        if not self.status().alive:
-            self._begin(self._waiting.popleft())
-
-    def clear_queue(self) -> None:
-        """Forget the studies that wait."""
-        self._waiting.clear()
+        self._line.add(self._order(profile, edits))
 
     def waiting(self) -> tuple[str, ...]:
         """Profile of every study that waits, and whether it was changed."""
-        return tuple(f"{order.profile}{', changed' if order.text else ''}" for order in self._waiting)
+        return tuple(f"{order.profile}{', changed' if order.text else ''}" for order in self._line.waiting)
 
     def resume(self) -> None:
         """Go on where the last calibration was stopped, be it one of an earlier session of the page.
@@ -154,18 +144,6 @@ class CalibrationProcess:
         out = self._last()
         self._tries += TRIES
         self._resume(out)
-
-    def status(self) -> CommandStatus:
-        """State, progress and partial results; starts the next study of the queue when one has ended."""
-        status = self._process.status()
-        if status.alive:
-            self._follow_up = True
-        elif self._follow_up:
-            self._follow_up = False
-            if self._waiting and status.state in ("finished", "failed"):
-                self._begin(self._waiting.popleft())
-                return self._process.status()
-        return status
 
     def close(self) -> None:
         """Cancel what runs and wait for its end."""
@@ -192,7 +170,7 @@ class CalibrationProcess:
             out.mkdir()
             write_whole(out / self._edited_name, order.text)
         self._process.start(out, self._arguments(out))
-        self._follow_up = True
+        self._line.begun()
 
     def _last(self) -> Path:
         out = self._process.out
@@ -206,7 +184,7 @@ class CalibrationProcess:
 
     def _resume(self, out: Path) -> None:
         self._process.resume(out, self._arguments(out))
-        self._follow_up = True
+        self._line.begun()
 
     @property
     def _edited_name(self) -> str:

@@ -9,12 +9,12 @@ import pytest
 
 from explorer.background.command_process import BackgroundError, CommandStatus
 from explorer.background.stage_progress import StageProgress
-from explorer.diagnosis.process import DiagnoseProcess
+from explorer.diagnosis.process import DiagnoseProcess, Question
 from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.study.diagnosis_panel import OWN, DiagnosisPanel, answer_markdown
 from explorer.viewer.study.plot_view import NOTHING
-from solver import AssetNotFoundError
+from solver import EFFECTS, AssetNotFoundError
 from solver.assets import measurement_folder, shipped_measurements
 from tests.explorer.background import only_folder, wait_for
 from tests.explorer.diagnosed import result_of_case
@@ -48,7 +48,7 @@ def test_a_diagnosis_runs_to_its_end_at_lower_priority(tmp_path):
     assert process.status() == CommandStatus("idle")
     assert process.out is None
     assert process.finished() == ()
-    process.start("trefoil_1")
+    process.start(Question("trefoil_1"))
     wait_for(lambda: process.status().state != "running")
     status = process.status()
     assert (status.state, status.stage, status.done, status.planned) == ("finished", "base model", 3, 3)
@@ -66,30 +66,30 @@ def test_a_diagnosis_runs_to_its_end_at_lower_priority(tmp_path):
 
 def test_cancel_and_resume_also_from_a_later_page(tmp_path):
     process = diagnosis(tmp_path, "time.sleep(0 if '--resume' in arguments else 60)")
-    process.start("trefoil_1")
+    process.start(Question("trefoil_1"))
     wait_for(lambda: process.status().done == 3)
     with pytest.raises(BackgroundError, match="a diagnosis is running already"):
-        process.start("trefoil_1")
+        process.start(Question("trefoil_1"))
     with pytest.raises(BackgroundError, match="a diagnosis is running already"):
-        process.resume("trefoil_1")
+        process.resume(Question("trefoil_1"))
     process.cancel()
     wait_for(lambda: process.status().state != "running")
     assert process.status().state == "cancelled"
     assert process.finished() == ()
     later = diagnosis(tmp_path)
     with pytest.raises(BackgroundError, match="no diagnosis of trefoil_2 has been stopped"):
-        later.resume("trefoil_2")
-    later.resume("trefoil_1")
+        later.resume(Question("trefoil_2"))
+    later.resume(Question("trefoil_1"))
     wait_for(lambda: later.status().state != "running")
     assert later.status().state == "finished"
     assert json.loads((only_folder(tmp_path) / "arguments.json").read_text())[-1] == "--resume"
     with pytest.raises(BackgroundError, match="no diagnosis of trefoil_1 has been stopped"):
-        later.resume("trefoil_1")
+        later.resume(Question("trefoil_1"))
 
 
 def test_a_diagnosis_that_fails_says_why(tmp_path):
     process = diagnosis(tmp_path, "sys.exit('error: condition fit: rate: -1')")
-    process.start(str(measurement_folder("trefoil_2")))
+    process.start(Question(str(measurement_folder("trefoil_2"))))
     wait_for(lambda: process.status().state != "running")
     assert process.status().state == "failed"
     assert process.status().message == "diagnose ended with exit code 1: error: condition fit: rate: -1"
@@ -98,11 +98,46 @@ def test_a_diagnosis_that_fails_says_why(tmp_path):
 def test_data_that_are_not_there_are_refused_before_a_start(tmp_path):
     process = diagnosis(tmp_path)
     with pytest.raises(AssetNotFoundError, match=r"shipped: .*trefoil_1"):
-        process.start("no such data")
+        process.start(Question("no such data"))
     with pytest.raises(BackgroundError, match="choose measured data"):
-        process.start("  ")
+        process.start(Question("  "))
     assert process.status().state == "idle"
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("question", "trouble"),
+    [
+        (Question("trefoil_1", ("drag",)), "effects: 'drag' is not one of rolling_resistance"),
+        (Question("trefoil_1", budget=20), "budget: 20 pours; allowed are 60 and more"),
+    ],
+)
+def test_a_question_that_cannot_be_asked_is_refused(tmp_path, question, trouble):
+    process = diagnosis(tmp_path)
+    for ask in (process.start, process.queue, process.resume):
+        with pytest.raises(BackgroundError, match=trouble):
+            ask(question)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_queued_diagnosis_starts_after_the_one_before_with_its_own_effects(tmp_path):
+    process = diagnosis(tmp_path, "time.sleep(0.3)")
+    process.queue(Question("trefoil_1"))  # nothing runs: at once
+    process.queue(Question("trefoil_2", ("air_drag", "twisting"), 300))
+    process.queue(Question("trefoil_1", budget=90))
+    assert process.waiting() == ("trefoil_2, 2 effects, about 300 pours", "trefoil_1, about 90 pours")
+    wait_for(lambda: process.status().state == "finished" and not process.waiting() and len(process.finished()) == 3)
+    asked = [json.loads((folder / "arguments.json").read_text()) for folder in reversed(process.finished())]
+    assert [one[one.index("--apply") + 1 : one.index("--store")] for one in asked] == [
+        [],
+        ["--effects", "air_drag,twisting", "--budget", "300"],
+        ["--budget", "90"],
+    ]
+    process.queue(Question("trefoil_1"))
+    process.queue(Question("trefoil_2"))
+    process.clear_queue()
+    assert process.waiting() == ()
+    process.close()
 
 
 class FakeDiagnosis:
@@ -111,8 +146,17 @@ class FakeDiagnosis:
     def __init__(self):
         self.asked, self.now, self.out = [], CommandStatus("idle"), None
 
-    def start(self, data):
-        self.asked.append(f"start {data}")
+    def start(self, question):
+        self.asked.append(("start", question))
+
+    def queue(self, question):
+        self.asked.append(("queue", question))
+
+    def clear_queue(self):
+        self.asked.append("clear queue")
+
+    def waiting(self):
+        return ("trefoil_1, 2 effects",)
 
     def cancel(self):
         self.asked.append("cancel")
@@ -123,8 +167,8 @@ class FakeDiagnosis:
     def go_on(self):
         self.asked.append("go on")
 
-    def resume(self, data):
-        self.asked.append(f"resume {data}")
+    def resume(self, question):
+        self.asked.append(("resume", question))
 
     def status(self):
         return self.now
@@ -135,8 +179,9 @@ class FakeDiagnosis:
 
 def press(panel, button):
     click = type("Event", (), {"client_id": 0, "target": type("Group", (), {"value": button})})
-    for callback in panel._view._buttons[0]._impl.update_cb:
-        callback(click)
+    for row in panel._view._buttons:
+        for callback in row._impl.update_cb:
+            callback(click)
 
 
 @pytest.fixture(scope="module")
@@ -159,7 +204,8 @@ def test_the_panel_asks_and_shows(server, tmp_path):
     press(panel, "Resume")
     press(panel, "Pause / go on")
     actions.carry_out()
-    assert process.asked == ["start trefoil_2", "pause", "cancel", "resume /home/me/my data", "go on"]
+    mine = Question("/home/me/my data")
+    assert process.asked == [("start", Question("trefoil_2")), "pause", "cancel", ("resume", mine), "go on"]
     stages = (StageProgress("base model", 30, 30, "*64* settings"), StageProgress("screening", 5, 20))
     process.now = CommandStatus("running", "screening", 5, 20, 125.0, stages=stages)
     panel.show("no such folder")
@@ -191,7 +237,27 @@ def test_an_uploaded_data_set_can_be_diagnosed(server, tmp_path):
     panel._data.value = "mine-0123456789ab"
     press(panel, "Start")
     actions.carry_out()
-    assert process.asked == [f"start {kept}"]
+    assert process.asked == [("start", Question(str(kept)))]
+
+
+def test_effects_budget_and_queue_are_asked_for_on_the_page(server, tmp_path):
+    process, actions = FakeDiagnosis(), Actions()
+    panel = DiagnosisPanel(server, process, shipped_measurements(), tmp_path / "uploads", actions.post)
+    boxes = panel._candidates._boxes
+    assert tuple(boxes) == tuple(EFFECTS)
+    for name in EFFECTS:
+        boxes[name].value = name in ("air_drag", "twisting")
+    panel._candidates._pours.value = 300
+    press(panel, "Queue")
+    press(panel, "Clear queue")
+    actions.carry_out()
+    assert process.asked == [("queue", Question("trefoil_2", ("air_drag", "twisting"), 300)), "clear queue"]
+    panel.show("")
+    assert "Waiting: trefoil" in panel._view._text.content
+    for box in boxes.values():
+        box.value = False
+    with pytest.raises(ValueError, match="none is chosen"):
+        panel._question()
 
 
 def test_a_file_that_is_no_diagnosis_is_one_line(server, tmp_path):

@@ -10,8 +10,9 @@ import pytest
 from doe.study import load_study
 from explorer.background.command_process import BackgroundError, CommandStatus, advanced
 from explorer.background.stage_progress import StageProgress, failures, given_up, with_event
+from explorer.background.waiting_line import MOST_WAITING
 from explorer.study.edit import StudyEdits
-from explorer.study.process import MOST_WAITING, CalibrationProcess
+from explorer.study.process import CalibrationProcess
 from solver import asset_path
 from tests.explorer.background import only_folder, wait_for
 
@@ -225,7 +226,7 @@ def test_a_failed_study_does_not_hold_up_the_queue_and_it_can_be_cleared(tmp_pat
     wait_for(lambda: process.status().state == "finished")
     assert "-standard-" in process.out.name
     for _ in range(MOST_WAITING + 1):
-        process._waiting.append(None)
+        process._line._waiting.append(None)
     with pytest.raises(BackgroundError, match="wait already"):
         process.queue("quick")
 

@@ -8,13 +8,14 @@ from pathlib import Path
 import viser
 
 from explorer.background.result_file import ResultFile
-from explorer.diagnosis.process import RESULT, DiagnosisProcess
+from explorer.diagnosis.process import RESULT, DiagnosisProcess, Question
 from explorer.files.uploads import kept_measurements
 from explorer.report.diagnosis.findings import summary_label, summary_value
 from explorer.report.diagnosis.in_short import verdict_sentence
 from explorer.report.diagnosis_plots import diagnosis_plots
 from explorer.report.findings import Plain
 from explorer.viewer.actions import Post
+from explorer.viewer.study.candidates import Candidates
 from explorer.viewer.study.plot_view import PlotView
 from explorer.viewer.study.process_view import ProcessView, escaped
 from explorer.viewer.study.result_chooser import ResultChooser
@@ -57,13 +58,11 @@ class DiagnosisPanel:
         self._folder = gui.add_text(
             "Folder", "", hint="Folder with measurement.toml, on the machine that serves this page."
         )
-        acts = {
-            "Start": self._start,
-            "Pause / go on": self._pause,
-            "Cancel": diagnosis.cancel,
-            "Resume": self._resume,
-        }
-        self._view = ProcessView(server, "Diagnosis", acts, post)
+        with gui.add_folder("Effects in question, and how much is poured", expand_by_default=False):
+            self._candidates = Candidates(server)
+        acts = {"Start": self._start, "Pause / go on": self._pause, "Cancel": diagnosis.cancel}
+        more = {"Resume": self._resume, "Queue": self._queue, "Clear queue": diagnosis.clear_queue}
+        self._view = ProcessView(server, "Diagnosis", acts, post, more)
         self._answer = gui.add_markdown("")
         self._plots = PlotView(server, "Chart", EMPTY, post, dark)
         self._chooser = ResultChooser(server, "Result", PRESENT, RESULT, post, self._follow)
@@ -78,10 +77,13 @@ class DiagnosisPanel:
         self._plots.dark = dark
 
     def _start(self) -> None:
-        self._diagnosis.start(self._chosen())
+        self._diagnosis.start(self._question())
 
     def _resume(self) -> None:
-        self._diagnosis.resume(self._chosen())
+        self._diagnosis.resume(self._question())
+
+    def _queue(self) -> None:
+        self._diagnosis.queue(self._question())
 
     def _pause(self) -> None:
         if self._diagnosis.status().state == "paused":
@@ -93,9 +95,10 @@ class DiagnosisPanel:
         """What the list of data sets holds now."""
         return (*self._shipped, *kept_measurements(self._uploads), OWN)
 
-    def _chosen(self) -> str:
+    def _question(self) -> Question:
         chosen = str(self._folder.value if self._data.value == OWN else self._data.value)
-        return str(kept_measurements(self._uploads).get(chosen, chosen))
+        data = str(kept_measurements(self._uploads).get(chosen, chosen))
+        return Question(data, self._candidates.effects, self._candidates.budget)
 
     def show(self, notice: str) -> None:
         """Ask the diagnosis how far it is; ``notice`` is the page's own last message, such as a refused click.
@@ -106,7 +109,11 @@ class DiagnosisPanel:
         if tuple(self._data.options) != offered:
             self._data.options = offered
         status = self._diagnosis.status()
-        self._view.show(status, stages_markdown(status, "diagnosis", "Pours", notice))
+        text = stages_markdown(status, "diagnosis", "Pours", notice)
+        waiting = self._diagnosis.waiting()
+        if waiting:
+            text += f"\n\nWaiting: {escaped('; '.join(waiting))}."
+        self._view.show(status, text)
         self._chooser.offer(self._diagnosis.finished())
         self._follow()
 
