@@ -31,7 +31,7 @@ class WaitingLine(Generic[Order]):
         return tuple(self._waiting)
 
     def add(self, order: Order) -> None:
-        """Begin ``order`` after those before it, at once if nothing runs. Raises BackgroundError if the line is full."""
+        """Begin ``order`` after those before it, at once if nothing runs. Raises BackgroundError if it is full."""
         if len(self._waiting) >= MOST_WAITING:
             raise BackgroundError(f"{MOST_WAITING} {self._what} wait already; more are not kept")
         self._waiting.append(order)
