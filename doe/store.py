@@ -63,6 +63,7 @@ def run_key(scene: Any, seed: int, code_version: str) -> str:
     """Digest of a frozen scene (all its fields, mesh files by content), seed and code version."""
     content = (type(scene.rig).__name__, dataclasses.asdict(scene))
     meshes = [Path(body.shape.file) for body in scene.bodies if getattr(body.shape, "file", "")]
+    meshes += [scene.rig.mesh_file] if hasattr(scene.rig, "mesh_file") else []
     digest = hashlib.sha256(repr((content, seed, code_version)).encode())
     for mesh in meshes:
         digest.update(mesh.read_bytes())

@@ -144,7 +144,7 @@ def study_from(table: Table, path: Path) -> Study:
         raise StudyFileError(f"format: {table.get('format')!r} is not 1")
     if "material" not in table:
         raise ParameterError("material: a shipped material or the path of a material file is needed")
-    scene = with_set_up(load_material(str(table["material"]), relative_to=path.parent), table)
+    scene = with_set_up(load_material(str(table["material"]), relative_to=path.parent), table, path.parent)
     factors = tuple(_factor(scene, entry) for entry in entries(table, "factor"))
     scene = with_values(scene, {factor.path: factor.reference for factor in factors})
     dummies = whole(table.get("dummies", 3), "dummies", least=1)
@@ -221,7 +221,7 @@ def _scan(scene: Scene, scan: Table) -> tuple[str | None, tuple[float, ...]]:
         if not scan.get(key):
             raise StudyFileError(f"scan.{key}: missing; a scan needs a path and values")
     path = canonical(scene, str(scan["path"]))
-    if parameters(scene)[path].choices or not isinstance(scan["values"], list):
+    if not parameters(scene)[path].is_number or not isinstance(scan["values"], list):
         raise StudyFileError(f"scan: {path} over {scan['values']!r}; a list of numbers is needed")
     values = tuple(float(parameters(scene)[path].check(value)) for value in scan["values"])
     for value in values:

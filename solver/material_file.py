@@ -82,7 +82,7 @@ def scene_from(table: dict[str, Any], path: Path) -> Scene:
         gravity=vector(table.get("gravity", (0.0, 0.0, -9.81)), "gravity"),
         assumed=tuple(str(name) for name in list_at(table, "assumed")),
     )
-    return with_set_up(scene, table)
+    return with_set_up(scene, table, path.parent)
 
 
 def _wall(table: dict[str, Any], materials: tuple[Material, ...], bodies: tuple[Body, ...]) -> str:

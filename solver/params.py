@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
+from solver.assets import AssetNotFoundError, asset_path, shipped_assets
+
 UNITS: dict[str, dict[str, float]] = {
     "Pa": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9},
     "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6},
@@ -46,7 +48,8 @@ class Parameter:
     """What is known about one parameter.
 
     ``live`` says whether a running pile takes a new value at once ("acts now") or only the next pour ("on restart").
-    ``choices`` is non-empty for a named choice (then ``low`` and ``high`` mean nothing).
+    ``choices`` is non-empty for a named choice, ``files`` holds the endings of a mesh file that is named (then ``low``
+    and ``high`` mean nothing).
     """
 
     path: str
@@ -57,6 +60,12 @@ class Parameter:
     live: bool = False
     scale: str = "linear"
     choices: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
+
+    @property
+    def is_number(self) -> bool:
+        """Whether its values are numbers, not names."""
+        return not self.choices and not self.files
 
     def check(self, value: Any) -> float | str:
         """Return ``value`` in SI, or raise :class:`ParameterError` naming path, value and what is allowed."""
@@ -64,11 +73,23 @@ class Parameter:
             if value not in self.choices:
                 raise ParameterError(f"{self.path}: {value!r} is not one of {', '.join(self.choices)}")
             return str(value)
+        if self.files:
+            return self._file(value)
         number = parse_quantity(value, self.unit, self.path)
         if not self.low <= number <= self.high:
             unit = "" if self.unit == "1" else f" {self.unit}"
             raise ParameterError(f"{self.path}: {number:g}{unit} is outside {self.low:g} … {self.high:g}{unit}")
         return number
+
+    def _file(self, value: Any) -> str:
+        """A shipped mesh's name as it is, the full path of a file of one's own."""
+        try:
+            path = asset_path("meshes", str(value))
+        except AssetNotFoundError as error:
+            raise ParameterError(f"{self.path}: {error}") from None
+        if path.suffix.lower() not in self.files:
+            raise ParameterError(f"{self.path}: {value!r}; allowed are files ending in {', '.join(self.files)}")
+        return str(value) if str(value) in shipped_assets("meshes") else str(path.absolute())
 
 
 def param(
@@ -81,6 +102,7 @@ def param(
     live: bool = False,
     scale: str = "linear",
     choices: tuple[str, ...] = (),
+    files: tuple[str, ...] = (),
 ) -> Any:
     """Declare a dataclass field that is a parameter: default (SI), unit, allowed range, one-line doc."""
     metadata = {
@@ -91,6 +113,7 @@ def param(
         "live": live,
         "scale": scale,
         "choices": choices,
+        "files": files,
     }
     return dataclasses.field(default=default, metadata={"parameter": metadata})
 

@@ -7,22 +7,30 @@ Keys are the last parts of parameter paths (``outlet_height`` in ``[rig]`` is ``
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 from solver.params import ParameterError
 from solver.scene import Scene, with_rig, with_values
 
 TABLES = ("rig", "insertion", "numerics", "effect")
+MESH = "rig.mesh"
+"""Path of the parameter that names a file."""
 
 
-def with_set_up(scene: Scene, table: Mapping[str, Any]) -> Scene:
-    """``scene`` with the set-up tables in ``table``, a parsed file whose other keys are of no concern here."""
+def with_set_up(scene: Scene, table: Mapping[str, Any], folder: Path | None = None) -> Scene:
+    """``scene`` with the set-up tables in ``table``, a parsed file whose other keys are of no concern here.
+
+    A relative path in it, such as the mesh of a rig, starts in ``folder``; None: the working directory.
+    """
     values: dict[str, Any] = {}
     for kind in TABLES:
         entries = table.get(kind, {})
         if not isinstance(entries, dict):
             raise ParameterError(f"{kind}: a table is needed, not {entries!r}")
         values |= dict(_by_path(kind, entries))
+    if folder is not None and (own := folder / Path(str(values.get(MESH, ""))).expanduser()).is_file():
+        values[MESH] = str(own)
     return with_settings(scene, values)
 
 

@@ -44,7 +44,7 @@ def _declared(path: str, scenes: Sequence[Scene]) -> Parameter:
 
 def _measured(parameter: Parameter, entry: Table, notes: list[str]) -> MeasuredParameter:
     where = f"parameters.{parameter.path}"
-    if parameter.choices:
+    if not parameter.is_number:
         raise MeasurementError(f"{where}: has named values; allowed: parameters that are numbers")
     only(entry, KEYS, where)
     mean, sd, low, high = (_number(entry.get(key), parameter, f"{where}.{key}") for key in KEYS)

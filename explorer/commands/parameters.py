@@ -24,6 +24,8 @@ def parameters(
     from solver import parameters as declared
 
     def allowed(entry: Parameter) -> str:
+        if entry.files:
+            return f"a file {', '.join(entry.files)}"
         return ", ".join(entry.choices) if entry.choices else f"{entry.low:g} … {entry.high:g}"
 
     def shown(number: float | str) -> str:

@@ -16,11 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 from explorer.errors import CommandError
-from explorer.export.triangles import revolved_triangles
+from explorer.export.triangles import mesh_triangles, revolved_triangles
 from solver import Body, Entries, Record, Scene
 from solver.effects.rolling_resistance import RollingResistance
 from solver.effects.set_up import actual
-from solver.rigs import Funnel, Plane, Revolved
+from solver.rigs import Funnel, MeshFunnel, Plane, Revolved, Rig
 from solver.scene import pour_rig
 
 Array = npt.NDArray[np.float64]
@@ -115,7 +115,7 @@ def deck_of(record: Record, time: float | None = None) -> Deck:
         record.dt,
         steps,
         _until(record.entries, steps),
-        plate=_plate(cast(Funnel, scene.rig)),
+        plate=_plate(scene.rig),
         meshes=_meshes(scene, record),
     )
 
@@ -135,8 +135,9 @@ def check_exportable(scene: Scene, *engines: str) -> None:
     damping = rolling(scene).rolling_damping
     if rolling(scene).on and damping > 0.0:
         raise CommandError(f"effect.rolling_resistance.rolling_damping: {damping:g} cannot be exported; allowed: 0")
-    if not isinstance(scene.rig, Funnel):
-        raise CommandError(f"rig {getattr(scene.rig, 'name', '?')!r} cannot be exported; allowed: funnel")
+    if not isinstance(scene.rig, Funnel | MeshFunnel):
+        allowed = f"{Funnel.name}, {MeshFunnel.name}"
+        raise CommandError(f"rig {getattr(scene.rig, 'name', '?')!r} cannot be exported; allowed: {allowed}")
     for body in scene.bodies:
         if body.sizes.varies:
             raise CommandError(
@@ -241,7 +242,7 @@ def _until(entries: Entries, steps: int) -> Entries:
     return Entries(**{field.name: getattr(entries, field.name)[kept] for field in dataclasses.fields(Entries)})
 
 
-def _plate(rig: Funnel) -> float:
+def _plate(rig: Rig) -> float:
     return next(surface.pose.origin[2] for surface in rig.surfaces() if isinstance(surface, Plane))
 
 
@@ -250,9 +251,10 @@ def _meshes(scene: Scene, record: Record) -> tuple[Mesh, ...]:
     opening = round(record.gate_opened / record.dt) if record.gate_opened > 0.0 else -1
     meshes = []
     for name, surface in zip(scene.rig.surface_names, scene.rig.surfaces(), strict=True):
-        if not isinstance(surface, Revolved) or (name == "gate" and not gated):
+        if isinstance(surface, Plane) or (name == "gate" and not gated):
             continue
-        meshes.append(Mesh(name, revolved_triangles(surface), opening if name == "gate" else -1))
+        triangles = revolved_triangles(surface) if isinstance(surface, Revolved) else mesh_triangles(surface)
+        meshes.append(Mesh(name, triangles, opening if name == "gate" else -1))
     return tuple(meshes)
 
 

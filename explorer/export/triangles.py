@@ -1,4 +1,4 @@
-"""Surfaces of revolution as triangles, and STL."""
+"""Walls as triangles, and STL."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from solver.rigs import Revolved
+from solver.insertion import rotation_matrix
+from solver.rigs import Revolved, TriangleMesh
 
 Array = npt.NDArray[np.float64]
 
@@ -37,6 +38,13 @@ def revolved_triangles(surface: Revolved) -> Array:
     low_next, high_next = np.roll(low, -1, axis=1), np.roll(high, -1, axis=1)
     quads = [np.stack([low, low_next, high_next], axis=2), np.stack([low, high_next, high], axis=2)]
     return np.concatenate([quad.reshape(-1, 3, 3) for quad in quads])
+
+
+def mesh_triangles(surface: TriangleMesh) -> Array:
+    """Corners (t, 3, 3) [m] of a mesh where it stands."""
+    turn = rotation_matrix(np.array(surface.pose.quaternion))
+    corners = np.array(surface.vertices) @ turn.T + np.array(surface.pose.origin)
+    return np.asarray(corners[np.array(surface.faces)])
 
 
 def write_stl(path: Path, name: str, triangles: Array) -> None:

@@ -5,7 +5,6 @@ A name from a browser is only ever a label; where a file is put is decided here,
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import io
 import re
@@ -20,13 +19,7 @@ from pathlib import Path, PurePosixPath
 from doe.measurement.load import FILE as MEASUREMENT_FILE
 from doe.measurement.load import load_measurement
 from explorer.errors import CommandError
-from explorer.files.whole_file import write_whole, write_whole_bytes
-from explorer.scene.source import SceneSource, material_source
-from explorer.scene.text import material_toml
-from explorer.shape.mesh_solid import MOST_FACES_DRAWN, mesh_solid
-from solver.mesh_file import SUFFIXES
-from solver.scene import Scene, check
-from solver.shape import Solid, surface_mesh
+from explorer.files.whole_file import write_whole_bytes
 
 MOST_FILE_BYTES = 30_000_000
 MOST_ZIP_BYTES, MOST_UNPACKED_BYTES, MOST_MEMBERS = 50_000_000, 200_000_000, 1000
@@ -35,55 +28,9 @@ PART = re.compile(r"[A-Za-z0-9_. -]+")
 """What a part of a path in an archive may consist of."""
 
 
-def shaped_source(present: Scene, body: str, name: str, content: bytes, unit: str | None, folder: Path) -> SceneSource:
-    """``present`` with the mesh ``content`` as the shape of its component ``body``, kept in ``folder`` as a material.
-
-    Args:
-        present: the scene whose other components, set-up and parameters stay.
-        body: name of the component.
-        name: name of the file in the browser.
-        content: the file.
-        unit: unit of its coordinates; None: that of the format, or millimetres.
-        folder: where mesh and material file are kept.
-
-    The member spheres are fitted here, which takes seconds: a mesh that no spheres can stand for is refused before the
-    pour is given up. Raises CommandError in one line, with nothing left behind.
-    """
-    if body not in [one.name for one in present.bodies]:
-        raise CommandError(f"body {body[:60]!r}: there is none of that name")
-    mesh = _place(name, content, folder, SUFFIXES)
-    material = folder / f"{mesh.stem}-{label(body)}.toml"
-    new = not mesh.exists()
-    with _named(name, mesh):
-        try:
-            write_whole_bytes(mesh, content)
-            solid = mesh_solid(mesh, unit, unit_input="unit")
-            _check_faces(solid)
-            shaped = [dataclasses.replace(one, shape=solid) if one.name == body else one for one in present.bodies]
-            scene = dataclasses.replace(present, bodies=tuple(shaped))
-            check(scene)
-            for one in scene.bodies:
-                _ = one.clump
-        except ValueError:
-            if new:
-                mesh.unlink(missing_ok=True)
-            raise
-    write_whole(material, material_toml(scene, f"{present.title}, with {mesh.name} as its {body}. SI."))
-    return material_source(str(material))
-
-
-def _check_faces(solid: Solid) -> None:
-    faces = len(surface_mesh(solid).faces)
-    if faces > MOST_FACES_DRAWN:
-        raise CommandError(
-            f"{faces} faces; the page draws up to {MOST_FACES_DRAWN}: reduce the mesh, or make a body file of it with "
-            "`explorer shape`"
-        )
-
-
 def kept_file(name: str, content: bytes, folder: Path, suffixes: Sequence[str]) -> Path:
     """The file ``content`` as it came, kept in ``folder``; CommandError in one line for another kind or size."""
-    path = _place(name, content, folder, suffixes)
+    path = place(name, content, folder, suffixes)
     write_whole_bytes(path, content)
     return path
 
@@ -109,7 +56,7 @@ def unpacked_folder(name: str, content: bytes, folder: Path, marker: str, read: 
         return kept
     apart = Path(tempfile.mkdtemp(prefix=".unpacking-", dir=folder))
     try:
-        with _named(name, apart):
+        with named(name, apart):
             _unpack(content, apart, marker)
             read(apart)
         apart.replace(kept)
@@ -169,7 +116,7 @@ def _top(members: list[zipfile.ZipInfo], marker: str) -> PurePosixPath:
     return found[0].parent
 
 
-def _place(name: str, content: bytes, folder: Path, suffixes: Sequence[str]) -> Path:
+def place(name: str, content: bytes, folder: Path, suffixes: Sequence[str]) -> Path:
     """Where an upload is put in ``folder``, which is there afterwards; CommandError for another kind or size."""
     suffix = Path(name).suffix.lower()
     if suffix not in suffixes:
@@ -185,7 +132,7 @@ def _digest(content: bytes) -> str:
 
 
 @contextmanager
-def _named(name: str, path: Path) -> Iterator[None]:
+def named(name: str, path: Path) -> Iterator[None]:
     """Errors with the name that the person knows in place of ``path``."""
     try:
         yield

@@ -116,7 +116,7 @@ def _set_up_scene(table: dict[str, Any], path: Path) -> Scene:
     material = table.get("material")
     if not isinstance(material, str):
         raise ParameterError(f"material: a name or a path is needed, not {material!r}")
-    return with_set_up(material_scene(material, path.parent), table)
+    return with_set_up(material_scene(material, path.parent), table, path.parent)
 
 
 @contextmanager

@@ -6,12 +6,14 @@ from solver.rigs.drop_plate_45 import DropPlate45
 from solver.rigs.funnel import Funnel
 from solver.rigs.inclined_plane import InclinedPlane
 from solver.rigs.lifting_cylinder import LiftingCylinder
+from solver.rigs.mesh_funnel import MeshFunnel
 from solver.rigs.rig import BenchRig, PourRig, Rig
 from solver.rigs.rotating_drum import RotatingDrum
 from solver.rigs.surface import Plane, Pose, Revolved, Surface, TriangleMesh
 
 RIGS: dict[str, type[PourRig]] = {
     "funnel": Funnel,
+    "mesh_funnel": MeshFunnel,
     "lifting_cylinder": LiftingCylinder,
     "draw_down_box": DrawDownBox,
     "rotating_drum": RotatingDrum,
@@ -27,6 +29,7 @@ __all__ = [
     "RIGS",
     "BenchRig",
     "Funnel",
+    "MeshFunnel",
     "Plane",
     "Pose",
     "PourRig",

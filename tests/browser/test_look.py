@@ -75,4 +75,17 @@ def test_a_click_on_the_pile_tells_of_a_body_and_escape_lets_it_go(page):  # noq
             break
     told.wait_for()
     press(page, "Escape")
-    page.get_by_text("Click a body to see what it is").wait_for()
+    page.get_by_text("Click a body, or press N").wait_for()
+
+
+def test_keys_go_from_body_to_body(page):  # noqa: F811
+    kind = page.locator(".body .line", has_text="Kind")
+    press(page, "n")
+    kind.wait_for()
+    first = kind.inner_text()
+    press(page, "n")
+    wait_for(lambda: kind.inner_text() != first)
+    press(page, "p")
+    wait_for(lambda: kind.inner_text() == first)
+    press(page, "Escape")
+    page.get_by_text("Click a body, or press N").wait_for()

@@ -10,12 +10,8 @@ import trimesh
 
 from doe.measurement.load import load_measurement
 from explorer.errors import CommandError
-from explorer.files.uploads import MOST_MEMBERS, label, shaped_source, unpacked_measurement
-from explorer.scene.file import load_scene
+from explorer.files.uploads import MOST_MEMBERS, label, unpacked_measurement
 from solver.assets import measurement_folder
-from solver.scene import with_values
-from solver.shape import mass_properties
-from tests.explorer.beads import bead_scene
 
 DRUM = measurement_folder("granudrum_mcc")
 
@@ -44,52 +40,6 @@ def drum_files(prefix=""):
     return {
         f"{prefix}{path.relative_to(DRUM)}": path.read_bytes() for path in sorted(DRUM.rglob("*")) if path.is_file()
     }
-
-
-SCENE = with_values(bead_scene(), {"pair.bead.bead.static_friction": 0.123, "body.spheres": "coarse"})
-
-
-def test_a_mesh_becomes_the_shape_of_a_body_and_a_material_that_every_command_takes(tmp_path):
-    source = shaped_source(SCENE, "bead", "../my box.STL", stl(), None, tmp_path)
-    body = source.scene.bodies[0]
-    assert mass_properties(body.shape, 1000.0).volume == pytest.approx(12e-3 * 10e-3 * 8e-3, rel=1e-6)
-    assert source.scene.pairs == SCENE.pairs
-    assert source.scene.rig == SCENE.rig
-    assert load_scene(*source.arguments) == source.scene
-    assert {path.parent for path in tmp_path.rglob("*")} == {tmp_path}
-    # Its spheres are fitted by now.
-    assert body.clump.mass == pytest.approx(body.mass)
-
-
-def test_the_unit_is_taken_as_told(tmp_path):
-    source = shaped_source(SCENE, "bead", "box.stl", stl((1.2, 1.0, 0.8)), "cm", tmp_path)
-    assert max(source.scene.bodies[0].extents) == pytest.approx(0.012, rel=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "unit", "words"),
-    [
-        ("open.stl", stl(holes=2), None, "not watertight"),
-        ("empty.stl", b"", None, "0 bytes"),
-        ("noise.stl", bytes(range(256)) * 9, None, "noise.stl"),
-        ("far.stl", stl(), "m", "is it in another unit"),
-        ("huge.stl", stl((400.0, 400.0, 400.0)), None, r"huge.stl: rig\."),
-        ("fine.stl", trimesh.creation.icosphere(5, 6.0).export(file_type="stl"), None, "20480 faces; the page draws"),
-        ("evil.exe", stl(), None, "ending in .stl"),
-        ("../../x<script>.stl", stl(holes=2), None, "not watertight"),
-    ],
-)
-def test_a_bad_mesh_is_refused_in_one_line_and_leaves_nothing(name, content, unit, words, tmp_path):
-    with pytest.raises(CommandError, match=words) as refused:
-        shaped_source(SCENE, "bead", name, content, unit, tmp_path)
-    assert "\n" not in str(refused.value)
-    assert str(tmp_path) not in str(refused.value)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_body_that_is_not_there_is_refused(tmp_path):
-    with pytest.raises(CommandError, match="none of that name"):
-        shaped_source(SCENE, "pebble", "box.stl", stl(), None, tmp_path)
 
 
 @pytest.mark.parametrize("prefix", ["", "my drum/", "a/b/"])

@@ -111,6 +111,12 @@ def test_energy_and_contacts_follow_the_statuses_and_begin_again():
     assert history.drawn(())[0].tolist() == [0.1]
 
 
+def test_the_spread_is_a_band_between_its_ends(server):
+    plot = Chart(server)._plot
+    (band,) = plot.bands
+    assert [plot.series[k]["label"] for k in band["series"]] == ["+ spread", "− spread over flanks"]
+
+
 def test_a_change_reaches_both_charts_of_the_page(server):
     for chart in (Chart(server), MotionChart(server)):
         chart.show(STATUS, [])

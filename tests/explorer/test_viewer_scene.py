@@ -10,12 +10,14 @@ from explorer.viewer.actions import Actions
 from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.pour.scene_panel import OWN, ScenePanel
+from solver.assets import asset_path
 from solver.rigs import RIGS
 from solver.scene import with_values
 from tests.explorer.beads import bead_scene
 from tests.explorer.page_session import PageSession, finished
 from tests.explorer.test_uploads import stl
 from tests.explorer.test_viewer_controls import event
+from tests.solver.rigs.test_mesh_funnel import cone, exported
 
 SOURCE = material_source("sunflower_extract")
 
@@ -37,8 +39,8 @@ class Bench:
         self.actions.post(self.panel._pour)
         return finished(self.actions, self.background)
 
-    def upload(self, name, content):
-        event(self.panel._upload, UploadedFile(name, content))
+    def upload(self, name, content, button="_upload"):
+        event(getattr(self.panel, button), UploadedFile(name, content))
         return finished(self.actions, self.background)
 
 
@@ -116,4 +118,17 @@ def test_a_bad_mesh_changes_nothing(bench):
     assert "not watertight" in bench.upload("open.stl", stl(holes=2))
     bench.panel._unit.value = "league"
     assert "allowed are" in bench.upload("box.stl", stl())
+    assert (bench.session.asked, bench.session.now) == before
+
+
+def test_a_mesh_becomes_the_funnel_and_a_bad_one_changes_nothing(bench):
+    bench.session.start(with_values(bead_scene(), {"body.spheres": "coarse"}), 5)
+    bench.panel.show(bench.session.status())
+    hopper = asset_path("meshes", "square_hopper").read_bytes()
+    assert bench.upload("hopper.stl", hopper, "_funnel") == ""
+    assert (bench.session.now.seed, bench.session.now.scene.rig.name) == (5, "mesh_funnel")
+    bench.panel.show(bench.session.status())
+    assert (bench.panel._rig.value, bench.panel._material.value) == ("mesh_funnel", OWN)
+    before = (list(bench.session.asked), bench.session.now)
+    assert "narrower than a body" in bench.upload("narrow.stl", exported(cone(outlet=4.0)), "_funnel")
     assert (bench.session.asked, bench.session.now) == before

@@ -11,7 +11,7 @@ from explorer.live.details import Details
 from explorer.live.frames import Frame
 from solver.scene import Scene
 
-NOBODY = "Click a body to see what it is, where it goes and what it touches."
+NOBODY = "Click a body, or press N, to see what it is, where it goes and what it touches."
 CONTACTS_SHOWN = 12
 
 STYLE = """<style>

@@ -26,8 +26,11 @@ from solver.scene import Scene
 GHOST = 0.22
 """Opacity of bodies while force chains are drawn through them."""
 FOLLOW, RELEASE, LINK = "Follow", "Release", "Link to this view"
+BEFORE, AFTER = "Previous", "Next"
 FOLLOW_KEY: Any = "F"
 RELEASE_KEY: Any = "escape"
+BEFORE_KEY: Any = "P"
+AFTER_KEY: Any = "N"
 VIEW_KEYS: dict[str, Any] = dict(zip(DIRECTIONS, ("1", "2", "3", "4"), strict=True))
 
 
@@ -63,12 +66,17 @@ class LookTab:
             self._link: Any = gui.add_text("Address", "", hint="Opens the page with this view.")
         with gui.add_folder("Body"):
             self._text = gui.add_html("")
-            acts = {FOLLOW: self._follow, RELEASE: lambda client: self._release()}
+            acts = {
+                FOLLOW: self._follow,
+                RELEASE: lambda client: self._release(),
+                BEFORE: lambda client: self._step(-1),
+                AFTER: lambda client: self._step(1),
+            }
             body = gui.add_button_group(
                 "Camera and body",
                 tuple(acts),
                 hint="F: the camera of this browser goes along with the body, or stays. Escape, or a click beside all "
-                "bodies: lets it go.",
+                "bodies: lets it go. P, N: the body in sight that entered before or after it; at first the topmost.",
             )
 
         @views.on_click
@@ -90,6 +98,8 @@ class LookTab:
             self._key(post, f"View: {name.lower()}", key, partial(self._look_from, name=name))
         self._key(post, "Follow the body that was clicked", FOLLOW_KEY, self._follow)
         self._key(post, "Let the body go", RELEASE_KEY, acts[RELEASE])
+        self._key(post, "Inspect the body that entered before", BEFORE_KEY, acts[BEFORE])
+        self._key(post, "Inspect the next body", AFTER_KEY, acts[AFTER])
 
         @self._server.scene.on_click()
         def _(event: viser.SceneClickEvent) -> None:
@@ -165,6 +175,22 @@ class LookTab:
         if hit != self._selected:
             self._release()
             self._selected = hit
+
+    def _step(self, by: int) -> None:
+        """Inspect the body in sight that entered next (by = 1) or before (-1), around; without one the topmost."""
+        if self._drawn is None:
+            return
+        _, frame = self._drawn
+        seen = np.flatnonzero(in_sight(frame, self._panel.look))
+        if len(seen) == 0:
+            raise InputError("no body is in sight")
+        if self._selected is None:
+            self._selected = int(seen[np.argmax(frame.position[seen, 2])])
+            return
+        place = (
+            np.searchsorted(seen, self._selected, side="right") if by > 0 else np.searchsorted(seen, self._selected) - 1
+        )
+        self._selected = int(seen[place % len(seen)])
 
     def _release(self) -> None:
         self._selected = None

@@ -13,7 +13,15 @@ import viser
 import viser.uplot
 
 from explorer.live.messages import Event, Status
-from explorer.viewer.palette import ANGLE_LINE, ANGLE_SPREAD_LINE, AXIS_TEXT, GRID_LINE, MARK_LINE, MASS_LINE
+from explorer.viewer.palette import (
+    ANGLE_LINE,
+    ANGLE_SPREAD_BAND,
+    ANGLE_SPREAD_LINE,
+    AXIS_TEXT,
+    GRID_LINE,
+    MARK_LINE,
+    MASS_LINE,
+)
 from explorer.viewer.pour.marks import NO_MARKS, Marks, with_marks
 from explorer.viewer.pour.readout import angle_of_repose_deg
 from solver.observables.value import Value
@@ -24,6 +32,8 @@ MOST_POINTS = 300
 """Points kept of each curve; when there are more, every other one is dropped."""
 LEAST_TOP_DEG = 50.0
 """The axis of the angle reaches at least to here [°]."""
+SPREAD = (2, 1)
+"""Places of the upper and the lower end of the angle's spread among the series."""
 
 
 class Curve:
@@ -111,8 +121,9 @@ class Chart:
         self._plot = server.gui.add_uplot(
             self._history.drawn(()),
             _series(NO_MARKS),
+            bands=(viser.uplot.Band(series=SPREAD, fill=ANGLE_SPREAD_BAND),),
             scales=_scales(LEAST_TOP_DEG),
-            axes=(axis("x", 2), axis("angle", 3, "angle [°]"), axis("mass", 1, "mass below [g]")),
+            axes=(axis("x", 2), axis("angle", 3, "angle [°]"), axis("mass", 1, "mass [g]")),
             aspect=2.5,
             padding=(12, 8, 0, 0),
         )

@@ -60,7 +60,7 @@ class MotionChart:
             self._history.drawn(()),
             _series(NO_MARKS),
             scales={"x": viser.uplot.Scale(time=False), "mark": viser.uplot.Scale(range=(0.0, 1.0))},
-            axes=(axis("x", 2), axis("energy", 3, "kinetic energy [mJ]"), axis("contacts", 1, "contacts")),
+            axes=(axis("x", 2), axis("energy", 3, "energy [mJ]"), axis("contacts", 1, "contacts")),
             aspect=2.5,
             padding=(12, 8, 0, 0),
         )

@@ -37,8 +37,10 @@ def size_paths(scene: Scene) -> tuple[str, ...]:
 
 
 def rest_paths(scene: Scene) -> tuple[str, ...]:
-    """Parameters of the folder of rig and feed: all that are not in the panel itself."""
-    return tuple(path for path in parameters(scene) if path.split(".")[0] in ("rig", "insertion") and path not in PATHS)
+    """Parameters of the folder of rig and feed: all that are not in the panel itself. Files are for `scene_panel`."""
+    known = parameters(scene).items()
+    ours = [path for path, parameter in known if path.split(".")[0] in ("rig", "insertion") and not parameter.files]
+    return tuple(path for path in ours if path not in PATHS)
 
 
 def effect_paths() -> tuple[str, ...]:

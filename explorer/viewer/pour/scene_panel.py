@@ -1,4 +1,4 @@
-"""Another rig, another material, another shape: each pours anew, and becomes the default that changes count from."""
+"""Another rig, material, shape or funnel: each pours anew, and becomes the default that changes are counted from."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import viser
 
 from explorer.errors import CommandError
-from explorer.files.uploads import shaped_source
+from explorer.files.mesh_uploads import funnel_source, shaped_source
 from explorer.live.messages import Status
 from explorer.scene.source import SceneSource, rig_source
 from explorer.session import Session
@@ -30,7 +30,7 @@ WORKING = "Reading what was asked for; the pour goes on until that is done."
 
 
 class ScenePanel:
-    """Choices of rig and material with a button, and the upload of a body's shape; ``folder`` keeps uploads."""
+    """Choices of rig and material with a button, uploads of a body's shape and of a funnel; ``folder`` keeps them."""
 
     def __init__(
         self, server: viser.ViserServer, session: Session, folder: Path, post: Post, background: BackgroundWork
@@ -47,22 +47,28 @@ class ScenePanel:
             )
             self._file = gui.add_text("File", "", hint="Material file (TOML), on the machine that serves this page.")
             pour = gui.add_button("Pour this", hint="A new pour; changes are then counted from this material and rig.")
-            with gui.add_folder("Shape from a mesh", expand_by_default=False):
-                self._body = gui.add_dropdown("Body", _names(scene), hint="The component that gets the shape.")
+            with gui.add_folder("Shape or funnel from a mesh", expand_by_default=False):
                 self._unit = gui.add_dropdown(
                     "Unit",
                     (UNIT_OF_FILE, *LENGTH_UNITS),
                     hint="Unit of the coordinates in the file; as usual: metres in .glb, millimetres in the others.",
                 )
+                self._body = gui.add_dropdown("Body", _names(scene), hint="The component that gets the shape.")
                 self._upload = gui.add_upload_button(
-                    "Upload a mesh and pour",
+                    "Upload a body and pour",
                     mime_type=",".join(SUFFIXES),
                     hint="A closed surface (STL, OBJ, PLY, GLB). Its member spheres are fitted first.",
+                )
+                self._funnel = gui.add_upload_button(
+                    "Upload a funnel and pour",
+                    mime_type=",".join(SUFFIXES),
+                    hint="A surface, z up, open at both ends, thin or with walls; its outlet is put over the plate.",
                 )
             self._doing = gui.add_html("")
         pour.on_click(lambda _: post(self._pour))
 
         on_upload(self._upload, self._take_shape, post)
+        on_upload(self._funnel, self._take_funnel, post)
 
     def show(self, status: Status) -> None:
         """Follow a pour that somebody else started; call it inside ``server.atomic()``."""
@@ -94,11 +100,19 @@ class ScenePanel:
         self._begin("reading the material", lambda: _checked(rig_source(rig, material)))
 
     def _take_shape(self, name: str, content: bytes) -> None:
-        present, body, unit = self._session.status().scene, str(self._body.value), str(self._unit.value)
+        present, body, unit = self._session.status().scene, str(self._body.value), self._given_unit()
+        self._begin("fitting member spheres", lambda: shaped_source(present, body, name, content, unit, self._folder))
+
+    def _take_funnel(self, name: str, content: bytes) -> None:
+        present, unit = self._session.status().scene, self._given_unit()
+        self._begin("reading the funnel", lambda: funnel_source(present, name, content, unit, self._folder))
+
+    def _given_unit(self) -> str | None:
+        """Unit of a mesh's coordinates; None: that of its format."""
+        unit = str(self._unit.value)
         if unit not in (UNIT_OF_FILE, *LENGTH_UNITS):
             raise CommandError(f"unit {unit[:60]!r}: allowed are {', '.join(LENGTH_UNITS)}")
-        given = None if unit == UNIT_OF_FILE else unit
-        self._begin("fitting member spheres", lambda: shaped_source(present, body, name, content, given, self._folder))
+        return None if unit == UNIT_OF_FILE else unit
 
     def _begin(self, what: str, find: Callable[[], SceneSource]) -> None:
         self._background.start(what, find, self._start)

@@ -1,0 +1,145 @@
+"""A funnel from a mesh file: what flows in at its top flows out at its bottom, onto a plate.
+
+The mesh stands with z up, as it is in its file; its outlet, the lowest cut through it, is put above the middle of the
+plate. It may be a thin shell or a solid with walls, round or not. What a body can pass is the largest circle about the
+axis within a cut; the gate that keeps the outlet shut is a disc over all of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from solver.assets import AssetNotFoundError, asset_path
+from solver.mesh_file import LENGTH_UNITS, SUFFIXES
+from solver.params import ParameterError, param
+from solver.rigs.feed import RoundFeed
+from solver.rigs.mesh_opening import Opening, cut, middle, opening
+from solver.rigs.rig import DISCHARGE, PILE, Action, Container, PourRig, Switch
+from solver.rigs.surface import Pose, Revolved, Surface, TriangleMesh, horizontal, load_mesh
+
+RIM = 0.005
+"""Share of the mesh's height, from its ends, at which outlet and inlet are looked at."""
+MOST_FACES = 20_000
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A mesh whose outlet stands above the origin, its lowest point in the plane z = 0, with its openings [m]."""
+
+    mesh: TriangleMesh
+    height: float
+    reach: float
+    """Of its farthest corner from the axis."""
+    outlet: Opening
+    inlet: Opening
+
+
+@dataclass(frozen=True)
+class MeshFunnel(PourRig):
+    """The mesh, where it stands, and the mass that is poured."""
+
+    mesh: str = param("square_hopper", files=SUFFIXES, doc="File of the funnel's surface, z up; or a shipped mesh.")
+    unit: str = param("mm", choices=tuple(LENGTH_UNITS), doc="Unit of the coordinates in the file.")
+    outlet_height: float = param(0.065, unit="m", low=0.005, high=2.0, doc="Lowest point of the mesh above the plate.")
+    mass: float = param(0.030, unit="kg", low=1e-5, high=10.0, doc="Mass that is poured.")
+    domain_half_width: float = param(
+        0.4, unit="m", low=0.05, high=10.0, doc="Bodies further than this from the axis are taken out."
+    )
+    wall: str = "rigid_sieve_plate"
+
+    name = "mesh_funnel"
+    surface_names = ("plate", "cone", "gate")
+    observables = PILE + DISCHARGE
+    protocols = ("pour_through", "fill_then_open")
+    refills = True
+
+    @property
+    def mesh_file(self) -> Path:
+        """Where the mesh is. Raises ParameterError where there is none any more."""
+        try:
+            return asset_path("meshes", self.mesh)
+        except AssetNotFoundError as error:
+            raise ParameterError(f"rig.mesh: {error}") from None
+
+    @property
+    def placed(self) -> Placed:
+        """The mesh as it was read. Raises ParameterError for a file that holds none."""
+        file = self.mesh_file
+        return _placed(file, LENGTH_UNITS[self.unit], self.wall, file.stat().st_mtime_ns)
+
+    @property
+    def inlet_height(self) -> float:
+        """Height of the top of the mesh above the plate [m]."""
+        return self.outlet_height + self.placed.height
+
+    def surfaces(self) -> tuple[Surface, ...]:
+        """Plate, mesh and gate, in the order of ``surface_names``."""
+        placed = self.placed
+        raised = TriangleMesh(placed.mesh.vertices, placed.mesh.faces, self.wall, Pose((0.0, 0.0, self.outlet_height)))
+        gate = Revolved(0.0, self.outlet_height, placed.outlet.farthest, self.outlet_height, self.wall)
+        return horizontal(0.0, self.wall), raised, gate
+
+    def poured_mass(self, density: float) -> float:
+        """Mass that is poured [kg], whatever its density."""
+        return self.mass
+
+    def feed(self) -> RoundFeed:
+        """The largest circle in the opening at the top."""
+        return RoundFeed(self.inlet_height, self.placed.inlet.nearest)
+
+    def container(self, since: float) -> Container:
+        """Above the outlet, as far from the axis as the mesh reaches."""
+        return Container(self.outlet_height, self.placed.reach)
+
+    def actions(self) -> tuple[Action, ...]:
+        """The gate opens."""
+        return (Switch(0.0, self.surface_names.index("gate"), False),)
+
+    def check(self, widest_body: float) -> None:
+        """Refuse a mesh that is not there or is closed at an end, and an outlet narrower than ``widest_body`` [m]."""
+        placed, name = self.placed, Path(self.mesh).name
+        for words, one in (("lower", placed.outlet), ("upper", placed.inlet)):
+            if not one.closed:
+                raise ParameterError(
+                    f"rig.mesh: {name}: no wall goes round the axis of the outlet at its {words} end; the mesh has to "
+                    "stand upright (z up) and open, and its inlet above its outlet"
+                )
+        if 2.0 * placed.outlet.nearest <= widest_body:
+            raise ParameterError(
+                f"rig.mesh: {name}: its outlet lets {2.0 * placed.outlet.nearest:.3g} m pass, narrower than a body "
+                f"({widest_body:.3g} m); allowed: more than that. Is its unit {self.unit}?"
+            )
+        if placed.reach >= self.domain_half_width:
+            raise ParameterError(
+                f"rig.mesh: {name}: reaches {placed.reach:.3g} m from its axis, beyond rig.domain_half_width "
+                f"({self.domain_half_width:g} m). Is its unit {self.unit}?"
+            )
+
+
+@lru_cache(maxsize=8)
+def _placed(file: Path, metres_per_unit: float, wall: str, stamp: int) -> Placed:
+    """The mesh in ``file`` as it was at ``stamp``."""
+    try:
+        shell = load_mesh(file, wall, metres_per_unit)
+    except ParameterError as error:
+        raise ParameterError(f"rig.mesh: {error}") from None
+    if len(shell.faces) > MOST_FACES:
+        raise ParameterError(f"rig.mesh: {file}: {len(shell.faces)} faces; allowed: up to {MOST_FACES}")
+    vertices = np.array(shell.vertices)
+    low, high = float(vertices[:, 2].min()), float(vertices[:, 2].max())
+    height = high - low
+    mesh = trimesh.Trimesh(vertices, np.array(shell.faces), process=False)
+    cuts = [cut(mesh, z) for z in (low + RIM * height, high - RIM * height)]
+    if not height > 0.0 or not all(map(len, cuts)):
+        raise ParameterError(f"rig.mesh: {file}: has no height; the mesh has to stand upright (z up)")
+    axis = middle(cuts[0])
+    outlet, inlet = (opening(one, z, axis) for one, z in zip(cuts, (0.0, height), strict=True))
+    moved = vertices - (*axis, low)
+    reach = float(np.hypot(moved[:, 0], moved[:, 1]).max())
+    corners = tuple((float(x), float(y), float(z)) for x, y, z in moved)
+    return Placed(TriangleMesh(corners, shell.faces, wall), height, reach, outlet, inlet)
