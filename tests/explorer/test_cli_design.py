@@ -76,6 +76,8 @@ def test_table_8_gives_table_9_the_papers_equation_and_a_solution(tmp_path):
     assert anova["r_squared"] == pytest.approx(0.983, abs=5e-4)
     assert anova["r_squared_adjusted"] == pytest.approx(0.9612, abs=5e-5)
     assert anova["cv_percent"] == pytest.approx(1.59, abs=5e-3)
+    # As the README quotes it; its check by leaving out one run at a time is in tests/doe/test_surface.py.
+    assert anova["r_squared_predicted"] == pytest.approx(0.832, abs=5e-4)
     printed = [18.31, 0.14, 149.7, -219.08, 3.01, 1.85, 22.22, -0.026, -249, 113.81]
     natural = result["surface"]["models"][0]["coefficients_natural"]
     assert natural == pytest.approx(printed, rel=0.03)  # 0.14 and -0.026 are printed with two digits
@@ -84,6 +86,9 @@ def test_table_8_gives_table_9_the_papers_equation_and_a_solution(tmp_path):
     assert single["predicted"] == pytest.approx(24.68, abs=1e-5)
     assert single["unidentified"] == ["A", "B", "C"]
     assert single["reachable_high"] == pytest.approx(28.34, abs=5e-3)
+    assert single["solution_share"] == pytest.approx([0.77, 0.76, 1.0], abs=5e-3)
+    (canonical,) = result["surface"]["canonical"]
+    assert (canonical["kind"], canonical["inside"]) == ("saddle", False)
 
 
 def test_report_is_written_complete_and_holds_the_same_numbers(tmp_path):

@@ -214,6 +214,24 @@ def test_a_body_that_is_cut_away_cannot_be_clicked(tab):
     assert tab.nodes._bodies[0].batched_scales.tolist()[:4] == [0, 0, 1, 0]
 
 
+def test_keys_go_from_body_to_body_among_those_in_sight(tab):
+    def step(by):
+        tab.tab._step(by)
+        tab.tab.show(tab.nodes, BEADS, SCENE)
+        return tab.session.watched[1]
+
+    assert step(1) == int(np.argmax(BEADS.position[:, 2]))  # at first the topmost
+    n = len(BEADS.component)
+    tab.tab._release()
+    click(tab, 0.05, 0.0)  # no. 2, counted from 1
+    assert [step(1) for _ in range(n)] == [(2 + k) % n for k in range(n)]
+    assert step(-1) == 0
+    assert step(-1) == n - 1
+    tab.tab._panel.change(cut_away="z above", cut_at=-1.0)
+    with pytest.raises(InputError, match="no body is in sight"):
+        tab.tab._step(1)
+
+
 def test_a_camera_follows_until_the_body_is_let_go(tab, monkeypatch):
     one, other = FakeClient(1), FakeClient(2)
     monkeypatch.setattr(tab.tab._server, "get_clients", lambda: {1: one, 2: other})
