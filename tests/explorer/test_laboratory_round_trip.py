@@ -21,7 +21,7 @@ CLOSING = {
 def test_all_shipped_pairs_and_components_close(test):
     result = explorer("lab", test, test, "--simulate", "--json")
     assert result.exit_code == 0, result.output
-    rows = json.loads(result.stdout)["twin"]
+    rows = json.loads(result.stdout)["twins"]
     for quantity, number in CLOSING[test].items():
         found = [row for row in rows if row["quantity"] == quantity]
         assert len(found) == number
