@@ -74,14 +74,14 @@ def run_diagnosis(
     observed = observe(measurement.fit)
     screened, verdict, fresh = pursued(screen(declared, model, budget, say), declared, observed, model, budget, say)
     say(f"verdict: {verdict.kind}")
-    number = max(FRESH, *(2 * condition.replicates for condition in measurement.conditions))
-    held_out = contenders_held_out(verdict, measurement, everywhere, number)
+    held_out = contenders_held_out(verdict, measurement, everywhere)
     if held_out:
         if gone := ruled_out(verdict, held_out):
             verdict = diagnose(screened.declared, screened.runs, observed, fresh=fresh, ruled_out=gone)
         verdict = upheld(verdict, held_out)
         say(f"with held-out data: {verdict.kind}")
     before, after = models(verdict)
+    number = max(FRESH, *(2 * condition.replicates for condition in measurement.conditions))
     widths = [len(summary_names(condition)) for condition in measurement.conditions]
     one = confirm(before, everywhere, number, widths)
     other = one if after == before else confirm(after, everywhere, number, widths)
@@ -131,17 +131,15 @@ def pursued(
     return screened, verdict, fresh
 
 
-def contenders_held_out(
-    verdict: Verdict, measurement: Measurement, pours: ModelPours, number: int
-) -> tuple[HeldOut, ...]:
-    """The named models and their rivals on the held-out conditions of ``pours``, by ``number`` pours of each."""
+def contenders_held_out(verdict: Verdict, measurement: Measurement, pours: ModelPours) -> tuple[HeldOut, ...]:
+    """The named models and their rivals on the held-out conditions of ``pours``."""
     places = [c for c, condition in enumerate(measurement.conditions) if condition.role == "holdout"]
     conditions = [measurement.conditions[c] for c in places]
     data = [complete_rows(condition) for condition in conditions]
     widths = [len(summary_names(condition)) for condition in conditions]
     if not data or min(map(len, data)) < 2:
         return ()
-    return compared(verdict, data, predictions(verdict, pours, number, widths, places))
+    return compared(verdict, data, predictions(verdict, pours, widths, places))
 
 
 def declare(measurement: Measurement, effects: Sequence[str]) -> Declared:

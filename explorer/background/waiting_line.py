@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Generic, TypeVar
 
 from explorer.background.command_process import BackgroundError, CommandProcess, CommandStatus
@@ -36,7 +37,7 @@ class WaitingLine(Generic[Order]):
             raise BackgroundError(f"{MOST_WAITING} {self._what} wait already; more are not kept")
         self._waiting.append(order)
         if not self.status().alive:
-            self._begin(self._waiting.popleft())
+            self._begin_next()
 
     def clear(self) -> None:
         """Forget the orders that wait."""
@@ -50,9 +51,18 @@ class WaitingLine(Generic[Order]):
         elif self._follow_up:
             self._follow_up = False
             if self._waiting and status.state in ("finished", "failed"):
-                self._begin(self._waiting.popleft())
+                try:
+                    self._begin_next()
+                except (ValueError, OSError) as error:
+                    # Nobody pressed a button that could tell: the status does, and the order still waits.
+                    return replace(status, state="failed", message=f"the next one cannot start: {error}")
                 return self._process.status()
         return status
+
+    def _begin_next(self) -> None:
+        """Begin the first order; it waits on where that fails."""
+        self._begin(self._waiting[0])
+        self._waiting.popleft()
 
     def begun(self) -> None:
         """A command was started or resumed: its end lets the next order begin, even if nobody looks in between."""

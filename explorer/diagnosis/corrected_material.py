@@ -11,13 +11,16 @@ from solver import EFFECTS, Scene, with_values
 def corrected_toml(measurement: Measurement, diagnosis: Diagnosis) -> str:
     """The final model of ``diagnosis`` in the set-up of the first fitted condition.
 
-    Parameters are those of the final fit; effects that the verdict names stand in ``[effect.<name>]``. Without a named
-    effect it is the calibrated declared model.
+    Parameters are those of the final fit; the first effect that the verdict names (both of a pair) stands in
+    ``[effect.<name>]``, and where it names several the heading says that it is one of them. Without a named effect it
+    is the calibrated declared model.
     """
     condition = measurement.fit[0].name
+    rivals = diagnosis.verdict.names
+    one_of = f"\nNOT ESTABLISHED: this is {rivals[0]}, the first of {len(rivals)} rivals." if len(rivals) > 1 else ""
     heading = (
         f"{measurement.title or measurement.folder.name}: {diagnosis.verdict.kind}\n"
-        f"{diagnosis.verdict.statement}\n"
+        f"{diagnosis.verdict.statement}{one_of}\n"
         f"Set-up of condition {condition}; parameters of the final fit. SI."
     )
     return material_toml(corrected_scene(measurement, diagnosis), heading)

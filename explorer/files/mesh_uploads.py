@@ -17,10 +17,11 @@ from explorer.scene.text import material_toml
 from explorer.shape.mesh_solid import FIXED_UNIT, MOST_FACES_DRAWN, USUAL_UNIT, mesh_solid
 from solver.mesh_file import SUFFIXES
 from solver.rigs import MeshFunnel
-from solver.scene import Scene, check, pour_rig
-from solver.set_up import with_settings
+from solver.scene import Scene, check, with_rig, with_values
 from solver.shape import Solid, surface_mesh
 
+KEPT = ("mass", "outlet_height", "domain_half_width")
+"""Parameters of the rig of before that the funnel has as well."""
 FEED_SHARE = 0.8
 """Radius of the feed over that of a mesh's opening, where the usual feed would be wider."""
 
@@ -56,19 +57,19 @@ def shaped_source(present: Scene, body: str, name: str, content: bytes, unit: st
 def funnel_source(present: Scene, name: str, content: bytes, unit: str | None, folder: Path) -> SceneSource:
     """``present`` poured through the mesh ``content``; the rest is as in :func:`shaped_source`.
 
-    Materials, bodies, the mass and the height of the outlet stay; the feed is drawn in where the mesh is narrower.
+    Materials, bodies, mass, height of the outlet and the feed stay; it is drawn in where the mesh is narrower.
     """
 
     def poured(mesh: Path) -> Scene:
         given = unit or FIXED_UNIT.get(mesh.suffix.lower(), USUAL_UNIT)
         rig = MeshFunnel(mesh=str(mesh.absolute()), unit=given, wall=present.rig.wall)
         feed = min(present.insertion.region_radius, FEED_SHARE * rig.placed.inlet.nearest)
-        values = {"rig.name": rig.name, "rig.mesh": rig.mesh, "rig.unit": given, "insertion.region_radius": feed}
-        if isinstance(mass := getattr(pour_rig(present), "mass", None), float):
-            values["rig.mass"] = mass
-        if isinstance(height := getattr(present.rig, "outlet_height", None), float):
-            values["rig.outlet_height"] = height
-        return with_settings(present, values)
+        own = {f"rig.{name}": getattr(present.rig, name) for name in KEPT if hasattr(present.rig, name)}
+        placed = with_rig(present, rig.name)
+        # What suited the rig of before may not suit a funnel.
+        fed = present.insertion if present.insertion.protocol in rig.protocols else placed.insertion
+        scene = dataclasses.replace(placed, insertion=dataclasses.replace(fed, region_radius=feed))
+        return with_values(scene, own | {"rig.mesh": rig.mesh, "rig.unit": given})
 
     return _kept(name, content, folder, MeshFunnel.name, poured)
 

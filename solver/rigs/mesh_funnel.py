@@ -18,7 +18,7 @@ from solver.assets import AssetNotFoundError, asset_path
 from solver.mesh_file import LENGTH_UNITS, SUFFIXES
 from solver.params import ParameterError, param
 from solver.rigs.feed import RoundFeed
-from solver.rigs.mesh_opening import Opening, cut, middle, opening
+from solver.rigs.mesh_opening import Opening, cut, middle, opening, shut
 from solver.rigs.rig import DISCHARGE, PILE, Action, Container, PourRig, Switch
 from solver.rigs.surface import Pose, Revolved, Surface, TriangleMesh, horizontal, load_mesh
 
@@ -37,6 +37,8 @@ class Placed:
     """Of its farthest corner from the axis."""
     outlet: Opening
     inlet: Opening
+    shut: bool
+    """Something stands in the way straight down from the inlet to the outlet."""
 
 
 @dataclass(frozen=True)
@@ -109,6 +111,10 @@ class MeshFunnel(PourRig):
                     f"rig.mesh: {name}: no wall goes round the axis of the outlet at its {words} end; the mesh has to "
                     "stand upright (z up) and open, and its inlet above its outlet"
                 )
+        if placed.shut:
+            raise ParameterError(
+                f"rig.mesh: {name}: a face stands across the axis of the outlet; a funnel is open from top to bottom"
+            )
         if 2.0 * placed.outlet.nearest <= widest_body:
             raise ParameterError(
                 f"rig.mesh: {name}: its outlet lets {2.0 * placed.outlet.nearest:.3g} m pass, narrower than a body "
@@ -142,4 +148,4 @@ def _placed(file: Path, metres_per_unit: float, wall: str, stamp: int) -> Placed
     moved = vertices - (*axis, low)
     reach = float(np.hypot(moved[:, 0], moved[:, 1]).max())
     corners = tuple((float(x), float(y), float(z)) for x, y, z in moved)
-    return Placed(TriangleMesh(corners, shell.faces, wall), height, reach, outlet, inlet)
+    return Placed(TriangleMesh(corners, shell.faces, wall), height, reach, outlet, inlet, shut(mesh, axis))

@@ -12,6 +12,8 @@ Array = npt.NDArray[np.float64]
 
 DIRECTIONS = 720
 """Half degrees in which the wall is looked for from the axis."""
+HAIR = 1e-6
+"""Angle [rad] that segments are longer at either end, so that none looks between two that meet."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,15 @@ def middle(segments: Array) -> tuple[float, float]:
     return float(x), float(y)
 
 
+def shut(mesh: trimesh.Trimesh, axis: tuple[float, float]) -> bool:
+    """Whether a face stands across the vertical line through ``axis`` (x, y): a lid, a bottom, or a wall aslant."""
+    a, b, c = (mesh.triangles[:, k, :2] - axis for k in range(3))
+    turns = np.stack([p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0] for p, q in ((a, b), (b, c), (c, a))])
+    area = np.abs(turns.sum(axis=0))
+    seen = area > 1e-9 * max(float(area.max(initial=0.0)), 1e-30)
+    return bool((((turns >= 0.0).all(axis=0) | (turns <= 0.0).all(axis=0)) & seen).any())
+
+
 def opening(segments: Array, height: float, axis: tuple[float, float]) -> Opening:
     """What ``segments`` (n, 2, 2) of a cut at ``height`` leave open about ``axis`` (x, y)."""
     start, end = segments[:, 0] - axis, segments[:, 1] - axis
@@ -56,6 +67,6 @@ def _all_round(start: Array, end: Array) -> bool:
     first = np.arctan2(start[:, 1], start[:, 0])
     turn = np.arctan2(start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0], (start * end).sum(axis=1))
     looked = np.linspace(-np.pi, np.pi, DIRECTIONS, endpoint=False)
-    # How far each direction is from the first end, in the sense of the segment's own turn.
-    ahead = np.mod((looked[:, None] - first[None, :]) * np.where(turn < 0.0, -1.0, 1.0), 2.0 * np.pi)
-    return bool((ahead <= np.abs(turn) + 1e-9).any(axis=1).all())
+    # How far each direction is from the first end, in the sense of the segment's own turn; a hair before it counts.
+    ahead = np.mod((looked[:, None] - first[None, :]) * np.where(turn < 0.0, -1.0, 1.0) + HAIR, 2.0 * np.pi)
+    return bool((ahead <= np.abs(turn) + 2.0 * HAIR).any(axis=1).all())

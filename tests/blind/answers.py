@@ -12,7 +12,7 @@ from doe.diagnose.decision.verdict import Verdict
 from doe.diagnose.diagnosis import FRESH, models
 from doe.diagnose.follow_up.closer import LOOKS, contenders, poured
 from doe.diagnose.follow_up.confirm import confirm
-from doe.diagnose.follow_up.held_out import compared, contenders_for, predictions, ruled_out, upheld
+from doe.diagnose.follow_up.held_out import POURS, compared, contenders_for, predictions, ruled_out, upheld
 from doe.diagnose.follow_up.holdout import HoldoutCondition, holdout_errors
 from doe.diagnose.simulation.plan import Point
 from doe.diagnose.simulation.pours import ModelPours
@@ -65,8 +65,8 @@ class Answers:
             pours = 0 if found is None else REPLICATES * len(self.measurement.fit)
             pours += sum(len(block) for one in questions[k].fresh for block in one.blocks) if found else 0
             models = len(contending.get(k, ()))
-            pours += (REPLICATES + FRESH * models) * len(self.measurement.holdout) if models else 0
-            pours += FRESH * len(self.measurement.holdout) if k in errors else 0
+            pours += (REPLICATES + POURS * models) * len(self.measurement.holdout) if models else 0
+            pours += 2 * FRESH * len(self.measurement.holdout) if k in errors else 0
             rows.append(
                 Row(
                     number=truth.case.number,
@@ -112,7 +112,7 @@ class Answers:
         found, rows, again = dict(verdicts), {}, {}
         for k, data in zip(asked, self.measured([truths[k] for k in asked], conditions), strict=True):
             if data is not None:
-                poured = predictions(found[k], pours, FRESH, widths)
+                poured = predictions(found[k], pours, widths)
                 rows[k] = compared(found[k], [vectors(c, data[c.name]) for c in conditions], poured)
                 if gone := ruled_out(found[k], rows[k]):
                     again[k] = replace(questions[k], ruled_out=gone)

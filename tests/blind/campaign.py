@@ -1,9 +1,9 @@
 """The blind campaign: laboratories pour, the diagnosis answers, and the answers are kept.
 
 The declared model is screened once, six times as far as in a diagnosis; each data set is judged from those runs and
-from pours at the best fits of its own contenders. A set takes ``REPLICATES`` pours per fitted condition. Where the name
-is right, the held-out condition is measured too, and predicted by fresh pours of the calibrated base model and of the
-named one.
+from pours at the best fits of its own contenders. A set takes ``REPLICATES`` pours per fitted condition. Where
+something is named, the held-out condition is measured too and predicted by the contenders; where the name is right,
+also by fresh pours of the calibrated base model and of the named one.
 """
 
 import os

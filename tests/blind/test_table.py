@@ -68,16 +68,17 @@ def test_targets_by_hand():
     rows += [row(54, "effect", "a", "effect:b", 10.0, 0.2)]
     rows += [row(55, "effect", "a", "out of reach: bounds", 6.0)]
     rows += [row(56, "outside", "sticky_funnel", "unexplained"), row(57, "outside", "sticky_funnel", "effect:b")]
+    rows += [row(58, "pair", "a+b", "effect:a", 10.0), row(59, "pair", "a+b", "unexplained", 10.0)]
     found = {target.name: target for target in targets([one for one in rows if one.answer != "out of reach"])}
     assert found["an effect blamed where none is"].found.startswith("1/50 = 2.0 %")
-    assert found["wrong name, library effects"].found.startswith("1/5 = 20.0 %")
+    assert found["wrong name, library effects and pairs"].found.startswith("2/7 = 28.6 %")
     assert found["right name at 10 σ"].found.startswith("4/5 = 80.0 %")
     assert found["holdout error ÷ noise floor, right names"].found == "1.10 over 4 sets"
     assert found["holdout error ÷ noise floor ≤ 1.25, right names"].found.startswith("3/4 = 75.0 %")
     assert found["outside effects called unexplained"].found.startswith("1/2")
     assert [target.met for target in found.values()] == [True, False, True, None, False, False, True, False]
     text = campaign_text(rows)
-    assert "57 data sets judged, 1 out of reach" in text
+    assert "59 data sets judged, 1 out of reach" in text
     # Seen shifts of 9.5 σ each, and the answers of the five sets.
     assert re.search(r"effect, 10 σ +5 +9\.5 +0 +4 +0 +0 +1\n", text)
     assert "wrong, set 54: a at 10 σ → effect:b" in text

@@ -23,6 +23,7 @@ CANDIDATES = (
     "air_drag",
     "kinetic_friction",
     "density_error",
+    "shape_elongation",
     "plate_tilt",
     "twisting",
 )

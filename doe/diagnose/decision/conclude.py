@@ -59,14 +59,11 @@ def conclude(
     if not race.fits:
         text = "The data hold more than noise, and no simulated effect could be seen by them."
         return Conclusion("unexplained", (), text, (), base, None)
+    fits, adequacy, asked = _first_adequate(emulator, evidence, race, limits, bootstrap, seed + 1)
+    if fits and adequacy:
+        return _answer(emulator, evidence, fits, ruled_out, asked, adequacy, limits, bootstrap, seed + 4)
     fit = race.fits[race.best]
-    adequacy = adequate(emulator, evidence, fit, race.best, limits, bootstrap, seed + 1)
-    if adequacy.gate.passed:
-        near, apart = _near(emulator, evidence, race, limits, seed + 4)
-        so_far = (adequacy.gate, *apart)
-        return _answer(emulator, evidence, race, near, ruled_out, so_far, adequacy, limits, bootstrap, seed + 5)
     pairs = race_pairs(emulator, evidence, base, fit, raced)
-    asked = [adequacy.gate]
     if pairs.fits:
         gain = race.criteria[race.best] - pairs.criteria[pairs.best]
         label = f"pair gain of {pairs.best} over {race.best}"
@@ -88,13 +85,32 @@ def conclude(
     return Conclusion("unexplained", (), text, tuple(asked), fit, None, pairs)
 
 
+def _first_adequate(
+    emulator: Emulator, evidence: Evidence, race: Race, limits: Limits, bootstrap: int, seed: int
+) -> tuple[Race | None, Adequacy | None, list[Gate]]:
+    """Return the race from the first single effect on that passes gate 2, with that and what was asked; None if none.
+
+    In order of the criterion. What fits worse than one that does not fit is not asked.
+    """
+    asked: list[Gate] = []
+    rest = race
+    while rest.fits:
+        label = rest.best
+        if all(rest.fits[label].t2 < gate.statistic for gate in asked):
+            found = adequate(emulator, evidence, rest.fits[label], label, limits, bootstrap, seed)
+            asked.append(found.gate)
+            if found.gate.passed:
+                return rest, found, asked
+        rest = rest.without((label,))
+    return None, None, asked
+
+
 def _answer(
     emulator: Emulator,
     evidence: Evidence,
     race: Race,
-    near: tuple[str, ...],
     ruled_out: Sequence[str],
-    gates: tuple[Gate, ...],
+    asked: Sequence[Gate],
     adequacy: Adequacy,
     limits: Limits,
     bootstrap: int,
@@ -102,15 +118,19 @@ def _answer(
 ) -> Conclusion:
     """Return the answer with the names that the fitted data leave, less those that held-out data rule out.
 
-    The fitted data have to bear the first one that is left by itself, else all stay.
+    The best one that is left has to fit by itself, else all stay; gates 3 and 4 are asked anew from there.
     """
-    left = tuple(name for name in near if name not in ruled_out) or near
-    if left[0] != near[0]:
-        other = adequate(emulator, evidence, race.fits[left[0]], left[0], limits, bootstrap, seed)
+    near, apart = _near(emulator, evidence, race, limits, seed)
+    gates = (*asked, *apart)
+    gone, rest = tuple(name for name in near if name in ruled_out), race.without(ruled_out)
+    if gone and rest.fits:
+        other = adequate(emulator, evidence, rest.fits[rest.best], rest.best, limits, bootstrap, seed + 1)
         gates = (*gates, other.gate)
-        left, adequacy = (left, other) if other.gate.passed else (near, adequacy)
-    gone = tuple(name for name in near if name not in left)
-    return Conclusion(*_named("effect", left, gone), gates, race.fits[left[0]], adequacy, ruled_out=gone)
+        if other.gate.passed:
+            left, again = _near(emulator, evidence, rest, limits, seed + 2)
+            named = _named("effect", left, gone)
+            return Conclusion(*named, (*gates, *again), rest.fits[rest.best], other, ruled_out=gone)
+    return Conclusion(*_named("effect", near), gates, race.fits[race.best], adequacy)
 
 
 def _near(

@@ -27,6 +27,11 @@ class Race:
         """Return the label of the least criterion."""
         return min(self.criteria, key=lambda name: self.criteria[name])
 
+    def without(self, names: Sequence[str]) -> Race:
+        """Return the race without some of its models."""
+        left = [name for name in self.fits if name not in names]
+        return Race({name: self.fits[name] for name in left}, {name: self.criteria[name] for name in left})
+
 
 def label_of(declared: Declared, members: Sequence[int]) -> str:
     """Return "a", "a+b" or "base"."""

@@ -58,11 +58,19 @@ class Confirmed:
 
 
 def confirm(
-    model: Model, pours: ModelPours, number: int, widths: Sequence[int], where: Sequence[int] | None = None
+    model: Model,
+    pours: ModelPours,
+    number: int,
+    widths: Sequence[int],
+    where: Sequence[int] | None = None,
+    sequence: str = "confirm",
 ) -> Confirmed:
-    """Pour ``model`` ``number`` times in every condition of ``pours``, or ``where``; ``widths``: summaries of each."""
-    points = [Point(f"confirm {number}", k, model.theta, model.effects) for k in range(number)]
-    rows = pours.run(f"confirmation of {model.name}", points, where)
+    """Pour ``model`` ``number`` times in every condition of ``pours``, or ``where``; ``widths``: summaries of each.
+
+    Pours of another ``sequence`` have other seeds.
+    """
+    points = [Point(f"{sequence} {number}", k, model.theta, model.effects) for k in range(number)]
+    rows = pours.run(f"{sequence}: {model.name}", points, where)
     blocks, profiles, broken = [], [], 0
     for c, width in enumerate(widths):
         valid = [row[c] for row in rows if row[c].valid and np.isfinite(row[c].summaries).all()]

@@ -1,14 +1,16 @@
 """Gate 5: do data that were not fitted agree with the name? They take names back, and never give a new one alone.
 
-Every contender (the named models, and others that the fit leaves near them) predicts the held-out conditions by fresh
-pours. With r measured and m poured means, S the covariance of the model's own pours, half shrunk to its diagonal:
+Every contender (the named models, and others that the fit leaves near them) predicts the held-out conditions by pours
+of its own, which nothing else rests on. With r measured and m poured ones, S the covariance of a pour pooled over all
+contenders, half shrunk to its diagonal:
 
-    T^2 = (measured - poured)' Sigma^-1 (measured - poured),   Sigma = S/r + S/m
-    D   = (m - 1 + d) ln(1 + T^2/(m - 1)) + ln|Sigma|,
+    T^2 = (measured - poured)' Sigma^-1 (measured - poured),   Sigma = S (1/r + 1/m)
+    D   = (f + d) ln(1 + T^2/f),   f = sum of m - 1 over the contenders,
 
--2 ln of a multivariate t density, which does not take a rare pour for a refutation (Lange, Little and Taylor 1989,
-JASA 84:881). A name that stands alone keeps doing so if every rival stays the gap of gate 3 behind in the criterion of
-the fit plus D; else they join it. Of several names those go that are WITHIN or more behind the first of them.
+-2 ln of a multivariate t density but for what is the same for all of them, which does not take a rare pour for a
+refutation (Lange, Little and Taylor 1989, JASA 84:881). A name that stands alone keeps doing so if every rival stays
+the gap of gate 3 behind in the criterion of the fit plus D; else they join it. Of several names those go that are
+WITHIN or more behind the first of them.
 """
 
 from __future__ import annotations
@@ -24,13 +26,18 @@ from doe.diagnose.decision.tables import listed
 from doe.diagnose.decision.verdict import FittedModel, Verdict
 from doe.diagnose.follow_up.closer import MODELS, WITHIN, near_best
 from doe.diagnose.follow_up.confirm import confirm, fitted
+from doe.diagnose.runs import CONSTANT_FLOOR, dust
 from doe.diagnose.simulation.pours import ModelPours
 from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
 
+SEQUENCE = "held out"
+"""Name of the pours: others than those that the error is stated by."""
+POURS = 8
+"""Per contender and condition."""
 LEAST = 6
-"""Pours of a model in a condition from which their scatter is known well enough."""
+"""Of them, readable, from which on a model has predicted anything."""
 
 
 @dataclass(frozen=True)
@@ -54,31 +61,54 @@ def contenders_for(verdict: Verdict) -> tuple[FittedModel, ...]:
 
 
 def predictions(
-    verdict: Verdict, pours: ModelPours, number: int, widths: Sequence[int], where: Sequence[int] | None = None
+    verdict: Verdict, pours: ModelPours, widths: Sequence[int], where: Sequence[int] | None = None, number: int = POURS
 ) -> dict[str, tuple[FloatArray, ...]]:
     """Label -> fresh pours of every contender in the conditions of ``pours``, or ``where``, per condition (m, d_c)."""
     return {
-        model.label: confirm(fitted(verdict, model.label), pours, number, widths, where).blocks
+        model.label: confirm(fitted(verdict, model.label), pours, number, widths, where, SEQUENCE).blocks
         for model in contenders_for(verdict)
     }
 
 
-def deviance(measured: FloatArray, poured: FloatArray) -> float:
-    """Return D of one condition: measured (r, d), poured (m, d). Summaries that vary in neither are left out."""
-    r, m = len(measured), len(poured)
-    varies = np.ptp(np.concatenate([measured, poured]), axis=0) > 0.0
-    spread = np.where(poured.std(axis=0, ddof=1) > 0.0, poured.std(axis=0, ddof=1), measured.std(axis=0, ddof=1))
-    known = varies & (spread > 0.0)
-    unit = spread[known]
-    z = poured[:, known] / unit
-    correlation = np.corrcoef(z, rowvar=False) if len(unit) > 1 else np.ones((1, 1))
-    correlation = np.where(np.isfinite(correlation), correlation, 0.0)
-    sigma = 0.5 * (correlation + np.eye(len(unit))) * (1.0 / r + 1.0 / m)
-    np.fill_diagonal(sigma, 1.0 / r + 1.0 / m)
-    off = (measured[:, known].mean(axis=0) - poured[:, known].mean(axis=0)) / unit
-    t2, df, d = float(off @ np.linalg.solve(sigma, off)), m - 1, len(unit)
-    determinant = float(np.linalg.slogdet(sigma)[1] + 2.0 * np.log(unit).sum())
-    return (df + d) * float(np.log1p(t2 / df)) + determinant
+@dataclass(frozen=True)
+class PourNoise:
+    """Of one pour: standard deviation (d,), 0 where nothing differs; correlations (d, d); degrees of freedom."""
+
+    spread: FloatArray
+    correlation: FloatArray
+    freedom: int
+
+
+def pour_noise(measured: FloatArray, poured: Sequence[FloatArray]) -> PourNoise:
+    """The noise pooled over ``poured`` [(m, d)], its correlations half shrunk.
+
+    What no pour varies has the deviation of the data, or ``CONSTANT_FLOOR`` of its size where they are constant too.
+    """
+    rest = np.concatenate([block - block.mean(axis=0) for block in poured])
+    freedom = sum(len(block) - 1 for block in poured)
+    spread = np.sqrt((rest**2).sum(axis=0) / freedom)
+    everything = np.concatenate([measured, *poured])
+    floor = CONSTANT_FLOOR * np.abs(everything).max(axis=0)
+    differs = np.ptp(everything, axis=0) > dust(everything)
+    spread = np.where(spread > floor, spread, np.where(differs, np.maximum(measured.std(axis=0, ddof=1), floor), 0.0))
+    z = rest / np.where(spread > 0.0, spread, 1.0)
+    correlation = 0.5 * (z.T @ z) / freedom
+    np.fill_diagonal(correlation, 1.0)
+    return PourNoise(spread, correlation, freedom)
+
+
+def deviance(measured: FloatArray, poured: FloatArray, noise: PourNoise) -> float:
+    """Return D of one condition: measured (r, d), poured (m, d).
+
+    Infinite where fewer than ``LEAST`` pours could be read: a model that breaks off where the laboratory measured.
+    """
+    if len(poured) < LEAST:
+        return float("inf")
+    known = noise.spread > 0.0
+    off = (measured[:, known].mean(axis=0) - poured[:, known].mean(axis=0)) / noise.spread[known]
+    square = float(off @ np.linalg.solve(noise.correlation[np.ix_(known, known)], off))
+    t2 = square / (1.0 / len(measured) + 1.0 / len(poured))
+    return float((noise.freedom + known.sum()) * np.log1p(t2 / noise.freedom))
 
 
 def compared(
@@ -86,18 +116,21 @@ def compared(
 ) -> tuple[HeldOut, ...]:
     """Contenders in order of the criterion of the fit plus D. poured: label -> per held-out condition (m, d_c).
 
-    A model of which fewer than ``LEAST`` pours could be read says nothing; without the named one nothing is compared.
+    Nothing is compared where no contender's pours can be read.
     """
-    found = {
-        label: sum(deviance(data, block) for data, block in zip(measured, blocks, strict=True))
-        for label, blocks in poured.items()
-        if min(map(len, blocks)) >= LEAST
-    }
-    if not found or verdict.names[0] not in found:
-        return ()
+    found = dict.fromkeys(poured, 0.0)
+    for c, data in enumerate(measured):
+        blocks = {label: blocks[c] for label, blocks in poured.items()}
+        readable = [block for block in blocks.values() if len(block) >= LEAST]
+        if not readable:
+            return ()
+        noise = pour_noise(data, readable)
+        found = {label: found[label] + deviance(data, block, noise) for label, block in blocks.items()}
     criteria = {model.label: model.criterion for model in verdict.models}
     total = {label: criteria[label] + value for label, value in found.items()}
-    best = min(total.values())
+    best = min(total.values(), default=float("inf"))
+    if not np.isfinite(best):
+        return ()
     return tuple(
         HeldOut(label, found[label], total[label] - best) for label in sorted(total, key=lambda label: total[label])
     )
@@ -132,5 +165,7 @@ def upheld(verdict: Verdict, rows: Sequence[HeldOut]) -> Verdict:
     if stands or len(verdict.names) > 1:
         return replace(verdict, gates=gates)
     names = (verdict.names[0], *(name for name in near if name != verdict.names[0]))
-    statement = f"{listed(names)}: the fitted data name {verdict.names[0]}, the held-out data do not bear it out."
+    statement = f"{listed(names)}: the fitted data favour {verdict.names[0]}, the held-out data do not bear it out."
+    if verdict.ruled_out:
+        statement += f" They rule out {listed(verdict.ruled_out)}, which the fitted data left as well."
     return replace(verdict, kind=f"ambiguous:{','.join(names)}", names=names, statement=statement, gates=gates)

@@ -74,7 +74,7 @@ def next_experiment(
         found = {label: block[k] for label, block in blocks.items()}
         if min(len(block) for block in found.values()) < POURS // 2:
             continue  # a set-up that jams tells nothing
-        spread = np.mean([np.cov(block, rowvar=False) for block in found.values()], axis=0)
+        spread = np.mean([np.atleast_2d(np.cov(block, rowvar=False)) for block in found.values()], axis=0)
         varies = np.diag(spread) > 0.0
         # Few pours: half of the way to the diagonal.
         pour = 0.5 * (spread + np.diag(np.diag(spread)))[np.ix_(varies, varies)]

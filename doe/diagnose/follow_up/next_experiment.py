@@ -2,7 +2,8 @@
 
     score(x) = sum_{i<j} w_i w_j [(mu_i - mu_j)' V_ij^-1 (mu_i - mu_j) + tr(2 V V_ij^-1) - d],  V_ij = 2 V + W_i + W_j
 
-with V the covariance of the measured mean, W_i that of model i's prediction (parameters and emulator), d summaries.
+with V the covariance of the measured mean, W_i that of model i's prediction, d summaries. The menu (menu.py) predicts
+by pours at the best fits: W_i is that of their mean, and what the fit leaves open is not in it.
 The -d makes set-ups with different numbers of summaries comparable: zero says that nothing is to be learnt. One more
 rival stands for a model outside the list, with a wide prediction: it marks down set-ups that no model can predict, so
 that repeating a known one is sometimes the answer. Source: Buzzi-Ferraris and Forzatti 1983, Chem. Eng. Sci. 38:225.
@@ -18,8 +19,6 @@ from itertools import combinations, permutations
 import numpy as np
 import numpy.typing as npt
 
-from doe.diagnose.decision.verdict import FittedModel
-from doe.diagnose.emulation.emulator import Emulator
 from doe.errors import StatisticsError
 from doe.record import Record
 
@@ -34,26 +33,10 @@ MAX_REPLICATES = 100
 
 @dataclass(frozen=True)
 class Prediction:
-    """What one model, refitted to the data, expects: mean (d,) and its covariance (d, d) without the noise of pours."""
+    """What one model, fitted to the data, expects: mean (d,) of its pours and the covariance (d, d) of that mean."""
 
     mean: FloatArray
     covariance: FloatArray
-
-
-def predictions(emulator: Emulator, model: FittedModel) -> tuple[Prediction, ...]:
-    """Return what a fitted model expects in every condition of an emulator of the same parameters and effects.
-
-    Covariance: J Cov(x) J' + that of the emulated mean. The emulator is that of the menu, not of the fitted conditions.
-    """
-    predictor = emulator.predictor(model.members)
-    own = predictor.mean_covariance(model.coded)
-    cuts = np.cumsum([len(covariance) for covariance in own])[:-1]
-    means = np.split(predictor.mean(model.coded), cuts)
-    slopes = np.split(predictor.jacobian(model.coded), cuts)
-    return tuple(
-        Prediction(mean, slope @ model.covariance @ slope.T + covariance)
-        for mean, slope, covariance in zip(means, slopes, own, strict=True)
-    )
 
 
 @dataclass(frozen=True)

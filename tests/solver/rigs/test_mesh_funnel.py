@@ -5,7 +5,6 @@ import pytest
 import trimesh
 
 from doe.store import run_key
-from solver.assets import asset_path
 from solver.material_file import load_material
 from solver.params import ParameterError
 from solver.record import Outcome
@@ -111,7 +110,7 @@ def test_the_file_is_a_parameter_like_others(tmp_path):
 
 @pytest.mark.usefixtures("taichi")
 def test_a_pour_through_the_mesh_of_a_cone_is_that_through_the_cone(tmp_path):
-    """Both come to rest with everything on the plate; the times of discharge differ by less than two pours do."""
+    """Both come to rest with everything on the plate; mean times of discharge agree within 3.5 of their errors."""
     shipped = with_values(
         load_material("sunflower_extract"), {"body.spheres": "coarse", "rig.mass": "6g", "rig.outlet_diameter": "50mm"}
     )
@@ -122,12 +121,14 @@ def test_a_pour_through_the_mesh_of_a_cone_is_that_through_the_cone(tmp_path):
     assert isinstance(shipped.rig, Funnel)
     t90 = {}
     for name, scene in (("cone", shipped), ("mesh", meshed)):
-        records = [run_pour(scene, seed) for seed in (1, 2, 3)]
-        assert [record.outcome for record in records] == [Outcome.AT_REST] * 3
+        records = [run_pour(scene, seed) for seed in (1, 2, 3, 4)]
+        assert [record.outcome for record in records] == [Outcome.AT_REST] * 4
         t90[name] = []
         for record in records:
             assert record.trace.discharged_mass[-1] == pytest.approx(record.poured_mass)
             t90[name].append(np.interp(0.9 * record.poured_mass, record.trace.discharged_mass, record.trace.time))
-    means, spread = {k: np.mean(v) for k, v in t90.items()}, np.std(t90["cone"] + t90["mesh"], ddof=1)
-    assert abs(means["cone"] - means["mesh"]) < 2.0 * spread + 0.02
-    assert asset_path("meshes", "square_hopper").is_file()
+    means = {name: np.mean(times) for name, times in t90.items()}
+    # Six degrees of freedom within the groups: |t| beyond 3.5 in 1.3 % of cases; the seeds are fixed.
+    within = np.sqrt(np.mean([np.var(times, ddof=1) for times in t90.values()]))
+    assert abs(means["cone"] - means["mesh"]) < 3.5 * within * np.sqrt(2.0 / 4)
+    assert within < 0.1

@@ -8,6 +8,7 @@ import pytest
 from solver.observables import REGISTRY
 from solver.params import ParameterError
 from solver.rigs import BENCH_RIGS, RIGS
+from solver.rigs.feed import RoundFeed
 from solver.rigs.rig import Move, Switch
 from solver.scene import body_counts, parameters, pour_rig, poured_mass, with_rig, with_values
 from solver.set_up import with_set_up, with_settings
@@ -124,7 +125,7 @@ def test_bodies_enter_inside_the_opening():
         assert not feed.holds(points * 1.5, np.zeros(len(places)), reach)
         # uniform: the mean of |x| over a disc of radius a is 4a/3π, over a box a/2; 1 standard error is 1 %
         outer = np.abs(places[:, 0]).max()
-        expected = 4.0 / (3.0 * np.pi) if name in ("funnel", "lifting_cylinder") else 0.5
+        expected = 4.0 / (3.0 * np.pi) if isinstance(feed, RoundFeed) else 0.5
         assert np.abs(places[:, 0]).mean() / outer == pytest.approx(expected, rel=0.04)
 
 

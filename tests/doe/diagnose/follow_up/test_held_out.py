@@ -8,7 +8,16 @@ from scipy import stats
 
 from doe.diagnose.decision.decide import judge
 from doe.diagnose.follow_up.closer import WITHIN
-from doe.diagnose.follow_up.held_out import HeldOut, compared, contenders_for, deviance, ruled_out, upheld
+from doe.diagnose.follow_up.held_out import (
+    LEAST,
+    HeldOut,
+    compared,
+    contenders_for,
+    deviance,
+    pour_noise,
+    ruled_out,
+    upheld,
+)
 from tests.doe.diagnose.toy import known_emulator, make_toy
 
 R, M, D = 6, 12, 4
@@ -26,15 +35,20 @@ def named_verdict():
     return verdict
 
 
+def deviances(measured, *poured):
+    """D of every model of one condition."""
+    noise = pour_noise(measured, poured)
+    return [deviance(measured, block, noise) for block in poured]
+
+
 def test_one_summary_is_a_t_density():
-    """D = -2 ln t_{m-1}(off/se) - ln n-terms that all models share, with the scale of the poured standard deviation."""
+    """D = -2 ln t_{m-1}(off/se), less its value at 0; the scale is the standard deviation of the model's own pours."""
     generator = np.random.default_rng(0)
     measured, poured = pours(generator, R)[:, :1], pours(generator, M, 0.4)[:, :1]
     se = poured.std(ddof=1) * np.sqrt(1 / R + 1 / M)
     off = measured.mean() - poured.mean()
-    constant = -2 * stats.t.logpdf(0.0, M - 1)
-    expected = -2 * stats.t.logpdf(off / se, M - 1) + 2 * np.log(se) - constant
-    assert deviance(measured, poured) == pytest.approx(expected)
+    expected = 2 * stats.t.logpdf(0.0, M - 1) - 2 * stats.t.logpdf(off / se, M - 1)
+    assert deviances(measured, poured) == [pytest.approx(float(expected))]
 
 
 def test_the_model_that_predicts_is_ahead():
@@ -42,16 +56,41 @@ def test_the_model_that_predicts_is_ahead():
     for seed in range(60):
         generator = np.random.default_rng([1, seed])
         measured = pours(generator, R)
-        ahead += deviance(measured, pours(generator, M)) < deviance(measured, pours(generator, M, [1.5, 0, 0, 0]))
+        true, other = deviances(measured, pours(generator, M), pours(generator, M, [1.5, 0, 0, 0]))
+        ahead += true < other
     # A shift of 1.5 in one summary is three standard errors of the difference of both means.
     assert ahead >= 51
 
 
-def test_constant_summaries_say_nothing():
+def test_units_and_constant_summaries_decide_nothing():
     generator = np.random.default_rng(2)
+    measured, one, other = pours(generator, R), pours(generator, M), pours(generator, M, 1.0)
+    plain = deviances(measured, one, other)
+    for more in (np.zeros, lambda n: np.full(n, 7.0)):
+        flat = [np.column_stack([block, more(len(block))]) for block in (measured, one, other)]
+        np.testing.assert_allclose(deviances(*flat), plain)
+    scaled = [block * [1e-4, 1.0, 1e3, 1e6] for block in (measured, one, other)]
+    np.testing.assert_allclose(deviances(*scaled), plain)
+
+
+def test_a_rare_reading_gives_its_model_no_advantage():
+    """All readings of data and model A are 0, one pour of B leaves a body behind: A must not fall behind for that."""
+    generator = np.random.default_rng(5)
     measured, poured = pours(generator, R), pours(generator, M)
-    flat = [np.column_stack([block, np.zeros(len(block))]) for block in (measured, poured)]
-    assert deviance(*flat) == pytest.approx(deviance(measured, poured))
+    rare = np.zeros(M)
+    rare[3] = 1.1e-4
+    blocks = [np.column_stack([block, x]) for block, x in ((measured, np.zeros(R)), (poured, np.zeros(M)))]
+    a, b = deviances(*blocks, np.column_stack([poured, rare]))
+    assert 0.0 < b - a < 2.0
+
+
+def test_a_constant_that_differs_is_a_refutation():
+    generator = np.random.default_rng(6)
+    measured, poured = pours(generator, R), pours(generator, M)
+    with_one = [np.column_stack([block, np.full(len(block), x)]) for block, x in ((measured, 1.0), (poured, 1.0))]
+    wrong = np.column_stack([poured, np.full(M, 2.0)])
+    right, refuted = deviances(*with_one, wrong)
+    assert refuted - right > WITHIN
 
 
 def test_only_what_is_named_has_contenders():
@@ -111,6 +150,11 @@ def test_without_a_rival_or_readable_pours_nothing_changes():
     alone = upheld(verdict, compared(verdict, [pours(generator, R)], {"e5": [pours(generator, M)]}))
     assert alone.kind == verdict.kind
     assert alone.gates[-1].passed
-    assert compared(verdict, [pours(generator, R)], {"e5": [pours(generator, 3)], "e6": [pours(generator, M)]}) == ()
+    few = pours(generator, LEAST - 1)
+    assert compared(verdict, [pours(generator, R)], {"e5": [few], "e6": [few]}) == ()
+    # A named model that breaks off where the laboratory could measure does not stand.
+    fallen = compared(verdict, [pours(generator, R)], {"e5": [few], "e6": [pours(generator, M)]})
+    assert [(row.label, row.behind) for row in fallen] == [("e6", 0.0), ("e5", np.inf)]
+    assert upheld(verdict, fallen).names == ("e5", "e6")
     assert upheld(verdict, ()) is verdict
     assert HeldOut("e5", 1.0, 0.0).to_dict()["label"] == "e5"

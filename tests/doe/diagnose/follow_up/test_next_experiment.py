@@ -5,18 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from doe.diagnose.decision.verdict import FittedModel
 from doe.diagnose.follow_up.next_experiment import (
     MenuItem,
     Prediction,
     discrimination,
     gaussian_divergence,
-    predictions,
     rank_experiments,
     replicates_for_odds,
 )
 from doe.errors import StatisticsError
-from tests.doe.diagnose.toy import known_emulator, make_toy
 
 WEIGHTS = {"a": 0.5, "b": 0.5}
 
@@ -76,14 +73,3 @@ def test_bad_menus_are_refused():
         rank_experiments([item(1.0)], {"a": 1.0}, 6)
     with pytest.raises(StatisticsError, match="no prediction by c"):
         rank_experiments([item(1.0)], {"a": 1.0, "c": 1.0}, 6)
-
-
-def test_a_prediction_carries_the_uncertainty_of_its_parameters():
-    """Known linear emulator: mean J theta + a s, covariance (J, s) Cov (J, s)'."""
-    toy = make_toy(8, 0)
-    coded, covariance = np.array([0.1, -0.2, 0.3, 0.5]), np.diag([0.01, 0.04, 0.09, 0.16])
-    model = FittedModel("e5", (5,), coded, covariance, (), (), 0.0, 0, 0.0)
-    (found,) = predictions(known_emulator(toy, np.random.default_rng(0)), model)
-    slopes = np.column_stack([toy.jacobian, toy.signatures[5]])
-    assert found.mean == pytest.approx(slopes @ coded)
-    assert found.covariance == pytest.approx(slopes @ covariance @ slopes.T)
