@@ -31,7 +31,7 @@ class Opening:
 
 def cut(mesh: trimesh.Trimesh, height: float) -> Array:
     """Segments in which the plane z = ``height`` cuts ``mesh``: ends (x, y) [m], shape (n, 2, 2)."""
-    found = trimesh.intersections.mesh_plane(mesh, (0.0, 0.0, 1.0), (0.0, 0.0, height))
+    found = trimesh.intersections.mesh_plane(mesh, (0.0, 0.0, 1.0), (0.0, 0.0, height))  # type: ignore[no-untyped-call]
     return np.asarray(found, dtype=np.float64).reshape(-1, 2, 3)[:, :, :2]
 
 

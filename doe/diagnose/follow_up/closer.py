@@ -35,7 +35,7 @@ STREAM = 2000
 """Seed of that sequence."""
 LEAD_SHARE = 0.5
 """Share of the largest drop of T^2 from which on an effect counts as a lead after the screening."""
-LEADS = 6
+LEADS = 5
 
 
 def leads(verdict: Verdict) -> tuple[str, ...]:
