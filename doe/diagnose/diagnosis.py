@@ -109,6 +109,13 @@ def pursued(
     """
     verdict = diagnose(screened.declared, screened.runs, observed)
     say(f"after screening: {verdict.kind}")
+    for _ in range(WIDENINGS):
+        unseen = out_of_sight(verdict, screened.declared, widest)
+        if not unseen:
+            break
+        screened = over_wider_ranges(screened, unseen, widest, model, budget, say)
+        verdict = diagnose(screened.declared, screened.runs, observed)
+        say(f"wider range of {', '.join(unseen)}, which could not be seen: {verdict.kind}")
     if followed := leads(verdict):
         screened = continued(screened, followed, model, budget, say)
         verdict = diagnose(screened.declared, screened.runs, observed)
@@ -190,11 +197,24 @@ def observe(conditions: Sequence[MeasuredCondition]) -> Observed:
     return Observed(blocks, tuple(stated), tuple(condition.mean_of for condition in conditions))
 
 
+def out_of_sight(verdict: Verdict, now: Declared, widest: Declared) -> tuple[str, ...]:
+    """Effects that these data cannot see over the range simulated so far, with more of it in the literature.
+
+    A range is found by the whole shift of the summaries; what calibration takes up of it is known only now.
+    """
+    room = with_room(now, widest)
+    return tuple(row.name for row in verdict.effects if row.status == "not identifiable here" and row.name in room)
+
+
+def with_room(now: Declared, widest: Declared) -> set[str]:
+    """Effects of which the literature supports more than has been simulated."""
+    pairs = zip(now.effects, widest.effects, strict=True)
+    return {effect.name for effect, end in pairs if max(effect.high) < max(end.high)}
+
+
 def at_edge(verdict: Verdict, now: Declared, widest: Declared) -> tuple[str, ...]:
     """Effects near the best that are driven to an end of the range simulated so far, with more in the literature."""
-    room = {
-        effect.name for effect, end in zip(now.effects, widest.effects, strict=True) if max(effect.high) < max(end.high)
-    }
+    room = with_room(now, widest)
     near = near_best([model for model in verdict.models if len(model.members) == 1], CRAMPED)
     return tuple(m.label for m in near if m.label in room and any(amplitude.at_edge for amplitude in m.amplitudes))
 

@@ -14,7 +14,7 @@ def diagnose(
     ),
     out: Path = typer.Option(Path("diagnosis"), help="Folder for diagnosis.json, report.html and report.md."),
     effects: str = typer.Option("", metavar="A,B,…", help="Candidates; all effects if not given."),
-    budget: int | None = typer.Option(None, min=60, metavar="POURS", help="About so many pours for the emulator."),
+    budget: int | None = typer.Option(None, min=1, metavar="POURS", help="About so many pours for the emulator."),
     resume: bool = typer.Option(False, "--resume", help="Go on in a folder that is not empty."),
     store: Path | None = typer.Option(None, help="SQLite file that keeps every pour."),
     threads: int | None = typer.Option(None, min=1, help="Worker processes; one per core if not given."),

@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
+from doe.diagnose.simulation.screen import Budget
+from doe.measurement.load import load_measurement
 from explorer.background.command_process import (
     PROGRAM,
     BackgroundError,
@@ -24,10 +26,6 @@ from solver import EFFECTS
 from solver.assets import measurement_folder
 
 RESULT = "diagnosis.json"
-
-
-LEAST_BUDGET = 60
-"""Pours that ``--budget`` may ask for at least."""
 
 
 @dataclass(frozen=True)
@@ -157,9 +155,11 @@ def _checked(question: Question) -> Question:
     for name in question.effects:
         if name not in EFFECTS:
             raise BackgroundError(f"effects: {name!r} is not one of {', '.join(EFFECTS)}")
-    if question.budget is not None and question.budget < LEAST_BUDGET:
-        raise BackgroundError(f"budget: {question.budget} pours; allowed are {LEAST_BUDGET} and more")
-    return replace(question, data=str(measurement_folder(question.data.strip()).absolute()))
+    folder = measurement_folder(question.data.strip()).absolute()
+    if question.budget is not None:
+        # Refused here, before a process is started for it.
+        Budget().scaled(question.budget, len(question.effects or EFFECTS), len(load_measurement(folder).fit))
+    return replace(question, data=str(folder))
 
 
 def _in_words(question: Question) -> str:

@@ -231,6 +231,24 @@ def test_a_failed_study_does_not_hold_up_the_queue_and_it_can_be_cleared(tmp_pat
         process.queue("quick")
 
 
+def test_an_order_that_cannot_begin_waits_on_and_says_so(tmp_path):
+    process = study(tmp_path, "time.sleep(0.3)")
+    process.start("quick")
+    process.queue("standard")
+    begin = process._line._begin
+
+    def refused(order):
+        raise OSError("No space left on device")
+
+    process._line._begin = refused
+    wait_for(lambda: process.status().state == "failed")
+    process._line._begin = begin
+    assert process.waiting() == ("standard",)
+    process.start("quick")
+    wait_for(lambda: process.status().state == "finished" and process.waiting() == ())
+    assert "-standard-" in process.out.name
+
+
 def test_a_changed_study_has_its_own_file_in_its_folder(tmp_path):
     process = shipped(tmp_path)
     edits = StudyEdits({"X4": {"low": 30e6}}, {"mean": 26.0})

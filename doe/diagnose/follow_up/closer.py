@@ -17,6 +17,7 @@ from doe.diagnose.emulation.fresh_pours import FreshPours
 from doe.diagnose.runs import Declared
 from doe.diagnose.simulation.plan import Point, sobol
 from doe.diagnose.simulation.pours import ModelPours
+from doe.diagnose.simulation.screen import LEADS
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -35,7 +36,6 @@ STREAM = 2000
 """Seed of that sequence."""
 LEAD_SHARE = 0.5
 """Share of the largest drop of T^2 from which on an effect counts as a lead after the screening."""
-LEADS = 5
 
 
 def leads(verdict: Verdict) -> tuple[str, ...]:

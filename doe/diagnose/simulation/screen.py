@@ -13,8 +13,12 @@ from doe.diagnose.runs import Declared, Effect, Runs
 from doe.diagnose.simulation.plan import Point, base_points, effect_points, middle_points, scaling_points
 from doe.diagnose.simulation.pours import ModelPours, Pour, as_runs
 from doe.diagnose.simulation.ranges import ranges
+from doe.errors import StatisticsError
 
 Say = Callable[[str], None]
+
+LEADS = 5
+"""At most so many effects are followed as leads."""
 
 
 @dataclass(frozen=True)
@@ -32,20 +36,25 @@ class Budget:
     widened: int = 12
     """Of an effect over a wider range than the first."""
 
+    def planned(self, effects: int, conditions: int) -> float:
+        """Pours of the emulator for effects of one amplitude, a range found at the first trial, and all leads."""
+        return conditions * (
+            self.base + self.middle + effects * (self.scaling + self.screening) + min(effects, LEADS) * self.leads
+        )
+
     def scaled(self, runs: int, effects: int, conditions: int) -> Budget:
-        """The same shares in about ``runs`` pours."""
-        total = conditions * (
-            self.base + self.middle + effects * (1.5 * self.scaling + self.screening) + 4 * self.leads
-        )
-        share = runs / total
-        return Budget(
-            base=max(24, round(share * self.base)),
-            middle=max(10, round(share * self.middle)),
-            scaling=max(2, round(share * self.scaling)),
-            screening=max(8, round(share * self.screening)),
-            leads=max(8, round(share * self.leads)),
-            widened=max(8, round(share * self.widened)),
-        )
+        """The same shares in about ``runs`` pours. Raises StatisticsError for fewer than ``LEAST`` takes."""
+        least = LEAST.planned(effects, conditions)
+        if runs < least:
+            raise StatisticsError(
+                f"budget: {runs} pours; {effects} effects in {conditions} fitted conditions take at least {least:.0f}"
+            )
+        share = runs / self.planned(effects, conditions)
+        return Budget(**{key: max(getattr(LEAST, key), round(share * value)) for key, value in vars(self).items()})
+
+
+LEAST = Budget(base=24, middle=10, scaling=2, screening=4, leads=4, widened=6)
+"""Below that there are fewer points than terms, or no covariance."""
 
 
 @dataclass(frozen=True)

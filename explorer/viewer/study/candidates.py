@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import viser
 
-from explorer.diagnosis.process import LEAST_BUDGET
 from explorer.screen_units import checked
 from solver import EFFECTS
 
@@ -25,9 +24,7 @@ class Candidates:
             name: gui.add_checkbox(name.replace("_", " "), True, hint=f"What reveals it: {kind.lever}.")
             for name, kind in EFFECTS.items()
         }
-        self._pours = gui.add_number(
-            "Pours (0: by itself)", 0, min=0, max=MOST, step=10, hint=f"{BY_ITSELF} Else at least {LEAST_BUDGET}."
-        )
+        self._pours = gui.add_number("Pours (0: by itself)", 0, min=0, max=MOST, step=10, hint=BY_ITSELF)
 
     @property
     def effects(self) -> tuple[str, ...]:

@@ -1,8 +1,11 @@
 """What is poured for which effect: nothing for one that cannot be seen, all of a wider range."""
 
+import pytest
+
 from doe.diagnose.runs import Declared, Effect
 from doe.diagnose.simulation.ranges import UNSEEN
-from doe.diagnose.simulation.screen import Budget, over_wider_ranges, screen
+from doe.diagnose.simulation.screen import LEADS, LEAST, Budget, over_wider_ranges, screen
+from doe.errors import StatisticsError
 from tests.doe.diagnose.simulation.made_up_pours import DECLARED, Noisy
 
 
@@ -34,3 +37,19 @@ def test_a_wider_range_asks_for_points_over_it_and_keeps_the_others():
     assert len(new) == 10
     assert max(new) == 0.5
     assert min(new) == -0.4
+
+
+@pytest.mark.parametrize("runs", [144, 200, 300, 600, 3000])
+def test_a_budget_is_about_what_is_asked_for(runs):
+    """15 effects in one condition, as for the shipped trefoils: by itself 64 + 15 × 10 + 5 × 8 = 254 pours."""
+    assert Budget().planned(15, 1) == 64 + 150 + 8 * LEADS == 254
+    found = Budget().scaled(runs, 15, 1)
+    # What is rounded, or held at its least, adds up to at most this.
+    assert found.planned(15, 1) == pytest.approx(runs, abs=max(0.15 * runs, 26))
+    assert all(getattr(found, key) >= value for key, value in vars(LEAST).items())
+
+
+def test_a_budget_that_can_bear_no_verdict_is_refused():
+    assert LEAST.planned(15, 1) == 34 + 90 + 20
+    with pytest.raises(StatisticsError, match="143 pours; 15 effects in 1 fitted conditions take at least 144"):
+        Budget().scaled(143, 15, 1)
