@@ -16,6 +16,7 @@ from doe.diagnose.simulation.screen import Budget
 from doe.store import Store
 from tests.blind.answers import Answers
 from tests.blind.campaign import CampaignOrder, emulated, run_campaign
+from tests.blind.disguise import disguise
 from tests.blind.judging import Question, judged_folder
 from tests.blind.laboratory import MODEL, declared_model, write_folder
 from tests.blind.schedule import Case
@@ -130,18 +131,3 @@ def test_the_verdict_depends_on_numbers_only(order, rows, tmp_path):
     one, other = (judged_folder(folder, question) for folder in (first, second))
     assert one.kind == "effect:rolling_resistance"
     assert other.to_dict() == one.to_dict()
-
-
-def disguise(folder, rng):
-    """Change everything in a data set that is no number."""
-    toml = folder / "measurement.toml"
-    text = toml.read_text()
-    for key in ("title", "source"):
-        text = re.sub(rf'^{key} = ".*"', f'{key} = "plate_tilt, surely"', text, flags=re.MULTILINE)
-    text = re.sub(r"^#.*$", "# no_missing_effect", text, flags=re.MULTILINE)
-    assert text != toml.read_text()
-    toml.write_text(text)
-    for path in folder.glob("*.csv"):
-        header, *lines = path.read_text().splitlines()
-        shuffled = [lines[k] for k in rng.permutation(len(lines))]
-        path.write_text("\n".join(["# tilted by 3 degrees", header, *shuffled]) + "\n")

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from doe.measurement import load_measurement, reach_of
+from doe.measurement.reach import TELLTALES
+from solver import EFFECTS
 from solver.assets import measurement_folder
 from tests.doe.measurement.folders import MEASUREMENT, changed, write
 
@@ -69,3 +71,7 @@ def test_shipped_pours_can_show_every_effect_and_the_drum_no_tilt():
     assert set(drum.hidden_effects) == {"plate_tilt", "funnel_offset"}
     assert not drum.has_asymmetry
     assert any("one replicate" in warning for warning in drum.warnings)
+
+
+def test_every_effect_has_its_telltales():
+    assert set(TELLTALES) == set(EFFECTS)

@@ -1,0 +1,59 @@
+"""A verdict is a function of declared model, simulated runs and readings: of a folder only its numbers get there."""
+
+import shutil
+
+import numpy as np
+
+from doe.diagnose.diagnosis import complete_rows, declare, observe
+from doe.measurement import load_measurement
+from solver import EFFECTS
+from solver.assets import measurement_folder
+from tests.blind.disguise import disguise
+from tests.blind.laboratory import MODEL, OBSERVABLES, write_folder
+
+
+def asked(folder):
+    """All that the decision is told of a data set."""
+    measurement = load_measurement(folder)
+    observed = observe(measurement.fit)
+    return (
+        declare(measurement, tuple(EFFECTS)),
+        [condition.scene for condition in measurement.conditions],
+        [np.sort(block, axis=0) for block in observed.blocks],
+        observed.instrument,
+        observed.mean_of,
+        [np.sort(complete_rows(condition), axis=0) for condition in measurement.holdout],
+    )
+
+
+def assert_same(one, other):
+    assert one[0] == other[0]
+    # A scene is called after its file; nothing else of it may differ.
+    for a, b in zip(one[1], other[1], strict=True):
+        assert {**vars(a), "title": ""} == {**vars(b), "title": ""}
+    for k in (2, 3, 5):
+        for a, b in zip(one[k], other[k], strict=True):
+            np.testing.assert_array_equal(a, b)
+    assert one[4] == other[4]
+
+
+def test_a_folder_s_name_its_texts_comments_and_order_say_nothing(tmp_path):
+    rng = np.random.default_rng(1)
+    conditions = sorted(path.stem for path in MODEL.glob("*.toml") if path.stem not in ("head", "material"))
+    data = {
+        c: [dict(zip(OBSERVABLES, rng.normal(size=len(OBSERVABLES)), strict=True)) for _ in range(6)]
+        for c in conditions
+    }
+    folders = [tmp_path / name for name in ("rolling_resistance", "no_missing_effect")]
+    for folder in folders:
+        folder.mkdir()
+        write_folder(folder, MODEL, data)
+    disguise(folders[1], rng)
+    assert_same(*map(asked, folders))
+
+
+def test_so_it_is_with_a_shipped_data_set(tmp_path):
+    shipped = measurement_folder("trefoil_2")
+    shutil.copytree(shipped, tmp_path / "air_drag")
+    disguise(tmp_path / "air_drag", np.random.default_rng(2))
+    assert_same(asked(shipped), asked(tmp_path / "air_drag"))
