@@ -41,7 +41,7 @@ def test_a_folder_s_name_its_texts_comments_and_order_say_nothing(tmp_path):
     rng = np.random.default_rng(1)
     conditions = sorted(path.stem for path in MODEL.glob("*.toml") if path.stem not in ("head", "material"))
     data = {
-        c: [dict(zip(OBSERVABLES, rng.normal(size=len(OBSERVABLES)), strict=True)) for _ in range(6)]
+        c: [dict(zip(OBSERVABLES, rng.normal(size=len(OBSERVABLES)).tolist(), strict=True)) for _ in range(6)]
         for c in conditions
     }
     folders = [tmp_path / name for name in ("rolling_resistance", "no_missing_effect")]
