@@ -24,6 +24,9 @@ FOLDER = Path("assets/pictures")
 DIAGNOSIS = Path("results/diagnosis")
 SIZE = {"width": 1500, "height": 1000}
 PATIENCE_MS = 120_000
+ALL_TABS = tuple(
+    (name, name.lower().replace(" ", "_")) for name in ("Pour", "Look", "Take along", "Calibrate", "Diagnose")
+)
 SETTLED = ("at rest", "ended", "jammed")
 
 
@@ -72,6 +75,11 @@ def answered(page: Page, folder: str, button: str, answer: str) -> None:
     page.get_by_text(answer).first.wait_for()
 
 
+def without_notifications(page: Page) -> None:
+    """Close viser's word on software rendering, which a person with a graphics card does not see."""
+    page.locator(".mantine-Notification-closeButton").first.click()
+
+
 def settled(page: Page) -> None:
     """Wait until the pile lies."""
     end = time.monotonic() + PATIENCE_MS / 1000
@@ -82,8 +90,7 @@ def settled(page: Page) -> None:
 def live_pictures(browser: object, home: str) -> None:
     with served(home, "--set", "body.spheres=coarse") as address:
         page = opened(browser, address, "Static friction")
-        # viser's word on software rendering, which a person with a graphics card does not see.
-        page.locator(".mantine-Notification-closeButton").first.click()
+        without_notifications(page)
         settled(page)
         page.keyboard.press("r")
         page.wait_for_function("() => /Simulated time\\s*1\\.[0-9]+ s/.test(document.querySelector('.pour').innerText)")
@@ -98,7 +105,7 @@ def live_pictures(browser: object, home: str) -> None:
         shot(page, "look_dark")
         for key in "ccck":  # coordination number, residence time, and back to the components
             page.keyboard.press(key)
-        for name, file in (("Take along", "take_along"), ("Calibrate", "calibrate"), ("Diagnose", "diagnose")):
+        for name, file in ALL_TABS[2:]:
             tab(page, name)
             time.sleep(4.0)
             shot(page, f"{file}_dark")
@@ -107,7 +114,7 @@ def live_pictures(browser: object, home: str) -> None:
         shot(page, "laboratory_dark")
         page.get_by_text("Photograph → angle of repose").click()
         page.get_by_text("Dark page").click()
-        for name, file in (("Pour", "pour"), ("Calibrate", "calibrate"), ("Diagnose", "diagnose")):
+        for name, file in ALL_TABS:
             tab(page, name)
             time.sleep(4.0)
             shot(page, f"{file}_light")
@@ -125,8 +132,11 @@ def replay_picture(browser: object, home: str) -> None:
     subprocess.run([*command, "--record", str(recording)], check=True, stdout=subprocess.DEVNULL)
     with served(home, "--replay", str(recording)) as address:
         page = opened(browser, address, "Replay")
+        without_notifications(page)
         time.sleep(6.0)
         shot(page, "replay")
+        page.get_by_text("Dark page").click()
+        shot(page, "replay_light")
         page.close()
 
 

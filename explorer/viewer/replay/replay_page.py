@@ -18,13 +18,13 @@ from explorer.logs.recording import Recording
 from explorer.screen_units import checked
 from explorer.viewer.actions import Action, Actions
 from explorer.viewer.buttons import add_keys, button_group
-from explorer.viewer.palette import ANGLE_LINE, MASS_LINE
+from explorer.viewer.palette import ANGLE_LINE, CONTACTS_LINE, ENERGY_LINE, MASS_LINE
 from explorer.viewer.pour.chart import LEAST_TOP_DEG, axis
 from explorer.viewer.pour.run_panel import FASTEST, SLOWEST
 from explorer.viewer.replay.replay_nodes import ReplayNodes, highest
 from explorer.viewer.replay.timeline import Timeline
 from explorer.viewer.slider_hands import SliderHands
-from explorer.viewer.theme import DARK, apply_theme
+from explorer.viewer.theme import DARK, ThemeSwitch, apply_theme
 from explorer.viewer.view import light, look_at_height
 
 FRAME_INTERVAL = 1.0 / 30.0
@@ -34,7 +34,12 @@ HAIR = 1e-6
 """Time [s] by which the end of a chart moves to and fro."""
 SLIDER_STEP = 1e-3
 """[s]; about as fine as frames lie."""
-CURVES = (("angle_of_repose_deg", "angle [°]", ANGLE_LINE), ("discharged_mass_g", "mass below [g]", MASS_LINE))
+CURVES = (
+    ("angle_of_repose_deg", "angle [°]", ANGLE_LINE),
+    ("discharged_mass_g", "mass below [g]", MASS_LINE),
+    ("kinetic_energy_mJ", "energy [mJ]", ENERGY_LINE),
+    ("contacts", "contacts", CONTACTS_LINE),
+)
 """Recorded curve, label, colour."""
 
 Array = npt.NDArray[np.float64]
@@ -61,6 +66,8 @@ class ReplayPage:
         if recording.outcome:
             with server.gui.add_folder("Outcome", expand_by_default=False):
                 server.gui.add_markdown(recording.outcome)
+        # viser's charts are drawn for both.
+        ThemeSwitch(server, self._actions.post, lambda dark: None)
 
     def _controls(self) -> None:
         gui, timeline = self._server.gui, self._timeline
@@ -94,14 +101,16 @@ class ReplayPage:
 
     def run(self, stop: threading.Event) -> None:
         """Keep the page up to date until ``stop`` is set."""
-        before = clock.monotonic()
+        before = due = clock.monotonic()
         while not stop.is_set():
             now = clock.monotonic()
             self._actions.carry_out()
             self._timeline.pass_by(now - before)
             before = now
             self.show()
-            stop.wait(max(0.0, FRAME_INTERVAL - (clock.monotonic() - now)))
+            # Counted from when the last frame was due, so that what waits too long does not add up.
+            due = max(due + FRAME_INTERVAL, clock.monotonic())
+            stop.wait(due - clock.monotonic())
 
     def show(self) -> None:
         """Draw the present moment, if it is another than the one that is drawn."""
