@@ -17,8 +17,9 @@ from doe.diagnose.follow_up.held_out import HeldOut, compared, predictions, rule
 from doe.diagnose.follow_up.holdout import HoldoutCondition, HoldoutError, holdout_errors
 from doe.diagnose.follow_up.menu import Suggestion, next_experiment
 from doe.diagnose.runs import Condition, Declared, Effect, Observed, Parameter
+from doe.diagnose.simulation.budget import Budget
 from doe.diagnose.simulation.pours import ModelPours, OnPour, effect_values
-from doe.diagnose.simulation.screen import Budget, Say, Screened, continued, over_wider_ranges, screen
+from doe.diagnose.simulation.screen import Say, Screened, continued, over_wider_ranges, screen
 from doe.measurement.measurement import Condition as MeasuredCondition
 from doe.measurement.measurement import MeasuredParameter, Measurement
 from doe.measurement.summaries import summaries_of_data, summary_names, summary_uncertainties

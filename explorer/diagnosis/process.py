@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
-from doe.diagnose.simulation.screen import Budget
+from doe.diagnose.simulation.budget import Budget
 from doe.measurement.load import load_measurement
 from explorer.background.command_process import (
     PROGRAM,

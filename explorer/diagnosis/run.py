@@ -16,8 +16,8 @@ import numpy.typing as npt
 from doe.diagnose.diagnosis import Diagnosis, run_diagnosis
 from doe.diagnose.follow_up.confirm import Confirmed
 from doe.diagnose.follow_up.holdout import HoldoutError
+from doe.diagnose.simulation.budget import Budget
 from doe.diagnose.simulation.profiles import measured_profile
-from doe.diagnose.simulation.screen import Budget
 from doe.measurement.load import load_measurement
 from doe.measurement.measurement import Measurement
 from doe.measurement.summaries import summaries

@@ -18,9 +18,10 @@ import numpy as np
 
 from doe.diagnose.diagnosis import declare
 from doe.diagnose.runs import Declared
+from doe.diagnose.simulation.budget import Budget
 from doe.diagnose.simulation.plan import directions
 from doe.diagnose.simulation.pours import Ended, ModelPours
-from doe.diagnose.simulation.screen import Budget, Screened, over_wider_ranges, screen
+from doe.diagnose.simulation.screen import Screened, over_wider_ranges, screen
 from doe.measurement import Measurement
 from doe.store import Store, default_store
 from solver import EFFECTS

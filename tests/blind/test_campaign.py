@@ -12,7 +12,7 @@ from contextlib import closing
 import numpy as np
 import pytest
 
-from doe.diagnose.simulation.screen import Budget
+from doe.diagnose.simulation.budget import Budget
 from doe.store import Store
 from tests.blind.answers import Answers
 from tests.blind.campaign import CampaignOrder, emulated, run_campaign

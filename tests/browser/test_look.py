@@ -29,6 +29,8 @@ def colours(page):  # noqa: F811
 
 def test_the_left_arrow_leads_back_to_the_same_positions(page):  # noqa: F811
     press(page, "r")
+    # The pour of before may be running as well, and later than this.
+    wait_for(lambda: not simulated_time(page) > 0.3)
     wait_for(lambda: state(page) == "running" and simulated_time(page) > 0.3)
     press(page, "Space")
     wait_for(lambda: state(page) == "paused")

@@ -9,7 +9,7 @@ are poured about their fits.
 import pytest
 
 from doe.diagnose.diagnosis import run_diagnosis
-from doe.diagnose.simulation.screen import Budget
+from doe.diagnose.simulation.budget import Budget
 from doe.measurement.load import load_measurement
 from doe.store import Store
 from solver import Crew

@@ -15,9 +15,9 @@ import numpy.typing as npt
 from doe.diagnose.decision.verdict import FittedModel, Verdict
 from doe.diagnose.emulation.fresh_pours import FreshPours
 from doe.diagnose.runs import Declared
+from doe.diagnose.simulation.budget import LEADS
 from doe.diagnose.simulation.plan import Point, sobol
 from doe.diagnose.simulation.pours import ModelPours
-from doe.diagnose.simulation.screen import LEADS
 
 FloatArray = npt.NDArray[np.float64]
 

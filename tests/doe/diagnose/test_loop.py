@@ -8,9 +8,9 @@ import pytest
 from doe.diagnose import diagnosis
 from doe.diagnose.follow_up import menu
 from doe.diagnose.runs import Effect, Observed
+from doe.diagnose.simulation.budget import Budget
 from doe.diagnose.simulation.pours import Pour
 from doe.diagnose.simulation.ranges import REPLICATES, TOO_FAR, answered, scaled_range, whitened_shift
-from doe.diagnose.simulation.screen import Budget
 from doe.measurement.load import load_measurement
 from doe.measurement.summaries import summaries_of_data, summary_names
 from solver import EFFECTS

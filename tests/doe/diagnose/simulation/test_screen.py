@@ -3,8 +3,9 @@
 import pytest
 
 from doe.diagnose.runs import Declared, Effect
+from doe.diagnose.simulation.budget import LEADS, LEAST, Budget
 from doe.diagnose.simulation.ranges import UNSEEN
-from doe.diagnose.simulation.screen import LEADS, LEAST, Budget, over_wider_ranges, screen
+from doe.diagnose.simulation.screen import over_wider_ranges, screen
 from doe.errors import StatisticsError
 from tests.doe.diagnose.simulation.made_up_pours import DECLARED, Noisy
 
