@@ -34,7 +34,8 @@ FloatArray = npt.NDArray[np.float64]
 class Limits(Record):
     """Limits of the gates. detect: level of each of the two tests. reach: least shift, in sigma, that an effect must be
     able to cause to enter the race. pair_gain: BIC by which a pair must beat the best single effect. chance: of
-    specificity.py, for pairs. rival: of rivals.py.
+    specificity.py, for pairs. rival: of rivals.py. held_out: of held_out.py, where a contender leaves the
+    race (closer.py).
     """
 
     detect: float = 0.005
@@ -44,6 +45,7 @@ class Limits(Record):
     reach: float = 3.0
     chance: float = 0.01
     rival: float = 0.05
+    held_out: float = 12.0
 
 
 @dataclass(frozen=True)

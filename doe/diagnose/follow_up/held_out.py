@@ -10,7 +10,7 @@ contenders, half shrunk to its diagonal:
 -2 ln of a multivariate t density but for what is the same for all of them, which does not take a rare pour for a
 refutation (Lange, Little and Taylor 1989, JASA 84:881). A name that stands alone keeps doing so if every rival stays
 the gap of gate 3 behind in the criterion of the fit plus D; else they join it. Of several names those go that are
-WITHIN or more behind the first of them.
+`Limits.held_out` or more behind the first of them.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ import numpy.typing as npt
 from doe.diagnose.decision.gates import Gate
 from doe.diagnose.decision.tables import listed
 from doe.diagnose.decision.verdict import FittedModel, Verdict
-from doe.diagnose.follow_up.closer import MODELS, WITHIN, near_best
+from doe.diagnose.follow_up.closer import MODELS, near_best
 from doe.diagnose.follow_up.confirm import confirm, fitted
 from doe.diagnose.runs import CONSTANT_FLOOR, dust
 from doe.diagnose.simulation.pours import ModelPours
@@ -137,7 +137,7 @@ def compared(
 
 
 def ruled_out(verdict: Verdict, rows: Sequence[HeldOut]) -> tuple[str, ...]:
-    """Of several names those that held-out data put ``WITHIN`` or more behind the first of them.
+    """Of several names those that held-out data put ``Limits.held_out`` or more behind the first of them.
 
     That is the distance at which a contender leaves the race: D knows nothing of the error of a fit, so a smaller one
     decides nothing.
@@ -145,7 +145,7 @@ def ruled_out(verdict: Verdict, rows: Sequence[HeldOut]) -> tuple[str, ...]:
     if len(verdict.names) < 2:
         return ()
     behind = {row.label: row.behind for row in rows if row.label in verdict.names}
-    return tuple(name for name in behind if behind[name] - min(behind.values()) >= WITHIN)
+    return tuple(name for name in behind if behind[name] - min(behind.values()) >= verdict.limits.held_out)
 
 
 def upheld(verdict: Verdict, rows: Sequence[HeldOut]) -> Verdict:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from doe.diagnose.follow_up.closer import WITHIN
 from explorer.report.content import Section, Table, Text
 from explorer.report.findings import Plain
 from explorer.report.units_for_people import MISSING, fixed, number, p_value
@@ -44,7 +43,7 @@ def gates(result: Plain) -> Section:
         f"single effect is adequate, and has to gain more than {fixed(limits['pair_gain'], 0)}, and be specific: "
         "few random shifts may be explained as well. Held-out data can take a name back: every rival near it predicts "
         "them by its own pours, and has to stay as far behind with them. Of several names they rule out those that are "
-        f"{fixed(WITHIN, 0)} or more behind the first."
+        f"{fixed(limits['held_out'], 0)} or more behind the first."
     )
     rows = tuple(
         (

@@ -79,7 +79,7 @@ def verdict_sentence(result: Plain) -> str:
 
 
 def _rivals(result: Plain) -> str:
-    gone = result["ruled_out"]
+    gone = result.get("ruled_out", [])  # not in results of before 2026-11-22
     if not gone:
         return "and no other effect in the list comes near"
     return f"as {enumeration([code(name) for name in gone])} would; the held-out data rule that out"
@@ -112,7 +112,7 @@ def cautions(result: Plain) -> list[str]:
             "Without held-out data the error after is counted on the data that chose the model; it is smaller than on "
             "new ones."
         )
-    if result["ruled_out"]:
+    if result.get("ruled_out"):
         found.append(
             "The held-out data took part in the choice of the effect, among those that the fitted data left; the error "
             "after is that much less independent, and smaller than on new data."
