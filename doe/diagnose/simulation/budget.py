@@ -1,0 +1,46 @@
+"""How many pours a diagnosis takes for its emulator, part by part. Loads nothing of the solver."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from doe.errors import StatisticsError
+
+LEADS = 5
+"""At most so many effects are followed as leads."""
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Numbers of points; each is poured once in every condition."""
+
+    base: int = 48
+    middle: int = 16
+    scaling: int = 2
+    """At each end that the search for a range tries; those at the end that it finds count like the screening."""
+    screening: int = 8
+    """Per effect with one amplitude; half as many again with two."""
+    leads: int = 8
+    """More of each lead, over its whole range."""
+    widened: int = 12
+    """Of an effect over a wider range than the first."""
+
+    def planned(self, effects: int, conditions: int) -> float:
+        """Pours of the emulator for effects of one amplitude, a range found at the first trial, and all leads."""
+        return conditions * (
+            self.base + self.middle + effects * (self.scaling + self.screening) + min(effects, LEADS) * self.leads
+        )
+
+    def scaled(self, runs: int, effects: int, conditions: int) -> Budget:
+        """The same shares in about ``runs`` pours. Raises StatisticsError for fewer than ``LEAST`` takes."""
+        least = LEAST.planned(effects, conditions)
+        if runs < least:
+            raise StatisticsError(
+                f"budget: {runs} pours; {effects} effects in {conditions} fitted conditions take at least {least:.0f}"
+            )
+        share = runs / self.planned(effects, conditions)
+        return Budget(**{key: max(getattr(LEAST, key), round(share * value)) for key, value in vars(self).items()})
+
+
+LEAST = Budget(base=24, middle=10, scaling=2, screening=4, leads=4, widened=6)
+"""Below that there are fewer points than terms, or no covariance."""
