@@ -36,7 +36,7 @@ SLIDER_STEP = 1e-3
 """[s]; about as fine as frames lie."""
 CURVES = (
     ("angle_of_repose_deg", "angle [°]", ANGLE_LINE),
-    ("discharged_mass_g", "mass below [g]", MASS_LINE),
+    ("discharged_mass_g", "mass [g]", MASS_LINE),
     ("kinetic_energy_mJ", "energy [mJ]", ENERGY_LINE),
     ("contacts", "contacts", CONTACTS_LINE),
 )
