@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import io
-from dataclasses import dataclass
 from math import dist
 
 from explorer.files.whole_file import write_whole, write_whole_bytes
+from explorer.photograph.measured import Measured
 from explorer.photograph.order import MeasureOrder
 from explorer.photograph.panels import sheet
-from explorer.photograph.simulated import SimulatedPiles, simulated_piles
+from explorer.photograph.simulated import simulated_piles
 from solver.photograph import (
     NotAPile,
     PhotographedPile,
@@ -19,24 +19,6 @@ from solver.photograph import (
     read_photograph,
     reference_pixels,
 )
-
-
-@dataclass(frozen=True, eq=False)
-class Measured:
-    """What came out, in the order of the pictures."""
-
-    readings: tuple[PhotographedPile | Refusal, ...]
-    simulated: SimulatedPiles | None
-
-    @property
-    def piles(self) -> tuple[PhotographedPile, ...]:
-        """Of the pictures that show one."""
-        return tuple(reading for reading in self.readings if isinstance(reading, PhotographedPile))
-
-    @property
-    def refusals(self) -> tuple[Refusal, ...]:
-        """Of the others."""
-        return tuple(reading for reading in self.readings if isinstance(reading, Refusal))
 
 
 def run_measure(order: MeasureOrder) -> Measured:
