@@ -15,7 +15,7 @@ LEAST_SHARE_BELOW = 0.25
 """Share of the poured mass that has to lie below the outlet: the first few bodies are no pile that has an angle."""
 SIMULATED_INTERVAL, WALL_INTERVAL = 0.1, 0.5
 """The angle is read anew after this long of simulated or of wall time [s], whichever comes first."""
-WALL_SHARE = 0.06
+WALL_SHARE = 0.15
 """Largest share of the wall time that reading may take; a big pile is read less often."""
 
 ANGLES: Mapping[str, Callable[[PileReading], Value]] = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 
-LAUNCH_WALL = 20e-3
+LAUNCH_WALL = 6e-3
 """Wall time [s] that one launch of steps aims at: less than a frame, so that a slider acts at the next one. Each launch
 costs some tenths of a millisecond of its own."""
 FRAME_WALL = 1.0 / 60.0

@@ -6,6 +6,7 @@ The parent imports this file, so Taichi is imported inside :func:`run` only.
 from __future__ import annotations
 
 import multiprocessing
+import os
 import queue
 import signal
 import traceback
@@ -16,6 +17,8 @@ from explorer.live.messages import Close, Command, Failure, Report, Start
 if TYPE_CHECKING:
     from explorer.live.live_pour import LivePour
 
+NICENESS = 5
+"""Priority below the page's, above that of a study in the background (10)."""
 IDLE_WAIT = 0.5
 """Longest wait [s] for a command before the process looks whether its parent still lives."""
 
@@ -24,6 +27,8 @@ def run(commands: Any, reports: Any, frames: Any, details: Any) -> None:
     """Main function of the process: commands in, reports out by queues; frames and details by shared memory."""
     # Ctrl-C in a terminal reaches the whole group; the parent decides when this process ends.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # The page, and a browser beside it that draws without a graphics card, go first: else what is seen lags behind.
+    os.nice(NICENESS)
     try:
         _work(commands, reports, frames, details)
     except Exception as error:  # whatever it is, the person at the screen has to hear of it
