@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,6 +36,8 @@ BOX = 3.0
 DRAWN_IN = 0.8
 WIDENINGS = 3
 """Times that a range may be doubled before the next look."""
+Wanting = Callable[[Verdict, Declared, Declared], tuple[str, ...]]
+"""Effects that want more range: from a verdict, the ranges simulated so far, and the widest."""
 FRESH = 12
 """Pours per model and condition in the confirmation, at least."""
 
@@ -110,26 +112,27 @@ def pursued(
     """
     verdict = diagnose(screened.declared, screened.runs, observed)
     say(f"after screening: {verdict.kind}")
-    for _ in range(WIDENINGS):
-        unseen = out_of_sight(verdict, screened.declared, widest)
-        if not unseen:
-            break
-        screened = over_wider_ranges(screened, unseen, widest, model, budget, say)
-        verdict = diagnose(screened.declared, screened.runs, observed)
-        say(f"wider range of {', '.join(unseen)}, which could not be seen: {verdict.kind}")
+
+    def widened(find: Wanting, why: str = "", fresh: Sequence[FreshPours] = ()) -> tuple[Screened, Verdict]:
+        """Runs and verdict once the effects that ``find`` tells have wider ranges, as long as it tells any."""
+        now, found = screened, verdict
+        for _ in range(WIDENINGS):
+            names = find(found, now.declared, widest)
+            if not names:
+                break
+            now = over_wider_ranges(now, names, widest, model, budget, say)
+            found = diagnose(now.declared, now.runs, observed, fresh=fresh)
+            say(f"wider range of {', '.join(names)}{why}: {found.kind}")
+        return now, found
+
+    screened, verdict = widened(out_of_sight, ", which could not be seen")
     if followed := leads(verdict):
         screened = continued(screened, followed, model, budget, say)
         verdict = diagnose(screened.declared, screened.runs, observed)
         say(f"leads followed: {verdict.kind}")
     fresh: tuple[FreshPours, ...] = ()
     for look in range(1 + LOOKS):
-        for _ in range(WIDENINGS):
-            cramped = at_edge(verdict, screened.declared, widest)
-            if not cramped:
-                break
-            screened = over_wider_ranges(screened, cramped, widest, model, budget, say)
-            verdict = diagnose(screened.declared, screened.runs, observed, fresh=fresh)
-            say(f"wider range of {', '.join(cramped)}: {verdict.kind}")
+        screened, verdict = widened(at_edge, fresh=fresh)
         closer = contenders(verdict, screened.declared, fresh)
         if look == LOOKS or not closer:
             break

@@ -16,6 +16,7 @@ from explorer.scene.meshes import scene_height
 from explorer.session import Session
 from explorer.study.process import StudyProcess
 from explorer.viewer.actions import Actions
+from explorer.viewer.frame_clock import FrameClock
 from explorer.viewer.laboratory.laboratory_tab import LaboratoryTab
 from explorer.viewer.look.look_tab import LookTab
 from explorer.viewer.output.recording_switch import Recorder
@@ -108,7 +109,7 @@ class Page:
     def run(self, stop: threading.Event) -> None:
         """Keep the page up to date until ``stop`` is set."""
         panels_due = background_due = 0.0
-        frame_due = time.monotonic()
+        frames = FrameClock(FRAME_INTERVAL)
         while not stop.is_set():
             began = time.monotonic()
             notice = self._actions.carry_out()
@@ -129,9 +130,7 @@ class Page:
                 if began >= background_due:
                     background_due = began + BACKGROUND_INTERVAL
                     self._show_background()
-            # Counted from when the last frame was due, so that what waits too long does not add up.
-            frame_due = max(frame_due + FRAME_INTERVAL, time.monotonic())
-            stop.wait(frame_due - time.monotonic())
+            frames.wait(stop)
 
     def _forget_what_comes_later(self, status: Status) -> None:
         if status.time < self._time:  # brought back, or another pour

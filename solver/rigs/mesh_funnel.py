@@ -144,7 +144,7 @@ def _placed(file: Path, metres_per_unit: float, wall: str, stamp: int) -> Placed
     if not height > 0.0 or not all(map(len, cuts)):
         raise ParameterError(f"rig.mesh: {file}: has no height; the mesh has to stand upright (z up)")
     axis = middle(cuts[0])
-    outlet, inlet = (opening(one, z, axis) for one, z in zip(cuts, (0.0, height), strict=True))
+    outlet, inlet = (opening(one, axis) for one in cuts)
     moved = vertices - (*axis, low)
     reach = float(np.hypot(moved[:, 0], moved[:, 1]).max())
     corners = tuple((float(x), float(y), float(z)) for x, y, z in moved)

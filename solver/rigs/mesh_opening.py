@@ -18,12 +18,11 @@ HAIR = 1e-6
 
 @dataclass(frozen=True)
 class Opening:
-    """A cut at ``height``, seen from the axis: distance of the nearest and of the farthest wall [m].
+    """A level cut, seen from the axis: distance of the nearest and of the farthest wall [m].
 
     closed: whether a wall stands in every direction; otherwise the axis is outside of it.
     """
 
-    height: float
     nearest: float
     farthest: float
     closed: bool
@@ -51,15 +50,15 @@ def shut(mesh: trimesh.Trimesh, axis: tuple[float, float]) -> bool:
     return bool((((turns >= 0.0).all(axis=0) | (turns <= 0.0).all(axis=0)) & seen).any())
 
 
-def opening(segments: Array, height: float, axis: tuple[float, float]) -> Opening:
-    """What ``segments`` (n, 2, 2) of a cut at ``height`` leave open about ``axis`` (x, y)."""
+def opening(segments: Array, axis: tuple[float, float]) -> Opening:
+    """What ``segments`` (n, 2, 2) of a cut leave open about ``axis`` (x, y)."""
     start, end = segments[:, 0] - axis, segments[:, 1] - axis
     along = end - start
     length2 = np.maximum((along**2).sum(axis=1), 1e-30)
     share = np.clip(-(start * along).sum(axis=1) / length2, 0.0, 1.0)
     nearest = np.linalg.norm(start + share[:, None] * along, axis=1)
     farthest = np.linalg.norm(np.concatenate([start, end]), axis=1)
-    return Opening(height, float(nearest.min()), float(farthest.max()), _all_round(start, end))
+    return Opening(float(nearest.min()), float(farthest.max()), _all_round(start, end))
 
 
 def _all_round(start: Array, end: Array) -> bool:

@@ -124,12 +124,14 @@ def _answer(
     gates = (*asked, *apart)
     gone, rest = tuple(name for name in near if name in ruled_out), race.without(ruled_out)
     if gone and rest.fits:
-        other = adequate(emulator, evidence, rest.fits[rest.best], rest.best, limits, bootstrap, seed + 1)
-        gates = (*gates, other.gate)
-        if other.gate.passed:
+        fits_by_itself = adequacy
+        if rest.best != race.best:
+            fits_by_itself = adequate(emulator, evidence, rest.fits[rest.best], rest.best, limits, bootstrap, seed + 1)
+            gates = (*gates, fits_by_itself.gate)
+        if fits_by_itself.gate.passed:
             left, again = _near(emulator, evidence, rest, limits, seed + 2)
             named = _named("effect", left, gone)
-            return Conclusion(*named, (*gates, *again), rest.fits[rest.best], other, ruled_out=gone)
+            return Conclusion(*named, (*gates, *again), rest.fits[rest.best], fits_by_itself, ruled_out=gone)
     return Conclusion(*_named("effect", near), gates, race.fits[race.best], adequacy)
 
 

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from doe.diagnose.decision.gates import Limits
 from doe.diagnose.decision.verdict import FittedModel, Verdict
 from doe.diagnose.emulation.fresh_pours import FreshPours
 from doe.diagnose.runs import Declared
@@ -24,7 +25,7 @@ FloatArray = npt.NDArray[np.float64]
 LOOKS = 3
 MODELS = 4
 """At most so many are poured per look: the best of the race,"""
-WITHIN = 12.0
+WITHIN = Limits.held_out
 """as far as their criterion is no farther behind the best."""
 CLOSE = 0.2
 """Distance of a fit from its pours, as a share of the box, within which they hold it."""

@@ -82,11 +82,15 @@ class RecordingSwitch:
         recorder, path = self._recorder, self._path
         if recorder is None or path is None:
             raise CommandError("recording: none is running")
-        self._recorder = None
         if isinstance(recorder, ScenePlayback):
+            self._recorder = None
             self._background.start("packing the recording", lambda: write_whole(path, recorder.html()), lambda _: None)
-        else:
+            return
+        # In this order: whoever sees that nothing is recorded any more may open the file.
+        try:
             recorder.close()
+        finally:
+            self._recorder = None
 
     def take(self, frame: Frame, status: Status) -> None:
         """Hand on what the page shows, if it is being recorded; a web page that is full is ended."""

@@ -18,6 +18,7 @@ from explorer.logs.recording import Recording
 from explorer.screen_units import checked
 from explorer.viewer.actions import Action, Actions
 from explorer.viewer.buttons import add_keys, button_group
+from explorer.viewer.frame_clock import FrameClock
 from explorer.viewer.palette import ANGLE_LINE, CONTACTS_LINE, ENERGY_LINE, MASS_LINE
 from explorer.viewer.pour.chart import LEAST_TOP_DEG, axis
 from explorer.viewer.pour.run_panel import FASTEST, SLOWEST
@@ -101,16 +102,14 @@ class ReplayPage:
 
     def run(self, stop: threading.Event) -> None:
         """Keep the page up to date until ``stop`` is set."""
-        before = due = clock.monotonic()
+        before, frames = clock.monotonic(), FrameClock(FRAME_INTERVAL)
         while not stop.is_set():
             now = clock.monotonic()
             self._actions.carry_out()
             self._timeline.pass_by(now - before)
             before = now
             self.show()
-            # Counted from when the last frame was due, so that what waits too long does not add up.
-            due = max(due + FRAME_INTERVAL, clock.monotonic())
-            stop.wait(due - clock.monotonic())
+            frames.wait(stop)
 
     def show(self) -> None:
         """Draw the present moment, if it is another than the one that is drawn."""

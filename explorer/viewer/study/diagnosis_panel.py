@@ -17,7 +17,7 @@ from explorer.report.findings import Plain
 from explorer.viewer.actions import Post
 from explorer.viewer.study.candidates import Candidates
 from explorer.viewer.study.plot_view import PlotView
-from explorer.viewer.study.process_view import ProcessView, escaped
+from explorer.viewer.study.process_view import ProcessView, escaped, waiting_markdown
 from explorer.viewer.study.result_chooser import ResultChooser
 from explorer.viewer.study.stage_table import stages_markdown
 
@@ -110,10 +110,7 @@ class DiagnosisPanel:
             self._data.options = offered
         status = self._diagnosis.status()
         text = stages_markdown(status, "diagnosis", "Pours", notice)
-        waiting = self._diagnosis.waiting()
-        if waiting:
-            text += f"\n\nWaiting: {escaped('; '.join(waiting))}."
-        self._view.show(status, text)
+        self._view.show(status, text + waiting_markdown(self._diagnosis.waiting()))
         self._chooser.offer(self._diagnosis.finished())
         self._follow()
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import viser
 
@@ -60,6 +60,11 @@ def time_left(eta_s: float | None) -> str:
         return "–"
     minutes, seconds = divmod(round(eta_s), 60)
     return f"{minutes} min {seconds:02d} s" if minutes else f"{seconds} s"
+
+
+def waiting_markdown(waiting: Sequence[str]) -> str:
+    """A paragraph with the orders that wait, next one first; empty where none does."""
+    return f"\n\nWaiting: {escaped('; '.join(waiting))}." if waiting else ""
 
 
 def escaped(text: str) -> str:

@@ -16,7 +16,7 @@ from explorer.viewer.actions import Post
 from explorer.viewer.study.comparison_panel import ComparisonPanel
 from explorer.viewer.study.order_panel import OrderPanel
 from explorer.viewer.study.plot_view import PlotView
-from explorer.viewer.study.process_view import ProcessView, escaped
+from explorer.viewer.study.process_view import ProcessView, escaped, waiting_markdown
 from explorer.viewer.study.profiler_panel import ProfilerPanel
 from explorer.viewer.study.result_chooser import ResultChooser, title
 from explorer.viewer.study.run_chooser import RunChooser
@@ -85,9 +85,7 @@ class StudyPanel:
         status = self._study.status()
         stage, line = self._so_far
         text = stages_markdown(status, "study", "Runs", notice, line if stage == status.stage else "")
-        waiting = self._study.waiting()
-        if waiting:
-            text += f"\n\nWaiting: {escaped('; '.join(waiting))}."
+        text += waiting_markdown(self._study.waiting())
         if self._trouble:
             text += f"\n\n{escaped(self._trouble)}"
         self._view.show(status, text)
