@@ -176,8 +176,9 @@ def test_a_click_into_the_scene_finds_a_body_and_one_beside_lets_it_go(page, bro
 def test_keys_move_the_camera_of_the_browser_that_pressed_them(page, browser):
     browser.press("View: side")
     expected = view_of(bead_scene(), "Side")
-    wait_for(lambda: np.allclose(browser.camera.position, expected.position))
-    assert browser.camera.look_at == pytest.approx(expected.look_at)
+    # Two messages, one after the other.
+    for part in ("position", "look_at"):
+        wait_for(lambda part=part: np.allclose(getattr(browser.camera, part), getattr(expected, part)))
 
 
 def test_following_nobody_is_told_in_a_line(page, browser):
