@@ -16,6 +16,7 @@ from dataclasses import replace
 from typing import Any
 
 from explorer.errors import CommandError
+from explorer.live.angle_process import run as read_angles
 from explorer.live.details import Details, detail_reader, shared_details
 from explorer.live.frames import MAX_BODIES, Frame, FrameReader, shared_block
 from explorer.live.messages import (
@@ -57,6 +58,7 @@ class Session:
     def __init__(self) -> None:
         self._context = multiprocessing.get_context("spawn")
         self._process: Any = None
+        self._reader: Any = None
         self._commands: Any = None
         self._reports: Any = None
         self._frames: FrameReader | None = None
@@ -210,10 +212,17 @@ class Session:
         self._commands, self._reports = self._context.Queue(), self._context.Queue()
         frames, details = shared_block(self._context), shared_details(self._context)
         self._frames, self._details = FrameReader(frames), detail_reader(details)
+        asking, answering = self._context.Pipe()
+        queues = (self._commands, self._reports)
         self._process = self._context.Process(
-            target=run, args=(self._commands, self._reports, frames, details), name="explorer-solver", daemon=True
+            target=run, args=(*queues, frames, details, asking), name="explorer-solver", daemon=True
         )
-        self._process.start()
+        self._reader = self._context.Process(target=read_angles, args=(answering,), name="explorer-angles", daemon=True)
+        for process in (self._reader, self._process):
+            process.start()
+        # With these gone the line has the two processes at its ends alone: either hears when the other one ends.
+        asking.close()
+        answering.close()
 
     def _forget_process(self) -> None:
         if self._process is None:
@@ -221,6 +230,7 @@ class Session:
         if self._process.is_alive():
             self._process.kill()
         self._process.join()
+        self._reader.join()  # its line is cut
         self._commands.cancel_join_thread()
         self._commands.close()
         self._reports.close()

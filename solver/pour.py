@@ -132,8 +132,12 @@ class Pour:
             limit = min(limit, self._ramp_left)
         return limit if at_most is None else min(limit, at_most)
 
-    def after(self, steps: int, row: npt.NDArray[np.float64]) -> bool:
-        """Take note of ``steps`` that were run; ``row`` is this world's summary. True at a moment of decision."""
+    def decides_after(self, steps: int) -> bool:
+        """Whether ``steps`` more lead to a moment of decision."""
+        return steps >= self._left
+
+    def after(self, steps: int, row: npt.NDArray[np.float64] | None = None) -> bool:
+        """Take note of ``steps`` that were run. True at a moment of decision; it asks for this world's summary."""
         self.steps += steps
         self._left -= steps
         if self._ramp is not None:
@@ -143,6 +147,8 @@ class Pour:
                 self._follow_ramp(self._ramp)
         if self._left > 0:
             return False
+        if row is None:
+            raise ValueError("a moment of decision asks for the world's summary")
         self._left = self._interval_steps()
         self._sample(dict(zip(SUMMARY_COLUMNS, row.tolist(), strict=True)))
         return True

@@ -151,10 +151,14 @@ class Batch:
         """What counts as inside the rig from now on (a cylinder that is lifted takes its inside along)."""
         exchange.set_container(self._s, w, inside.height, inside.radius)
 
-    def advance(self, steps: Ints) -> Array:
-        """Run world w for ``steps[w]`` steps; returns :meth:`summary`."""
+    def run(self, steps: Ints) -> None:
+        """Run world w for ``steps[w]`` steps."""
         self._steps[:] = steps
         advance(self._s, self._steps)
+
+    def advance(self, steps: Ints) -> Array:
+        """:meth:`run`, and :meth:`summary` of what it came to."""
+        self.run(steps)
         return self.summary()
 
     def measure(self, w: int) -> Array:

@@ -1,9 +1,15 @@
-"""The angle of repose of a pour that still moves: when to read it, and what it read last."""
+"""The angle of repose of a pour that still moves: when to read it, and what was read last.
+
+A reading takes some 25 ms, for which the pour would stand still: while it runs, another process reads
+(``explorer/live/angle_process.py``). What stands still is read here, so that its angle is that of what is seen.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection
 
 from solver.observables.outline import Outline
 from solver.observables.pile import angle_of_repose, angle_of_repose_left, angle_of_repose_right
@@ -25,29 +31,95 @@ ANGLES: Mapping[str, Callable[[PileReading], Value]] = {
 }
 
 
+@dataclass(frozen=True)
+class Angles:
+    """What was read of a pile."""
+
+    observables: Mapping[str, Value] = field(default_factory=dict)
+    """The angles by name; empty before there was a pile."""
+    outline: Outline | None = None
+    """The view that the left and the right angle were read from, with the lines of its flanks."""
+
+
+def read_angles(pile: Pile) -> Angles:
+    """What ``pile`` is read as."""
+    reading = PileReading(pile)
+    return Angles({name: angle(reading) for name, angle in ANGLES.items()}, reading.front if reading.is_pile else None)
+
+
 class AngleReader:
-    """Reads the angles of one pour. Times in seconds; ``wall`` is the present moment on the caller's clock."""
+    """Reads the angles of one pour after the other. Times are in seconds.
 
-    def __init__(self) -> None:
-        self.observables: Mapping[str, Value] = {}
-        """The angles that were read last, by name; empty before there was a pile."""
-        self.outline: Outline | None = None
-        """The view that the left and the right angle were read from, with the lines of its flanks."""
-        self._read_at = -math.inf
-        self._wall_due = self._wall_earliest = -math.inf
+    line: to a process that reads while this one goes on; without it everything is read here.
+    clock: the present moment of wall time.
+    """
 
-    def due(self, time: float, wall: float) -> bool:
+    def __init__(self, line: Connection | None, clock: Callable[[], float]) -> None:
+        self._line, self._clock = line, clock
+        self._unheard = 0
+        self.forget()
+
+    def forget(self, angles: Angles | None = None) -> None:
+        """Begin anew: another pour, or an earlier moment of this one, of which ``angles`` had been read."""
+        self.newest = angles or Angles()
+        self._forgotten = self._unheard
+        self._read_at = self._wall_due = self._wall_earliest = -math.inf
+
+    def due(self, time: float) -> bool:
         """Whether the angle of simulated ``time`` should be read now."""
+        wall = self._clock()
         moved_on = time >= self._read_at + SIMULATED_INTERVAL or wall >= self._wall_due
-        return time > self._read_at and moved_on and wall >= self._wall_earliest
+        return time > self._read_at and moved_on and wall >= self._wall_earliest and self._unheard == self._forgotten
 
-    def read(self, pile: Pile, share_below: float, time: float, clock: Callable[[], float]) -> None:
+    def read(self, pile: Pile, share_below: float, time: float) -> None:
         """Read ``pile``, if ``share_below`` (0 … 1, mass below the outlet per poured mass) makes it one."""
-        before = clock()
+        self._forgotten = self._unheard
+        self._begin(time)
         if share_below >= LEAST_SHARE_BELOW:
-            reading = PileReading(pile)
-            self.observables = {name: angle(reading) for name, angle in ANGLES.items()}
-            self.outline = reading.front if reading.is_pile else None
-        now = clock()
-        self._read_at, self._wall_due = time, now + WALL_INTERVAL
-        self._wall_earliest = now + (now - before) / WALL_SHARE
+            self.newest = read_angles(pile)
+        self._end()
+
+    def ask(self, pile: Pile, share_below: float, time: float) -> None:
+        """Have ``pile`` read at the other end of the line; :meth:`hear` takes the answer."""
+        if self._line is None or share_below < LEAST_SHARE_BELOW:
+            self.read(pile, share_below, time)
+            return
+        if self._unheard:  # still at a pile that is forgotten; this one will be due again
+            return
+        self._begin(time)
+        try:
+            self._line.send(pile)
+            self._unheard += 1
+        except OSError:
+            self._hang_up()
+
+    def hear(self) -> bool:
+        """Take what the other process has read, if it has; True where that is news."""
+        if self._line is None or not self._unheard:
+            return False
+        try:
+            if not self._line.poll():
+                return False
+            answer = self._line.recv()
+        except (OSError, EOFError):
+            self._hang_up()
+            return False
+        self._unheard -= 1
+        if self._forgotten:
+            self._forgotten -= 1
+            return False
+        self.newest = answer
+        self._end()
+        return True
+
+    def _begin(self, time: float) -> None:
+        self._read_at, self._began = time, self._clock()
+
+    def _end(self) -> None:
+        now = self._clock()
+        self._wall_due = now + WALL_INTERVAL
+        self._wall_earliest = now + (now - self._began) / WALL_SHARE
+
+    def _hang_up(self) -> None:
+        """The other process has ended: everything is read here from now on."""
+        self._line, self._unheard, self._forgotten, self._read_at = None, 0, 0, -math.inf

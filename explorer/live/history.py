@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from explorer.live.angle_reader import AngleReader
+from explorer.live.angle_reader import Angles
 from solver.rewind import Kept
 from solver.scene import Scene
 
@@ -31,8 +31,8 @@ class Moment:
     kept: Kept
     scene: Scene
     """As the person sees it, with the parameters in force."""
-    angles: AngleReader
-    """What was read last; nothing changes it any more."""
+    angles: Angles
+    """What was read last."""
     retuned: bool
     """Parameters had been changed since the pour began."""
 
@@ -54,6 +54,10 @@ class History:
     def earliest(self) -> float:
         """Time [s] of the first moment; NaN while there is none."""
         return self._moments[0].time if self._moments else math.nan
+
+    def since(self, time: float) -> float:
+        """How long before ``time`` [s] the last moment was; infinite while there is none."""
+        return time - self._moments[-1].time + HAIR if self._moments else math.inf
 
     @property
     def times(self) -> list[float]:

@@ -10,6 +10,7 @@ import os
 import queue
 import signal
 import traceback
+from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any
 
 from explorer.live.messages import Close, Command, Failure, Report, Start
@@ -23,23 +24,27 @@ IDLE_WAIT = 0.5
 """Longest wait [s] for a command before the process looks whether its parent still lives."""
 
 
-def run(commands: Any, reports: Any, frames: Any, details: Any) -> None:
-    """Main function of the process: commands in, reports out by queues; frames and details by shared memory."""
+def run(commands: Any, reports: Any, frames: Any, details: Any, reading: Connection) -> None:
+    """Main function of the process: commands in, reports out by queues; frames and details by shared memory.
+
+    ``reading`` is the line to the process that reads angles.
+    """
     # Ctrl-C in a terminal reaches the whole group; the parent decides when this process ends.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # The page, and a browser beside it that draws without a graphics card, go first: else what is seen lags behind.
     os.nice(NICENESS)
     try:
-        _work(commands, reports, frames, details)
+        _work(commands, reports, frames, details, reading)
     except Exception as error:  # whatever it is, the person at the screen has to hear of it
         traceback.print_exc()
         reports.put(Failure(f"{type(error).__name__}: {' '.join(str(error).split())[:300]}"))
 
 
-def _work(commands: Any, reports: Any, frames: Any, details: Any) -> None:
+def _work(commands: Any, reports: Any, frames: Any, details: Any, reading: Connection) -> None:
     from explorer.live.details import DetailWriter
     from explorer.live.frames import FrameWriter
     from explorer.live.live_pour import LivePour
+    from explorer.live.publisher import Publisher
     from solver import backend
 
     backend.init(threads=1)
@@ -51,7 +56,8 @@ def _work(commands: Any, reports: Any, frames: Any, details: Any) -> None:
             if pour is not None:
                 pour.obey(command)
             elif isinstance(command, Start):
-                pour = LivePour(command, FrameWriter(frames), _sender(reports), DetailWriter(details))
+                screen = Publisher(FrameWriter(frames), DetailWriter(details))
+                pour = LivePour(command, screen, _sender(reports), reading)
         if not _parent_lives():
             return
         if pour is not None and pour.seconds_to_wait() == 0.0:

@@ -89,10 +89,12 @@ def live(taichi):
     """A live pour of beads that stands still at its beginning, in this process."""
     from explorer.live.live_pour import LivePour
     from explorer.live.messages import Pause
+    from explorer.live.publisher import Publisher
 
     block, reports = shared_block(multiprocessing.get_context("spawn")), []
     details = shared_details(multiprocessing.get_context("spawn"))
-    pour = LivePour(Start(bead_scene(), 1, 1), FrameWriter(block), reports.append, DetailWriter(details))
+    screen = Publisher(FrameWriter(block), DetailWriter(details))
+    pour = LivePour(Start(bead_scene(), 1, 1), screen, reports.append)
     pour.obey(Pause())
     return SimpleNamespace(pour=pour, reports=reports, reader=FrameReader(block), details=detail_reader(details))
 
