@@ -54,6 +54,12 @@ def init(threads: int | None = None) -> None:
     _owner = current
 
 
+def serial() -> bool:
+    """Whether loops run on the calling thread: with one CPU thread, each handing over to Taichi's own costs 0.1 ms."""
+    config = impl.current_cfg()
+    return bool(config.arch == ti.cpu and config.cpu_max_num_threads == 1)
+
+
 def lanes() -> int:
     """Loop iterations per world (see ``kernels/batch.py``): one on a GPU, whose threads take one each."""
     return LANES_ON_CPU if impl.current_cfg().arch == ti.cpu else 1

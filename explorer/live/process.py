@@ -76,7 +76,8 @@ def _waiting(commands: Any, pour: LivePour | None) -> list[Command]:
     wait = None if pour is None else pour.seconds_to_wait()
     found: list[Command] = []
     try:
-        found.append(commands.get(timeout=IDLE_WAIT if wait is None else max(wait, 1e-4)))
+        # Even the shortest wait hands the processor over; a pour that is behind the clock has no time for it.
+        found.append(commands.get(block=wait != 0.0, timeout=IDLE_WAIT if wait is None else wait))
         while True:
             found.append(commands.get_nowait())
     except queue.Empty:

@@ -1,6 +1,6 @@
 """The kernel that runs a batch: worlds in parallel, the steps of a world one after the other."""
 
-from solver.backend import lanes, ti
+from solver.backend import lanes, serial, ti
 from solver.kernels.contacts import push
 from solver.kernels.motion import move, prepare
 from solver.kernels.neighbours import rebuild
@@ -42,6 +42,7 @@ def advance(s: ti.template(), steps: ti.types.ndarray(dtype=ti.i32, ndim=1)):
     A world has several loop iterations, all but one of them idle: a CPU thread is given so many in a row that a loop
     over few worlds would run on one thread. Threads get equal, contiguous shares of the worlds.
     """
+    ti.loop_config(serialize=ti.static(serial()))
     for lane in range(steps.shape[0] * ti.static(lanes())):
         w = lane // ti.static(lanes())
         if lane % ti.static(lanes()) == 0 and steps[w] > 0:
@@ -53,6 +54,7 @@ def advance(s: ti.template(), steps: ti.types.ndarray(dtype=ti.i32, ndim=1)):
 @ti.kernel
 def measure(s: ti.template(), world_index: ti.i32):
     """Summarise one world as it stands."""
+    ti.loop_config(serialize=ti.static(serial()))
     for w in range(world_index, world_index + 1):
         summarise(s, w)
 
@@ -64,6 +66,7 @@ def take_out(s: ti.template(), world_index: ti.i32) -> ti.i32:
     Rolling or hopping out over the plate is a stray; leaving above the outlet or through the plate is a loss.
     """
     lost = 0
+    ti.loop_config(serialize=ti.static(serial()))
     for w in range(world_index, world_index + 1):
         for b in range(s.world.bodies[w]):
             if s.body.alive[w, b] == 1:

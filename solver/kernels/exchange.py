@@ -1,6 +1,6 @@
 """Everything that crosses between NumPy and the arrays of a batch: one small kernel per errand."""
 
-from solver.backend import ti
+from solver.backend import serial, ti
 from solver.effects.air_drag import shape_factors
 from solver.kernels.geometry import rotation
 from solver.kernels.sleep import rouse_all
@@ -60,6 +60,7 @@ def load_world(s: ti.template(), w: ti.i32, settings: Row):
 def load_bodies(s: ti.template(), w: ti.i32, numbers: Table, places: IntTable, spheres: Table, owner: IntTable):
     """All bodies that will enter, by the columns of ``layout.Layout``: numbers, places, spheres (x y z r), owner."""
     s.world.loaded[w] = numbers.shape[0]
+    ti.loop_config(serialize=ti.static(serial()))
     for b in range(numbers.shape[0]):
         s.body.mass[w, b] = numbers[b, 0]
         s.body.inertia[w, b] = triple(numbers, b, 1)
@@ -77,6 +78,7 @@ def load_bodies(s: ti.template(), w: ti.i32, numbers: Table, places: IntTable, s
         s.body.asleep[w, b] = 0
         s.body.listed[w, b] = 0
         s.body.touching[w, b] = 0
+    ti.loop_config(serialize=ti.static(serial()))
     for m in range(spheres.shape[0]):
         s.member.local[w, m] = triple(spheres, m, 0)
         s.member.radius[w, m] = spheres[m, 3]
@@ -88,6 +90,7 @@ def load_bodies(s: ti.template(), w: ti.i32, numbers: Table, places: IntTable, s
 def load_walls(s: ti.template(), w: ti.i32, poses: Table, marks: IntTable, grids: Table, cells: IntTable):
     """Walls at rest. poses: origin, quaternion; marks: kind, active; grids: low, cell; cells: counts (3), first."""
     s.world.walls[w] = poses.shape[0]
+    ti.loop_config(serialize=ti.static(serial()))
     for k in range(poses.shape[0]):
         s.wall.origin[w, k] = triple(poses, k, 0)
         s.wall.quaternion[w, k] = Vec4(poses[k, 3], poses[k, 4], poses[k, 5], poses[k, 6])
@@ -111,6 +114,7 @@ def load_walls(s: ti.template(), w: ti.i32, poses: Table, marks: IntTable, grids
 def load_surfaces(s: ti.template(), w: ti.i32, geometry: Table, marks: IntTable, primitives: ti.i32):
     """What spheres can touch, the ``primitives`` first; marks: shape, wall."""
     s.world.primitives[w] = primitives
+    ti.loop_config(serialize=ti.static(serial()))
     for p in range(geometry.shape[0]):
         s.surface.geometry[w, p] = Vec4(geometry[p, 0], geometry[p, 1], geometry[p, 2], geometry[p, 3])
         s.surface.shape[w, p] = marks[p, 0]
@@ -120,6 +124,7 @@ def load_surfaces(s: ti.template(), w: ti.i32, geometry: Table, marks: IntTable,
 @ti.kernel
 def load_triangles(s: ti.template(), w: ti.i32, corners: Table, guards: Table, marks: IntTable):
     """Triangles of all meshes. corners: a, b, c; guards: a row per edge; marks: surface, edges (3), corners (3)."""
+    ti.loop_config(serialize=ti.static(serial()))
     for t in range(corners.shape[0]):
         s.triangle.a[w, t] = triple(corners, t, 0)
         s.triangle.b[w, t] = triple(corners, t, 3)
@@ -134,8 +139,10 @@ def load_triangles(s: ti.template(), w: ti.i32, corners: Table, guards: Table, m
 @ti.kernel
 def load_cells(s: ti.template(), w: ti.i32, first: IntRow, items: IntRow):
     """Cells of all meshes' grids: where each one's triangles begin (and where the last ones end), and the triangles."""
+    ti.loop_config(serialize=ti.static(serial()))
     for c in range(first.shape[0]):
         s.mesh_cell.first[w, c] = first[c]
+    ti.loop_config(serialize=ti.static(serial()))
     for k in range(items.shape[0]):
         s.mesh_item.triangle[w, k] = items[k]
 
@@ -145,6 +152,7 @@ def load_law(s: ti.template(), w: ti.i32, table: Table, kinds: ti.i32):
     """Contact constants of every pair of kinds, shape (kinds², 5), row a · kinds + b."""
     s.world.kinds[w] = kinds
     rouse_all(s, w)
+    ti.loop_config(serialize=ti.static(serial()))
     for k in range(table.shape[0]):
         s.law.row[w, k] = Vec5(table[k, 0], table[k, 1], table[k, 2], table[k, 3], table[k, 4])
 
@@ -157,6 +165,7 @@ def load_effects(s: ti.template(), w: ti.i32, table: Table, grip: ti.f64):
     s.world.cell[w] = s.world.cell[w] + (grip - s.world.grip[w])
     s.world.grip[w] = grip
     s.world.moved[w] = s.world.skin[w]
+    ti.loop_config(serialize=ti.static(serial()))
     for k in range(table.shape[0]):
         for column in range(table.shape[1]):
             s.effect.row[w, k, column] = table[k, column]
@@ -231,6 +240,7 @@ def set_sleep(s: ti.template(), w: ti.i32, speed: ti.f64, time: ti.f64):
 @ti.kernel
 def scale_springs(s: ti.template(), w: ti.i32, ratio: Row):
     """Multiply tangential springs by the ``ratio`` of their row of the law table: a spring keeps its displacement."""
+    ti.loop_config(serialize=ti.static(serial()))
     for k in range(s.world.contacts[w]):
         s.contact.spring[w, k] = s.contact.spring[w, k] * ratio[s.contact.law[w, k]]
 
@@ -238,6 +248,7 @@ def scale_springs(s: ti.template(), w: ti.i32, ratio: Row):
 @ti.kernel
 def read_bodies(s: ti.template(), w: ti.i32, out: Table):
     """Per body: position (3), quaternion (4), velocity (3), spin (3), alive, touching contacts, asleep."""
+    ti.loop_config(serialize=ti.static(serial()))
     for b in range(out.shape[0]):
         for d in ti.static(range(3)):
             out[b, d] = s.body.position[w, b][d]
@@ -253,6 +264,7 @@ def read_bodies(s: ti.template(), w: ti.i32, out: Table):
 @ti.kernel
 def read_walls(s: ti.template(), w: ti.i32, out: Table):
     """Per wall: origin (3), quaternion (4), velocity (3), angular velocity (3), force (3), torque (3)."""
+    ti.loop_config(serialize=ti.static(serial()))
     for k in range(out.shape[0]):
         for d in ti.static(range(3)):
             out[k, d] = s.wall.origin[w, k][d]
@@ -267,6 +279,7 @@ def read_walls(s: ti.template(), w: ti.i32, out: Table):
 @ti.kernel
 def read_summary(s: ti.template(), out: Table):
     """One row per world, columns as in ``world.SUMMARY_COLUMNS``."""
+    ti.loop_config(serialize=ti.static(serial()))
     for w in range(out.shape[0]):
         out[w, 0] = s.summary.kinetic[w]
         out[w, 1] = s.summary.elastic[w]

@@ -3,7 +3,7 @@
 ``width`` is the number of columns that an entry of the group takes, ``first`` the number in the row where it begins.
 """
 
-from solver.backend import ti
+from solver.backend import serial, ti
 
 Row = ti.types.ndarray(dtype=ti.f64, ndim=1)
 
@@ -11,6 +11,7 @@ Row = ti.types.ndarray(dtype=ti.f64, ndim=1)
 @ti.kernel
 def pack(fields: ti.template(), w: ti.i32, entries: ti.i32, width: ti.i32, first: ti.i32, row: Row):
     """Write the first ``entries`` entries of ``fields`` (of shape (worlds, …)) into ``row``."""
+    ti.loop_config(serialize=ti.static(serial()))
     for k in range(entries):
         at = first + k * width
         for field in ti.static(fields):
@@ -29,6 +30,7 @@ def pack(fields: ti.template(), w: ti.i32, entries: ti.i32, width: ti.i32, first
 @ti.kernel
 def unpack(fields: ti.template(), w: ti.i32, entries: ti.i32, width: ti.i32, first: ti.i32, row: Row):
     """Take back what :func:`pack` wrote."""
+    ti.loop_config(serialize=ti.static(serial()))
     for k in range(entries):
         at = first + k * width
         for field in ti.static(fields):
@@ -47,6 +49,7 @@ def unpack(fields: ti.template(), w: ti.i32, entries: ti.i32, width: ti.i32, fir
 @ti.kernel
 def pack_world(fields: ti.template(), w: ti.i32, row: Row):
     """Write what a world has once (``fields`` of shape (worlds,)) into the beginning of ``row``."""
+    ti.loop_config(serialize=ti.static(serial()))
     for world in range(w, w + 1):
         at = 0
         for field in ti.static(fields):
@@ -62,6 +65,7 @@ def pack_world(fields: ti.template(), w: ti.i32, row: Row):
 @ti.kernel
 def unpack_world(fields: ti.template(), w: ti.i32, row: Row):
     """Take back what :func:`pack_world` wrote."""
+    ti.loop_config(serialize=ti.static(serial()))
     for world in range(w, w + 1):
         at = 0
         for field in ti.static(fields):
@@ -77,6 +81,7 @@ def unpack_world(fields: ti.template(), w: ti.i32, row: Row):
 @ti.kernel
 def pack_memory(number: ti.template(), w: ti.i32, entries: ti.i32, first: ti.i32, row: Row):
     """Write what effects keep of the first ``entries`` contacts (``number`` of shape (worlds, contacts, columns))."""
+    ti.loop_config(serialize=ti.static(serial()))
     for k in range(entries):
         for column in range(number.shape[2]):
             row[first + k * number.shape[2] + column] = number[w, k, column]
@@ -85,6 +90,7 @@ def pack_memory(number: ti.template(), w: ti.i32, entries: ti.i32, first: ti.i32
 @ti.kernel
 def unpack_memory(number: ti.template(), w: ti.i32, entries: ti.i32, first: ti.i32, row: Row):
     """Take back what :func:`pack_memory` wrote."""
+    ti.loop_config(serialize=ti.static(serial()))
     for k in range(entries):
         for column in range(number.shape[2]):
             number[w, k, column] = row[first + k * number.shape[2] + column]
