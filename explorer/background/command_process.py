@@ -26,10 +26,10 @@ from typing import IO, Any, Literal
 
 from explorer.background.stage_progress import StageProgress, TriedRun, with_event, with_run
 from explorer.errors import CommandError
+from explorer.priority import BACKGROUND, session_gives_way
 
 CommandState = Literal["idle", "running", "paused", "cancelled", "finished", "failed"]
 
-NICENESS = 10
 CANCEL_WAIT = 5.0
 """Seconds that a cancelled command has to write what it has, before it is ended for good."""
 LOCK_WAIT = 1.0
@@ -151,7 +151,7 @@ class CommandProcess:
         patience = LOCK_WAIT if out == self.out else 0.0
         self.out, self._command = out, arguments[0]
         nice = shutil.which("nice")
-        lower = [nice, "-n", str(NICENESS)] if nice else []
+        lower = [nice, "-n", str(BACKGROUND)] if nice else []
         with self._log().open("ab") as log:
             # The child inherits the lock with the open file, and holds it to its end, whatever becomes of the page.
             if not _locked(log, patience):
@@ -164,6 +164,7 @@ class CommandProcess:
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
             )
+        session_gives_way(self._process.pid, BACKGROUND)
         self._cancelled_at = None
         self._status = CommandStatus("running")
 

@@ -5,18 +5,16 @@ The parent imports this file, so what reads is imported inside :func:`run` only.
 
 from __future__ import annotations
 
-import os
 import signal
 from multiprocessing.connection import Connection
 
-NICENESS = 5
-"""Priority: that of the solver's process."""
+from explorer.priority import LIVE, give_way
 
 
 def run(line: Connection) -> None:
     """Main function of the process. It ends with the solver's process, whose end of the line closes with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    os.nice(NICENESS)
+    give_way(LIVE)
     from explorer.live.angle_reader import read_angles
 
     try:

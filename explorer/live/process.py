@@ -6,7 +6,6 @@ The parent imports this file, so Taichi is imported inside :func:`run` only.
 from __future__ import annotations
 
 import multiprocessing
-import os
 import queue
 import signal
 import traceback
@@ -14,12 +13,11 @@ from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any
 
 from explorer.live.messages import Close, Command, Failure, Report, Start
+from explorer.priority import LIVE, give_way
 
 if TYPE_CHECKING:
     from explorer.live.live_pour import LivePour
 
-NICENESS = 5
-"""Priority below the page's, above that of a study in the background (10)."""
 IDLE_WAIT = 0.5
 """Longest wait [s] for a command before the process looks whether its parent still lives."""
 
@@ -32,7 +30,7 @@ def run(commands: Any, reports: Any, frames: Any, details: Any, reading: Connect
     # Ctrl-C in a terminal reaches the whole group; the parent decides when this process ends.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # The page, and a browser beside it that draws without a graphics card, go first: else what is seen lags behind.
-    os.nice(NICENESS)
+    give_way(LIVE)
     try:
         _work(commands, reports, frames, details, reading)
     except Exception as error:  # whatever it is, the person at the screen has to hear of it

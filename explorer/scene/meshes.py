@@ -99,7 +99,8 @@ def _plane(plane: Plane, name: str, reach: Array) -> Triangles:
     """The infinite ``plane``: a disc about the z axis if it is the plate, else a rectangle beside ``reach`` (n, 3)."""
     if name == PLATE_NAME:
         radius = PLATE_OVERHANG * float(np.hypot(reach[:, 0], reach[:, 1]).max())
-        return _revolved(Revolved(0.0, 0.0, radius, 0.0, plane.material))
+        # From the rim inwards, so that its faces look up.
+        return _revolved(Revolved(radius, 0.0, 0.0, 0.0, plane.material))
     turn = rotation_matrix(np.array(plane.pose.quaternion))
     seen = (reach - np.array(plane.pose.origin)) @ turn
     (x0, y0), (x1, y1) = seen[:, :2].min(axis=0), seen[:, :2].max(axis=0)

@@ -18,7 +18,7 @@ BODY_COLOURS: tuple[Colour, ...] = (
 )
 GLASS: Colour = (190, 210, 225)
 RIM: Colour = (150, 170, 185)
-PLATE: Colour = (44, 50, 58)
+PLATE: Colour = (74, 82, 92)
 RING: Colour = (110, 122, 135)
 BRAND: Colour = (86, 150, 200)
 

@@ -10,6 +10,7 @@ import pytest
 from explorer.background.command_process import BackgroundError, CommandStatus
 from explorer.background.stage_progress import StageProgress
 from explorer.diagnosis.process import DiagnoseProcess, Question
+from explorer.priority import BACKGROUND
 from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.study.diagnosis_panel import OWN, DiagnosisPanel, answer_markdown
@@ -61,7 +62,7 @@ def test_a_diagnosis_runs_to_its_end_at_lower_priority(tmp_path):
     arguments = json.loads((folder / "arguments.json").read_text())
     assert arguments == ["diagnose", data, "--out", str(folder), "--apply", "--store", str(tmp_path / "runs.sqlite")]
     assert folder.name.startswith("trefoil_1-")
-    assert int((folder / "niceness").read_text()) == min(19, os.nice(0) + 10)
+    assert int((folder / "niceness").read_text()) == min(19, os.nice(0) + BACKGROUND)
 
 
 def test_cancel_and_resume_also_from_a_later_page(tmp_path):

@@ -17,6 +17,7 @@ from explorer.diagnosis.process import DiagnoseProcess
 from explorer.live.messages import SessionState
 from explorer.session import Session
 from explorer.viewer.guarded_server import guarded_server
+from explorer.viewer.look import look_tab
 from explorer.viewer.look.camera import view_of
 from explorer.viewer.page import Page
 from explorer.viewer.pour.run_panel import BACK, PLAY_PAUSE, STEP
@@ -216,3 +217,13 @@ def test_a_browser_that_comes_back_finds_the_pour_as_it_is(page, browser):
     wait_for(lambda: again.received > 0)
     assert status(page).generation == generation
     again.leave()
+
+
+def test_shadows_are_switched_off_and_on(page, monkeypatch):
+    lit = []
+    monkeypatch.setattr(look_tab, "light", lambda server, shadows: lit.append(shadows))
+    panel = page.page._look._panel
+    for shadows in (False, True):
+        page.page._actions.post(lambda shadows=shadows: panel.change(shadows=shadows))
+        wait_for(lambda shadows=shadows: lit[-1:] == [shadows])
+    assert lit == [False, True]

@@ -11,6 +11,7 @@ from doe.study import load_study
 from explorer.background.command_process import BackgroundError, CommandStatus, advanced
 from explorer.background.stage_progress import StageProgress, failures, given_up, with_event
 from explorer.background.waiting_line import MOST_WAITING
+from explorer.priority import BACKGROUND
 from explorer.study.edit import StudyEdits
 from explorer.study.process import CalibrationProcess
 from solver import asset_path
@@ -54,7 +55,7 @@ def test_a_study_runs_to_its_end_at_lower_priority(tmp_path):
     arguments = json.loads((folder / "arguments.json").read_text())
     expected = ["calibrate", "--headless", "--study", str(tmp_path / "my study.toml"), "--profile", "quick"]
     assert arguments == [*expected, "--out", str(folder), "--store", str(tmp_path / "runs.sqlite")]
-    assert int((folder / "niceness").read_text()) == min(19, os.nice(0) + 10)
+    assert int((folder / "niceness").read_text()) == min(19, os.nice(0) + BACKGROUND)
 
 
 def test_cancel_and_resume(tmp_path):

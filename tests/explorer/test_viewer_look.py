@@ -206,9 +206,10 @@ def test_controls_make_a_look(panel):
     enter(look_panel._cut, "y below")
     enter(look_panel._cut_at, -20.0)
     enter(look_panel._opacity, 0.5)
+    enter(look_panel._shadows, False)
     assert actions.carry_out() == ""
     assert look_panel.look == Look(
-        colour_by="speed", chains=True, threshold=5.0, cut_away="y below", cut_at=-0.02, rig_opacity=0.5
+        colour_by="speed", chains=True, threshold=5.0, cut_away="y below", cut_at=-0.02, rig_opacity=0.5, shadows=False
     )
 
 

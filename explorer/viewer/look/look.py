@@ -39,6 +39,7 @@ class Look:
     cut_at: float = 0.0
     """Place of the cut on its axis [m]."""
     rig_opacity: float = CLEAR
+    shadows: bool = True
 
     @property
     def needs_details(self) -> bool:

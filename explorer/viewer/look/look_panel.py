@@ -57,6 +57,9 @@ class LookPanel:
             )
             self._cut_at = gui.add_slider("Place of the cut [mm]", -REACH_MM, REACH_MM, 1.0, 0.0)
             self._opacity = gui.add_slider("Opacity of the rig", 0.0, 1.0, 0.01, self.look.rig_opacity)
+            self._shadows = gui.add_checkbox(
+                "Shadows", self.look.shadows, hint="Off: nearly twice as quick in a browser without a graphics card."
+            )
         self._listen()
         acts: dict[str, Action] = {
             "Colour by the next quantity": lambda: self._next("colour_by", COLOURS),
@@ -79,6 +82,7 @@ class LookPanel:
             (self._cut, look.cut_away),
             (self._cut_at, 1e3 * look.cut_at),
             (self._opacity, look.rig_opacity),
+            (self._shadows, look.shadows),
         )
         for handle, value in shown:
             if handle.value != value:
@@ -118,6 +122,7 @@ class LookPanel:
             lambda value: self.change(cut_at=1e-3 * checked(value, -REACH_MM, REACH_MM, "place of the cut")),
         )
         _on(self._opacity, self._post, lambda value: self.change(rig_opacity=checked(value, 0.0, 1.0, "opacity")))
+        _on(self._shadows, self._post, lambda value: self.change(shadows=value is True))
 
     def _set_automatic(self, value: object) -> None:
         low, high = (checked(box.value, -LARGEST, LARGEST, "range") for box in (self._low, self._high))

@@ -21,6 +21,7 @@ from explorer.viewer.look.look import COMPONENT, in_sight
 from explorer.viewer.look.look_panel import LookPanel
 from explorer.viewer.look.picking import nearest_hit
 from explorer.viewer.scene_nodes import SceneNodes
+from explorer.viewer.view import light
 from solver.scene import Scene
 
 GHOST = 0.22
@@ -49,6 +50,7 @@ class LookTab:
         self._moved_for: object = None
         self._painted_for: object = None
         self._faded_for: object = None
+        self._shadows = True
         self._chained_for: object = None
         self._told_for: object = None
         self._build(post)
@@ -144,6 +146,9 @@ class LookTab:
         if faded != self._faded_for:
             self._faded_for = faded
             nodes.fade(GHOST if look.chains else None, look.rig_opacity)
+        if look.shadows != self._shadows:
+            self._shadows = look.shadows
+            light(self._server, look.shadows)
 
     def _show_chains(self, frame: Frame, seen: Any, details: Details | None) -> None:
         look = self._panel.look

@@ -8,9 +8,8 @@ import numpy as np
 import viser
 
 from explorer.logs.recording import Component, Recording
-from explorer.scene.meshes import PLATE_NAME
 from explorer.viewer.palette import linear
-from explorer.viewer.scene_nodes import Poses, nowhere
+from explorer.viewer.scene_nodes import Poses, drawn, nowhere
 
 
 class ReplayNodes:
@@ -27,9 +26,7 @@ class ReplayNodes:
                     surface.shape.faces,
                     color=surface.shape.colour,
                     opacity=surface.shape.opacity if surface.shape.opacity < 1.0 else None,
-                    side="double",
-                    cast_shadow=False,
-                    receive_shadow=surface.shape.name == PLATE_NAME,
+                    **drawn(surface.shape.name),
                 ),
             )
             for surface in recording.surfaces
