@@ -99,8 +99,7 @@ def _plane(plane: Plane, name: str, reach: Array) -> Triangles:
     """The infinite ``plane``: a disc about the z axis if it is the plate, else a rectangle beside ``reach`` (n, 3)."""
     if name == PLATE_NAME:
         radius = PLATE_OVERHANG * float(np.hypot(reach[:, 0], reach[:, 1]).max())
-        # From the rim inwards, so that its faces look up.
-        return _revolved(Revolved(radius, 0.0, 0.0, 0.0, plane.material))
+        return _revolved(Revolved(0.0, 0.0, radius, 0.0, plane.material))
     turn = rotation_matrix(np.array(plane.pose.quaternion))
     seen = (reach - np.array(plane.pose.origin)) @ turn
     (x0, y0), (x1, y1) = seen[:, :2].min(axis=0), seen[:, :2].max(axis=0)
@@ -127,8 +126,8 @@ def _revolved(surface: Revolved) -> Triangles:
     following = (k + 1) % SIDES
     faces = np.concatenate(
         [
-            np.stack([k, following, k + SIDES], axis=1),
-            np.stack([following, following + SIDES, k + SIDES], axis=1),
+            np.stack([k, k + SIDES, following], axis=1),
+            np.stack([following, k + SIDES, following + SIDES], axis=1),
         ]
     )
     return _triangles(np.concatenate([low, high]), np.concatenate([normals, normals]), faces)

@@ -59,5 +59,11 @@ def test_rig_lies_on_its_surfaces(scene):
     assert (plate[:, 2] == 0.0).all()
     assert np.hypot(plate[:, 0], plate[:, 1]).max() == pytest.approx(PLATE_OVERHANG * rig.inlet_diameter / 2.0)
     assert (drawn["plate"].normals == [0.0, 0.0, 1.0]).all()
+    # Faces look the way of the normals: what is drawn from one side only is seen from above.
+    for surface in drawn.values():
+        corners = surface.vertices[surface.faces].astype(float)
+        facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        seen = np.linalg.norm(facing, axis=1) > 0.0
+        assert (np.einsum("ij,ij->i", facing, surface.normals[surface.faces[:, 0]])[seen] > 0.0).all()
     along = cone[len(cone) // 2] - cone[0]
     assert drawn["cone"].normals[0] @ along == pytest.approx(0.0, abs=1e-7)
