@@ -35,7 +35,7 @@ class Limits(Record):
     """Limits of the gates. detect: level of each of the two tests. reach: least shift, in sigma, that an effect must be
     able to cause to enter the race. pair_gain: BIC by which a pair must beat the best single effect. chance: of
     specificity.py, for pairs. rival: of rivals.py. held_out: of held_out.py, where a contender leaves the
-    race (closer.py).
+    race (closer.py). contradicted: of held_out.py, below which a name is contradicted.
     """
 
     detect: float = 0.005
@@ -46,6 +46,7 @@ class Limits(Record):
     chance: float = 0.01
     rival: float = 0.05
     held_out: float = 12.0
+    contradicted: float = 0.001
 
 
 @dataclass(frozen=True)

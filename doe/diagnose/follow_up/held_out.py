@@ -1,4 +1,4 @@
-"""Gate 5: do data that were not fitted agree with the name? They take names back, and never give a new one alone.
+"""Gates 5 and 6: do data that were not fitted agree with the name? They take names back, and never give one alone.
 
 Every contender (the named models, and others that the fit leaves near them) predicts the held-out conditions by pours
 of its own, which nothing else rests on. With r measured and m poured ones, S the covariance of a pour pooled over all
@@ -11,6 +11,12 @@ contenders, half shrunk to its diagonal:
 refutation (Lange, Little and Taylor 1989, JASA 84:881). A name that stands alone keeps doing so if every rival stays
 the gap of gate 3 behind in the criterion of the fit plus D; else they join it. Of several names those go that are
 `Limits.held_out` or more behind the first of them.
+
+Where the held-out data contradict every name, nothing is named. The farthest summary of a model, over all held-out
+conditions, is |t| = max |measured - poured|/(s sqrt(1/r + 1/m)), s the deviation of a pour pooled over data and
+contenders with f degrees of freedom; Bonferroni's p = (number of summaries) P(|t_f| >= |t|) is below
+`Limits.contradicted`. That is strict because the error of the fit is not in s, and summary by summary because an effect
+that is none of those asked shows in what it acts on, not evenly over all.
 """
 
 from __future__ import annotations
@@ -20,6 +26,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
+from scipy import stats
 
 from doe.diagnose.decision.gates import Gate
 from doe.diagnose.decision.tables import listed
@@ -43,12 +50,14 @@ LEAST = 6
 @dataclass(frozen=True)
 class HeldOut(Record):
     """What a contender's fresh pours say of the held-out data: D (see above), and how far it is behind the best in the
-    criterion of the fit plus D.
+    criterion of the fit plus D. farthest, p: |t| of its farthest summary, and Bonferroni's p of that.
     """
 
     label: str
     deviance: float
     behind: float
+    farthest: float
+    p: float
 
 
 def contenders_for(verdict: Verdict) -> tuple[FittedModel, ...]:
@@ -111,6 +120,15 @@ def deviance(measured: FloatArray, poured: FloatArray, noise: PourNoise) -> floa
     return float((noise.freedom + known.sum()) * np.log1p(t2 / noise.freedom))
 
 
+def distances(measured: FloatArray, poured: FloatArray, noise: PourNoise) -> FloatArray:
+    """|t| of the summaries that vary: measured (r, d), poured (m, d). Infinite where too few could be poured."""
+    known = noise.spread > 0.0
+    if len(poured) < LEAST:
+        return np.full(known.sum(), np.inf)
+    off = (measured[:, known].mean(axis=0) - poured[:, known].mean(axis=0)) / noise.spread[known]
+    return np.asarray(np.abs(off) / np.sqrt(1.0 / len(measured) + 1.0 / len(poured)))
+
+
 def compared(
     verdict: Verdict, measured: Sequence[FloatArray], poured: Mapping[str, Sequence[FloatArray]]
 ) -> tuple[HeldOut, ...]:
@@ -119,6 +137,7 @@ def compared(
     Nothing is compared where no contender's pours can be read.
     """
     found = dict.fromkeys(poured, 0.0)
+    farthest, chance, asked = dict.fromkeys(poured, 0.0), dict.fromkeys(poured, 1.0), 0
     for c, data in enumerate(measured):
         blocks = {label: blocks[c] for label, blocks in poured.items()}
         readable = [block for block in blocks.values() if len(block) >= LEAST]
@@ -126,13 +145,21 @@ def compared(
             return ()
         noise = pour_noise(data, readable)
         found = {label: found[label] + deviance(data, block, noise) for label, block in blocks.items()}
+        # The data scatter as well, and a summary that all contenders hold still may not be still in the laboratory.
+        everyone = pour_noise(data, [*readable, data])
+        asked += int((everyone.spread > 0.0).sum())
+        for label, block in blocks.items():
+            t = distances(data, block, everyone).max(initial=0.0)
+            farthest[label] = max(farthest[label], t)
+            chance[label] = min(chance[label], 2.0 * float(stats.t.sf(t, everyone.freedom)))
     criteria = {model.label: model.criterion for model in verdict.models}
     total = {label: criteria[label] + value for label, value in found.items()}
     best = min(total.values(), default=float("inf"))
     if not np.isfinite(best):
         return ()
     return tuple(
-        HeldOut(label, found[label], total[label] - best) for label in sorted(total, key=lambda label: total[label])
+        HeldOut(label, found[label], total[label] - best, farthest[label], min(1.0, asked * chance[label]))
+        for label in sorted(total, key=lambda label: total[label])
     )
 
 
@@ -149,12 +176,31 @@ def ruled_out(verdict: Verdict, rows: Sequence[HeldOut]) -> tuple[str, ...]:
 
 
 def upheld(verdict: Verdict, rows: Sequence[HeldOut]) -> Verdict:
+    """The verdict with gates 5 and 6; as it is where nothing was compared."""
+    if not rows:
+        return verdict
+    verdict = borne_out(verdict, rows)
+    named = [row for row in rows if row.label in verdict.names]
+    if not named:
+        return verdict
+    best, limit = max(named, key=lambda row: row.p), verdict.limits.contradicted
+    words = f"the farthest summary of {best.label} is {best.farthest:.1f} standard errors off"
+    gate = Gate("held out: agreement", best.farthest, best.p, limit, best.p >= limit, words)
+    verdict = replace(verdict, gates=(*verdict.gates, gate))
+    if gate.passed:
+        return verdict
+    statement = (
+        f"The fitted data would name {listed(verdict.names)}, and the held-out data contradict it: {words}. "
+        "None of the effects in the race explains both."
+    )
+    return replace(verdict, kind="unexplained", names=(), statement=statement)
+
+
+def borne_out(verdict: Verdict, rows: Sequence[HeldOut]) -> Verdict:
     """The verdict with gate 5: a name that held-out data do not bear out becomes one among several.
 
     Where several are named they stay, and the gate says whom the held-out data favour.
     """
-    if not rows:
-        return verdict
     gap, first = verdict.limits.gap, rows[0].label
     near = tuple(row.label for row in rows if row.behind < gap)
     behind = rows[1].behind if len(rows) > 1 else float("inf")

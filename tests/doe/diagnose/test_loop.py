@@ -77,8 +77,20 @@ def data_of(measurement, effects, seed, formula=expected):
     return Observed(tuple(blocks), tuple(np.zeros(block.shape[1]) for block in blocks))
 
 
+def measure(measurement, monkeypatch, effects, seed, formula=expected):
+    """Let the laboratory read the formula with ``effects``, in the fitted and in the held-out conditions."""
+    rng, theta = np.random.default_rng(seed + 1), [p.mean for p in measurement.parameters]
+
+    def replicates(condition):
+        width = len(summary_names(condition))
+        return formula(theta, effects, condition.name, width) + rng.normal(size=(REPLICATES, width))
+
+    monkeypatch.setattr(diagnosis, "observe", lambda conditions: data_of(measurement, effects, seed, formula))
+    monkeypatch.setattr(diagnosis, "complete_rows", replicates)
+
+
 def run(measurement, monkeypatch, effects, seed=1):
-    monkeypatch.setattr(diagnosis, "observe", lambda conditions: data_of(measurement, effects, seed))
+    measure(measurement, monkeypatch, effects, seed)
     said = []
     found = diagnosis.run_diagnosis(measurement, None, None, NAMES, BUDGET, said.append)
     return found, said
@@ -86,15 +98,6 @@ def run(measurement, monkeypatch, effects, seed=1):
 
 def test_a_planted_effect_is_named_with_its_amplitude(measurement, monkeypatch):
     planted = 0.4 * EFFECTS["rolling_resistance"].strongest
-    theta = [p.mean for p in measurement.parameters]
-    rng = np.random.default_rng(1)
-
-    def replicates(condition):
-        width = len(summary_names(condition))
-        mean = expected(theta, (("rolling_resistance", (planted,)),), condition.name, width)
-        return mean + rng.normal(size=(REPLICATES, width))
-
-    monkeypatch.setattr(diagnosis, "complete_rows", replicates)
     found, said = run(measurement, monkeypatch, (("rolling_resistance", (planted,)),))
     assert found.verdict.kind == "effect:rolling_resistance", said
     (amplitude,) = found.verdict.amplitudes
@@ -127,7 +130,7 @@ def bent(theta, effects, condition, width):
 @pytest.mark.parametrize(("seed", "at_first"), [(4, "unexplained"), (2, "effects:rolling_resistance+density_error")])
 def test_pours_at_the_best_fits_put_right_what_a_thin_screening_says(measurement, monkeypatch, seed, at_first):
     planted = (("rolling_resistance", (0.7 * EFFECTS["rolling_resistance"].strongest,)),)
-    monkeypatch.setattr(diagnosis, "observe", lambda conditions: data_of(measurement, planted, seed, bent))
+    measure(measurement, monkeypatch, planted, seed, bent)
     said = []
     thin = Budget(base=48, middle=16, scaling=2, screening=10)
     monkeypatch.setattr(FormulaPours, "formula", staticmethod(bent))
@@ -153,14 +156,7 @@ def test_held_out_data_rule_out_a_twin(measurement, monkeypatch):
     """What the fitted conditions cannot tell, a held-out one that is far off does; without it both names stay."""
     planted = (("air_drag", (0.5,)),)
     monkeypatch.setattr(FormulaPours, "formula", staticmethod(twins))
-    monkeypatch.setattr(diagnosis, "observe", lambda conditions: data_of(measurement, planted, 2, twins))
-    rng, theta = np.random.default_rng(3), [p.mean for p in measurement.parameters]
-
-    def held_out(condition):
-        width = len(summary_names(condition))
-        return twins(theta, planted, condition.name, width) + rng.normal(size=(REPLICATES, width))
-
-    monkeypatch.setattr(diagnosis, "complete_rows", held_out)
+    measure(measurement, monkeypatch, planted, 2, twins)
     said = []
     found = diagnosis.run_diagnosis(measurement, None, None, NAMES, BUDGET, said.append)
     # The fitted data even favour the wrong one.

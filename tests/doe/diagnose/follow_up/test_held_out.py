@@ -18,7 +18,7 @@ from doe.diagnose.follow_up.held_out import (
     ruled_out,
     upheld,
 )
-from tests.doe.diagnose.toy import known_emulator, make_toy
+from tests.doe.diagnose.toy import known_emulator, make_toy, wilson
 
 R, M, D = 6, 12, 4
 
@@ -106,7 +106,9 @@ def test_only_what_is_named_has_contenders():
 
 def test_of_several_names_those_go_that_are_far_behind():
     verdict = replace(named_verdict(), kind="ambiguous:e5,e6,e7", names=("e5", "e6", "e7"))
-    rows = tuple(HeldOut(name, 1.0, behind) for name, behind in (("e4", 0.0), ("e6", 3.0), ("e7", 14.9), ("e5", 15.0)))
+    rows = tuple(
+        HeldOut(name, 1.0, behind, 1.0, 0.9) for name, behind in (("e4", 0.0), ("e6", 3.0), ("e7", 14.9), ("e5", 15.0))
+    )
     # e4 is not among the names: what is ahead of all of them rules none out and is not named itself.
     assert ruled_out(verdict, rows) == ("e5",)
     assert ruled_out(replace(verdict, kind="effect:e5", names=("e5",)), rows) == ()
@@ -115,10 +117,10 @@ def test_of_several_names_those_go_that_are_far_behind():
 
 def test_several_names_stay_and_are_told_apart():
     verdict = replace(named_verdict(), kind="ambiguous:e5,e6", names=("e5", "e6"))
-    found = upheld(verdict, (HeldOut("e6", 1.0, 0.0), HeldOut("e5", 9.0, 9.0)))
+    found = upheld(verdict, (HeldOut("e6", 1.0, 0.0, 1.0, 0.9), HeldOut("e5", 9.0, 9.0, 3.0, 0.1)))
     assert (found.kind, found.names) == (verdict.kind, verdict.names)
-    assert found.gates[-1].statement == "e5 is 9.0 behind e6"
-    assert not found.gates[-1].passed
+    assert found.gates[-2].statement == "e5 is 9.0 behind e6"
+    assert [gate.passed for gate in found.gates[-2:]] == [False, True]
 
 
 @pytest.mark.parametrize(
@@ -141,7 +143,7 @@ def test_a_name_is_borne_out_or_taken_back(off, kind):
     assert found.names[0] in ("e5", "e6")
     assert ("e6" in found.names) == (kind == "ambiguous")
     assert "e5" in found.names
-    assert found.gates[-1].passed == (kind == "effect:e5")
+    assert found.gates[-2].passed == (kind == "effect:e5")
 
 
 def test_without_a_rival_or_readable_pours_nothing_changes():
@@ -157,4 +159,33 @@ def test_without_a_rival_or_readable_pours_nothing_changes():
     assert [(row.label, row.behind) for row in fallen] == [("e6", 0.0), ("e5", np.inf)]
     assert upheld(verdict, fallen).names == ("e5", "e6")
     assert upheld(verdict, ()) is verdict
-    assert HeldOut("e5", 1.0, 0.0).to_dict()["label"] == "e5"
+    assert HeldOut("e5", 1.0, 0.0, 1.0, 0.9).to_dict()["label"] == "e5"
+
+
+def test_a_name_that_the_held_out_data_contradict_is_none():
+    """One summary of four is off by ten deviations of a pour: for the name and its rival, or for the name alone."""
+    verdict, generator = named_verdict(), np.random.default_rng(5)
+    measured = pours(generator, R)
+
+    def told(name, rival):
+        poured = {"e5": [pours(generator, M)], "e6": [pours(generator, M)]}
+        for label, shift in (("e5", name), ("e6", rival)):
+            poured[label][0][:, 0] += shift
+        return upheld(verdict, compared(verdict, [measured], poured))
+
+    found = told(10.0, 10.0)
+    assert (found.kind, found.names) == ("unexplained", ())
+    assert found.gates[-1].p < verdict.limits.contradicted
+    assert "contradict" in found.statement
+    assert told(1.0, 1.0).names[0] == "e5"
+    assert set(told(10.0, 0.0).names) == {"e5", "e6"}
+
+
+def test_names_are_contradicted_by_chance_as_rarely_as_the_limit_says():
+    """Pours and data of one distribution: p is below 5 % in at most 5 % of the sets (Bonferroni is cautious)."""
+    verdict, generator = named_verdict(), np.random.default_rng(6)
+    sets, poured = 400, lambda: {"e5": [pours(generator, M)], "e6": [pours(generator, M)]}
+    rows = [compared(verdict, [pours(generator, R)], poured()) for _ in range(sets)]
+    found = sum(next(row.p for row in one if row.label == "e5") < 0.05 for one in rows)
+    assert found > 0
+    assert wilson(found, sets)[0] <= 0.05
