@@ -10,7 +10,7 @@ import contextlib
 import os
 from pathlib import Path
 
-LIVE, BACKGROUND = 10, 15
+LIVE, BACKGROUND = 5, 15
 """Niceness of what a person looks at, and of what works in the background."""
 
 

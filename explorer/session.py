@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import multiprocessing
-import queue
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import replace
@@ -207,22 +206,22 @@ class Session:
         return self._process is not None and self._process.is_alive()
 
     def _spawn(self) -> None:
-        # New queues: a process that was killed may have left the old ones locked.
+        # A new queue: a process that was killed may have left the old one locked.
         self._forget_process()
-        self._commands, self._reports = self._context.Queue(), self._context.Queue()
+        self._commands = self._context.Queue()
+        self._reports, reporting = self._context.Pipe(duplex=False)
         frames, details = shared_block(self._context), shared_details(self._context)
         self._frames, self._details = FrameReader(frames), detail_reader(details)
         asking, answering = self._context.Pipe()
-        queues = (self._commands, self._reports)
         self._process = self._context.Process(
-            target=run, args=(*queues, frames, details, asking), name="explorer-solver", daemon=True
+            target=run, args=(self._commands, reporting, frames, details, asking), name="explorer-solver", daemon=True
         )
         self._reader = self._context.Process(target=read_angles, args=(answering,), name="explorer-angles", daemon=True)
         for process in (self._reader, self._process):
             process.start()
-        # With these gone the line has the two processes at its ends alone: either hears when the other one ends.
-        asking.close()
-        answering.close()
+        # With these gone every line has one process at either end, which hears when the other one ends.
+        for end in (asking, answering, reporting):
+            end.close()
 
     def _forget_process(self) -> None:
         if self._process is None:
@@ -245,12 +244,14 @@ class Session:
     def _listen(self) -> None:
         if self._process is None or self._status is None:
             return
-        # Asked before the queue is emptied: a process that is dead now has said all it will say.
+        # Asked before the line is emptied: a process that is dead now has said all it will say.
         alive = self._process.is_alive()
         while True:
             try:
-                report = self._reports.get_nowait()
-            except queue.Empty:
+                if not self._reports.poll():
+                    break
+                report = self._reports.recv()
+            except (EOFError, OSError):
                 break
             self._take(report)
         if not alive and self._status.state not in (SessionState.FAILED, SessionState.DIED):

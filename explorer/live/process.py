@@ -12,7 +12,7 @@ import traceback
 from multiprocessing.connection import Connection
 from typing import TYPE_CHECKING, Any
 
-from explorer.live.messages import Close, Command, Failure, Report, Start
+from explorer.live.messages import Close, Command, Failure, Start
 from explorer.priority import LIVE, give_way
 
 if TYPE_CHECKING:
@@ -22,10 +22,11 @@ IDLE_WAIT = 0.5
 """Longest wait [s] for a command before the process looks whether its parent still lives."""
 
 
-def run(commands: Any, reports: Any, frames: Any, details: Any, reading: Connection) -> None:
-    """Main function of the process: commands in, reports out by queues; frames and details by shared memory.
+def run(commands: Any, reports: Connection, frames: Any, details: Any, reading: Connection) -> None:
+    """Main function of the process: commands in by a queue, reports out, frames and details by shared memory.
 
-    ``reading`` is the line to the process that reads angles.
+    ``reading`` is the line to the process that reads angles. Reports have no queue, whose thread would wait for the
+    interpreter while the solver computes.
     """
     # Ctrl-C in a terminal reaches the whole group; the parent decides when this process ends.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -33,12 +34,14 @@ def run(commands: Any, reports: Any, frames: Any, details: Any, reading: Connect
     give_way(LIVE)
     try:
         _work(commands, reports, frames, details, reading)
+    except BrokenPipeError:
+        return  # nobody listens any more
     except Exception as error:  # whatever it is, the person at the screen has to hear of it
         traceback.print_exc()
-        reports.put(Failure(f"{type(error).__name__}: {' '.join(str(error).split())[:300]}"))
+        reports.send(Failure(f"{type(error).__name__}: {' '.join(str(error).split())[:300]}"))
 
 
-def _work(commands: Any, reports: Any, frames: Any, details: Any, reading: Connection) -> None:
+def _work(commands: Any, reports: Connection, frames: Any, details: Any, reading: Connection) -> None:
     from explorer.live.details import DetailWriter
     from explorer.live.frames import FrameWriter
     from explorer.live.live_pour import LivePour
@@ -55,18 +58,11 @@ def _work(commands: Any, reports: Any, frames: Any, details: Any, reading: Conne
                 pour.obey(command)
             elif isinstance(command, Start):
                 screen = Publisher(FrameWriter(frames), DetailWriter(details))
-                pour = LivePour(command, screen, _sender(reports), reading)
+                pour = LivePour(command, screen, reports.send, reading)
         if not _parent_lives():
             return
         if pour is not None and pour.seconds_to_wait() == 0.0:
             pour.advance()
-
-
-def _sender(reports: Any) -> Any:
-    def send(report: Report) -> None:
-        reports.put(report)
-
-    return send
 
 
 def _waiting(commands: Any, pour: LivePour | None) -> list[Command]:

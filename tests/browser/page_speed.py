@@ -23,6 +23,8 @@ import viser
 import websockets
 import zstandard
 
+from explorer.priority import BACKGROUND, session_gives_way
+
 POUR = ("body.spheres=coarse", "rig.mass=30g")
 MANY, RADIUS, DENSITY = 20_000, 1.5e-3, 1000.0
 MASS = DENSITY * 4.0 / 3.0 * math.pi * RADIUS**3
@@ -207,9 +209,12 @@ def serve(*arguments):
 def main():
     for name, study in (("alone", False), ("beside a study", True)):
         with tempfile.TemporaryDirectory() as folder:
-            command = ["nice", "-n", "10", sys.executable, "-m", "explorer", "calibrate", "--headless"]
+            command = ["nice", "-n", str(BACKGROUND), sys.executable, "-m", "explorer", "calibrate", "--headless"]
             command += ["--profile", "quick", "--out", f"{folder}/out", "--store", f"{folder}/runs.sqlite"]
-            running = subprocess.Popen(command, stdout=subprocess.DEVNULL) if study else None
+            # As the page starts one.
+            running = subprocess.Popen(command, stdout=subprocess.DEVNULL, start_new_session=True) if study else None
+            if running is not None:
+                session_gives_way(running.pid, BACKGROUND)
             if running:
                 while not list(Path(folder).glob("out/progress.jsonl")):
                     time.sleep(0.5)
