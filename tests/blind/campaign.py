@@ -51,7 +51,10 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class CampaignOrder:
-    """What is asked for. ``minutes``: stop after so long, infinite by default. ``cases``: instead of the schedule's."""
+    """What is asked for.
+
+    minutes: stop after so long, infinite by default; 0: judge nothing. cases: instead of the schedule's.
+    """
 
     out: Path
     number: int
@@ -77,7 +80,7 @@ def run_campaign(order: CampaignOrder, say: Say) -> list[Row]:
     todo = [case for case in order.asked if case.number not in known]
     say(f"{path}: {len(known)} data sets are there, {len(todo)} to come")
     deadline = time.monotonic() + 60.0 * order.minutes
-    if todo:
+    if todo and order.minutes > 0.0:
         with ExitStack() as stack:
             store = Store(order.store or default_store())
             stack.callback(store.close)

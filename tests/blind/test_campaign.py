@@ -108,7 +108,7 @@ def test_a_row_that_is_lost_comes_out_the_same_without_a_new_pour(order, rows):
 
 def test_time_that_is_over_stops_it_cleanly(order, tmp_path):
     said = []
-    late = dataclasses.replace(order, out=tmp_path, store=tmp_path / "empty.sqlite", minutes=0.0)
+    late = dataclasses.replace(order, out=tmp_path, store=tmp_path / "empty.sqlite", minutes=1e-4)
     assert run_campaign(late, said.append) == []
     assert "goes on" in said[-1]
 

@@ -7,11 +7,16 @@ from pathlib import Path
 import pytest
 from statsmodels.stats.proportion import proportion_confint
 
+from solver import EFFECTS
+from tests.blind.outside import AMPLITUDE
+from tests.blind.schedule import cases
 from tests.blind.sets import Row, answer_to, append_row, read_rows
 from tests.blind.table import campaign_text, targets, wilson
 
 NAN = math.nan
 ROOT = Path(__file__).parents[2]
+SCHEDULE = 327
+"""Data sets of the whole campaign."""
 
 
 def row(number, kind, label, verdict, strength=NAN, cosine=NAN, after=NAN):
@@ -55,10 +60,16 @@ def test_rows_come_back_as_they_were_written(tmp_path):
 
 def test_the_readme_s_table_is_that_of_the_rows_that_stand_beside_it():
     rows = read_rows(ROOT / "assets/validation/sets.csv")
-    assert [one.number for one in rows] == list(range(len(rows)))
+    # Every row is that of the schedule with its number, once.
+    planned = list(cases(SCHEDULE, tuple(EFFECTS), tuple(AMPLITUDE)))
+    assert len({one.number for one in rows}) == len(rows)
+    for one in rows:
+        case = planned[one.number]
+        assert (one.kind, one.strength) == (case.kind, pytest.approx(case.strength, nan_ok=True))
+        assert case.label in ("", one.label)
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     assert f"```\n{campaign_text(rows)}\n```" in readme
-    assert f"--n {len(rows)} --out assets/validation" in readme
+    assert f"--n {SCHEDULE} --minutes 0 --out assets/validation" in readme
 
 
 def test_targets_by_hand():
