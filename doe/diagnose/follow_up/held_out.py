@@ -114,19 +114,18 @@ def deviance(measured: FloatArray, poured: FloatArray, noise: PourNoise) -> floa
     if len(poured) < LEAST:
         return float("inf")
     known = noise.spread > 0.0
-    off = (measured[:, known].mean(axis=0) - poured[:, known].mean(axis=0)) / noise.spread[known]
-    square = float(off @ np.linalg.solve(noise.correlation[np.ix_(known, known)], off))
-    t2 = square / (1.0 / len(measured) + 1.0 / len(poured))
+    off = distances(measured, poured, noise)
+    t2 = float(off @ np.linalg.solve(noise.correlation[np.ix_(known, known)], off))
     return float((noise.freedom + known.sum()) * np.log1p(t2 / noise.freedom))
 
 
 def distances(measured: FloatArray, poured: FloatArray, noise: PourNoise) -> FloatArray:
-    """|t| of the summaries that vary: measured (r, d), poured (m, d). Infinite where too few could be poured."""
+    """t of the summaries that vary: measured (r, d), poured (m, d). Infinite where fewer than ``LEAST`` were poured."""
     known = noise.spread > 0.0
     if len(poured) < LEAST:
         return np.full(known.sum(), np.inf)
     off = (measured[:, known].mean(axis=0) - poured[:, known].mean(axis=0)) / noise.spread[known]
-    return np.asarray(np.abs(off) / np.sqrt(1.0 / len(measured) + 1.0 / len(poured)))
+    return np.asarray(off / np.sqrt(1.0 / len(measured) + 1.0 / len(poured)))
 
 
 def compared(
@@ -149,7 +148,7 @@ def compared(
         everyone = pour_noise(data, [*readable, data])
         asked += int((everyone.spread > 0.0).sum())
         for label, block in blocks.items():
-            t = distances(data, block, everyone).max(initial=0.0)
+            t = float(np.abs(distances(data, block, everyone)).max(initial=0.0))
             farthest[label] = max(farthest[label], t)
             chance[label] = min(chance[label], 2.0 * float(stats.t.sf(t, everyone.freedom)))
     criteria = {model.label: model.criterion for model in verdict.models}
