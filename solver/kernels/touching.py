@@ -1,6 +1,6 @@
 """The contacts of a world as they are: read, and nothing changed."""
 
-from solver.backend import ti
+from solver.backend import serial, ti
 from solver.effects.columns import HERTZ
 from solver.kernels.contacts import lasts, meet
 from solver.laws.hertz_mindlin import normal_spring_force
@@ -17,6 +17,7 @@ def read_contacts(s: ti.template(), world: ti.i32, out: Table, count: IntRow):
     The force is that of the last step: the elastic part of Hertz along the normal, less the part that takes energy
     (``contact.loss``), which holds damping and friction. ``count[0]`` says how many rows are filled.
     """
+    ti.loop_config(serialize=ti.static(serial()))
     for w in range(world, world + 1):
         found = 0
         for k in range(s.world.contacts[w]):
