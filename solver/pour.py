@@ -138,6 +138,8 @@ class Pour:
 
     def after(self, steps: int, row: npt.NDArray[np.float64] | None = None) -> bool:
         """Take note of ``steps`` that were run. True at a moment of decision; it asks for this world's summary."""
+        if row is None and self.decides_after(steps):
+            raise ValueError("a moment of decision asks for the world's summary")
         self.steps += steps
         self._left -= steps
         if self._ramp is not None:
@@ -145,10 +147,8 @@ class Pour:
             self._ramp_left -= steps
             if self._ramp_left <= 0:
                 self._follow_ramp(self._ramp)
-        if self._left > 0:
+        if self._left > 0 or row is None:
             return False
-        if row is None:
-            raise ValueError("a moment of decision asks for the world's summary")
         self._left = self._interval_steps()
         self._sample(dict(zip(SUMMARY_COLUMNS, row.tolist(), strict=True)))
         return True

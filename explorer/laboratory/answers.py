@@ -53,31 +53,59 @@ class Answer:
     picture: npt.NDArray[np.uint8] | None = None
 
 
+@dataclass(frozen=True)
+class Ruler:
+    """What tells lengths on a photograph: mm of a pixel, or mm of the one straight bar in it; neither: in pixels."""
+
+    scale_mm: float | None = None
+    reference_mm: float | None = None
+
+    @property
+    def known(self) -> bool:
+        """Whether lengths are in millimetres."""
+        return self.scale_mm is not None or self.reference_mm is not None
+
+
 def bench_answer(order: LabOrder) -> Answer:
     """`explorer lab`: readings → parameters."""
     result = analysed(order)
-    words = ["explorer", "lab", order.test, str(order.file)]
-    words += ["--compression", order.compression] if order.compression else []
-    words += [word for name in order.left_out for word in ("--leave-out", name)]
     plots: Plots = {title: Plot(partial(dict, spec), STRAIGHT) for title, spec in curve_charts(result).items()}
     part = part_file(result, part_table(result)).encode()
-    return Answer(lab_text(result), shlex.join(words), plots, {f"{order.test}.toml": part})
+    return Answer(lab_text(result), shlex.join(["explorer", *lab_words(order)]), plots, {f"{order.test}.toml": part})
 
 
-def photograph_answer(photo: str, scale_mm: float | None) -> Answer:
+def lab_words(order: LabOrder) -> list[str]:
+    """The command line of ``order``, without the program's name."""
+    words = ["lab", order.test, str(order.file)]
+    words += ["--compression", order.compression] if order.compression else []
+    words += [word for name in order.left_out for word in ("--leave-out", name)]
+    words += ["--simulate"] if order.simulate else []
+    words += ["--material", order.material] if order.material else []
+    return [*words, "--bias"] if order.bias else words
+
+
+def photograph_answer(photo: str, ruler: Ruler) -> Answer:
     """`explorer measure`: the angle of repose on a photograph (file, or a shipped one's name), or why there is none."""
-    order = measure_order([photo], scale_mm, None, None, "auto", None, None, None)
+    order = measure_order([photo], ruler.scale_mm, ruler.reference_mm, None, "auto", None, None, None)
     measured = run_measure(order)
-    words = ["explorer", "measure", photo, *(["--scale", f"{scale_mm:g}"] if scale_mm else [])]
+    words = ["explorer", *measure_words(photo, ruler)]
     drawn = sheet([open_picture(order.pictures[0])], measured.readings, None)
     file = io.BytesIO()
     drawn.save(file, "PNG")
     stem = order.pictures[0].stem
     files = {f"{stem}_read.png": file.getvalue()}
-    if measured.piles and scale_mm:
+    if measured.piles and ruler.known:
         files[f"{stem}_outline.csv"] = outline_text(measured.piles[0]).encode()
     text = "\n".join([measure_text(measured), *refusal_lines(measured.refusals)]).strip()
     return Answer(text, shlex.join(words), {}, files, np.asarray(drawn, dtype=np.uint8))
+
+
+def measure_words(photo: str, ruler: Ruler) -> list[str]:
+    """The command line that reads ``photo``, without the program's name."""
+    words = ["measure", photo]
+    for option, length in (("--scale", ruler.scale_mm), ("--reference-length", ruler.reference_mm)):
+        words += [] if length is None else [option, f"{length:g}"]
+    return words
 
 
 def sheet_answer(order: PlanOrder, factors: str, sigma: float | None) -> Answer:
@@ -85,8 +113,16 @@ def sheet_answer(order: PlanOrder, factors: str, sigma: float | None) -> Answer:
     file = read_factors(asset_path("designs", factors))
     plan = make_plan(order, file)
     words = ["explorer", "design", order.kind.value, "--factors", factors, "--out", "runs.csv"]
-    for option, number in (("--replicates", order.replicates), ("--centre", order.centre), ("--sigma", sigma)):
+    numbers = (
+        ("--runs", order.runs),
+        ("--replicates", order.replicates),
+        ("--centre", order.centre),
+        ("--sigma", sigma),
+    )
+    for option, number in numbers:
         words += [] if number is None else [option, f"{number:g}"]
+    words += ["--fold"] if order.fold else []
+    words += [word for generator in order.generators for word in ("--generator", generator)]
     return Answer(
         plan_text(plan, file, sigma, None), shlex.join(words), {}, {"runs.csv": sheet_text(plan, file).encode()}
     )

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 from pathlib import Path
 
 from doe.laboratory import LabResult
 from explorer.errors import CommandError
-from explorer.files.uploads import label
-from explorer.files.whole_file import write_whole
+from explorer.files.uploads import kept_file
 from explorer.laboratory.part import measured_text, part_table, with_part
 from explorer.scene.source import SceneSource, material_source
 from explorer.scene.text import material_toml
@@ -26,7 +24,5 @@ def measured_source(present: Scene, result: LabResult, folder: Path) -> SceneSou
     scene = with_part(present, part)
     text = material_toml(scene, f"{present.title}, with {result.test} measured. SI; origins: [measured] below.")
     text += measured_text(part.get("measured", {}))
-    folder.mkdir(parents=True, exist_ok=True)
-    path = folder / f"{label(present.title)}-{result.test}-{hashlib.sha256(text.encode()).hexdigest()[:12]}.toml"
-    write_whole(path, text)
+    path = kept_file(f"{present.title[:20]}-{result.test}.toml", text.encode(), folder, (".toml",))
     return material_source(str(path))

@@ -152,6 +152,8 @@ class Event:
     text: str
     is_change: bool = False
     """Whether it is a parameter that was changed, ``text`` then being ``path: old → new``."""
+    is_order: bool = False
+    """Whether somebody asked for something else: another pour, a study."""
 
 
 @dataclass(frozen=True)

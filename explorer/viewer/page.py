@@ -19,6 +19,7 @@ from explorer.viewer.actions import Actions
 from explorer.viewer.frame_clock import FrameClock
 from explorer.viewer.laboratory.laboratory_tab import LaboratoryTab
 from explorer.viewer.look.look_tab import LookTab
+from explorer.viewer.orders import Orders
 from explorer.viewer.output.recording_switch import Recorder
 from explorer.viewer.people import People
 from explorer.viewer.pour.chart import Chart
@@ -59,6 +60,7 @@ class Page:
         self._server, self._session, self._recorder = server, session, recorder
         self._events: deque[Event] = deque(maxlen=EVENTS_REMEMBERED)
         self._actions, self._people = Actions(), People(server)
+        self._orders = Orders({"diagnosis": diagnosis} | ({} if study is None else {"study": study}))
         self._notice = ""
         status = session.status()
         self._nodes, self._drawn = SceneNodes(server, status.scene), status.scene
@@ -116,7 +118,7 @@ class Page:
             self._notice = self._notice if notice is None else notice
             frame = self._session.frame()
             status = self._session.status()
-            happened = self._session.new_events()
+            happened = (*self._session.new_events(), *self._orders.of_the_pour(status))
             self._events.extend(map(self._people.signed, happened))
             self._forget_what_comes_later(status)
             self._panels.take(status, frame)
@@ -129,6 +131,7 @@ class Page:
                     self._show_panels(status)
                 if began >= background_due:
                     background_due = began + BACKGROUND_INTERVAL
+                    self._events.extend(map(self._people.signed, self._orders.in_the_background(status)))
                     self._show_background()
             frames.wait(stop)
 

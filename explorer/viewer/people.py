@@ -47,8 +47,8 @@ class People:
         return len(self._server.get_clients())
 
     def signed(self, event: Event) -> Event:
-        """``event``, a change with the browser behind its text where there are several."""
-        if not event.is_change or self.present < 2 or time.monotonic() > self._at + ACTED_WITHIN:
+        """``event``, a change or an order with the browser behind its text where there are several."""
+        if not (event.is_change or event.is_order) or self.present < 2 or time.monotonic() > self._at + ACTED_WITHIN:
             return event
         return replace(event, text=f"{event.text} · browser {self._last}")
 

@@ -4,11 +4,12 @@
     real time        simulated seconds per second over the whole pour, from its first second on the page to its rest
     echo             from a slider's new value to the line "In the solver", median and 95th percentile [ms]
 
-each alone, and while a study of the quick profile runs at low priority on the same machine; and the frames/s of 20 000
-spheres that fall into a box.
+each alone, and while a study of the quick profile runs at low priority on the same machine; the time from a slider of
+the profiler to its new chart, while the pour runs; and the frames/s of 20 000 spheres that fall into a box.
 """
 
 import asyncio
+import json
 import math
 import re
 import statistics
@@ -18,12 +19,9 @@ import tempfile
 import time
 from pathlib import Path
 
-import msgspec
-import viser
-import websockets
-import zstandard
-
 from explorer.priority import BACKGROUND, session_gives_way
+from tests.browser.page_socket import CAMERA, Socket, connected, serve, until
+from tests.explorer import reported_studies
 
 POUR = ("body.spheres=coarse", "rig.mass=30g")
 MANY, RADIUS, DENSITY = 20_000, 1.5e-3, 1000.0
@@ -59,59 +57,15 @@ rate = 10.0
 region_height = 0.18
 """
 ECHOES = 40
+PROFILED = "X7"
+"""Factor whose slider is moved, between 0.5 and 0.7: within the region."""
 QUIET = 3.0
 """Seconds without a window, or at rest, after which a pour is over."""
 POUR_SECONDS = 8.0
-CAMERA = {
-    "type": "ViewerCameraMessage",
-    "wxyz": (1.0, 0.0, 0.0, 0.0),
-    "position": (1.0, 0.0, 0.0),
-    "fov": 0.6,
-    "near": 0.01,
-    "far": 100.0,
-    "image_height": 600,
-    "image_width": 800,
-    "look_at": (0.0, 0.0, 0.0),
-    "up_direction": (0.0, 0.0, 1.0),
-}
-
-
-class Socket:
-    """A client of the page. Keeps the labels of the inputs and the texts that it was sent last."""
-
-    def __init__(self, socket):
-        self._socket, self.labels, self.texts = socket, {}, {}
-
-    async def send(self, message):
-        await self._socket.send(msgspec.msgpack.encode(message))
-
-    async def window(self):
-        """The messages of the next window."""
-        raw = await self._socket.recv()
-        size, packed = int.from_bytes(raw[:8], "little"), int.from_bytes(raw[8:16], "little")
-        text = zstandard.ZstdDecompressor().decompress(raw[16 : 16 + packed], size)
-        messages = msgspec.msgpack.decode(text)["messages"]
-        for message in messages:
-            props = message.get("props") or {}
-            if isinstance(props, dict) and "label" in props:
-                self.labels.setdefault(props["label"], message["uuid"])
-            if isinstance(props, dict) and "content" in props:
-                self.texts[message["uuid"]] = props["content"]
-            if message["type"] == "GuiUpdateMessage" and "content" in message["updates"]:
-                self.texts[message["uuid"]] = message["updates"]["content"]
-        return messages
 
 
 def moves_bodies(messages):
     return any(m["type"] == "SceneNodeUpdateMessage" and "batched_positions" in m["updates"] for m in messages)
-
-
-async def until(page, told, patience=120.0):
-    """Take in windows until ``told`` holds for some text of the page."""
-    end = time.perf_counter() + patience
-    while not any(told(text) for text in page.texts.values()):
-        assert time.perf_counter() < end, "waited in vain"
-        await asyncio.wait_for(page.window(), patience)
 
 
 async def echo_ms(page, slider, value):
@@ -122,14 +76,27 @@ async def echo_ms(page, slider, value):
     return 1e3 * (time.perf_counter() - began)
 
 
-def connected(port):
-    return websockets.connect(
-        f"ws://127.0.0.1:{port}",
-        subprotocols=[f"viser-v{viser.__version__}"],
-        origin=f"http://127.0.0.1:{port}",
-        max_size=None,
-        compression=None,
-    )
+def redraws(messages):
+    return any("_plotly_json_str" in (m.get("updates") or m.get("props") or {}) for m in messages)
+
+
+async def profile_ms(page, slider, value):
+    """Milliseconds until the chart comes that follows a slider of the profiler."""
+    began = time.perf_counter()
+    await page.send({"type": "GuiUpdateMessage", "uuid": slider, "updates": {"value": value}})
+    while not redraws(await page.window()):
+        assert time.perf_counter() < began + 20.0, "waited in vain"
+    return 1e3 * (time.perf_counter() - began)
+
+
+async def measure_profiler(port):
+    """Of the finished study's friction, over its region; the first one chooses the chart."""
+    async with connected(port) as socket:
+        page = Socket(socket)
+        await page.send(CAMERA)
+        await until(page, lambda text: re.search(r"Real-time factor</span><span>[0-9.]", text))
+        slider = next(uuid for label, uuid in page.labels.items() if label.startswith(PROFILED))
+        return [await profile_ms(page, slider, round(0.5 + 0.005 * k, 3)) for k in range(ECHOES + 1)][1:]
 
 
 async def frames_per_second(page, seconds):
@@ -192,21 +159,29 @@ async def measure(port):
 
 
 def tell(name, frames, factor, echoes):
-    ordered = sorted(echoes)
-    print(
-        f"{name:18} {frames:5.1f} frames/s   real time {factor:4.2f}   echo {statistics.median(echoes):5.0f} ms, "
-        f"95 % {ordered[int(0.95 * len(ordered))]:5.0f} ms ({len(echoes)} changes)"
-    )
+    print(f"{name:18} {frames:5.1f} frames/s   real time {factor:4.2f}   echo {spread(echoes)}")
 
 
-def serve(*arguments):
-    server = subprocess.Popen(
-        [sys.executable, "-m", "explorer", "serve", "--port", "0", *arguments], stdout=subprocess.PIPE, text=True
-    )
-    return server, int(re.search(r":(\d+) ", server.stdout.readline())[1])
+def spread(waits):
+    last = sorted(waits)[int(0.95 * len(waits))]
+    return f"{statistics.median(waits):5.0f} ms, 95 % {last:5.0f} ms ({len(waits)} changes)"
+
+
+def beside_the_profiler():
+    with tempfile.TemporaryDirectory() as data:
+        study = Path(data, "repose-explorer", "studies", "sunflower_extract-quick-20260101-101010")
+        study.mkdir(parents=True)
+        (study / "result.json").write_text(json.dumps(reported_studies.result_of_case("planted")), encoding="utf-8")
+        server, port = serve(*(part for one in POUR for part in ("--set", one)), data=data)
+        try:
+            print(f"{'profiler':18} {spread(asyncio.run(measure_profiler(port)))}")
+        finally:
+            server.terminate()
+            server.wait(20)
 
 
 def main():
+    beside_the_profiler()
     for name, study in (("alone", False), ("beside a study", True)):
         with tempfile.TemporaryDirectory() as folder:
             command = ["nice", "-n", str(BACKGROUND), sys.executable, "-m", "explorer", "calibrate", "--headless"]

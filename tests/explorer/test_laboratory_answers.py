@@ -11,6 +11,7 @@ from explorer.design.kinds import Kind
 from explorer.design.plan import PlanOrder
 from explorer.errors import CommandError
 from explorer.laboratory.answers import (
+    Ruler,
     analysis_answer,
     audit_answer,
     bench_answer,
@@ -52,25 +53,47 @@ def test_options_are_part_of_the_command_line():
 
 
 def test_a_photograph_is_read_and_drawn():
-    answer = photograph_answer("cone_25_30", 0.2)
+    answer = photograph_answer("cone_25_30", Ruler(scale_mm=0.2))
     assert answer.text == told(answer)
     assert answer.picture.ndim == 3
     assert np.ptp(answer.picture) > 100
     assert {name.split(".")[-1] for name in answer.files} == {"png", "csv"}
-    assert "outline" not in "".join(photograph_answer(str(asset_path("photographs", "cone_25_30")), None).files)
+    assert "outline" not in "".join(photograph_answer(str(asset_path("photographs", "cone_25_30")), Ruler()).files)
+
+
+def test_a_bar_in_the_picture_gives_lengths_too():
+    answer = photograph_answer("cone_25_30", Ruler(reference_mm=100.0))
+    assert answer.text == told(answer)
+    assert "--reference-length 100" in answer.command
+    assert "cone_25_30_outline.csv" in answer.files
 
 
 def test_a_picture_of_nothing_says_so(tmp_path):
     from PIL import Image
 
     Image.new("L", (640, 480), 128).save(tmp_path / "nothing.png")
-    answer = photograph_answer(str(tmp_path / "nothing.png"), None)
+    answer = photograph_answer(str(tmp_path / "nothing.png"), Ruler())
     assert answer.text.startswith("nothing.png: no angle: ")
 
 
 def test_a_sheet_is_that_of_the_command(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     answer = sheet_answer(PlanOrder(Kind.BOX_BEHNKEN, replicates=2), "sunflower_extract", 0.5)
+    assert told(answer).startswith(answer.text.strip())
+    assert (tmp_path / "runs.csv").read_bytes() == answer.files["runs.csv"]
+
+
+@pytest.mark.parametrize(
+    ("order", "said"),
+    [
+        (PlanOrder(Kind.PLACKETT_BURMAN, runs=12, fold=True), "--runs 12 --fold"),
+        (PlanOrder(Kind.FACTORIAL, generators=("C=AB",)), "--generator C=AB"),
+    ],
+)
+def test_options_of_a_design_are_part_of_its_command_line(order, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    answer = sheet_answer(order, "sunflower_extract", None)
+    assert said in answer.command
     assert told(answer).startswith(answer.text.strip())
     assert (tmp_path / "runs.csv").read_bytes() == answer.files["runs.csv"]
 

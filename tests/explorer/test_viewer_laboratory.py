@@ -6,6 +6,7 @@ import zipfile
 import pytest
 from viser import UploadedFile
 
+from explorer.laboratory.answers import Answer
 from explorer.scene.source import material_source
 from explorer.viewer.actions import Actions
 from explorer.viewer.background_work import BackgroundWork
@@ -15,7 +16,8 @@ from explorer.viewer.laboratory.audit_panel import AuditPanel
 from explorer.viewer.laboratory.bench_panel import BenchPanel
 from explorer.viewer.laboratory.design_panel import DesignPanel
 from explorer.viewer.laboratory.laboratory_tab import LaboratoryTab
-from explorer.viewer.laboratory.photograph_panel import PhotographPanel
+from explorer.viewer.laboratory.photograph_panel import PhotographPanel, positive
+from explorer.viewer.laboratory.rig_panel import RigPanel
 from solver.assets import asset_path
 from tests.explorer.page_session import PageSession, finished
 from tests.explorer.test_viewer_controls import event
@@ -37,13 +39,19 @@ class Bench:
         self.session = PageSession(material_source("sunflower_extract"))
         post = self.actions.post
         self.bench = BenchPanel(server, self.session, folder, post, self.background)
-        self.photograph = PhotographPanel(server, folder, post, self.background)
+        self.rig = RigPanel(server, self.session, folder, post, self.background)
+        self.photograph = PhotographPanel(server, self.session, folder, post, self.background)
         self.design = DesignPanel(server, folder, post, self.background)
         self.audit = AuditPanel(server, folder, post, self.background)
 
     def do(self, act):
         self.actions.post(act)
         return finished(self.actions, self.background)
+
+    def choose_rig(self, name):
+        self.rig._rig.value = name
+        event(self.rig._rig, name)
+        finished(self.actions, self.background)
 
 
 @pytest.fixture
@@ -101,6 +109,69 @@ def test_a_photograph_from_the_browser_is_read_and_shown(bench):
     assert "text" in bench.do(bench.photograph._read)
 
 
+def test_a_rig_shows_its_own_parameters_and_the_bodies_that_are_poured(bench):
+    panel = bench.rig
+    assert {"rig.tilt_rate", "rig.body"} == set(panel._inputs)
+    bench.choose_rig("drop_plate_45")
+    assert {"rig.drop_height", "rig.specimen", "rig.drops", "rig.body"} == set(panel._inputs)
+    other = material_source("nine_sphere_seed")
+    bench.session.start(other.scene, 1, other)
+    panel.show()
+    assert panel._inputs["rig.body"].options == tuple(body.name for body in other.scene.bodies)
+
+
+def test_a_rig_is_run_with_what_is_on_the_screen(bench, monkeypatch):
+    asked = {}
+
+    def answered(scene, rig, values, seed, folder):
+        asked.update(values, scene=scene, rig=rig)
+        return Answer("0.62 for 0.62", "explorer simulate drop_plate_45")
+
+    monkeypatch.setattr("explorer.viewer.laboratory.rig_panel.rig_answer", answered)
+    bench.choose_rig("drop_plate_45")
+    bench.rig._inputs["rig.drop_height"].value = 300.0
+    bench.rig._inputs["rig.body"].value = "petiole"
+    assert bench.do(bench.rig._run) == ""
+    assert (asked["rig"], asked["rig.body"], asked["scene"]) == ("drop_plate_45", "petiole", bench.session.now.scene)
+    assert asked["rig.drop_height"] == pytest.approx(0.3)
+    assert "0.62 for 0.62" in text_of(bench.rig.view)
+
+
+def test_a_bench_test_is_repeated_on_the_solver_with_the_material_that_is_poured(bench, monkeypatch):
+    asked = []
+    monkeypatch.setattr(
+        "explorer.viewer.laboratory.bench_panel.twin_answer", lambda order: asked.append(order) or Answer("", "")
+    )
+    bench.bench._test.value = "drop"
+    bench.bench._readings.offer(("drop",))
+    bench.bench._twin.value = True
+    assert bench.do(bench.bench._evaluate) == ""
+    bench.bench._twin.value, bench.bench._bias.value = False, True
+    assert bench.do(bench.bench._evaluate) == ""
+    assert [(one.simulate, one.bias, one.material) for one in asked] == [
+        (True, False, "sunflower_extract"),
+        (False, True, None),
+    ]
+
+
+def test_a_photograph_is_compared_with_what_is_poured(bench, monkeypatch):
+    asked = []
+
+    def answered(photo, ruler, scene, folder):
+        asked.append((photo, ruler.reference_mm, scene))
+        return Answer("beside", "explorer measure")
+
+    monkeypatch.setattr("explorer.viewer.laboratory.photograph_panel.compared_answer", answered)
+    bench.photograph._bar.value = 100.0
+    assert bench.do(bench.photograph._compare) == ""
+    assert asked == [(bench.photograph._photo.chosen, 100.0, bench.session.now.scene)]
+
+
+@pytest.mark.parametrize(("entered", "length"), [(0.0, None), (0.2, 0.2), (float("nan"), None), ("wide", None)])
+def test_a_length_of_nothing_is_none(entered, length):
+    assert positive(entered) == length
+
+
 def test_a_sheet_is_made_and_a_filled_one_analysed(bench):
     assert bench.do(bench.design._make) == ""
     assert "explorer design box-behnken" in text_of(bench.design.sheet)
@@ -146,8 +217,6 @@ def test_the_tab_tells_what_is_done_and_what_was_refused(server, tmp_path):
 
 
 def test_a_command_line_is_selected_as_a_whole():
-    from explorer.laboratory.answers import Answer
-
     html = answer_html(Answer("one & two", "explorer audit"))
     assert "one &amp; two" in html
     assert "user-select:all" in html

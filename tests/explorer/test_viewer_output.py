@@ -58,7 +58,9 @@ class Bench:
         self.session.newest = frame_of([0, 1, 2], [[0.0, 0.0, 0.01 * k] for k in range(3)])
         self.background = BackgroundWork(self.actions.post)
         self.recording = RecordingSwitch(server, folder, self.background, FileRecorder)
-        self.panel = OutputPanel(server, self.session, self.recording, self.actions.post, self.background)
+        self.panel = OutputPanel(
+            server, self.session, self.recording, folder / "kept", self.actions.post, self.background
+        )
 
     def press(self, label):
         event(self.panel._exports[label], True, client=self.browser)
@@ -92,6 +94,19 @@ def test_the_command_line_follows_what_is_on_the_screen(bench):
     bench.session.set_parameters({"pair.seed.seed.static_friction": 0.2})
     bench.panel.show(bench.session.status(), "")
     assert "--set pair.seed.seed.static_friction=0.2" in bench.panel._command.content
+
+
+def test_the_pour_is_exported_for_another_program(bench, monkeypatch):
+    asked = []
+    monkeypatch.setattr(
+        "explorer.viewer.output.engine_export.packed_export", lambda scene, *order: asked.append(order) or b"zip"
+    )
+    engine = bench.panel.engine
+    engine._program.value = "yade"
+    event(engine._button, True, client=bench.browser)
+    assert finished(bench.actions, bench.background) == ""
+    assert asked == [("yade", 1)]
+    assert bench.browser.sent == {"pour_yade.zip": b"zip"}
 
 
 def test_the_command_line_is_escaped_and_its_absence_explained():

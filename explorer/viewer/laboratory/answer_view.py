@@ -10,7 +10,7 @@ import viser
 from explorer.errors import CommandError
 from explorer.laboratory.answers import Answer
 from explorer.viewer.actions import Post
-from explorer.viewer.output.output_panel import send_file
+from explorer.viewer.output.send_file import send_file
 from explorer.viewer.small_text import small_html
 from explorer.viewer.study.plot_view import PlotView
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import viser
 from explorer.laboratory.answers import bench_answer
 from explorer.laboratory.measured_pour import measured_source
 from explorer.laboratory.run import LabOrder, analysed
+from explorer.laboratory.solver_answers import twin_answer
 from explorer.scene.source import SceneSource
 from explorer.session import Session
 from explorer.viewer.actions import Post
@@ -47,6 +49,16 @@ class BenchPanel:
             self._left_out = gui.add_text(
                 "Leave out", "", hint="With composition: components that are not poured; the rest is scaled to one."
             )
+            self._twin = gui.add_checkbox(
+                "Repeat it on the solver",
+                False,
+                hint="The same test with the parameters just found, in the background: does it give them back?",
+            )
+            self._bias = gui.add_checkbox(
+                "Where the formula misses",
+                False,
+                hint="What the test's usual formula gives over a range of what was put in (drop, compression, shear).",
+            )
             evaluate = gui.add_button("Evaluate", hint="Mean, spread, interval, normality, outliers, parameters.")
             pour = gui.add_button(
                 "Pour with these parameters", hint="The present material with what was measured, as a file of its own."
@@ -68,12 +80,13 @@ class BenchPanel:
         return LabOrder(test, self._readings.chosen, given, left_out if test == "composition" else ())
 
     def _evaluate(self) -> None:
-        order = self._order()
-        self._background.start(
-            "evaluating the readings",
-            lambda: bench_answer(order),
-            self.view.show,
-        )
+        order, twin, bias = self._order(), bool(self._twin.value), bool(self._bias.value)
+        if not (twin or bias):
+            self._background.start("evaluating the readings", lambda: bench_answer(order), self.view.show)
+            return
+        material = self._session.source.material if twin else ""
+        asked = replace(order, simulate=twin, bias=bias, material=material or None)
+        self._background.start("running the test on the solver", lambda: twin_answer(asked), self.view.show)
 
     def _pour(self) -> None:
         order, present, folder = self._order(), self._session.status().scene, self._folder

@@ -35,6 +35,15 @@ class DesignPanel:
                 server, "Factors", shipped_assets("designs"), (".toml",), folder, post, "Name, low, high, unit of each."
             )
             self._replicates = gui.add_number("Runs of each row", 1, min=1, max=1000, step=1)
+            self._size = gui.add_number(
+                "Size", 0, min=0, max=20_000, step=1, hint="plackett-burman: 8 … 48; lhs, sobol: points; 0: as usual."
+            )
+            self._fold = gui.add_checkbox(
+                "Fold over", False, hint="plackett-burman: the mirror image of every row too, which frees main effects."
+            )
+            self._generators = gui.add_text(
+                "Generators", "", hint="factorial: a fraction, as E=ABC; several with spaces between."
+            )
             self._sigma = gui.add_number(
                 "Standard deviation of a run", 0.0, min=0.0, hint="In the response's unit; 0: unknown. For the power."
             )
@@ -55,7 +64,14 @@ class DesignPanel:
         kind = str(self._kind.value)
         if kind not in tuple(Kind):
             raise CommandError(f"design {kind[:40]!r}: allowed are {', '.join(Kind)}")
-        order, factors = PlanOrder(Kind(kind), replicates=int(self._replicates.value)), self._factors.chosen
+        order = PlanOrder(
+            Kind(kind),
+            runs=int(self._size.value) or None,
+            replicates=int(self._replicates.value),
+            fold=bool(self._fold.value),
+            generators=tuple(str(self._generators.value).split()),
+        )
+        factors = self._factors.chosen
         sigma = float(self._sigma.value)
         known = sigma if math.isfinite(sigma) and sigma > 0.0 else None
         self._background.start("making the sheet", lambda: sheet_answer(order, factors, known), self.sheet.show)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import viser
 
 from explorer.files.measured_file import PICTURES
-from explorer.laboratory.answers import photograph_answer
+from explorer.laboratory.answers import Answer, Ruler, photograph_answer
+from explorer.laboratory.solver_answers import compared_answer
+from explorer.session import Session
 from explorer.viewer.actions import Post
 from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.laboratory.answer_view import AnswerView
@@ -19,10 +22,12 @@ WAITING = "Camera level, the plate's edge in view. Choose a shipped picture or u
 
 
 class PhotographPanel:
-    """Picture, scale, answer; ``folder`` keeps uploads."""
+    """Picture, scale, answer; ``folder`` keeps uploads, and the pours that pictures are compared with."""
 
-    def __init__(self, server: viser.ViserServer, folder: Path, post: Post, background: BackgroundWork) -> None:
-        self._background, gui = background, server.gui
+    def __init__(
+        self, server: viser.ViserServer, session: Session, folder: Path, post: Post, background: BackgroundWork
+    ) -> None:
+        self._session, self._folder, self._background, gui = session, folder, background, server.gui
         with gui.add_folder("Photograph → angle of repose", expand_by_default=False):
             self._photo = UploadSlot(
                 server, "Photograph", shipped_assets("photographs"), PICTURES, folder, post, "One pile, from the side."
@@ -30,11 +35,39 @@ class PhotographPanel:
             self._scale = gui.add_number(
                 "Scale [mm per pixel]", 0.0, min=0.0, max=10.0, step=0.001, hint="0: lengths stay in pixels."
             )
+            self._bar = gui.add_number(
+                "Reference bar [mm]",
+                0.0,
+                min=0.0,
+                max=10_000.0,
+                step=0.1,
+                hint="Length of the one straight bar in the picture, in place of the scale; 0: there is none.",
+            )
             read = gui.add_button("Read the angle", hint="By the estimator of the simulated piles.")
+            beside = gui.add_button(
+                "Read it beside a pour",
+                hint="Pours what is on the screen once more, in the background, and reads both piles by the same fit.",
+            )
             self.view = AnswerView(server, WAITING, post)
         read.on_click(lambda _: post(self._read))
+        beside.on_click(lambda _: post(self._compare))
 
     def _read(self) -> None:
-        photo, scale = self._photo.chosen, float(self._scale.value)
-        given = scale if math.isfinite(scale) and scale > 0.0 else None
-        self._background.start("reading the photograph", lambda: photograph_answer(photo, given), self.view.show)
+        photo, ruler = self._photo.chosen, self._ruler()
+        self._answer("reading the photograph", lambda: photograph_answer(photo, ruler))
+
+    def _compare(self) -> None:
+        photo, ruler, scene, folder = self._photo.chosen, self._ruler(), self._session.status().scene, self._folder
+        self._answer("pouring beside the photograph", lambda: compared_answer(photo, ruler, scene, folder))
+
+    def _answer(self, what: str, find: Callable[[], Answer]) -> None:
+        self._background.start(what, find, self.view.show)
+
+    def _ruler(self) -> Ruler:
+        return Ruler(positive(self._scale.value), positive(self._bar.value))
+
+
+def positive(entered: object) -> float | None:
+    """A length that a person entered; None for 0, which stands for none, and for what is no number."""
+    number = float(entered) if isinstance(entered, int | float) else math.nan
+    return number if math.isfinite(number) and number > 0.0 else None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from html import escape
+from pathlib import Path
 from typing import Any
 
 import viser
@@ -17,7 +18,9 @@ from explorer.scene.text import material_toml
 from explorer.session import Session
 from explorer.viewer.actions import Post
 from explorer.viewer.background_work import BackgroundWork
+from explorer.viewer.output.engine_export import EngineExport
 from explorer.viewer.output.recording_switch import HTML, RRD, RecordingSwitch
+from explorer.viewer.output.send_file import send_file
 from explorer.viewer.small_text import small_html
 from solver.scene import Scene
 
@@ -31,13 +34,14 @@ START, STOP, DOWNLOAD = "Start", "Stop", "Download"
 
 
 class OutputPanel:
-    """Command line, exports, and the switch of the recording."""
+    """Command line, exports, and the switch of the recording; ``folder`` keeps scenes that are exported."""
 
     def __init__(
         self,
         server: viser.ViserServer,
         session: Session,
         recording: RecordingSwitch,
+        folder: Path,
         post: Post,
         background: BackgroundWork,
     ) -> None:
@@ -57,6 +61,7 @@ class OutputPanel:
         for label, (hint, act) in hints.items():
             self._exports[label] = gui.add_button(label, hint=hint)
             self._listen(self._exports[label], act)
+        self.engine = EngineExport(server, session, folder, post, background)
         gui.add_markdown("**Recording** of the moving scene")
         self._kind = gui.add_dropdown(
             "Kind",
@@ -168,9 +173,3 @@ def recording_html(recording: RecordingSwitch, busy_with: str, notice: str) -> s
     elif recording.path is not None:
         lines.append(f"Recorded: {recording.path}")
     return small_html("<br>".join(escape(line) for line in lines if line))
-
-
-def send_file(client: Any, name: str, content: bytes) -> None:
-    """Have a browser keep ``content`` as a file called ``name``."""
-    # At once: otherwise a person gets a link in a notification, and has to press it.
-    client.send_file_download(name, content, save_immediately=True)

@@ -44,7 +44,9 @@ class PourPanels:
 
     def add_output(self) -> None:
         """Make what is taken along: command line, files, recordings."""
-        self.output = OutputPanel(self._server, self._session, self.recording, self._post, self._background)
+        self.output = OutputPanel(
+            self._server, self._session, self.recording, uploads_folder(), self._post, self._background
+        )
 
     def take(self, status: Status, frame: Frame | None) -> None:
         """Take note of what is new; call it as often as there may be something."""

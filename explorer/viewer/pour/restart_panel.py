@@ -57,13 +57,13 @@ class RestartPanel:
         set_up = [path for path in PATHS if path in known]
         self._shown = {path: known[path] for path in (*set_up, *rest_paths(scene), *size_paths(scene), *effect_paths())}
         with server.gui.add_folder("Set-up (on restart)"):
-            self._inputs = {path: _input(server.gui, known[path], scene) for path in set_up}
+            self._inputs = {path: parameter_input(server.gui, known[path], scene) for path in set_up}
             with server.gui.add_folder("More of rig and feed", expand_by_default=False):
-                self._inputs |= {path: _input(server.gui, known[path], scene) for path in rest_paths(scene)}
+                self._inputs |= {path: parameter_input(server.gui, known[path], scene) for path in rest_paths(scene)}
             with server.gui.add_folder("Sizes of the bodies", expand_by_default=False):
-                self._inputs |= {path: _input(server.gui, known[path], scene) for path in size_paths(scene)}
+                self._inputs |= {path: parameter_input(server.gui, known[path], scene) for path in size_paths(scene)}
             with server.gui.add_folder("Effects of material and set-up", expand_by_default=False):
-                self._inputs |= {path: _input(server.gui, known[path], scene) for path in effect_paths()}
+                self._inputs |= {path: parameter_input(server.gui, known[path], scene) for path in effect_paths()}
             self._seed = server.gui.add_number(
                 "Seed", seed, min=0, max=LARGEST_SEED, step=1, hint="Same seed, same pour."
             )
@@ -120,7 +120,8 @@ def label(parameter: Parameter) -> str:
     return title(parameter)
 
 
-def _input(gui: viser.GuiApi, parameter: Parameter, scene: Scene) -> Any:
+def parameter_input(gui: viser.GuiApi, parameter: Parameter, scene: Scene) -> Any:
+    """A box or a list for ``parameter``, at its value in ``scene``."""
     present = on_screen(parameter, scene)
     if parameter.choices:
         offered = options(parameter, present)

@@ -1,0 +1,42 @@
+"""What a command of the command line prints, for a page that waits for it in a thread: the solver runs beside it."""
+
+from __future__ import annotations
+
+import atexit
+import shutil
+import subprocess
+from collections.abc import Sequence
+
+from explorer.background.command_process import PROGRAM
+from explorer.errors import CommandError
+from explorer.priority import BACKGROUND, session_gives_way
+
+FAILURE = 1
+"""Exit code of a command that has done its work and has no good news."""
+LONGEST_LINE = 300
+
+
+def printed(arguments: Sequence[str], program: Sequence[str] = PROGRAM) -> str:
+    """Standard output of ``program arguments``, which gives way to everything that a person looks at.
+
+    A command that ends with ``FAILURE`` and has printed something has an answer too. Raises CommandError with the last
+    line of any other that does not end well. The command does not outlive this process.
+    """
+    nice = shutil.which("nice")
+    lower = [nice, "-n", str(BACKGROUND)] if nice else []
+    with subprocess.Popen(
+        [*lower, *program, *arguments],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as process:
+        atexit.register(process.kill)
+        session_gives_way(process.pid, BACKGROUND)
+        said, refused = process.communicate()
+        atexit.unregister(process.kill)
+    if process.returncode == 0 or (process.returncode == FAILURE and said.strip()):
+        return said.strip()
+    lines = refused.strip().splitlines() or [f"{arguments[0]} ended with exit code {process.returncode}"]
+    raise CommandError(lines[-1].removeprefix("error: ")[:LONGEST_LINE])
