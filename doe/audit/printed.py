@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from typing import Literal
@@ -32,6 +33,13 @@ class Printed(Record):
     def decimals(self) -> int:
         """Digits behind the point."""
         return len(self.text.lower().partition("e")[0].partition(".")[2])
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Least and largest value that it stands for."""
+        if self.bound == "<":
+            return -math.inf, self.value
+        return (self.value, math.inf) if self.bound == ">" else (self.value - self.half, self.value + self.half)
 
     def agrees(self, value: float, slack: float = 0.0) -> bool:
         """Whether ``value``, known to ± ``slack``, rounds to the print or lies beyond its bound."""

@@ -142,6 +142,25 @@ def test_what_the_article_does_not_print_is_said_so(article):
     assert "10 values" in unchecked["section 2.6", "angle of repose"]
 
 
+def test_the_three_factors_named_are_the_significant_ones(article):
+    """Section 3.2: p < 0.01 for three factors, p > 0.05 for all others."""
+    named, others = of(article, "significance", "Table 6")
+    assert (named.status, others.status) == ("reproduced", "reproduced")
+    assert (named.printed, others.printed) == ("X4, X7, X16", "the other 21")
+    assert others.quantity == "factors not named: p > 0.05"
+    assert others.how == "nearest to the level is X17 0.0537 as printed, 0.0537 from F"
+
+
+def test_table_8_is_centred_on_step_3_between_steps_2_and_4(article):
+    low, centre, high = of(article, "levels of the design on the walk", "Table 7 and Table 8")
+    assert {figure.status for figure in (low, centre, high)} == {"reproduced"}
+    assert [figure.printed for figure in (low, centre, high)] == [
+        "46.18, 0.52, 0.536",
+        "52.26, 0.57, 0.572",
+        "58.34, 0.62, 0.608",
+    ]
+
+
 def test_nothing_else_differs(article):
     places = {(figure.check, figure.where) for figure in article.having("differs")}
     assert places == {
@@ -257,6 +276,12 @@ SPOILED = {
     "range": ("study.toml", "low = 20.0", "low = 60.0", "surface.factor: low must be below high"),
     "term": ("study.toml", '"A*B" =', '"A*D" =', "A*D: is not one of 1, A, B, C"),
     "best": ("study.toml", "[ascent]", '[ascent]\nfoo = "1"', "ascent.foo: unknown key"),
+    "step": (
+        "study.toml",
+        'centre = "3"',
+        'centre = "9"',
+        "surface.steps.centre: '9' is no step of the ascent; allowed: 1",
+    ),
     "significant": ("study.toml", '["F1"', '["G1"', "screening.significant: 'G1' is not one of F1"),
     "empty": ("shares.csv", None, "", "a line of column names and at least one row are needed"),
     "binary": ("shares.csv", None, b"\xff\xfe\x00", "not a text file in UTF-8"),

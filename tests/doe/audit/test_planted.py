@@ -7,6 +7,7 @@ import pytest
 
 from doe.audit import audit_study
 from doe.audit.printed import printed
+from doe.audit.study import DesignSteps
 from tests.doe.audit.made_up import clean_study, shown
 
 
@@ -89,8 +90,32 @@ def screening_total(study):
     return replace(study, screening=replace(screening, total=printed(f"{screening.total.value + 2:.2f}")))
 
 
-def significance(study):
+def one_significant_factor_not_named(study):
     return replace(study, screening=replace(study.screening, significant=("F1", "F2")))
+
+
+def one_named_factor_too_many(study):
+    return replace(study, screening=replace(study.screening, significant=("F1", "F2", "F3", "F5")))
+
+
+def one_other_factor_below_its_level(study):
+    """F4 has p = 0.038: not significant at 0.01, but p > 0.05 is not true of it."""
+    return replace(study, screening=replace(study.screening, level_of_others=0.05))
+
+
+def a_printed_p_that_hides_a_factor(study):
+    """F says p < 0.0001, the print 0.21, and the factor is not named."""
+    screening = study.screening
+    wrong = replace(screening, p=at(screening.p, 4, printed("0.21")), significant=("F1", "F2"))
+    return replace(study, screening=wrong)
+
+
+def design_levels(study):
+    return replace(study, surface=replace(study.surface, steps=DesignSteps("1", "3", "4")))
+
+
+def design_centre(study):
+    return replace(study, surface=replace(study.surface, steps=DesignSteps("2", "4", "4")))
 
 
 def one_ascent_error(study):
@@ -132,6 +157,7 @@ def verified_p(study):
     return replace(study, verified=replace(study.verified, p_two_sample=printed("0.912")))
 
 
+ON_THE_WALK = "levels of the design on the walk"
 PLANTED = {
     derived: ("stated formula", "Table 1", "Poisson's ratio, husk"),
     mean_of_replicates: ("mean of replicates", "Table 1", "density, husk"),
@@ -144,9 +170,14 @@ PLANTED = {
     p_value: ("p from F", "Table 5", "p of F6"),
     screening_sum: ("sums of squares from the design", "Table 5", "sum of squares of F1"),
     screening_total: ("sums of squares add up", "Table 5", "total sum of squares"),
-    significance: ("significance", "Table 5", "factors with p < 0.01"),
+    one_significant_factor_not_named: ("significance", "Table 5", "factors not named: p > 0.01"),
+    one_named_factor_too_many: ("significance", "Table 5", "factors named: p < 0.01"),
+    one_other_factor_below_its_level: ("significance", "Table 5", "factors not named: p > 0.05"),
+    a_printed_p_that_hides_a_factor: ("significance", "Table 5", "factors not named: p > 0.01"),
     one_ascent_error: ("relative error against the stated target", "Table 6", "relative error [%], step 3"),
     best_step: ("nearest step", "Table 6", "step nearest to the target"),
+    design_levels: (ON_THE_WALK, "Table 6 and Table 7", "level −1 of the design, the lower of steps 1 and 4"),
+    design_centre: (ON_THE_WALK, "Table 6 and Table 7", "level 0 of the design, step 4"),
     anova_cell: ("analysis of variance from the runs", "Table 8", "sum of squares of B"),
     anova_total: ("sums of squares add up", "Table 8", "sum of squares of total"),
     r_squared: ("statistics of the fit", "section 4", "R²"),
@@ -155,8 +186,12 @@ PLANTED = {
     verified_p: ("two-sample t test", "Table 9", "p"),
 }
 ALSO = {
-    # A wrong F belongs to another p, a wrong sum to another F; a wrong total is not that of the runs either.
-    f_value: ("p from F",),
+    # A wrong F belongs to another p (and makes F4 significant), a wrong sum to another F; a wrong total is not that of
+    # the runs either.
+    f_value: ("p from F", "significance"),
+    a_printed_p_that_hides_a_factor: ("p from F",),
+    # Step 1 is the higher one of the factor that the walk lowers.
+    design_levels: (ON_THE_WALK,),
     screening_sum: ("F from sums of squares", "sums of squares add up"),
     anova_total: ("analysis of variance from the runs",),
 }
@@ -264,6 +299,59 @@ def test_a_factor_that_holm_s_correction_loses_is_remarked(clean):
     remarks = [r for r in audit_study(replace(clean, screening=weak)).remarks if r.check == "significance"]
     assert len(remarks) == 1
     assert "F5 (p = 0.054)" in remarks[0].text
+
+
+def test_a_p_at_its_level_is_no_fault_and_a_bound_says_what_it_says(clean):
+    """0.04 may stand for 0.035 … 0.045, so only F tells that F4 is not above 0.04; <0.05 may be above 0.01."""
+    screening = replace(clean.screening, level_of_others=0.04)
+    at_level = replace(screening, p=at(screening.p, 3, printed("0.04")))
+    named, others = significant(replace(clean, screening=at_level))
+    assert (named.status, others.status) == ("reproduced", "differs")
+    assert "0.0378 from F" in others.how
+    unknown = replace(at_level, f=(), error_df=2)
+    assert [f.status for f in significant(replace(clean, screening=unknown))] == ["reproduced"] * 2
+    bound = replace(unknown, p=at(screening.p, 3, printed("<0.05")), level_of_others=0.01)
+    assert [f.status for f in significant(replace(clean, screening=bound))] == ["reproduced"] * 2
+
+
+def significant(study):
+    return [figure for figure in audit_study(study).figures if figure.check == "significance"]
+
+
+def test_without_p_and_f_what_the_factors_leave_of_the_runs_decides(clean):
+    """12 runs less 8 factors leave the 3 degrees of freedom of the error; with another number nothing can be said."""
+    bare = replace(clean.screening, f=(), p=())
+    assert [f.status for f in significant(replace(clean, screening=bare))] == ["reproduced"] * 2
+    fewer = replace(bare, significant=("F1", "F2"))
+    assert [f.status for f in significant(replace(clean, screening=fewer))] == ["reproduced", "differs"]
+    lost = replace(bare, error_df=2)
+    assert [f.status for f in significant(replace(clean, screening=lost))] == ["cannot be checked"] * 2
+
+
+def test_a_design_off_the_best_step_or_off_the_walk_is_remarked(clean):
+    """Nothing is said of steps here: the design around step 2, and one whose second factor goes between the steps."""
+    surface = replace(clean.surface, steps=None)
+    assert audit_study(replace(clean, surface=surface)).remarks == ()
+    delta = clean.ascent.settings[1] - clean.ascent.settings[2]
+    off = replace(surface, low=surface.low + delta, high=surface.high + delta)
+    (remark,) = on_the_walk(replace(clean, surface=off))
+    assert "is step 2 and not the step called best, 3 (30, 0.4, 3), which lies at (+1.00, +1.00, -1.00)" in remark.text
+    inward = np.array([0.0, 0.02, 0.0])
+    narrow = replace(surface, low=surface.low + inward, high=surface.high - inward)
+    (remark,) = on_the_walk(replace(clean, surface=narrow))
+    assert "are no steps of the walk: B 0.34 and 0.46, steps 0.24, 0.32, 0.4" in remark.text
+
+
+def on_the_walk(study):
+    """Remarks on the design's levels alone: the model and the optimum move with them."""
+    audit = audit_study(replace(study, optimum=None, verified=None))
+    return [remark for remark in audit.remarks if remark.check == ON_THE_WALK]
+
+
+def test_levels_of_a_factor_that_was_not_walked_cannot_be_checked(clean):
+    ascent = replace(clean.ascent, factors=("F1", "F2", "F8"))
+    (figure,) = audit_study(replace(clean, ascent=ascent)).having("cannot be checked")
+    assert figure.how == "the walk does not move C"
 
 
 def test_errors_printed_with_a_sign_are_no_fault(clean):
