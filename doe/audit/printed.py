@@ -68,3 +68,11 @@ def printed(text: str) -> Printed:
     if not (value == 0 or SMALLEST <= abs(value) <= LARGEST):
         raise AuditError(f"{text!r} is out of range; allowed are sizes from {SMALLEST:g} to {LARGEST:g}, and 0")
     return Printed(plain, value, half * scale, kind)
+
+
+def printed_or_none(text: str) -> Printed | None:
+    """The same, None for what is no such number."""
+    try:
+        return printed(text)
+    except AuditError:
+        return None

@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from doe.audit import Printed, audit_study
+from doe.audit import Printed, audit_study, printed
 from doe.audit.surface_refit import refit
 from explorer.audit.read_study import read_study
 from explorer.audit.report import audit_sections, write_audit
 from explorer.audit.sentences import audit_text
+from explorer.audit.tables import places, read_table
 from explorer.report.html import page
 from solver.assets import asset_path
 from tests.doe.audit.made_up import clean_study
@@ -200,6 +201,14 @@ def test_a_surface_may_be_written_in_other_units(clean, tmp_path):
     audit = audit_study(again)
     assert audit.having("differs") == ()
     assert len(of(audit, "printed equation", "Equation 5")) == 10
+
+
+def test_a_number_is_found_in_a_table_however_it_is_printed(tmp_path):
+    """Rows are named by their words; a bound, though written with the same digits, is not the number."""
+    (tmp_path / "t.csv").write_text("part,form,size,p\nseed,,\u22121.2e-3,<0.05\nhusk,flat,0.05,7\n", encoding="utf-8")
+    table = read_table(tmp_path, "t.csv")
+    assert places(table, printed("-0.0012")) == ("size of seed",)
+    assert places(table, printed("0.05")) == ("size of husk–flat",)
 
 
 def _plain(value):
