@@ -9,6 +9,7 @@ from doe.audit.drop_test import check_drop_test
 from doe.audit.finding import Audit, Figure, Finding, Remark, unchecked
 from doe.audit.optimum_claim import check_optimum, check_runs_against_model
 from doe.audit.screening_anova import check_screening
+from doe.audit.significance import check_significance
 from doe.audit.simple_checks import (
     check_derived,
     check_measured,
@@ -18,6 +19,7 @@ from doe.audit.simple_checks import (
     check_total,
 )
 from doe.audit.study import PublishedStudy
+from doe.audit.surface_levels import check_levels
 from doe.audit.surface_refit import check_surface
 from doe.audit.target_errors import check_ascent_errors, check_verification_error
 from doe.audit.verification_tests import check_verification_test
@@ -61,6 +63,7 @@ def _target(study: PublishedStudy) -> Iterator[Finding]:
 def _screening(study: PublishedStudy) -> Iterator[Finding]:
     if study.screening is not None:
         yield from check_screening(study.screening)
+        yield from check_significance(study.screening)
 
 
 def _ascent(study: PublishedStudy) -> Iterator[Finding]:
@@ -72,6 +75,8 @@ def _ascent(study: PublishedStudy) -> Iterator[Finding]:
 
 def _surface(study: PublishedStudy) -> Iterator[Finding]:
     if study.surface is not None:
+        if study.ascent is not None:
+            yield from check_levels(study.surface, study.ascent)
         yield from check_surface(study.surface)
 
 

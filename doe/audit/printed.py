@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from typing import Literal
@@ -33,6 +34,13 @@ class Printed(Record):
         """Digits behind the point."""
         return len(self.text.lower().partition("e")[0].partition(".")[2])
 
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Least and largest value that it stands for."""
+        if self.bound == "<":
+            return -math.inf, self.value
+        return (self.value, math.inf) if self.bound == ">" else (self.value - self.half, self.value + self.half)
+
     def agrees(self, value: float, slack: float = 0.0) -> bool:
         """Whether ``value``, known to ± ``slack``, rounds to the print or lies beyond its bound."""
         room = slack + DUST * max(abs(value), abs(self.value))
@@ -60,3 +68,11 @@ def printed(text: str) -> Printed:
     if not (value == 0 or SMALLEST <= abs(value) <= LARGEST):
         raise AuditError(f"{text!r} is out of range; allowed are sizes from {SMALLEST:g} to {LARGEST:g}, and 0")
     return Printed(plain, value, half * scale, kind)
+
+
+def printed_or_none(text: str) -> Printed | None:
+    """The same, None for what is no such number."""
+    try:
+        return printed(text)
+    except AuditError:
+        return None

@@ -19,15 +19,13 @@ from doe.audit.rounding import common_half, halves_of, most_agreed, rounding_sla
 from doe.audit.study import Screening
 from doe.designs import plackett_burman
 from doe.errors import StatisticsError
-from doe.multiple_tests import holm
 
 FloatArray = npt.NDArray[np.float64]
-ALPHA = 0.05
 ADDS_UP = "sums of squares add up"
 
 
 def check_screening(screening: Screening) -> Iterator[Finding]:
-    """F and p of every factor, the total sum of squares, the sums of squares themselves, and what is significant."""
+    """F and p of every factor, the total sum of squares, and the sums of squares themselves."""
     yield from _total(screening)
     if screening.f:
         low, high = implied_mse(screening.sums, screening.f)
@@ -36,8 +34,6 @@ def check_screening(screening: Screening) -> Iterator[Finding]:
     if screening.f and screening.p:
         yield from _p_values(screening)
     yield from _sums(screening)
-    if screening.p:
-        yield from _significance(screening)
 
 
 def implied_mse(sums: Sequence[Printed], f: Sequence[Printed]) -> tuple[float, float]:
@@ -84,12 +80,12 @@ def _p_values(screening: Screening) -> Iterator[Finding]:
 def _total(screening: Screening) -> Iterator[Finding]:
     """The printed total sum of squares against that of the runs."""
     if screening.total is not None:
-        value, slack = _total_of_runs(screening)
+        value, slack = total_of_runs(screening)
         how = f"Σ (y − mean)² of the {len(screening.responses)} runs of {screening.where_runs}"
         yield compared(ADDS_UP, screening.where_anova, "total sum of squares", screening.total, value, how, slack)
 
 
-def _total_of_runs(screening: Screening) -> tuple[float, float]:
+def total_of_runs(screening: Screening) -> tuple[float, float]:
     """Σ (y − mean)² and what rounding of the runs does to it."""
 
     def total(y: FloatArray) -> FloatArray:
@@ -102,7 +98,7 @@ def _total_of_runs(screening: Screening) -> tuple[float, float]:
 def _adding_up(screening: Screening, low: float, high: float) -> Iterator[Finding]:
     """Total sum of squares of the runs against the factors' and the error's."""
     check, factors, n = ADDS_UP, values_of(screening.sums), len(screening.responses)
-    total, of_runs = _total_of_runs(screening)
+    total, of_runs = total_of_runs(screening)
     error = screening.error_df * 0.5 * (low + high)
     explained, parts = float(factors.sum()), n - 1 - factors.size
     slack = of_runs + float(np.sqrt(3 * (halves_of(screening.sums) ** 2).sum())) + screening.error_df * (high - low) / 2
@@ -168,31 +164,3 @@ def _standard_design(runs: int, factors: int) -> FloatArray | None:
         return plackett_burman(runs)[:, :factors].astype(np.float64)
     except StatisticsError:
         return None
-
-
-def _significance(screening: Screening) -> Iterator[Finding]:
-    if screening.significant is None:
-        return
-    names = [factor.name for factor in screening.factors]
-    p = values_of(screening.p)
-    found = tuple(name for name, value in zip(names, p, strict=True) if value < screening.level)
-    yield Figure(
-        "significance",
-        screening.where_anova,
-        f"factors with p < {screening.level:g}",
-        "reproduced" if set(found) == set(screening.significant) else "differs",
-        ", ".join(screening.significant),
-        ", ".join(found),
-        0.0,
-        "from the printed p values",
-    )
-    adjusted = dict(zip(names, holm(p), strict=True))
-    lost = [name for name in found if adjusted[name] >= ALPHA]
-    if lost:
-        yield Remark(
-            "significance",
-            screening.where_anova,
-            f"{len(names)} factors were tested at once. After Holm's correction {', '.join(lost)} "
-            f"({', '.join(f'p = {adjusted[name]:.3f}' for name in lost)}) "
-            f"{'is' if len(lost) == 1 else 'are'} not significant at {ALPHA:g}.",
-        )

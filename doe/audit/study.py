@@ -116,7 +116,8 @@ class Screening:
 
     design: coded levels, shape (runs, factors), None if not printed. error_df: degrees of freedom of the error that
     F is tested against (dummy columns). sums, f, p: per factor; f and p are empty if not printed. total: printed total
-    sum of squares. significant: names claimed to be so at `level`, None without a claim.
+    sum of squares. significant: names claimed to be so at `level`, None without a claim; of all others p is said to be
+    above `level_of_others`.
     """
 
     where_runs: str
@@ -131,6 +132,7 @@ class Screening:
     total: Printed | None
     significant: tuple[str, ...] | None
     level: float
+    level_of_others: float
 
 
 @dataclass(frozen=True)
@@ -172,12 +174,22 @@ class Equation:
 
 
 @dataclass(frozen=True)
+class DesignSteps:
+    """The steps of the ascent that a design's levels −1, 0 and +1 are said to be."""
+
+    low: str
+    centre: str
+    high: str
+
+
+@dataclass(frozen=True)
 class SurfaceStudy:
     """A second-order design with its runs, coded, shape (runs, factors), and what was printed about its fit.
 
     low, high: natural values of −1 and +1, shape (factors,). screened: names of the factors in the screening and the
     ascent, which may number them otherwise. statistics: "r_squared", "r_squared_adjusted",
-    "r_squared_predicted", "cv_percent", "adequate_precision", "sigma" → as printed.
+    "r_squared_predicted", "cv_percent", "adequate_precision", "sigma" → as printed. steps: None where nothing is said
+    of steps of the ascent.
     """
 
     where_runs: str
@@ -192,6 +204,7 @@ class SurfaceStudy:
     anova: tuple[AnovaLine, ...]
     statistics: Mapping[str, Printed]
     equation: Equation | None
+    steps: DesignSteps | None = None
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from pathlib import Path
 from doe.laboratory import columns, weighing
 from doe.laboratory.columns import Layout
 from doe.laboratory.contact import friction, restitution
+from doe.laboratory.dimensions import FLAT, SHAPES, dimensions, size_spreads
 from doe.laboratory.elastic import moduli, poisson_ratios
 from doe.laboratory.result import LabResult
 from doe.laboratory.table import LaboratoryError, Table, read_table
@@ -56,6 +57,14 @@ def _composition(table: Table) -> LabResult:
     return LabResult("composition", table.file, weighing.composition(table), notes=(weighing.FRACTIONS,))
 
 
+def _dimensions(table: Table) -> LabResult:
+    derived = dimensions(table)
+    measured = {one.of[0] for one in derived if one.name == "geometric_mean_diameter"}
+    flat = dict.fromkeys(one.of[0] for one in derived if one.of[0] not in measured)
+    notes = (*(f"{name}: {FLAT}" for name in flat), SHAPES)
+    return LabResult("dimensions", table.file, derived, size_spreads(derived), notes=notes)
+
+
 TESTS: dict[str, BenchTest] = {
     "compression": BenchTest(columns.FORCE_DISPLACEMENT, _compression),
     "shear": BenchTest(columns.FORCE_DISPLACEMENT, _shear),
@@ -64,6 +73,7 @@ TESTS: dict[str, BenchTest] = {
     "moisture": BenchTest(columns.MOISTURE, _moisture),
     "density": BenchTest(columns.IMMERSION, _density),
     "composition": BenchTest(columns.COMPOSITION, _composition),
+    "dimensions": BenchTest(columns.DIMENSIONS, _dimensions),
 }
 
 

@@ -19,7 +19,10 @@ DENSITY = {"kg_m3": 1.0, "g_cm3": 1e3}
 
 @dataclass(frozen=True)
 class Column:
-    """One column: ``low`` < value < ``high`` in SI, or 0 where ``zero``; ``needed`` says if it must be there."""
+    """One column: ``low`` < value < ``high`` in SI, or 0 where ``zero``; ``needed`` says if it must be there.
+
+    blank: whether single cells of it may be empty; such a row has no value of this column.
+    """
 
     stem: str
     units: dict[str, float]
@@ -27,6 +30,7 @@ class Column:
     high: float = math.inf
     zero: bool = False
     needed: bool = True
+    blank: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -103,3 +107,11 @@ IMMERSION = Layout(
     ),
 )
 COMPOSITION = Layout(COMPONENT, (Column("mass", MASS, low=0.0, zero=True),))
+DIMENSIONS = Layout(
+    COMPONENT,
+    (
+        positive("length", LENGTH),
+        positive("width", LENGTH),
+        Column("thickness", LENGTH, low=0.0, needed=False, blank=True),
+    ),
+)

@@ -136,7 +136,11 @@ def _row(path: Path, line: int, header: list[str], cells: list[str], columns: di
     for key in (*layout.keys, REPLICATE):
         if not NAME.fullmatch(by_name[key]):
             raise LaboratoryError(f"{where}, column {key}: {by_name[key]!r}; allowed: letters, digits, _ and -")
-    values = {column.stem: _number(where, name, by_name[name], column) for name, column in columns.items()}
+    values = {
+        column.stem: _number(where, name, by_name[name], column)
+        for name, column in columns.items()
+        if by_name[name] or not column.blank
+    }
     return Row(line, tuple(by_name[key] for key in layout.keys), by_name[REPLICATE], values)
 
 

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from doe.audit.study import (
     AnovaLine,
     Ascent,
+    DesignSteps,
     Equation,
     Optimum,
     ScreenedFactor,
@@ -44,6 +45,7 @@ def read_screening(entries: Entries, folder: Path) -> Screening:
     for row, one in enumerate(ranges):
         if not one.low < one.high:
             raise AuditError(f"{factors.name}, line {factors.lines[row]}: low must be below high")
+    level = entries.number("level", 0.0, 1.0) if "level" in entries else 0.05
     significant = entries.texts("significant") if "significant" in entries else None
     unknown = [name for name in significant or () if name not in names]
     if unknown:
@@ -62,7 +64,8 @@ def read_screening(entries: Entries, folder: Path) -> Screening:
         p=anova.numbers("p_value") if "p_value" in anova.columns else (),
         total=entries.figure_or_none("total"),
         significant=significant,
-        level=entries.number("level", 0.0, 1.0) if "level" in entries else 0.05,
+        level=level,
+        level_of_others=entries.number("level_of_others", 0.0, 1.0) if "level_of_others" in entries else level,
     )
 
 
@@ -87,8 +90,9 @@ def read_ascent(entries: Entries, folder: Path) -> Ascent:
     )
 
 
-def read_surface(entries: Entries, folder: Path) -> SurfaceStudy:
-    """``[surface]`` with ``[[surface.factor]]``, ``[surface.statistics]`` and ``[surface.equation]``."""
+def read_surface(entries: Entries, folder: Path, ascent: Ascent | None) -> SurfaceStudy:
+    """``[surface]`` with ``[[surface.factor]]``, ``[surface.statistics]`` and ``[surface.equation]``; ``ascent`` is the
+    walk that its levels may be said to be steps of."""
     runs, anova = read_table(folder, entries.text("runs")), read_table(folder, entries.text("anova"))
     factors = entries.tables("factor")
     if not 1 <= len(factors) <= MOST_FACTORS:
@@ -124,6 +128,7 @@ def read_surface(entries: Entries, folder: Path) -> SurfaceStudy:
         anova=tuple(_anova_line(anova, row) for row in range(anova.rows)),
         statistics=statistics,
         equation=_equation(entries.table("equation"), names) if "equation" in entries else None,
+        steps=_steps(entries.table("steps"), ascent) if "steps" in entries else None,
     )
 
 
@@ -157,6 +162,17 @@ def read_verified(entries: Entries, folder: Path) -> Verified:
 def _numbers(table: Table, columns: tuple[str, ...]) -> FloatArray:
     """Columns as values, shape (rows, columns)."""
     return np.array([[cell.value for cell in table.numbers(column)] for column in columns]).T
+
+
+def _steps(entries: Entries, ascent: Ascent | None) -> DesignSteps:
+    found = {}
+    for key in ("low", "centre", "high"):
+        found[key] = entries.text(key)
+        if ascent is None or found[key] not in ascent.steps:
+            known = "there is no [ascent]" if ascent is None else f"allowed: {', '.join(ascent.steps)}"
+            raise entries.error(key, f"{found[key]!r} is no step of the ascent; {known}")
+    entries.finish()
+    return DesignSteps(**found)
 
 
 def _anova_line(table: Table, row: int) -> AnovaLine:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -42,7 +43,8 @@ def _study(entries: Entries, folder: Path) -> PublishedStudy:
     def optional(key: str, read: Callable[[Entries, Path], Part]) -> Part | None:
         return _finished(read, entries.table(key), folder) if key in entries else None
 
-    surface = optional("surface", read_surface)
+    ascent = optional("ascent", read_ascent)
+    surface = optional("surface", partial(read_surface, ascent=ascent))
     study = PublishedStudy(
         title=entries.text("title"),
         source=entries.text("source", " ").strip(),
@@ -53,7 +55,7 @@ def _study(entries: Entries, folder: Path) -> PublishedStudy:
         quotes=tuple(_finished(_quote, one, folder) for one in entries.tables("quoted")),
         drop_test=optional("drop_test", _drop_test),
         screening=optional("screening", read_screening),
-        ascent=optional("ascent", read_ascent),
+        ascent=ascent,
         surface=surface,
         optimum=read_optimum(entries.table("optimum"), surface) if "optimum" in entries else None,
         verified=optional("verification", read_verified),

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import csv
 import io
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from doe.audit import Printed, printed
+from doe.audit import Printed, printed, printed_or_none
 from doe.errors import AuditError
 from doe.text_file import read_text
 
-NUMBER = re.compile(r"-?\d+(\.\d+)?")
 MOST_BYTES = 2_000_000
 """Bytes of one file; published tables hold thousands."""
 
@@ -58,9 +56,9 @@ def places(table: Table, value: Printed) -> tuple[str, ...]:
     found = []
     for row in range(table.rows):
         cells = {column: texts[row] for column, texts in table.columns.items()}
-        numbers = {column: NUMBER.fullmatch(text) for column, text in cells.items()}
-        name = "–".join(text for column, text in cells.items() if not numbers[column]) or f"row {row + 1}"
-        like = [c for c, is_number in numbers.items() if is_number and value.agrees(float(cells[c]))]
+        numbers = {column: printed_or_none(text) for column, text in cells.items()}
+        name = "–".join(text for column, text in cells.items() if text and numbers[column] is None) or f"row {row + 1}"
+        like = [c for c, number in numbers.items() if number and not number.bound and value.agrees(number.value)]
         found += [f"{column} of {name}" for column in like]
     return tuple(found)
 

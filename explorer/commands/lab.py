@@ -18,6 +18,7 @@ class Test(StrEnum):
     MOISTURE = "moisture"
     DENSITY = "density"
     COMPOSITION = "composition"
+    DIMENSIONS = "dimensions"
 
 
 def lab(

@@ -20,9 +20,8 @@ import numpy.typing as npt
 from explorer.export.liggghts import (
     INPUT,
     WRITE_FINAL,
+    ContactLaw,
     gravity_lines,
-    model_lines,
-    plane_line,
     run_lines,
     settings_lines,
 )
@@ -69,19 +68,19 @@ def write_liggghts_bed(folder: Path, bed: Bed) -> None:
     table = np.full((2, 2), bed.restitution), np.full((2, 2), bed.friction)
     largest = float(bed.radius.max())
     room = np.array([np.array(bed.low) - 4.0 * largest, np.array(bed.high) + 4.0 * largest])
-    settings = settings_lines(room, 2, SKIN * largest)
+    settings, law = settings_lines(room, 2, SKIN * largest), ContactLaw()
     walls = [
-        plane_line("low_x", 2, "x", bed.low[0]),
-        plane_line("high_x", 2, "x", bed.high[0]),
-        plane_line("low_y", 2, "y", bed.low[1]),
-        plane_line("high_y", 2, "y", bed.high[1]),
-        plane_line("floor", 2, "z", bed.low[2]),
+        law.plane_line("low_x", 2, "x", bed.low[0]),
+        law.plane_line("high_x", 2, "x", bed.high[0]),
+        law.plane_line("low_y", 2, "y", bed.low[1]),
+        law.plane_line("high_y", 2, "y", bed.high[1]),
+        law.plane_line("floor", 2, "z", bed.low[2]),
     ]
     lines = [
         f"# {len(bed.radius)} spheres, {bed.steps} steps of {bed.dt:.6g} s",
         *[line for line in settings if not line.startswith(("region", "create_box"))],
         f"read_data {DATA}",
-        *model_lines([bed.youngs_modulus] * 2, [bed.poisson_ratio] * 2, *table),
+        *law.pair_lines([bed.youngs_modulus] * 2, [bed.poisson_ratio] * 2, *table),
         *gravity_lines(bed.gravity),
         *walls,
         "fix motion all nve/sphere",

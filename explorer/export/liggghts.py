@@ -18,6 +18,7 @@ follows from the replaced restitution (18 % stronger at e = 0.5).
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -74,42 +75,55 @@ def write_liggghts(folder: Path, deck: Deck) -> None:
     write_readme(folder, "liggghts", deck)
 
 
-def model(rolling_friction: float) -> str:
-    """The contact law, in words of LIGGGHTS."""
-    return MODEL + (ROLLING if rolling_friction > 0.0 else "")
+@dataclass(frozen=True)
+class ContactLaw:
+    """The law between particles and at walls, in words of LIGGGHTS: with our rolling resistance where there is one."""
 
+    rolling_friction: float = 0.0
 
-def model_lines(
-    moduli: list[float], ratios: list[float], restitution: Array, friction: Array, rolling_friction: float = 0.0
-) -> list[str]:
-    """Materials by class and pairs of classes, and the contact law between particles.
+    @property
+    def words(self) -> str:
+        """The model of a pair style or a wall."""
+        return MODEL + (ROLLING if self.rolling_friction > 0.0 else "")
 
-    Raises :class:`CommandError` where a restitution is too low for LIGGGHTS.
-    """
-    n, rolling = len(moduli), [rolling_friction] * len(moduli) ** 2
-    replaced = np.vectorize(unclamped_restitution, otypes=[float])(restitution)
-    if replaced.min() <= LEAST_RESTITUTION:
-        raise CommandError(
-            f"restitution {restitution.min():g}: LIGGGHTS needs more than {LEAST_RESTITUTION:g} after its damping is "
-            "matched to ours; allowed: 0.22 … 1"
-        )
-    confirmations = [f"soft_particles yes  # a modulus below {SOFT:g} Pa"] if min(moduli) < SOFT else []
-    if max(moduli) > HARD:
-        confirmations.append(f"hard_particles yes  # a modulus above {HARD:g} Pa")
-    return [
-        *confirmations,
-        f"fix youngs all property/global youngsModulus peratomtype {_row(moduli)}",
-        f"fix poisson all property/global poissonsRatio peratomtype {_row(ratios)}",
-        f"fix restitution all property/global coefficientRestitution peratomtypepair {n} {_row(replaced.ravel())}",
-        f"fix friction all property/global coefficientFriction peratomtypepair {n} {_row(friction.ravel())}",
-        *(
-            [f"fix rolling all property/global coefficientRollingFriction peratomtypepair {n} {_row(rolling)}"]
-            if rolling_friction > 0.0
-            else []
-        ),
-        f"pair_style gran {model(rolling_friction)} limitForce on",
-        "pair_coeff * *",
-    ]
+    def pair_lines(self, moduli: list[float], ratios: list[float], restitution: Array, friction: Array) -> list[str]:
+        """Materials by class and pairs of classes, and the law between particles.
+
+        Raises :class:`CommandError` where a restitution is too low for LIGGGHTS.
+        """
+        n = len(moduli)
+        replaced = np.vectorize(unclamped_restitution, otypes=[float])(restitution)
+        if replaced.min() <= LEAST_RESTITUTION:
+            raise CommandError(
+                f"restitution {restitution.min():g}: LIGGGHTS needs more than {LEAST_RESTITUTION:g} after its damping "
+                "is matched to ours; allowed: 0.22 … 1"
+            )
+        return [
+            *_confirmations(moduli),
+            f"fix youngs all property/global youngsModulus peratomtype {_row(moduli)}",
+            f"fix poisson all property/global poissonsRatio peratomtype {_row(ratios)}",
+            f"fix restitution all property/global coefficientRestitution peratomtypepair {n} {_row(replaced.ravel())}",
+            f"fix friction all property/global coefficientFriction peratomtypepair {n} {_row(friction.ravel())}",
+            *self._rolling_lines(n),
+            f"pair_style gran {self.words} limitForce on",
+            "pair_coeff * *",
+        ]
+
+    def plane_line(self, name: str, wall: int, axis: str, place: float) -> str:
+        """An infinite plane of material ``wall`` across ``axis`` (x, y, z) at ``place`` [m]; R* is the sphere's."""
+        plane = f"primitive type {wall} {axis}plane {place!r}"
+        return f"fix {name} all wall/gran {self.words} {plane} limitForce on"
+
+    def mesh_lines(self, names: list[str]) -> list[str]:
+        """All meshes as one wall; LIGGGHTS allows no more than one of this kind."""
+        meshes = f"n_meshes {len(names)} meshes {' '.join(names)}"
+        return [f"fix walls all wall/gran {self.words} mesh {meshes} limitForce on"] if names else []
+
+    def _rolling_lines(self, n: int) -> list[str]:
+        if not self.rolling_friction > 0.0:
+            return []
+        table = _row([self.rolling_friction] * n**2)
+        return [f"fix rolling all property/global coefficientRollingFriction peratomtypepair {n} {table}"]
 
 
 def gravity_lines(gravity: tuple[float, float, float]) -> list[str]:
@@ -147,12 +161,6 @@ def run_lines(steps: int, dt: float) -> list[str]:
     ]
 
 
-def plane_line(name: str, wall: int, axis: str, place: float, rolling_friction: float = 0.0) -> str:
-    """An infinite plane of material ``wall`` across ``axis`` (x, y, z) at ``place`` [m]; R* is the sphere's radius."""
-    plane = f"primitive type {wall} {axis}plane {place!r}"
-    return f"fix {name} all wall/gran {model(rolling_friction)} {plane} limitForce on"
-
-
 COLUMNS = "id radius x y z vx vy vz omegax omegay omegaz"
 FORMAT = " ".join(["%d", *["%.12g"] * 10])
 WRITE_FINAL = f'write_dump all custom {FINAL} {COLUMNS} modify sort id format "{FORMAT}"'
@@ -161,32 +169,30 @@ WRITE_FINAL = f'write_dump all custom {FINAL} {COLUMNS} modify sort id format "{
 def _input(deck: Deck) -> list[str]:
     moduli = [*(clump.youngs_modulus for clump in deck.clumps), deck.wall_youngs_modulus]
     ratios = [*(clump.poisson_ratio for clump in deck.clumps), deck.wall_poisson_ratio]
-    wall = len(moduli)
+    wall, law = len(moduli), ContactLaw(deck.rolling_friction)
     largest = max(float(clump.radii.max()) for clump in deck.clumps)
     return [
         f"# {deck.title}, seed {deck.seed}: {deck.bodies} bodies, {deck.steps} steps of {deck.dt:.6g} s",
         *settings_lines(deck.box, wall, SKIN * largest),
         f"neigh_modify binsize {CELL * largest:.12g}",
-        *model_lines(moduli, ratios, deck.restitution, deck.friction, deck.rolling_friction),
+        *law.pair_lines(moduli, ratios, deck.restitution, deck.friction),
         *gravity_lines(deck.gravity),
-        *([] if deck.plate is None else [plane_line("plate", wall, "z", deck.plate, deck.rolling_friction)]),
+        *([] if deck.plate is None else [law.plane_line("plate", wall, "z", deck.plate)]),
         *(f"fix {mesh.name} all mesh/surface file {mesh.name}.stl type {wall}" for mesh in deck.meshes),
-        *_mesh_wall_lines([mesh.name for mesh in deck.meshes], deck.rolling_friction),
+        *law.mesh_lines([mesh.name for mesh in deck.meshes]),
         *(line for k, clump in enumerate(deck.clumps, start=1) for line in _template_lines(k, clump)),
         "fix motion all multisphere",
         *run_lines(deck.steps, deck.dt),
         *(line for body in range(deck.bodies) for line in _insertion_lines(deck, body)),
-        *_runs(deck),
+        *_runs(deck, law),
         WRITE_FINAL,
     ]
 
 
-def _mesh_wall_lines(names: list[str], rolling_friction: float) -> list[str]:
-    """All meshes as one wall; LIGGGHTS allows no more than one of this kind."""
-    if not names:
-        return []
-    law, meshes = model(rolling_friction), f"n_meshes {len(names)} meshes {' '.join(names)}"
-    return [f"fix walls all wall/gran {law} mesh {meshes} limitForce on"]
+def _confirmations(moduli: list[float]) -> list[str]:
+    """What LIGGGHTS wants to hear before it takes very soft or very hard particles."""
+    soft = [f"soft_particles yes  # a modulus below {SOFT:g} Pa"] if min(moduli) < SOFT else []
+    return soft + ([f"hard_particles yes  # a modulus above {HARD:g} Pa"] if max(moduli) > HARD else [])
 
 
 def _template_lines(k: int, clump: Clump) -> list[str]:
@@ -211,7 +217,7 @@ def _insertion_lines(deck: Deck, body: int) -> list[str]:
     ]
 
 
-def _runs(deck: Deck) -> list[str]:
+def _runs(deck: Deck, law: ContactLaw) -> list[str]:
     """Runs between the moments at which a mesh is taken away; one step more than ours, since theirs begin at 1.
 
     The wall is declared anew without it: contacts with the other meshes start over without a tangential spring.
@@ -221,7 +227,7 @@ def _runs(deck: Deck) -> list[str]:
         if 0 <= mesh.until_step < deck.steps:
             there.remove(mesh.name)
             lines += [f"run {mesh.until_step + 1 - done}", "unfix walls", f"unfix {mesh.name}"]
-            lines += _mesh_wall_lines(there, deck.rolling_friction)
+            lines += law.mesh_lines(there)
             done = mesh.until_step + 1
     return [*lines, f"run {deck.steps + 1 - done}"]
 

@@ -1,7 +1,8 @@
 """Part of a material: measured parameters with where they come from, as `explorer lab --out` writes it.
 
 format = 1
-[materials.<name>]  [pair.<a>.<b>]  [[body]] name, mass_fraction      as in a material file; only what was measured
+[materials.<name>]  [pair.<a>.<b>]  [[body]] name and mass_fraction, or size_distribution and size_spread
+                             as in a material file; only what was measured
 [measured.….<parameter>]     value, unit, n, sd, low_95, high_95, formula, source, sha256: the same number's origin
 
 `explorer new material NAME --like MATERIAL --part FILE` lays parts over a material; by hand, the tables can be copied
@@ -24,6 +25,9 @@ from solver import ParameterError, Scene, read_toml, with_values
 from solver.toml_table import as_table, list_at, refuse_unknown
 
 KEYS = ("format", "materials", "pair", "body", "measured")
+SIZES = ("size_distribution", "size_spread")
+SCATTER = "log_normal"
+"""Distribution of a measured spread, which acts only with one; as of measured diameters in a material file."""
 ELASTIC = ("youngs_modulus", "shear_modulus", "poisson_ratio")
 Table = dict[str, Any]
 
@@ -80,8 +84,10 @@ def with_part(scene: Scene, table: Table) -> Scene:
             for key, value in as_table(entry, f"pair.{a}.{b}").items():
                 settings[f"pair.{a}.{b}.{key}"] = value
                 struck |= {f"pair.{a}.{b}.{key}", f"pair.{b}.{a}.{key}"}
-    fractions = _fractions(list_at(table, "body"))
-    struck |= {f"body.{name}.mass_fraction" for name in fractions}
+    of_bodies = _of_bodies(list_at(table, "body"))
+    fractions = {path.split(".")[1]: value for path, value in of_bodies.items() if path.endswith(".mass_fraction")}
+    settings |= {path: value for path, value in of_bodies.items() if not path.endswith(".mass_fraction")}
+    struck |= set(of_bodies)
     scene = with_values(_with_fractions(scene, fractions), settings)
     return dataclasses.replace(scene, assumed=tuple(path for path in scene.assumed if path not in struck))
 
@@ -116,15 +122,18 @@ def _number(value: Any, where: str) -> float:
     return float(value)
 
 
-def _fractions(bodies: list[Any]) -> dict[str, float]:
-    found = {}
+def _of_bodies(bodies: list[Any]) -> dict[str, Any]:
+    """Parameter path → value of everything that is said of bodies."""
+    found: dict[str, Any] = {}
     for entry in bodies:
         body = as_table(entry, "body")
-        refuse_unknown(body, ("name", "mass_fraction"), "body.")
+        refuse_unknown(body, ("name", "mass_fraction", *SIZES), "body.")
         name, fraction = body.get("name"), body.get("mass_fraction")
-        if not isinstance(name, str) or not isinstance(fraction, int | float) or not 0.0 <= fraction <= 1.0:
+        if not isinstance(name, str) or len(body) == 1:
+            raise ParameterError(f"body: {body}; allowed: a name, and a mass_fraction or {' and '.join(SIZES)}")
+        if "mass_fraction" in body and (not isinstance(fraction, int | float) or not 0.0 <= fraction <= 1.0):
             raise ParameterError(f"body: {body}; allowed: a name and a mass_fraction of 0 … 1")
-        found[name] = float(fraction)
+        found |= {f"body.{name}.{key}": value for key, value in body.items() if key != "name"}
     return found
 
 
@@ -146,7 +155,8 @@ def _with_fractions(scene: Scene, fractions: Mapping[str, float]) -> Scene:
 def _put(table: Table, parameter: str, value: float) -> None:
     kind, *names, key = parameter.split(".")
     if kind == "body":
-        table.setdefault("body", []).append({"name": names[0], key: value})
+        scatter = {"size_distribution": SCATTER} if key == "size_spread" else {}
+        table.setdefault("body", []).append({"name": names[0], **scatter, key: value})
     else:
         _keep(table, [kind, *names], {key: value}, root="")
 

@@ -147,6 +147,7 @@ error_df = {screening.error_df}
 total = {screening.total.text}
 significant = {json.dumps(screening.significant)}
 level = {screening.level}
+level_of_others = {screening.level_of_others}
 [ascent]
 where = "{study.ascent.where}"
 file = "ascent.csv"
@@ -162,6 +163,7 @@ response = "angle"
 anova = "surface_anova.csv"
 where_anova = "{surface.where_anova}"
 where_statistics = "{surface.where_statistics}"
+steps = {{ low = "{surface.steps.low}", centre = "{surface.steps.centre}", high = "{surface.steps.high}" }}
 {factors}
 [surface.statistics]
 {statistics}

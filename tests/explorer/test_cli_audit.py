@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from doe.audit import Printed, audit_study
+from doe.audit import Printed, audit_study, printed
 from doe.audit.surface_refit import refit
 from explorer.audit.read_study import read_study
 from explorer.audit.report import audit_sections, write_audit
 from explorer.audit.sentences import audit_text
+from explorer.audit.tables import places, read_table
 from explorer.report.html import page
 from solver.assets import asset_path
 from tests.doe.audit.made_up import clean_study
@@ -142,6 +143,25 @@ def test_what_the_article_does_not_print_is_said_so(article):
     assert "10 values" in unchecked["section 2.6", "angle of repose"]
 
 
+def test_the_three_factors_named_are_the_significant_ones(article):
+    """Section 3.2: p < 0.01 for three factors, p > 0.05 for all others."""
+    named, others = of(article, "significance", "Table 6")
+    assert (named.status, others.status) == ("reproduced", "reproduced")
+    assert (named.printed, others.printed) == ("X4, X7, X16", "the other 21")
+    assert others.quantity == "factors not named: p > 0.05"
+    assert others.how == "nearest to the level is X17 0.0537 as printed, 0.0537 from F"
+
+
+def test_table_8_is_centred_on_step_3_between_steps_2_and_4(article):
+    low, centre, high = of(article, "levels of the design on the walk", "Table 7 and Table 8")
+    assert {figure.status for figure in (low, centre, high)} == {"reproduced"}
+    assert [figure.printed for figure in (low, centre, high)] == [
+        "46.18, 0.52, 0.536",
+        "52.26, 0.57, 0.572",
+        "58.34, 0.62, 0.608",
+    ]
+
+
 def test_nothing_else_differs(article):
     places = {(figure.check, figure.where) for figure in article.having("differs")}
     assert places == {
@@ -181,6 +201,14 @@ def test_a_surface_may_be_written_in_other_units(clean, tmp_path):
     audit = audit_study(again)
     assert audit.having("differs") == ()
     assert len(of(audit, "printed equation", "Equation 5")) == 10
+
+
+def test_a_number_is_found_in_a_table_however_it_is_printed(tmp_path):
+    """Rows are named by their words; a bound, though written with the same digits, is not the number."""
+    (tmp_path / "t.csv").write_text("part,form,size,p\nseed,,\u22121.2e-3,<0.05\nhusk,flat,0.05,7\n", encoding="utf-8")
+    table = read_table(tmp_path, "t.csv")
+    assert places(table, printed("-0.0012")) == ("size of seed",)
+    assert places(table, printed("0.05")) == ("size of husk–flat",)
 
 
 def _plain(value):
@@ -257,6 +285,12 @@ SPOILED = {
     "range": ("study.toml", "low = 20.0", "low = 60.0", "surface.factor: low must be below high"),
     "term": ("study.toml", '"A*B" =', '"A*D" =', "A*D: is not one of 1, A, B, C"),
     "best": ("study.toml", "[ascent]", '[ascent]\nfoo = "1"', "ascent.foo: unknown key"),
+    "step": (
+        "study.toml",
+        'centre = "3"',
+        'centre = "9"',
+        "surface.steps.centre: '9' is no step of the ascent; allowed: 1",
+    ),
     "significant": ("study.toml", '["F1"', '["G1"', "screening.significant: 'G1' is not one of F1"),
     "empty": ("shares.csv", None, "", "a line of column names and at least one row are needed"),
     "binary": ("shares.csv", None, b"\xff\xfe\x00", "not a text file in UTF-8"),

@@ -57,13 +57,14 @@ def test_the_bias_needs_no_readings():
 
 
 def test_from_readings_to_a_material(tmp_path):
-    """Parts of five tests over the shipped material: its own numbers, with their origin, and no fraction assumed."""
+    """Parts of six tests over the shipped material: its own numbers, with their origin, and no fraction assumed."""
     orders = {
         "friction": ["inclined_plane", "inclined_plane"],
         "drop": ["drop", "drop"],
         "elastic": ["shear", "shear", "--compression", "compression"],
         "density": ["density", "density"],
         "composition": ["composition", "composition", "--leave-out", "light_impurity"],
+        "sizes": ["dimensions", "dimensions"],
     }
     parts = []
     for name, words in orders.items():
@@ -86,6 +87,9 @@ def test_from_readings_to_a_material(tmp_path):
         # printed digits of ν
         assert own.poisson_ratio == pytest.approx(material.poisson_ratio, abs=5e-3)
     measured = tomllib.loads(path.read_text())["measured"]
+    spreads = {body.name: (body.sizes.kind, body.sizes.spread) for body in ours.bodies}
+    assert spreads["seed"] == ("log_normal", pytest.approx(measured["body"]["seed"]["size_spread"]["value"]))
+    assert spreads["plate"] == ("none", 0.0)
     assert measured["pair"]["seed"]["seed"]["restitution"]["source"] == "drop.csv"
     assert measured["seed"]["moisture_percent"] == 28.7
     assert not any("mass_fraction" in entry for entry in ours.assumed)
@@ -132,6 +136,8 @@ def test_the_figure_holds_every_replicate_and_escapes_names(tmp_path):
         (["drop", "--bias", "--simulate"], "need readings"),
         (["moisture", "moisture", "--simulate"], "moisture has no rig"),
         (["moisture", "moisture", "--bias"], "difference of masses"),
+        (["dimensions", "dimensions", "--simulate"], "dimensions has no rig"),
+        (["dimensions", "dimensions", "--bias"], "a caliper has no model"),
         (["drop", "drop", "--compression", "compression"], "shear"),
         (["drop", "drop", "--leave-out", "seed"], "composition"),
         (["drop", "drop", "--plot", "x.html"], "force–displacement"),

@@ -86,6 +86,18 @@ def test_the_other_estimates_of_a_drop_are_kept_beside_the_paper_s():
     assert set(table["pair"]["seed"]["plate"]) == {"restitution"}
 
 
+def test_a_measured_spread_of_sizes_comes_with_a_distribution_and_no_shape(scene):
+    part = part_table(analyse("dimensions", shipped("dimensions")))
+    assert [body["name"] for body in part["body"]] == ["seed", "petiole"]
+    assert set(part["body"][0]) == {"name", "size_distribution", "size_spread"}
+    other = with_part(scene, part)
+    for old, new in zip(scene.bodies, other.bodies, strict=True):
+        assert (new.shape, new.mass_fraction) == (old.shape, old.mass_fraction)
+    seed = other.bodies[0].sizes
+    assert (seed.kind, seed.spread) == ("log_normal", part["measured"]["body"]["seed"]["size_spread"]["value"])
+    assert part["measured"]["seed"]["length"]["value"] == pytest.approx(27.92e-3)
+
+
 @pytest.mark.parametrize(
     ("table", "word"),
     [
@@ -99,6 +111,9 @@ def test_the_other_estimates_of_a_drop_are_kept_beside_the_paper_s():
         ({"body": [{"name": "seed", "mass_fraction": 1.0}]}, "seed, plate, petiole"),
         ({"body": [{"name": n, "mass_fraction": 0.5} for n in ("seed", "plate", "petiole")]}, "add up to 1.5"),
         ({"body": [{"name": "seed", "mass_fraction": "much"}]}, "mass_fraction"),
+        ({"body": [{"name": "seed"}]}, "a mass_fraction or size_distribution and size_spread"),
+        ({"body": [{"name": "seed", "size_distribution": "log_normal", "size_spread": 0.7}]}, "size_spread"),
+        ({"body": [{"name": "stone", "size_spread": 0.1}]}, "body.stone"),
     ],
 )
 def test_a_part_that_does_not_fit_is_refused(table, word, scene):

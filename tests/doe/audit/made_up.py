@@ -14,6 +14,7 @@ from doe.audit.study import (
     AnovaLine,
     Ascent,
     Derived,
+    DesignSteps,
     DropTest,
     Equation,
     Measured,
@@ -35,7 +36,8 @@ from doe.surface_anova import analyse_surface
 NAMES = tuple(f"F{k}" for k in range(1, 9))
 LOW = np.array([10.0, 0.2, 0.3, 1.0, 2.0, 3.0, 4.0, 5.0])
 HIGH = np.array([50.0, 0.6, 0.9, 2.0, 4.0, 5.0, 8.0, 9.0])
-SURFACE_LOW, SURFACE_HIGH = np.array([20.0, 0.3, 2.5]), np.array([40.0, 0.5, 3.5])
+SURFACE_LOW, SURFACE_HIGH = np.array([20.0, 0.32, 2.7]), np.array([40.0, 0.48, 3.3])
+"""Steps 2 and 4 of the ascent, which lowers the third factor."""
 CHOSEN = (0, 1, 4)
 """The factors that act."""
 
@@ -100,6 +102,7 @@ def _screening(rng):
         total=show(((y - y.mean()) ** 2).sum(), 2),
         significant=tuple(NAMES[k] for k in CHOSEN),
         level=0.01,
+        level_of_others=0.01,
     )
 
 
@@ -109,7 +112,7 @@ def _truth(x, y, z):
 
 
 def _ascent(rng, target):
-    shares = np.linspace(-0.8, 1.0, 6)[:, None] * np.array([1.0, 0.8, -0.6])
+    shares = np.linspace(-1.0, 1.5, 6)[:, None] * np.array([1.0, 0.8, -0.6])
     low, high = LOW[list(CHOSEN)], HIGH[list(CHOSEN)]
     settings = (low + high) / 2 + shares * (high - low) / 2
     coded = (2 * settings - SURFACE_LOW - SURFACE_HIGH) / (SURFACE_HIGH - SURFACE_LOW)
@@ -168,6 +171,7 @@ def _surface(rng):
             "sigma": show(anova.sigma, 3),
         },
         equation=Equation("Equation 5", False, coefficients),
+        steps=DesignSteps("2", "3", "4"),
     )
     return study, fitted
 

@@ -7,6 +7,7 @@ import pytest
 
 from doe.audit import audit_study
 from doe.audit.printed import printed
+from doe.audit.study import DesignSteps
 from tests.doe.audit.made_up import clean_study, shown
 
 
@@ -89,8 +90,32 @@ def screening_total(study):
     return replace(study, screening=replace(screening, total=printed(f"{screening.total.value + 2:.2f}")))
 
 
-def significance(study):
+def one_significant_factor_not_named(study):
     return replace(study, screening=replace(study.screening, significant=("F1", "F2")))
+
+
+def one_named_factor_too_many(study):
+    return replace(study, screening=replace(study.screening, significant=("F1", "F2", "F3", "F5")))
+
+
+def one_other_factor_below_its_level(study):
+    """F4 has p = 0.038: not significant at 0.01, but p > 0.05 is not true of it."""
+    return replace(study, screening=replace(study.screening, level_of_others=0.05))
+
+
+def a_printed_p_that_hides_a_factor(study):
+    """F says p < 0.0001, the print 0.21, and the factor is not named."""
+    screening = study.screening
+    wrong = replace(screening, p=at(screening.p, 4, printed("0.21")), significant=("F1", "F2"))
+    return replace(study, screening=wrong)
+
+
+def design_levels(study):
+    return replace(study, surface=replace(study.surface, steps=DesignSteps("1", "3", "4")))
+
+
+def design_centre(study):
+    return replace(study, surface=replace(study.surface, steps=DesignSteps("2", "4", "4")))
 
 
 def one_ascent_error(study):
@@ -132,6 +157,7 @@ def verified_p(study):
     return replace(study, verified=replace(study.verified, p_two_sample=printed("0.912")))
 
 
+ON_THE_WALK = "levels of the design on the walk"
 PLANTED = {
     derived: ("stated formula", "Table 1", "Poisson's ratio, husk"),
     mean_of_replicates: ("mean of replicates", "Table 1", "density, husk"),
@@ -144,9 +170,14 @@ PLANTED = {
     p_value: ("p from F", "Table 5", "p of F6"),
     screening_sum: ("sums of squares from the design", "Table 5", "sum of squares of F1"),
     screening_total: ("sums of squares add up", "Table 5", "total sum of squares"),
-    significance: ("significance", "Table 5", "factors with p < 0.01"),
+    one_significant_factor_not_named: ("significance", "Table 5", "factors not named: p > 0.01"),
+    one_named_factor_too_many: ("significance", "Table 5", "factors named: p < 0.01"),
+    one_other_factor_below_its_level: ("significance", "Table 5", "factors not named: p > 0.05"),
+    a_printed_p_that_hides_a_factor: ("significance", "Table 5", "factors not named: p > 0.01"),
     one_ascent_error: ("relative error against the stated target", "Table 6", "relative error [%], step 3"),
     best_step: ("nearest step", "Table 6", "step nearest to the target"),
+    design_levels: (ON_THE_WALK, "Table 6 and Table 7", "level −1 of the design, the lower of steps 1 and 4"),
+    design_centre: (ON_THE_WALK, "Table 6 and Table 7", "level 0 of the design, step 4"),
     anova_cell: ("analysis of variance from the runs", "Table 8", "sum of squares of B"),
     anova_total: ("sums of squares add up", "Table 8", "sum of squares of total"),
     r_squared: ("statistics of the fit", "section 4", "R²"),
@@ -155,8 +186,12 @@ PLANTED = {
     verified_p: ("two-sample t test", "Table 9", "p"),
 }
 ALSO = {
-    # A wrong F belongs to another p, a wrong sum to another F; a wrong total is not that of the runs either.
-    f_value: ("p from F",),
+    # A wrong F belongs to another p (and makes F4 significant), a wrong sum to another F; a wrong total is not that of
+    # the runs either.
+    f_value: ("p from F", "significance"),
+    a_printed_p_that_hides_a_factor: ("p from F",),
+    # Step 1 is the higher one of the factor that the walk lowers.
+    design_levels: (ON_THE_WALK,),
     screening_sum: ("F from sums of squares", "sums of squares add up"),
     anova_total: ("analysis of variance from the runs",),
 }
