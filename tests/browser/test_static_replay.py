@@ -102,7 +102,7 @@ def test_it_draws_the_recording_and_plays(page):
         lambda rows: len(rows) >= LEAST_SHOWN and rows.mean() < first.mean() - LEAST_RISE,
     )
     if shot := os.environ.get("REPOSE_SCREENSHOT"):
-        page.screenshot(path=shot)
+        page.screenshot(path=shot, timeout=1000 * START_LIMIT)
 
 
 def test_it_asks_no_other_host_and_nothing_breaks(page):
