@@ -1,8 +1,8 @@
 """Colours of the page. Those of bodies and of lines begin with Okabe & Ito (2008).
 
-Okabe and Ito's seven are nearer to each other than one would like (two of them 16 in CIELAB for tritanopes), and two are
-too pale for lines on white. They are moved as little as it takes: any two are told apart with every common form of
-colour blindness, and lines are seen on a light and on a dark page (a test holds both).
+Their seven are nearer to each other than one would like (two of them 16 in CIELAB for tritanopes), and two are too pale
+for lines on white. They are moved as little as it takes: any two are told apart with every common form of colour
+blindness, and lines are seen on a light and on a dark page (a test holds both).
 """
 
 from __future__ import annotations

@@ -17,6 +17,8 @@ from explorer.viewer.look.look_settings import LookSettings, one_of
 COLOUR_KEY, NEXT_COLOUR = "C", "Colour by the next quantity"
 LARGEST = 1e6
 """Largest end of a fixed range of colours, in the unit of the screen."""
+STEP = 1e-3
+"""Of its ends; viser rounds what a box shows to this, and by itself to whole numbers."""
 
 
 class ColourPanel:
@@ -42,8 +44,10 @@ class ColourPanel:
             self._automatic = gui.add_checkbox(
                 "Automatic range", True, hint="From 0 to a round number near the largest value."
             )
-            self._low = gui.add_number("From", look.low, min=-LARGEST, max=LARGEST, hint="In the unit of the bar.")
-            self._high = gui.add_number("To", look.high, min=-LARGEST, max=LARGEST, hint="In the unit of the bar.")
+            self._low, self._high = (
+                gui.add_number(label, end, min=-LARGEST, max=LARGEST, step=STEP, hint="In the unit of the bar.")
+                for label, end in (("From", look.low), ("To", look.high))
+            )
         settings.bind(
             self._colour, lambda look: look.colour_by, lambda sent: {"colour_by": one_of(sent, choices, "colour by")}
         )
