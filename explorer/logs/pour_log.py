@@ -1,6 +1,7 @@
 """One recording: a pour as moving bodies, curves, events and parameters in a ``.rrd`` file.
 
-    world/bodies/<component>    the mesh once, then one pose per body that is in the domain, per frame
+    world/bodies/<component>    the mesh once, then one pose per body that is in the domain, per frame, in the order of
+                                entry; Departed:left are the places in that order of those that have left
     world/plate, world/cone …   the rig, and where its surfaces are when they move; world/gate while it is shut
     curves/<plot>/<name>        scalars, the unit in the name
     log                         events
@@ -19,6 +20,7 @@ from typing import Protocol, Self
 
 import numpy as np
 import numpy.typing as npt
+import pyarrow as pa  # type: ignore[import-untyped]
 import rerun as rr
 
 from explorer.files.new_file import check_new_file
@@ -82,6 +84,7 @@ class PourLog:
         rr.set_strict_mode(True)
         self._scene = scene
         self._shown: set[int] = set()
+        self._left: dict[int, npt.NDArray[np.int32]] = {}
         self._gate_shown = False
         self._poses = rig_poses(scene.rig)
         self._placed = np.tile(IN_PLACE, (len(self._poses), 1))
@@ -170,7 +173,8 @@ class PourLog:
         """
         body = self._scene.bodies[k]
         entity = f"world/bodies/{body.name}"
-        chosen = (poses.component == k) & poses.inside
+        mine = poses.component == k
+        chosen = mine & poses.inside
         if not chosen.any():
             if k in self._shown:
                 self._stream.log(entity, rr.Clear(recursive=False))
@@ -180,6 +184,7 @@ class PourLog:
             colour = BODY_COLOURS[k % len(BODY_COLOURS)]
             self._stream.log(entity, _mesh(body_triangles(body), (*colour, 255)))
             self._shown.add(k)
+        self._departed(k, entity, np.flatnonzero(~poses.inside[mine]).astype(np.int32))
         # wxyz here, xyzw in rerun
         turned = poses.quaternion[chosen][:, [1, 2, 3, 0]].astype(np.float32)
         self._stream.log(
@@ -192,6 +197,13 @@ class PourLog:
                 else None,
             ),
         )
+
+    def _departed(self, k: int, entity: str, left: npt.NDArray[np.int32]) -> None:
+        """Say who is missing among the poses: without it nobody could tell which body a pose belongs to."""
+        if k not in self._left or not np.array_equal(left, self._left[k]):
+            self._left[k] = left
+            # Typed: rerun drops an empty list of no type.
+            self._stream.log(entity, rr.DynamicArchetype("Departed", components={"left": pa.array(left)}))
 
     def _gate(self, shut: bool) -> None:
         if GATE_NAME not in self._rig:

@@ -46,6 +46,13 @@ class Instances:
     position: Floats
     quaternion: Floats
     scale: Floats
+    place: npt.NDArray[np.int64] | None
+    """Place of each in its component's order of entry, shape (n,); None where the file does not tell."""
+
+
+NOBODY = Instances(
+    np.zeros((0, 3), np.float32), np.zeros((0, 4), np.float32), np.zeros(0, np.float32), np.zeros(0, np.int64)
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,10 +68,10 @@ class Component:
         """Largest number of bodies at any time."""
         return max((len(frame.scale) for frame in self.frames), default=0)
 
-    def at(self, time: float) -> Instances | None:
-        """The bodies at ``time`` [s]; None before the first and while there are none."""
-        k = _index(self.times, time)
-        return None if k is None or not len(self.frames[k].scale) else self.frames[k]
+    def at(self, time: float) -> Instances:
+        """The bodies at ``time`` [s]; none before the first."""
+        k = index_at(self.times, time)
+        return NOBODY if k is None else self.frames[k]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,12 +86,12 @@ class Surface:
 
     def pose_at(self, time: float) -> Array | None:
         """Its pose at ``time`` [s]; None where nobody has placed it."""
-        k = _index(self.times, time)
+        k = index_at(self.times, time)
         return None if k is None else self.poses[k]
 
     def seen_at(self, time: float) -> bool:
         """Whether it is there at ``time`` [s]."""
-        k = _index(self.shown_from, time)
+        k = index_at(self.shown_from, time)
         return k is not None and bool(self.shown[k])
 
 
@@ -190,18 +197,31 @@ def _component(entity: str, columns: Mapping[str, _Rows]) -> Component:
             sizes = [block[:, 0] for block in _blocks(scales, 3)]
         # xyzw in rerun, wxyz here
         events = [
-            (float(time), Instances(p, q[:, [3, 0, 1, 2]], s))
-            for time, p, q, s in zip(moved.times, positions, turns, sizes, strict=True)
+            (float(time), Instances(p, q[:, [3, 0, 1, 2]], s, place))
+            for time, p, q, s, place in zip(
+                moved.times, positions, turns, sizes, _places(moved.times, sizes, columns), strict=True
+            )
         ]
-    none = Instances(np.zeros((0, 3), np.float32), np.zeros((0, 4), np.float32), np.zeros(0, np.float32))
     cleared = columns.get("Clear:is_recursive")
-    events += [] if cleared is None else [(float(time), none) for time in cleared.times]
+    events += [] if cleared is None else [(float(time), NOBODY) for time in cleared.times]
     events.sort(key=lambda event: event[0])
     return Component(
         _shape(entity.removeprefix(BODIES), columns),
         np.array([time for time, _ in events]),
         tuple(instances for _, instances in events),
     )
+
+
+def _places(
+    times: Array, sizes: list[Floats], columns: Mapping[str, _Rows]
+) -> list[npt.NDArray[np.int64]] | list[None]:
+    """Places of the bodies of each frame in the order of entry: those that have not left."""
+    departed = columns.get("Departed:left")
+    if departed is None:
+        return [None] * len(times)
+    left = [np.array(one, dtype=np.int64) for one in departed.values.to_pylist()]
+    gone = (left[index_at(departed.times, time) or 0] for time in times)
+    return [np.delete(np.arange(len(size) + len(away)), away) for size, away in zip(sizes, gone, strict=True)]
 
 
 def _surface(entity: str, columns: Mapping[str, _Rows]) -> Surface:
@@ -255,7 +275,7 @@ def _blocks(rows: _Rows, width: int) -> list[Any]:
     return np.split(flat, np.cumsum(lengths)[:-1]) if len(lengths) else []
 
 
-def _index(times: Array, time: float) -> int | None:
-    """Index of the last entry that is not later than ``time``."""
+def index_at(times: Array, time: float) -> int | None:
+    """Index of the last entry that is not later than ``time`` [s]; None before the first."""
     k = int(np.searchsorted(times, time + SAME_TIME, side="right")) - 1
     return None if k < 0 else k

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import viser
 
 from explorer.viewer.actions import Action, Post
+
+ClientAction = Callable[[Any], None]
+"""Something that is done to one browser."""
 
 
 def button_group(gui: viser.GuiApi, title: str, acts: Mapping[str, Action], post: Post, hint: str | None = None) -> Any:
@@ -21,6 +25,28 @@ def button_group(gui: viser.GuiApi, title: str, acts: Mapping[str, Action], post
             post(acts[event.target.value])
 
     return buttons
+
+
+def client_buttons(
+    gui: viser.GuiApi, title: str, acts: Mapping[str, ClientAction], post: Post, hint: str | None = None
+) -> None:
+    """A row of buttons named by the keys of ``acts``; a click posts the action with the browser that it came from."""
+    buttons = gui.add_button_group(title, tuple(acts), hint=hint)
+
+    @buttons.on_click
+    def _(event: viser.GuiEvent[Any]) -> None:
+        if event.client is not None and event.target.value in acts:
+            post(partial(acts[event.target.value], event.client))
+
+
+def add_client_key(gui: viser.GuiApi, label: str, key: Any, act: ClientAction, post: Post) -> None:
+    """A command with a key, which posts ``act`` with the browser in which it was pressed."""
+
+    def pressed(event: Any) -> None:
+        if event.client is not None:
+            post(partial(act, event.client))
+
+    gui.add_command(label, hotkey=key).on_trigger(pressed)
 
 
 def add_keys(gui: viser.GuiApi, acts: Mapping[str, Action], keys: Mapping[str, Any], post: Post) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,8 @@ import viser
 
 from explorer.live.frames import Frame
 from explorer.scene.meshes import GATE_NAME, PLATE_NAME, body_triangles, rig_poses, rig_triangles, rim_circles
-from explorer.viewer.palette import BODY_COLOURS, GLASS, PLATE, RIM, RING, Colour, linear
+from explorer.viewer.body_nodes import BodyNodes, Kind
+from explorer.viewer.palette import BODY_COLOURS, GLASS, PLATE, RIM, RING, Colour
 from solver.scene import Scene, body_counts
 
 Array = npt.NDArray[np.float64]
@@ -28,46 +28,18 @@ CLEAR, OPACITY = 0.16, {GATE_NAME: 0.5}
 """Opacity of what one has to look through: all surfaces but the plate."""
 
 
-FINE = 2000
-"""Bodies up to which each is drawn with all its faces, however far it is."""
-
-
-@dataclass(frozen=True)
-class Poses:
-    """Instances of one component as viser wants them; bodies that are not in the scene have scale 0."""
-
-    position: npt.NDArray[np.float32]
-    """[m], shape (n, 3)."""
-    quaternion: npt.NDArray[np.float32]
-    """wxyz, shape (n, 4)."""
-    scale: npt.NDArray[np.float32]
-    """Size of a body relative to its mesh, or 0, shape (n,)."""
-
-
 class SceneNodes:
     """Nodes of one scene, below the node ``root``; :meth:`show` moves the bodies and the surfaces of the rig."""
 
     def __init__(self, server: viser.ViserServer, scene: Scene, root: str = "") -> None:
-        self._numbers = body_counts(scene)
-        self._bodies: list[Any] = []
         self.meshes = [body_triangles(body) for body in scene.bodies]
         """Surface of a body of each component, in its own frame."""
-        for k, (mesh, n) in enumerate(zip(self.meshes, self._numbers, strict=True)):
-            none = nowhere(n)
-            self._bodies.append(
-                server.scene.add_batched_meshes_simple(
-                    f"{root}/bodies/{k}",
-                    mesh.vertices,
-                    mesh.faces,
-                    batched_wxyzs=none.quaternion,
-                    batched_positions=none.position,
-                    batched_scales=none.scale,
-                    batched_colors=plain_colours(k, n),
-                    lod="off" if n <= FINE else "auto",
-                )
-                if n > 0
-                else None
-            )
+        numbers = body_counts(scene)
+        self.bodies = BodyNodes(
+            server,
+            [Kind(mesh, component_colour(k), n) for k, (mesh, n) in enumerate(zip(self.meshes, numbers, strict=True))],
+            root,
+        )
         self._rig = rig_nodes(server, scene, root)
         self._surface_names, self._at_first = scene.rig.surface_names, rig_poses(scene.rig)
         self._surfaces = self._at_first
@@ -78,34 +50,17 @@ class SceneNodes:
         ``seen`` says which bodies are drawn, shape (n,); by default all that are in the domain.
         """
         self._show_surfaces(frame.surfaces)
-        for k, (node, n) in enumerate(zip(self._bodies, self._numbers, strict=True)):
-            if node is not None:
-                _place(node, component_poses(frame, k, n, seen))
+        self.bodies.show(frame, seen)
 
-    def paint(self, frame: Frame, colours: npt.NDArray[np.uint8]) -> None:
-        """Give the bodies of ``frame`` their ``colours`` (n, 3), those of batched meshes (``palette.linear``)."""
-        for k, (node, n) in enumerate(zip(self._bodies, self._numbers, strict=True)):
-            if node is not None:
-                chosen = np.flatnonzero(frame.component == k)[:n]
-                painted = plain_colours(k, n)
-                painted[: len(chosen)] = colours[chosen]
-                node.batched_colors = painted
-
-    def fade(self, bodies: float | None, rig: float) -> None:
-        """Opacity of the bodies (None: opaque), and of the surfaces of the rig that one has to look through."""
-        for node in self._bodies:
-            if node is not None:
-                node.opacity = bodies
-        for name in self._surface_names:
-            if name != PLATE_NAME and name not in OPACITY:
-                self._rig[name].opacity = rig
+    def fade(self, opacity: float) -> None:
+        """Opacity of the surfaces that one has to look through."""
+        for name in filter(seen_through, self._surface_names):
+            self._rig[name].opacity = opacity
 
     def clear(self) -> None:
         """Hide all bodies, surfaces where they were: a new pour has not begun to fall yet."""
         self._show_surfaces(self._at_first)
-        for node, n in zip(self._bodies, self._numbers, strict=True):
-            if node is not None:
-                _place(node, nowhere(n))
+        self.bodies.clear()
 
     def _show_surfaces(self, poses: Array) -> None:
         """Move those surfaces whose pose has changed; ``poses`` as in ``rig_poses``, or empty where none is known."""
@@ -123,46 +78,19 @@ class SceneNodes:
 
     def remove(self) -> None:
         """Take all nodes off the page."""
-        for node in (*self._bodies, *self._rig.values()):
-            if node is not None:
-                node.remove()
-
-
-def _place(node: Any, poses: Poses) -> None:
-    node.batched_positions = poses.position
-    node.batched_wxyzs = poses.quaternion
-    node.batched_scales = poses.scale
-
-
-def component_poses(frame: Frame, component: int, n: int, seen: npt.NDArray[np.bool_] | None = None) -> Poses:
-    """Poses of the bodies of one component, ``n`` of which will enter in all, in order of entry.
-
-    Those that are not ``seen``, shape (bodies of the frame,), are hidden; by default those that have left the domain.
-    """
-    seen = frame.inside if seen is None else seen
-    poses = nowhere(n)
-    chosen = np.flatnonzero(frame.component == component)[:n]
-    poses.position[: len(chosen)] = frame.position[chosen]
-    poses.quaternion[: len(chosen)] = frame.quaternion[chosen]
-    poses.scale[: len(chosen)] = np.where(seen[chosen], frame.scale[chosen], 0.0)
-    return poses
-
-
-def nowhere(n: int) -> Poses:
-    """``n`` hidden instances."""
-    quaternion = np.zeros((n, 4), dtype=np.float32)
-    quaternion[:, 0] = 1.0
-    return Poses(np.zeros((n, 3), dtype=np.float32), quaternion, np.zeros(n, dtype=np.float32))
-
-
-def plain_colours(k: int, n: int) -> npt.NDArray[np.uint8]:
-    """Colours of ``n`` bodies of component ``k`` as batched meshes want them, shape (n, 3)."""
-    return np.tile(np.array(linear(component_colour(k)), dtype=np.uint8), (n, 1))
+        self.bodies.remove()
+        for node in self._rig.values():
+            node.remove()
 
 
 def component_colour(k: int) -> Colour:
     """Colour of component ``k``."""
     return BODY_COLOURS[k % len(BODY_COLOURS)]
+
+
+def seen_through(name: str) -> bool:
+    """Whether a surface of the rig fades as a person wants it: all but the plate, and those with their own opacity."""
+    return name != PLATE_NAME and name not in OPACITY
 
 
 def drawn(name: str) -> dict[str, Any]:

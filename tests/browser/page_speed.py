@@ -95,7 +95,7 @@ async def measure_profiler(port):
         page = Socket(socket)
         await page.send(CAMERA)
         await until(page, lambda text: re.search(r"Real-time factor</span><span>[0-9.]", text))
-        slider = next(uuid for label, uuid in page.labels.items() if label.startswith(PROFILED))
+        slider = next(uuid for label, uuid in page.labels.items() if label and label.startswith(PROFILED))
         return [await profile_ms(page, slider, round(0.5 + 0.005 * k, 3)) for k in range(ECHOES + 1)][1:]
 
 

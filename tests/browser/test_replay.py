@@ -1,4 +1,4 @@
-"""A recording on the page in headless Chromium: scrubbed by keyboard, played and stepped by keys."""
+"""A recording on the page in headless Chromium: scrubbed by keyboard, played, stepped and looked at by keys."""
 
 import re
 import subprocess
@@ -8,17 +8,19 @@ import pytest
 
 from explorer.logs.pour_log import PourLog
 from explorer.scene.file import load_scene
+from tests.browser.test_look import colours, press
 from tests.browser.test_page import FLAGS, PATIENCE, positions, slider, wait_for
 from tests.explorer.test_logs import poses
 
 pytestmark = pytest.mark.browser
 
 FRAMES = 60
-"""20 ms apart; body 0 rises by a millimetre per frame."""
+"""20 ms apart; body 0 rises by a millimetre per frame, body 1 stands beside it."""
+BODIES = 2
 
 
 def state_at(k):
-    made = poses(0, 0)
+    made = poses(*[0] * BODIES)
     made.position[0] = (0.0, 0.0, 1e-3 * k)
     return made
 
@@ -87,3 +89,27 @@ def test_keys_step_and_play(page):
     wait_for(lambda: height(page) == pytest.approx(0.0, abs=1e-3))
     page.keyboard.press("Space")
     wait_for(lambda: height(page) == pytest.approx(FRAMES - 1, abs=1e-3))
+
+
+SEEN = """() => Object.entries(window.__viserSceneTree.getState())
+    .filter(([name, node]) => /^.bodies.\\d+$/.test(name) && node?.message?.props?.batched_scales)
+    .flatMap(([name, node]) => Array.from(node.message.props.batched_scales)).filter(scale => scale > 0).length"""
+"""Bodies that are drawn."""
+
+
+def test_keys_colour_the_bodies_and_cut_them_away(page):
+    at_rest(page)
+    page.get_by_role("tab", name="Look").click()
+    plain = colours(page)
+    press(page, "c")
+    # One rises by a millimetre in 20 ms, the other stands.
+    page.get_by_text("speed [m/s]: mean from the frame before to the one after").wait_for()
+    wait_for(lambda: (colours(page) != plain).any())
+    press(page, "c")
+    page.get_by_text("residence time [s]").wait_for()
+    press(page, "c")
+    wait_for(lambda: (colours(page) == plain).all())
+    assert page.evaluate(SEEN) == BODIES
+    for _ in range(2):  # x below, x above
+        press(page, "x")
+    wait_for(lambda: page.evaluate(SEEN) == 1)

@@ -1,13 +1,32 @@
-"""Colours of the charts: told apart with each common form of colour blindness, and seen on both pages."""
+"""Colours of charts and bodies: told apart with each common form of colour blindness; charts seen on both pages."""
 
+import re
 from itertools import combinations
 
 import numpy as np
 import pytest
 
 from explorer.report.figures.style import ASSUMPTION, CHOSEN, DUMMY, FACTOR, TARGET
+from explorer.viewer import palette
 
-COLOURS = (FACTOR, ASSUMPTION, DUMMY, TARGET, CHOSEN)
+
+def written(colour):
+    """A colour of the page, a tuple or in CSS, as the report writes it; how clear it is does not count."""
+    channels = re.findall(r"\d+", colour)[:3] if isinstance(colour, str) else colour
+    return "#" + "".join(f"{int(channel):02x}" for channel in channels)
+
+
+REPORT = (FACTOR, ASSUMPTION, DUMMY, TARGET, CHOSEN)
+LIVE = tuple(
+    map(
+        written,
+        (palette.ANGLE_LINE, palette.MASS_LINE, palette.ENERGY_LINE, palette.CONTACTS_LINE, palette.MARK_LINE),
+    )
+)
+OUTLINES = (written(palette.FLANK), written(palette.MEASURED))
+BODIES = tuple(map(written, palette.BODY_COLOURS))
+TOGETHER = {"report": REPORT, "live charts": LIVE, "outlines": OUTLINES, "bodies": BODIES}
+"""What may be seen side by side."""
 # Machado, Oliveira and Fernandes 2009, IEEE Trans. Vis. Comput. Graph. 15:1291, severity 1, on linear RGB.
 SEEN_BY = {
     "everybody": np.eye(3),
@@ -49,15 +68,22 @@ def lab(light):
 
 
 @pytest.mark.parametrize("people", SEEN_BY)
-def test_any_two_colours_are_told_apart(people):
-    seen = [lab(np.array(SEEN_BY[people]) @ linear(colour)) for colour in COLOURS]
+@pytest.mark.parametrize("place", TOGETHER)
+def test_any_two_colours_are_told_apart(place, people):
+    seen = [lab(np.array(SEEN_BY[people]) @ linear(colour)) for colour in TOGETHER[place]]
     # ΔE of 2.3 is just noticeable; ten times that is clear also on thin lines and small marks.
     assert min(np.linalg.norm(a - b) for a, b in combinations(seen, 2)) > 23.0
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_every_colour_is_seen_on_light_and_dark(page):
-    for colour in COLOURS:
+@pytest.mark.parametrize("place", [place for place in TOGETHER if place != "bodies"])
+def test_every_line_is_seen_on_light_and_dark(place, page):
+    for colour in TOGETHER[place]:
         dark, light = sorted(float(XYZ[1] @ linear(one)) for one in (colour, page))
         # WCAG 2.1 asks for 3 for charts; one palette for both pages can hold 2.6.
         assert (light + 0.05) / (dark + 0.05) > 2.6, colour
+
+
+def test_the_spread_has_the_colour_of_its_angle():
+    spreads = (palette.ANGLE_SPREAD_LINE, palette.ANGLE_SPREAD_BAND)
+    assert {written(colour) for colour in spreads} == {written(palette.ANGLE_LINE)}

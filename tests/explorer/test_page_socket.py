@@ -15,9 +15,10 @@ from viser import _messages
 
 from explorer.diagnosis.process import DiagnoseProcess
 from explorer.live.messages import SessionState
+from explorer.scene.meshes import scene_height
 from explorer.session import Session
 from explorer.viewer.guarded_server import guarded_server
-from explorer.viewer.look import look_tab
+from explorer.viewer.look import drawn_look
 from explorer.viewer.look.camera import view_of
 from explorer.viewer.page import Page
 from explorer.viewer.pour.run_panel import BACK, PLAY_PAUSE, STEP
@@ -149,12 +150,12 @@ def test_left_arrow_goes_back_and_space_goes_on(page, browser):
 
 def test_keys_colour_the_bodies_and_the_solver_sends_what_that_takes(page, browser):
     browser.press("Colour by the next quantity")
-    wait_for(lambda: page.look._panel.look.colour_by == "speed")
-    wait_for(lambda: "speed [m/s]" in page.look._panel._bar.content)
+    wait_for(lambda: page.look._settings.look.colour_by == "speed")
+    wait_for(lambda: "speed [m/s]" in page.look._colours._bar.content)
     wait_for(lambda: page.page._session._details.newest() is not None)
     details = page.page._session._details.newest()
     assert len(details.load) == status(page).bodies
-    (node,) = page.page._nodes._bodies
+    (node,) = page.page._nodes.bodies.nodes
     wait_for(lambda: len(np.unique(node.batched_colors[: status(page).bodies], axis=0)) > 1)
 
 
@@ -176,7 +177,7 @@ def test_a_click_into_the_scene_finds_a_body_and_one_beside_lets_it_go(page, bro
 
 def test_keys_move_the_camera_of_the_browser_that_pressed_them(page, browser):
     browser.press("View: side")
-    expected = view_of(bead_scene(), "Side")
+    expected = view_of(scene_height(bead_scene()), "Side")
     # Two messages, one after the other.
     for part in ("position", "look_at"):
         wait_for(lambda part=part: np.allclose(getattr(browser.camera, part), getattr(expected, part)))
@@ -221,9 +222,9 @@ def test_a_browser_that_comes_back_finds_the_pour_as_it_is(page, browser):
 
 def test_shadows_are_switched_off_and_on(page, monkeypatch):
     lit = []
-    monkeypatch.setattr(look_tab, "light", lambda server, shadows: lit.append(shadows))
-    panel = page.page._look._panel
+    monkeypatch.setattr(drawn_look, "light", lambda server, shadows: lit.append(shadows))
+    settings = page.page._look._settings
     for shadows in (False, True):
-        page.page._actions.post(lambda shadows=shadows: panel.change(shadows=shadows))
+        page.page._actions.post(lambda shadows=shadows: settings.change(shadows=shadows))
         wait_for(lambda shadows=shadows: lit[-1:] == [shadows])
     assert lit == [False, True]

@@ -36,7 +36,19 @@ def test_bodies_are_where_they_were(scene, tmp_path):
         assert np.array_equal(there.quaternion, state.quaternion[chosen].astype(np.float32))
         assert np.array_equal(there.scale, np.ones(chosen.sum()))
     # The plate's body came at 20 ms and rolled out at 40 ms.
-    assert [plate.at(time) is None for time in (0.0, 0.02, 0.04)] == [True, False, True]
+    assert [len(plate.at(time).scale) == 0 for time in (0.0, 0.02, 0.04)] == [True, False, True]
+
+
+def test_every_pose_is_of_a_body_that_is_known(scene, tmp_path):
+    path = tmp_path / "left.rrd"
+    states = [poses(0, 0), poses(0, 0, 1, 0, inside=(False, True, True, True)), poses(*[0] * 5, inside=(False,) * 5)]
+    states += [poses(*[0] * 6, inside=(False, True, False, False, False, True))]
+    with PourLog(path, scene, seed=1) as log:
+        for k, state in enumerate(states):
+            log.frame(0.02 * k, state, {})
+    plate, seed = sorted(read_recording(path).components, key=lambda c: c.shape.name)
+    assert [seed.at(0.02 * k).place.tolist() for k in range(4)] == [[0, 1], [1, 2], [], [1, 5]]
+    assert plate.at(0.02).place.tolist() == [0]
 
 
 def test_shapes_have_the_page_s_mesh_and_colour(scene, tmp_path):

@@ -2,6 +2,7 @@
 
 import threading
 import time
+from contextlib import nullcontext
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,6 +12,11 @@ from explorer.logs.pour_log import PourLog
 from explorer.logs.recording import read_recording
 from explorer.scene.file import load_scene
 from explorer.viewer.guarded_server import guarded_server
+from explorer.viewer.look import drawn_look
+from explorer.viewer.look.camera import view_of
+from explorer.viewer.look.look import COMPONENT
+from explorer.viewer.palette import VIRIDIS, linear, linear_all, mapped
+from explorer.viewer.replay.replay_nodes import highest
 from explorer.viewer.replay.replay_page import ReplayPage, columns, moment_html
 from tests.explorer.test_logs import poses
 
@@ -36,19 +42,19 @@ def page(recording):
 
 def drawn(page):
     """Positions of the seeds that are not hidden."""
-    ((_, node),) = page._nodes._components
+    (node,) = page._look._nodes.bodies.nodes
     return node.batched_positions[node.batched_scales > 0]
 
 
 def gate(page):
-    return next(node for surface, node in page._nodes._surfaces if surface.shape.name == "gate")
+    return next(node for surface, node in page._look._nodes._surfaces if surface.shape.name == "gate")
 
 
 def test_a_moment_is_drawn_as_it_was_recorded(page, recording):
     page._timeline.go_to(0.03)
     page.show()
     assert np.array_equal(drawn(page), recording.components[0].at(0.02).position)
-    assert page._nodes._surfaces
+    assert page._look._nodes._surfaces
     assert gate(page).visible
     page._timeline.go_to(0.06)
     page.show()
@@ -90,6 +96,90 @@ def test_it_plays_by_itself_to_the_end(page):
     loop.join()
     assert page._timeline.time == pytest.approx(0.06)
     assert len(drawn(page)) == 4
+
+
+def settle(page, **settings):
+    page._timeline.playing = False
+    page._look._settings.change(**settings)
+    page.show()
+
+
+def test_colours_are_of_the_component_of_speed_and_of_residence_time(page, recording):
+    (node,) = page._look._nodes.bodies.nodes
+    page._timeline.go_to(0.04)
+    settle(page)
+    colour = list(linear(recording.components[0].shape.colour))
+    assert node.batched_colors[:3].tolist() == [colour] * 3
+    # A body enters with every frame: 40, 20 and 0 ms ago, in a range up to 50 ms.
+    settle(page, colour_by="residence time")
+    expected = linear_all(mapped(np.array([0.8, 0.4, 0.0])))
+    assert node.batched_colors[:3].tolist() == expected.tolist()
+    assert "residence time [s]: time since a body is first in the recording" in page._look._colours._bar.content
+    assert page._look._colours._bar.visible
+    # None of them moves.
+    settle(page, colour_by="speed")
+    assert node.batched_colors[:3].tolist() == [list(linear(VIRIDIS[0]))] * 3
+    settle(page, colour_by=COMPONENT)
+    assert node.batched_colors[:3].tolist() == [colour] * 3
+    assert not page._look._colours._bar.visible
+
+
+def test_what_is_not_recorded_is_not_offered_and_the_hint_says_so(page):
+    chooser = page._look._colours._colour
+    assert chooser.options == (COMPONENT, "speed", "residence time")
+    assert "no contact forces" in chooser._impl.props.hint
+
+
+def test_a_cut_hides_bodies_and_the_rig_fades(page):
+    page._timeline.go_to(0.06)
+    settle(page, cut_away="x above", cut_at=0.15)
+    assert drawn(page)[:, 0] == pytest.approx([0.0, 0.1])
+    settle(page, rig_opacity=0.5)
+    opacities = {surface.shape.name: node.opacity for surface, node in page._look._nodes._surfaces}
+    assert opacities["cone"] == 0.5
+    assert opacities["plate"] is None
+    assert opacities["gate"] != 0.5
+
+
+def test_shadows_are_switched_off(page, monkeypatch):
+    lit = []
+    monkeypatch.setattr(drawn_look, "light", lambda server, shadows: lit.append(shadows))
+    settle(page, shadows=False)
+    assert lit == [False]
+
+
+def trigger(page, label):
+    """Trigger the command that the key of ``label`` triggers, as the browser that has pressed it."""
+    client = SimpleNamespace(client_id=1, atomic=nullcontext, camera=SimpleNamespace())
+    commands = page._server.gui._command_handle_from_uuid.values()
+    (command,) = [one for one in commands if one._impl.props.label == label]
+    for callback in command._impl.trigger_cb:
+        callback(SimpleNamespace(client=client, client_id=1))
+    page._actions.carry_out()
+    return client
+
+
+def test_keys_are_those_of_the_live_page(page, recording):
+    trigger(page, "Colour by the next quantity")
+    assert page._look._settings.look.colour_by == "speed"
+    trigger(page, "Cut away the next side")
+    assert page._look._settings.look.cut_away == "x below"
+    camera, expected = trigger(page, "View: side").camera, view_of(highest(recording), "Side")
+    assert camera.position == pytest.approx(expected.position)
+    assert camera.look_at == pytest.approx(expected.look_at)
+
+
+def test_what_is_refused_is_told(page):
+    stop = threading.Event()
+    loop = threading.Thread(target=page.run, args=(stop,))
+    loop.start()
+    entered(page._look._colours._high, -1.0)
+    deadline = time.monotonic() + 20.0
+    while "is not above" not in page._text.content and time.monotonic() < deadline:
+        time.sleep(0.02)
+    stop.set()
+    loop.join()
+    assert "colour range: its end -1 is not above its beginning 0" in page._text.content
 
 
 def test_the_moment_is_told_and_texts_of_the_file_are_escaped(recording):

@@ -95,7 +95,8 @@ def test_a_body_that_has_just_entered_is_told_without_what_is_not_known_yet():
 
 @pytest.mark.parametrize("name", DIRECTIONS)
 def test_presets_have_rig_and_feed_in_the_picture(name):
-    view, height = view_of(SCENE, name), scene_height(SCENE)
+    height = scene_height(SCENE)
+    view = view_of(height, name)
     away = view.position - view.look_at
     assert away / np.linalg.norm(away) == pytest.approx(np.array(DIRECTIONS[name]) / np.linalg.norm(DIRECTIONS[name]))
     # Half the picture at that distance is more than the part of the height above the middle.
@@ -131,9 +132,9 @@ class FakeClient:
 
 def test_a_camera_goes_to_a_preset():
     client = FakeClient()
-    go_to(client, view_of(SCENE, "Front"))
-    assert client.camera.position == pytest.approx(view_of(SCENE, "Front").position)
-    assert client.camera.look_at == pytest.approx(view_of(SCENE, "Front").look_at)
+    go_to(client, view_of(scene_height(SCENE), "Front"))
+    assert client.camera.position == pytest.approx(view_of(scene_height(SCENE), "Front").position)
+    assert client.camera.look_at == pytest.approx(view_of(scene_height(SCENE), "Front").look_at)
 
 
 def test_a_camera_goes_along_and_keeps_its_distance_and_side():
@@ -199,19 +200,19 @@ def test_a_click_inspects_a_body_and_another_beside_lets_it_go(tab):
     assert tab.session.watched == (False, None)
     click(tab, 0.05, 0.0)
     assert tab.session.watched == (True, 1)
-    assert tab.nodes._bodies[0].batched_colors[1].tolist() == list(linear(SELECTED))
+    assert tab.nodes.bodies.nodes[0].batched_colors[1].tolist() == list(linear(SELECTED))
     assert "bead no. 2 of 4" in tab.tab._text.content
     click(tab, 0.5, 0.5)
     assert tab.session.watched == (False, None)
     assert NOBODY in tab.tab._text.content
-    assert tab.nodes._bodies[0].batched_colors[1].tolist() != list(linear(SELECTED))
+    assert tab.nodes.bodies.nodes[0].batched_colors[1].tolist() != list(linear(SELECTED))
 
 
 def test_a_body_that_is_cut_away_cannot_be_clicked(tab):
-    tab.tab._panel.change(cut_away="z above", cut_at=0.07)
+    tab.tab._settings.change(cut_away="z above", cut_at=0.07)
     click(tab, 0.0, 0.0)
     assert tab.session.watched == (True, 2)
-    assert tab.nodes._bodies[0].batched_scales.tolist()[:4] == [0, 0, 1, 0]
+    assert tab.nodes.bodies.nodes[0].batched_scales.tolist()[:4] == [0, 0, 1, 0]
 
 
 def test_keys_go_from_body_to_body_among_those_in_sight(tab):
@@ -228,7 +229,7 @@ def test_keys_go_from_body_to_body_among_those_in_sight(tab):
     place = seen.index(1)
     assert [step(1) for _ in seen] == [*seen[place + 1 :], *seen[: place + 1]]
     assert step(-1) == seen[place - 1]
-    tab.tab._panel.change(cut_away="z above", cut_at=-1.0)
+    tab.tab._settings.change(cut_away="z above", cut_at=-1.0)
     with pytest.raises(InputError, match="no body is in sight"):
         tab.tab._step(1)
 
@@ -275,17 +276,17 @@ def test_another_pour_or_a_time_before_its_entry_lets_a_body_go(tab):
 
 
 def test_what_is_asked_for_is_drawn_when_it_comes(tab):
-    tab.tab._panel.change(colour_by="speed", chains=True)
+    tab.tab._settings.change(colour_by="speed", chains=True)
     tab.tab.show(tab.nodes, BEADS, SCENE)
     assert tab.session.watched == (True, None)
     assert not any(node.visible for node in tab.tab._chains._nodes)
-    before = tab.nodes._bodies[0].batched_colors.copy()
+    before = tab.nodes.bodies.nodes[0].batched_colors.copy()
     tab.session.found = DETAILS
     tab.tab.show(tab.nodes, BEADS, SCENE)
     assert any(node.visible for node in tab.tab._chains._nodes)
-    assert (tab.nodes._bodies[0].batched_colors != before).any()
-    assert tab.nodes._bodies[0].opacity < 1.0
-    tab.tab._panel.change(colour_by="component", chains=False)
+    assert (tab.nodes.bodies.nodes[0].batched_colors != before).any()
+    assert tab.nodes.bodies.nodes[0].opacity < 1.0
+    tab.tab._settings.change(colour_by="component", chains=False)
     tab.tab.show(tab.nodes, BEADS, SCENE)
     assert not any(node.visible for node in tab.tab._chains._nodes)
-    assert tab.nodes._bodies[0].opacity is None
+    assert tab.nodes.bodies.nodes[0].opacity is None

@@ -12,10 +12,13 @@ from explorer.live.frames import Frame
 from explorer.screen_units import InputError
 from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import guarded_server
+from explorer.viewer.look.colour_panel import ColourPanel
 from explorer.viewer.look.colouring import QUANTITIES, bar_html, body_colours, colour_range, nice_top
+from explorer.viewer.look.cut_panel import CutPanel
 from explorer.viewer.look.force_chains import ForceChains, chain_segments, chain_text
+from explorer.viewer.look.force_panel import ForcePanel
 from explorer.viewer.look.look import COMPONENT, CUTS, NOTHING, Look, in_sight
-from explorer.viewer.look.look_panel import COLOURS, LookPanel
+from explorer.viewer.look.look_settings import LookSettings
 from explorer.viewer.palette import SELECTED, VIRIDIS, linear, linear_all, mapped
 from explorer.viewer.scene_nodes import SceneNodes, component_colour
 from tests.explorer.beads import bead_scene
@@ -59,8 +62,11 @@ def server():
 @pytest.fixture
 def panel(server):
     actions = Actions()
-    panel = LookPanel(server, server.gui.add_html(""), actions.post)
-    return SimpleNamespace(panel=panel, actions=actions)
+    settings = LookSettings(actions.post)
+    colours = ColourPanel(server, server.gui.add_html(""), settings, QUANTITIES, actions.post)
+    forces, cut = ForcePanel(server, settings, actions.post), CutPanel(server, settings, actions.post)
+    handles = {**vars(colours), **vars(forces), **vars(cut)}
+    return SimpleNamespace(settings=settings, colours=colours, handles=handles, actions=actions)
 
 
 def enter(handle, value, client_id=0):
@@ -102,31 +108,41 @@ def test_viridis_gets_lighter_all_the_way():
     assert linear_all(np.array([[10.0, 128.0, 255.0]])).tolist() == [list(linear((10, 128, 255)))]
 
 
+PLAIN = np.array([linear(component_colour(k)) for k in FRAME.component], dtype=np.uint8)
+SPEED = QUANTITIES["speed"]
+
+
 def test_bodies_have_the_colour_of_their_value_and_newcomers_that_of_their_component():
-    painted = body_colours(FRAME, DETAILS, Look(colour_by="speed"), selected=None)
+    painted = body_colours(PLAIN, Look(colour_by="speed"), SPEED, DETAILS, selected=None)
     assert painted[0].tolist() == list(linear(VIRIDIS[0]))
     assert painted[2].tolist() == list(linear(VIRIDIS[-1]))
     assert painted[3].tolist() == list(linear(component_colour(0)))
-    plain = body_colours(FRAME, DETAILS, Look(), selected=1)
+    plain = body_colours(PLAIN, Look(), None, DETAILS, selected=1)
     assert plain[2].tolist() == list(linear(component_colour(1)))
     assert plain[1].tolist() == list(linear(SELECTED))
 
 
+def test_a_body_without_a_number_keeps_the_colour_of_its_component():
+    some = replace(DETAILS, velocity=np.float32([[math.nan, 0, 0], [0, 1, 0], [0, 0, 0]]))
+    painted = body_colours(PLAIN, Look(colour_by="speed"), SPEED, some, selected=None)
+    assert painted[0].tolist() == PLAIN[0].tolist()
+    assert painted[1].tolist() == list(linear(VIRIDIS[-1]))
+
+
 def test_a_pour_that_was_brought_back_has_fewer_bodies_than_its_last_details():
     early = replace(FRAME, component=FRAME.component[:1], position=FRAME.position[:1], inside=FRAME.inside[:1])
-    assert body_colours(early, DETAILS, Look(colour_by="speed"), 2).shape == (1, 3)
+    assert body_colours(PLAIN[:1], Look(colour_by="speed"), SPEED, DETAILS, 2).shape == (1, 3)
     segments = chain_segments(early, early.inside, DETAILS, 0.0)
     # Of the four contacts only that with the plate is between things that are there.
     assert sum(len(one) for one in segments) == 1
 
 
 def test_before_the_first_body_there_is_nothing_to_paint():
-    none = replace(FRAME, component=FRAME.component[:0], position=FRAME.position[:0], inside=FRAME.inside[:0])
-    assert body_colours(none, None, Look(colour_by="speed"), None).shape == (0, 3)
+    assert body_colours(PLAIN[:0], Look(colour_by="speed"), SPEED, None, None).shape == (0, 3)
 
 
 def test_the_bar_tells_quantity_unit_and_ends():
-    text = bar_html(Look(colour_by="contact force"), DETAILS)
+    text = bar_html(Look(colour_by="contact force"), QUANTITIES["contact force"], DETAILS)
     for part in (
         "contact force [mN]: sum of the normal forces",
         "<span>0</span>",
@@ -134,8 +150,8 @@ def test_the_bar_tells_quantity_unit_and_ends():
         "<span>5</span>",
     ):
         assert part in text
-    assert "<span>7</span>" in bar_html(Look(colour_by="speed", automatic=False, low=1, high=7), DETAILS)
-    assert bar_html(Look(), DETAILS) == ""
+    assert "<span>7</span>" in bar_html(Look(colour_by="speed", automatic=False, low=1, high=7), SPEED, DETAILS)
+    assert bar_html(Look(), None, DETAILS) == ""
 
 
 def test_chains_go_from_centre_to_centre_and_are_thicker_where_they_press_harder():
@@ -185,12 +201,13 @@ def test_nodes_are_painted_faded_and_hidden(server):
     nodes = SceneNodes(server, scene)
     beads = replace(FRAME, component=np.zeros(4, dtype=np.int32))
     nodes.show(beads, np.array([True, False, True, False]))
-    (node,) = nodes._bodies
+    (node,) = nodes.bodies.nodes
     assert node.batched_scales.tolist() == [1, 0, 1, 0, 0, 0]
-    nodes.paint(beads, np.arange(12, dtype=np.uint8).reshape(4, 3))
+    nodes.bodies.paint(beads, np.arange(12, dtype=np.uint8).reshape(4, 3))
     assert node.batched_colors[1].tolist() == [3, 4, 5]
     assert node.batched_colors[5].tolist() == list(linear(component_colour(0)))
-    nodes.fade(0.3, 0.7)
+    nodes.bodies.fade(0.3)
+    nodes.fade(0.7)
     assert node.opacity == 0.3
     assert nodes._rig["cone"].opacity == 0.7
     assert nodes._rig["plate"].opacity is None
@@ -199,16 +216,16 @@ def test_nodes_are_painted_faded_and_hidden(server):
 
 
 def test_controls_make_a_look(panel):
-    look_panel, actions = panel.panel, panel.actions
-    enter(look_panel._colour, "speed")
-    enter(look_panel._chains, True)
-    enter(look_panel._threshold, 99.0)
-    enter(look_panel._cut, "y below")
-    enter(look_panel._cut_at, -20.0)
-    enter(look_panel._opacity, 0.5)
-    enter(look_panel._shadows, False)
+    handles, actions = panel.handles, panel.actions
+    enter(handles["_colour"], "speed")
+    enter(handles["_chains"], True)
+    enter(handles["_threshold"], 99.0)
+    enter(handles["_cut"], "y below")
+    enter(handles["_cut_at"], -20.0)
+    enter(handles["_opacity"], 0.5)
+    enter(handles["_shadows"], False)
     assert actions.carry_out() == ""
-    assert look_panel.look == Look(
+    assert panel.settings.look == Look(
         colour_by="speed", chains=True, threshold=5.0, cut_away="y below", cut_at=-0.02, rig_opacity=0.5, shadows=False
     )
 
@@ -226,37 +243,37 @@ def test_controls_make_a_look(panel):
     ],
 )
 def test_what_a_browser_may_not_send_is_refused_in_a_line(panel, control, value):
-    before = panel.panel.look
-    enter(getattr(panel.panel, control), value)
+    before = panel.settings.look
+    enter(panel.handles[control], value)
     assert panel.actions.carry_out()
-    assert panel.panel.look == before
+    assert panel.settings.look == before
 
 
 def test_what_the_page_writes_itself_is_no_input(panel):
-    enter(panel.panel._colour, "speed", client_id=None)
+    enter(panel.handles["_colour"], "speed", client_id=None)
     assert panel.actions.carry_out() is None
 
 
 def test_an_entered_end_fixes_the_range_at_what_is_on_the_screen(panel):
-    look_panel = panel.panel
-    look_panel.change(colour_by="speed")
-    look_panel.show(DETAILS)
-    assert (look_panel._low.value, look_panel._high.value) == (0.0, 1.0)
-    enter(look_panel._low, 0.25)
+    settings, handles = panel.settings, panel.handles
+    settings.change(colour_by="speed")
+    panel.colours.show(DETAILS)
+    assert (handles["_low"].value, handles["_high"].value) == (0.0, 1.0)
+    enter(handles["_low"], 0.25)
     panel.actions.carry_out()
-    assert (look_panel.look.automatic, look_panel.look.low, look_panel.look.high) == (False, 0.25, 1.0)
-    assert look_panel._automatic.value is False
-    enter(look_panel._low, 3.0)
+    assert (settings.look.automatic, settings.look.low, settings.look.high) == (False, 0.25, 1.0)
+    assert handles["_automatic"].value is False
+    enter(handles["_low"], 3.0)
     assert "not above" in panel.actions.carry_out()
     with pytest.raises(InputError, match="colour range"):
-        look_panel.change(low=1.0, high=1.0)
+        settings.change(low=1.0, high=1.0)
 
 
 def test_keys_walk_through_the_choices(panel):
-    look_panel = panel.panel
-    for _ in COLOURS[1:]:
-        look_panel._next("colour_by", COLOURS)
-    assert (look_panel.look.colour_by, look_panel._colour.value) == (COLOURS[-1], COLOURS[-1])
-    look_panel._next("colour_by", COLOURS)
-    assert look_panel.look.colour_by == COMPONENT
-    assert look_panel.look.cut_away == NOTHING
+    settings, choices = panel.settings, (COMPONENT, *QUANTITIES)
+    for _ in choices[1:]:
+        settings.next("colour_by", choices)
+    assert (settings.look.colour_by, panel.handles["_colour"].value) == (choices[-1], choices[-1])
+    settings.next("colour_by", choices)
+    assert settings.look.colour_by == COMPONENT
+    assert settings.look.cut_away == NOTHING

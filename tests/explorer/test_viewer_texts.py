@@ -9,6 +9,7 @@ import pytest
 from explorer.background.command_process import CommandStatus
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, SessionState, Status
+from explorer.viewer.body_nodes import component_poses
 from explorer.viewer.palette import BODY_COLOURS, linear
 from explorer.viewer.pour.chart import MOST_POINTS, History
 from explorer.viewer.pour.readout import (
@@ -22,7 +23,6 @@ from explorer.viewer.pour.readout import (
     recent,
     time_step_text,
 )
-from explorer.viewer.scene_nodes import component_poses
 from explorer.viewer.study.process_view import escaped, progress, time_left
 from solver.observables.value import Value
 from solver.record import Outcome, Phase

@@ -9,10 +9,8 @@ import numpy as np
 import numpy.typing as npt
 import viser
 
-from explorer.scene.meshes import scene_height
 from explorer.viewer.guarded_server import address
 from explorer.viewer.view import VIEW_DIRECTION, VIEW_FIELD, View, view_from
-from solver.scene import Scene
 
 Array = npt.NDArray[np.float64]
 
@@ -28,9 +26,9 @@ STILL = 1e-5
 """A body that has moved by less than this [m] does not move the camera."""
 
 
-def view_of(scene: Scene, name: str) -> View:
-    """The preset ``name``: rig, pile and feed in one picture."""
-    return view_from(DIRECTIONS[name], scene_height(scene))
+def view_of(height: float, name: str) -> View:
+    """The preset ``name``: everything up to ``height`` [m] in one picture."""
+    return view_from(DIRECTIONS[name], height)
 
 
 def go_to(client: Any, view: View) -> None:

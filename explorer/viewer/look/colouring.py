@@ -5,22 +5,28 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from explorer.live.details import Details
-from explorer.live.frames import Frame
 from explorer.viewer.look.look import Look
 from explorer.viewer.palette import SELECTED, VIRIDIS, css, linear, linear_all, mapped
-from explorer.viewer.scene_nodes import component_colour
 
 Array = npt.NDArray[np.float64]
 
 TOP_PERCENTILE = 99.0
 """An automatic range reaches to here: a single fast body must not make all others look the same."""
 NICE = (1.0, 2.0, 5.0, 10.0)
+
+
+class Numbered(Protocol):
+    """What is known of bodies at a moment: :class:`Details` of a live pour, or the motion of a recorded one."""
+
+    @property
+    def number(self) -> int:
+        """Another number: another moment."""
 
 
 @dataclass(frozen=True)
@@ -31,25 +37,31 @@ class Quantity:
     """On the screen."""
     per_si: float
     """Numbers on the screen per number in SI."""
-    read: Callable[[Details], npt.NDArray[Any]]
-    """One number in SI per body."""
+    read: Callable[[Any], npt.NDArray[Any]]
+    """One number in SI per body, out of what is known of them at a moment."""
+    meaning: str = ""
+    """In a few words, where the name does not say it all."""
 
-    def shown(self, details: Details) -> Array:
+    def shown(self, details: Numbered) -> Array:
         """One number per body in the unit of the screen, shape (n,)."""
         return self.per_si * np.asarray(self.read(details), dtype=np.float64)
 
 
+def _speed(details: Details) -> npt.NDArray[Any]:
+    return np.asarray(np.linalg.norm(details.velocity, axis=1))
+
+
+def _residence(details: Details) -> npt.NDArray[Any]:
+    return details.time - details.entered
+
+
 QUANTITIES: Mapping[str, Quantity] = {
-    "speed": Quantity("m/s", 1.0, lambda details: np.linalg.norm(details.velocity, axis=1)),
-    "contact force": Quantity("mN", 1e3, lambda details: details.load),
-    "coordination number": Quantity("", 1.0, lambda details: details.neighbours),
-    "residence time": Quantity("s", 1.0, lambda details: details.time - details.entered),
+    "speed": Quantity("m/s", 1.0, _speed),
+    "contact force": Quantity("mN", 1e3, lambda details: details.load, "sum of the normal forces on a body"),
+    "coordination number": Quantity("", 1.0, lambda details: details.neighbours, "other bodies that a body touches"),
+    "residence time": Quantity("s", 1.0, _residence, "time since a body entered"),
 }
-MEANINGS = {
-    "contact force": "sum of the normal forces on a body",
-    "coordination number": "other bodies that a body touches",
-    "residence time": "time since a body entered",
-}
+"""Of a live pour."""
 
 
 def colour_range(look: Look, values: Array) -> tuple[float, float]:
@@ -68,34 +80,38 @@ def nice_top(values: Array) -> float:
     return next(nice * decade for nice in NICE if top <= nice * decade * (1.0 + 1e-9))
 
 
-def body_colours(frame: Frame, details: Details | None, look: Look, selected: int | None) -> npt.NDArray[np.uint8]:
-    """Colours of the n bodies of ``frame`` for batched meshes, shape (n, 3).
+def body_colours(
+    plain: npt.NDArray[np.uint8], look: Look, quantity: Quantity | None, details: Numbered | None, selected: int | None
+) -> npt.NDArray[np.uint8]:
+    """Colours of the n bodies of a frame for batched meshes, shape (n, 3).
 
-    Bodies that entered after ``details`` were read keep the colour of their component.
+    Args:
+        plain: those of their components, shape (n, 3).
+        look: the range of the colours.
+        quantity: what the colours tell; None: the component.
+        details: what is known of the first bodies; those that entered later, and those without a number, stay plain.
+        selected: the body under inspection, if any.
     """
-    kinds = int(frame.component.max(initial=-1)) + 1
-    colours = np.array([linear(component_colour(k)) for k in range(kinds)], dtype=np.uint8).reshape(-1, 3)
-    painted = colours[frame.component]
-    quantity = QUANTITIES.get(look.colour_by)
+    painted = plain.copy()
     if quantity is not None and details is not None:
         values = quantity.shown(details)[: len(painted)]
         low, high = colour_range(look, values)
-        painted[: len(values)] = linear_all(mapped((values - low) / (high - low)))
+        known = np.flatnonzero(np.isfinite(values))
+        painted[known] = linear_all(mapped((values[known] - low) / (high - low)))
     if selected is not None and selected < len(painted):
         painted[selected] = linear(SELECTED)
     return painted
 
 
-def bar_html(look: Look, details: Details | None) -> str:
+def bar_html(look: Look, quantity: Quantity | None, details: Numbered | None) -> str:
     """The bar below the choice of colours: the map, its ends, the quantity with its unit."""
-    quantity = QUANTITIES.get(look.colour_by)
     if quantity is None:
         return ""
     values = quantity.shown(details) if details is not None else np.zeros(0)
     low, high = colour_range(look, values)
     stops = ", ".join(css(colour) for colour in VIRIDIS)
     unit = f" [{quantity.unit}]" if quantity.unit else ""
-    meaning = f": {MEANINGS[look.colour_by]}" if look.colour_by in MEANINGS else ""
+    meaning = f": {quantity.meaning}" if quantity.meaning else ""
     middle = 0.5 * (low + high)
     ends = "".join(f"<span>{number:.4g}</span>" for number in (low, middle, high))
     return (

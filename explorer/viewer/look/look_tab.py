@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,29 +9,32 @@ import viser
 
 from explorer.live.details import Details
 from explorer.live.frames import Frame
+from explorer.scene.meshes import scene_height
 from explorer.screen_units import InputError
 from explorer.session import Session
 from explorer.viewer.actions import Post
-from explorer.viewer.look.camera import DIRECTIONS, go_along, go_to, link_to, view_of
-from explorer.viewer.look.colouring import body_colours
+from explorer.viewer.buttons import ClientAction, add_client_key, client_buttons
+from explorer.viewer.look.camera import go_along
+from explorer.viewer.look.camera_panel import CameraPanel
+from explorer.viewer.look.colour_panel import ColourPanel
+from explorer.viewer.look.colouring import QUANTITIES
+from explorer.viewer.look.cut_panel import CutPanel
+from explorer.viewer.look.drawn_look import DrawnLook
 from explorer.viewer.look.force_chains import ForceChains
+from explorer.viewer.look.force_panel import ForcePanel
 from explorer.viewer.look.inspector import body_html
 from explorer.viewer.look.look import COMPONENT, in_sight
-from explorer.viewer.look.look_panel import LookPanel
+from explorer.viewer.look.look_settings import LookSettings
 from explorer.viewer.look.picking import nearest_hit
 from explorer.viewer.scene_nodes import SceneNodes
-from explorer.viewer.view import light
 from solver.scene import Scene
 
-GHOST = 0.22
-"""Opacity of bodies while force chains are drawn through them."""
-FOLLOW, RELEASE, LINK = "Follow", "Release", "Link to this view"
+FOLLOW, RELEASE = "Follow", "Release"
 BEFORE, AFTER = "Previous", "Next"
 FOLLOW_KEY: Any = "F"
 RELEASE_KEY: Any = "escape"
 BEFORE_KEY: Any = "P"
 AFTER_KEY: Any = "N"
-VIEW_KEYS: dict[str, Any] = dict(zip(DIRECTIONS, ("1", "2", "3", "4"), strict=True))
 
 
 class LookTab:
@@ -43,81 +45,55 @@ class LookTab:
 
     def __init__(self, server: viser.ViserServer, session: Session, bar: viser.GuiHtmlHandle, post: Post) -> None:
         self._server, self._session = server, session
-        self._panel, self._chains = LookPanel(server, bar, post), ForceChains(server)
+        self._settings = LookSettings(post)
+        self._colours = ColourPanel(server, bar, self._settings, QUANTITIES, post)
+        self._forces, self._chains = ForcePanel(server, self._settings, post), ForceChains(server)
+        CutPanel(server, self._settings, post)
+        self._on_page = DrawnLook(server)
         self._selected: int | None = None
         self._followers: set[int] = set()
         self._drawn: tuple[SceneNodes, Frame] | None = None
-        self._moved_for: object = None
-        self._painted_for: object = None
-        self._faded_for: object = None
-        self._shadows = True
         self._chained_for: object = None
         self._told_for: object = None
-        self._build(post)
+        CameraPanel(server, post, lambda: scene_height(session.status().scene), self._stay)
+        self._add_inspector(post)
 
     @property
     def by_component(self) -> bool:
         """Whether a body's colour says what it is."""
-        return self._panel.look.colour_by == COMPONENT
+        return self._settings.look.colour_by == COMPONENT
 
-    def _build(self, post: Post) -> None:
+    def _add_inspector(self, post: Post) -> None:
         gui = self._server.gui
-        with gui.add_folder("Camera"):
-            views = gui.add_button_group("View", tuple(DIRECTIONS), hint="Keys 1, 2, 3, 4.")
-            link = gui.add_button(LINK, hint="Puts the address of what you see into the field below.")
-            self._link: Any = gui.add_text("Address", "", hint="Opens the page with this view.")
+        acts: dict[str, ClientAction] = {
+            FOLLOW: self._follow,
+            RELEASE: lambda client: self._release(),
+            BEFORE: lambda client: self._step(-1),
+            AFTER: lambda client: self._step(1),
+        }
         with gui.add_folder("Body"):
             self._text = gui.add_html("")
-            acts = {
-                FOLLOW: self._follow,
-                RELEASE: lambda client: self._release(),
-                BEFORE: lambda client: self._step(-1),
-                AFTER: lambda client: self._step(1),
-            }
-            body = gui.add_button_group(
+            client_buttons(
+                gui,
                 "Camera and body",
-                tuple(acts),
+                acts,
+                post,
                 hint="F: the camera of this browser goes along with the body, or stays. Escape, or a click beside all "
                 "bodies: lets it go. P, N: the body in sight that entered before or after it; at first the topmost.",
             )
-
-        @views.on_click
-        def _(event: viser.GuiEvent[Any]) -> None:
-            if event.client is not None and event.target.value in DIRECTIONS:
-                post(partial(self._look_from, event.client, event.target.value))
-
-        @link.on_click
-        def _(event: viser.GuiEvent[Any]) -> None:
-            if event.client is not None:
-                post(partial(self._show_link, event.client))
-
-        @body.on_click
-        def _(event: viser.GuiEvent[Any]) -> None:
-            if event.client is not None and event.target.value in acts:
-                post(partial(acts[event.target.value], event.client))
-
-        for name, key in VIEW_KEYS.items():
-            self._key(post, f"View: {name.lower()}", key, partial(self._look_from, name=name))
-        self._key(post, "Follow the body that was clicked", FOLLOW_KEY, self._follow)
-        self._key(post, "Let the body go", RELEASE_KEY, acts[RELEASE])
-        self._key(post, "Inspect the body that entered before", BEFORE_KEY, acts[BEFORE])
-        self._key(post, "Inspect the next body", AFTER_KEY, acts[AFTER])
+        add_client_key(gui, "Follow the body that was clicked", FOLLOW_KEY, acts[FOLLOW], post)
+        add_client_key(gui, "Let the body go", RELEASE_KEY, acts[RELEASE], post)
+        add_client_key(gui, "Inspect the body that entered before", BEFORE_KEY, acts[BEFORE], post)
+        add_client_key(gui, "Inspect the next body", AFTER_KEY, acts[AFTER], post)
 
         @self._server.scene.on_click()
         def _(event: viser.SceneClickEvent) -> None:
             origin, direction = event.ray_origin, event.ray_direction
             post(lambda: self.click(np.array(origin, dtype=float), np.array(direction, dtype=float)))
 
-    def _key(self, post: Post, label: str, key: Any, act: Any) -> None:
-        def pressed(event: Any) -> None:
-            if event.client is not None:
-                post(partial(act, event.client))
-
-        self._server.gui.add_command(label, hotkey=key).on_trigger(pressed)
-
     def show(self, nodes: SceneNodes, frame: Frame, scene: Scene) -> None:
         """Draw ``frame``; call it inside ``server.atomic()``, as often as the page looks for frames."""
-        look, details = self._panel.look, self._session.details()
+        look, details = self._settings.look, self._session.details()
         if self._drawn is None or self._drawn[1].generation != frame.generation:
             self._release()
         if self._selected is not None and self._selected >= len(frame.component):
@@ -125,33 +101,14 @@ class LookTab:
         self._session.watch(look.needs_details or self._selected is not None, self._selected)
         self._drawn = nodes, frame
         seen = in_sight(frame, look)
-        moved = (id(nodes), frame.number, look.cut_away, look.cut_at)
-        if moved != self._moved_for:
-            self._moved_for = moved
-            nodes.show(frame, seen)
+        if self._on_page.move(nodes, frame, look, seen):
             self._go_along(frame)
-        self._paint(nodes, frame, details)
+        self._on_page.paint(nodes, frame, look, self._colours.quantity, details, self._selected)
         self._show_chains(frame, seen, details)
         self._tell(scene, frame, details)
 
-    def _paint(self, nodes: SceneNodes, frame: Frame, details: Details | None) -> None:
-        look = self._panel.look
-        values = details.number if details is not None and look.colour_by != COMPONENT else 0
-        colours = (look.colour_by, look.automatic, look.low, look.high)
-        painted = (id(nodes), frame.generation, len(frame.component), colours, values, self._selected)
-        if painted != self._painted_for:
-            self._painted_for = painted
-            nodes.paint(frame, body_colours(frame, details, look, self._selected))
-        faded = (id(nodes), look.chains, look.rig_opacity)
-        if faded != self._faded_for:
-            self._faded_for = faded
-            nodes.fade(GHOST if look.chains else None, look.rig_opacity)
-        if look.shadows != self._shadows:
-            self._shadows = look.shadows
-            light(self._server, look.shadows)
-
     def _show_chains(self, frame: Frame, seen: Any, details: Details | None) -> None:
-        look = self._panel.look
+        look = self._settings.look
         cut = (look.cut_away, look.cut_at)
         number = details.number if look.chains and details is not None else 0
         chained = (frame.generation, number, look.threshold, cut)
@@ -164,11 +121,12 @@ class LookTab:
             self._chains.hide()
 
     def _tell(self, scene: Scene, frame: Frame, details: Details | None) -> None:
-        told = (self._panel.look, self._selected, frame.generation, details.number if details is not None else 0)
+        told = (self._settings.look, self._selected, frame.generation, details.number if details is not None else 0)
         if told == self._told_for:
             return
         self._told_for = told
-        self._panel.show(details)
+        self._colours.show(details)
+        self._forces.show(details)
         self._text.content = body_html(scene, frame, details, self._selected)
 
     def click(self, origin: Any, direction: Any) -> None:
@@ -176,7 +134,7 @@ class LookTab:
         if self._drawn is None:
             return
         nodes, frame = self._drawn
-        hit = nearest_hit(nodes.meshes, frame, in_sight(frame, self._panel.look), origin, direction)
+        hit = nearest_hit(nodes.meshes, frame, in_sight(frame, self._settings.look), origin, direction)
         if hit != self._selected:
             self._release()
             self._selected = hit
@@ -186,7 +144,7 @@ class LookTab:
         if self._drawn is None:
             return
         _, frame = self._drawn
-        seen = np.flatnonzero(in_sight(frame, self._panel.look))
+        seen = np.flatnonzero(in_sight(frame, self._settings.look))
         if len(seen) == 0:
             raise InputError("no body is in sight")
         if self._selected is None:
@@ -216,9 +174,6 @@ class LookTab:
         self._followers &= set(clients)
         go_along((clients[number] for number in self._followers), frame.position[self._selected].astype(float))
 
-    def _look_from(self, client: Any, name: str) -> None:
+    def _stay(self, client: Any) -> None:
+        """The camera of ``client`` goes along with no body any longer."""
         self._followers.discard(client.client_id)
-        go_to(client, view_of(self._session.status().scene, name))
-
-    def _show_link(self, client: Any) -> None:
-        self._link.value = link_to(self._server, client.camera)

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+import numpy.typing as npt
 import viser
 
-from explorer.logs.recording import Component, Recording
-from explorer.viewer.palette import linear
-from explorer.viewer.scene_nodes import Poses, drawn, nowhere
+from explorer.live.frames import Frame
+from explorer.logs.recording import Recording
+from explorer.viewer.body_nodes import BodyNodes, Kind
+from explorer.viewer.scene_nodes import drawn, seen_through
 
 
 class ReplayNodes:
-    """Nodes of one recording; :meth:`show` moves them to a time."""
+    """Nodes of one recording."""
 
     def __init__(self, server: viser.ViserServer, recording: Recording) -> None:
-        self._components = [(c, self._batch(server, k, c)) for k, c in enumerate(recording.components)]
+        self.bodies = BodyNodes(server, [Kind(c.shape, c.shape.colour, c.most) for c in recording.components])
         self._surfaces = [
             (
                 surface,
@@ -32,41 +32,20 @@ class ReplayNodes:
             for surface in recording.surfaces
         ]
 
-    @staticmethod
-    def _batch(server: viser.ViserServer, k: int, component: Component) -> Any:
-        none = nowhere(component.most)
-        return server.scene.add_batched_meshes_simple(
-            f"/bodies/{k}",
-            component.shape.vertices,
-            component.shape.faces,
-            batched_wxyzs=none.quaternion,
-            batched_positions=none.position,
-            batched_scales=none.scale,
-            batched_colors=linear(component.shape.colour),
-            lod="off",
-        )
-
-    def show(self, time: float) -> None:
-        """Draw the state at ``time`` [s]; call it inside ``server.atomic()``."""
-        for component, node in self._components:
-            poses = poses_at(component, time)
-            node.batched_positions = poses.position
-            node.batched_wxyzs = poses.quaternion
-            node.batched_scales = poses.scale
+    def show(self, frame: Frame, seen: npt.NDArray[np.bool_] | None = None) -> None:
+        """Draw the state of ``frame``; ``seen`` says which bodies are drawn. Call it inside ``server.atomic()``."""
+        self.bodies.show(frame, seen)
         for surface, node in self._surfaces:
-            node.visible = surface.seen_at(time)
-            pose = surface.pose_at(time)
+            node.visible = surface.seen_at(frame.time)
+            pose = surface.pose_at(frame.time)
             if pose is not None:
                 node.position, node.wxyz = pose[:3], pose[3:]
 
-
-def poses_at(component: Component, time: float) -> Poses:
-    """The bodies of a component at ``time`` [s], the places of absent ones hidden by scale 0."""
-    poses, there = nowhere(component.most), component.at(time)
-    if there is not None:
-        n = len(there.scale)
-        poses.position[:n], poses.quaternion[:n], poses.scale[:n] = there.position, there.quaternion, there.scale
-    return poses
+    def fade(self, opacity: float) -> None:
+        """Opacity of the surfaces that one has to look through."""
+        for surface, node in self._surfaces:
+            if seen_through(surface.shape.name):
+                node.opacity = opacity
 
 
 def highest(recording: Recording) -> float:

@@ -1,4 +1,4 @@
-"""``explorer serve --replay``: a recording on the page, with a time slider, keys, curves and the log."""
+"""``explorer serve --replay``: a recording on the page, with a time slider, keys, curves, the log and the look."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ from explorer.viewer.frame_clock import FrameClock
 from explorer.viewer.palette import ANGLE_LINE, CONTACTS_LINE, ENERGY_LINE, MASS_LINE
 from explorer.viewer.pour.chart import LEAST_TOP_DEG, axis
 from explorer.viewer.pour.run_panel import FASTEST, SLOWEST
-from explorer.viewer.replay.replay_nodes import ReplayNodes, highest
+from explorer.viewer.replay.replay_look import ReplayLook
+from explorer.viewer.replay.replay_nodes import highest
 from explorer.viewer.replay.timeline import Timeline
 from explorer.viewer.slider_hands import SliderHands
 from explorer.viewer.theme import DARK, ThemeSwitch, apply_theme
@@ -52,21 +53,26 @@ class ReplayPage:
     def __init__(self, server: viser.ViserServer, recording: Recording, name: str) -> None:
         self._server, self._recording = server, recording
         self._timeline, self._actions = Timeline(recording.times), Actions()
+        self._notice = ""
         light(server)
         look_at_height(server, highest(recording))
-        self._nodes = ReplayNodes(server, recording)
         self._shown, self._turn = math.nan, 0
         apply_theme(server, DARK)
         server.gui.main_panel.dock_right()
         server.gui.add_markdown(f"**Replay** of `{name.replace('`', '')}`")
-        self._controls()
-        self._text = server.gui.add_html("")
-        self._plots = [_plot(server, recording, *curve) for curve in CURVES if curve[0] in recording.curves]
-        with server.gui.add_folder("Parameters", expand_by_default=False):
-            server.gui.add_markdown(recording.parameters)
-        if recording.outcome:
-            with server.gui.add_folder("Outcome", expand_by_default=False):
-                server.gui.add_markdown(recording.outcome)
+        colour_bar = server.gui.add_html("", visible=False)
+        tabs = server.gui.add_tab_group()
+        with tabs.add_tab("Replay", viser.Icon.PLAYER_PLAY):
+            self._controls()
+            self._text = server.gui.add_html("")
+            self._plots = [_plot(server, recording, *curve) for curve in CURVES if curve[0] in recording.curves]
+            with server.gui.add_folder("Parameters", expand_by_default=False):
+                server.gui.add_markdown(recording.parameters)
+            if recording.outcome:
+                with server.gui.add_folder("Outcome", expand_by_default=False):
+                    server.gui.add_markdown(recording.outcome)
+        with tabs.add_tab("Look", viser.Icon.EYE):
+            self._look = ReplayLook(server, recording, colour_bar, self._actions.post)
         # viser's charts are drawn for both.
         ThemeSwitch(server, self._actions.post, lambda dark: None)
 
@@ -105,24 +111,25 @@ class ReplayPage:
         before, frames = clock.monotonic(), FrameClock(FRAME_INTERVAL)
         while not stop.is_set():
             now = clock.monotonic()
-            self._actions.carry_out()
+            notice = self._actions.carry_out()
+            self._notice = self._notice if notice is None else notice
             self._timeline.pass_by(now - before)
             before = now
             self.show()
             frames.wait(stop)
 
     def show(self) -> None:
-        """Draw the present moment, if it is another than the one that is drawn."""
+        """Draw the present moment; what is drawn already is left alone."""
         time = self._timeline.time
-        if time != self._shown:
-            self._shown = time
-            with self._server.atomic():
-                self._nodes.show(time)
+        with self._server.atomic():
+            self._look.show(time)
+            if time != self._shown:
+                self._shown = time
                 self._slider.value = round(time, 6)  # type: ignore[misc]
                 self._turn += 1
                 for name, plot in self._plots:
                     plot.data = columns(*self._recording.curves[name], time, self._turn)
-        text = moment_html(self._recording, time, self._timeline.playing)
+        text = moment_html(self._recording, time, self._timeline.playing, self._notice)
         if self._text.content != text:
             self._text.content = text
 
@@ -159,10 +166,10 @@ def columns(times: Array, values: Array, now: float, turn: int = 0) -> tuple[Arr
     return np.append(times, end), np.append(values, np.nan), marked
 
 
-def moment_html(recording: Recording, time: float, playing: bool) -> str:
-    """The moment in words and numbers, and what has happened last. Texts of the file are escaped."""
-    bodies = sum(0 if (there := c.at(time)) is None else len(there.scale) for c in recording.components)
+def moment_html(recording: Recording, time: float, playing: bool, notice: str = "") -> str:
+    """The moment in words and numbers, what was refused last, and what has happened. Texts of the file are escaped."""
+    bodies = sum(len(component.at(time).scale) for component in recording.components)
     lines = [f"{'playing' if playing else 'paused'} · {time:.3f} of {recording.times[-1]:.3f} s · {bodies} bodies"]
     happened = [f"{when:.3f} s  {text}" for when, text in recording.events if when <= time + 1e-9]
-    lines += happened[: -EVENTS_SHOWN - 1 : -1]
+    lines += [notice] * bool(notice) + happened[: -EVENTS_SHOWN - 1 : -1]
     return "<div style='padding:0 0.75em; font-size:0.82em'>" + "<br>".join(map(escape, lines)) + "</div>"
