@@ -27,10 +27,10 @@ CAMERA = {
 
 
 class Socket:
-    """A client of the page. Keeps the labels of the inputs and the texts that it was sent last."""
+    """A client of the page. Keeps the labels of the inputs, what sliders reach, and the texts that it was sent last."""
 
     def __init__(self, socket):
-        self._socket, self.labels, self.texts = socket, {}, {}
+        self._socket, self.labels, self.reaches, self.texts = socket, {}, {}, {}
 
     async def send(self, message):
         await self._socket.send(msgspec.msgpack.encode(message))
@@ -45,6 +45,7 @@ class Socket:
             props = message.get("props") or {}
             if isinstance(props, dict) and "label" in props:
                 self.labels.setdefault(props["label"], message["uuid"])
+                self.reaches[message["uuid"]] = (props.get("min"), props.get("max"))
             if isinstance(props, dict) and "content" in props:
                 self.texts[message["uuid"]] = props["content"]
             if message["type"] == "GuiUpdateMessage" and "content" in message["updates"]:

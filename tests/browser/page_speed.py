@@ -58,7 +58,7 @@ region_height = 0.18
 """
 ECHOES = 40
 PROFILED = "X7"
-"""Factor whose slider is moved, between 0.5 and 0.7: within the region."""
+"""Factor whose slider is moved, from end to end of the region."""
 QUIET = 3.0
 """Seconds without a window, or at rest, after which a pour is over."""
 POUR_SECONDS = 8.0
@@ -84,7 +84,7 @@ async def profile_ms(page, slider, value):
     """Milliseconds until the chart comes that follows a slider of the profiler."""
     began = time.perf_counter()
     await page.send({"type": "GuiUpdateMessage", "uuid": slider, "updates": {"value": value}})
-    while not redraws(await page.window()):
+    while not redraws(await asyncio.wait_for(page.window(), QUIET)):
         assert time.perf_counter() < began + 20.0, "waited in vain"
     return 1e3 * (time.perf_counter() - began)
 
@@ -96,7 +96,9 @@ async def measure_profiler(port):
         await page.send(CAMERA)
         await until(page, lambda text: re.search(r"Real-time factor</span><span>[0-9.]", text))
         slider = next(uuid for label, uuid in page.labels.items() if label and label.startswith(PROFILED))
-        return [await profile_ms(page, slider, round(0.5 + 0.005 * k, 3)) for k in range(ECHOES + 1)][1:]
+        low, high = page.reaches[slider]
+        values = [low + (high - low) * (k + 1) / (ECHOES + 2) for k in range(ECHOES + 1)]
+        return [await profile_ms(page, slider, value) for value in values][1:]
 
 
 async def frames_per_second(page, seconds):
