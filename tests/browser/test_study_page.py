@@ -14,8 +14,9 @@ from tests.explorer import reported_studies
 
 pytestmark = pytest.mark.browser
 
-COMPILED = 240.0
-"""Seconds: the first run of a study comes after its workers have compiled the solver, beside the page's own."""
+COMPILED = 480.0
+"""Seconds: the first run of a study comes after its workers have compiled the solver, behind a page that pours and a
+browser that draws without a graphics card."""
 TRACES = "() => document.querySelector('.js-plotly-plot').data.map(trace => trace.name ?? '')"
 HERE = (
     """() => document.querySelector('.js-plotly-plot').data.filter(trace => trace.name === 'here').map(t => t.x[0])"""

@@ -14,6 +14,8 @@ from solver.photograph import PhotographedPile, read_photograph
 from solver.record import Spheres
 from tests.solver.photograph.rendered import Look, fitted, image_cover, photograph, picture_of, solid_cover
 
+HALF = 0.44
+"""Most of the picture's width that a solid takes to either side of its apex."""
 FINE = 0.1e-3
 """Pixel of the noise-free silhouette of bodies [m]."""
 
@@ -67,13 +69,13 @@ def any_look(rng, widths):
 
 
 def solid_trial(seed, widths):
-    """A solid with flanks of 12 … 45°."""
+    """A solid with flanks of 12 … 45°, the whole of it in the picture, whose middle is below its apex."""
     rng = np.random.default_rng(seed)
     look = any_look(rng, widths)
     truth = rng.uniform(12, 45, 2)
+    slopes = np.tan(np.radians(truth))
     base = rng.uniform(0.45, 0.7) * look.width
-    height = base / (1.0 / np.tan(np.radians(truth))).sum()
-    height = min(height, 0.38 * look.width)
+    height = min(base / (1.0 / slopes).sum(), 0.38 * look.width, HALF * look.width * slopes.min())
     return _trial(solid_cover(*truth, height), look, truth)
 
 
