@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from explorer.export import WRITERS
 from explorer.export import bed as peer_bed
 from explorer.export.deck import deck_of
+from explorer.export.decks import WRITERS
 from explorer.export.run import PeerRun, run_liggghts, run_yade
 from explorer.scene.file import load_scene
 from solver.benchmark import Bed, Measurement, measure_batch, measure_bed, measure_pour, wide_bed

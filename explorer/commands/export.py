@@ -34,8 +34,9 @@ def export(
     stands for its study with the factors at the optimum.
     """
     from explorer.errors import CommandError
-    from explorer.export import PROGRAMS, WRITERS
+    from explorer.export import PROGRAMS
     from explorer.export.deck import check_exportable, deck_of
+    from explorer.export.decks import WRITERS
     from explorer.export.material_table import write_material_table
     from explorer.export.moments import moments
     from explorer.export.paraview import check_meshio, write_paraview

@@ -1,5 +1,6 @@
 """Files for other programs: decks for engines, one file per engine, and what they share; VTK; material tables.
 
+decks.py        deck writers by engine
 deck.py         what a deck says, whatever the engine;  deck_of(record) makes it from a pour of ours
 triangles.py    cone and gate as triangles, STL
 liggghts.py     LIGGGHTS-PUBLIC 3.8 (in.liggghts)
@@ -11,19 +12,8 @@ moments.py      a pour at given moments;  paraview.py them as VTK files
 material_table.py   a material as CSV for EDEM, with the convention of every coefficient
 """
 
-from __future__ import annotations
+# Nothing of the solver is loaded here: the page names the programs, and its process has no Taichi.
+PROGRAMS = ("liggghts", "yade", "paraview", "edem")
+"""Everything that something can be exported to: decks for engines (`decks.py`), then files for others."""
 
-from collections.abc import Callable
-from pathlib import Path
-
-from explorer.export.deck import Deck
-from explorer.export.liggghts import write_liggghts
-from explorer.export.yade import write_yade
-
-WRITERS: dict[str, Callable[[Path, Deck], None]] = {"liggghts": write_liggghts, "yade": write_yade}
-"""Engine → what writes its deck into an existing folder."""
-
-PROGRAMS = (*WRITERS, "paraview", "edem")
-"""Everything that something can be exported to."""
-
-__all__ = ["PROGRAMS", "WRITERS", "Deck", "write_liggghts", "write_yade"]
+__all__ = ["PROGRAMS"]

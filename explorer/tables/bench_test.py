@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from explorer.files.run_folder import json_text, parameters_text
 from explorer.files.run_result import parameter_values, versions
 from explorer.tables.text_table import text_table
 from solver import Scene
-from solver.bench_tests import BenchResult
+
+if TYPE_CHECKING:  # it loads Taichi, and the page reads tables without
+    from solver.bench_tests import BenchResult
 
 
 def bench_data(scene: Scene, result: BenchResult) -> dict[str, Any]:

@@ -9,9 +9,10 @@ import trimesh
 from scipy.integrate import solve_ivp
 
 from explorer.errors import CommandError
-from explorer.export import WRITERS
+from explorer.export import PROGRAMS
 from explorer.export.bed import BED_WRITERS, Bed
 from explorer.export.deck import assembled, deck_of, read_deck
+from explorer.export.decks import WRITERS
 from explorer.export.frames import Frame, motion, read_frames, rigid_fit
 from explorer.export.liggghts import unclamped_restitution, write_liggghts
 from explorer.export.triangles import revolved_triangles, write_stl
@@ -208,3 +209,7 @@ def test_what_liggghts_cannot_take_is_one_line(taichi, tmp_path):
     with pytest.raises(CommandError, match=r"restitution 0.15: .* allowed: 0.22 … 1"):
         write_liggghts(tmp_path, assembled(dull, 0, 1e-6, 1, entries))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_every_program_that_is_named_can_be_written_for():
+    assert set(PROGRAMS) == {*WRITERS, "paraview", "edem"}

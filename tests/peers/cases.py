@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from explorer.export import WRITERS
 from explorer.export.deck import assembled
+from explorer.export.decks import WRITERS
 from explorer.export.frames import TRAJECTORY, Motion, motion, read_frames
 from explorer.export.liggghts import INPUT
 from explorer.export.run import run_liggghts, run_yade
