@@ -1,7 +1,7 @@
 """Errors and intervals over many rendered photographs: a small sample each time, a campaign when asked for.
 
-Nominal 95 %; asked for 90 %. On 2026-11-22, of the first 108 solids 99 % of the flanks' intervals held, of the first 126
-piles of bodies 91 %.
+Nominal 95 %; asked for 90 %. On 2026-11-22, of the first 108 solids 99 % of the flanks' intervals held, of the
+first 126 piles of bodies 91 %.
 """
 
 import pytest
