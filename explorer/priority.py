@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import contextlib
 import os
+import shutil
+from collections.abc import Sequence
 from pathlib import Path
 
 LIVE, BACKGROUND = 5, 15
@@ -26,3 +28,9 @@ def session_gives_way(process: int, niceness: int) -> None:
     """Let the session of ``process`` go on at ``niceness``; without effect where sessions are not told apart."""
     with contextlib.suppress(OSError):
         Path(f"/proc/{process}/autogroup").write_text(str(niceness), encoding="ascii")
+
+
+def lowered(command: Sequence[str], niceness: int) -> list[str]:
+    """``command`` as it is started with ``niceness``; as it is where there is no program `nice`."""
+    nice = shutil.which("nice")
+    return [*([nice, "-n", str(niceness)] if nice else []), *command]

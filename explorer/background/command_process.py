@@ -14,7 +14,6 @@ import fcntl
 import json
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -26,7 +25,7 @@ from typing import IO, Any, Literal
 
 from explorer.background.stage_progress import StageProgress, TriedRun, with_event, with_run
 from explorer.errors import CommandError
-from explorer.priority import BACKGROUND, session_gives_way
+from explorer.priority import BACKGROUND, lowered, session_gives_way
 
 CommandState = Literal["idle", "running", "paused", "cancelled", "finished", "failed"]
 
@@ -150,15 +149,13 @@ class CommandProcess:
         # Workers of a command of our own that has just ended may hold the lock for a moment longer.
         patience = LOCK_WAIT if out == self.out else 0.0
         self.out, self._command = out, arguments[0]
-        nice = shutil.which("nice")
-        lower = [nice, "-n", str(BACKGROUND)] if nice else []
         with self._log().open("ab") as log:
             # The child inherits the lock with the open file, and holds it to its end, whatever becomes of the page.
             if not _locked(log, patience):
                 raise BackgroundError(f"{out}: runs already, started from another page")
             # A session of its own: Ctrl-C for the page must not cut a run in two, cancel() ends it in order.
             self._process = subprocess.Popen(
-                [*lower, *self._program, *arguments],
+                lowered((*self._program, *arguments), BACKGROUND),
                 stdin=subprocess.DEVNULL,
                 stdout=log,
                 stderr=subprocess.STDOUT,

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import atexit
-import shutil
 import subprocess
 from collections.abc import Sequence
 
 from explorer.background.command_process import PROGRAM
 from explorer.errors import CommandError
-from explorer.priority import BACKGROUND, session_gives_way
+from explorer.priority import BACKGROUND, lowered, session_gives_way
 
 FAILURE = 1
 """Exit code of a command that has done its work and has no good news."""
@@ -22,10 +21,8 @@ def printed(arguments: Sequence[str], program: Sequence[str] = PROGRAM) -> str:
     A command that ends with ``FAILURE`` and has printed something has an answer too. Raises CommandError with the last
     line of any other that does not end well. The command does not outlive this process.
     """
-    nice = shutil.which("nice")
-    lower = [nice, "-n", str(BACKGROUND)] if nice else []
     with subprocess.Popen(
-        [*lower, *program, *arguments],
+        lowered((*program, *arguments), BACKGROUND),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,

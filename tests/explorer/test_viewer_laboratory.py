@@ -16,7 +16,8 @@ from explorer.viewer.laboratory.audit_panel import AuditPanel
 from explorer.viewer.laboratory.bench_panel import BenchPanel
 from explorer.viewer.laboratory.design_panel import DesignPanel
 from explorer.viewer.laboratory.laboratory_tab import LaboratoryTab
-from explorer.viewer.laboratory.photograph_panel import PhotographPanel, positive
+from explorer.viewer.laboratory.numbers import positive
+from explorer.viewer.laboratory.photograph_panel import PhotographPanel
 from explorer.viewer.laboratory.rig_panel import RigPanel
 from solver.assets import asset_path
 from tests.explorer.page_session import PageSession, finished

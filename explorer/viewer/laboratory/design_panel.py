@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import viser
@@ -15,6 +14,7 @@ from explorer.laboratory.answers import analysis_answer, sheet_answer
 from explorer.viewer.actions import Post
 from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.laboratory.answer_view import AnswerView
+from explorer.viewer.laboratory.numbers import number_or_none, positive
 from explorer.viewer.laboratory.upload_slot import UploadSlot
 from solver.assets import shipped_assets
 
@@ -72,24 +72,10 @@ class DesignPanel:
             generators=tuple(str(self._generators.value).split()),
         )
         factors = self._factors.chosen
-        sigma = float(self._sigma.value)
-        known = sigma if math.isfinite(sigma) and sigma > 0.0 else None
+        known = positive(self._sigma.value)
         self._background.start("making the sheet", lambda: sheet_answer(order, factors, known), self.sheet.show)
 
     def _analyse(self) -> None:
         target = number_or_none(str(self._target.value), "target")
         order = AnalyseOrder(self._filled.chosen, str(self._response.value).strip(), target)
         self._background.start("analysing the sheet", lambda: analysis_answer(order), self.analysis.show)
-
-
-def number_or_none(text: str, what: str) -> float | None:
-    """A number that a person typed, None for nothing; CommandError for anything else."""
-    if not text.strip():
-        return None
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        raise CommandError(f"{what} {text.strip()[:40]!r}: allowed is a number, or nothing")
-    return number

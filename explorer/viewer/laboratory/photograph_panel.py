@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from explorer.session import Session
 from explorer.viewer.actions import Post
 from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.laboratory.answer_view import AnswerView
+from explorer.viewer.laboratory.numbers import positive
 from explorer.viewer.laboratory.upload_slot import UploadSlot
 from solver.assets import shipped_assets
 
@@ -65,9 +65,3 @@ class PhotographPanel:
 
     def _ruler(self) -> Ruler:
         return Ruler(positive(self._scale.value), positive(self._bar.value))
-
-
-def positive(entered: object) -> float | None:
-    """A length that a person entered; None for 0, which stands for none, and for what is no number."""
-    number = float(entered) if isinstance(entered, int | float) else math.nan
-    return number if math.isfinite(number) and number > 0.0 else None
