@@ -12,6 +12,7 @@ import os
 import signal
 from collections import deque
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import TYPE_CHECKING, Any
@@ -21,6 +22,8 @@ from solver.scene import Scene
 if TYPE_CHECKING:
     from solver.record import Record
     from solver.run import Job
+    from solver.state import Capacity
+    from solver.world import Batch
 
 
 GONE = "a worker process has ended before its work was done"
@@ -104,11 +107,10 @@ def _work(pipe: Connection) -> None:
     # Ctrl-C reaches the whole group; the process in charge decides, and its end closes the pipe.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     from solver import backend
-    from solver.run import capacity_for, run_job
-    from solver.world import Batch
+    from solver.run import run_job
 
     backend.init(threads=1)
-    batch: Batch | None = None
+    rooms = Rooms()
     while True:
         try:
             order = pipe.recv()
@@ -116,13 +118,42 @@ def _work(pipe: Connection) -> None:
             return
         try:
             if isinstance(order, list):
-                batch = Batch(capacity_for(order, 1))
+                rooms.make(order)
                 continue
-            assert batch is not None, "room is made before the first job"
-            answer: Any = run_job(batch, order)
+            answer: Any = run_job(rooms.for_scene(order.scene), order)
         except Exception as error:  # whatever it is, the process in charge has to know
             answer = error
         try:
             pipe.send(answer)
         except BrokenPipeError:
             return
+
+
+class Rooms:
+    """A worker's batches of one world: a scene without effects runs in one that has none compiled in (0.8 of the time).
+
+    They are kept as long as they are large enough, since another size would compile anew.
+    """
+
+    def __init__(self) -> None:
+        self._capacity: Capacity | None = None
+        self._batches: dict[bool, Batch] = {}
+
+    def make(self, scenes: Sequence[Scene]) -> None:
+        """Make room for ``scenes``, and leave what is there."""
+        from solver.run import capacity_for
+
+        needed = capacity_for(scenes, 1)
+        self._capacity = needed if self._capacity is None else self._capacity.joined(needed)
+
+    def for_scene(self, scene: Scene) -> Batch:
+        """The batch for ``scene``."""
+        from solver.effects.columns import kernel_effects
+        from solver.world import Batch
+
+        assert self._capacity is not None, "room is made before the first job"
+        effects = kernel_effects(scene)
+        wanted = replace(self._capacity, effects=effects)
+        if effects not in self._batches or self._batches[effects].capacity != wanted:
+            self._batches[effects] = Batch(wanted)
+        return self._batches[effects]

@@ -4,7 +4,7 @@ Worlds are independent runs. Every array has the world as its leading axis; capa
 allocated, and a world that outgrows them stops with the outcome ``buffer_overflow``.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cache
 
 from solver.backend import ti
@@ -192,6 +192,12 @@ class Capacity:
     """Cells of all meshes' grids, and one more."""
     cell_items: int = 1
     """Triangles in those cells, counted once per cell."""
+
+    def joined(self, other: "Capacity") -> "Capacity":
+        """The least that holds what either holds."""
+        return Capacity(
+            **{field.name: max(getattr(self, field.name), getattr(other, field.name)) for field in fields(self)}
+        )
 
     @property
     def buckets(self) -> int:

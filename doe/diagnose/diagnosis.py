@@ -11,7 +11,7 @@ import numpy.typing as npt
 from doe.diagnose.decision.decide import diagnose
 from doe.diagnose.decision.verdict import Verdict
 from doe.diagnose.emulation.fresh_pours import FreshPours
-from doe.diagnose.follow_up.closer import LOOKS, contenders, leads, near_best, poured
+from doe.diagnose.follow_up.closer import LOOKS, contenders, leads, maybe_leads, near_best, poured
 from doe.diagnose.follow_up.confirm import Confirmed, Model, confirm, fitted
 from doe.diagnose.follow_up.held_out import HeldOut, compared, predictions, ruled_out, upheld
 from doe.diagnose.follow_up.holdout import HoldoutCondition, HoldoutError, holdout_errors
@@ -125,11 +125,18 @@ def pursued(
             say(f"wider range of {', '.join(names)}{why}: {found.kind}")
         return now, found
 
+    def followed(what: str, names: Sequence[str], number: int) -> tuple[Screened, Verdict]:
+        """Runs and verdict with ``number`` more settings of ``names``."""
+        if not names or number == 0:
+            return screened, verdict
+        now = continued(screened, what, names, number, model, say)
+        found = diagnose(now.declared, now.runs, observed)
+        say(f"after {what}: {found.kind}")
+        return now, found
+
+    screened, verdict = followed("second look", maybe_leads(verdict), budget.second_look)
     screened, verdict = widened(out_of_sight, ", which could not be seen")
-    if followed := leads(verdict):
-        screened = continued(screened, followed, model, budget, say)
-        verdict = diagnose(screened.declared, screened.runs, observed)
-        say(f"leads followed: {verdict.kind}")
+    screened, verdict = followed("leads", leads(verdict), budget.leads)
     fresh: tuple[FreshPours, ...] = ()
     for look in range(1 + LOOKS):
         screened, verdict = widened(at_edge, fresh=fresh)

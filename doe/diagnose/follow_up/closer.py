@@ -35,20 +35,30 @@ SCATTER = 0.15
 """Share of the box to either side of a fit over which its pours are scattered, so that they tell slopes as well."""
 STREAM = 2000
 """Seed of that sequence."""
-LEAD_SHARE = 0.5
-"""Share of the largest drop of T^2 from which on an effect counts as a lead after the screening."""
+MAYBE_SHARE, LEAD_SHARE = 0.25, 0.5
+"""Shares of the largest drop of T^2 from which on an effect gets a second look, and then counts as a lead."""
+
+
+def maybe_leads(verdict: Verdict) -> tuple[str, ...]:
+    """Effects that a first look does not rule out as leads."""
+    return taking_up(verdict, MAYBE_SHARE)
 
 
 def leads(verdict: Verdict) -> tuple[str, ...]:
-    """Effects that take up a good part of the residual, after a screening too thin to say how much they leave.
+    """The effects to follow after the second look."""
+    return taking_up(verdict, LEAD_SHARE)[:LEADS]
 
-    The criterion of a fit is not asked yet: from ten runs of an effect it may be off by more than what it has to tell.
+
+def taking_up(verdict: Verdict, share: float) -> tuple[str, ...]:
+    """Effects that take up ``share`` of what the best one does of the residual, in that order; none without a residual.
+
+    The criterion of a fit is not asked: from ten runs of an effect it may be off by more than what it has to tell.
     """
     drops = {row.name: row.drop for row in verdict.effects if row.status == "raced"}
     most = max(drops.values(), default=0.0)
     if verdict.kind == "no_missing_effect" or most <= 0.0:
         return ()
-    return tuple(sorted((name for name in drops if drops[name] >= LEAD_SHARE * most), key=lambda n: -drops[n])[:LEADS])
+    return tuple(sorted((name for name in drops if drops[name] >= share * most), key=lambda n: -drops[n]))
 
 
 def near_best(race: Sequence[FittedModel], number: int) -> tuple[FittedModel, ...]:

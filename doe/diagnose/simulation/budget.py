@@ -18,29 +18,36 @@ class Budget:
     middle: int = 16
     scaling: int = 2
     """At each end that the search for a range tries; those at the end that it finds count like the screening."""
-    screening: int = 8
+    screening: int = 4
     """Per effect with one amplitude; half as many again with two."""
+    second_look: int = 4
+    """More of each effect that the first look does not rule out as a lead, over its whole range."""
     leads: int = 8
-    """More of each lead, over its whole range."""
+    """More of each lead, likewise."""
     widened: int = 12
     """Of an effect over a wider range than the first."""
 
     def planned(self, effects: int, conditions: int) -> float:
-        """Pours of the emulator for effects of one amplitude, a range found at the first trial, and all leads."""
-        return conditions * (
-            self.base + self.middle + effects * (self.scaling + self.screening) + min(effects, LEADS) * self.leads
-        )
+        """Pours of the emulator for effects of one amplitude, ranges found at the first trial, and none ruled out."""
+        each = self.scaling + self.screening + self.second_look
+        return conditions * (self.base + self.middle + effects * each + min(effects, LEADS) * self.leads)
 
     def scaled(self, runs: int, effects: int, conditions: int) -> Budget:
-        """The same shares in about ``runs`` pours. Raises StatisticsError for fewer than ``LEAST`` takes."""
+        """The same shares in at most ``runs`` pours. Raises StatisticsError for fewer than ``LEAST`` takes."""
         least = LEAST.planned(effects, conditions)
         if runs < least:
             raise StatisticsError(
                 f"budget: {runs} pours; {effects} effects in {conditions} fitted conditions take at least {least:.0f}"
             )
         share = runs / self.planned(effects, conditions)
+        # What is held at its least is taken from the rest.
+        while (found := self._shares(share)).planned(effects, conditions) > runs:
+            share *= 0.98
+        return found
+
+    def _shares(self, share: float) -> Budget:
         return Budget(**{key: max(getattr(LEAST, key), round(share * value)) for key, value in vars(self).items()})
 
 
-LEAST = Budget(base=24, middle=10, scaling=2, screening=4, leads=4, widened=6)
+LEAST = Budget(base=24, middle=10, scaling=2, screening=4, second_look=0, leads=4, widened=6)
 """Below that there are fewer points than terms, or no covariance."""

@@ -56,10 +56,9 @@ def effect_points(
     """Points ``first`` … ``number`` - 1 of an effect's sequence; ``stream`` is its place in the list of effects."""
     axes = [(p.low, p.high) for p in parameters] + [(0.0, 1.0)] * effect.amplitudes
     rows = sobol(axes, number, EFFECT_STREAM + stream)
-    scale = "_".join(f"{bound:.6g}" for bound in effect.high)
-    k = len(parameters)
+    name, k = sequence(effect), len(parameters)
     return [
-        Point(f"{effect.name}@{scale}", n, row[:k], ((effect.name, amplitude_at(effect, row[k:])),))
+        Point(name, n, row[:k], ((effect.name, amplitude_at(effect, row[k:])),))
         for n, row in list(enumerate(rows))[first:]
     ]
 
@@ -71,11 +70,13 @@ def middle_points(parameters: tuple[Parameter, ...], number: int) -> list[Point]
 
 def scaling_points(parameters: tuple[Parameter, ...], effect: Effect, number: int) -> list[Point]:
     """Replicates with the effect at its full range, parameters in the middle."""
-    scale = "_".join(f"{bound:.6g}" for bound in effect.high)
-    return [
-        Point(f"{effect.name}@{scale} middle", k, middle(parameters), ((effect.name, full(effect)),))
-        for k in range(number)
-    ]
+    name = f"{sequence(effect)} middle"
+    return [Point(name, k, middle(parameters), ((effect.name, full(effect)),)) for k in range(number)]
+
+
+def sequence(effect: Effect) -> str:
+    """Name of the points of an effect over its present range; over another one they are others."""
+    return f"{effect.name}@{'_'.join(f'{bound:.6g}' for bound in effect.high)}"
 
 
 def amplitude_at(effect: Effect, unit: Sequence[float]) -> tuple[float, ...]:

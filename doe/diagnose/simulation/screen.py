@@ -1,4 +1,4 @@
-"""What is simulated, in order: the base model, how far each effect may go, all effects, leads, wider ranges.
+"""What is simulated, in order: the base model, how far each effect may go, all effects, those that may lead, leads.
 
 Measured values come in only in the choice of leads and of ranges to be widened; all the pours belong to the declared
 model.
@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from doe.diagnose.runs import Declared, Effect, Runs
 from doe.diagnose.simulation.budget import Budget
-from doe.diagnose.simulation.plan import Point, base_points, effect_points, middle_points, scaling_points
+from doe.diagnose.simulation.plan import Point, base_points, effect_points, middle_points, scaling_points, sequence
 from doe.diagnose.simulation.pours import ModelPours, Pour, as_runs
 from doe.diagnose.simulation.ranges import ranges
 
@@ -59,16 +59,18 @@ def screen(declared: Declared, model: ModelPours, budget: Budget, say: Say) -> S
     return Screened(declared, (*points, *asked), tuple(map(tuple, (*pours, *found_pours))))
 
 
-def continued(screened: Screened, names: Sequence[str], model: ModelPours, budget: Budget, say: Say) -> Screened:
-    """More settings of the effects ``names`` over their whole range, on in their sequences."""
+def continued(
+    screened: Screened, what: str, names: Sequence[str], number: int, model: ModelPours, say: Say
+) -> Screened:
+    """``number`` more settings of each of the effects ``names`` over their whole range, on in their sequences."""
     asked: list[Point] = []
     for stream, effect in enumerate(screened.declared.effects):
         if effect.name in names:
-            first = screening_number(effect, budget.screening)
-            number = first + screening_number(effect, budget.leads)
-            asked += effect_points(screened.declared.parameters, effect, stream, number, first)
-    pours = model.run("leads", asked)
-    say(f"leads: {len(asked)} more settings of {', '.join(names)}")
+            there = sum(point.sequence == sequence(effect) for point in screened.points)
+            more = screening_number(effect, number)
+            asked += effect_points(screened.declared.parameters, effect, stream, there + more, there)
+    pours = model.run(what, asked)
+    say(f"{what}: {len(asked)} more settings of {', '.join(names)}")
     return Screened(screened.declared, (*screened.points, *asked), (*screened.pours, *map(tuple, pours)))
 
 

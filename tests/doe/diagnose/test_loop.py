@@ -17,7 +17,7 @@ from solver import EFFECTS
 from solver.assets import measurement_folder
 
 NAMES = ("rolling_resistance", "air_drag", "plate_tilt", "density_error")
-BUDGET = Budget(base=48, middle=16, scaling=2, screening=16, widened=16)
+BUDGET = Budget(base=48, middle=16, scaling=2, screening=16, second_look=0, widened=16)
 
 
 def direction(name, size):

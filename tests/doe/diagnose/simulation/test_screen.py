@@ -41,12 +41,12 @@ def test_a_wider_range_asks_for_points_over_it_and_keeps_the_others():
 
 
 @pytest.mark.parametrize("runs", [144, 200, 300, 600, 3000])
-def test_a_budget_is_about_what_is_asked_for(runs):
-    """15 effects in one condition, as for the shipped trefoils: by itself 64 + 15 × 10 + 5 × 8 = 254 pours."""
+def test_a_budget_is_all_but_what_is_asked_for(runs):
+    """15 effects in one condition, as for the shipped trefoils: by itself 64 + 15 × (2 + 4 + 4) + 5 × 8 = 254 pours."""
     assert Budget().planned(15, 1) == 64 + 150 + 8 * LEADS == 254
     found = Budget().scaled(runs, 15, 1)
-    # What is rounded, or held at its least, adds up to at most this.
-    assert found.planned(15, 1) == pytest.approx(runs, abs=max(0.15 * runs, 26))
+    # Of what every effect gets alike nothing may be left out: steps of 15 pours, at most two at once.
+    assert runs - 30 <= found.planned(15, 1) <= runs
     assert all(getattr(found, key) >= value for key, value in vars(LEAST).items())
 
 
