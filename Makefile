@@ -38,7 +38,9 @@ test: .venv/.ready ## format check, lint, types, fast tests
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
-	$(BIN)/pytest
+	@# A file stays in one process; what is drawn in a browser is not fast enough beside other tests.
+	$(BIN)/pytest -m "not slow and not browser" -n auto --maxprocesses 4 --dist loadfile
+	$(BIN)/pytest -m "not slow and browser"
 
 slow: .venv/.ready ## the tests marked slow, but for those of `make peers`
 	$(BIN)/pytest -m "slow and not peers"

@@ -24,6 +24,7 @@ from solver.record import Outcome
 from solver.retune import Ramp
 from solver.scene import Scene
 from solver.snapshot import Arrays
+from solver.supply import Entry
 from solver.version import code_version
 from solver.world import Batch
 
@@ -31,7 +32,6 @@ PLAIN = (
     "dt",
     "energy_put_in",
     "_supplied",
-    "entered",
     "steps",
     "_time_base",
     "_steps_base",
@@ -39,7 +39,6 @@ PLAIN = (
     "samples",
     "_moving",
     "_quiet_samples",
-    "_last_entry",
     "_began",
     "_left",
     "_ramp_left",
@@ -69,15 +68,15 @@ def checkpoint_of(pour: Pour) -> Checkpoint:
     """The present state of ``pour``, between two launches."""
     decided: dict[str, Any] = {name: getattr(pour, name) for name in PLAIN}
     decided["outcome"] = pour.outcome.value
-    decided["random"] = pour._rng.bit_generator.state
+    decided["random"] = pour.supply.random.bit_generator.state
     decided["done"] = len(pour.rig.actions()) - len(pour._to_do)
     decided["table"] = pour._table.tolist()
     decided["ramp"] = None
     if pour._ramp is not None:
         decided["ramp"] = [pour._ramp.before.tolist(), pour._ramp.after.tolist(), pour._ramp.start]
     decided["entries"] = [
-        [time, step, pose.position.tolist(), pose.quaternion.tolist(), speed.tolist()]
-        for time, step, pose, speed in pour._entries
+        [time, step, pose.position.tolist(), pose.quaternion.tolist(), velocity.tolist()]
+        for time, step, pose, velocity in pour.supply.entries
     ]
     decided["free_surface"] = [[time, heights.tolist()] for time, heights in pour._free_surface]
     # A round trip now makes an unfit value fail here, and what is restored the same as what is read from a file.
@@ -97,16 +96,16 @@ def resumed(batch: Batch, w: int, scene: Scene, kept: Checkpoint) -> Pour:
     for name in PLAIN:
         setattr(pour, name, decided[name])
     pour.outcome = Outcome(decided["outcome"])
-    pour._rng.bit_generator.state = decided["random"]
+    pour.supply.random.bit_generator.state = decided["random"]
     pour._to_do = list(pour.rig.actions())[decided["done"] :]
     pour._inside = pour.container
     pour._table = np.array(decided["table"])
     if decided["ramp"] is not None:
         before, after, start = decided["ramp"]
         pour._ramp = Ramp(np.array(before), np.array(after), start)
-    pour._entries = [
-        (time, step, Pose(np.array(position), np.array(quaternion)), np.array(speed))
-        for time, step, position, quaternion, speed in decided["entries"]
+    pour.supply.entries = [
+        Entry(time, step, Pose(np.array(position), np.array(quaternion)), np.array(velocity))
+        for time, step, position, quaternion, velocity in decided["entries"]
     ]
     pour._free_surface = [(time, np.array(heights)) for time, heights in decided["free_surface"]]
     batch.set_law(w, pour._table)

@@ -14,11 +14,8 @@ import time as clock
 import numpy as np
 import numpy.typing as npt
 
-from solver import insertion
-from solver.clump import scaled
 from solver.contacts import Contacts, contacts_from
 from solver.effects.set_up import actual
-from solver.layout import layout
 from solver.observables.free_surface import surface_heights
 from solver.record import Bodies, Outcome, Phase, Record
 from solver.record_builder import (
@@ -33,18 +30,14 @@ from solver.record_builder import (
 )
 from solver.retune import RAMP_STEPS, RAMP_TIME, Ramp, spring_ratio
 from solver.rigs.rig import Container, Switch
-from solver.scene import Scene, body_counts, pour_rig
-from solver.sizes import drawn_sizes
+from solver.scene import Scene, pour_rig
+from solver.supply import Supply
 from solver.time_step import time_step
-from solver.verdict import Moment, verdict
+from solver.verdict import Moment, stalled, verdict
 from solver.world import SUMMARY_COLUMNS, Batch, law_table
 
 SETTLE_LIMIT = 1.0
 """``fill_then_open``: the rig acts this long [s] after the last body entered even if the fill still moves."""
-
-STALL_TIME = 0.5
-"""A container that has let nothing out for this long [s] is done, even if what is stuck in it rocks: twice the time
-that a body needs to fall through the funnel."""
 
 Summary = dict[str, float]
 
@@ -59,27 +52,20 @@ class Pour:
         scene = actual(scene)
         self.batch, self.w, self.scene, self.seed = batch, w, scene, seed
         self.rig = pour_rig(scene)
-        self._rng = np.random.default_rng(seed)
-        self.order = insertion.shuffled_components(body_counts(scene), self._rng)
-        sizes = drawn_sizes([body.sizes for body in scene.bodies], self.order, seed)
-        self._layout = layout(scene, self.order, sizes)
+        self.supply = Supply(scene, seed)
         self.dt = time_step(scene)
-        batch.load(w, scene, self._layout, self.dt, (True,) * len(self.rig.surfaces()))
-        self._due = insertion.entry_times(self._layout.numbers[:, 0], scene.insertion.rate) - scene.insertion.lead
+        batch.load(w, scene, self.supply.layout, self.dt, (True,) * len(self.rig.surfaces()))
         self._table = law_table(scene)
         self._ramp: Ramp | None = None
         self._ramp_left = 0
         self.energy_put_in = 0.0
         self._supplied = 0.0
-        self.entered = 0
-        self._entries: list[tuple[float, int, insertion.Pose, npt.NDArray[np.float64]]] = []
         self.steps = 0
         self._time_base, self._steps_base = 0.0, 0
         self.outcome, self.message = Outcome.RUNNING, ""
         self.samples: list[Summary] = []
         self._free_surface: list[tuple[float, npt.NDArray[np.float64]]] = []
         self._moving, self._quiet_samples = 0.0, 0
-        self._last_entry = 0.0
         self._began: float | None = None if scene.insertion.protocol == "fill_then_open" else 0.0
         self._to_do, self._inside = list(self.rig.actions()), self.container
         self._act()
@@ -93,9 +79,9 @@ class Pour:
         return self._time_base + (self.steps - self._steps_base) * self.dt
 
     @property
-    def poured_mass(self) -> float:
-        """Mass of all bodies of this pour [kg]."""
-        return float(self._layout.numbers[:, 0].sum())
+    def entered(self) -> int:
+        """Number of bodies that have entered."""
+        return self.supply.entered
 
     @property
     def gate_shut(self) -> bool:
@@ -117,7 +103,7 @@ class Pour:
         """Where the pour is."""
         if self.outcome == Outcome.AT_REST:
             return Phase.AT_REST
-        if self.entered < len(self.order) or self.gate_shut:
+        if self.supply.missing > 0 or self.gate_shut:
             return Phase.FILL
         if self.rig.running_time is not None:
             return Phase.RUN
@@ -176,14 +162,14 @@ class Pour:
     def move_to(self, batch: Batch) -> None:
         """Go on in ``batch``, in the same world, with the same bits: for instance in one with effects compiled in."""
         kept = self.batch.take(self.w)
-        batch.load(self.w, self.scene, self._layout, self.dt, (True,) * len(self.rig.surfaces()))
+        batch.load(self.w, self.scene, self.supply.layout, self.dt, (True,) * len(self.rig.surfaces()))
         batch.set_law(self.w, self._table)
         batch.put(self.w, kept)
         self.batch = batch
 
     def bodies(self) -> Bodies:
         """Present state of all bodies that have entered."""
-        return bodies_of(self.scene, self.order, self._layout, self.batch.bodies(self.w, self.entered))
+        return bodies_of(self.scene, self.supply.order, self.supply.layout, self.batch.bodies(self.w, self.entered))
 
     def surface_poses(self) -> npt.NDArray[np.float64]:
         """Where the rig's surfaces are: origin [m] and orientation wxyz, shape (k, 7)."""
@@ -193,15 +179,10 @@ class Pour:
         """Present contacts of the bodies, with each other and with the rig."""
         return contacts_from(self.batch.contacts(self.w))
 
-    @property
-    def entry_times(self) -> npt.NDArray[np.float64]:
-        """When the bodies entered [s], in order of entry."""
-        return np.array([time for time, *_ in self._entries], dtype=float)
-
     def record(self) -> Record:
         """What the run leaves behind."""
         state = self.batch.bodies(self.w, self.entered)
-        bodies = bodies_of(self.scene, self.order, self._layout, state)
+        bodies = bodies_of(self.scene, self.supply.order, self.supply.layout, state)
         spheres = member_spheres(self.scene, bodies)
         # What rolls away is no part of a pile at rest; at a given moment it lies where it is, for a camera as well.
         rolling = None if self.scene.numerics.duration > 0.0 else rolling_away(self.scene, self.container, state)
@@ -216,9 +197,9 @@ class Pour:
             pile=measured_from(pile, self.scene.axis),
             free_surface=free_surface_of(self.rig.watch, self._free_surface),
             trace=trace_of(self.samples),
-            entries=entries_of(self.order, self._entries),
+            entries=entries_of(self.supply.order, self.supply.entries),
             gate_opened=self.gate_opened,
-            poured_mass=self.poured_mass,
+            poured_mass=self.supply.mass,
             dt=self.dt,
             steps=self.steps,
             wall_s=clock.perf_counter() - self._started,
@@ -233,27 +214,12 @@ class Pour:
         return max(1, interval)
 
     def _insert(self) -> None:
-        if self._began is not None and not self.rig.refills:
+        if (self._began is not None and not self.rig.refills) or not self.supply.due(self.time):
             return
-        if self.entered == len(self.order) or self._due[self.entered] > self.time:
-            return
-        feed = self.rig.feed()
-        speed = np.array([0.0, 0.0, -self.scene.insertion.drop_speed])
-        spheres = member_spheres(self.scene, self.bodies())
-        near = spheres.centre[:, 2] + spheres.radius > feed.floor
-        centres, radii = spheres.centre[near], spheres.radius[near]
-        while self.entered < len(self.order) and self._due[self.entered] <= self.time:
-            clump = scaled(self.scene.bodies[self.order[self.entered]].clump, self._layout.scale[self.entered])
-            pose = insertion.find_place(clump, self.scene.insertion, feed, centres, radii, self._rng)
-            if pose is None:
-                return
-            centres = np.concatenate([centres, pose.position + insertion.turned(clump.centres, pose.quaternion)])
-            radii = np.concatenate([radii, clump.radii])
-            self.batch.enter(self.w, self.entered, pose.position, pose.quaternion, speed, np.zeros(3))
-            self._entries.append((self.time, self.steps, pose, speed))
-            self._supplied += self._mechanical_energy(self.entered, pose.position, speed)
-            self.entered += 1
-            self._last_entry = self.time
+        there = member_spheres(self.scene, self.bodies())
+        for b, entry in self.supply.placed(self.rig.feed(), there, self.time, self.steps):
+            self.batch.enter(self.w, b, entry.pose.position, entry.pose.quaternion, entry.velocity, np.zeros(3))
+            self._supplied += self._mechanical_energy(b, entry.pose.position, entry.velocity)
 
     def _act(self) -> None:
         """Carry out what the rig has to do by now."""
@@ -272,13 +238,13 @@ class Pour:
 
     def _mechanical_energy(self, b: int, position: npt.NDArray[np.float64], velocity: npt.NDArray[np.float64]) -> float:
         """Kinetic and potential energy [J] of body ``b`` that does not turn."""
-        mass, gravity = self._layout.numbers[b, 0], np.array(self.scene.gravity)
+        mass, gravity = self.supply.layout.numbers[b, 0], np.array(self.scene.gravity)
         return float(mass * (0.5 * velocity @ velocity - gravity @ position))
 
     def _sample(self, row: Summary) -> None:
         row["time"] = self.time
         row["supplied"] = self._supplied
-        row["entered"] = float(self._layout.numbers[: self.entered, 0].sum())
+        row["entered"] = self.supply.entered_mass
         row["lost"] = float(self.batch.take_out(self.w))
         self.samples.append(row)
         self._insert()
@@ -286,8 +252,8 @@ class Pour:
         self._quiet_samples = self._quiet_samples + 1 if self._moving < self.scene.numerics.rest_speed else 0
         self._watch()
         self.outcome, self.message = verdict(self.rig, self.scene.numerics, self._moment(row))
-        waiting = self.time > self._last_entry + SETTLE_LIMIT
-        if self.gate_shut and (self._all_in() or self._blocked()) and (self._quiet() or waiting):
+        waiting = self.time > self.supply.last_entry + SETTLE_LIMIT
+        if self.gate_shut and (self.supply.missing == 0 or self._blocked()) and (self._quiet() or waiting):
             self._began, self._quiet_samples = self.time, 0
         self._act()
 
@@ -302,20 +268,9 @@ class Pour:
         numerics = self.scene.numerics
         return self._quiet_samples * numerics.sample_interval >= numerics.rest_time
 
-    def _all_in(self) -> bool:
-        return self.entered == len(self.order)
-
     def _blocked(self) -> bool:
         """The next body has been due for long and finds no place: the rig is full to the feed opening."""
-        return not self._all_in() and self.time > self._due[self.entered] + SETTLE_LIMIT
-
-    def _stalled(self) -> bool:
-        """Nothing has left the container for ``STALL_TIME``, although it could."""
-        since = self.time - max(self._last_entry, self.gate_opened)
-        back = math.ceil(STALL_TIME / self.scene.numerics.sample_interval)
-        if since <= STALL_TIME or len(self.samples) <= back:
-            return False
-        return self.samples[-1 - back]["discharged"] == self.samples[-1]["discharged"]
+        return self.supply.overdue(self.time, SETTLE_LIMIT)
 
     def _moment(self, row: Summary) -> Moment:
         return Moment(
@@ -323,10 +278,10 @@ class Pour:
             row=row,
             acting=None if self._began is None else self.time - self._began,
             acted=not self._to_do,
-            missing=len(self.order) - self.entered,
+            missing=self.supply.missing,
             blocked=self._blocked(),
             quiet=self._quiet(),
-            stalled=self._stalled(),
+            stalled=stalled(self.samples, self.scene.numerics, max(self.supply.last_entry, self.gate_opened)),
             speed=self._moving,
             room=self.batch.capacity.contacts,
         )

@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from solver.insertion import Pose, rotation_matrix
+from solver.insertion import rotation_matrix
 from solver.layout import Layout
 from solver.numerics import ROLLING_SLOPE
 from solver.observables.free_surface import column_places
 from solver.record import Bodies, Entries, FreeSurface, Pile, Spheres, Trace
 from solver.rigs.rig import Container, Watch
 from solver.scene import Scene
+from solver.supply import Entry
 
 Array = npt.NDArray[np.float64]
 
@@ -123,14 +124,14 @@ def trace_of(samples: list[dict[str, float]]) -> Trace:
     )
 
 
-def entries_of(order: npt.NDArray[np.int32], log: list[tuple[float, int, Pose, Array]]) -> Entries:
-    """How bodies entered, from the log (time [s], steps done, pose, velocity [m/s]) of a run."""
+def entries_of(order: npt.NDArray[np.int32], log: list[Entry]) -> Entries:
+    """How bodies entered, from the log of a run."""
     n = len(log)
     return Entries(
-        time=np.array([time for time, *_ in log], dtype=float),
-        step=np.array([step for _, step, *_ in log], dtype=np.int32),
+        time=np.array([entry.time for entry in log], dtype=float),
+        step=np.array([entry.step for entry in log], dtype=np.int32),
         component=order[:n].copy(),
-        position=np.array([pose.position for _, _, pose, _ in log], dtype=float).reshape(n, 3),
-        quaternion=np.array([pose.quaternion for _, _, pose, _ in log], dtype=float).reshape(n, 4),
-        velocity=np.array([velocity for *_, velocity in log], dtype=float).reshape(n, 3),
+        position=np.array([entry.pose.position for entry in log], dtype=float).reshape(n, 3),
+        quaternion=np.array([entry.pose.quaternion for entry in log], dtype=float).reshape(n, 4),
+        velocity=np.array([entry.velocity for entry in log], dtype=float).reshape(n, 3),
     )

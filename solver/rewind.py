@@ -14,9 +14,7 @@ from solver.moving_state import Moving
 from solver.pour import Pour
 from solver.scene import Scene
 
-GROWING = ("samples", "_entries", "_free_surface")
-"""Lists that only grow, so that their length is enough to have them as they were."""
-DECIDED = (*(name for name in PLAIN if name not in GROWING), "outcome", "_table", "_ramp", "_inside")
+DECIDED = (*(name for name in PLAIN if name != "samples"), "outcome", "_table", "_ramp", "_inside")
 """What a pour has decided, in values that it replaces and never changes."""
 
 
@@ -29,7 +27,7 @@ class Kept:
     scene: Scene
     """With the parameters that were in force."""
     decided: Mapping[str, Any]
-    lengths: Mapping[str, int]
+    lengths: tuple[int, ...]
     to_do: tuple[Any, ...]
     random: Mapping[str, Any]
     world: Moving
@@ -40,16 +38,21 @@ class Kept:
         return self.world.nbytes
 
 
+def growing(pour: Pour) -> tuple[list[Any], ...]:
+    """Lists that only grow, so that their length is enough to have them as they were."""
+    return pour.samples, pour.supply.entries, pour._free_surface
+
+
 def keep(pour: Pour) -> Kept:
     """The present moment of ``pour``, between two launches."""
-    places = pour._layout
+    places = pour.supply.layout
     return Kept(
         time=pour.time,
         scene=pour.scene,
         decided={name: getattr(pour, name) for name in DECIDED},
-        lengths={name: len(getattr(pour, name)) for name in GROWING},
+        lengths=tuple(map(len, growing(pour))),
         to_do=tuple(pour._to_do),
-        random=pour._rng.bit_generator.state,
+        random=pour.supply.random.bit_generator.state,
         world=pour.batch.take_moving(pour.w, len(places.numbers), len(places.spheres)),
     )
 
@@ -58,11 +61,11 @@ def put_back(pour: Pour, kept: Kept) -> None:
     """Bring ``pour`` back to ``kept``, one of its earlier moments; what came after is forgotten."""
     for name, found in kept.decided.items():
         setattr(pour, name, found)
-    for name, length in kept.lengths.items():
-        del getattr(pour, name)[length:]
+    for rows, length in zip(growing(pour), kept.lengths, strict=True):
+        del rows[length:]
     pour.scene = kept.scene
     pour._to_do = list(kept.to_do)
-    pour._rng.bit_generator.state = kept.random
+    pour.supply.random.bit_generator.state = kept.random
     # These two wake every body; what follows puts the sleepers back to sleep.
     pour.batch.set_law(pour.w, pour._table)
     pour.batch.set_effects(pour.w, kept.scene)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from solver.numerics import Numerics
@@ -12,6 +12,9 @@ from solver.rigs.rig import PourRig
 
 Verdict = tuple[Outcome, str]
 RUNNING: Verdict = (Outcome.RUNNING, "")
+STALL_TIME = 0.5
+"""A container that has let nothing out for this long [s] is done, even if what is stuck in it rocks: twice the time
+that a body needs to fall through the funnel."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,14 @@ def verdict(rig: PourRig, numerics: Numerics, moment: Moment) -> Verdict:
     if moment.time >= numerics.max_time:
         return Outcome.TIME_LIMIT, f"still moving at {moment.speed:.3g} m/s after {numerics.max_time:g} s"
     return RUNNING
+
+
+def stalled(samples: Sequence[Mapping[str, float]], numerics: Numerics, since: float) -> bool:
+    """Whether nothing has left the container for ``STALL_TIME``, of those ``samples`` after the time ``since`` [s]."""
+    back = math.ceil(STALL_TIME / numerics.sample_interval)
+    if not samples or samples[-1]["time"] - since <= STALL_TIME or len(samples) <= back:
+        return False
+    return samples[-1 - back]["discharged"] == samples[-1]["discharged"]
 
 
 def _broken(numerics: Numerics, moment: Moment) -> Verdict:

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from solver import moving_state, snapshot
 from solver.body import Body
 from solver.effects.columns import effect_table, kernel_effects, reach_of_pulls
-from solver.kernels import exchange, touching
+from solver.kernels import changing, loading, reading, touching
 from solver.kernels.batch import advance, measure, take_out
 from solver.laws.hertz_mindlin import constants
 from solver.layout import Layout
@@ -85,8 +85,8 @@ class Batch:
         settings = [dt, numerics.skin, cell, sleep_speed, numerics.sleep_time]
         inside = rig.container(0.0)
         settings += [rig.domain_half_width, inside.height, inside.radius, *scene.gravity]
-        exchange.load_world(s, w, np.array(settings))
-        exchange.load_bodies(s, w, bodies.numbers, bodies.places, bodies.spheres, bodies.owner)
+        loading.load_world(s, w, np.array(settings))
+        loading.load_bodies(s, w, bodies.numbers, bodies.places, bodies.spheres, bodies.owner)
         self._load_walls(w, scene, wall_tables(rig.surfaces()), active)
         self._scenes[w] = scene
         self.set_law(w, law_table(scene))
@@ -102,7 +102,7 @@ class Batch:
     def set_law(self, w: int, table: Array) -> None:
         """Replace the contact constants (see :func:`law_table`); wakes all bodies."""
         kinds = len(table)
-        exchange.load_law(self._s, w, np.ascontiguousarray(table.reshape(kinds * kinds, -1)), kinds)
+        changing.load_law(self._s, w, np.ascontiguousarray(table.reshape(kinds * kinds, -1)), kinds)
 
     def set_effects(self, w: int, scene: Scene) -> None:
         """Replace the parameters of contact and body effects by those of ``scene``; wakes all bodies.
@@ -114,42 +114,42 @@ class Batch:
         walls = wall_materials(scene)
         table = effect_table(scene, walls)
         rows = np.ascontiguousarray(table.reshape(-1, table.shape[-1]))
-        exchange.load_effects(self._s, w, rows, reach_of_pulls(scene, walls))
+        changing.load_effects(self._s, w, rows, reach_of_pulls(scene, walls))
 
     def set_time_step(self, w: int, dt: float) -> None:
         """Replace the time step [s]."""
-        exchange.set_time_step(self._s, w, dt)
+        changing.set_time_step(self._s, w, dt)
 
     def set_sleep(self, w: int, speed: float, time: float) -> None:
         """Replace ``numerics.sleep_speed`` [m/s] (0: no body sleeps) and ``sleep_time`` [s]; wakes all bodies."""
-        exchange.set_sleep(self._s, w, speed, time)
+        changing.set_sleep(self._s, w, speed, time)
 
     def set_gravity(self, w: int, gravity: Sequence[float]) -> None:
         """Replace gravity [m/s²]; wakes all bodies."""
-        exchange.set_gravity(self._s, w, *(float(g) for g in gravity))
+        changing.set_gravity(self._s, w, *(float(g) for g in gravity))
 
     def scale_springs(self, w: int, ratio: Array) -> None:
         """Multiply tangential springs by ``ratio[kind, kind]``."""
-        exchange.scale_springs(self._s, w, np.ascontiguousarray(ratio.ravel()))
+        changing.scale_springs(self._s, w, np.ascontiguousarray(ratio.ravel()))
 
     def enter(self, w: int, b: int, position: Array, quaternion: Array, velocity: Array, spin: Array) -> None:
         """Let body ``b`` enter (or put it somewhere else): SI, quaternion wxyz, spin in the principal frame."""
         pose = np.concatenate([position, quaternion, velocity, spin]).astype(float)
-        exchange.load_state(self._s, w, b, pose)
+        changing.load_state(self._s, w, b, pose)
 
     def set_active(self, w: int, wall: int, active: bool) -> None:
         """Switch a surface on or off; wakes all bodies."""
-        exchange.set_active(self._s, w, wall, int(active))
+        changing.set_active(self._s, w, wall, int(active))
 
     def set_motion(self, w: int, wall: int, velocity: Sequence[float], angular_velocity: Sequence[float]) -> None:
         """Let a surface move: ``velocity`` [m/s] of its pose's origin, ``angular_velocity`` [rad/s, world] about it."""
         rig = self._scenes[w].rig
         reach = extent(rig.surfaces()[wall], angular_velocity, rig.domain_half_width)
-        exchange.set_motion(self._s, w, wall, np.array([*velocity, *angular_velocity, reach], dtype=float))
+        changing.set_motion(self._s, w, wall, np.array([*velocity, *angular_velocity, reach], dtype=float))
 
     def set_container(self, w: int, inside: Container) -> None:
         """What counts as inside the rig from now on (a cylinder that is lifted takes its inside along)."""
-        exchange.set_container(self._s, w, inside.height, inside.radius)
+        changing.set_container(self._s, w, inside.height, inside.radius)
 
     def run(self, steps: Ints) -> None:
         """Run world w for ``steps[w]`` steps."""
@@ -169,19 +169,19 @@ class Batch:
     def summary(self) -> Array:
         """One row per world, columns ``SUMMARY_COLUMNS``, as of the last launch."""
         out = np.zeros((self.capacity.worlds, len(SUMMARY_COLUMNS)))
-        exchange.read_summary(self._s, out)
+        reading.read_summary(self._s, out)
         return out
 
     def take_out(self, w: int) -> int:
         """Take bodies out that left the domain, and start looking for the largest overlap anew; returns the lost."""
-        exchange.clear_overlap(self._s, w)
+        changing.clear_overlap(self._s, w)
         return int(take_out(self._s, w))
 
     def bodies(self, w: int, n: int) -> Array:
         """First ``n`` bodies: position 0:3, quaternion 3:7, velocity 7:10, spin 10:13, alive, touching, asleep."""
         out = np.zeros((n, 16))
         if n:
-            exchange.read_bodies(self._s, w, out)
+            reading.read_bodies(self._s, w, out)
         return out
 
     def contacts(self, w: int) -> Array:
@@ -198,7 +198,7 @@ class Batch:
         The pose is that after the last step, force [N] and torque about the origin [N m] are those at its beginning.
         """
         out = np.zeros((len(self._scenes[w].rig.surfaces()), 19))
-        exchange.read_walls(self._s, w, out)
+        reading.read_walls(self._s, w, out)
         return out
 
     def take(self, w: int) -> Arrays:
@@ -221,8 +221,8 @@ class Batch:
         s, walls = self._s, wall_materials(scene)
         kinds = [len(scene.bodies) + walls.index(surface.material) for surface in scene.rig.surfaces()]
         marks = np.array(list(zip(kinds, map(int, active), strict=True)), dtype=np.int32)
-        exchange.load_walls(s, w, tables.poses, marks, tables.grids, tables.cells)
-        exchange.load_surfaces(s, w, tables.geometry, tables.surfaces, tables.primitives)
+        loading.load_walls(s, w, tables.poses, marks, tables.grids, tables.cells)
+        loading.load_surfaces(s, w, tables.geometry, tables.surfaces, tables.primitives)
         if len(tables.corners):
-            exchange.load_triangles(s, w, tables.corners, tables.guards, tables.triangles)
-            exchange.load_cells(s, w, tables.first, tables.items)
+            loading.load_triangles(s, w, tables.corners, tables.guards, tables.triangles)
+            loading.load_cells(s, w, tables.first, tables.items)

@@ -146,10 +146,10 @@ class LivePour:
             dt_limit=self._dt_limit,
             earliest=self._history.earliest,
             bodies=pour.entered,
-            bodies_planned=len(pour.order),
+            bodies_planned=len(pour.supply.order),
             entered_mass=sample["entered"],
             discharged_mass=sample["discharged"],
-            poured_mass=pour.poured_mass,
+            poured_mass=pour.supply.mass,
             kinetic_energy=sample["kinetic"],
             contacts=round(sample["touching"]),
             gate_shut=pour.gate_shut,
@@ -229,7 +229,7 @@ class LivePour:
     def _observe(self) -> None:
         pour = self._pour
         if pour.outcome != Outcome.NON_FINITE:
-            share_below = self._sample()["discharged"] / pour.poured_mass
+            share_below = self._sample()["discharged"] / pour.supply.mass
             running = pour.outcome == Outcome.RUNNING and not self._paused
             read = self._angles.ask if running else self._angles.read
             read(pour.record().pile, share_below, pour.time)

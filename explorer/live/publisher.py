@@ -52,4 +52,4 @@ class Publisher:
         self._detailed = wall
         if self._watch.wanted and pour.outcome != Outcome.NON_FINITE:
             bodies, contacts = pour.bodies(), pour.contacts()
-            self._details.publish(generation, pour.time, bodies, pour.entry_times, contacts, self._watch.body)
+            self._details.publish(generation, pour.time, bodies, pour.supply.times, contacts, self._watch.body)

@@ -40,10 +40,10 @@ def measure_pour(case: str, scene: Scene, seed: int, duration: float | None, sle
     wall = time.perf_counter() - begin
     if pour.outcome not in (Outcome.AT_REST, Outcome.TIME_LIMIT, Outcome.JAMMED):
         raise RuntimeError(f"{case}: the pour ended with {pour.outcome}: {pour.message}")
-    spheres = sum(len(scene.bodies[k].clump.radii) for k in pour.order)
+    spheres = sum(len(scene.bodies[k].clump.radii) for k in pour.supply.order)
     name = "ours" if sleeping else "ours, nothing sleeps"
     return Measurement(
-        case, name, len(pour.order), spheres, pour.steps, wall, pour.time, contacts[-1], float(np.mean(contacts))
+        case, name, len(pour.supply.order), spheres, pour.steps, wall, pour.time, contacts[-1], float(np.mean(contacts))
     )
 
 

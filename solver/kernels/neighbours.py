@@ -1,15 +1,16 @@
 """The contact list of a world: pairs of member spheres, and spheres near a surface, that may touch soon.
 
-Bodies are found by a hashed grid, then sorted out by bounding boxes, then member against box, then member against
-member, so the cost grows with the number of bodies. The list reaches as far as a pull may hold (``grip``) and the skin
-beyond; it holds while no two points have approached by more than the skin. Tangential springs, and what effects keep
-of a contact, are carried over by merging two ordered lists.
+Bodies near each other are found by the body grid, then sorted out member against box, then member against member, so
+the cost grows with the number of bodies. The list reaches as far as a pull may hold (``grip``) and the skin beyond; it
+holds while no two points have approached by more than the skin. Tangential springs, and what effects keep of a contact,
+are carried over by merging two ordered lists.
 """
 
 from solver.backend import ti
+from solver.kernels.body_grid import bound, fill_grid, find_near
 from solver.kernels.geometry import nearest_on_triangle, offset, rotation
 from solver.kernels.walls import from_primitive, into_wall
-from solver.state import Ints3, Vec3
+from solver.state import Vec3
 
 
 @ti.func
@@ -42,67 +43,6 @@ def place_members(s: ti.template(), w, b, every: ti.template()):
             s.member.centre[w, m] = origin + turn @ s.member.local[w, m]
         elif s.member.listed[w, m] == 1:
             s.member.centre[w, m] = origin + turn @ s.member.local[w, m]
-
-
-@ti.func
-def bound(s: ti.template(), w, b):
-    """Bounding box of one body, from its member spheres, none of which is listed yet."""
-    low, high = s.body.position[w, b], s.body.position[w, b]
-    for m in range(s.body.first[w, b], s.body.first[w, b] + s.body.members[w, b]):
-        s.member.listed[w, m] = 0
-        r = Vec3(1.0, 1.0, 1.0) * s.member.radius[w, m]
-        low = ti.min(low, s.member.centre[w, m] - r)
-        high = ti.max(high, s.member.centre[w, m] + r)
-    s.body.low[w, b] = low
-    s.body.high[w, b] = high
-
-
-@ti.func
-def bucket(s: ti.template(), c):
-    """Hash of a cell's whole-number coordinates (Teschner et al. 2003, Optimized spatial hashing)."""
-    return ((c[0] * 73856093) ^ (c[1] * 19349663) ^ (c[2] * 83492791)) & (s.grid.bucket.shape[1] - 1)
-
-
-@ti.func
-def fill_grid(s: ti.template(), w):
-    """Sort the bodies into the hashed grid by their centres. A cell is as long as the largest body and the skin."""
-    for h in range(s.grid.bucket.shape[1]):
-        s.grid.bucket[w, h] = -1
-    for b in range(s.world.bodies[w]):
-        if s.body.alive[w, b] == 1:
-            h = bucket(s, ti.floor(s.body.position[w, b] / s.world.cell[w], ti.i32))
-            s.body.next[w, b] = s.grid.bucket[w, h]
-            s.grid.bucket[w, h] = b
-
-
-@ti.func
-def find_near(s: ti.template(), w, a):
-    """Bodies after ``a`` whose bounding boxes are within the skin of its own, ascending; returns how many."""
-    skin = s.world.skin[w] + s.world.grip[w]
-    low, high = s.body.low[w, a] - skin, s.body.high[w, a] + skin
-    home = ti.floor(s.body.position[w, a] / s.world.cell[w], ti.i32)
-    near = 0
-    for c in range(27):
-        h = bucket(s, home + Ints3(c % 3 - 1, (c // 3) % 3 - 1, c // 9 - 1))
-        b = s.grid.bucket[w, h]
-        while b > a:  # a bucket's bodies descend
-            other_low, other_high = s.body.low[w, b], s.body.high[w, b]
-            apart = 0
-            for d in ti.static(range(3)):
-                if other_low[d] > high[d] or other_high[d] < low[d]:
-                    apart = 1
-            if apart == 0:
-                # Keep the list ascending; two cells may share a bucket, and a body come twice.
-                at = near
-                while at > 0 and s.body.near[w, at - 1] > b:
-                    at -= 1
-                if at == 0 or s.body.near[w, at - 1] != b:
-                    for k in range(near - at):
-                        s.body.near[w, near - k] = s.body.near[w, near - k - 1]
-                    s.body.near[w, at] = b
-                    near += 1
-            b = s.body.next[w, b]
-    return near
 
 
 @ti.func

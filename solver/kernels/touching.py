@@ -2,7 +2,7 @@
 
 from solver.backend import serial, ti
 from solver.effects.columns import HERTZ
-from solver.kernels.contacts import lasts, meet
+from solver.kernels.meeting import lasts, meet
 from solver.laws.hertz_mindlin import normal_spring_force
 from solver.state import Vec3
 

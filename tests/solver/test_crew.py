@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from solver import load_material, with_values
-from solver.crew import Crew
+from solver.crew import Crew, Rooms
 from solver.run import Job, run_pours
 
 HEAP = with_values(
@@ -64,3 +64,26 @@ def test_nothing_is_left_after_close():
     ((process, _),) = crew._workers
     crew.close()
     assert process.exitcode == 0
+
+
+def test_a_scene_without_effects_in_the_kernels_has_a_room_without_them(taichi):
+    """Whatever else was asked for; a tilt is a matter of the set-up and needs none."""
+    rolling = with_values(HEAP, {"effect.rolling_resistance.rolling_friction": 0.1})
+    tilted = with_values(HEAP, {"effect.plate_tilt.tilt_x": 2.0})
+    rooms = Rooms()
+    rooms.make([rolling, HEAP])
+    assert rooms.for_scene(rolling).capacity.effects
+    assert not rooms.for_scene(HEAP).capacity.effects
+    assert rooms.for_scene(tilted) is rooms.for_scene(HEAP)
+
+
+def test_a_room_is_kept_until_it_is_too_small(taichi):
+    rooms = Rooms()
+    rooms.make([HEAP])
+    first = rooms.for_scene(HEAP)
+    rooms.make([with_values(HEAP, {"rig.mass": 0.001})])
+    assert rooms.for_scene(HEAP) is first
+    larger = with_values(HEAP, {"rig.mass": 0.02})
+    rooms.make([larger])
+    assert rooms.for_scene(larger).capacity.bodies > first.capacity.bodies
+    assert rooms.for_scene(HEAP) is rooms.for_scene(larger)

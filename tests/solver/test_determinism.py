@@ -95,7 +95,7 @@ def test_looking_changes_nothing(alone):
 def test_an_interrupted_pour_with_sleepers_ends_in_the_same_bits():
     """A pile some of which sleeps, kept and put back into another slot: bits of bodies, sums, and forces on walls."""
     pour = Pour(Batch(room(1)), 0, HEAP, 1)
-    while pour.entered < len(pour.order) or pour.samples[-1]["asleep"] < 8:
+    while pour.entered < len(pour.supply.order) or pour.samples[-1]["asleep"] < 8:
         steps = pour.steps_due()
         pour.after(steps, pour.batch.advance(np.array([steps], dtype=np.int32))[0])
     kept, n, steps = pour.batch.take(0), pour.entered, 20_000

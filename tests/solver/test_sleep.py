@@ -32,7 +32,7 @@ def heap(taichi):
     pour = Pour(Batch(capacity_for([HEAP], 1)), 0, HEAP, 3)
     while n := pour.steps_due():
         pour.after(n, pour.batch.advance(np.array([n], dtype=np.int32))[0])
-    assert pour.batch.measure(0)[0, ASLEEP] == pour.entered == len(pour.order)
+    assert pour.batch.measure(0)[0, ASLEEP] == pour.entered == len(pour.supply.order)
     return pour, pour.batch.take(0), pour.batch.bodies(0, pour.entered)
 
 
@@ -41,7 +41,7 @@ def pile(heap):
     """The batch with that pile in its world 0, as it was."""
     pour, kept, _ = heap
     pour.batch = Batch(pour.batch.capacity)  # other tests may have used the arrays
-    pour.batch.load(0, HEAP, pour._layout, pour.dt, (True, True, False))
+    pour.batch.load(0, HEAP, pour.supply.layout, pour.dt, (True, True, False))
     pour.batch.put(0, kept)
     return pour.batch
 
@@ -124,11 +124,11 @@ def test_the_fill_sleeps_on_the_gate_and_falls_when_it_opens():
         pour.after(n, row)
     assert row[ASLEEP] > 0.8 * pour.entered
     gate = -pour.batch.surface_state(0)[pour.rig.surface_names.index("gate"), 15]
-    assert 0.05 < gate / (9.81 * pour.poured_mass) < 1.0  # the cone carries the rest
+    assert 0.05 < gate / (9.81 * pour.supply.mass) < 1.0  # the cone carries the rest
     row = onward(pour.batch, round(0.1 / pour.dt))
     assert row[ASLEEP] < 0.2 * pour.entered
     assert pour.batch.surface_state(0)[pour.rig.surface_names.index("gate"), 15] == 0.0
-    assert row[SUMMARY_COLUMNS.index("discharged")] > 0.2 * pour.poured_mass
+    assert row[SUMMARY_COLUMNS.index("discharged")] > 0.2 * pour.supply.mass
 
 
 def bedroom(n, *surfaces, friction=0.5, restitution=0.5):

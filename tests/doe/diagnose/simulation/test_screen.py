@@ -5,7 +5,7 @@ import pytest
 from doe.diagnose.runs import Declared, Effect
 from doe.diagnose.simulation.budget import LEADS, LEAST, Budget
 from doe.diagnose.simulation.ranges import UNSEEN
-from doe.diagnose.simulation.screen import over_wider_ranges, screen
+from doe.diagnose.simulation.screen import continued, over_wider_ranges, screen
 from doe.errors import StatisticsError
 from tests.doe.diagnose.simulation.made_up_pours import DECLARED, Noisy
 
@@ -38,6 +38,27 @@ def test_a_wider_range_asks_for_points_over_it_and_keeps_the_others():
     assert len(new) == 10
     assert max(new) == 0.5
     assert min(new) == -0.4
+
+
+def test_more_settings_go_on_in_the_sequence_of_the_present_range():
+    declared = Declared(DECLARED.parameters, (Effect("e", (0.0,), (0.25,)),), DECLARED.conditions)
+    widest = Declared(DECLARED.parameters, (Effect("e", (0.0,), (1.0,)),), DECLARED.conditions)
+    model = Noisy(e=40.0)
+
+    def numbers(what):
+        return [point.number for asked, point in model.asked if asked == what]
+
+    found = screen(declared, model, Budget(base=24, middle=16, screening=4), lambda line: None)
+    found = continued(found, "second look", ("e",), 4, model, lambda line: None)
+    assert numbers("second look") == [4, 5, 6, 7]
+    found = continued(found, "leads", ("e",), 8, model, lambda line: None)
+    assert numbers("leads") == list(range(8, 16))
+    one = [point for point in found.points if point.effects and not point.sequence.endswith("middle")]
+    assert len({point.theta for point in one}) == 16
+
+    found = over_wider_ranges(found, ("e",), widest, model, Budget(widened=10), lambda line: None)
+    continued(found, "wider leads", ("e",), 3, model, lambda line: None)
+    assert numbers("wider leads") == [10, 11, 12]
 
 
 @pytest.mark.parametrize("runs", [144, 200, 300, 600, 3000])

@@ -1,0 +1,135 @@
+"""A scene as tables → the arrays of an empty world: one small kernel per table."""
+
+from solver.backend import serial, ti
+from solver.effects.air_drag import shape_factors
+from solver.kernels.geometry import rotation
+from solver.kernels.tables import IntRow, IntTable, Row, Table
+from solver.state import Ints3, Mat3, Vec3, Vec4
+
+
+@ti.func
+def triple(table: ti.template(), row, column):
+    """Three neighbouring cells of a row as a vector."""
+    return Vec3(table[row, column], table[row, column + 1], table[row, column + 2])
+
+
+@ti.kernel
+def load_world(s: ti.template(), w: ti.i32, settings: Row):
+    """Empty world ``w`` and set it up; the columns of ``settings`` are those of ``world.SETTINGS``."""
+    s.world.dt[w] = settings[0]
+    s.world.skin[w] = settings[1]
+    s.world.cell[w] = settings[2]
+    s.world.sleep_speed[w] = settings[3]
+    s.world.sleep_time[w] = settings[4]
+    s.world.domain[w] = settings[5]
+    s.world.outlet[w] = settings[6]
+    s.world.inlet_radius[w] = settings[7]
+    s.world.gravity[w] = Vec3(settings[8], settings[9], settings[10])
+    s.world.grip[w] = 0.0
+    s.world.moved[w] = settings[1]
+    s.world.bodies[w] = 0
+    s.world.walls[w] = 0
+    s.world.primitives[w] = 0
+    s.world.contacts[w] = 0
+    s.world.candidates[w] = 0
+    s.world.live[w] = 0
+    s.world.awake[w] = 0
+    s.world.border[w] = 0
+    s.world.stirred[w] = 1
+    s.world.rebuilds[w] = 0
+    s.world.overflow[w] = 0
+    s.world.overlap[w] = 0.0
+    s.world.dissipated[w] = 0.0
+    s.world.wall_work[w] = 0.0
+    s.world.taken_out[w] = 0.0
+
+
+@ti.kernel
+def load_bodies(s: ti.template(), w: ti.i32, numbers: Table, places: IntTable, spheres: Table, owner: IntTable):
+    """All bodies that will enter, by the columns of ``layout.Layout``: numbers, places, spheres (x y z r), owner."""
+    s.world.loaded[w] = numbers.shape[0]
+    ti.loop_config(serialize=ti.static(serial()))
+    for b in range(numbers.shape[0]):
+        s.body.mass[w, b] = numbers[b, 0]
+        s.body.inertia[w, b] = triple(numbers, b, 1)
+        s.body.inverse_mass[w, b] = 1.0 / numbers[b, 0]
+        s.body.inverse_inertia[w, b] = 1.0 / triple(numbers, b, 1)
+        s.body.reach[w, b] = numbers[b, 4]
+        s.body.semi_axes[w, b] = triple(numbers, b, 5)
+        s.body.diameter[w, b] = numbers[b, 8]
+        s.body.drag_factors[w, b] = shape_factors(numbers[b, 9])
+        s.body.swing[w, b] = 0.0
+        s.body.first[w, b] = places[b, 0]
+        s.body.members[w, b] = places[b, 1]
+        s.body.kind[w, b] = places[b, 2]
+        s.body.alive[w, b] = 0
+        s.body.asleep[w, b] = 0
+        s.body.listed[w, b] = 0
+        s.body.touching[w, b] = 0
+    ti.loop_config(serialize=ti.static(serial()))
+    for m in range(spheres.shape[0]):
+        s.member.local[w, m] = triple(spheres, m, 0)
+        s.member.radius[w, m] = spheres[m, 3]
+        s.member.body[w, m] = owner[m, 0]
+        s.body.swing[w, owner[m, 0]] = ti.max(s.body.swing[w, owner[m, 0]], s.member.local[w, m].norm())
+
+
+@ti.kernel
+def load_walls(s: ti.template(), w: ti.i32, poses: Table, marks: IntTable, grids: Table, cells: IntTable):
+    """Walls at rest. poses: origin, quaternion; marks: kind, active; grids: low, cell; cells: counts (3), first."""
+    s.world.walls[w] = poses.shape[0]
+    ti.loop_config(serialize=ti.static(serial()))
+    for k in range(poses.shape[0]):
+        s.wall.origin[w, k] = triple(poses, k, 0)
+        s.wall.quaternion[w, k] = Vec4(poses[k, 3], poses[k, 4], poses[k, 5], poses[k, 6])
+        s.wall.turn[w, k] = rotation(s.wall.quaternion[w, k])
+        s.wall.velocity[w, k] = Vec3(0.0, 0.0, 0.0)
+        s.wall.omega[w, k] = Vec3(0.0, 0.0, 0.0)
+        s.wall.moving[w, k] = 0
+        s.wall.extent[w, k] = 0.0
+        s.wall.travel[w, k] = 0.0
+        s.wall.force[w, k] = Vec3(0.0, 0.0, 0.0)
+        s.wall.torque[w, k] = Vec3(0.0, 0.0, 0.0)
+        s.wall.kind[w, k] = marks[k, 0]
+        s.wall.active[w, k] = marks[k, 1]
+        s.wall.low[w, k] = triple(grids, k, 0)
+        s.wall.cell[w, k] = grids[k, 3]
+        s.wall.cells[w, k] = Ints3(cells[k, 0], cells[k, 1], cells[k, 2])
+        s.wall.first_cell[w, k] = cells[k, 3]
+
+
+@ti.kernel
+def load_surfaces(s: ti.template(), w: ti.i32, geometry: Table, marks: IntTable, primitives: ti.i32):
+    """What spheres can touch, the ``primitives`` first; marks: shape, wall."""
+    s.world.primitives[w] = primitives
+    ti.loop_config(serialize=ti.static(serial()))
+    for p in range(geometry.shape[0]):
+        s.surface.geometry[w, p] = Vec4(geometry[p, 0], geometry[p, 1], geometry[p, 2], geometry[p, 3])
+        s.surface.shape[w, p] = marks[p, 0]
+        s.surface.wall[w, p] = marks[p, 1]
+
+
+@ti.kernel
+def load_triangles(s: ti.template(), w: ti.i32, corners: Table, guards: Table, marks: IntTable):
+    """Triangles of all meshes. corners: a, b, c; guards: a row per edge; marks: surface, edges (3), corners (3)."""
+    ti.loop_config(serialize=ti.static(serial()))
+    for t in range(corners.shape[0]):
+        s.triangle.a[w, t] = triple(corners, t, 0)
+        s.triangle.b[w, t] = triple(corners, t, 3)
+        s.triangle.c[w, t] = triple(corners, t, 6)
+        one, two, three = triple(guards, t, 0), triple(guards, t, 3), triple(guards, t, 6)
+        s.triangle.guards[w, t] = Mat3([one, two, three])
+        s.triangle.surface[w, t] = marks[t, 0]
+        s.triangle.edges[w, t] = Ints3(marks[t, 1], marks[t, 2], marks[t, 3])
+        s.triangle.corners[w, t] = Ints3(marks[t, 4], marks[t, 5], marks[t, 6])
+
+
+@ti.kernel
+def load_cells(s: ti.template(), w: ti.i32, first: IntRow, items: IntRow):
+    """Cells of all meshes' grids: where each one's triangles begin (and where the last ones end), and the triangles."""
+    ti.loop_config(serialize=ti.static(serial()))
+    for c in range(first.shape[0]):
+        s.mesh_cell.first[w, c] = first[c]
+    ti.loop_config(serialize=ti.static(serial()))
+    for k in range(items.shape[0]):
+        s.mesh_item.triangle[w, k] = items[k]
