@@ -16,7 +16,7 @@ class Budget:
 
     base: int = 48
     middle: int = 16
-    scaling: int = 2
+    scaling: int = 1
     """At each end that the search for a range tries; those at the end that it finds count like the screening."""
     screening: int = 4
     """Per effect with one amplitude; half as many again with two."""
@@ -49,5 +49,5 @@ class Budget:
         return Budget(**{key: max(getattr(LEAST, key), round(share * value)) for key, value in vars(self).items()})
 
 
-LEAST = Budget(base=24, middle=10, scaling=2, screening=4, second_look=0, leads=4, widened=6)
+LEAST = Budget(base=24, middle=10, scaling=1, screening=4, second_look=0, leads=4, widened=6)
 """Below that there are fewer points than terms, or no covariance."""
