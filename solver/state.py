@@ -241,7 +241,7 @@ class State:
         self.mesh_cell = Group({"first": ti.i32}, (c.worlds, c.cells))  # where the cell's triangles begin
         self.mesh_item = Group({"triangle": ti.i32}, (c.worlds, c.cell_items))
         self.candidate = Group({"triangle": ti.i32}, (c.worlds, c.candidates))
-        self.law = Group(LAW, (c.worlds, c.kinds * c.kinds))
+        self.law = Group({"row": Vec5}, (c.worlds, c.kinds * c.kinds))
         # Parameters of effects by contact class, and what they keep of a contact (``effects/columns.py``).
         self.effects = c.effects
         room = (c.worlds, c.contacts, KEPT) if c.effects else (1, 1, 1)
