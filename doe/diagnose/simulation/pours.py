@@ -25,7 +25,6 @@ from solver import (
     ParameterError,
     Record,
     Scene,
-    SetUpEffect,
     code_version,
     with_values,
 )
@@ -99,22 +98,16 @@ class ModelPours:
         places = [(point, c) for point in points for c in asked]
         wanted = [(point, c) for point, c in places if not self._find(point, c)]
         left = len(wanted)
-        # Two kinds of arrays, with and without effects compiled in; each is compiled once for all points.
-        for acting in (False, True):
-            queue = deque(
-                Job(self.scene(point, c), self.seed(point, c), tag=tag)
-                for tag, (point, c) in enumerate(wanted)
-                if any(acts(name) for name, _ in point.effects) == acting
-            )
-            room = self.room(acting) + [job.scene for job in queue]
-            for job, record in self._pours(queue, room) if queue else ():
-                point, c = wanted[job.tag]
-                self._known[point, c] = self._keep(what, point, c, job, record)
-                self.run_now += 1
-                left -= 1
-                if self._on_pour is not None:
-                    label = f"{point.sequence} {point.number}, {self._conditions[c].name}"
-                    self._on_pour(what, left, Ended(label, job.seed, record.outcome, record.message))
+        queue = deque(Job(self.scene(point, c), self.seed(point, c), tag=tag) for tag, (point, c) in enumerate(wanted))
+        room = self.room() + [job.scene for job in queue]
+        for job, record in self._pours(queue, room) if queue else ():
+            point, c = wanted[job.tag]
+            self._known[point, c] = self._keep(what, point, c, job, record)
+            self.run_now += 1
+            left -= 1
+            if self._on_pour is not None:
+                label = f"{point.sequence} {point.number}, {self._conditions[c].name}"
+                self._on_pour(what, left, Ended(label, job.seed, record.outcome, record.message))
         return [[self._known[point, c] for c in asked] for point in points]
 
     def scene(self, point: Point, condition: int) -> Scene:
@@ -128,13 +121,14 @@ class ModelPours:
         """Seed of the pour of ``point`` in a condition."""
         return seed_of(self._root, point.sequence, point.number, condition, 0)
 
-    def room(self, acting: bool) -> list[Scene]:
-        """Scenes that need as much room as most points: every condition at the ends of each effect, where it can be."""
+    def room(self) -> list[Scene]:
+        """Scenes that need as much room as most points: every condition at the ends of each effect, where it can be.
+
+        The same at every stage, so that a worker compiles its batches once.
+        """
         room: list[Scene] = []
         for condition in self._conditions:
             for name, kind in EFFECTS.items():
-                if acts(name) != acting:
-                    continue
                 for share in (-1.0, 1.0):
                     ends = effect_values(name, [share * kind.strongest for _ in kind.amplitudes])
                     with contextlib.suppress(ParameterError):
@@ -181,11 +175,6 @@ def effect_values(effect: str, amplitude: Sequence[float]) -> dict[str, float]:
     """Parameter path → value of an effect's amplitudes."""
     names = EFFECTS[effect].amplitudes
     return {f"effect.{effect}.{name}": one for name, one in zip(names, amplitude, strict=True)}
-
-
-def acts(effect: str) -> bool:
-    """Whether an effect acts in the kernels, rather than on material or set-up before a run."""
-    return not issubclass(EFFECTS[effect], SetUpEffect)
 
 
 def as_runs(declared: Declared, points: Sequence[Point], pours: Sequence[Sequence[Pour]]) -> Runs:
