@@ -29,7 +29,7 @@ DOE_PARTS_THAT_MAY_USE_THE_SOLVER = {
     "doe/factors.py": "checks a factor's path and range against the declared parameters",
     "doe/study.py": "reads a study file: its material, rig and insertion make a scene",
     "doe/measurement/": "a condition is a scene, and data and runs are read by the same functions",
-    "doe/diagnose/diagnosis.py": "turns declared parameters and effects into those of the decision",
+    "doe/diagnose/declare.py": "turns declared parameters and effects into those of the decision",
     "doe/diagnose/simulation/pours.py": "turns a point of a plan into a simulated world",
     "doe/diagnose/follow_up/menu.py": "set-ups that a rig can do",
     "doe/diagnose/simulation/profiles.py": "pictures of simulated piles by the function that reads measured ones",

@@ -5,35 +5,26 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-import numpy.typing as npt
-
 from doe.diagnose.decision.decide import diagnose
 from doe.diagnose.decision.verdict import Verdict
+from doe.diagnose.declare import complete_rows, declare, observe
 from doe.diagnose.emulation.fresh_pours import FreshPours
-from doe.diagnose.follow_up.closer import LOOKS, contenders, leads, maybe_leads, near_best, poured
+from doe.diagnose.follow_up.closer import LOOKS, contenders, leads, lost, maybe_leads, near_best, poured
 from doe.diagnose.follow_up.confirm import Confirmed, Model, confirm, fitted
 from doe.diagnose.follow_up.held_out import HeldOut, compared, predictions, ruled_out, upheld
 from doe.diagnose.follow_up.holdout import HoldoutCondition, HoldoutError, holdout_errors
 from doe.diagnose.follow_up.menu import Suggestion, next_experiment
-from doe.diagnose.runs import Condition, Declared, Effect, Observed, Parameter
+from doe.diagnose.runs import Declared, Observed
 from doe.diagnose.simulation.budget import Budget
-from doe.diagnose.simulation.pours import ModelPours, OnPour, effect_values
+from doe.diagnose.simulation.pours import ModelPours, OnPour
 from doe.diagnose.simulation.screen import Say, Screened, continued, over_wider_ranges, screen
-from doe.measurement.measurement import Condition as MeasuredCondition
-from doe.measurement.measurement import MeasuredParameter, Measurement
-from doe.measurement.summaries import summaries_of_data, summary_names, summary_uncertainties
+from doe.measurement.measurement import Measurement
+from doe.measurement.summaries import summary_names
 from doe.runner import Pours
 from doe.store import Store
-from solver import EFFECTS, ParameterError, Scene, parameters, with_values
-
-FloatArray = npt.NDArray[np.float64]
 
 CRAMPED = 5
 """At most so many effects get a wider range: the best of the race."""
-BOX = 3.0
-"""Standard deviations about an independently measured mean."""
-DRAWN_IN = 0.8
 WIDENINGS = 3
 """Times that a range may be doubled before the next look."""
 Wanting = Callable[[Verdict, Declared, Declared], tuple[str, ...]]
@@ -134,9 +125,10 @@ def pursued(
         say(f"after {what}: {found.kind}")
         return now, found
 
-    screened, verdict = followed("second look", maybe_leads(verdict), budget.second_look)
+    looked_at = maybe_leads(verdict)
+    screened, verdict = followed("second look", looked_at, budget.second_look)
     screened, verdict = widened(out_of_sight, ", which could not be seen")
-    screened, verdict = followed("leads", leads(verdict), budget.leads)
+    screened, verdict = followed("leads", (*leads(verdict), *lost(verdict, looked_at)), budget.leads)
     fresh: tuple[FreshPours, ...] = ()
     for look in range(1 + LOOKS):
         screened, verdict = widened(at_edge, fresh=fresh)
@@ -158,54 +150,6 @@ def contenders_held_out(verdict: Verdict, measurement: Measurement, pours: Model
     if not data or min(map(len, data)) < 2:
         return ()
     return compared(verdict, data, predictions(verdict, pours, widths, places))
-
-
-def declare(measurement: Measurement, effects: Sequence[str]) -> Declared:
-    """The declared model in the terms of the decision: parameters, effects with their widest ranges, conditions."""
-    scenes = [condition.scene for condition in measurement.conditions]
-    return Declared(
-        tuple(box_of(p) for p in measurement.parameters),
-        tuple(widest(name, scenes) for name in effects),
-        tuple(Condition(c.name, summary_names(c)) for c in measurement.fit),
-    )
-
-
-def widest(name: str, scenes: Sequence[Scene]) -> Effect:
-    """The effect from end to end of what the literature supports, drawn in until every scene can be set up with it."""
-    kind, known = EFFECTS[name], parameters(scenes[0])
-    ends = [known[f"effect.{name}.{field}"] for field in kind.amplitudes]
-    low = tuple(max(end.low, -kind.strongest) for end in ends)
-    high = tuple(min(end.high, kind.strongest) for end in ends)
-    while not all(_possible(scene, name, bounds) for scene in scenes for bounds in (low, high)):
-        low, high = tuple(DRAWN_IN * x for x in low), tuple(DRAWN_IN * x for x in high)
-    return Effect(name, low, high)
-
-
-def _possible(scene: Scene, name: str, amplitude: tuple[float, ...]) -> bool:
-    try:
-        with_values(scene, effect_values(name, amplitude))
-    except ParameterError:
-        return False
-    return True
-
-
-def box_of(measured: MeasuredParameter) -> Parameter:
-    """The range over which a parameter is simulated: as stated, and within ``BOX`` standard deviations of its mean.
-
-    Farther off nobody who trusts the measurement would look, and an emulator of a smaller box is a better one.
-    """
-    if measured.mean is None or measured.sd is None:
-        return Parameter(measured.path, measured.low, measured.high)
-    low = max(measured.low, measured.mean - BOX * measured.sd)
-    high = min(measured.high, measured.mean + BOX * measured.sd)
-    return Parameter(measured.path, low, high, measured.mean, measured.sd)
-
-
-def observe(conditions: Sequence[MeasuredCondition]) -> Observed:
-    """The measured side of ``conditions``; what states no uncertainty of its own has none beside its replicates."""
-    stated = [np.nan_to_num(summary_uncertainties(condition)) for condition in conditions]
-    blocks = tuple(summaries_of_data(condition) for condition in conditions)
-    return Observed(blocks, tuple(stated), tuple(condition.mean_of for condition in conditions))
 
 
 def out_of_sight(verdict: Verdict, now: Declared, widest: Declared) -> tuple[str, ...]:
@@ -244,9 +188,3 @@ def errors_of(measurement: Measurement, role: str, before: Confirmed, after: Con
         if condition.role == role and min(map(len, rows)) >= 2:
             conditions.append(HoldoutCondition(condition.name, summary_names(condition), *rows))
     return holdout_errors(conditions) if conditions else ()
-
-
-def complete_rows(condition: MeasuredCondition) -> FloatArray:
-    """The measured replicates of which everything could be read, (r, d)."""
-    data = summaries_of_data(condition)
-    return np.asarray(data[np.isfinite(data).all(axis=1)], dtype=np.float64)

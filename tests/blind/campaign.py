@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from doe.diagnose.diagnosis import declare
+from doe.diagnose.declare import declare
 from doe.diagnose.runs import Declared
 from doe.diagnose.simulation.budget import Budget
 from doe.diagnose.simulation.plan import directions

@@ -9,7 +9,7 @@ import numpy as np
 
 from doe.diagnose.decision.decide import diagnose
 from doe.diagnose.decision.verdict import Verdict
-from doe.diagnose.diagnosis import observe
+from doe.diagnose.declare import observe
 from doe.diagnose.emulation.fresh_pours import FreshPours
 from doe.diagnose.runs import Declared, Runs
 from doe.measurement import load_measurement

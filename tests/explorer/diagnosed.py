@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from doe.diagnose.decision.decide import diagnose
-from doe.diagnose.diagnosis import Diagnosis, declare, errors_of, models, observe
+from doe.diagnose.declare import declare, observe
+from doe.diagnose.diagnosis import Diagnosis, errors_of, models
 from doe.diagnose.follow_up.confirm import Confirmed
 from doe.diagnose.follow_up.menu import Suggestion
 from doe.diagnose.follow_up.next_experiment import MenuItem, Prediction, rank_experiments

@@ -49,6 +49,15 @@ def leads(verdict: Verdict) -> tuple[str, ...]:
     return taking_up(verdict, LEAD_SHARE)[:LEADS]
 
 
+def lost(verdict: Verdict, names: Sequence[str]) -> tuple[str, ...]:
+    """Those of ``names`` that these data cannot see any more: too few settings may have told too little of them.
+
+    What the emulator does not know of an effect is taken off the shift that it can cause, so an effect that bends much
+    may go out of sight when more of its settings come in.
+    """
+    return tuple(row.name for row in verdict.effects if row.name in names and row.status == "not identifiable here")
+
+
 def taking_up(verdict: Verdict, share: float) -> tuple[str, ...]:
     """Effects that take up ``share`` of what the best one does of the residual, in that order; none without a residual.
 

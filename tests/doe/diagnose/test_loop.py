@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from doe.diagnose import diagnosis
+from doe.diagnose.declare import declare
 from doe.diagnose.follow_up import menu
 from doe.diagnose.runs import Effect, Observed
 from doe.diagnose.simulation.budget import Budget
@@ -209,7 +210,7 @@ def test_the_same_model_asks_for_the_same_pours(measurement, monkeypatch):
 
 
 def test_whitened_shift_is_the_distance_in_standard_errors(measurement):
-    declared = diagnosis.declare(measurement, NAMES)
+    declared = declare(measurement, NAMES)
     rng, width = np.random.default_rng(2), len(declared.conditions[0].summaries)
     step = 3.0 * direction("step", width)
 
@@ -223,7 +224,7 @@ def test_whitened_shift_is_the_distance_in_standard_errors(measurement):
 
 
 def test_a_range_that_goes_too_far_is_drawn_in(measurement):
-    declared = diagnosis.declare(measurement, NAMES)
+    declared = declare(measurement, NAMES)
     condition, width = measurement.fit[0], len(declared.conditions[0].summaries)
 
     class Strong(FormulaPours):
@@ -248,14 +249,14 @@ def diagnosis_middle(declared):
 
 
 def test_ranges_fit_the_set_up(measurement):
-    declared = diagnosis.declare(measurement, tuple(EFFECTS))
+    declared = declare(measurement, tuple(EFFECTS))
     for effect in declared.effects:
         assert all(low <= 0.0 <= high for low, high in zip(effect.low, effect.high, strict=True))
         assert max(effect.high) <= EFFECTS[effect.name].strongest
 
 
 def test_the_box_is_three_deviations_about_a_measured_mean(measurement):
-    friction = diagnosis.declare(measurement, NAMES).parameters[2]
+    friction = declare(measurement, NAMES).parameters[2]
     assert (friction.low, friction.high) == (pytest.approx(0.73 - 0.12), pytest.approx(0.73 + 0.12))
 
 

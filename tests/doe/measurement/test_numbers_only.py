@@ -4,7 +4,7 @@ import shutil
 
 import numpy as np
 
-from doe.diagnose.diagnosis import complete_rows, declare, observe
+from doe.diagnose.declare import complete_rows, declare, observe
 from doe.measurement import load_measurement
 from solver import EFFECTS
 from solver.assets import measurement_folder

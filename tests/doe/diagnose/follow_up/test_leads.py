@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from doe.diagnose.follow_up.closer import LEAD_SHARE, MAYBE_SHARE, leads, maybe_leads
+from doe.diagnose.follow_up.closer import LEAD_SHARE, MAYBE_SHARE, leads, lost, maybe_leads
 from doe.diagnose.simulation.budget import LEADS
 
 
@@ -32,3 +32,10 @@ def test_where_nothing_is_missing_or_nothing_helps_none_lead(asked):
     assert asked(verdict("no_missing_effect", best=100.0)) == ()
     assert asked(verdict(best=0.0)) == ()
     assert asked(verdict()) == ()
+
+
+def test_what_was_looked_at_and_has_gone_out_of_sight_is_not_given_up():
+    seen = verdict(best=100.0, other=1.0)
+    assert lost(seen, ("best", "hidden")) == ("hidden",)
+    assert lost(seen, ("best", "other")) == ()
+    assert "hidden" not in leads(seen)
