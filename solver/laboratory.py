@@ -41,8 +41,8 @@ RADIUS = 5e-3
 AT_REST = np.zeros(3)
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
-ROOM = Capacity(worlds=1, bodies=128, members=1024, contacts=8192, kinds=64)
-"""One size for all laboratories without a mesh, so that the kernels are compiled once."""
+ROOM = Capacity(worlds=1, bodies=128, members=1024, contacts=8192, kinds=64).rounded()
+"""One size for all laboratories without a mesh, so that the kernels are compiled once. Only the newest is alive."""
 
 
 @dataclass(frozen=True)
@@ -158,4 +158,4 @@ def room_for(surfaces: Sequence[Surface]) -> Capacity:
         triangles=max(1, len(tables.corners)),
         cells=max(1, len(tables.first)),
         cell_items=max(1, len(tables.items)),
-    )
+    ).rounded()

@@ -55,11 +55,10 @@ def capacity_for(scenes: Sequence[Scene], worlds: int) -> Capacity:
         bodies = max(bodies, sum(numbers))
         members = max(members, sum(n * len(b.clump.radii) for n, b in zip(numbers, scene.bodies, strict=True)))
         kinds = max(kinds, len(scene.bodies) + len(wall_materials(scene)))
-    members = 256 * (1 + members // 256)
     tables = [wall_tables(scene.rig.surfaces()) for scene in scenes]
     return Capacity(
         worlds=worlds,
-        bodies=32 * (1 + bodies // 32),
+        bodies=bodies,
         members=members,
         contacts=CONTACTS_PER_MEMBER * members,
         kinds=kinds,
@@ -69,7 +68,7 @@ def capacity_for(scenes: Sequence[Scene], worlds: int) -> Capacity:
         cells=max(1, *(len(table.first) for table in tables)),
         cell_items=max(1, *(len(table.items) for table in tables)),
         effects=any(kernel_effects(scene) for scene in scenes),
-    )
+    ).rounded()
 
 
 def run_queue(

@@ -4,7 +4,7 @@ Worlds are independent runs. Every array has the world as its leading axis; capa
 allocated, and a world that outgrows them stops with the outcome ``buffer_overflow``.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cache
 
 from solver.backend import ti
@@ -174,6 +174,11 @@ SUMMARY = {
 """Per world, written by the kernel at the end of a launch, shape (worlds,)."""
 
 
+QUANTA = {"bodies": 128, "members": 1024, "contacts": 16384}
+MESH_QUANTA = {"triangles": 256, "cells": 4096, "cell_items": 16384}
+"""What a size is a multiple of, so that scenes much alike share the kernels that are compiled for it."""
+
+
 @dataclass(frozen=True)
 class Capacity:
     """Sizes of a batch. ``kinds`` counts contact classes (components and surface materials)."""
@@ -192,6 +197,11 @@ class Capacity:
     """Cells of all meshes' grids, and one more."""
     cell_items: int = 1
     """Triangles in those cells, counted once per cell."""
+
+    def rounded(self) -> "Capacity":
+        """Sizes rounded up to multiples of their quanta; where there is no mesh, none is made room for."""
+        quanta = QUANTA | (MESH_QUANTA if self.triangles > 1 else {})
+        return replace(self, **{name: -(-getattr(self, name) // unit) * unit for name, unit in quanta.items()})
 
     def joined(self, other: "Capacity") -> "Capacity":
         """The least that holds what either holds."""

@@ -10,17 +10,15 @@ import numpy.typing as npt
 
 from solver.body import Body, Members
 from solver.effects.columns import kernel_effects
+from solver.laboratory import ROOM
 from solver.layout import layout
 from solver.rigs.rig import Rig
 from solver.scene import Scene
-from solver.state import Capacity
 from solver.time_step import time_step
 from solver.world import SUMMARY_COLUMNS, Batch
 
 Array = npt.NDArray[np.float64]
 
-ROOM = Capacity(worlds=1, bodies=4, members=512, contacts=2048)
-"""One size for all tests, so that the kernels are compiled once. Only the newest bench is alive."""
 HELD = 1e12
 """Factor on the moments of inertia of a body that is held so that it cannot turn."""
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])

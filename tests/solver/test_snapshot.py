@@ -1,9 +1,11 @@
 """A world that is kept and put back goes on bit by bit, in whatever slot of whatever batch."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from solver.laboratory import EARTH, RADIUS, bench
+from solver.laboratory import EARTH, RADIUS, ROOM, bench
 from solver.layout import layout
 from solver.state import Capacity
 from solver.time_step import time_step
@@ -15,10 +17,10 @@ N = 40
 STEPS = 3000
 
 
-def crowd(worlds, w, bodies=64):
+def crowd(worlds, w, bodies=ROOM.bodies):
     """A heap of beads that fall on each other, in world ``w``."""
     scene = bench(gravity=EARTH, friction=0.5)
-    batch = Batch(Capacity(worlds, bodies, members=8 * bodies, contacts=64 * bodies))
+    batch = Batch(replace(ROOM, worlds=worlds, bodies=bodies))
     batch.load(w, scene, layout(scene, np.zeros(N, dtype=np.int32)), time_step(scene), (True,))
     return batch
 
@@ -36,7 +38,7 @@ def run(batch, w, steps):
     return batch.advance(todo)[w]
 
 
-@pytest.mark.parametrize(("worlds", "w", "bodies"), [(1, 0, 64), (3, 2, 128)])
+@pytest.mark.parametrize(("worlds", "w", "bodies"), [(1, 0, 128), (3, 2, 256)])
 def test_an_interrupted_run_ends_in_the_same_bits(worlds, w, bodies):
     whole = crowd(1, 0)
     drop(whole, 0)

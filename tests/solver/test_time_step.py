@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from solver.laboratory import bench
+from solver.laboratory import ROOM, bench
 from solver.layout import layout
 from solver.material_file import load_material
 from solver.scene import with_values
-from solver.state import Capacity
 from solver.time_step import rayleigh_time, stability_limit, time_step
 from solver.world import Batch
 
@@ -25,7 +24,7 @@ def test_the_limit_is_the_step_without_its_safety():
 def test_an_impact_gains_energy_only_beyond_the_limit(taichi, share, stable):
     """At 2 m/s, the speed that the limit of a body is taken at."""
     scene = bench(gravity=(0.0, 0.0, -9.81), friction=0.0)
-    batch = Batch(Capacity(1, 32, members=256, contacts=256))
+    batch = Batch(ROOM)
     dt = share * stability_limit(scene)
     batch.load(0, scene, layout(scene, np.zeros(1, dtype=np.int32)), dt, (True,))
     radius = float(scene.bodies[0].clump.radii[0])
