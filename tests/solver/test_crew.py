@@ -83,7 +83,7 @@ def test_a_room_is_kept_until_it_is_too_small(taichi):
     first = rooms.for_scene(HEAP)
     rooms.make([with_values(HEAP, {"rig.mass": 0.001})])
     assert rooms.for_scene(HEAP) is first
-    larger = with_values(HEAP, {"rig.mass": 0.02})
+    larger = with_values(HEAP, {"rig.mass": 0.1})
     rooms.make([larger])
     assert rooms.for_scene(larger).capacity.bodies > first.capacity.bodies
     assert rooms.for_scene(HEAP) is rooms.for_scene(larger)
