@@ -56,7 +56,7 @@ def verdict(rig: PourRig, numerics: Numerics, moment: Moment) -> Verdict:
 def stalled(samples: Sequence[Mapping[str, float]], numerics: Numerics, since: float) -> bool:
     """Whether nothing has left the container for ``STALL_TIME``, of those ``samples`` after the time ``since`` [s]."""
     back = math.ceil(STALL_TIME / numerics.sample_interval)
-    if not samples or samples[-1]["time"] - since <= STALL_TIME or len(samples) <= back:
+    if len(samples) <= back or samples[-1]["time"] - since <= STALL_TIME:
         return False
     return samples[-1 - back]["discharged"] == samples[-1]["discharged"]
 
