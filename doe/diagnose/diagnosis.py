@@ -9,7 +9,7 @@ from doe.diagnose.decision.decide import diagnose
 from doe.diagnose.decision.verdict import Verdict
 from doe.diagnose.declare import complete_rows, declare, observe
 from doe.diagnose.emulation.fresh_pours import FreshPours
-from doe.diagnose.follow_up.closer import LOOKS, contenders, leads, lost, maybe_leads, near_best, poured
+from doe.diagnose.follow_up.closer import LOOKS, MODELS, contenders, in_question, lost, near_best, poured
 from doe.diagnose.follow_up.confirm import Confirmed, Model, confirm, fitted
 from doe.diagnose.follow_up.held_out import HeldOut, compared, predictions, ruled_out, upheld
 from doe.diagnose.follow_up.holdout import HoldoutCondition, HoldoutError, holdout_errors
@@ -23,8 +23,6 @@ from doe.measurement.summaries import summary_names
 from doe.runner import Pours
 from doe.store import Store
 
-CRAMPED = 5
-"""At most so many effects get a wider range: the best of the race."""
 WIDENINGS = 3
 """Times that a range may be doubled before the next look."""
 Wanting = Callable[[Verdict, Declared, Declared], tuple[str, ...]]
@@ -97,7 +95,7 @@ def run_diagnosis(
 def pursued(
     screened: Screened, widest: Declared, observed: Observed, model: ModelPours, budget: Budget, say: Say
 ) -> tuple[Screened, Verdict, tuple[FreshPours, ...]]:
-    """The verdict once its leads have been followed, over wider ranges where one ends, and poured about their fits.
+    """The verdict once what is in question has been looked at again, over wider ranges, and about the best fits.
 
     With the runs and the pours that it rests on.
     """
@@ -125,10 +123,10 @@ def pursued(
         say(f"after {what}: {found.kind}")
         return now, found
 
-    looked_at = maybe_leads(verdict)
+    looked_at = in_question(verdict)
     screened, verdict = followed("second look", looked_at, budget.second_look)
     screened, verdict = widened(out_of_sight, ", which could not be seen")
-    screened, verdict = followed("leads", (*leads(verdict), *lost(verdict, looked_at)), budget.leads)
+    screened, verdict = followed("third look", lost(verdict, looked_at), budget.third_look)
     fresh: tuple[FreshPours, ...] = ()
     for look in range(1 + LOOKS):
         screened, verdict = widened(at_edge, fresh=fresh)
@@ -168,9 +166,9 @@ def with_room(now: Declared, widest: Declared) -> set[str]:
 
 
 def at_edge(verdict: Verdict, now: Declared, widest: Declared) -> tuple[str, ...]:
-    """Effects near the best that are driven to an end of the range simulated so far, with more in the literature."""
+    """Effects to be poured next, driven to an end of the range simulated so far, with more in the literature."""
     room = with_room(now, widest)
-    near = near_best([model for model in verdict.models if len(model.members) == 1], CRAMPED)
+    near = near_best([model for model in verdict.models if len(model.members) == 1], MODELS)
     return tuple(m.label for m in near if m.label in room and any(amplitude.at_edge for amplitude in m.amplitudes))
 
 

@@ -110,7 +110,7 @@ def test_data_that_are_not_there_are_refused_before_a_start(tmp_path):
     ("question", "trouble"),
     [
         (Question("trefoil_1", ("drag",)), "effects: 'drag' is not one of rolling_resistance"),
-        (Question("trefoil_1", budget=20), "budget: 20 pours; 15 effects in 1 fitted conditions take at least 129"),
+        (Question("trefoil_1", budget=20), "budget: 20 pours; 15 effects in 1 fitted conditions take at least 109"),
     ],
 )
 def test_a_question_that_cannot_be_asked_is_refused(tmp_path, question, trouble):

@@ -6,18 +6,33 @@ the parametric bootstrap of Williams 1970, Biometrics 26:23):
 
     lead = T^2(rival) - T^2(best), both under the rival's Sigma;   p = P(lead of pseudo-data of the rival >= lead)
 
-Pseudo-data carry the error of the rival's emulation, both models are refitted to them. A rival with p above the limit
-stays in the answer.
+Pseudo-data carry the error of the rival's emulation, both models are refitted to them. The best model is known as
+badly: it meets the same pseudo-data with an error of its own. And the errors of both make two models look farther apart
+than they are, by d^2 = r' Sigma^-1 r, where r is what the best model leaves of the rival's prediction:
+
+    E d^2 = (true d)^2 + tr(P C),   C the covariance of r, P = Sigma^-1 less what a refit takes up,
+
+so r is drawn in to r sqrt(max(0, 1 - tr(P C)/d^2)) (James and Stein 1961). A rival with p above the limit stays in the
+answer.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import block_diag
 
 from doe.diagnose.decision.gates import Gate, Limits, bootstrap_p, refit
 from doe.diagnose.emulation.emulator import Emulator
+from doe.diagnose.emulation.predictor import Predictor
 from doe.diagnose.fitting.calibrate import Evidence, Fit, fit_with_covariance
-from doe.diagnose.fitting.pseudo_data import draw_pseudo_data
+from doe.diagnose.fitting.pseudo_data import PseudoData, draw_pseudo_data, gaussian
+
+FloatArray = npt.NDArray[np.float64]
 
 SETS = 400
 """Pseudo-data sets per rival: p = 0.05 with a standard error of 0.011."""
@@ -43,7 +58,8 @@ def told_apart(
         rival = fits[name]
         pseudo = draw_pseudo_data(emulator, evidence, rival, SETS, seed + number)
         own = refit(rival.predictor, pseudo, evidence, rival.x)[1]
-        others = refit(best.predictor, pseudo, evidence, rival.x[:k])[1]
+        seen = met_by(best, rival, pseudo, emulator, evidence, seed + number)
+        others = refit(best.predictor, seen, evidence, rival.x[:k])[1]
         lead = rival.t2 - fit_with_covariance(best.predictor, best.members, evidence, rival.sigma).t2
         found[name] = bootstrap_p(lead, own - others)
     stay = tuple(name for name, p in found.items() if p > limits.rival)
@@ -55,3 +71,66 @@ def told_apart(
         f"were {hardest} the truth, {order[0]} would fit better by as much in {100 * found[hardest]:.1f} % of data sets"
     )
     return Gate(label, found[hardest], found[hardest], limits.rival, not stay, statement), stay
+
+
+def met_by(best: Fit, rival: Fit, pseudo: PseudoData, emulator: Emulator, evidence: Evidence, seed: int) -> PseudoData:
+    """Return the pseudo-data of ``rival`` as the best model meets them: off by its own error of emulation, and nearer.
+
+    Its error e_b goes with the rival's e_r as far as both rest on the same coefficients: e_b = e_r cov/var(e_r) + rest.
+    """
+    predictor, x, left = nearest(best, rival, evidence)
+    generator = np.random.default_rng([seed, 1])
+    theirs = rival.predictor.variance_shares(rival.x)
+    shared = emulator.shared_shares(predictor, x, rival.predictor, rival.x)
+    alike = [both / share if share > 0.0 else 0.0 for both, share in zip(shared, theirs, strict=True)]
+    rests = [
+        max(0.0, own - part * both) * pour + np.diag(bias)
+        for own, part, both, pour, bias in zip(
+            predictor.variance_shares(x),
+            alike,
+            shared,
+            predictor.pour_covariance,
+            predictor.bias_variance(x),
+            strict=True,
+        )
+    ]
+    apart = [
+        rest + (1.0 - part) ** 2 * error
+        for rest, part, error in zip(rests, alike, rival.predictor.mean_covariance(rival.x), strict=True)
+    ]
+    off = 1.0 - drawn_in(predictor, x, left, rival.sigma, apart, evidence)
+    means = tuple(
+        mean - (1.0 - part) * error + gaussian(rest, len(mean), generator) - off * r
+        for mean, error, part, rest, r in zip(pseudo.means, pseudo.emulation, alike, rests, left, strict=True)
+    )
+    return replace(pseudo, means=means)
+
+
+def nearest(best: Fit, rival: Fit, evidence: Evidence) -> tuple[Predictor, FloatArray, tuple[FloatArray, ...]]:
+    """Return the best model's predictor, its x nearest to the rival's prediction, and what is left of that, (d_c,)."""
+    fitted = tuple(mean - r for mean, r in zip(evidence.means, rival.residual, strict=True))
+    k = rival.predictor.parameters
+    there = replace(evidence, means=fitted, prior_mean=rival.x[:k])
+    found = fit_with_covariance(best.predictor, best.members, there, rival.sigma)
+    return best.predictor, found.x, found.residual
+
+
+def drawn_in(
+    predictor: Predictor,
+    x: FloatArray,
+    left: Sequence[FloatArray],
+    sigma: Sequence[FloatArray],
+    apart: Sequence[FloatArray],
+    evidence: Evidence,
+) -> float:
+    """Return sqrt(max(0, 1 - tr(P C)/d^2)): left and apart are r and C per condition, x where the model is refitted."""
+    weight = block_diag(*(np.linalg.inv(block) for block in sigma))
+    residual, covariance = np.concatenate(left), block_diag(*apart)
+    width = predictor.high - predictor.low
+    free = (x > predictor.low + 1e-6 * width) & (x < predictor.high - 1e-6 * width)
+    slopes = predictor.jacobian(x)[:, free]
+    prior = np.concatenate([evidence.prior_weight, np.zeros(len(x) - len(evidence.prior_weight))])[free]
+    taken_up = weight @ slopes
+    p = weight - taken_up @ np.linalg.pinv(slopes.T @ taken_up + np.diag(prior), hermitian=True) @ taken_up.T
+    d2 = float(residual @ weight @ residual)
+    return math.sqrt(max(0.0, 1.0 - float(np.trace(p @ covariance)) / d2)) if d2 > 0.0 else 0.0

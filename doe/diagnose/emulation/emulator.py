@@ -90,9 +90,21 @@ class Emulator:
             amplitudes=tuple(sizes),
             low=np.concatenate([self.theta_low, *(self.low[e] for e in members)]),
             high=np.concatenate([self.theta_high, *(self.high[e] for e in members)]),
+            columns=chosen,
         )
         held = next((one for one in self.fresh if one.members == members), None)
         return predictor if held is None else anchored(predictor, held.coded(self.declared), held.blocks)
+
+    def shared_shares(self, one: Predictor, x: FloatArray, other: Predictor, y: FloatArray) -> tuple[float, ...]:
+        """Return per condition the covariance, in pours, of predictions of two models at x (q,) and y.
+
+        It is terms(x)' (X'X)^-1 terms(y). What an anchor knows is not shared: pours about a fit are a model's own.
+        """
+        steps = one.step(x), other.step(y)
+        return tuple(
+            float(steps[0] @ block.information_inverse[np.ix_(one.columns, other.columns)] @ steps[1])
+            for block in self.blocks
+        )
 
 
 def fit_emulator(declared: Declared, runs: Runs, floors: tuple[FloatArray, ...]) -> Emulator:

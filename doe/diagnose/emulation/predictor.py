@@ -38,7 +38,7 @@ class Predictor:
 
     Per condition c: coefficients (p, d_c), information_inverse (p, p), pour_covariance (d_c, d_c), lack_of_fit (d_c,),
     excess (members, d_c) with the numbers of their amplitudes (block.py). low, high: (q,) the sampled box, in which
-    alone it predicts.
+    alone it predicts. columns: (p,) places of its terms among those of the emulator.
     """
 
     parameters: int
@@ -51,6 +51,7 @@ class Predictor:
     amplitudes: tuple[int, ...]
     low: FloatArray
     high: FloatArray
+    columns: IntArray
     anchor: Anchor | None = None
 
     def mean(self, x: FloatArray) -> FloatArray:
@@ -82,14 +83,15 @@ class Predictor:
 
         With an anchor, that of the anchor and of the step from it.
         """
-        terms = monomials(x, self.exponents)
-        if self.anchor is None:
-            return tuple(float(terms @ inverse @ terms) for inverse in self.information_inverse)
-        step = terms - monomials(self.anchor.x, self.exponents)
+        step, held = self.step(x), self.anchor.shares if self.anchor else (0.0,) * len(self.information_inverse)
         return tuple(
-            share + float(step @ inverse @ step)
-            for share, inverse in zip(self.anchor.shares, self.information_inverse, strict=True)
+            share + float(step @ inverse @ step) for share, inverse in zip(held, self.information_inverse, strict=True)
         )
+
+    def step(self, x: FloatArray) -> FloatArray:
+        """Return the terms at x (q,) whose coefficients the prediction there rests on, (p,): less the anchor's."""
+        terms = monomials(x, self.exponents)
+        return terms if self.anchor is None else terms - monomials(self.anchor.x, self.exponents)
 
     def bias_variance(self, x: FloatArray) -> tuple[FloatArray, ...]:
         """Return per condition the variance of what no number of runs would mend at x (q,): (d_c,)."""

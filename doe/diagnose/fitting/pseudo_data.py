@@ -21,9 +21,13 @@ FloatArray = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class PseudoData:
-    """B sets. Per condition: means (B, d_c), weights = inverse covariance (B, d_c, d_c). prior_mean: (B, k)."""
+    """B sets. Per condition: means (B, d_c), weights = inverse covariance (B, d_c, d_c). prior_mean: (B, k).
+
+    emulation: (B, d_c), the part of the means that is the emulator's error.
+    """
 
     means: tuple[FloatArray, ...]
+    emulation: tuple[FloatArray, ...]
     weights: tuple[FloatArray, ...]
     prior_mean: FloatArray
 
@@ -36,12 +40,12 @@ def draw_pseudo_data(emulator: Emulator, evidence: Evidence, truth: Fit, sets: i
     emulated, shares = predictor.mean_covariance(truth.x), predictor.variance_shares(truth.x)
     biases = predictor.bias_variance(truth.x)
     noise = measured_noise(predictor, evidence)
-    means, weights = [], []
+    means, errors, weights = [], [], []
     for c, block in enumerate(emulator.blocks):
         systematic, count, pour = np.diag(evidence.systematic[c]), evidence.counts[c], noise[c]
         simulated = block.noise.covariance
-        error = gaussian(emulated[c] + systematic, sets, generator)
-        means.append(fitted[c] + _mean_of_pours(block.noise.rows, pour, count, sets, generator) + error)
+        errors.append(gaussian(emulated[c], sets, generator))
+        means.append(fitted[c] + _mean_of_pours(block.noise.rows, pour, count, sets, generator) + errors[c])
         estimate = shrink(wishart(simulated, block.noise.df, sets, generator), block.noise.shrinkage)
         spread = np.sqrt(np.diag(pour) / np.diag(simulated)) * _spread_error(evidence, c, sets, generator)
         bias = np.diag(biases[c])
@@ -52,7 +56,9 @@ def draw_pseudo_data(emulator: Emulator, evidence: Evidence, truth: Fit, sets: i
     measured = evidence.prior_weight > 0
     sd = np.where(measured, 1 / np.sqrt(np.where(measured, evidence.prior_weight, 1.0)), 0.0)
     priors = truth.x[:k] + sd * generator.standard_normal((sets, k))
-    return PseudoData(tuple(means), tuple(weights), priors)
+    instrument = [gaussian(np.diag(variance), sets, generator) for variance in evidence.systematic]
+    means = [mean + error for mean, error in zip(means, instrument, strict=True)]
+    return PseudoData(tuple(means), tuple(errors), tuple(weights), priors)
 
 
 def gaussian(covariance: FloatArray, sets: int, generator: np.random.Generator) -> FloatArray:

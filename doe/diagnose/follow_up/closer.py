@@ -16,13 +16,13 @@ from doe.diagnose.decision.gates import Limits
 from doe.diagnose.decision.verdict import FittedModel, Verdict
 from doe.diagnose.emulation.fresh_pours import FreshPours
 from doe.diagnose.runs import Declared
-from doe.diagnose.simulation.budget import LEADS
 from doe.diagnose.simulation.plan import Point, sobol
 from doe.diagnose.simulation.pours import ModelPours
 
 FloatArray = npt.NDArray[np.float64]
 
-LOOKS = 3
+LOOKS = 4
+"""Times that models are poured about their fits; each asks again which are the best of the race."""
 MODELS = 4
 """At most so many are poured per look: the best of the race,"""
 WITHIN = Limits.held_out
@@ -35,18 +35,21 @@ SCATTER = 0.15
 """Share of the box to either side of a fit over which its pours are scattered, so that they tell slopes as well."""
 STREAM = 2000
 """Seed of that sequence."""
-MAYBE_SHARE, LEAD_SHARE = 0.25, 0.5
-"""Shares of the largest drop of T^2 from which on an effect gets a second look, and then counts as a lead."""
+IN_QUESTION = 0.25
+"""Share of the largest drop of T^2 from which on an effect gets a second look."""
 
 
-def maybe_leads(verdict: Verdict) -> tuple[str, ...]:
-    """Effects that a first look does not rule out as leads."""
-    return taking_up(verdict, MAYBE_SHARE)
+def in_question(verdict: Verdict) -> tuple[str, ...]:
+    """Effects that take up ``IN_QUESTION`` of what the best one does of the residual, best first.
 
-
-def leads(verdict: Verdict) -> tuple[str, ...]:
-    """The effects to follow after the second look."""
-    return taking_up(verdict, LEAD_SHARE)[:LEADS]
+    None where nothing is missing. The criterion of a fit is not asked: from five runs of an effect it may be off by
+    more than what it has to tell.
+    """
+    drops = {row.name: row.drop for row in verdict.effects if row.status == "raced"}
+    most = max(drops.values(), default=0.0)
+    if verdict.kind == "no_missing_effect" or most <= 0.0:
+        return ()
+    return tuple(sorted((name for name in drops if drops[name] >= IN_QUESTION * most), key=lambda n: -drops[n]))
 
 
 def lost(verdict: Verdict, names: Sequence[str]) -> tuple[str, ...]:
@@ -56,18 +59,6 @@ def lost(verdict: Verdict, names: Sequence[str]) -> tuple[str, ...]:
     may go out of sight when more of its settings come in.
     """
     return tuple(row.name for row in verdict.effects if row.name in names and row.status == "not identifiable here")
-
-
-def taking_up(verdict: Verdict, share: float) -> tuple[str, ...]:
-    """Effects that take up ``share`` of what the best one does of the residual, in that order; none without a residual.
-
-    The criterion of a fit is not asked: from ten runs of an effect it may be off by more than what it has to tell.
-    """
-    drops = {row.name: row.drop for row in verdict.effects if row.status == "raced"}
-    most = max(drops.values(), default=0.0)
-    if verdict.kind == "no_missing_effect" or most <= 0.0:
-        return ()
-    return tuple(sorted((name for name in drops if drops[name] >= share * most), key=lambda n: -drops[n]))
 
 
 def near_best(race: Sequence[FittedModel], number: int) -> tuple[FittedModel, ...]:

@@ -6,9 +6,6 @@ from dataclasses import dataclass
 
 from doe.errors import StatisticsError
 
-LEADS = 5
-"""At most so many effects are followed as leads."""
-
 
 @dataclass(frozen=True)
 class Budget:
@@ -21,16 +18,15 @@ class Budget:
     screening: int = 4
     """Per effect with one amplitude; half as many again with two."""
     second_look: int = 4
-    """More of each effect that the first look does not rule out as a lead, over its whole range."""
-    leads: int = 8
-    """More of each lead, likewise."""
+    """More of each effect that the first look does not rule out, over its whole range."""
+    third_look: int = 8
+    """More of each that the second look has put out of sight, likewise."""
     widened: int = 12
     """Of an effect over a wider range than the first."""
 
     def planned(self, effects: int, conditions: int) -> float:
-        """Pours of the emulator for effects of one amplitude, ranges found at the first trial, and none ruled out."""
-        each = self.scaling + self.screening + self.second_look
-        return conditions * (self.base + self.middle + effects * each + min(effects, LEADS) * self.leads)
+        """Pours of the emulator for effects of one amplitude, ranges found at once, none ruled out, all in sight."""
+        return conditions * (self.base + self.middle + effects * (self.scaling + self.screening + self.second_look))
 
     def scaled(self, runs: int, effects: int, conditions: int) -> Budget:
         """The same shares in at most ``runs`` pours. Raises StatisticsError for fewer than ``LEAST`` takes."""
@@ -49,5 +45,5 @@ class Budget:
         return Budget(**{key: max(getattr(LEAST, key), round(share * value)) for key, value in vars(self).items()})
 
 
-LEAST = Budget(base=24, middle=10, scaling=1, screening=4, second_look=0, leads=4, widened=6)
+LEAST = Budget(base=24, middle=10, scaling=1, screening=4, second_look=0, third_look=4, widened=6)
 """Below that there are fewer points than terms, or no covariance."""

@@ -1,6 +1,6 @@
-"""What is simulated, in order: the base model, how far each effect may go, all effects, those that may lead, leads.
+"""What is simulated, in order: the base model, how far each effect may go, all effects, those that stay in question.
 
-Measured values come in only in the choice of leads and of ranges to be widened; all the pours belong to the declared
+Measured values come in only in the choice of these and of ranges to be widened; all the pours belong to the declared
 model.
 """
 

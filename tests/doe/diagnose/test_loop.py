@@ -171,7 +171,7 @@ def test_held_out_data_rule_out_a_twin(measurement, monkeypatch):
     """What the fitted conditions cannot tell, a held-out one that is far off does; without it both names stay."""
     planted = (("air_drag", (0.5,)),)
     monkeypatch.setattr(FormulaPours, "formula", staticmethod(twins))
-    measure(measurement, monkeypatch, planted, 2, twins)
+    measure(measurement, monkeypatch, planted, 10, twins)
     said = []
     found = diagnosis.run_diagnosis(measurement, None, None, NAMES, BUDGET, said.append)
     # The fitted data even favour the wrong one.

@@ -27,6 +27,7 @@ def predictor(exponents, generator, low, high, parameters):
         amplitudes=(exponents.shape[1] - parameters,),
         low=low,
         high=high,
+        columns=np.arange(p),
     )
 
 
