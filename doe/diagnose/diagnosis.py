@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from doe.diagnose.decision.decide import diagnose
 from doe.diagnose.decision.verdict import Verdict
 from doe.diagnose.declare import complete_rows, declare, observe
 from doe.diagnose.emulation.fresh_pours import FreshPours
-from doe.diagnose.follow_up.closer import LOOKS, MODELS, contenders, in_question, lost, near_best, poured
+from doe.diagnose.follow_up.closer import LOOKS, MODELS, contenders, lost, near_best, poured, with_new
 from doe.diagnose.follow_up.confirm import Confirmed, Model, confirm, fitted
 from doe.diagnose.follow_up.held_out import HeldOut, compared, predictions, ruled_out, upheld
 from doe.diagnose.follow_up.holdout import HoldoutCondition, HoldoutError, holdout_errors
@@ -72,19 +73,18 @@ def run_diagnosis(
             verdict = diagnose(screened.declared, screened.runs, observed, fresh=fresh, ruled_out=gone)
         verdict = upheld(verdict, held_out)
         say(f"with held-out data: {verdict.kind}")
-    before, after = models(verdict)
     number = max(FRESH, *(2 * condition.replicates for condition in measurement.conditions))
     widths = [len(summary_names(condition)) for condition in measurement.conditions]
-    one = confirm(before, everywhere, number, widths)
-    other = one if after == before else confirm(after, everywhere, number, widths)
+    confirmed = confirm(tuple(dict.fromkeys(models(verdict))), everywhere, number, widths)
+    before, after = confirmed[0], confirmed[-1]
     menu = next_experiment(verdict, measurement.fit[0], paths, store, pours, on_pour)
     return Diagnosis(
         declared=screened.declared,
         verdict=verdict,
-        before=one,
-        after=other,
-        fit_error=errors_of(measurement, "fit", one, other),
-        holdout_error=errors_of(measurement, "holdout", one, other),
+        before=before,
+        after=after,
+        fit_error=errors_of(measurement, "fit", before, after),
+        holdout_error=errors_of(measurement, "holdout", before, after),
         held_out=held_out,
         suggestions=menu.suggestions,
         pours=model.run_now + everywhere.run_now + menu.run_now,
@@ -95,7 +95,7 @@ def run_diagnosis(
 def pursued(
     screened: Screened, widest: Declared, observed: Observed, model: ModelPours, budget: Budget, say: Say
 ) -> tuple[Screened, Verdict, tuple[FreshPours, ...]]:
-    """The verdict once what is in question has been looked at again, over wider ranges, and about the best fits.
+    """The verdict once what is in question has been poured about its fits, over wider ranges where one ends.
 
     With the runs and the pours that it rests on.
     """
@@ -114,28 +114,20 @@ def pursued(
             say(f"wider range of {', '.join(names)}{why}: {found.kind}")
         return now, found
 
-    def followed(what: str, names: Sequence[str], number: int) -> tuple[Screened, Verdict]:
-        """Runs and verdict with ``number`` more settings of ``names``."""
-        if not names or number == 0:
-            return screened, verdict
-        now = continued(screened, what, names, number, model, say)
-        found = diagnose(now.declared, now.runs, observed)
-        say(f"after {what}: {found.kind}")
-        return now, found
-
-    looked_at = in_question(verdict)
-    screened, verdict = followed("second look", looked_at, budget.second_look)
     screened, verdict = widened(out_of_sight, ", which could not be seen")
-    screened, verdict = followed("third look", lost(verdict, looked_at), budget.third_look)
     fresh: tuple[FreshPours, ...] = ()
     for look in range(1 + LOOKS):
-        screened, verdict = widened(at_edge, fresh=fresh)
+        screened, verdict = widened(partial(at_edge, fresh=fresh), fresh=fresh)
         closer = contenders(verdict, screened.declared, fresh)
         if look == LOOKS or not closer:
             break
-        fresh += poured(closer, screened.declared, model)
+        fresh = with_new(fresh, poured(closer, screened.declared, model, [fresh] * len(closer)))
         verdict = diagnose(screened.declared, screened.runs, observed, fresh=fresh)
         say(f"poured about the best fits of {', '.join(one.label for one in closer)}: {verdict.kind}")
+        if names := lost(verdict, [one.label for one in closer]):
+            screened = continued(screened, "second look", names, budget.second_look, model, say)
+            verdict = diagnose(screened.declared, screened.runs, observed, fresh=fresh)
+            say(f"after second look: {verdict.kind}")
     return screened, verdict, fresh
 
 
@@ -165,11 +157,15 @@ def with_room(now: Declared, widest: Declared) -> set[str]:
     return {effect.name for effect, end in pairs if max(effect.high) < max(end.high)}
 
 
-def at_edge(verdict: Verdict, now: Declared, widest: Declared) -> tuple[str, ...]:
-    """Effects to be poured next, driven to an end of the range simulated so far, with more in the literature."""
-    room = with_room(now, widest)
+def at_edge(verdict: Verdict, now: Declared, widest: Declared, fresh: Sequence[FreshPours]) -> tuple[str, ...]:
+    """Effects near the best, driven to an end of their range, with more in the literature, that pours have borne out.
+
+    Most of those that an emulator alone drives there fall behind when they are poured, and need no more range.
+    """
+    room, known = with_room(now, widest), {one.members for one in fresh}
     near = near_best([model for model in verdict.models if len(model.members) == 1], MODELS)
-    return tuple(m.label for m in near if m.label in room and any(amplitude.at_edge for amplitude in m.amplitudes))
+    ends = [m for m in near if m.label in room and any(amplitude.at_edge for amplitude in m.amplitudes)]
+    return tuple(m.label for m in ends if m.members in known)
 
 
 def models(verdict: Verdict) -> tuple[Model, Model]:

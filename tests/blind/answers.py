@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from doe.diagnose.decision.verdict import Verdict
 from doe.diagnose.diagnosis import FRESH, models
-from doe.diagnose.follow_up.closer import LOOKS, contenders, poured
+from doe.diagnose.follow_up.closer import LOOKS, contenders, poured, with_new
 from doe.diagnose.follow_up.confirm import confirm
 from doe.diagnose.follow_up.held_out import POURS, compared, contenders_for, predictions, ruled_out, upheld
 from doe.diagnose.follow_up.holdout import HoldoutCondition, holdout_errors
@@ -94,10 +94,11 @@ class Answers:
         pours = self.model_pours(self.measurement.fit)
         for _ in range(LOOKS):
             closer = {k: found for k, v in verdicts.items() if (found := contenders(v, declared, questions[k].fresh))}
-            fresh = iter(poured([model for found in closer.values() for model in found], declared, pours))
+            asked = [(model, questions[k].fresh) for k, found in closer.items() for model in found]
+            fresh = iter(poured([model for model, _ in asked], declared, pours, [known for _, known in asked]))
             for k, found in closer.items():
                 known = questions[k].fresh
-                questions[k] = replace(questions[k], fresh=(*known, *(next(fresh) for _ in found)))
+                questions[k] = replace(questions[k], fresh=with_new(known, [next(fresh) for _ in found]))
             again = self.place.map(judged, [questions[k] for k in closer])
             verdicts |= dict(zip(closer, again, strict=True))
         return verdicts, questions
@@ -168,7 +169,7 @@ class Answers:
         widths = [len(summary_names(condition)) for condition in conditions]
         ratios = []
         for data, verdict in zip(self.measured(truths, conditions), verdicts, strict=True):
-            blocks = [confirm(model, pours, FRESH, widths).blocks for model in models(verdict)]
+            blocks = [one.blocks for one in confirm(models(verdict), pours, FRESH, widths)]
             if data is None or min(len(block) for model in blocks for block in model) < REPLICATES:
                 ratios.append((NAN, NAN))
                 continue

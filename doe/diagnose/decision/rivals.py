@@ -74,31 +74,13 @@ def told_apart(
 
 
 def met_by(best: Fit, rival: Fit, pseudo: PseudoData, emulator: Emulator, evidence: Evidence, seed: int) -> PseudoData:
-    """Return the pseudo-data of ``rival`` as the best model meets them: off by its own error of emulation, and nearer.
-
-    Its error e_b goes with the rival's e_r as far as both rest on the same coefficients: e_b = e_r cov/var(e_r) + rest.
-    """
-    predictor, x, left = nearest(best, rival, evidence)
+    """Return the rival's pseudo-data as the best model meets them: off by its own error of emulation, and nearer."""
+    x, left = nearest(best, rival, evidence)
+    alike, rests = error_beside(best.predictor, x, rival.predictor, rival.x, emulator)
+    theirs = rival.predictor.mean_covariance(rival.x)
+    apart = [rest + (1.0 - part) ** 2 * error for rest, part, error in zip(rests, alike, theirs, strict=True)]
+    off = 1.0 - drawn_in(best.predictor, x, left, rival.sigma, apart, evidence)
     generator = np.random.default_rng([seed, 1])
-    theirs = rival.predictor.variance_shares(rival.x)
-    shared = emulator.shared_shares(predictor, x, rival.predictor, rival.x)
-    alike = [both / share if share > 0.0 else 0.0 for both, share in zip(shared, theirs, strict=True)]
-    rests = [
-        max(0.0, own - part * both) * pour + np.diag(bias)
-        for own, part, both, pour, bias in zip(
-            predictor.variance_shares(x),
-            alike,
-            shared,
-            predictor.pour_covariance,
-            predictor.bias_variance(x),
-            strict=True,
-        )
-    ]
-    apart = [
-        rest + (1.0 - part) ** 2 * error
-        for rest, part, error in zip(rests, alike, rival.predictor.mean_covariance(rival.x), strict=True)
-    ]
-    off = 1.0 - drawn_in(predictor, x, left, rival.sigma, apart, evidence)
     means = tuple(
         mean - (1.0 - part) * error + gaussian(rest, len(mean), generator) - off * r
         for mean, error, part, rest, r in zip(pseudo.means, pseudo.emulation, alike, rests, left, strict=True)
@@ -106,13 +88,25 @@ def met_by(best: Fit, rival: Fit, pseudo: PseudoData, emulator: Emulator, eviden
     return replace(pseudo, means=means)
 
 
-def nearest(best: Fit, rival: Fit, evidence: Evidence) -> tuple[Predictor, FloatArray, tuple[FloatArray, ...]]:
-    """Return the best model's predictor, its x nearest to the rival's prediction, and what is left of that, (d_c,)."""
+def nearest(best: Fit, rival: Fit, evidence: Evidence) -> tuple[FloatArray, tuple[FloatArray, ...]]:
+    """Return where the best model comes nearest to the rival's prediction, (q,), and what it leaves of it, (d_c,)."""
     fitted = tuple(mean - r for mean, r in zip(evidence.means, rival.residual, strict=True))
-    k = rival.predictor.parameters
-    there = replace(evidence, means=fitted, prior_mean=rival.x[:k])
+    there = replace(evidence, means=fitted, prior_mean=rival.x[: rival.predictor.parameters])
     found = fit_with_covariance(best.predictor, best.members, there, rival.sigma)
-    return best.predictor, found.x, found.residual
+    return found.x, found.residual
+
+
+def error_beside(
+    one: Predictor, x: FloatArray, other: Predictor, y: FloatArray, emulator: Emulator
+) -> tuple[list[float], list[FloatArray]]:
+    """Return per condition how far the error of ``one`` at x goes with that of ``other`` at y, and what else it has.
+
+    As far as both rest on the same coefficients: e = e_other cov/var(e_other) + rest.
+    """
+    shared = emulator.shared_shares(one, x, other, y)
+    alike = [s / share if share > 0.0 else 0.0 for s, share in zip(shared, other.variance_shares(y), strict=True)]
+    own = zip(one.variance_shares(x), alike, shared, one.pour_covariance, one.bias_variance(x), strict=True)
+    return alike, [max(0.0, share - part * s) * pour + np.diag(bias) for share, part, s, pour, bias in own]
 
 
 def drawn_in(

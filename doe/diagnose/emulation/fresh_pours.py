@@ -48,6 +48,23 @@ class FreshPours:
         scale = np.concatenate([np.empty(0), *(declared.effects[e].scale for e in self.members)])
         return np.concatenate([declared.coded(self.theta), self.amplitudes / scale], axis=1)
 
+    def joined(self, more: FreshPours) -> FreshPours:
+        """Return these pours with ``more`` of the same model."""
+        return FreshPours(
+            self.members,
+            np.vstack([self.theta, more.theta]),
+            np.vstack([self.amplitudes, more.amplitudes]),
+            tuple(np.vstack(pair) for pair in zip(self.blocks, more.blocks, strict=True)),
+        )
+
+    def goes_on_from(self, other: FreshPours) -> bool:
+        """Return whether these are the pours of ``other`` and more."""
+        n = len(other.theta)
+        return self.members == other.members and all(
+            len(mine) > n and np.array_equal(mine[:n], theirs)
+            for mine, theirs in ((self.theta, other.theta), (self.amplitudes, other.amplitudes))
+        )
+
 
 def newest(fresh: Sequence[FreshPours]) -> tuple[FreshPours, ...]:
     """Return the last pours of every model: those that hold its prediction."""

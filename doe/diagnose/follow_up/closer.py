@@ -1,7 +1,8 @@
 """Closer looks: the models that the answer hangs on are poured where they were fitted, and judged again.
 
 An emulator of the whole box finds where a model fits best, well or badly by the number of runs that it was made from;
-pours about that point tell what the model gives there. A model whose fit then moves away from its pours is poured
+pours about that point tell what the model gives there. Every effect that may explain the residual gets a few. Those
+that are then near the best get more, since their errors decide, and one whose fit moves away from its pours is poured
 again, as in a sequential search over response surfaces (Box and Wilson 1951, J. R. Stat. Soc. B 13:1).
 """
 
@@ -21,22 +22,23 @@ from doe.diagnose.simulation.pours import ModelPours
 
 FloatArray = npt.NDArray[np.float64]
 
-LOOKS = 4
+LOOKS = 6
 """Times that models are poured about their fits; each asks again which are the best of the race."""
 MODELS = 4
-"""At most so many are poured per look: the best of the race,"""
+"""At most so many are near the best: the first of the race,"""
 WITHIN = Limits.held_out
 """as far as their criterion is no farther behind the best."""
 CLOSE = 0.2
 """Distance of a fit from its pours, as a share of the box, within which they hold it."""
-POURS = 12
-"""Per model and condition: with twice the pours of a usual data set, what they add to its error is half of that."""
+STEP, POURS = 6, 12
+"""Pours per model, condition and look, and of a contender in all: twice those of a usual data set, so that what they
+add to its error is half of that."""
 SCATTER = 0.15
 """Share of the box to either side of a fit over which its pours are scattered, so that they tell slopes as well."""
 STREAM = 2000
 """Seed of that sequence."""
 IN_QUESTION = 0.25
-"""Share of the largest drop of T^2 from which on an effect gets a second look."""
+"""Share of the largest drop of T^2 from which on an effect may explain the residual."""
 
 
 def in_question(verdict: Verdict) -> tuple[str, ...]:
@@ -67,23 +69,34 @@ def near_best(race: Sequence[FittedModel], number: int) -> tuple[FittedModel, ..
 
 
 def contenders(verdict: Verdict, declared: Declared, fresh: Sequence[FreshPours]) -> tuple[FittedModel, ...]:
-    """Models near the best of the race whose fit no pours of their own hold; none where nothing is missing.
+    """Models to be poured next: effects in question that never were, else those near the best that too few pours hold.
 
-    Pairs come when all single effects that are near are held: a pair makes up for what a single one is off.
+    None where nothing is missing. Pairs come when all single effects that are near are held: a pair makes up for what a
+    single one is off.
     """
     if verdict.kind == "no_missing_effect":
         return ()
     singles = [model for model in verdict.models if len(model.members) == 1]
+    known, asked = {one.members for one in fresh}, in_question(verdict)
+    if unheard := tuple(model for model in singles if model.label in asked and model.members not in known):
+        return unheard
     for race in (singles, [model for model in verdict.models if model.members]):
         near = near_best(race, MODELS)
-        loose = tuple(model for model in near if not any(_holds(one, model, declared) for one in fresh))
+        loose = tuple(
+            model for model in near if (there := about_fit(model, declared, fresh)) is None or len(there.theta) < POURS
+        )
         if loose:
             return loose
     return ()
 
 
-def _holds(fresh: FreshPours, model: FittedModel, declared: Declared) -> bool:
-    if fresh.members != model.members or len(fresh.theta) < POURS:
+def about_fit(model: FittedModel, declared: Declared, fresh: Sequence[FreshPours]) -> FreshPours | None:
+    """The newest of ``fresh`` that are of this model, about where it is fitted."""
+    return next((one for one in reversed(fresh) if _is_about(one, model, declared)), None)
+
+
+def _is_about(fresh: FreshPours, model: FittedModel, declared: Declared) -> bool:
+    if fresh.members != model.members:
         return False
     step = (fresh.coded(declared).mean(axis=0) - model.coded) / np.subtract(*_box(declared, model.members)[::-1])
     return bool(np.linalg.norm(step) <= CLOSE)
@@ -98,33 +111,45 @@ def _box(declared: Declared, members: tuple[int, ...]) -> tuple[FloatArray, Floa
     return low, high
 
 
-def about(model: FittedModel, declared: Declared, number: int) -> list[Point]:
-    """``number`` points about a model's fit, within the box: a Sobol sequence over ``SCATTER`` of it on either side."""
+def about(model: FittedModel, declared: Declared, number: int, first: int = 0) -> list[Point]:
+    """``number`` points about a model's fit, within the box: a Sobol sequence over ``SCATTER`` of it on either side.
+
+    From its point ``first`` on.
+    """
     low, high = _box(declared, model.members)
     reach = SCATTER * (high - low)
     ends = np.clip([model.coded - reach, model.coded + reach], low, high)
     k, points = len(declared.parameters), []
-    for n, row in enumerate(np.array(sobol(list(zip(*ends.tolist(), strict=True)), number, STREAM))):
+    for n, row in enumerate(np.array(sobol(list(zip(*ends.tolist(), strict=True)), first + number, STREAM))):
         theta = tuple(p.natural(float(x)) for p, x in zip(declared.parameters, row[:k], strict=True))
-        effects, first = [], k
+        effects, column = [], k
         for e in model.members:
             effect = declared.effects[e]
-            coded = row[first : first + effect.amplitudes]
+            coded = row[column : column + effect.amplitudes]
             effects.append((effect.name, tuple((coded * effect.scale).tolist())))
-            first += effect.amplitudes
+            column += effect.amplitudes
         points.append(Point(f"about {model.label}", n, theta, tuple(effects)))
-    return points
+    return points[first:]
 
 
 def poured(
-    models: Sequence[FittedModel], declared: Declared, pours: ModelPours, number: int = POURS
+    models: Sequence[FittedModel],
+    declared: Declared,
+    pours: ModelPours,
+    fresh: Sequence[Sequence[FreshPours]],
+    number: int = STEP,
 ) -> tuple[FreshPours, ...]:
-    """``number`` fresh pours about the fit of each of ``models`` in every condition of ``pours``."""
-    asked = [about(model, declared, number) for model in models]
+    """``number`` pours about the fit of each of ``models`` in every condition of ``pours``, with those there already.
+
+    fresh: per model, what was poured before.
+    """
+    before = [about_fit(model, declared, known) for model, known in zip(models, fresh, strict=True)]
+    starts = [0 if one is None else len(one.theta) for one in before]
+    asked = [about(model, declared, number, start) for model, start in zip(models, starts, strict=True)]
     # All of them at once, so that no worker waits for the last pour of a model.
     rows = iter(pours.run("best fits", [point for points in asked for point in points]))
     found = []
-    for model, points in zip(models, asked, strict=True):
+    for model, points, known in zip(models, asked, before, strict=True):
         own = [next(rows) for _ in points]
         blocks = tuple(
             np.array([row[c].summaries if row[c].valid else np.full(len(row[c].summaries), np.nan) for row in own])
@@ -132,5 +157,11 @@ def poured(
         )
         theta = np.array([point.theta for point in points])
         amplitudes = np.array([[x for _, a in point.effects for x in a] for point in points])
-        found.append(FreshPours(model.members, theta, amplitudes, blocks))
+        new = FreshPours(model.members, theta, amplitudes, blocks)
+        found.append(new if known is None else known.joined(new))
     return tuple(found)
+
+
+def with_new(fresh: Sequence[FreshPours], found: Sequence[FreshPours]) -> tuple[FreshPours, ...]:
+    """``fresh`` and ``found``, of which those that go on from earlier pours take their place."""
+    return (*(one for one in fresh if not any(new.goes_on_from(one) for new in found)), *found)

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from doe.diagnose.decision.verdict import Verdict
 from doe.diagnose.simulation.plan import Point
-from doe.diagnose.simulation.pours import ModelPours
+from doe.diagnose.simulation.pours import ModelPours, Pour
 from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
@@ -58,19 +58,24 @@ class Confirmed:
 
 
 def confirm(
-    model: Model,
+    models: Sequence[Model],
     pours: ModelPours,
     number: int,
     widths: Sequence[int],
     where: Sequence[int] | None = None,
     sequence: str = "confirm",
-) -> Confirmed:
-    """Pour ``model`` ``number`` times in every condition of ``pours``, or ``where``; ``widths``: summaries of each.
+) -> tuple[Confirmed, ...]:
+    """Pour each model ``number`` times in every condition of ``pours``, or ``where``; ``widths``: summaries of each.
 
     Pours of another ``sequence`` have other seeds.
     """
-    points = [Point(f"{sequence} {number}", k, model.theta, model.effects) for k in range(number)]
-    rows = pours.run(f"{sequence}: {model.name}", points, where)
+    points = [Point(f"{sequence} {number}", k, model.theta, model.effects) for model in models for k in range(number)]
+    # All of them at once, so that no worker waits for the last pour of a model.
+    rows = iter(pours.run(f"{sequence}: {', '.join(model.name for model in models)}", points, where))
+    return tuple(_confirmed(model, [next(rows) for _ in range(number)], widths) for model in models)
+
+
+def _confirmed(model: Model, rows: Sequence[Sequence[Pour]], widths: Sequence[int]) -> Confirmed:
     blocks, profiles, broken = [], [], 0
     for c, width in enumerate(widths):
         valid = [row[c] for row in rows if row[c].valid and np.isfinite(row[c].summaries).all()]

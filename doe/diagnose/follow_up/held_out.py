@@ -73,10 +73,9 @@ def predictions(
     verdict: Verdict, pours: ModelPours, widths: Sequence[int], where: Sequence[int] | None = None, number: int = POURS
 ) -> dict[str, tuple[FloatArray, ...]]:
     """Label -> fresh pours of every contender in the conditions of ``pours``, or ``where``, per condition (m, d_c)."""
-    return {
-        model.label: confirm(fitted(verdict, model.label), pours, number, widths, where, SEQUENCE).blocks
-        for model in contenders_for(verdict)
-    }
+    labels = [model.label for model in contenders_for(verdict)]
+    poured = confirm([fitted(verdict, label) for label in labels], pours, number, widths, where, SEQUENCE)
+    return {label: one.blocks for label, one in zip(labels, poured, strict=True)}
 
 
 @dataclass(frozen=True)

@@ -68,7 +68,8 @@ def next_experiment(
     set_ups = [replace(condition, name=name, scene=scene) for name, scene in feasible(condition.scene).items()]
     # All set-ups at once, so that no core waits for the last pour of one of them.
     model, widths = ModelPours(set_ups, paths, store, pours, on_pour), [len(summary_names(one)) for one in set_ups]
-    blocks = {label: confirm(one, model, POURS, widths).blocks for label, one in rivals.items()}
+    poured = confirm(tuple(rivals.values()), model, POURS, widths)
+    blocks = {label: one.blocks for label, one in zip(rivals, poured, strict=True)}
     items = []
     for k, set_up in enumerate(set_ups):
         found = {label: block[k] for label, block in blocks.items()}

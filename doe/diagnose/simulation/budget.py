@@ -17,16 +17,14 @@ class Budget:
     """At each end that the search for a range tries; those at the end that it finds count like the screening."""
     screening: int = 4
     """Per effect with one amplitude; half as many again with two."""
-    second_look: int = 4
-    """More of each effect that the first look does not rule out, over its whole range."""
-    third_look: int = 8
-    """More of each that the second look has put out of sight, likewise."""
+    second_look: int = 8
+    """More of each that pours about its fit have put out of sight, over its whole range."""
     widened: int = 12
     """Of an effect over a wider range than the first."""
 
     def planned(self, effects: int, conditions: int) -> float:
         """Pours of the emulator for effects of one amplitude, ranges found at once, none ruled out, all in sight."""
-        return conditions * (self.base + self.middle + effects * (self.scaling + self.screening + self.second_look))
+        return conditions * (self.base + self.middle + effects * (self.scaling + self.screening))
 
     def scaled(self, runs: int, effects: int, conditions: int) -> Budget:
         """The same shares in at most ``runs`` pours. Raises StatisticsError for fewer than ``LEAST`` takes."""
@@ -38,12 +36,12 @@ class Budget:
         share = runs / self.planned(effects, conditions)
         # What is held at its least is taken from the rest.
         while (found := self._shares(share)).planned(effects, conditions) > runs:
-            share *= 0.98
+            share *= 0.995
         return found
 
     def _shares(self, share: float) -> Budget:
         return Budget(**{key: max(getattr(LEAST, key), round(share * value)) for key, value in vars(self).items()})
 
 
-LEAST = Budget(base=24, middle=10, scaling=1, screening=4, second_look=0, third_look=4, widened=6)
+LEAST = Budget(base=24, middle=10, scaling=1, screening=4, second_look=4, widened=6)
 """Below that there are fewer points than terms, or no covariance."""

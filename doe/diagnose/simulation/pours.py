@@ -5,8 +5,9 @@ from __future__ import annotations
 import contextlib
 import math
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -74,6 +75,20 @@ class Pour:
         return Outcome(self.outcome).valid
 
 
+Rows = list[list[Pour]]
+"""Pours per point and condition."""
+Result = TypeVar("Result")
+Search = Generator[Sequence[Point], Rows, Result]
+"""Asks for pours of points, as often as it needs, and ends with what it has found."""
+Place = tuple[Point, int]
+"""Point and number of a condition."""
+
+
+def once(points: Sequence[Point]) -> Search[Rows]:
+    """The search that asks for ``points`` and ends with their pours."""
+    return (yield points)
+
+
 class ModelPours:
     """Runs points of one declared model under its conditions. Points asked for before are not run again."""
 
@@ -92,23 +107,62 @@ class ModelPours:
         self.run_now = 0
         """Pours that were really run, not found in the store."""
 
-    def run(self, what: str, points: Sequence[Point], where: Sequence[int] | None = None) -> list[list[Pour]]:
+    def run(self, what: str, points: Sequence[Point], where: Sequence[int] | None = None) -> Rows:
         """Pours of every point, one per condition, or per condition ``where``."""
+        return self.answered(what, [once(points)], where)[0]
+
+    def answered(
+        self,
+        what: str,
+        searches: Sequence[Search[Result]],
+        where: Sequence[int] | None = None,
+        widest: Sequence[Point] = (),
+    ) -> list[Result]:
+        """What each of ``searches`` ends with. Each is answered as soon as its own pours are there.
+
+        What is asked for in answer to pours goes first, so that a search of many steps does not come last. It has to
+        fit into the room that its first points and the points ``widest`` need.
+        """
         asked = range(len(self._conditions)) if where is None else where
-        places = [(point, c) for point in points for c in asked]
-        wanted = [(point, c) for point, c in places if not self._find(point, c)]
-        left = len(wanted)
-        queue = deque(Job(self.scene(point, c), self.seed(point, c), tag=tag) for tag, (point, c) in enumerate(wanted))
-        room = self.room() + [job.scene for job in queue]
+        found: dict[int, Result] = {}
+        open_places: dict[int, set[Place]] = {}
+        points: dict[int, Sequence[Point]] = {}
+        wanted: list[tuple[int, Place]] = []
+        queue: deque[Job] = deque()
+
+        def resumed(k: int) -> list[Job]:
+            """Jobs that search ``k`` waits for now; none where it has ended."""
+            try:
+                while True:
+                    rows = [[self._known[point, c] for c in asked] for point in points[k]] if k in points else None
+                    points[k] = next(searches[k]) if rows is None else searches[k].send(rows)
+                    places = dict.fromkeys((point, c) for point in points[k] for c in asked)
+                    if missing := [place for place in places if not self._find(*place)]:
+                        break
+            except StopIteration as end:
+                found[k] = end.value
+                return []
+            open_places[k] = set(missing)
+            first = len(wanted)
+            wanted.extend((k, place) for place in missing)
+            return [Job(self.scene(*one), self.seed(*one), tag=first + n) for n, one in enumerate(missing)]
+
+        for k in range(len(searches)):
+            queue.extend(resumed(k))
+        left = len(queue)
+        room = self.room() + [job.scene for job in queue] + self._possible(widest, asked)
         for job, record in self._pours(queue, room) if queue else ():
-            point, c = wanted[job.tag]
+            k, (point, c) = wanted[job.tag]
             self._known[point, c] = self._keep(what, point, c, job, record)
             self.run_now += 1
-            left -= 1
+            open_places[k].discard((point, c))
+            more = [] if open_places[k] else resumed(k)
+            queue.extendleft(reversed(more))
+            left += len(more) - 1
             if self._on_pour is not None:
                 label = f"{point.sequence} {point.number}, {self._conditions[c].name}"
                 self._on_pour(what, left, Ended(label, job.seed, record.outcome, record.message))
-        return [[self._known[point, c] for c in asked] for point in points]
+        return [found[k] for k in range(len(searches))]
 
     def scene(self, point: Point, condition: int) -> Scene:
         """The scene of ``point`` in a condition."""
@@ -134,6 +188,15 @@ class ModelPours:
                     with contextlib.suppress(ParameterError):
                         room.append(with_values(condition.scene, ends))
         return room
+
+    def _possible(self, points: Sequence[Point], where: Sequence[int]) -> list[Scene]:
+        """Scenes of ``points``, less those that there cannot be."""
+        scenes: list[Scene] = []
+        for point in points:
+            for c in where:
+                with contextlib.suppress(ParameterError):
+                    scenes.append(self.scene(point, c))
+        return scenes
 
     def _find(self, point: Point, condition: int) -> bool:
         """Whether the pour is known, here or in the store."""

@@ -1,28 +1,24 @@
 """How far each effect is simulated: from zero to where it shifts the summaries clearly.
 
 With the parameters in the middle, a range ends where the effect shifts the summaries by ``WANTED`` standard errors of a
-data set of ``REPLICATES`` pours, or at the end of what the literature supports if that comes first. The searches of all
-effects go on side by side, a round of each at a time, so that no core waits for the last pour of one of them.
+data set of ``REPLICATES`` pours, or at the end of what the literature supports if that comes first.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Sequence
 from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from doe.diagnose.runs import Declared, Effect
-from doe.diagnose.simulation.plan import Point, scaling_points
-from doe.diagnose.simulation.pours import ModelPours, Pour
+from doe.diagnose.simulation.plan import scaling_points
+from doe.diagnose.simulation.pours import Rows, Search
 
 FloatArray = npt.NDArray[np.float64]
-Rows = Sequence[Sequence[Pour]]
-"""Pours per point and condition."""
-Search = Generator[list[Point], Rows, tuple[Effect, float]]
-"""Asks for pours of points, as often as it needs, and ends with the effect over its range and the shift [σ] there."""
+RangeSearch = Search[tuple[Effect, float]]
+"""Ends with the effect over its range and the shift [σ] at its end."""
 
 REPLICATES = 6
 WANTED = 16.0
@@ -39,36 +35,15 @@ SECOND_LOOK = 8
 """Pours by which that is decided."""
 
 
-def ranges(declared: Declared, model: ModelPours, number: int, centre: Rows) -> list[tuple[Effect, float]]:
-    """The effects over their ranges, and the shift [σ] at the end, by ``number`` pours per trial and condition."""
-    return answered([search(declared, effect, number, centre) for effect in declared.effects], model)
-
-
-def answered(searches: Sequence[Search], model: ModelPours) -> list[tuple[Effect, float]]:
-    """What ``searches`` find; what they ask for in a round is poured together."""
-    found: dict[int, tuple[Effect, float]] = {}
-    asked = {k: next(one) for k, one in enumerate(searches)}
-    while asked:
-        rows = iter(model.run("ranges of the effects", [point for points in asked.values() for point in points]))
-        answers = {k: [next(rows) for _ in points] for k, points in asked.items()}
-        asked = {}
-        for k, pours in answers.items():
-            try:
-                asked[k] = searches[k].send(pours)
-            except StopIteration as end:
-                found[k] = end.value
-    return [found[k] for k in range(len(searches))]
-
-
-def search(declared: Declared, effect: Effect, number: int, centre: Rows) -> Search:
-    """The range of one effect, which is looked at twice where all of it seems to shift too little."""
+def range_of(declared: Declared, effect: Effect, number: int, centre: Rows) -> RangeSearch:
+    """The range of one effect by ``number`` pours a trial, looked at twice where all of it shifts too little."""
     found, shift = yield from scaled_range(declared, effect, number, centre)
     if shift < UNSEEN and found.high == effect.high:
         found, shift = yield from looked_twice(declared, effect, centre)
     return found, shift
 
 
-def looked_twice(declared: Declared, effect: Effect, centre: Rows) -> Search:
+def looked_twice(declared: Declared, effect: Effect, centre: Rows) -> RangeSearch:
     """``effect`` by ``SECOND_LOOK`` pours at its whole range, named unseen where they shift too little, and the shift.
 
     Two pours may hide five standard errors; so many do not hide much more than the three that could be told at all.
@@ -78,7 +53,7 @@ def looked_twice(declared: Declared, effect: Effect, centre: Rows) -> Search:
     return (replace(effect, unseen=shift) if shift < UNSEEN else effect), shift
 
 
-def scaled_range(declared: Declared, effect: Effect, number: int, centre: Rows) -> Search:
+def scaled_range(declared: Declared, effect: Effect, number: int, centre: Rows) -> RangeSearch:
     """``effect`` with its bounds drawn in to where the summaries shift by about ``WANTED``, and the shift [σ].
 
     From the whole range inward; back out, halfway on a logarithmic scale, where a step inward went too far.

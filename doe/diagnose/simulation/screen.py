@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from doe.diagnose.runs import Declared, Effect, Runs
 from doe.diagnose.simulation.budget import Budget
 from doe.diagnose.simulation.plan import Point, base_points, effect_points, middle_points, scaling_points, sequence
-from doe.diagnose.simulation.pours import ModelPours, Pour, as_runs
-from doe.diagnose.simulation.ranges import ranges
+from doe.diagnose.simulation.pours import ModelPours, Pour, Rows, Search, as_runs
+from doe.diagnose.simulation.ranges import range_of
 
 Say = Callable[[str], None]
 
@@ -38,25 +38,50 @@ def screen(declared: Declared, model: ModelPours, budget: Budget, say: Say) -> S
     pours = model.run("base model", points)
     say(f"base model: {len(points)} settings")
     centre = [row for point, row in zip(points, pours, strict=True) if point.sequence == "middle"]
-    effects = []
-    for effect, shift in ranges(declared, model, budget.scaling, centre):
-        seen = "" if effect.unseen is None else "; too little to be told from noise"
-        end = f"{effect.name}: up to {effect.high[0]:.3g}"
-        say(f"{end}, which shifts the summaries by {shift:.1f} standard errors{seen}")
-        effects.append(effect)
-    declared = replace(declared, effects=tuple(effects))
-    asked = [
-        point
-        for stream, effect in enumerate(effects)
-        if effect.unseen is None
-        for point in (
-            *scaling_points(declared.parameters, effect, budget.scaling),
-            *effect_points(declared.parameters, effect, stream, screening_number(effect, budget.screening)),
-        )
+    searches = [looked_at(declared, effect, stream, budget, centre) for stream, effect in enumerate(declared.effects)]
+    widest = [
+        point for stream, effect in enumerate(declared.effects) for point in settings(declared, effect, stream, budget)
     ]
-    found_pours = model.run("screening", asked)
-    say(f"screening: {len(asked)} settings of {sum(effect.unseen is None for effect in effects)} effects")
-    return Screened(declared, (*points, *asked), tuple(map(tuple, (*pours, *found_pours))))
+    found = model.answered("screening", searches, widest=widest)
+    for look in found:
+        seen = "" if look.effect.unseen is None else "; too little to be told from noise"
+        end = f"{look.effect.name}: up to {look.effect.high[0]:.3g}"
+        say(f"{end}, which shifts the summaries by {look.shift:.1f} standard errors{seen}")
+    asked = [point for look in found for point in look.points]
+    say(f"screening: {len(asked)} settings of {sum(look.effect.unseen is None for look in found)} effects")
+    return Screened(
+        replace(declared, effects=tuple(look.effect for look in found)),
+        (*points, *asked),
+        tuple(map(tuple, (*pours, *(row for look in found for row in look.pours)))),
+    )
+
+
+@dataclass(frozen=True)
+class FirstLook:
+    """An effect over its range, the shift [σ] at its end, and its settings with their pours; none of one unseen."""
+
+    effect: Effect
+    shift: float
+    points: tuple[Point, ...] = ()
+    pours: tuple[Sequence[Pour], ...] = ()
+
+
+def looked_at(declared: Declared, effect: Effect, stream: int, budget: Budget, centre: Rows) -> Search[FirstLook]:
+    """The range of one effect, and its first settings over it."""
+    effect, shift = yield from range_of(declared, effect, budget.scaling, centre)
+    if effect.unseen is not None:
+        return FirstLook(effect, shift)
+    points = settings(declared, effect, stream, budget)
+    pours = yield points
+    return FirstLook(effect, shift, points, tuple(pours))
+
+
+def settings(declared: Declared, effect: Effect, stream: int, budget: Budget) -> tuple[Point, ...]:
+    """The first settings of one effect: at the end of its range, as its search has poured them, and all over it."""
+    return (
+        *scaling_points(declared.parameters, effect, budget.scaling),
+        *effect_points(declared.parameters, effect, stream, screening_number(effect, budget.screening)),
+    )
 
 
 def continued(

@@ -11,11 +11,12 @@ from doe.diagnose.follow_up import menu
 from doe.diagnose.runs import Effect, Observed
 from doe.diagnose.simulation.budget import Budget
 from doe.diagnose.simulation.pours import Pour
-from doe.diagnose.simulation.ranges import REPLICATES, TOO_FAR, answered, scaled_range, whitened_shift
+from doe.diagnose.simulation.ranges import REPLICATES, TOO_FAR, scaled_range, whitened_shift
 from doe.measurement.load import load_measurement
 from doe.measurement.summaries import summaries_of_data, summary_names
 from solver import EFFECTS
 from solver.assets import measurement_folder
+from tests.doe.diagnose.simulation.made_up_pours import AtOnce
 
 NAMES = ("rolling_resistance", "air_drag", "plate_tilt", "density_error")
 BUDGET = Budget(base=48, middle=16, scaling=2, screening=16, second_look=0, widened=16)
@@ -34,7 +35,7 @@ def short(point):
     return " ".join(f"{number:.8g}" for number in numbers)
 
 
-class FormulaPours:
+class FormulaPours(AtOnce):
     """Stands for ``ModelPours``: summaries linear in parameters and amplitudes, with unit noise per pour."""
 
     def __init__(self, conditions, paths, store, pours, on_pour=None, root=0):
@@ -171,7 +172,7 @@ def test_held_out_data_rule_out_a_twin(measurement, monkeypatch):
     """What the fitted conditions cannot tell, a held-out one that is far off does; without it both names stay."""
     planted = (("air_drag", (0.5,)),)
     monkeypatch.setattr(FormulaPours, "formula", staticmethod(twins))
-    measure(measurement, monkeypatch, planted, 10, twins)
+    measure(measurement, monkeypatch, planted, 2, twins)
     said = []
     found = diagnosis.run_diagnosis(measurement, None, None, NAMES, BUDGET, said.append)
     # The fitted data even favour the wrong one.
@@ -198,7 +199,7 @@ def test_the_same_model_asks_for_the_same_pours(measurement, monkeypatch):
 
     class Recording(FormulaPours):
         def run(self, what, points, where=None):
-            if what in ("base model", "screening") or what.startswith("range"):
+            if what in ("base model", "screening"):
                 asked[-1].extend((point.sequence, point.number, point.theta, point.effects) for point in points)
             return super().run(what, points, where)
 
@@ -235,9 +236,8 @@ def test_a_range_that_goes_too_far_is_drawn_in(measurement):
 
     model = Strong([condition], [], None, None)
     centre = model.run("middle", diagnosis_middle(declared))
-    ((effect, shift),) = answered(
-        [scaled_range(declared, Effect("rolling_resistance", (0.0,), (1.0,)), 4, centre)], model
-    )
+    search = scaled_range(declared, Effect("rolling_resistance", (0.0,), (1.0,)), 4, centre)
+    effect, shift = model.result_of("range", search)
     assert 0.0 < effect.high[0] < 0.5
     assert shift <= TOO_FAR
 

@@ -7,7 +7,7 @@ import pytest
 
 from doe.diagnose.decision.gates import Limits
 from doe.diagnose.decision.race import race_singles
-from doe.diagnose.decision.rivals import told_apart
+from doe.diagnose.decision.rivals import drawn_in, error_beside, told_apart
 from doe.diagnose.emulation.fresh_pours import FreshPours
 from doe.diagnose.fitting.calibrate import calibrate, gather_evidence
 from tests.doe.diagnose.toy import PARAMETERS, estimated_emulator, known_emulator, make_toy
@@ -104,3 +104,43 @@ def test_the_criterion_decides_who_is_best():
     race, _, _ = raced(5, 10.0, 6, effects=(0, 5))
     assert race.best == "e5"
     assert race.criteria["e5"] == pytest.approx(min(race.criteria.values()))
+
+
+def test_the_distance_of_two_models_is_drawn_in_by_what_their_errors_add_to_it():
+    """One parameter along the first summary, two summaries off it, unit Sigma: E d^2 = 3^2 + 0.5^2 + 0.5^2."""
+    toy = make_toy(3, 0)
+    toy = replace(toy, jacobian=np.eye(3)[:, :PARAMETERS] * [5.0, 0.0, 0.0], signatures=np.zeros_like(toy.signatures))
+    emulator = known_emulator(toy, np.random.default_rng(0))
+    evidence = gather_evidence(emulator, toy.measured(np.random.default_rng(1), np.zeros(3)))
+    model, x = emulator.predictor(()), np.zeros(PARAMETERS)
+    apart = [0.25 * np.eye(3)]
+
+    def share(distance, at=x):
+        return drawn_in(model, at, [np.array([0.0, distance, 0.0])], [np.eye(3)], apart, evidence)
+
+    assert share(np.sqrt(9.5)) == pytest.approx(3.0 / np.sqrt(9.5))
+    assert share(np.sqrt(0.4)) == 0.0
+    # At an end of its range the parameter takes up nothing, and the first summary counts as well.
+    assert share(np.sqrt(9.75), np.array([1.0, 0.0, 0.0])) == pytest.approx(3.0 / np.sqrt(9.75))
+
+
+def test_models_from_the_same_runs_err_together_and_those_with_own_pours_by_themselves():
+    toy, generator = make_toy(12, 1), np.random.default_rng(5)
+    emulator = estimated_emulator(toy, generator, base=64, per_effect=9)
+    x, away = np.array([0.2, -0.1, 0.3, 0.0]), np.array([0.2, -0.1, 0.3, 0.5])
+    one, other = emulator.predictor((0,)), emulator.predictor((1,))
+    # With no amplitude both are the base model: the same number, and nothing is left.
+    (alike,), (rest,) = error_beside(one, x, other, x, emulator)
+    assert alike == pytest.approx(1.0)
+    assert np.abs(rest - np.diag(one.bias_variance(x)[0])).max() < 1e-9
+    (alike,), (rest,) = error_beside(one, away, other, away, emulator)
+    assert alike < 1.0
+    assert np.diag(rest).min() > 0.0
+    data = toy.measured(np.random.default_rng(6), toy.listed(0, 8.0))
+    evidence = gather_evidence(emulator, data)
+    race = race_singles(emulator, evidence, calibrate(emulator, (), evidence), (0, 1))
+    held = replace(emulator, fresh=about_the_fits(toy, race, toy.signatures[:2], generator))
+    first, second = (held.predictor((e,)) for e in (0, 1))
+    (alike,), (rest,) = error_beside(first, first.anchor.x, second, second.anchor.x, held)
+    assert alike == 0.0
+    assert np.allclose(rest, first.mean_covariance(first.anchor.x)[0])

@@ -11,7 +11,22 @@ DECLARED = Declared((Parameter("p", 0.0, 1.0),), (), (Condition("one", SUMMARIES
 STANDARD_ERROR = 1 / np.sqrt(REPLICATES)
 
 
-class Noisy:
+class AtOnce:
+    """``ModelPours.answered`` where pours are there as soon as they are asked for: one search after the other."""
+
+    def answered(self, what, searches, where=None, widest=()):
+        return [self.result_of(what, search) for search in searches]
+
+    def result_of(self, what, search):
+        pours = None
+        while True:
+            try:
+                pours = self.run(what, search.send(pours))
+            except StopIteration as end:
+                return end.value
+
+
+class Noisy(AtOnce):
     """Pours with unit noise; an effect shifts the first summary by ``answer`` (amplitude) standard errors."""
 
     def __init__(self, **answers):

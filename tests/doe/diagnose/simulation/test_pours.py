@@ -10,6 +10,7 @@ import pytest
 from doe.diagnose.follow_up.confirm import Model, confirm
 from doe.diagnose.runs import Condition, Declared
 from doe.diagnose.simulation import pours as module
+from doe.diagnose.simulation.plan import Point
 from doe.diagnose.simulation.pours import ModelPours, Pour
 from doe.diagnose.simulation.ranges import whitened_shift
 from doe.store import Store
@@ -46,11 +47,46 @@ def poured(monkeypatch, tmp_path):
 def test_two_models_are_confirmed_by_pours_of_their_own(poured):
     pours, jobs = poured
     width = len(OBSERVABLES) - 1
-    for friction in (0.5, 0.6, 0.5):
-        (block,) = confirm(Model((friction,)), pours, 3, [width]).blocks
-        assert block.tolist() == [[friction] * width] * 3
-    # The third asks for what the first has poured.
+    for asked in ((0.5,), (0.6, 0.5)):
+        found = confirm([Model((friction,)) for friction in asked], pours, 3, [width])
+        assert [one.blocks[0].tolist() for one in found] == [[[friction] * width] * 3 for friction in asked]
+    # The last asks for what the first has poured.
     assert len(jobs) == 6
+
+
+def at(friction, number=0):
+    return Point("search", number, (friction,))
+
+
+def test_searches_are_answered_side_by_side_and_what_follows_a_pour_goes_first(poured):
+    """A search of three steps beside two of one: each gets its own pours, and the long one does not come last."""
+    pours, jobs = poured
+
+    def climbing(friction):
+        for _ in range(2):
+            (row,) = yield [at(friction)]
+            friction = row[0].summaries[0] + 0.01
+        rows = yield [at(friction), at(friction, 1)]
+        return [row[0].summaries[0] for row in rows]
+
+    def single(friction):
+        ((pour,),) = yield [at(friction)]
+        return pour.summaries[0]
+
+    found = pours.answered("search", [climbing(0.5), single(0.6), single(0.7)])
+    assert found == [pytest.approx([0.52, 0.52]), 0.6, 0.7]
+    run = [float(value(job.scene, FRICTION)) for job in jobs]
+    assert run == pytest.approx([0.5, 0.51, 0.52, 0.52, 0.6, 0.7])
+    # All of it is known now: the searches end without a pour.
+    assert pours.answered("search", [climbing(0.5), single(0.7)]) == [pytest.approx([0.52, 0.52]), 0.7]
+    assert (len(jobs), pours.run_now) == (6, 6)
+
+
+def test_a_point_that_is_asked_for_twice_is_poured_once(poured):
+    pours, jobs = poured
+    first, second = pours.run("twice", [at(0.5), at(0.5)])
+    assert first == second
+    assert len(jobs) == 1
 
 
 def test_an_effect_under_which_no_pour_ends_is_infinitely_far():

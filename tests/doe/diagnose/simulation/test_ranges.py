@@ -1,17 +1,15 @@
 """How far an effect's range is drawn in, on made-up answers of known size."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from doe.diagnose.runs import Effect
 from doe.diagnose.simulation.pours import Pour
-from doe.diagnose.simulation.ranges import TOO_FAR, TOO_LITTLE, answered, looked_twice, ranges, scaled_range
-from tests.doe.diagnose.simulation.made_up_pours import DECLARED, STANDARD_ERROR, Noisy
+from doe.diagnose.simulation.ranges import TOO_FAR, TOO_LITTLE, looked_twice, scaled_range
+from tests.doe.diagnose.simulation.made_up_pours import DECLARED, STANDARD_ERROR, AtOnce, Noisy
 
 
-class Answering:
+class Answering(AtOnce):
     """Pours of which the first summary is ``answer`` (amplitude), in standard errors, the second nothing."""
 
     def __init__(self, answer):
@@ -68,25 +66,5 @@ def test_an_effect_of_five_standard_errors_is_not_given_up(centre):
     assert kept >= 36
 
 
-def test_searches_side_by_side_find_what_each_finds_alone(centre):
-    """One that ends at once beside one of several rounds: the answers are not mixed up, and a round is one queue."""
-    declared = replace(DECLARED, effects=(Effect("weak", (0.0,), (1.0,)), Effect("strong", (0.0,), (1.0,))))
-
-    class Both(Noisy):
-        def run(self, what, points):
-            self.asked.append({name for point in points for name, _ in point.effects})
-            (shifts,) = [[sum(self.answers[n] * a for n, (a,) in p.effects) * STANDARD_ERROR for p in points]]
-            return [[Pour((shift, 0.0), "measured")] for shift in shifts]
-
-    model = Both(weak=14.0, strong=100.0)
-    (weak, _), (strong, _) = ranges(declared, model, 3, centre)
-    assert model.asked == [{"weak", "strong"}, {"strong"}]
-    assert weak.high == (1.0,)
-    alone = _found(scaled_range(DECLARED, declared.effects[1], 3, centre), Both(strong=100.0))[0]
-    assert strong == alone
-    assert 0.1 < strong.high[0] < 0.25
-
-
 def _found(search, model):
-    (found,) = answered([search], model)
-    return found
+    return model.result_of("range", search)
