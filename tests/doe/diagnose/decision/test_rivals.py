@@ -107,21 +107,21 @@ def test_the_criterion_decides_who_is_best():
 
 
 def test_the_distance_of_two_models_is_drawn_in_by_what_their_errors_add_to_it():
-    """One parameter along the first summary, two summaries off it, unit Sigma: E d^2 = 3^2 + 0.5^2 + 0.5^2."""
-    toy = make_toy(3, 0)
-    toy = replace(toy, jacobian=np.eye(3)[:, :PARAMETERS] * [5.0, 0.0, 0.0], signatures=np.zeros_like(toy.signatures))
+    """One parameter along the first summary, three summaries off it, unit Sigma: E d^2 = 3^2 + 3 0.5^2."""
+    toy = make_toy(4, 0)
+    toy = replace(toy, jacobian=np.eye(4)[:, :PARAMETERS] * [5.0, 0.0, 0.0], signatures=np.zeros_like(toy.signatures))
     emulator = known_emulator(toy, np.random.default_rng(0))
-    evidence = gather_evidence(emulator, toy.measured(np.random.default_rng(1), np.zeros(3)))
+    evidence = gather_evidence(emulator, toy.measured(np.random.default_rng(1), np.zeros(4)))
     model, x = emulator.predictor(()), np.zeros(PARAMETERS)
-    apart = [0.25 * np.eye(3)]
+    apart = [0.25 * np.eye(4)]
 
     def share(distance, at=x):
-        return drawn_in(model, at, [np.array([0.0, distance, 0.0])], [np.eye(3)], apart, evidence)
+        return drawn_in(model, at, [np.array([0.0, distance, 0.0, 0.0])], [np.eye(4)], apart, evidence)
 
-    assert share(np.sqrt(9.5)) == pytest.approx(3.0 / np.sqrt(9.5))
-    assert share(np.sqrt(0.4)) == 0.0
+    assert share(np.sqrt(9.75)) == pytest.approx(3.0 / np.sqrt(9.75))
+    assert share(np.sqrt(0.7)) == 0.0
     # At an end of its range the parameter takes up nothing, and the first summary counts as well.
-    assert share(np.sqrt(9.75), np.array([1.0, 0.0, 0.0])) == pytest.approx(3.0 / np.sqrt(9.75))
+    assert share(np.sqrt(10.0), np.array([1.0, 0.0, 0.0])) == pytest.approx(3.0 / np.sqrt(10.0))
 
 
 def test_models_from_the_same_runs_err_together_and_those_with_own_pours_by_themselves():
