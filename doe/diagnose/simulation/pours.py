@@ -9,10 +9,6 @@ from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-import numpy as np
-import numpy.typing as npt
-
-from doe.diagnose.runs import BASE, Declared, Runs
 from doe.diagnose.simulation.plan import Point
 from doe.diagnose.simulation.profiles import profile_names, profile_of_record
 from doe.measurement.measurement import Condition
@@ -29,8 +25,6 @@ from solver import (
     code_version,
     with_values,
 )
-
-FloatArray = npt.NDArray[np.float64]
 
 ROOT = 0
 """Root of the seeds: the same for every data set of a model, so that its pours are found again."""
@@ -238,22 +232,3 @@ def effect_values(effect: str, amplitude: Sequence[float]) -> dict[str, float]:
     """Parameter path → value of an effect's amplitudes."""
     names = EFFECTS[effect].amplitudes
     return {f"effect.{effect}.{name}": one for name, one in zip(names, amplitude, strict=True)}
-
-
-def as_runs(declared: Declared, points: Sequence[Point], pours: Sequence[Sequence[Pour]]) -> Runs:
-    """Points with at most one effect and their pours as arrays; a pour that broke off counts as not simulated."""
-    names = [effect.name for effect in declared.effects]
-    effect = np.full(len(points), BASE, dtype=np.int64)
-    amplitude = np.zeros((len(points), 2))
-    for k, point in enumerate(points):
-        for name, values in point.effects:
-            effect[k] = names.index(name)
-            amplitude[k, : len(values)] = values
-    blocks = []
-    for c, condition in enumerate(declared.conditions):
-        block = np.full((len(points), len(condition.summaries)), np.nan)
-        for k, row in enumerate(pours):
-            if row[c].valid:
-                block[k] = row[c].summaries
-        blocks.append(block)
-    return Runs(np.array([p.theta for p in points]), effect, amplitude, tuple(blocks))

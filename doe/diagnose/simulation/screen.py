@@ -9,10 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from doe.diagnose.runs import Declared, Effect, Runs
+import numpy as np
+
+from doe.diagnose.runs import BASE, Declared, Effect, Runs
 from doe.diagnose.simulation.budget import Budget
 from doe.diagnose.simulation.plan import Point, base_points, effect_points, middle_points, scaling_points, sequence
-from doe.diagnose.simulation.pours import ModelPours, Pour, Rows, Search, as_runs
+from doe.diagnose.simulation.pours import ModelPours, Pour, Rows, Search
 from doe.diagnose.simulation.ranges import range_of
 
 Say = Callable[[str], None]
@@ -122,3 +124,22 @@ def over_wider_ranges(
 def screening_number(effect: Effect, points: int) -> int:
     """Points of an effect where one with a single amplitude gets ``points``."""
     return points * (1 + effect.amplitudes) // 2
+
+
+def as_runs(declared: Declared, points: Sequence[Point], pours: Sequence[Sequence[Pour]]) -> Runs:
+    """Points with at most one effect and their pours as arrays; a pour that broke off counts as not simulated."""
+    names = [effect.name for effect in declared.effects]
+    effect = np.full(len(points), BASE, dtype=np.int64)
+    amplitude = np.zeros((len(points), 2))
+    for k, point in enumerate(points):
+        for name, values in point.effects:
+            effect[k] = names.index(name)
+            amplitude[k, : len(values)] = values
+    blocks = []
+    for c, condition in enumerate(declared.conditions):
+        block = np.full((len(points), len(condition.summaries)), np.nan)
+        for k, row in enumerate(pours):
+            if row[c].valid:
+                block[k] = row[c].summaries
+        blocks.append(block)
+    return Runs(np.array([p.theta for p in points]), effect, amplitude, tuple(blocks))
