@@ -75,25 +75,24 @@ def told_apart(
 
 def met_by(best: Fit, rival: Fit, pseudo: PseudoData, emulator: Emulator, evidence: Evidence, seed: int) -> PseudoData:
     """Return the rival's pseudo-data as the best model meets them: off by its own error of emulation, and nearer."""
-    x, left = nearest(best, rival, evidence)
-    alike, rests = error_beside(best.predictor, x, rival.predictor, rival.x, emulator)
+    near = nearest(best, rival, evidence)
+    alike, rests = error_beside(near.predictor, near.x, rival.predictor, rival.x, emulator)
     theirs = rival.predictor.mean_covariance(rival.x)
     apart = [rest + (1.0 - part) ** 2 * error for rest, part, error in zip(rests, alike, theirs, strict=True)]
-    off = 1.0 - drawn_in(best.predictor, x, left, rival.sigma, apart, evidence)
+    off = 1.0 - drawn_in(near, apart, evidence.prior_weight)
     generator = np.random.default_rng([seed, 1])
     means = tuple(
         mean - (1.0 - part) * error + gaussian(rest, len(mean), generator) - off * r
-        for mean, error, part, rest, r in zip(pseudo.means, pseudo.emulation, alike, rests, left, strict=True)
+        for mean, error, part, rest, r in zip(pseudo.means, pseudo.emulation, alike, rests, near.residual, strict=True)
     )
     return replace(pseudo, means=means)
 
 
-def nearest(best: Fit, rival: Fit, evidence: Evidence) -> tuple[FloatArray, tuple[FloatArray, ...]]:
-    """Return where the best model comes nearest to the rival's prediction, (q,), and what it leaves of it, (d_c,)."""
+def nearest(best: Fit, rival: Fit, evidence: Evidence) -> Fit:
+    """Return the best model fitted to what the rival predicts; its residual is what it leaves of that."""
     fitted = tuple(mean - r for mean, r in zip(evidence.means, rival.residual, strict=True))
     there = replace(evidence, means=fitted, prior_mean=rival.x[: rival.predictor.parameters])
-    found = fit_with_covariance(best.predictor, best.members, there, rival.sigma)
-    return found.x, found.residual
+    return fit_with_covariance(best.predictor, best.members, there, rival.sigma)
 
 
 def error_beside(
@@ -109,21 +108,16 @@ def error_beside(
     return alike, [max(0.0, share - part * s) * pour + np.diag(bias) for share, part, s, pour, bias in own]
 
 
-def drawn_in(
-    predictor: Predictor,
-    x: FloatArray,
-    left: Sequence[FloatArray],
-    sigma: Sequence[FloatArray],
-    apart: Sequence[FloatArray],
-    evidence: Evidence,
-) -> float:
-    """Return sqrt(max(0, 1 - tr(P C)/d^2)): left and apart are r and C per condition, x where the model is refitted."""
-    weight = block_diag(*(np.linalg.inv(block) for block in sigma))
-    residual, covariance = np.concatenate(left), block_diag(*apart)
-    width = predictor.high - predictor.low
-    free = (x > predictor.low + 1e-6 * width) & (x < predictor.high - 1e-6 * width)
-    slopes = predictor.jacobian(x)[:, free]
-    prior = np.concatenate([evidence.prior_weight, np.zeros(len(x) - len(evidence.prior_weight))])[free]
+def drawn_in(near: Fit, apart: Sequence[FloatArray], prior_weight: FloatArray) -> float:
+    """Return sqrt(max(0, 1 - tr(P C)/d^2)): r is the residual of ``near``, C per condition ``apart``.
+
+    prior_weight: (k,) of the parameters, which a refit pays for.
+    """
+    weight = block_diag(*(np.linalg.inv(block) for block in near.sigma))
+    residual, covariance = np.concatenate(near.residual), block_diag(*apart)
+    free = near.at_edge == 0
+    slopes = near.predictor.jacobian(near.x)[:, free]
+    prior = np.concatenate([prior_weight, np.zeros(len(near.x) - len(prior_weight))])[free]
     taken_up = weight @ slopes
     p = weight - taken_up @ np.linalg.pinv(slopes.T @ taken_up + np.diag(prior), hermitian=True) @ taken_up.T
     d2 = float(residual @ weight @ residual)

@@ -9,7 +9,7 @@ from doe.diagnose.decision.gates import Limits
 from doe.diagnose.decision.race import race_singles
 from doe.diagnose.decision.rivals import drawn_in, error_beside, told_apart
 from doe.diagnose.emulation.fresh_pours import FreshPours
-from doe.diagnose.fitting.calibrate import calibrate, gather_evidence
+from doe.diagnose.fitting.calibrate import calibrate, fit_with_covariance, gather_evidence
 from tests.doe.diagnose.toy import PARAMETERS, estimated_emulator, known_emulator, make_toy
 
 SETS = 150
@@ -112,16 +112,19 @@ def test_the_distance_of_two_models_is_drawn_in_by_what_their_errors_add_to_it()
     toy = replace(toy, jacobian=np.eye(4)[:, :PARAMETERS] * [5.0, 0.0, 0.0], signatures=np.zeros_like(toy.signatures))
     emulator = known_emulator(toy, np.random.default_rng(0))
     evidence = gather_evidence(emulator, toy.measured(np.random.default_rng(1), np.zeros(4)))
-    model, x = emulator.predictor(()), np.zeros(PARAMETERS)
+    model = emulator.predictor(())
     apart = [0.25 * np.eye(4)]
 
-    def share(distance, at=x):
-        return drawn_in(model, at, [np.array([0.0, distance, 0.0, 0.0])], [np.eye(4)], apart, evidence)
+    near = fit_with_covariance(model, (), evidence, [np.eye(4)])
+
+    def share(distance, at_edge=(0, 0, 0)):
+        left = (np.array([0.0, distance, 0.0, 0.0]),)
+        return drawn_in(replace(near, residual=left, at_edge=np.array(at_edge)), apart, evidence.prior_weight)
 
     assert share(np.sqrt(9.75)) == pytest.approx(3.0 / np.sqrt(9.75))
     assert share(np.sqrt(0.7)) == 0.0
     # At an end of its range the parameter takes up nothing, and the first summary counts as well.
-    assert share(np.sqrt(10.0), np.array([1.0, 0.0, 0.0])) == pytest.approx(3.0 / np.sqrt(10.0))
+    assert share(np.sqrt(10.0), (1, 0, 0)) == pytest.approx(3.0 / np.sqrt(10.0))
 
 
 def test_models_from_the_same_runs_err_together_and_those_with_own_pours_by_themselves():
