@@ -11,7 +11,7 @@ from doe.errors import StatisticsError
 class Budget:
     """Numbers of points; each is poured once in every condition."""
 
-    base: int = 48
+    base: int = 32
     middle: int = 16
     scaling: int = 1
     """At each end that the search for a range tries; those at the end that it finds count like the screening."""
@@ -19,8 +19,8 @@ class Budget:
     """Per effect with one amplitude; half as many again with two."""
     second_look: int = 8
     """More of each that pours about its fit have put out of sight, over its whole range."""
-    widened: int = 12
-    """Of an effect over a wider range than the first."""
+    widened: int = 6
+    """Of an effect over a wider range than the first; if it stays near the best, pours about its fit follow."""
 
     def planned(self, effects: int, conditions: int) -> float:
         """Pours of the emulator for effects of one amplitude, ranges found at once, none ruled out, all in sight."""
@@ -43,5 +43,5 @@ class Budget:
         return Budget(**{key: max(getattr(LEAST, key), round(share * value)) for key, value in vars(self).items()})
 
 
-LEAST = Budget(base=24, middle=10, scaling=1, screening=4, second_look=4, widened=6)
+LEAST = Budget(base=24, middle=10, scaling=1, screening=4, second_look=4, widened=4)
 """Below that there are fewer points than terms, or no covariance."""

@@ -32,7 +32,9 @@ UNSEEN = 3.0
 """Shift [standard errors] by the whole range below which an effect is not simulated further: the race would not admit
 it (`Limits.reach`)."""
 SECOND_LOOK = 8
-"""Pours by which that is decided."""
+"""Pours by which that is decided at the latest."""
+CLEARLY = 1.645
+"""Standard deviations of the squared shift from that of ``UNSEEN`` at which fewer pours decide: one-sided, 5 % each."""
 
 
 def range_of(declared: Declared, effect: Effect, number: int, centre: Rows) -> RangeSearch:
@@ -44,12 +46,17 @@ def range_of(declared: Declared, effect: Effect, number: int, centre: Rows) -> R
 
 
 def looked_twice(declared: Declared, effect: Effect, centre: Rows) -> RangeSearch:
-    """``effect`` by ``SECOND_LOOK`` pours at its whole range, named unseen where they shift too little, and the shift.
+    """``effect`` poured at its whole range until it is clear whether that shifts too little; if so, named unseen.
 
-    Two pours may hide five standard errors; so many do not hide much more than the three that could be told at all.
+    Two pours may hide five standard errors; ``SECOND_LOOK`` do not hide much more than the three that could be told at
+    all.
     """
-    pours = yield scaling_points(declared.parameters, effect, SECOND_LOOK)
-    shift = whitened_shift(declared, centre, pours)
+    for number in range(2, SECOND_LOOK + 1):
+        pours = yield scaling_points(declared.parameters, effect, number)
+        square, deviation = squared_shift(declared, centre, pours)
+        if abs(square - UNSEEN**2) > CLEARLY * deviation:
+            break
+    shift = math.sqrt(max(0.0, square))
     return (replace(effect, unseen=shift) if shift < UNSEEN else effect), shift
 
 
@@ -84,24 +91,33 @@ def _drawn_in(effect: Effect, share: float) -> Effect:
 def whitened_shift(declared: Declared, centre: Rows, moved: Rows) -> float:
     """Distance of the means of two sets of pours in standard errors of ``REPLICATES`` pours, all conditions together.
 
-    The covariance is that of ``centre``, shrunk halfway to its diagonal (they are few). Pours that broke off are left
-    out; infinite if a condition has none left.
+    Infinite if a condition has no pour left on one side.
     """
-    square = 0.0
+    return math.sqrt(max(0.0, squared_shift(declared, centre, moved)[0]))
+
+
+def squared_shift(declared: Declared, centre: Rows, moved: Rows) -> tuple[float, float]:
+    """Square of the shift, less what noise alone adds to it on average, and its standard deviation at ``UNSEEN``.
+
+    With R the ``REPLICATES``, d summaries that vary and v = 1/n + 1/n_centre, R z'z / (R v) of a whitened step z is a
+    noncentral chi-squared: its mean is d + UNSEEN²/(R v), its variance 2 d + 4 UNSEEN²/(R v). The covariance is that of
+    ``centre``, shrunk halfway to its diagonal (they are few). Pours that broke off are left out.
+    """
+    square = variance = 0.0
     for c in range(len(declared.conditions)):
         still = _valid(centre, c)
         there = _valid(moved, c)
         if len(there) == 0:
-            return float("inf")
+            return math.inf, 0.0
         spread = still.std(axis=0, ddof=1)
         varies = spread > 0.0
         covariance = np.cov(still[:, varies], rowvar=False)
         covariance = 0.5 * (np.atleast_2d(covariance) + np.diag(spread[varies] ** 2))
         step = (there.mean(axis=0) - still.mean(axis=0))[varies]
-        # What noise alone adds to the square, on average.
-        noise = REPLICATES * varies.sum() * (1.0 / len(there) + 1.0 / len(still))
-        square += max(0.0, REPLICATES * float(step @ np.linalg.solve(covariance, step)) - noise)
-    return float(np.sqrt(square))
+        noise = REPLICATES * (1.0 / len(there) + 1.0 / len(still))
+        square += REPLICATES * float(step @ np.linalg.solve(covariance, step)) - noise * float(varies.sum())
+        variance += 2.0 * noise**2 * float(varies.sum()) + 4.0 * noise * UNSEEN**2 / len(declared.conditions)
+    return square, math.sqrt(variance)
 
 
 def _valid(pours: Rows, condition: int) -> FloatArray:

@@ -169,14 +169,16 @@ def twins(theta, effects, condition, width):
 
 
 def test_held_out_data_rule_out_a_twin(measurement, monkeypatch):
-    """What the fitted conditions cannot tell, a held-out one that is far off does; without it both names stay."""
-    planted = (("air_drag", (0.5,)),)
+    """What the fitted conditions cannot tell, a held-out one that is far off does; without it both names stay.
+
+    Which of the two the fitted data put first is chance. Of the seeds 8 … 19 nine end with the right name, three with
+    both names, none with the wrong one.
+    """
     monkeypatch.setattr(FormulaPours, "formula", staticmethod(twins))
-    measure(measurement, monkeypatch, planted, 13, twins)
+    measure(measurement, monkeypatch, (("air_drag", (0.5,)),), 13, twins)
     said = []
     found = diagnosis.run_diagnosis(measurement, None, None, NAMES, BUDGET, said.append)
-    # The fitted data even favour the wrong one.
-    assert said[-2] == "verdict: ambiguous:rolling_resistance,air_drag"
+    assert said[-2].startswith("verdict: ambiguous:")
     assert (found.verdict.kind, found.verdict.ruled_out) == ("effect:air_drag", ("rolling_resistance",)), said
     assert found.after.model.effects[0][0] == "air_drag"
     # Of eight such sets: 0.46 … 1.08, since six replicates know the amplitude to 0.1 of its 0.5.
@@ -184,7 +186,7 @@ def test_held_out_data_rule_out_a_twin(measurement, monkeypatch):
 
     monkeypatch.setattr(diagnosis, "contenders_held_out", lambda *_: ())
     left = diagnosis.run_diagnosis(measurement, None, None, NAMES, BUDGET, said.append)
-    assert left.verdict.names == ("rolling_resistance", "air_drag")
+    assert sorted(left.verdict.names) == ["air_drag", "rolling_resistance"]
 
 
 def test_nothing_planted_is_nothing_found(measurement, monkeypatch):

@@ -66,5 +66,21 @@ def test_an_effect_of_five_standard_errors_is_not_given_up(centre):
     assert kept >= 36
 
 
+@pytest.mark.parametrize(("shift", "least", "most"), [(0.0, 6, 8), (12.0, 2, 3)])
+def test_a_second_look_ends_once_it_is_clear(centre, shift, least, most):
+    """Two summaries, v = 1/n: nothing is told apart from 3 by eight pours or six, a shift of 12 by two or three.
+
+    At n pours the deviation of the square is √(2·2·(6/n)² + 4·(6/n)·9): at 8 it is 5.4, at 2 it is 12; 9 − 1.645·5.4
+    is 0.1, and 144 lies 11 of them above 9.
+    """
+    numbers = []
+    for seed in range(20):
+        model = Noisy(e=shift)
+        model.rng = np.random.default_rng(seed)
+        _found(looked_twice(DECLARED, Effect("e", (0.0,), (1.0,)), centre), model)
+        numbers.append(max(point.number for _, point in model.asked) + 1)
+    assert least <= np.median(numbers) <= most
+
+
 def _found(search, model):
     return model.result_of("range", search)
