@@ -1,4 +1,4 @@
-"""The panel of studies in headless Chromium: charts of a finished study, and a study that is started and stopped."""
+"""The panels of studies and diagnoses in headless Chromium: charts, and work that is started, watched and stopped."""
 
 import json
 import os
@@ -67,10 +67,20 @@ def page(address, chromium):
         browser.close()
 
 
-def opened(page, address):
+def opened(page, address, tab="Calibrate"):
     page.goto(address)
-    page.get_by_role("tab", name="Calibrate").click()
-    page.get_by_text("Profile").first.wait_for()
+    page.get_by_role("tab", name=tab).click()
+    page.get_by_text("Profile" if tab == "Calibrate" else "Which physical effect").first.wait_for()
+
+
+def press(page, button):
+    """Click the button of that name in the open tab."""
+    page.get_by_role("button", name=button, exact=True).filter(visible=True).first.click()
+
+
+def shown(page, text):
+    """Wait for ``text`` in the open tab."""
+    page.get_by_text(text).filter(visible=True).first.wait_for()
 
 
 def choose(page, label, option):
@@ -101,8 +111,8 @@ def test_a_slider_of_the_profiler_moves_its_chart_by_keyboard(page):
 
 
 def test_a_study_is_started_paused_cancelled_and_resumed(page, address, data):
-    page.get_by_role("button", name="Start", exact=True).first.click()
-    page.get_by_text("Running at low priority").wait_for()
+    press(page, "Start")
+    shown(page, "Running at low priority")
     # It runs on without a page, and faster than beside a browser that draws without a graphics card.
     page.goto("about:blank")
     wait_for(lambda: any(len(file.read_text().splitlines()) > 2 for file in data.rglob("progress.jsonl")), COMPILED)
@@ -115,16 +125,35 @@ def test_a_study_is_started_paused_cancelled_and_resumed(page, address, data):
     before = positions(page)
     wait_for(lambda: len(positions(page)) > len(before) or (positions(page) != before).any())
     page.get_by_role("button", name="Pause / go on").first.click()
-    page.get_by_text("Paused: it stands still").wait_for()
+    shown(page, "Paused: it stands still")
     standing = re.search(r"(\d+) of \d+ runs", page.inner_text("body"))[1]
     time.sleep(5.0)
     assert re.search(r"(\d+) of \d+ runs", page.inner_text("body"))[1] == standing
-    page.get_by_role("button", name="Cancel", exact=True).first.click()
-    page.get_by_text("Cancelled.").wait_for()
-    page.get_by_role("button", name="Resume", exact=True).first.click()
-    page.get_by_text("Running at low priority").wait_for()
-    page.get_by_role("button", name="Cancel", exact=True).first.click()
-    page.get_by_text("Cancelled.").wait_for()
+    press(page, "Cancel")
+    shown(page, "Cancelled.")
+    press(page, "Resume")
+    shown(page, "Running at low priority")
+    press(page, "Cancel")
+    shown(page, "Cancelled.")
+
+
+def test_a_diagnosis_is_started_watched_cancelled_and_resumed(page, address, data):
+    """On the measured data that are chosen at first, up to the first pours of the base model."""
+    opened(page, address, "Diagnose")
+    press(page, "Start")
+    shown(page, "Running at low priority")
+    page.goto("about:blank")
+    folder = data / "repose-explorer" / "diagnoses"
+    wait_for(lambda: any(len(file.read_text().splitlines()) > 2 for file in folder.rglob("progress.jsonl")), COMPILED)
+    opened(page, address, "Diagnose")
+    wait_for(lambda: re.search(r"[1-9]\d* of \d+ pours, time left", page.inner_text("body")))
+    shown(page, "base model")
+    press(page, "Cancel")
+    shown(page, "Cancelled.")
+    press(page, "Resume")
+    shown(page, "Running at low priority")
+    press(page, "Cancel")
+    shown(page, "Cancelled.")
 
 
 def test_the_console_has_nothing_to_complain_about(page):

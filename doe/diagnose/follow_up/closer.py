@@ -22,7 +22,7 @@ from doe.diagnose.simulation.pours import ModelPours
 
 FloatArray = npt.NDArray[np.float64]
 
-LOOKS = 8
+LOOKS = 6
 """Times that models are poured about their fits; each asks again which are the best of the race."""
 MODELS = 4
 """At most so many are near the best: the first of the race,"""
@@ -30,9 +30,9 @@ WITHIN = Limits.held_out
 """as far as their criterion is no farther behind the best."""
 CLOSE = 0.2
 """Distance of a fit from its pours, as a share of the box, within which they hold it."""
-STEP, POURS = 4, 12
-"""Pours per model, condition and look, few so that what falls behind costs few, and of a contender in all: twice those
-of a usual data set, so that what they add to its error is half of that."""
+STEP, POURS = 6, 12
+"""Pours per model, condition and look, and of a contender in all: twice those of a usual data set, so that what they
+add to its error is half of that."""
 SCATTER = 0.15
 """Share of the box to either side of a fit over which its pours are scattered, so that they tell slopes as well."""
 STREAM = 2000

@@ -11,7 +11,7 @@ from doe.errors import StatisticsError
 class Budget:
     """Numbers of points; each is poured once in every condition."""
 
-    base: int = 32
+    base: int = 48
     middle: int = 16
     scaling: int = 1
     """At each end that the search for a range tries; those at the end that it finds count like the screening."""
