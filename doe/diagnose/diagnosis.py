@@ -28,8 +28,8 @@ WIDENINGS = 3
 """Times that a range may be doubled before the next look."""
 Wanting = Callable[[Verdict, Declared, Declared], tuple[str, ...]]
 """Effects that want more range: from a verdict, the ranges simulated so far, and the widest."""
-FRESH = 12
-"""Pours per model and condition in the confirmation, at least."""
+FRESH = 8
+"""Pours per model and condition in the confirmation, or as many as there are replicates if that is more."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def run_diagnosis(
             verdict = diagnose(screened.declared, screened.runs, observed, fresh=fresh, ruled_out=gone)
         verdict = upheld(verdict, held_out)
         say(f"with held-out data: {verdict.kind}")
-    number = max(FRESH, *(2 * condition.replicates for condition in measurement.conditions))
+    number = max(FRESH, *(condition.replicates for condition in measurement.conditions))
     widths = [len(summary_names(condition)) for condition in measurement.conditions]
     confirmed = confirm(tuple(dict.fromkeys(models(verdict))), everywhere, number, widths)
     before, after = confirmed[0], confirmed[-1]

@@ -30,9 +30,9 @@ WITHIN = Limits.held_out
 """as far as their criterion is no farther behind the best."""
 CLOSE = 0.2
 """Distance of a fit from its pours, as a share of the box, within which they hold it."""
-STEP, POURS = 6, 12
-"""Pours per model, condition and look, and of a contender in all: twice those of a usual data set, so that what they
-add to its error is half of that."""
+STEP, POURS = 6, 18
+"""Pours per model, condition and look, and of a contender in all: three times those of a usual data set, so that what
+they add to the variance of its mean is a third of that."""
 SCATTER = 0.15
 """Share of the box to either side of a fit over which its pours are scattered, so that they tell slopes as well."""
 STREAM = 2000
