@@ -83,6 +83,16 @@ def shown(page, text):
     page.get_by_text(text).filter(visible=True).first.wait_for()
 
 
+def cancel_resume_cancel(page):
+    """What runs in the open tab is cancelled, goes on, and is cancelled for good."""
+    press(page, "Cancel")
+    shown(page, "Cancelled.")
+    press(page, "Resume")
+    shown(page, "Running at low priority")
+    press(page, "Cancel")
+    shown(page, "Cancelled.")
+
+
 def choose(page, label, option):
     page.get_by_label(label, exact=True).click()
     page.get_by_role("option", name=option, exact=True).click()
@@ -129,12 +139,7 @@ def test_a_study_is_started_paused_cancelled_and_resumed(page, address, data):
     standing = re.search(r"(\d+) of \d+ runs", page.inner_text("body"))[1]
     time.sleep(5.0)
     assert re.search(r"(\d+) of \d+ runs", page.inner_text("body"))[1] == standing
-    press(page, "Cancel")
-    shown(page, "Cancelled.")
-    press(page, "Resume")
-    shown(page, "Running at low priority")
-    press(page, "Cancel")
-    shown(page, "Cancelled.")
+    cancel_resume_cancel(page)
 
 
 def test_a_diagnosis_is_started_watched_cancelled_and_resumed(page, address, data):
@@ -148,12 +153,7 @@ def test_a_diagnosis_is_started_watched_cancelled_and_resumed(page, address, dat
     opened(page, address, "Diagnose")
     wait_for(lambda: re.search(r"[1-9]\d* of \d+ pours, time left", page.inner_text("body")))
     shown(page, "base model")
-    press(page, "Cancel")
-    shown(page, "Cancelled.")
-    press(page, "Resume")
-    shown(page, "Running at low priority")
-    press(page, "Cancel")
-    shown(page, "Cancelled.")
+    cancel_resume_cancel(page)
 
 
 def test_the_console_has_nothing_to_complain_about(page):
