@@ -1,7 +1,7 @@
 """Data from another engine (LIGGGHTS), with and without an effect that their files do not declare. Slow: half an hour.
 
 By `explorer diagnose` with all fifteen effects from an empty store on two cores (2026-11-23, 297 pours, 38 min):
-trefoil_2 `effect:rolling_resistance`, μ_r = 0.212 (0.167 … 0.257), error on held-out data 3.86 standard deviations
+trefoil_2 `effect:rolling_resistance`, μ_r = 0.212 (0.170 … 0.268), error on held-out data 3.86 standard deviations
 before, 0.62 after, noise floor 0.62; the fitted data alone leave shape_elongation beside it. trefoil_1 after it
 `no_missing_effect` (T² = 7.9 on 12, p = 0.83).
 These tests, with fewer candidates, were not run since then.
