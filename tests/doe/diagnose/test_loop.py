@@ -172,7 +172,7 @@ def test_held_out_data_rule_out_a_twin(measurement, monkeypatch):
     """What the fitted conditions cannot tell, a held-out one that is far off does; without it both names stay.
 
     Which of the two the fitted data put first is chance (here the wrong one). Of the seeds 8 … 19 six end with the
-    right name and five with both; in one, 8, the fitted data had taken the truth out, which gate 4 may in one of twenty.
+    right name and five with both; in one, 8, the fitted data had taken the truth out, as gate 4 may in one of twenty.
     """
     monkeypatch.setattr(FormulaPours, "formula", staticmethod(twins))
     measure(measurement, monkeypatch, (("air_drag", (0.5,)),), 19, twins)
