@@ -91,7 +91,7 @@ def _drawn_in(effect: Effect, share: float) -> Effect:
 def whitened_shift(declared: Declared, centre: Rows, moved: Rows) -> float:
     """Distance of the means of two sets of pours in standard errors of ``REPLICATES`` pours, all conditions together.
 
-    Infinite if a condition has no pour left on one side.
+    Infinite if a condition has no pour of ``moved`` left.
     """
     return math.sqrt(max(0.0, squared_shift(declared, centre, moved)[0]))
 
@@ -101,7 +101,8 @@ def squared_shift(declared: Declared, centre: Rows, moved: Rows) -> tuple[float,
 
     With R the ``REPLICATES``, d summaries that vary and v = 1/n + 1/n_centre, R z'z / (R v) of a whitened step z is a
     noncentral chi-squared: its mean is d + UNSEEN²/(R v), its variance 2 d + 4 UNSEEN²/(R v). The covariance is that of
-    ``centre``, shrunk halfway to its diagonal (they are few). Pours that broke off are left out.
+    ``centre``, shrunk halfway to its diagonal (they are few). Pours that broke off are left out. Of several conditions
+    each has an equal share of UNSEEN². Infinite, and certain, if a condition has no pour of ``moved`` left.
     """
     square = variance = 0.0
     for c in range(len(declared.conditions)):
@@ -115,8 +116,8 @@ def squared_shift(declared: Declared, centre: Rows, moved: Rows) -> tuple[float,
         covariance = 0.5 * (np.atleast_2d(covariance) + np.diag(spread[varies] ** 2))
         step = (there.mean(axis=0) - still.mean(axis=0))[varies]
         noise = REPLICATES * (1.0 / len(there) + 1.0 / len(still))
-        square += REPLICATES * float(step @ np.linalg.solve(covariance, step)) - noise * float(varies.sum())
-        variance += 2.0 * noise**2 * float(varies.sum()) + 4.0 * noise * UNSEEN**2 / len(declared.conditions)
+        square += REPLICATES * float(step @ np.linalg.solve(covariance, step)) - noise * len(step)
+        variance += 2.0 * noise**2 * len(step) + 4.0 * noise * UNSEEN**2 / len(declared.conditions)
     return square, math.sqrt(variance)
 
 
