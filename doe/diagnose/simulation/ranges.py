@@ -31,7 +31,7 @@ ROUNDS = 6
 UNSEEN = 3.0
 """Shift [standard errors] by the whole range below which an effect is not simulated further: the race would not admit
 it (`Limits.reach`)."""
-SECOND_LOOK = 8
+UNSEEN_BY = 8
 """Pours by which that is decided at the latest."""
 CLEARLY = 1.645
 """Standard deviations of the squared shift from that of ``UNSEEN`` at which fewer pours decide: one-sided, 5 % each."""
@@ -48,10 +48,10 @@ def range_of(declared: Declared, effect: Effect, number: int, centre: Rows) -> R
 def looked_twice(declared: Declared, effect: Effect, centre: Rows) -> RangeSearch:
     """``effect`` poured at its whole range until it is clear whether that shifts too little; if so, named unseen.
 
-    Two pours may hide five standard errors; ``SECOND_LOOK`` do not hide much more than the three that could be told at
+    Two pours may hide five standard errors; ``UNSEEN_BY`` do not hide much more than the three that could be told at
     all.
     """
-    for number in range(2, SECOND_LOOK + 1):
+    for number in range(2, UNSEEN_BY + 1):
         pours = yield scaling_points(declared.parameters, effect, number)
         square, deviation = squared_shift(declared, centre, pours)
         if abs(square - UNSEEN**2) > CLEARLY * deviation:

@@ -8,7 +8,9 @@ from explorer.screen_units import checked
 from solver import EFFECTS
 
 MOST = 100_000
-BY_ITSELF = "As many pours as the program takes by itself: about ten settings per effect, more for those that matter."
+BY_ITSELF = (
+    "As many pours as the program takes by itself: five settings per effect, then more about the fits that matter."
+)
 
 
 class Candidates:

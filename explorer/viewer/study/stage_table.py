@@ -10,7 +10,9 @@ FAILURES_SHOWN = 6
 DONE, AT_WORK, TO_COME = "done", "▶", "–"
 
 
-def stages_markdown(status: CommandStatus, what: str, runs: str, notice: str = "", so_far: str = "") -> str:
+def stages_markdown(
+    status: CommandStatus, what: str, runs: str, notice: str = "", so_far: str = "", counted: str = ""
+) -> str:
     """State, a row per stage, and failed runs; texts of the command are escaped.
 
     Args:
@@ -19,10 +21,12 @@ def stages_markdown(status: CommandStatus, what: str, runs: str, notice: str = "
         runs: heading of what is counted, such as "Runs".
         notice: the page's own last message, such as a refused click.
         so_far: what the stage at work would find if it ended now.
+        counted: what the numbers done and planned and the time left are of, where it is less than the whole.
     """
     state = STATE_WORDS.get(status.state, f"No {what} runs.")
     if status.alive and status.planned:
-        state += f" {status.done} of {status.planned} {runs.lower()}, time left {time_left(status.eta_s)}."
+        part = f"{counted}: " if counted else ""
+        state += f" {part}{status.done} of {status.planned} {runs.lower()}, time left {time_left(status.eta_s)}."
     if status.alive and not status.done and status.stage:
         state += f" Now: {escaped(status.stage)}."
     parts = [state]
