@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from explorer.viewer.slider_hands import WAIT, SliderHands
+from tests.explorer.background import wait_for
 
 
 class Server:
@@ -30,8 +31,7 @@ def page():
 def test_an_arrow_alone_acts(page):
     page.post("step")
     assert page.posted == []
-    time.sleep(2 * WAIT)
-    assert page.posted == ["step"]
+    wait_for(lambda: page.posted == ["step"])
 
 
 @pytest.mark.parametrize("first", ["key", "value"])
@@ -49,8 +49,7 @@ def test_an_arrow_on_a_slider_does_not(page, first):
 def test_other_inputs_are_no_sliders(page, value):
     page.post("step")
     page.server.send(value)
-    time.sleep(2 * WAIT)
-    assert page.posted == ["step"]
+    wait_for(lambda: page.posted == ["step"])
 
 
 def test_it_listens_to_what_a_browser_sends_when_a_slider_moves(page):
