@@ -8,23 +8,20 @@ restart brings a new one; a solver whose parent is gone ends by itself.
 from __future__ import annotations
 
 import math
-import multiprocessing
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 from explorer.errors import CommandError
-from explorer.live.angle_process import run as read_angles
-from explorer.live.details import Details, detail_reader, shared_details
-from explorer.live.frames import MAX_BODIES, Frame, FrameReader, shared_block
+from explorer.live.details import Details
+from explorer.live.frames import MAX_BODIES, Frame
 from explorer.live.messages import (
-    Close,
     Command,
     Event,
     Failure,
     Pause,
     Play,
+    Report,
     SessionState,
     SetParameters,
     SetSpeed,
@@ -34,8 +31,7 @@ from explorer.live.messages import (
     StepBack,
     Watch,
 )
-from explorer.live.process import run
-from explorer.live.slots import SlotReader
+from explorer.live.solver_process import SolverProcess
 from explorer.scene.source import SceneSource
 from solver.params import ParameterError
 from solver.scene import Scene, body_counts, canonical, parameters, poured_mass, with_values
@@ -43,8 +39,6 @@ from solver.scene import Scene, body_counts, canonical, parameters, poured_mass,
 SPEED_RANGE = (0.01, 10.0)
 """Allowed ratio of simulated to wall time."""
 EVENTS_KEPT = 200
-CLOSE_WAIT = 3.0
-"""Seconds that a solver process has to end by itself."""
 
 
 class SessionError(CommandError):
@@ -55,13 +49,7 @@ class Session:
     """Owner of the solver process. Use it from one thread."""
 
     def __init__(self) -> None:
-        self._context = multiprocessing.get_context("spawn")
-        self._process: Any = None
-        self._reader: Any = None
-        self._commands: Any = None
-        self._reports: Any = None
-        self._frames: FrameReader | None = None
-        self._details: SlotReader[Details] | None = None
+        self._process: SolverProcess | None = None
         self._watch = Watch(wanted=False)
         self._status: Status | None = None
         self._events: deque[Event] = deque(maxlen=EVENTS_KEPT)
@@ -86,8 +74,9 @@ class Session:
         self._generation += 1
         # A process that has failed may live on for a moment, but takes no commands any more.
         failed = self._status is not None and self._status.state == SessionState.FAILED
-        if failed or not self._alive():
-            self._spawn()
+        process = self._process if not failed else None
+        if process is None or not process.alive:
+            process = self._renewed()
         self._status = Status(
             state=SessionState.STARTING,
             message="starting the solver process",
@@ -96,9 +85,7 @@ class Session:
             generation=self._generation,
             speed=self._speed,
         )
-        self._commands.put(Start(scene, seed, self._generation))
-        self._commands.put(SetSpeed(self._speed))
-        self._commands.put(self._watch)
+        process.send(Start(scene, seed, self._generation), SetSpeed(self._speed), self._watch)
 
     def restart(self, scene: Scene | None = None, seed: int | None = None) -> None:
         """Start again, by default with the scene as it is now and the same seed."""
@@ -151,17 +138,17 @@ class Session:
         if self._watch == Watch(wanted, body):
             return
         self._watch = Watch(wanted, body)
-        if self._alive():
-            self._commands.put(self._watch)
+        if self._process is not None and self._process.alive:
+            self._process.send(self._watch)
 
     def details(self) -> Details | None:
         """Velocities, loads and contacts of the present pour, as they were read last; None before they were."""
-        details = self._details.newest() if self._details is not None else None
+        details = self._process.details.newest() if self._process is not None else None
         return details if details is not None and details.generation == self._generation else None
 
     def frame(self) -> Frame | None:
         """The newest frame of the present pour; None before its first one."""
-        frame = self._frames.newest() if self._frames is not None else None
+        frame = self._process.frames.newest() if self._process is not None else None
         return frame if frame is not None and frame.generation == self._generation else None
 
     def status(self) -> Status:
@@ -178,10 +165,8 @@ class Session:
 
     def close(self) -> None:
         """End the solver process; afterwards only ``start`` and ``restart`` make sense."""
-        if self._alive():
-            self._commands.put(Close())
-            self._process.join(CLOSE_WAIT)
-        self._forget_process()
+        if self._process is not None:
+            self._process.close()
         if self._status is not None:
             self._status = replace(self._status, state=SessionState.CLOSED, message="", real_time_factor=0.0)
 
@@ -195,72 +180,40 @@ class Session:
     @property
     def process_id(self) -> int | None:
         """Process id of the solver process, None where there is none."""
-        return self._process.pid if self._alive() else None
+        return self._process.process_id if self._process is not None and self._process.alive else None
 
     def _present(self) -> Status:
         if self._status is None:
             raise SessionError("no pour has been started")
         return self._status
 
-    def _alive(self) -> bool:
-        return self._process is not None and self._process.is_alive()
-
-    def _spawn(self) -> None:
-        # A new queue: a process that was killed may have left the old one locked.
-        self._forget_process()
-        self._commands = self._context.Queue()
-        self._reports, reporting = self._context.Pipe(duplex=False)
-        frames, details = shared_block(self._context), shared_details(self._context)
-        self._frames, self._details = FrameReader(frames), detail_reader(details)
-        asking, answering = self._context.Pipe()
-        self._process = self._context.Process(
-            target=run, args=(self._commands, reporting, frames, details, asking), name="explorer-solver", daemon=True
-        )
-        self._reader = self._context.Process(target=read_angles, args=(answering,), name="explorer-angles", daemon=True)
-        for process in (self._reader, self._process):
-            process.start()
-        # With these gone every line has one process at either end, which hears when the other one ends.
-        for end in (asking, answering, reporting):
-            end.close()
-
-    def _forget_process(self) -> None:
-        if self._process is None:
-            return
-        if self._process.is_alive():
+    def _renewed(self) -> SolverProcess:
+        """A new process in place of the one there was."""
+        if self._process is not None:
             self._process.kill()
-        self._process.join()
-        self._reader.join()  # its line is cut
-        self._commands.cancel_join_thread()
-        self._commands.close()
-        self._reports.close()
-        self._process = None
+        self._process = SolverProcess()
+        return self._process
 
     def _send(self, command: Command) -> None:
         present = self.status()
-        if not self._alive():
+        if self._process is None or not self._process.alive:
             raise SessionError(present.message or "the solver process does not run; restart the pour")
-        self._commands.put(command)
+        self._process.send(command)
 
     def _listen(self) -> None:
-        if self._process is None or self._status is None:
+        if self._process is None or self._status is None or self._status.state == SessionState.CLOSED:
             return
         # Asked before the line is emptied: a process that is dead now has said all it will say.
-        alive = self._process.is_alive()
-        while True:
-            try:
-                if not self._reports.poll():
-                    break
-                report = self._reports.recv()
-            except (EOFError, OSError):
-                break
+        alive = self._process.alive
+        for report in self._process.heard():
             self._take(report)
         if not alive and self._status.state not in (SessionState.FAILED, SessionState.DIED):
             self._stand_still(
                 SessionState.DIED,
-                f"the solver process ended (exit code {self._process.exitcode}); restart the pour for a new one",
+                f"the solver process ended (exit code {self._process.exit_code}); restart the pour for a new one",
             )
 
-    def _take(self, report: Status | Event | Failure) -> None:
+    def _take(self, report: Report) -> None:
         if isinstance(report, Failure):
             self._stand_still(SessionState.FAILED, f"the solver stopped: {report.message}; restart the pour")
         elif report.generation == self._generation:

@@ -152,8 +152,8 @@ def test_keys_colour_the_bodies_and_the_solver_sends_what_that_takes(page, brows
     browser.press("Colour by the next quantity")
     wait_for(lambda: page.look._settings.look.colour_by == "speed")
     wait_for(lambda: "speed [m/s]" in page.look._colours._bar.content)
-    wait_for(lambda: page.page._session._details.newest() is not None)
-    details = page.page._session._details.newest()
+    wait_for(lambda: page.page._session.details() is not None)
+    details = page.page._session.details()
     assert len(details.load) == status(page).bodies
     (node,) = page.page._nodes.bodies.nodes
     wait_for(lambda: len(np.unique(node.batched_colors[: status(page).bodies], axis=0)) > 1)
