@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from explorer.export import bed as peer_bed
-from explorer.export.deck import deck_of
+from explorer.export.deck_of_scene import deck_of
 from explorer.export.decks import WRITERS
 from explorer.export.run import PeerRun, run_liggghts, run_yade
 from explorer.scene.file import load_scene

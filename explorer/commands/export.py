@@ -35,7 +35,7 @@ def export(
     """
     from explorer.errors import CommandError
     from explorer.export import PROGRAMS
-    from explorer.export.deck import check_exportable, deck_of
+    from explorer.export.deck_of_scene import check_exportable, deck_of
     from explorer.export.decks import WRITERS
     from explorer.export.material_table import write_material_table
     from explorer.export.moments import moments

@@ -15,8 +15,9 @@ from doe.designs.factorial import factor_letters
 from doe.errors import StatisticsError
 from doe.record import plain
 from explorer.design.factors_file import read_factors, region_of
+from explorer.design.filled_sheet import read_sheet
 from explorer.design.kinds import ModelOrder
-from explorer.design.runs_file import Runs, read_sheet, runs_of
+from explorer.design.runs import Runs, runs_of
 from explorer.errors import CommandError
 from explorer.files.run_folder import appearing, json_text
 from explorer.files.run_result import versions

@@ -12,15 +12,8 @@ from typing import Protocol
 
 from doe.diagnose.simulation.budget import Budget
 from doe.measurement.load import load_measurement
-from explorer.background.command_process import (
-    PROGRAM,
-    BackgroundError,
-    CommandProcess,
-    CommandStatus,
-    finished,
-    new_folder,
-    newest_unfinished,
-)
+from explorer.background.command_process import PROGRAM, BackgroundError, CommandProcess, CommandStatus
+from explorer.background.output_folders import finished, new_folder, newest_unfinished
 from explorer.background.waiting_line import WaitingLine
 from solver import EFFECTS
 from solver.assets import measurement_folder

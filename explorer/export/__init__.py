@@ -1,7 +1,8 @@
 """Files for other programs: decks for engines, one file per engine, and what they share; VTK; material tables.
 
 decks.py        deck writers by engine
-deck.py         what a deck says, whatever the engine;  deck_of(record) makes it from a pour of ours
+deck.py         what a deck says, whatever the engine, and the file that holds it
+deck_of_scene.py  deck_of(record): the deck that repeats a pour of ours
 triangles.py    cone and gate as triangles, STL
 liggghts.py     LIGGGHTS-PUBLIC 3.8 (in.liggghts)
 yade.py         YADE 2023 (yade_pour.py, copied into the folder, reads deck.json)

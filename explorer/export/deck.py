@@ -7,26 +7,17 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from explorer.errors import CommandError
-from explorer.export.triangles import mesh_triangles, revolved_triangles
-from solver import Body, Entries, Record, Scene
-from solver.effects.rolling_resistance import RollingResistance
-from solver.effects.set_up import actual
-from solver.rigs import Funnel, MeshFunnel, Plane, Revolved, Rig
-from solver.scene import pour_rig
+from solver import Entries
 
 Array = npt.NDArray[np.float64]
 FILE = "deck.json"
-HOLDS = {"liggghts": (RollingResistance.name,), "yade": ()}
-"""Effects that an engine's deck can hold: its law has the same one."""
 
 
 @dataclass(frozen=True)
@@ -96,92 +87,6 @@ class Deck:
         return self.clumps[int(self.entries.component[body])].centres
 
 
-def deck_of(record: Record, time: float | None = None) -> Deck:
-    """The deck that repeats ``record``: the same bodies at the same moments and places, the same number of steps.
-
-    Args:
-        record: a pour of ours; its entries say how bodies enter, and its gate when it opens.
-        time: simulated time [s] instead of the record's; bodies that enter later are left out.
-
-    Raises:
-        CommandError: the scene has something that no exported deck can hold.
-    """
-    scene = record.scene
-    check_exportable(scene, *HOLDS)
-    steps = record.steps if time is None else math.ceil(time / record.dt)
-    return assembled(
-        scene,
-        record.seed,
-        record.dt,
-        steps,
-        _until(record.entries, steps),
-        plate=_plate(scene.rig),
-        meshes=_meshes(scene, record),
-    )
-
-
-def check_exportable(scene: Scene, *engines: str) -> None:
-    """Raise :class:`CommandError` if ``scene`` has something that the deck of none of ``engines`` can hold.
-
-    Effects of material and set-up are carried out in a deck; of those of contacts and flight ``HOLDS`` says which have
-    an equal there.
-    """
-    scene = actual(scene)
-    for effect in scene.effects:
-        held = any(effect.name in HOLDS[engine] for engine in engines)
-        if effect.on and not held:
-            amplitude, where = f"effect.{effect.name}.{effect.amplitudes[0]}", " or ".join(engines)
-            raise CommandError(f"{amplitude}: {effect.numbers[0]:g} cannot be exported to {where}; allowed: 0")
-    damping = rolling(scene).rolling_damping
-    if rolling(scene).on and damping > 0.0:
-        raise CommandError(f"effect.rolling_resistance.rolling_damping: {damping:g} cannot be exported; allowed: 0")
-    if not isinstance(scene.rig, Funnel | MeshFunnel):
-        allowed = f"{Funnel.name}, {MeshFunnel.name}"
-        raise CommandError(f"rig {getattr(scene.rig, 'name', '?')!r} cannot be exported; allowed: {allowed}")
-    for body in scene.bodies:
-        if body.sizes.varies:
-            raise CommandError(
-                f"body.{body.name}.size_distribution: {body.sizes.kind!r} cannot be exported, a deck has one clump per "
-                "component; allowed: none"
-            )
-
-
-def rolling(scene: Scene) -> RollingResistance:
-    """The scene's rolling resistance, which may be off."""
-    return cast(RollingResistance, scene.effect(RollingResistance.name))
-
-
-def assembled(
-    scene: Scene,
-    seed: int,
-    dt: float,
-    steps: int,
-    entries: Entries,
-    plate: float | None = None,
-    meshes: tuple[Mesh, ...] = (),
-) -> Deck:
-    """A deck with the materials and bodies of ``scene`` that enter as ``entries`` say, and whatever walls are given."""
-    friction, restitution = _pair_tables(scene)
-    wall = scene.material(scene.rig.wall)
-    return Deck(
-        title=scene.title,
-        seed=seed,
-        dt=dt,
-        steps=steps,
-        gravity=scene.gravity,
-        clumps=_clumps(scene),
-        wall_youngs_modulus=wall.youngs_modulus,
-        wall_poisson_ratio=wall.poisson_ratio,
-        friction=friction,
-        restitution=restitution,
-        rolling_friction=rolling(scene).rolling_friction,
-        entries=entries,
-        plate=plate,
-        meshes=meshes,
-        box=_box(scene),
-    )
-
-
 def write_deck(folder: Path, deck: Deck) -> None:
     """Write ``deck.json`` into ``folder``."""
     text = json.dumps(dataclasses.asdict(deck), indent=1, default=lambda array: array.tolist(), allow_nan=False)
@@ -202,63 +107,3 @@ def read_deck(folder: Path) -> Deck:
 
 def _arrays(table: dict[str, Any], *keys: str) -> dict[str, Any]:
     return table | {key: np.array(table[key], dtype=float) for key in keys}
-
-
-def _clumps(scene: Scene) -> tuple[Clump, ...]:
-    clumps = []
-    for body in scene.bodies:
-        clump, material = body.clump, scene.material(body.material)
-        clumps.append(
-            Clump(
-                name=body.name,
-                centres=np.array(clump.centres),
-                radii=np.array(clump.radii),
-                mass=float(clump.mass),
-                inertia=np.array(clump.inertia),
-                density=material.density,
-                youngs_modulus=material.youngs_modulus,
-                poisson_ratio=material.poisson_ratio,
-            )
-        )
-    return tuple(clumps)
-
-
-def _pair_tables(scene: Scene) -> tuple[Array, Array]:
-    """Friction and restitution of all classes; wall against wall, which never meet, get those of the first body."""
-    n, wall = len(scene.bodies), scene.rig.wall
-    others: tuple[Body | str, ...] = (*scene.bodies, wall)
-    pairs = [[scene.contact_pair(one, other) for other in others] for one in scene.bodies]
-    friction, restitution = np.zeros((n + 1, n + 1)), np.zeros((n + 1, n + 1))
-    for table, key in ((friction, "static_friction"), (restitution, "restitution")):
-        for a in range(n):
-            for b in range(n + 1):
-                table[a, b] = table[b, a] = getattr(pairs[a][b], key)
-        table[n, n] = table[0, n]
-    return friction, restitution
-
-
-def _until(entries: Entries, steps: int) -> Entries:
-    kept = entries.step < steps
-    return Entries(**{field.name: getattr(entries, field.name)[kept] for field in dataclasses.fields(Entries)})
-
-
-def _plate(rig: Rig) -> float:
-    return next(surface.pose.origin[2] for surface in rig.surfaces() if isinstance(surface, Plane))
-
-
-def _meshes(scene: Scene, record: Record) -> tuple[Mesh, ...]:
-    gated = scene.insertion.protocol == "fill_then_open"
-    opening = round(record.gate_opened / record.dt) if record.gate_opened > 0.0 else -1
-    meshes = []
-    for name, surface in zip(scene.rig.surface_names, scene.rig.surfaces(), strict=True):
-        if isinstance(surface, Plane) or (name == "gate" and not gated):
-            continue
-        triangles = revolved_triangles(surface) if isinstance(surface, Revolved) else mesh_triangles(surface)
-        meshes.append(Mesh(name, triangles, opening if name == "gate" else -1))
-    return tuple(meshes)
-
-
-def _box(scene: Scene) -> Array:
-    half, longest = scene.rig.domain_half_width, max(max(body.extents) for body in scene.bodies)
-    top = pour_rig(scene).feed().floor + scene.insertion.region_height + longest
-    return np.array([[-half, -half, -0.01], [half, half, top]])

@@ -10,7 +10,7 @@ from doe.designs import box_behnken, central_composite, factorial, latin_hypercu
 from explorer.design.analysis import AnalyseOrder, analyse_runs
 from explorer.design.analysis_text import analysis_text
 from explorer.design.factors_file import Factor
-from explorer.design.runs_file import Runs
+from explorer.design.runs import Runs
 from explorer.report.content import Figure, Folded, Table
 from explorer.report.design import design_html, design_markdown
 from explorer.report.design.sections import sections_of

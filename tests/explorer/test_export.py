@@ -11,7 +11,8 @@ from scipy.integrate import solve_ivp
 from explorer.errors import CommandError
 from explorer.export import PROGRAMS
 from explorer.export.bed import BED_WRITERS, Bed
-from explorer.export.deck import assembled, deck_of, read_deck
+from explorer.export.deck import read_deck
+from explorer.export.deck_of_scene import assembled, deck_of
 from explorer.export.decks import WRITERS
 from explorer.export.frames import Frame, motion, read_frames, rigid_fit
 from explorer.export.liggghts import unclamped_restitution, write_liggghts

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from explorer.errors import CommandError
-from explorer.export.deck import check_exportable, deck_of
+from explorer.export.deck_of_scene import check_exportable, deck_of
 from solver.effects import EFFECTS
 from solver.sizes import SizeDistribution
 from tests.solver.observables.made_up import cone, record_of

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from explorer.export.deck import assembled
+from explorer.export.deck_of_scene import assembled
 from explorer.export.decks import WRITERS
 from explorer.export.frames import TRAJECTORY, Motion, motion, read_frames
 from explorer.export.liggghts import INPUT

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from explorer.export.deck import deck_of
+from explorer.export.deck_of_scene import deck_of
 from explorer.export.decks import WRITERS
 from explorer.export.frames import motion
 from explorer.export.run import run_liggghts, run_yade
