@@ -127,7 +127,7 @@ class Answers:
         for attempt in range(TRIES):
             numbers = range(REPLICATES * (attempt + 1))
             orders = [order for k in short for c in conditions for order in self.orders(truths[k], c, numbers)]
-            readings = iter(self.place.pour(orders, self.laboratory(conditions).room))
+            readings = iter(self.place.pour(orders, self.laboratory(conditions).room()))
             for k in short:
                 data[k] = {c.name: complete(next(readings) for _ in numbers)[:REPLICATES] for c in conditions}
             short = [k for k in short if any(len(one) < REPLICATES for one in (data[k] or {}).values())]

@@ -1,7 +1,7 @@
 """The campaign in the small: 26 bodies a pour, one parameter, two effects, one set of each kind, from an empty store.
 
 It proves that the machinery works on real pours from end to end. How often the diagnosis is right it cannot prove;
-that takes the whole campaign. 115 s of processor time: slow, a minute on two idle cores.
+that takes the whole campaign. 115 s of processor time, a minute on two idle cores: this is the part that CI runs.
 """
 
 import dataclasses
@@ -22,8 +22,6 @@ from tests.blind.laboratory import MODEL, declared_model, write_folder
 from tests.blind.schedule import Case
 from tests.blind.truth import ruler, truth_of
 from tests.blind.work_place import WorkPlace
-
-pytestmark = pytest.mark.slow
 
 STRONG = 10.0
 CASES = (

@@ -16,7 +16,6 @@ from typing import Any
 from doe.measurement import Condition, readings_of_record
 from doe.store import Store, StoredRun, run_key
 from solver import Crew, Job, Outcome, Record, Scene, code_version
-from solver.effects.columns import kernel_effects
 from tests.blind.laboratory import OBSERVABLES, Reading
 from tests.blind.outside import AMPLITUDE, outside_pour
 
@@ -69,16 +68,15 @@ class WorkPlace:
         if time.monotonic() > self.deadline:
             raise OutOfTimeError
 
-    def pour(self, orders: Sequence[Order], room: Callable[[bool], Sequence[Scene]]) -> list[Reading | None]:
-        """Readings of the pours in order, None for one that broke off. ``room(effects)``: scenes that all fit into."""
+    def pour(self, orders: Sequence[Order], room: Sequence[Scene]) -> list[Reading | None]:
+        """Readings of the pours in order, None for one that broke off. ``room``: scenes that nearly all fit into."""
         wanted = [order for order in {order.key: order for order in orders}.values() if not self._known(order)]
-        for acting in (False, True):
-            plain = [order for order in wanted if not order.outside and kernel_effects(order.scene) == acting]
-            queue = deque(Job(order.scene, order.seed, tag=k) for k, order in enumerate(plain))
-            # A pair of effects may need more bodies than any single one.
-            scenes = [*room(acting), *(job.scene for job in queue)]
-            for job, record in self.crew.run_queue(queue, scenes) if queue else ():
-                self._keep(plain[job.tag], record)
+        plain = [order for order in wanted if not order.outside]
+        queue = deque(Job(order.scene, order.seed, tag=k) for k, order in enumerate(plain))
+        # A pair of effects may need more bodies than any single one.
+        scenes = [*room, *(job.scene for job in queue)]
+        for job, record in self.crew.run_queue(queue, scenes) if queue else ():
+            self._keep(plain[job.tag], record)
         strange = [order for order in wanted if order.outside]
         tasks = [(order.outside, order.scene, order.seed, AMPLITUDE[order.outside]) for order in strange]
         for order, record in zip(strange, self.map(_outside, tasks), strict=True):
