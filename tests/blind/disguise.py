@@ -1,9 +1,12 @@
 """Everything in a data set that is no number, changed: what a verdict must not depend on."""
 
 import re
+from pathlib import Path
+
+import numpy as np
 
 
-def disguise(folder, rng):
+def disguise(folder: Path, rng: np.random.Generator) -> None:
     """Change everything in a data set that is no number."""
     toml = folder / "measurement.toml"
     text = toml.read_text()

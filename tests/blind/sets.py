@@ -9,9 +9,10 @@ nothing      no missing effect
 
 import csv
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 Answer = Literal["right", "undecided", "wrong", "unexplained", "nothing", "out of reach"]
 
@@ -99,10 +100,8 @@ def _cell(value: object) -> str:
 
 
 def _row(cells: dict[str, str]) -> Row:
-    kinds = {"int": int, "float": lambda text: float(text or "nan"), "str": str}
-    return Row(
-        **{
-            field.name: kinds[getattr(field.type, "__name__", str(field.type))](cells[field.name])
-            for field in fields(Row)
-        }
-    )
+    kinds: dict[str, Callable[[str], object]] = {"int": int, "float": lambda text: float(text or "nan"), "str": str}
+    values: dict[str, Any] = {
+        field.name: kinds[getattr(field.type, "__name__", str(field.type))](cells[field.name]) for field in fields(Row)
+    }
+    return Row(**values)

@@ -7,6 +7,7 @@ that a strength means the same however much was simulated. Where an effect's own
 that is noise, for nobody can say beforehand how far they go in one data set.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -77,7 +78,8 @@ class Ruler:
         stray = [level * np.where(b.straying[effect], b.excess[effect], 0.0) for b in self.emulator.blocks]
         frame = self.frame(theta, stray)
         z = projected(frame, shift_of(self.emulator, effect, theta, amplitude))
-        return float(np.sqrt(max(0.0, z @ z - noise_square(self.emulator, effect, frame, theta, amplitude))))
+        square = float(z @ z) - noise_square(self.emulator, effect, frame, theta, amplitude)
+        return math.sqrt(max(0.0, square))
 
     def seen(self, theta: Sequence[float], means: FloatArray) -> float:
         """Shift [σ] of the measured means (D,) off the base model at the true parameters, freed from noise."""
@@ -119,7 +121,9 @@ def truth_of(case: Case, ruler: Ruler) -> Truth:
 def drawn_theta(declared: Declared, rng: np.random.Generator) -> tuple[float, ...]:
     """Parameters drawn from their independent measurement, or over their range, within what is simulated."""
     return tuple(
-        float(np.clip(rng.normal(p.mean, p.sd), p.low, p.high)) if p.mean is not None else rng.uniform(p.low, p.high)
+        rng.uniform(p.low, p.high)
+        if p.mean is None or p.sd is None
+        else float(np.clip(rng.normal(p.mean, p.sd), p.low, p.high))
         for p in declared.parameters
     )
 
