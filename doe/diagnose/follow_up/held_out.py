@@ -10,7 +10,8 @@ contenders, half shrunk to its diagonal:
 -2 ln of a multivariate t density but for what is the same for all of them, which does not take a rare pour for a
 refutation (Lange, Little and Taylor 1989, JASA 84:881). A name that stands alone keeps doing so if every rival stays
 the gap of gate 3 behind in the criterion of the fit plus D; else they join it. Of several names those go that are
-`Limits.held_out` or more behind the first of them.
+`Limits.held_out` or more behind the first of them in that sum, and by D alone as well: that the fitted data put them
+behind cannot count against them twice, for gate 4 has found that it may be chance.
 
 Where the held-out data contradict every name, nothing is named. The farthest summary of a model, over all held-out
 conditions, is |t| = max |measured - poured|/(s sqrt(1/r + 1/m)), s the deviation of a pour pooled over data and
@@ -162,15 +163,20 @@ def compared(
 
 
 def ruled_out(verdict: Verdict, rows: Sequence[HeldOut]) -> tuple[str, ...]:
-    """Of several names those that held-out data put ``Limits.held_out`` or more behind the first of them.
+    """Of several names those ``Limits.held_out`` or more behind the first of them, by the sum and by D alone.
 
     That is the distance at which a contender leaves the race: D knows nothing of the error of a fit, so a smaller one
     decides nothing.
     """
-    if len(verdict.names) < 2:
+    named = [row for row in rows if row.label in verdict.names]
+    if len(verdict.names) < 2 or not named:
         return ()
-    behind = {row.label: row.behind for row in rows if row.label in verdict.names}
-    return tuple(name for name in behind if behind[name] - min(behind.values()) >= verdict.limits.held_out)
+    first = min(named, key=lambda row: row.behind)
+    return tuple(
+        row.label
+        for row in named
+        if min(row.behind - first.behind, row.deviance - first.deviance) >= verdict.limits.held_out
+    )
 
 
 def upheld(verdict: Verdict, rows: Sequence[HeldOut]) -> Verdict:
