@@ -43,8 +43,8 @@ def gates(result: Plain) -> Section:
         f"single effect is adequate, and has to gain more than {fixed(limits['pair_gain'], 0)}, and be specific: "
         "few random shifts may be explained as well. Held-out data can take a name back: every rival near it predicts "
         "them by its own pours, and has to stay as far behind with them. Of several names they rule out those that are "
-        f"{fixed(limits['held_out'], 0)} or more behind the first; and where a summary of every name is off at "
-        f"p < {number(limits['contradicted'])}, nothing is named."
+        f"{fixed(limits['held_out'], 0)} or more behind the first, with the fitted data and by themselves; and where a "
+        f"summary of every name is off at p < {number(limits['contradicted'])}, nothing is named."
     )
     rows = tuple(
         (
