@@ -8,7 +8,7 @@ BIN := .venv/bin
 EXPLORER := $(BIN)/explorer
 
 .DEFAULT_GOAL := help
-.PHONY: help venv serve calibrate calibrate-quick diagnose test slow pictures page-speed peers clean
+.PHONY: help venv serve calibrate calibrate-quick diagnose test slow nightly pictures page-speed peers golden clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 18
@@ -45,6 +45,9 @@ test: .venv/.ready ## format check, lint, types, fast tests
 slow: .venv/.ready ## the tests marked slow, but for those of `make peers`
 	$(BIN)/pytest -m "slow and not peers"
 
+nightly: .venv/.ready ## what is too long for CI (80 min at most); writes docs/nightly.md
+	$(BIN)/python -m tests.nightly
+
 pictures: .venv/.ready ## the README's pictures, taken from the running program (needs Chromium; 6 min)
 	$(BIN)/python -m tests.browser.pictures
 
@@ -53,6 +56,11 @@ page-speed: .venv/.ready ## frames, real-time factor and slider echo of the page
 
 peers: .venv/.ready ## our solver against installed LIGGGHTS and YADE, with 18 pours each (hours)
 	$(BIN)/pytest tests/peers -m "slow or not slow" -s
+
+golden: .venv/.ready ## record the golden bits of the solver and the golden readings; refused where their version does not fit
+	$(BIN)/python -m tests.solver.golden.golden_file
+	$(BIN)/python -m tests.doe.golden_readings
+	$(BIN)/python -m tests.solver.shipped_fits
 
 clean: ## remove .venv and the caches; results stay
 	rm -rf .venv .mypy_cache .pytest_cache .ruff_cache .hypothesis

@@ -18,7 +18,6 @@ from doe.stages.lines import LINES
 from doe.stages.pilot import Bias, PilotResult, pilot
 from doe.stages.scan import ScanResult, scan
 from doe.stages.screening import ScreeningResult, assumptions, screening
-from doe.stages.sizing import ASSUMPTION_ROWS, SCREENING_ROWS
 from doe.stages.surface import OptimumResult, SurfaceResult, optimum, surface
 from doe.stages.verification import VerificationResult, verification
 from doe.study import Study
@@ -111,19 +110,6 @@ class CountingRunner:
         self.runs += sum(len(runs) for runs in rows)
         self.outcomes = Counter(run.outcome for runs in rows for run in runs)
         return rows
-
-
-def planned_runs(study: Study, profile: Profile) -> dict[str, int]:
-    """Valid runs that each stage will make, replacements of failed runs not counted."""
-    return {
-        "pilot": profile.pilot_runs + profile.change_runs * len(study.changes),
-        "screening": SCREENING_ROWS * profile.screening_replicates,
-        "assumptions": ASSUMPTION_ROWS * profile.assumption_replicates if study.assumptions else 0,
-        "scan": len(study.scan_values) * profile.scan_replicates,
-        "ascent": profile.ascent_steps * profile.ascent_replicates,
-        "surface": 17 * profile.surface_replicates,
-        "verification": profile.verification_runs,
-    }
 
 
 def summary_of_runs(result: CampaignResult) -> dict[str, Any]:

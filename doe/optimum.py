@@ -5,6 +5,7 @@ The settings with model = target form a surface in the cube, so one target canno
 chosen point minimises sum ((x_i - reference_i)/scale_i)^2 on that surface. Reported beside it: the bootstrap
 interval of the point (the target's own standard error included), the range that each factor can take on the
 surface (its width), and the share of the cube whose predicted mean is compatible with the target at 95 %.
+The interval is that of the rule's choice: it says what is known of a factor only where the factor is identified.
 Source: Davison and Hinkley 1997 (bootstrap); Myers, Montgomery and Anderson-Cook 2016, ch. 6-7.
 """
 
@@ -149,7 +150,16 @@ def find_optimum(
         unidentified=unidentified,
         compatible_share=compatible_share(surface, target, target_standard_error),
         better_than_noise=better,
-        statement=_statement(surface.names, target, reached, predicted, region.natural(point), unidentified, better),
+        statement=_statement(
+            surface.names,
+            target,
+            reached,
+            predicted,
+            region.natural(point),
+            unidentified,
+            (region.natural(solution_low), region.natural(solution_high)),
+            better,
+        ),
     )
 
 
@@ -188,17 +198,25 @@ def _statement(
     predicted: float,
     point: FloatArray,
     unidentified: tuple[str, ...],
+    solution: tuple[FloatArray, FloatArray],
     better_than_noise: bool,
 ) -> str:
     """Return the result in one or two sentences."""
     place = ", ".join(f"{name} = {value:.4g}" for name, value in zip(names, point, strict=True))
-    if reached:
+    if reached and unidentified:
+        ranges = ", ".join(
+            f"{name} in {low:.4g} … {high:.4g}"
+            for name, low, high in zip(names, *solution, strict=True)
+            if name in unidentified
+        )
+        text = f"The target {target:.4g} does not identify {', '.join(unidentified)}: the model gives it with {ranges}"
+        text += " (not in every combination). " if len(unidentified) > 1 else ". "
+        text += f"Chosen by rule, nearest to the reference among the settings that give the target: {place}."
+    elif reached:
         text = f"The model gives {target:.4g} at {place}, the solution nearest to the reference."
     else:
         text = f"The model does not reach {target:.4g} in the region; "
         text += f"its nearest value is {predicted:.4g} at {place}."
-    if reached and unidentified:
-        text += f" The target does not identify {', '.join(unidentified)}."
     if not better_than_noise:
         text += " The surface is not better than noise, so this point is not a calibration."
     return text

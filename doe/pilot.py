@@ -21,6 +21,9 @@ from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
 
+BIAS_LIMIT_DEG = 5.0
+"""An estimator that misses the angle of made-up piles by more, however they are filled, is not taken."""
+
 
 @dataclass(frozen=True)
 class Noise(Record):

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
+from doe.errors import StudyFileError
 from doe.record import Record
 from doe.study_table import Table, only, positive, whole
 
+NAME = re.compile(r"[^/\\\x00-\x1f]{1,60}")
+"""What a profile may be called: the page names folders of results after it."""
 LEAST = {"pilot_runs": 3, "verification_runs": 3, "ascent_steps": 2}
 """Least value of a number of runs, where it is not 1."""
 
@@ -37,6 +41,8 @@ COUNTS = tuple(key for key in Profile.__dataclass_fields__ if key.endswith(("_ru
 def profile_from(name: str, entry: Table, spheres: str, mass: float) -> Profile:
     """Profile from its table in a study file, shapes and mass [kg] read already; raises StudyFileError."""
     where = f"profile.{name}"
+    if not NAME.fullmatch(name):
+        raise StudyFileError(f"profile: {name!r} is no name; allowed: 1 to 60 characters, no / and no \\")
     only(entry, set(Profile.__dataclass_fields__) - {"name"}, where)
     positive(mass, f"{where}.mass")
     counts = {key: whole(entry[key], f"{where}.{key}", LEAST.get(key, 1)) for key in COUNTS if key in entry}

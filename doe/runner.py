@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -12,9 +11,21 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.record import Record
-from doe.store import Store, StoredRun, run_key
+from doe.store import READINGS, RIG, Reader, Store, StoredRun, StoreError, observables_of, read_off
 from doe.study import TRIES
-from solver import Job, Outcome, Scene, code_version, observe, parameters, run_queue, value, with_values
+from solver import (
+    PHYSICS,
+    Job,
+    Outcome,
+    Scene,
+    observable_names,
+    packed,
+    parameters,
+    pour_key,
+    run_queue,
+    value,
+    with_values,
+)
 from solver import Record as PourRecord
 
 FloatArray = npt.NDArray[np.float64]
@@ -84,7 +95,7 @@ def seed_of(study_seed: int, stage: str, row: int, replicate: int, attempt: int)
 def responses(rows: Sequence[Sequence[Run]], observable: str) -> FloatArray:
     """Matrix (settings, replicates) of an observable; NaN where a replicate has no valid run."""
     width = max((run.replicate + 1 for runs in rows for run in runs), default=0)
-    table = np.full((len(rows), width), math.nan)
+    table = np.full((len(rows), width), np.nan)
     for k, runs in enumerate(rows):
         for run in runs:
             found = run.observables.get(observable)
@@ -95,7 +106,7 @@ def responses(rows: Sequence[Sequence[Run]], observable: str) -> FloatArray:
 
 def no_pile_shares(rows: Sequence[Sequence[Run]]) -> FloatArray:
     """Share of the runs of each setting that did not give a pile, replacements included, shape (settings,)."""
-    return np.array([np.mean([not run.valid for run in runs]) if runs else math.nan for runs in rows])
+    return np.array([np.mean([not run.valid for run in runs]) if runs else np.nan for runs in rows])
 
 
 Pours = Callable[[deque[Job], Sequence[Scene]], Iterable[tuple[Job, PourRecord]]]
@@ -103,23 +114,32 @@ Pours = Callable[[deque[Job], Sequence[Scene]], Iterable[tuple[Job, PourRecord]]
 
 
 def stored_run(
-    job: Job, record: PourRecord, study: str, stage: str, label: str, seen: Mapping[str, float]
+    job: Job, record: PourRecord, study: str, stage: str, label: str, reader: Reader, key: str, variant: str = ""
 ) -> StoredRun:
-    """A finished job as the store keeps it; ``seen`` is what was read off it, NaN where nothing could be."""
+    """A finished job as the store keeps it, with what ``reader`` reads off it.
+
+    ``key`` is that of the pour when it was asked for, ``variant`` what it was made with (`pour_key`). Raises StoreError
+    where the key is another one by now: a mesh file was changed meanwhile.
+    """
+    if pour_key(job.scene, job.seed, variant) != key:
+        raise StoreError(f"{stage}, {label}: a mesh file was changed while it was poured; begin again")
+    raw = packed(record)
     return StoredRun(
-        key=run_key(job.scene, job.seed, code_version()),
+        key=key,
         study=study,
         stage=stage,
         label=label,
         seed=job.seed,
-        code_version=code_version(),
+        physics=PHYSICS,
         outcome=str(record.outcome),
         message=record.message,
-        parameters={path: value(job.scene, path) for path in parameters(job.scene)},
-        observables={name: number if math.isfinite(number) else None for name, number in seen.items()},
+        parameters={RIG: job.scene.rig.name} | {path: value(job.scene, path) for path in parameters(job.scene)},
+        readings=READINGS,
+        observables=read_off(raw, reader),
         dt=record.dt,
         steps=record.steps,
         wall_s=record.wall_s,
+        raw=raw,
     )
 
 
@@ -150,7 +170,7 @@ class PourRunner:
         """See :class:`Runner`. Runs found in the store are taken from there."""
         scenes = [with_values(self._scene, setting.values) for setting in settings]
         found: list[list[Run]] = [[] for _ in settings]
-        places: list[tuple[int, int, int]] = []
+        places: list[tuple[int, int, int, str]] = []
         queue: deque[Job] = deque()
         waiting = [sum(setting.replicates for setting in settings)]
 
@@ -165,11 +185,13 @@ class PourRunner:
 
         def request(row: int, replicate: int, attempt: int) -> None:
             seed = seed_of(self._seed, stage, row, replicate, attempt)
-            stored = self._store.find(run_key(scenes[row], seed, code_version()))
+            key = pour_key(scenes[row], seed)
+            stored = self._store.find(key)
             if stored is not None:
+                stored = self._store.read(stored, observable_names(scenes[row]), observables_of)
                 settle(_reused(stored, settings[row], replicate, attempt), row)
             else:
-                places.append((row, replicate, attempt))
+                places.append((row, replicate, attempt, key))
                 queue.append(Job(scenes[row], seed, tag=len(places) - 1))
 
         # The whole design once, then again: what is there so far can be analysed long before the last run.
@@ -187,15 +209,16 @@ class PourRunner:
 
         if queue:
             for job, record in (self._pours or here)(queue, scenes):
-                row, replicate, attempt = places[job.tag]
+                row, replicate, attempt, key = places[job.tag]
                 if self._observer is not None:
                     self._observer.finish(stage, job.seed, record)
-                settle(self._keep(stage, settings[row], replicate, attempt, job, record), row)
+                settle(self._keep(stage, settings[row], replicate, attempt, job, record, key), row)
         return [sorted(runs, key=lambda run: (run.replicate, run.attempt)) for runs in found]
 
-    def _keep(self, stage: str, setting: Setting, replicate: int, attempt: int, job: Job, record: PourRecord) -> Run:
-        seen = {name: found.value for name, found in observe(record).items()}
-        stored = stored_run(job, record, self._study, stage, setting.label, seen)
+    def _keep(
+        self, stage: str, setting: Setting, replicate: int, attempt: int, job: Job, record: PourRecord, key: str
+    ) -> Run:
+        stored = stored_run(job, record, self._study, stage, setting.label, observables_of, key)
         self._store.add(stored)
         return Run(
             setting.label,

@@ -1,32 +1,55 @@
-"""The store: every run that finished, kept in one SQLite file and found again by what was run.
+"""The store: every pour that finished, kept raw in one SQLite file and found again by what was poured.
 
-The key of a run is a digest of the whole scene, the seed and the code version, so a stored run is reused exactly
-when repeating it would give the same bits.
+A pour is kept once and for all under the key of what decides its bits (`solver.pour_key`). What is read off it, its
+observables and the summaries of a diagnosis, is kept beside it with the version of the readings, and read anew from the
+raw pour where that version has changed or a name is missing: a new observable costs no pour.
+
+A file belongs to one version of the physics. One of an older version stays readable; nothing is poured into it.
 """
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import dataclasses
-import hashlib
 import json
+import math
 import os
 import sqlite3
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
 import platformdirs
 
+from solver import PHYSICS, RIGS, RawPourError, Record, observe, unpacked
+
+READINGS = 1
+"""Version of what is read off a raw pour. Raise it when an observable, a summary or a profile comes to give another
+number for the same pour; a new name needs no new version. `tests/doe/golden_readings.json` holds it to that."""
+
+SCHEMA_VERSION = 1
 SCHEMA = """
-CREATE TABLE IF NOT EXISTS runs (
+CREATE TABLE IF NOT EXISTS pours (
     key TEXT PRIMARY KEY, created REAL NOT NULL, study TEXT NOT NULL, stage TEXT NOT NULL, label TEXT NOT NULL,
-    seed INTEGER NOT NULL, code_version TEXT NOT NULL, outcome TEXT NOT NULL, message TEXT NOT NULL,
-    parameters TEXT NOT NULL, observables TEXT NOT NULL, dt REAL NOT NULL, steps INTEGER NOT NULL, wall_s REAL NOT NULL
+    seed INTEGER NOT NULL, physics INTEGER NOT NULL, outcome TEXT NOT NULL, message TEXT NOT NULL,
+    parameters TEXT NOT NULL, readings INTEGER NOT NULL, observables TEXT NOT NULL, dt REAL NOT NULL,
+    steps INTEGER NOT NULL, wall_s REAL NOT NULL, raw BLOB NOT NULL
 )
 """
+OWN = {"store", "pours"}
+"""Names of its tables."""
+BEFORE_RAW_POURS = "runs"
+"""The table of a store made before raw pours were kept: readings only, physics 0."""
+
+Reader = Callable[[Record], Mapping[str, float]]
+"""Reads named numbers off a record; NaN where there is nothing to read."""
+Readings = dict[str, float | None]
+"""Numbers by name; None where nothing could be read."""
+RIG = "rig.name"
+"""Beside the parameters of a stored run: which rig it was poured in."""
 
 
 class StoreError(ValueError):
@@ -35,58 +58,122 @@ class StoreError(ValueError):
 
 @dataclass(frozen=True)
 class StoredRun:
-    """One finished run. ``parameters`` holds every parameter of the scene, ``observables`` their values (None: NaN)."""
+    """One finished run. ``parameters`` holds every parameter of the scene, and ``RIG``."""
 
     key: str
     study: str
     stage: str
     label: str
     seed: int
-    code_version: str
+    physics: int
     outcome: str
     message: str
     parameters: dict[str, Any]
-    observables: dict[str, float | None]
+    readings: int
+    """Version of the readings that ``observables`` are of."""
+    observables: Readings
     dt: float
     steps: int
     wall_s: float
+    raw: bytes
+    """See `solver.raw_pour`; empty for a run stored before raw pours were kept."""
     created: float = 0.0
 
 
 def default_store() -> Path:
-    """``$REPOSE_STORE``, or ``runs.sqlite`` in the user's data directory."""
+    """``$REPOSE_STORE``, or the file of the present physics in the user's data directory."""
     named = os.environ.get("REPOSE_STORE")
-    return Path(named) if named else Path(platformdirs.user_data_dir("repose-explorer")) / "runs.sqlite"
+    return Path(named) if named else Path(platformdirs.user_data_dir("repose-explorer")) / f"pours_{PHYSICS}.sqlite"
 
 
-def run_key(scene: Any, seed: int, code_version: str) -> str:
-    """Digest of a frozen scene (all its fields, mesh files by content), seed and code version."""
-    content = (type(scene.rig).__name__, dataclasses.asdict(scene))
-    meshes = [Path(body.shape.file) for body in scene.bodies if getattr(body.shape, "file", "")]
-    meshes += [scene.rig.mesh_file] if hasattr(scene.rig, "mesh_file") else []
-    digest = hashlib.sha256(repr((content, seed, code_version)).encode())
-    for mesh in meshes:
-        digest.update(mesh.read_bytes())
-    return digest.hexdigest()
+def observables_in_rig(run: StoredRun) -> tuple[str, ...]:
+    """Names of the observables of the rig of ``run``; none for a rig that is not known."""
+    rig = RIGS.get(str(run.parameters.get(RIG)))
+    return rig().observables if rig is not None else ()
+
+
+def read_off(raw: bytes, reader: Reader) -> Readings:
+    """Return what ``reader`` reads off a raw pour.
+
+    Always off the raw pour, never off the record that it was packed from: a reading is the same number whether it is
+    taken when the pour ends or years later.
+    """
+    seen = reader(unpacked(raw))
+    return {name: float(number) if math.isfinite(number) else None for name, number in seen.items()}
+
+
+def observables_of(record: Record) -> dict[str, float]:
+    """The observables of the record's rig: the reader of a study."""
+    return {name: found.value for name, found in observe(record).items()}
 
 
 class Store:
-    """Runs in a SQLite file; several processes may read and write at once."""
+    """Pours in a SQLite file; several processes may read and write at once.
 
-    def __init__(self, path: Path) -> None:
+    ``pouring`` says whether pours will be added. Raises StoreError for a file that is no store, and, if pours will be
+    added, for one of another version of the physics.
+    """
+
+    def __init__(self, path: Path, pouring: bool = True) -> None:
         self.path = path
-        try:
+        with self._told():
             path.parent.mkdir(parents=True, exist_ok=True)
             self._db = sqlite3.connect(path, timeout=60.0)
-            self._db.execute("PRAGMA journal_mode=WAL")
-            self._db.execute(SCHEMA)
-            self._db.commit()
+            self._table = self._opened()
+        if pouring and self.physics != PHYSICS:
+            self.close()
+            raise StoreError(
+                f"{path}: a store of physics {self.physics}, and this program pours by physics {PHYSICS}; it stays "
+                f"readable (explorer runs --store {path}), name another file for new pours"
+            )
+
+    @contextlib.contextmanager
+    def _told(self) -> Iterator[None]:
+        """Turn what SQLite and the file system complain of into one line."""
+        try:
+            yield
         except (sqlite3.Error, OSError) as error:
-            raise StoreError(f"{path}: cannot be used as a store of runs ({error})") from None
+            raise StoreError(f"{self.path}: cannot be used as a store of runs ({error})") from None
+
+    def _opened(self) -> str:
+        """Name of the table that holds the runs; made where there is none."""
+        version = self._db.execute("PRAGMA user_version").fetchone()[0]
+        if version > SCHEMA_VERSION:
+            raise StoreError(
+                f"{self.path}: a store of format {version}, made by a newer version of this program; allowed: up to "
+                f"{SCHEMA_VERSION}"
+            )
+        tables = {name for (name,) in self._db.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
+        if BEFORE_RAW_POURS in tables:
+            self.physics = 0
+            return BEFORE_RAW_POURS
+        if tables - OWN:
+            raise StoreError(f"{self.path}: is the database of another program (it has a table {min(tables - OWN)!r})")
+        if version == 0:
+            # Two processes may make it at once: one switches the journal, the other finds the file locked meanwhile.
+            with contextlib.suppress(sqlite3.OperationalError):
+                self._db.execute("PRAGMA journal_mode=WAL")
+            with self._db:
+                self._db.execute("CREATE TABLE IF NOT EXISTS store (physics INTEGER NOT NULL)")
+                self._db.execute("INSERT INTO store SELECT ? WHERE NOT EXISTS (SELECT * FROM store)", (PHYSICS,))
+                self._db.execute(SCHEMA)
+                self._db.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+        (self.physics,) = self._db.execute("SELECT physics FROM store").fetchone()
+        return "pours"
+
+    @property
+    def version(self) -> str:
+        """Of which physics it is, and whether that is an old one, in words."""
+        if self.physics == PHYSICS:
+            return f"physics {PHYSICS}"
+        made = f"physics {self.physics}" if self.physics else "a program that kept no raw pours"
+        age = "old" if self.physics < PHYSICS else "newer"
+        return f"{age}, of {made}; this program pours by physics {PHYSICS} and adds nothing to it"
 
     def find(self, key: str) -> StoredRun | None:
         """The run with that key, or None."""
-        row = self._db.execute(f"SELECT {_COLUMNS} FROM runs WHERE key = ?", (key,)).fetchone()
+        with self._told():
+            row = self._db.execute(f"SELECT {_COLUMNS} FROM pours WHERE key = ?", (key,)).fetchone()
         return _from_row(row) if row else None
 
     def add(self, run: StoredRun) -> None:
@@ -94,39 +181,64 @@ class Store:
         values = dataclasses.asdict(run)
         values["parameters"] = json.dumps(run.parameters, sort_keys=True)
         values["observables"] = json.dumps(run.observables, sort_keys=True)
-        values["created"] = time.time()
-        names = [field.name for field in dataclasses.fields(StoredRun)]
-        marks = ", ".join("?" for _ in names)
-        with self._db:
-            self._db.execute(f"INSERT OR REPLACE INTO runs ({_COLUMNS}) VALUES ({marks})", [values[n] for n in names])
+        values["created"] = run.created or time.time()
+        marks = ", ".join("?" for _ in _NAMES)
+        with self._told(), self._db:
+            self._db.execute(f"INSERT OR REPLACE INTO pours ({_COLUMNS}) VALUES ({marks})", [values[n] for n in _NAMES])
+
+    def read(self, run: StoredRun, names: Iterable[str], reader: Reader) -> StoredRun:
+        """Return ``run`` with the readings ``names`` of the present version.
+
+        Those that are kept, if they are of that version and all of ``names`` are there. Otherwise ``reader`` reads the
+        raw pour again, and what it finds is kept, but for a store of an older physics. A run without a raw pour is
+        returned as it is. Raises StoreError for a raw pour that cannot be read.
+        """
+        present = run.readings == READINGS
+        if not run.raw or (present and run.observables.keys() >= set(names)):
+            return run
+        try:
+            seen = read_off(run.raw, reader)
+        except RawPourError as error:
+            raise StoreError(f"{self.path}: run {run.key[:12]}: {error}") from None
+        # What is kept was read by whoever knew the pour best.
+        kept = run.observables if present else {}
+        run = dataclasses.replace(run, readings=READINGS, observables=seen | kept)
+        if self.physics == PHYSICS:
+            self.add(run)
+        return run
 
     def runs(self, study: str | None = None) -> Iterator[StoredRun]:
-        """All runs, oldest first; of one study if named."""
+        """All runs, oldest first; of one study if named. Read with the version that they were read with."""
         where, arguments = ("WHERE study = ?", (study,)) if study else ("", ())
-        for row in self._db.execute(f"SELECT {_COLUMNS} FROM runs {where} ORDER BY created", arguments):
-            yield _from_row(row)
+        columns = _COLUMNS if self._table == "pours" else _COLUMNS_BEFORE_RAW_POURS
+        with self._told():
+            rows = self._db.execute(f"SELECT {columns} FROM {self._table} {where} ORDER BY created", arguments)
+            yield from map(_from_row, rows)
 
     def close(self) -> None:
         """Close the file."""
         self._db.close()
 
 
-_COLUMNS = ", ".join(field.name for field in dataclasses.fields(StoredRun))
+_NAMES = [field.name for field in dataclasses.fields(StoredRun)]
+_COLUMNS = ", ".join(_NAMES)
+_ABSENT = {"physics": "0 AS physics", "readings": "0 AS readings", "raw": "x'' AS raw"}
+_COLUMNS_BEFORE_RAW_POURS = ", ".join(_ABSENT.get(name, name) for name in _NAMES)
 
 
 def _from_row(row: tuple[Any, ...]) -> StoredRun:
-    values = dict(zip([field.name for field in dataclasses.fields(StoredRun)], row, strict=True))
+    values = dict(zip(_NAMES, row, strict=True))
     values["parameters"] = json.loads(values["parameters"])
     values["observables"] = json.loads(values["observables"])
     return StoredRun(**values)
 
 
-def write_csv(runs: Iterator[StoredRun], file: IO[str]) -> int:
+def write_csv(runs: Iterable[StoredRun], file: IO[str]) -> int:
     """Write runs as CSV, one column per parameter and observable that occurs; returns the number of rows."""
     rows = list(runs)
     parameters = sorted({name for run in rows for name in run.parameters})
     observables = sorted({name for run in rows for name in run.observables})
-    fixed = ["study", "stage", "label", "seed", "outcome", "message", "dt", "steps", "wall_s", "code_version"]
+    fixed = ["study", "stage", "label", "seed", "outcome", "message", "dt", "steps", "wall_s", "physics", "readings"]
     writer = csv.writer(file)
     writer.writerow([*fixed, *parameters, *observables])
     for run in rows:

@@ -29,6 +29,7 @@ from solver import (
     Scene,
     asset_path,
     canonical,
+    is_material,
     load_material,
     observable_names,
     parameters,
@@ -41,7 +42,7 @@ from solver import (
 CALIBRATED = 3
 """Factors that go on from the screening to the ascent and the response surface."""
 COLUMNS = 27
-"""Columns of the 28-run design; those without a factor are its dummies."""
+"""Columns of the screening's design, one less than its rows; those without a factor are its dummies."""
 
 TRIES = 3
 """Seeds that are tried for one replicate; a run that jammed or broke is kept with its outcome and replaced."""
@@ -115,7 +116,7 @@ def with_profile(study: Study, name: str) -> tuple[Study, Profile]:
     testable, or it asks for a resolution in degrees of a target that is no angle.
     """
     if name not in study.profiles:
-        raise ParameterError(f"profile: {name!r} is not one of {', '.join(study.profiles)}")
+        raise ParameterError(f"{study.file}: profile: {name!r} is not one of {', '.join(study.profiles)}")
     profile = study.profiles[name]
     mass = {"rig.mass": profile.mass} if "rig.mass" in parameters(study.scene) else {}
     scene = with_values(study.scene, {"body.spheres": profile.spheres, **mass})
@@ -139,6 +140,11 @@ def with_profile(study: Study, name: str) -> tuple[Study, Profile]:
 
 def study_from(table: Table, path: Path) -> Study:
     """Study from a parsed file. Raises ParameterError or StudyFileError."""
+    if is_material(table):
+        raise StudyFileError(
+            f'{path} is a material, not a study; a study names it (material = "{path.name}"), and '
+            f"`explorer new study {path.stem}` writes one"
+        )
     only(table, KEYS, "")
     if table.get("format") != 1:
         raise StudyFileError(f"format: {table.get('format')!r} is not 1")
@@ -151,7 +157,7 @@ def study_from(table: Table, path: Path) -> Study:
     if not CALIBRATED <= len(factors) <= COLUMNS - dummies:
         raise StudyFileError(
             f"factor: {len(factors)} factors with {dummies} dummies; allowed: {CALIBRATED} to {COLUMNS - dummies} in a "
-            "28-run design"
+            f"{COLUMNS + 1}-run design"
         )
     assumptions = tuple(_levels(scene, entry, "assumption") for entry in entries(table, "assumption"))
     _refuse_twins([*factors, *assumptions])

@@ -1,35 +1,59 @@
 """The physics: a discrete-element solver for rigid multi-sphere bodies, batched over independent worlds.
 
-Names that other packages may use stand in ``__all__``. Importing this package does not import Taichi (which takes a
-second and may not happen in the page's process): the names that need it are fetched when they are first used.
+Names that other packages may use stand in ``__all__``. Those in ``_LATE`` are fetched when they are first used, so that
+importing this package imports neither Taichi, which takes a second and may not happen in the page's process, nor what
+reads photographs.
 """
 
 import importlib
 from typing import TYPE_CHECKING, Any
 
 from solver.assets import AssetNotFoundError, asset_path
-from solver.body import Body
-from solver.effects import EFFECTS, SetUpEffect
-from solver.material_file import load_material
+from solver.body import Body, Members
+from solver.effects import EFFECTS, SetUpEffect, Telltale
+from solver.material_file import is_material, load_material
 from solver.observables import Value, observable_names, observe
 from solver.observables.free_surface import slope_angle_deg
 from solver.observables.named import Named, all_names, named, observe_named, observe_scan
 from solver.params import Parameter, ParameterError, parse_quantity
-from solver.photograph import PhotographedPile, PhotographError, open_picture, read_photograph
+from solver.pour_key import pour_key
+from solver.raw_pour import RawPourError, packed, unpacked
 from solver.record import Bodies, Entries, Outcome, Phase, Pile, Record, Spheres, Trace
+from solver.rigs import RIGS
 from solver.scan import scanned_pile
-from solver.scene import Scene, body_counts, canonical, parameters, pour_rig, value, with_rig, with_values
+from solver.scene import (
+    Scene,
+    body_counts,
+    canonical,
+    parameters,
+    pour_rig,
+    poured_mass,
+    value,
+    with_rig,
+    with_values,
+)
 from solver.set_up import with_set_up, with_settings
 from solver.toml_table import read_toml
-from solver.version import code_version
+from solver.version import PHYSICS
 
 if TYPE_CHECKING:
-    from solver.crew import Crew
-    from solver.run import Job, run_pour, run_pours, run_queue
+    from solver.crew import Crew, begin_worker
+    from solver.photograph import PhotographedPile, PhotographError, open_picture, read_photograph
+    from solver.pour import Pour
+    from solver.run import Job, capacity_for, run_pour, run_pours, run_queue
+    from solver.world import Batch
 
-_NEEDS_TAICHI = {
+_LATE = {
+    "Batch": "solver.world",
     "Crew": "solver.crew",
     "Job": "solver.run",
+    "PhotographError": "solver.photograph",
+    "PhotographedPile": "solver.photograph",
+    "Pour": "solver.pour",
+    "begin_worker": "solver.crew",
+    "capacity_for": "solver.run",
+    "open_picture": "solver.photograph",
+    "read_photograph": "solver.photograph",
     "run_pour": "solver.run",
     "run_pours": "solver.run",
     "run_queue": "solver.run",
@@ -37,19 +61,23 @@ _NEEDS_TAICHI = {
 
 
 def __getattr__(name: str) -> Any:
-    if name in _NEEDS_TAICHI:
-        return getattr(importlib.import_module(_NEEDS_TAICHI[name]), name)
+    if name in _LATE:
+        return getattr(importlib.import_module(_LATE[name]), name)
     raise AttributeError(f"module 'solver' has no attribute {name!r}")
 
 
 __all__ = [
     "EFFECTS",
+    "PHYSICS",
+    "RIGS",
     "AssetNotFoundError",
+    "Batch",
     "Bodies",
     "Body",
     "Crew",
     "Entries",
     "Job",
+    "Members",
     "Named",
     "Outcome",
     "Parameter",
@@ -58,17 +86,22 @@ __all__ = [
     "PhotographError",
     "PhotographedPile",
     "Pile",
+    "Pour",
+    "RawPourError",
     "Record",
     "Scene",
     "SetUpEffect",
     "Spheres",
+    "Telltale",
     "Trace",
     "Value",
     "all_names",
     "asset_path",
+    "begin_worker",
     "body_counts",
     "canonical",
-    "code_version",
+    "capacity_for",
+    "is_material",
     "load_material",
     "named",
     "observable_names",
@@ -76,9 +109,12 @@ __all__ = [
     "observe_named",
     "observe_scan",
     "open_picture",
+    "packed",
     "parameters",
     "parse_quantity",
+    "pour_key",
     "pour_rig",
+    "poured_mass",
     "read_photograph",
     "read_toml",
     "run_pour",
@@ -86,6 +122,7 @@ __all__ = [
     "run_queue",
     "scanned_pile",
     "slope_angle_deg",
+    "unpacked",
     "value",
     "with_rig",
     "with_set_up",

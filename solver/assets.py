@@ -96,6 +96,11 @@ def measurement_folder(name: str) -> Path:
     )
 
 
+def shipped_fits() -> Path:
+    """Folder of the member spheres of shipped bodies (`solver.clump_cache`)."""
+    return _folder("clumps")
+
+
 def shipped_measurements() -> tuple[str, ...]:
     """Names of the shipped measured data sets, sorted."""
     return tuple(sorted(path.parent.name for path in _folder("measurements").glob("*/measurement.toml")))

@@ -20,12 +20,12 @@ from solver.effects.set_up import actual
 from solver.insertion import Pose
 from solver.params import ParameterError
 from solver.pour import Pour
+from solver.pour_key import pour_key
 from solver.record import Outcome
 from solver.retune import Ramp
 from solver.scene import Scene
-from solver.snapshot import Arrays
+from solver.snapshot import TABLES, Arrays
 from solver.supply import Entry
-from solver.version import code_version
 from solver.world import Batch
 
 PLAIN = (
@@ -60,8 +60,9 @@ class Checkpoint:
 
 
 def fingerprint(scene: Scene) -> str:
-    """The same for equal scenes under one version of the solver."""
-    return hashlib.sha256(f"{code_version()} {scene!r}".encode()).hexdigest()
+    """The same for pours of one key (mesh files by their contents), where a checkpoint holds the same arrays."""
+    held = [f"{group}.{name}" for group, table in TABLES.items() for name in table]
+    return hashlib.sha256(f"{pour_key(scene, seed=0)} {PLAIN} {held}".encode()).hexdigest()
 
 
 def checkpoint_of(pour: Pour) -> Checkpoint:

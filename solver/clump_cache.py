@@ -1,9 +1,9 @@
 """Fitted member spheres, kept between programs: a fit takes seconds, reading it back a millisecond.
 
-One file per fit in ``$REPOSE_CACHE``, or ``clumps`` in the user's cache directory. Its name is a digest of all that the
-fit depends on (the solid, a mesh by its contents; the spheres asked for; the solver's sources; NumPy, SciPy and
-trimesh), so a file is either the fit that would be made or not found. A cache that cannot be read or written is as
-none.
+One file per fit, of shipped bodies in ``assets/clumps``, of all others in ``$REPOSE_CACHE`` or ``clumps`` in the user's
+cache directory. Its name is a digest of all that the fit depends on (the solid, a mesh by its contents; the spheres
+asked for; the version of the fitting), so a file is either the fit that was asked for or not found. A cache that cannot
+be read or written is as none.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ import tempfile
 import zipfile
 from collections.abc import Callable
 from dataclasses import astuple
-from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import platformdirs
 
+from solver.assets import shipped_fits
 from solver.clump_fit import ClumpFit
 from solver.shape import Solid
-from solver.version import code_version
+from solver.version import FITTING
 
 Array = npt.NDArray[np.float64]
 Fit = tuple[Array, Array, ClumpFit]
@@ -38,32 +38,34 @@ def cache_folder() -> Path:
 
 def kept_fit(solid: Solid, spheres: str, fit: Callable[[Solid, str], Fit]) -> Fit:
     """The fit of ``solid`` from the cache, or made by ``fit`` and kept; the same bits either way."""
-    path = cache_folder() / f"{_digest(solid, spheres)}.npz"
-    found = _read(path)
+    name = fit_name(solid, spheres)
+    found = read_fit(shipped_fits() / name) or read_fit(cache_folder() / name)
     if found is None:
         found = fit(solid, spheres)
-        _write(path, found)
+        write_fit(cache_folder() / name, found)
     return found
 
 
-def _digest(solid: Solid, spheres: str) -> str:
+def fit_name(solid: Solid, spheres: str) -> str:
+    """Name of the file of a fit."""
     mesh = Path(solid.file).read_bytes() if solid.file else b""
-    libraries = [version(name) for name in ("numpy", "scipy", "trimesh")]
-    named = [solid.kind, [float(x).hex() for x in solid.dimensions], solid.unit, spheres, code_version(), libraries]
-    return hashlib.sha256(repr(named).encode() + mesh).hexdigest()[:32]
+    named = [solid.kind, [float(x).hex() for x in solid.dimensions], solid.unit, spheres, FITTING]
+    return f"{hashlib.sha256(repr(named).encode() + mesh).hexdigest()[:32]}.npz"
 
 
-def _read(path: Path) -> Fit | None:
+def read_fit(path: Path) -> Fit | None:
+    """The fit in a file, or None."""
     try:
         with np.load(path, allow_pickle=False) as kept:
-            centres, radii, numbers = kept["centres"], kept["radii"], [float(x) for x in kept["fit"]]
+            centres, radii = kept["centres"], kept["radii"]
+            share, covered, rms, largest, x, y, z, smallest = (float(number) for number in kept["fit"])
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None
-    share, covered, rms, largest, x, y, z, smallest = numbers
     return centres, radii, ClumpFit(len(radii), share, covered, rms, largest, (x, y, z), smallest)
 
 
-def _write(path: Path, fit: Fit) -> None:
+def write_fit(path: Path, fit: Fit) -> None:
+    """Keep a fit; a place that cannot be written keeps none."""
     centres, radii, quality = fit
     _, share, covered, rms, largest, errors, smallest = astuple(quality)
     try:

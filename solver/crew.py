@@ -102,14 +102,20 @@ def _answer(pipe: Connection) -> Any:
     return answer
 
 
-def _work(pipe: Connection) -> None:
-    """Run what comes through ``pipe``: a list of scenes makes room for them, a job is answered by its record."""
-    # Ctrl-C reaches the whole group; the process in charge decides, and its end closes the pipe.
+def begin_worker() -> None:
+    """Make this a worker process: one CPU thread, and Ctrl-C left to the process in charge."""
+    # It reaches the whole group; the process in charge decides, and its end closes the pipe.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     from solver import backend
-    from solver.run import run_job
 
     backend.init(threads=1)
+
+
+def _work(pipe: Connection) -> None:
+    """Run what comes through ``pipe``: a list of scenes makes room for them, a job is answered by its record."""
+    begin_worker()
+    from solver.run import run_job
+
     rooms = Rooms()
     while True:
         try:

@@ -55,6 +55,11 @@ def load_material(name: str, relative_to: Path | None = None) -> Scene:
         raise ParameterError(text if text.startswith(str(path)) else f"{path}: {text}") from None
 
 
+def is_material(table: dict[str, Any]) -> bool:
+    """Whether a parsed TOML file is a material: only those have materials or bodies."""
+    return "materials" in table or "body" in table
+
+
 def scene_from(table: dict[str, Any], path: Path) -> Scene:
     """Scene from a parsed material file; its rig is the default funnel unless it has a table ``[rig]``."""
     unknown = sorted(set(table) - KNOWN)

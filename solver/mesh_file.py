@@ -7,13 +7,16 @@ side; parts that are closed only together (a surface split by its materials) are
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-import trimesh
 
 from solver.mesh_winding import lattice_axes, winding_numbers
 from solver.params import UNITS
+
+if TYPE_CHECKING:
+    import trimesh
 
 SUFFIXES = (".stl", ".obj", ".ply", ".glb")
 LENGTH_UNITS = UNITS["m"]
@@ -40,6 +43,8 @@ def read_solid_mesh(file: str, unit: str = "m") -> trimesh.Trimesh:
         MeshFileError: missing, unreadable or too large; no faces, or coordinates that are not finite; open or with
             edges of more than two faces; faces that disagree about the outside; inverted; flat; cutting through itself.
     """
+    import trimesh
+
     _check_size(Path(file))
     parts = [_welded(part) for part in _parts(file)]
     faces = sum(len(part.faces) for part in parts)
@@ -67,6 +72,8 @@ def _check_size(path: Path) -> None:
 
 
 def _parts(file: str) -> list[trimesh.Trimesh]:
+    import trimesh
+
     try:
         found = trimesh.load_scene(file, process=False).dump(concatenate=False)
     except Exception as error:  # the readers of a damaged file raise anything from KeyError to struct.error
@@ -80,6 +87,8 @@ def _parts(file: str) -> list[trimesh.Trimesh]:
 
 
 def _side_by_side(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
+    import trimesh
+
     first = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
     faces = np.concatenate([part.faces + offset for part, offset in zip(parts, first, strict=True)])
     return trimesh.Trimesh(np.concatenate([part.vertices for part in parts]), faces, process=False)
@@ -87,6 +96,8 @@ def _side_by_side(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
 
 def _welded(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     """Without texture and normals, equal corners made one, faces dropped in which a corner repeats."""
+    import trimesh
+
     # 1e-30: a mesh that is one point has no extent
     cells = np.round(mesh.vertices / (WELD * max(mesh.extents.max(), 1e-30)))
     _, first, corner = np.unique(cells, axis=0, return_index=True, return_inverse=True)

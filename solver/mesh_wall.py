@@ -10,14 +10,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-import trimesh
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from solver.rigs.surface import TriangleMesh
+
+if TYPE_CHECKING:
+    import trimesh
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]
@@ -59,6 +60,8 @@ class MeshWall:
 
 def mesh_wall(surface: TriangleMesh) -> MeshWall:
     """Tables of ``surface``."""
+    import trimesh
+
     mesh = trimesh.Trimesh(np.array(surface.vertices), np.array(surface.faces), process=False)
     patch = _patches(mesh)
     order = np.argsort(patch, kind="stable")
@@ -72,6 +75,9 @@ def mesh_wall(surface: TriangleMesh) -> MeshWall:
 
 def _patches(mesh: trimesh.Trimesh) -> Ints:
     """Number of the smooth patch of each face, whichever way the faces are wound."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
     n, pairs = len(mesh.faces), mesh.face_adjacency
     ends = mesh.vertices[mesh.face_adjacency_edges]
     centres = mesh.triangles.mean(axis=1)

@@ -22,6 +22,7 @@ from solver.record_builder import (
     bodies_of,
     entries_of,
     free_surface_of,
+    lying,
     measured_from,
     member_spheres,
     pile_of,
@@ -186,7 +187,7 @@ class Pour:
         spheres = member_spheres(self.scene, bodies)
         # What rolls away is no part of a pile at rest; at a given moment it lies where it is, for a camera as well.
         rolling = None if self.scene.numerics.duration > 0.0 else rolling_away(self.scene, self.container, state)
-        pile = pile_of(self.container, bodies, spheres, rolling)
+        in_pile = lying(self.container, bodies, rolling)
         return Record(
             scene=self.scene,
             seed=self.seed,
@@ -194,7 +195,8 @@ class Pour:
             message=self.message,
             bodies=bodies,
             spheres=spheres,
-            pile=measured_from(pile, self.scene.axis),
+            in_pile=in_pile,
+            pile=measured_from(pile_of(bodies, spheres, in_pile), self.scene.axis),
             free_surface=free_surface_of(self.rig.watch, self._free_surface),
             trace=trace_of(self.samples),
             entries=entries_of(self.supply.order, self.supply.entries),

@@ -180,6 +180,8 @@ class Record:
     message: str
     bodies: Bodies
     spheres: Spheres
+    in_pile: npt.NDArray[np.bool_]
+    """Which of ``bodies`` belong to ``pile``, shape (n,)."""
     pile: Pile
     trace: Trace
     entries: Entries

@@ -73,14 +73,15 @@ def measured_from(pile: Pile, axis: tuple[float, float]) -> Pile:
     return replace(pile, spheres=spheres, position=pile.position + shift)
 
 
-def pile_of(
-    container: Container, bodies: Bodies, spheres: Spheres, rolling: npt.NDArray[np.bool_] | None = None
-) -> Pile:
-    """The bodies that lie below the container, inside the domain and do not roll away, renumbered from 0."""
-    lying = bodies.inside & (bodies.position[:, 2] < container.height)
-    chosen = np.flatnonzero(lying if rolling is None else lying & ~rolling)
-    number = np.full(len(bodies.mass), -1, dtype=np.int32)
-    number[chosen] = np.arange(len(chosen), dtype=np.int32)
+def lying(container: Container, bodies: Bodies, rolling: npt.NDArray[np.bool_] | None = None) -> npt.NDArray[np.bool_]:
+    """Bodies that lie below the container, inside the domain, and do not roll away."""
+    below = bodies.inside & (bodies.position[:, 2] < container.height)
+    return below if rolling is None else below & ~rolling
+
+
+def pile_of(bodies: Bodies, spheres: Spheres, chosen: npt.NDArray[np.bool_]) -> Pile:
+    """The pile of the ``chosen`` bodies, renumbered from 0."""
+    number = np.where(chosen, np.cumsum(chosen) - 1, -1).astype(np.int32)
     kept = number[spheres.body] >= 0
     return Pile(
         spheres=Spheres(spheres.centre[kept], spheres.radius[kept], number[spheres.body[kept]]),

@@ -11,13 +11,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Literal, cast, get_args
+from typing import TYPE_CHECKING, Any, Literal, cast, get_args
 
 import numpy as np
 import numpy.typing as npt
-import trimesh
 
 from solver.mesh_file import LENGTH_UNITS, SUFFIXES, MeshFileError, read_solid_mesh
+
+# Imported by the functions that make a mesh, here and in the other files of shapes: with what it brings along, trimesh
+# takes as long as the rest of the program, and a pour of known bodies needs none of it.
+if TYPE_CHECKING:
+    import trimesh
 
 Kind = Literal["ellipsoid", "cylinder", "box", "sphere", "mesh"]
 Array = npt.NDArray[np.float64]
@@ -243,6 +247,8 @@ def _solid_from_table(table: Mapping[str, Any], folder: Path | None) -> Solid:
 
 @lru_cache(maxsize=64)
 def _surface_mesh(solid: Solid, refinement: int, stamp: int) -> trimesh.Trimesh:
+    import trimesh
+
     if solid.kind == "mesh":
         return _in_principal_frame(_read_mesh(solid))
     extents = principal_extents(solid)
@@ -269,6 +275,8 @@ def _read_mesh(solid: Solid) -> trimesh.Trimesh:
 
 def _in_principal_frame(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     """The mesh about its centre of mass, turned so that its moments of inertia ascend along x, y, z."""
+    import trimesh
+
     # in units of the cube root of the volume: moments of small bodies would drown in absolute tolerances
     scale = mesh.volume ** (1.0 / 3.0)
     unit = trimesh.Trimesh((mesh.vertices - mesh.center_mass) / scale, mesh.faces, process=False)

@@ -19,7 +19,6 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq
 from scipy.special import ndtr, ndtri
 
 Array = npt.NDArray[np.float64]
@@ -97,6 +96,7 @@ def drawn_sizes(distributions: Sequence[SizeDistribution], order: Ints, seed: in
 @lru_cache(maxsize=256)
 def _log_normal(spread: float) -> tuple[float, float]:
     """Mean m and standard deviation t of ln s before the cut."""
+    from scipy.optimize import brentq
 
     def excess(t: float) -> float:
         squares = t**2 + math.log(_share(2, t) * _share(0, t) / _share(1, t) ** 2)

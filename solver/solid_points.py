@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import numpy.typing as npt
-import trimesh
 
 from solver.mesh_winding import PITCH, lattice_axes, winding_numbers
 from solver.shape import Array, Solid, cylinder_axis, mass_properties, principal_extents, surface_mesh
+
+if TYPE_CHECKING:
+    import trimesh
 
 FINE = 5
 

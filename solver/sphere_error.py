@@ -9,8 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-import trimesh
-from scipy.spatial import cKDTree
 
 from solver.clump_fit import measured_fit
 from solver.shape import Solid, surface_mesh
@@ -75,6 +73,9 @@ def distance_to_mesh(solid: Solid, points: Array) -> Array:
 
     Exact to the nearest of the facets that carry the nearest of 30 000 surface points.
     """
+    import trimesh
+    from scipy.spatial import cKDTree
+
     mesh = surface_mesh(solid, FINE)
     places, facets = points_on(mesh, 30_000)
     nearest = cKDTree(places).query(points, k=LOOKED_AT)[1]

@@ -16,7 +16,6 @@ from itertools import product
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
 from solver.sphere_union import Array, squared_distances
 
@@ -50,6 +49,8 @@ class Target:
 
         Half the thickness of a plate or a seed; of a bent strip its own, not that of its bounding box.
         """
+        from scipy.spatial import cKDTree
+
         inside = np.abs(self.interior) if self.symmetric else self.interior
         depth = float(cKDTree(self.surface).query(inside)[0].max())
         return min(depth, float(np.diff(self.bounds, axis=0).min() / 2.0))

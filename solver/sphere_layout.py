@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from solver.sphere_fit import Orbits, Target, orbits_of
 from solver.sphere_union import Array
@@ -30,6 +29,8 @@ def start_layouts(target: Target, most: int, least_radius: float) -> dict[int, l
     lie inside. Radii start near the largest inscribed one, and at least at `least_radius` [m]: small spheres
     have to prove useful.
     """
+    from scipy.spatial import cKDTree
+
     radius = target.inscribed_radius
     extents = target.bounds[1] - target.bounds[0]
     compact = int(extents[2] > 0.5 * extents[0]) + int(extents[2] > 0.8 * extents[0])
@@ -102,6 +103,8 @@ def _spread(low: float, high: float, count: int, inset: float) -> Array:
 
 def _cell_means(interior: Array, centres: Array) -> Array:
     """Centres moved to the mean of the interior points nearest to each, three times over (Lloyd 1982)."""
+    from scipy.spatial import cKDTree
+
     for _ in range(3):
         nearest = cKDTree(centres).query(interior)[1]
         count = np.bincount(nearest, minlength=len(centres))

@@ -16,7 +16,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from solver.shape import Solid, surface_mesh
 from solver.solid_points import interior_points, surface_points
@@ -72,6 +71,8 @@ def deviation(target: Target, centres: Array, radii: Array) -> float:
     From the union the distance is taken to the tangent plane of the nearest surface point, if that is shorter than the
     spacing of points allows to tell.
     """
+    from scipy.spatial import cKDTree
+
     outward = distance_to_union(target.surface, centres, radii)
     points, owner = open_points(centres, radii, SCORE_POINTS)
     distance, nearest = cKDTree(target.surface).query(points)
@@ -84,11 +85,15 @@ def deviation(target: Target, centres: Array, radii: Array) -> float:
 
 def _inscribed(target: Target, centres: Array, floor: float) -> Array:
     """Radii of the largest inscribed spheres at ``centres``, within ``floor`` and the largest of all [m]."""
+    from scipy.spatial import cKDTree
+
     return np.clip(cKDTree(target.surface).query(centres)[0], floor, max(floor, target.inscribed_radius))
 
 
 def _cells(target: Target, inside: Array, number: int, floor: float) -> Orbits:
     """Means of ``number`` cells of the interior; the first ones are the points that lie furthest from each other."""
+    from scipy.spatial import cKDTree
+
     chosen = [int(squared_distances(inside, inside.mean(axis=0)[None])[:, 0].argmax())]
     distance = squared_distances(inside, inside[chosen])[:, 0]
     while len(chosen) < number:
@@ -104,6 +109,8 @@ def _cells(target: Target, inside: Array, number: int, floor: float) -> Orbits:
 
 def _cover(target: Target, inside: Array, number: int, floor: float) -> tuple[Array, Array]:
     """Centres and radii of inscribed spheres by the volume that each adds; smaller ones than the floor are not used."""
+    from scipy.spatial import cKDTree
+
     depth = cKDTree(target.surface).query(inside)[0]
     deep = np.flatnonzero(depth >= min(floor, depth.max()))
     deep = deep[:: max(1, len(deep) // 2000)]

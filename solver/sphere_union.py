@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
 Array = npt.NDArray[np.float64]
 
@@ -37,6 +36,8 @@ def distance_to_union(points: Array, centres: Array, radii: Array) -> Array:
     Exact outside, and inside where the nearest place is straight away from a centre; elsewhere inside (the
     nearest place is a groove between spheres) to the spacing, r / 18, of points spread over the surface.
     """
+    from scipy.spatial import cKDTree
+
     distance = np.sqrt(squared_distances(points, centres))
     gap = (distance - radii).min(axis=1)
     inside = np.flatnonzero(gap < 0.0)

@@ -4,6 +4,7 @@ Worlds are independent runs. Every array has the world as its leading axis; capa
 allocated, and a world that outgrows them stops with the outcome ``buffer_overflow``.
 """
 
+import math
 from dataclasses import dataclass, fields, replace
 from functools import cache
 
@@ -177,6 +178,8 @@ SUMMARY = {
 QUANTA = {"bodies": 128, "members": 1024, "contacts": 16384}
 MESH_QUANTA = {"triangles": 256, "cells": 4096, "cell_items": 16384}
 """What a size is a multiple of, so that scenes much alike share the kernels that are compiled for it."""
+KINDS = 6
+"""Contact classes of the smallest table; a larger one has twice as many, or four times."""
 
 
 @dataclass(frozen=True)
@@ -201,7 +204,9 @@ class Capacity:
     def rounded(self) -> "Capacity":
         """Sizes rounded up to multiples of their quanta; where there is no mesh, none is made room for."""
         quanta = QUANTA | (MESH_QUANTA if self.triangles > 1 else {})
-        return replace(self, **{name: -(-getattr(self, name) // unit) * unit for name, unit in quanta.items()})
+        kinds = KINDS * 2 ** math.ceil(math.log2(max(1.0, self.kinds / KINDS)))
+        sizes = {name: -(-getattr(self, name) // unit) * unit for name, unit in quanta.items()}
+        return replace(self, kinds=kinds, **sizes)
 
     def joined(self, other: "Capacity") -> "Capacity":
         """The least that holds what either holds."""

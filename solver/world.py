@@ -44,6 +44,22 @@ SUMMARY_COLUMNS = (
 )
 """Columns of a summary, SI; what they mean stands in ``state.SUMMARY`` and ``state.WORLD``."""
 
+SETTINGS = (
+    "dt",
+    "skin",
+    "cell",
+    "sleep_speed",
+    "sleep_time",
+    "domain",
+    "outlet",
+    "inlet_radius",
+    "gravity_x",
+    "gravity_y",
+    "gravity_z",
+)
+"""Columns of the row that sets up a world, in the order in which ``kernels.loading.load_world`` reads them, SI; what
+they mean stands in ``state.WORLD``."""
+
 
 def wall_materials(scene: Scene) -> tuple[str, ...]:
     """Materials of the rig's surfaces, each once, in order of appearance."""
@@ -64,6 +80,22 @@ def law_table(scene: Scene) -> Array:
     return table
 
 
+def settings_of(scene: Scene, bodies: Layout, dt: float) -> dict[str, float]:
+    """What a world is set up with, by ``SETTINGS``."""
+    numerics, inside = scene.numerics, scene.rig.container(0.0)
+    gravity = dict(zip(("gravity_x", "gravity_y", "gravity_z"), scene.gravity, strict=True))
+    return {
+        "dt": dt,
+        "skin": numerics.skin,
+        "cell": 2.0 * float(bodies.numbers[:, 4].max()) + numerics.skin,
+        "sleep_speed": numerics.sleep_speed if any(scene.gravity) else 0.0,
+        "sleep_time": numerics.sleep_time,
+        "domain": scene.rig.domain_half_width,
+        "outlet": inside.height,
+        "inlet_radius": inside.radius,
+    } | gravity
+
+
 class Batch:
     """Worlds side by side. ``w`` is the index of a world throughout, ``wall`` that of a surface of its rig."""
 
@@ -76,18 +108,14 @@ class Batch:
 
     def load(self, w: int, scene: Scene, bodies: Layout, dt: float, active: Sequence[bool]) -> None:
         """Empty world ``w`` and set it up for ``scene``; no body has entered yet. ``active``: one per surface."""
-        s, rig, numerics = self._s, scene.rig, scene.numerics
+        s = self._s
         for name, needed in (("bodies", len(bodies.numbers)), ("members", len(bodies.spheres))):
             if needed > getattr(self.capacity, name):
                 raise ValueError(f"{needed} {name} do not fit into a batch of {getattr(self.capacity, name)}")
-        cell = 2.0 * float(bodies.numbers[:, 4].max()) + numerics.skin
-        sleep_speed = numerics.sleep_speed if any(scene.gravity) else 0.0
-        settings = [dt, numerics.skin, cell, sleep_speed, numerics.sleep_time]
-        inside = rig.container(0.0)
-        settings += [rig.domain_half_width, inside.height, inside.radius, *scene.gravity]
-        loading.load_world(s, w, np.array(settings))
+        settings = settings_of(scene, bodies, dt)
+        loading.load_world(s, w, np.array([settings[name] for name in SETTINGS]))
         loading.load_bodies(s, w, bodies.numbers, bodies.places, bodies.spheres, bodies.owner)
-        self._load_walls(w, scene, wall_tables(rig.surfaces()), active)
+        self._load_walls(w, scene, wall_tables(scene.rig.surfaces()), active)
         self._scenes[w] = scene
         self.set_law(w, law_table(scene))
         self.set_effects(w, scene)

@@ -25,10 +25,12 @@ THIRD_PARTY_HOMES = {
 
 # The rest of doe is statistics and must stay testable without Taichi.
 DOE_PARTS_THAT_MAY_USE_THE_SOLVER = {
+    "doe/store.py": "keeps raw pours, and reads observables off them",
     "doe/runner.py": "turns a row of a design into a batch of simulated worlds",
     "doe/factors.py": "checks a factor's path and range against the declared parameters",
     "doe/study.py": "reads a study file: its material, rig and insertion make a scene",
     "doe/measurement/": "a condition is a scene, and data and runs are read by the same functions",
+    "doe/validation/": "laboratories that pour what the diagnosis is then asked about",
     "doe/diagnose/declare.py": "turns declared parameters and effects into those of the decision",
     "doe/diagnose/simulation/pours.py": "turns a point of a plan into a simulated world",
     "doe/diagnose/follow_up/menu.py": "set-ups that a rig can do",
@@ -39,7 +41,11 @@ DOE_PARTS_THAT_MAY_USE_THE_SOLVER = {
 DIAGNOSIS_ROOMS = ("simulation", "emulation", "fitting", "decision", "follow_up")
 
 TI_INIT_HOME = "solver/backend.py"
-MAX_LINES = 400
+MAX_LINES = 600
+"""A file answers one question, usually in 100 to 500 lines."""
+FEW_LINES, MOST_PIECES = 100, 65
+"""Shorter files that only one file of their folder imports: each has to be a method, a plug-in or a process of its own,
+or else a part of that neighbour. There may be fewer of them than today, never more."""
 # Names that say nothing about what is inside.
 EMPTY_NAMES = {"util", "utils", "helper", "helpers", "manager", "managers"}
 
@@ -195,9 +201,35 @@ def diagnosis_flows_one_way(source: Source) -> list[str]:
     return [f"{source.path}: {parts[2]} comes before {room}" for room in later if room in used]
 
 
+def no_truth_within_reach_of_the_diagnosis(source: Source) -> list[str]:
+    if not source.path.startswith("doe/diagnose/"):
+        return []
+    used = {one.module for one in imports(source) if one.module.startswith("doe.validation")}
+    return [f"{source.path}: the diagnosis may not import {module}, which knows the truths" for module in sorted(used)]
+
+
 def files_stay_short(source: Source) -> list[str]:
     lines = len(source.text.splitlines())
     return [f"{source.path}: {lines} lines, more than {MAX_LINES}; split by concept"] if lines > MAX_LINES else []
+
+
+def pieces_of_a_neighbour(sources: list[Source]) -> list[str]:
+    """Short files whose only importer is a file beside them; what a package lists in its `__init__` is a plug-in."""
+    files = {source.path.removesuffix(".py").replace("/", "."): source for source in sources}
+    importers: dict[str, set[str]] = {module: set() for module in files}
+    for source in sources:
+        for one in imports(source):
+            for module in {one.module, *(f"{one.module}.{name}" for name in one.names)} & files.keys():
+                if files[module] is not source:
+                    importers[module].add(source.path)
+    return sorted(
+        f"{files[module].path}: a piece of {next(iter(users))}"
+        for module, users in importers.items()
+        if len(users) == 1
+        and len(files[module].text.splitlines()) < FEW_LINES
+        and Path(next(iter(users))).parent == Path(files[module].path).parent
+        and Path(next(iter(users))).name != "__init__.py"
+    )
 
 
 def names_say_something(source: Source) -> list[str]:
@@ -214,6 +246,7 @@ PACKAGE_RULES: tuple[Rule, ...] = (
     no_future_annotations_beside_taichi,
     doe_uses_public_solver_names,
     diagnosis_flows_one_way,
+    no_truth_within_reach_of_the_diagnosis,
 )
 EVERYWHERE_RULES: tuple[Rule, ...] = (files_stay_short, names_say_something)
 
@@ -250,6 +283,7 @@ VIOLATIONS: tuple[tuple[Rule, str, str], ...] = (
     (doe_uses_public_solver_names, "doe/runner.py", "import solver"),
     (doe_uses_public_solver_names, "doe/runner.py", "from solver import _not_a_public_name"),
     (diagnosis_flows_one_way, "doe/diagnose/emulation/tails.py", "from doe.diagnose.decision.verdict import Residual"),
+    (no_truth_within_reach_of_the_diagnosis, "doe/diagnose/diagnosis.py", "from doe.validation.truth import Truth"),
     (files_stay_short, "doe/anova.py", "x = 1\n" * (MAX_LINES + 1)),
     (names_say_something, "solver/utils.py", ""),
     (names_say_something, "tests/doe/helpers.py", ""),
@@ -273,6 +307,7 @@ ALLOWED: tuple[tuple[Rule, str, str], ...] = (
     ),
     (doe_uses_public_solver_names, "explorer/session.py", "from solver.world import World"),
     (diagnosis_flows_one_way, "doe/diagnose/decision/gates.py", "from doe.diagnose.fitting.calibrate import Fit"),
+    (no_truth_within_reach_of_the_diagnosis, "explorer/diagnosis/run.py", "from doe.validation.truth import Truth"),
     (files_stay_short, "doe/anova.py", "x = 1\n" * MAX_LINES),
     (names_say_something, "solver/shape.py", ""),
 )
@@ -286,6 +321,28 @@ def test_packages_keep_the_rule(rule):
 @pytest.mark.parametrize("rule", EVERYWHERE_RULES, ids=lambda rule: rule.__name__)
 def test_all_files_keep_the_rule(rule):
     assert [line for source in repository_sources(*PACKAGES, "tests") for line in rule(source)] == []
+
+
+def test_no_more_files_are_pieces_of_their_only_neighbour():
+    found = pieces_of_a_neighbour(repository_sources(*PACKAGES))
+    assert len(found) == MOST_PIECES, f"now {len(found)}; fewer: write that number down here; more:\n" + "\n".join(
+        found
+    )
+
+
+def test_a_piece_of_a_neighbour_is_found_and_a_plug_in_is_not():
+    sources = [
+        Source("doe/fit.py", "from doe.fit_text import line"),
+        Source("doe/fit_text.py", "line = 1"),
+        Source("doe/shared.py", "x = 1"),
+        Source("doe/one.py", "from doe import shared"),
+        Source("doe/two.py", "import doe.shared"),
+        Source("doe/designs/__init__.py", "from doe.designs import box_behnken"),
+        Source("doe/designs/box_behnken.py", "x = 1"),
+        Source("doe/method.py", "x = 1\n" * FEW_LINES),
+        Source("doe/caller.py", "from doe.method import x"),
+    ]
+    assert pieces_of_a_neighbour(sources) == ["doe/fit_text.py: a piece of doe/fit.py"]
 
 
 def test_tests_start_taichi_only_through_the_backend():

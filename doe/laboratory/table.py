@@ -1,18 +1,19 @@
 """A laboratory's CSV file → rows in SI, with one clear line for whatever is wrong.
 
-First the names of the columns, then one row per reading. ``#`` starts a comment: a reading behind it is left out and
-stays visible. Rows are counted as a spreadsheet does, the first line of the file being row 1.
+First the names of the columns, then one row per reading; cells and numbers as `doe.csv_table` reads them. ``#`` starts
+a comment: a reading behind it is left out and stays visible. Rows are counted as a spreadsheet does, the first line of
+the file being row 1.
 """
 
 from __future__ import annotations
 
-import csv
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from doe.csv_table import csv_table
 from doe.laboratory.columns import Column, Layout
 from doe.text_file import read_text
 
@@ -58,38 +59,31 @@ class Table:
 
 def read_table(path: Path, layout: Layout) -> Table:
     """The readings in ``path``; LaboratoryError in one line naming file, row and column."""
-    lines = _numbered_cells(path)
-    try:
-        line, header = next(lines)
-    except StopIteration:
-        raise LaboratoryError(f"{path}: no rows; allowed: {_columns_text(layout)}, and readings below") from None
+    text = read_text(path, MOST_BYTES, LaboratoryError)
+    found = csv_table(text, lambda row, what: LaboratoryError(f"{path}, row {row}: {what}"), trailing_comments=True)
+    if not found.rows:
+        raise LaboratoryError(f"{path}: no rows; allowed: {_columns_text(layout)}, and readings below")
+    (line, header), *readings = found.rows
     columns = _columns(f"{path}, row {line}", header, layout)
-    rows = tuple(_row(path, number, header, cells, columns, layout) for number, cells in lines)
+    rows = []
+    for line, cells in readings:
+        where = f"{path}, row {line}"
+        if len(cells) != len(header):
+            raise LaboratoryError(
+                f"{where}: {len(cells)} cells; allowed: {len(header)}, one per column (between commas, decimals with a "
+                "point)"
+            )
+        rows.append(_row(where, line, dict(zip(header, cells, strict=True)), columns, layout, found.number))
     if not rows:
         raise LaboratoryError(f"{path}: no readings below the names of the columns")
-    table = Table(str(path), rows)
+    table = Table(str(path), tuple(rows))
     if not layout.curves:
         _check_single(table)
     return table
 
 
-def _numbered_cells(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """Rows that are neither empty nor a comment, with their numbers."""
-    text = read_text(path, MOST_BYTES, LaboratoryError)
-    for number, line in enumerate(text.splitlines(), start=1):
-        bare = line.partition("#")[0].strip()
-        if not bare.strip(","):
-            continue
-        try:
-            yield number, [cell.strip() for cell in next(csv.reader([bare], strict=True))]
-        except csv.Error as error:
-            raise LaboratoryError(f"{path}, row {number}: {error}; allowed: cells between commas") from None
-
-
 def _columns(where: str, header: list[str], layout: Layout) -> dict[str, Column]:
     """Columns of numbers by their name in the file."""
-    if len(header) == 1 and (";" in header[0] or "\t" in header[0]):
-        raise LaboratoryError(f"{where}: cells between ; or tabs; allowed: cells between commas, decimals with a point")
     twice = next((name for name in header if header.count(name) > 1), None)
     if twice is not None:
         raise LaboratoryError(f"{where}, column {twice}: stands twice; allowed: once")
@@ -126,29 +120,27 @@ def _columns_text(layout: Layout) -> str:
     return ",".join([*layout.keys, REPLICATE, *numbers])
 
 
-def _row(path: Path, line: int, header: list[str], cells: list[str], columns: dict[str, Column], layout: Layout) -> Row:
-    where = f"{path}, row {line}"
-    if len(cells) != len(header):
-        raise LaboratoryError(
-            f"{where}: {len(cells)} cells; allowed: {len(header)}, one per column, decimals with a point"
-        )
-    by_name = dict(zip(header, cells, strict=True))
+def _row(
+    where: str,
+    line: int,
+    cells: dict[str, str],
+    columns: dict[str, Column],
+    layout: Layout,
+    number: Callable[[str], float],
+) -> Row:
     for key in (*layout.keys, REPLICATE):
-        if not NAME.fullmatch(by_name[key]):
-            raise LaboratoryError(f"{where}, column {key}: {by_name[key]!r}; allowed: letters, digits, _ and -")
+        if not NAME.fullmatch(cells[key]):
+            raise LaboratoryError(f"{where}, column {key}: {cells[key]!r}; allowed: letters, digits, _ and -")
     values = {
-        column.stem: _number(where, name, by_name[name], column)
+        column.stem: _value(where, name, cells[name], column, number)
         for name, column in columns.items()
-        if by_name[name] or not column.blank
+        if cells[name] or not column.blank
     }
-    return Row(line, tuple(by_name[key] for key in layout.keys), by_name[REPLICATE], values)
+    return Row(line, tuple(cells[key] for key in layout.keys), cells[REPLICATE], values)
 
 
-def _number(where: str, name: str, text: str, column: Column) -> float:
-    try:
-        value = float(text) * column.factor(name)
-    except ValueError:
-        value = math.nan
+def _value(where: str, name: str, text: str, column: Column, number: Callable[[str], float]) -> float:
+    value = number(text) * column.factor(name)
     if not (math.isfinite(value) and column.allowed(value)):
         raise LaboratoryError(f"{where}, column {name}: {text!r}; allowed: {column.range_text(name)}")
     return value

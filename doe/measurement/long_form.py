@@ -1,20 +1,20 @@
 """A condition's table in long form: replicate,observable,x,value[,unit] → one array per observable.
 
-``#`` starts a comment. Numbers are SI, angles degrees, unless a column ``unit`` names another unit of the value. A
-scalar has an empty x, a curve a place. Missing rows are missing data (NaN).
+Cells and numbers as `doe.csv_table` reads them; ``#`` starts a comment. Numbers are SI, angles degrees, unless a column
+``unit`` names another unit of the value. A scalar has an empty x, a curve a place. Missing rows are missing data (NaN).
 """
 
 from __future__ import annotations
 
-import csv
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
+from doe.csv_table import csv_table
 from doe.errors import MeasurementError
 from doe.text_file import read_text
 from solver import ParameterError, all_names, named, parse_quantity
@@ -49,9 +49,8 @@ class LongForm:
 
 def read_long_form(path: Path) -> LongForm:
     """The table in ``path``; MeasurementError in one line naming file, line and what is allowed."""
-    lines = read_text(path, MOST_BYTES, MeasurementError).splitlines()
     rows, unknown = [], set()
-    for row in _rows(path, lines):
+    for row in _rows(path):
         if isinstance(row, str):
             unknown.add(row)
         else:
@@ -71,27 +70,24 @@ def read_long_form(path: Path) -> LongForm:
     return LongForm(replicates, values, tuple(sorted(unknown)))
 
 
-def _rows(path: Path, lines: list[str]) -> Iterator[Row | str]:
+def _rows(path: Path) -> Iterator[Row | str]:
     """Rows in order; of a row with an unknown observable its name."""
-    header: list[str] | None = None
-    for line, text in enumerate(lines, start=1):
-        bare = text.partition("#")[0].strip()
-        if not bare:
-            continue
-        cells = [cell.strip() for cell in next(csv.reader([bare]))]
-        if header is None:
-            header = cells
-            if header not in (COLUMNS, [*COLUMNS, "unit"]):
-                raise MeasurementError(
-                    f"{path}:{line}: columns {','.join(header)}; allowed: {','.join(COLUMNS)}, and unit after them"
-                )
-            continue
+    text = read_text(path, MOST_BYTES, MeasurementError)
+    table = csv_table(text, lambda line, what: MeasurementError(f"{path}:{line}: {what}"), trailing_comments=True)
+    if not table.rows:
+        return
+    (line, header), *rows = table.rows
+    if header not in (COLUMNS, [*COLUMNS, "unit"]):
+        raise MeasurementError(
+            f"{path}:{line}: columns {','.join(header)}; allowed: {','.join(COLUMNS)}, and unit after them"
+        )
+    for line, cells in rows:
         if len(cells) != len(header):
             raise MeasurementError(f"{path}:{line}: {len(cells)} cells; allowed: {len(header)}, one per column")
-        yield _row(f"{path}:{line}", line, dict(zip(header, cells, strict=True)))
+        yield _row(f"{path}:{line}", line, dict(zip(header, cells, strict=True)), table.number)
 
 
-def _row(where: str, line: int, cells: dict[str, str]) -> Row | str:
+def _row(where: str, line: int, cells: dict[str, str], number: Callable[[str], float]) -> Row | str:
     name = cells["observable"]
     known = named(name)
     if known is None:
@@ -102,28 +98,25 @@ def _row(where: str, line: int, cells: dict[str, str]) -> Row | str:
     if (known.x_unit is None) != (cells["x"] == ""):
         kind = "an empty x (it is a scalar)" if known.x_unit is None else f"a place x in {known.x_unit} (it is a curve)"
         raise MeasurementError(f"{where}: {name}: x is {cells['x']!r}; allowed: {kind}")
-    x = None if known.x_unit is None else _number(where, "x", cells["x"], known.x_unit)
-    return Row(line, int(cells["replicate"]), name, x, _value(where, cells, known.unit))
+    x = None if known.x_unit is None else _finite(where, "x", cells["x"], known.x_unit, number)
+    return Row(line, int(cells["replicate"]), name, x, _value(where, cells, known.unit, number))
 
 
-def _value(where: str, cells: dict[str, str], unit: str) -> float:
-    number = _number(where, "value", cells["value"], unit)
+def _value(where: str, cells: dict[str, str], unit: str, number: Callable[[str], float]) -> float:
+    value = _finite(where, "value", cells["value"], unit, number)
     if cells.get("unit", unit) in (unit, ""):
-        return number
+        return value
     try:
-        return number * parse_quantity(f"1{cells['unit']}", unit, "unit")
+        return value * parse_quantity(f"1{cells['unit']}", unit, "unit")
     except ParameterError as error:
         raise MeasurementError(f"{where}: {error}") from None
 
 
-def _number(where: str, column: str, text: str, unit: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
+def _finite(where: str, column: str, text: str, unit: str, number: Callable[[str], float]) -> float:
+    value = number(text)
+    if math.isnan(value):
         raise MeasurementError(f"{where}: {column}: {text!r}; allowed: a finite number in {unit}")
-    return number
+    return value
 
 
 def _refuse_wrong_unit(where: str, name: str) -> None:

@@ -16,6 +16,7 @@ from scipy import stats
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.summaries import ASYMMETRY, summaries, summaries_of_data, summary_uncertainties
 from doe.record import Record
+from solver import EFFECTS, Telltale
 
 DISCHARGE = ("discharge_", "discharged_mass_kg", "residual_mass_kg")
 STRAYS = ("stray_fraction", "footprint_r90_m", "left_domain_fraction")
@@ -25,26 +26,15 @@ SHAPE = ("angle_of_repose", "footprint_", "slope_", "dynamic_angle_deg", "draw_d
 FLOWING = ("surface_profile_m", "slope_", "dynamic_angle_deg")
 """Read off a bed in motion."""
 FLOW = (*DISCHARGE, *STRAYS, *FLOWING)
-DENSITY = ("solid_fraction", "bulk_density", *HEIGHT, *DISCHARGE)
+PACKING = ("solid_fraction", "bulk_density", *HEIGHT, *DISCHARGE)
 
-TELLTALES: dict[str, tuple[str, ...]] = {
-    "rolling_resistance": SHAPE,
-    "twisting": SHAPE,
-    "adhesion_jkr": SHAPE,
-    "adhesion_sjkr": SHAPE,
-    "capillary_bridge": SHAPE,
-    "wall_adhesion": SHAPE,
-    "plastic_contact": SHAPE,
-    "air_drag": FLOW,
-    "kinetic_friction": FLOW,
-    "velocity_dependent_restitution": FLOW,
-    "plate_tilt": ASYMMETRIC,
-    "funnel_offset": ASYMMETRIC,
-    "size_dispersion": DENSITY,
-    "shape_elongation": DENSITY,
-    "density_error": DENSITY,
+TELLTALES: dict[Telltale, tuple[str, ...]] = {
+    Telltale.SHAPE: SHAPE,
+    Telltale.FLOW: FLOW,
+    Telltale.ASYMMETRY: ASYMMETRIC,
+    Telltale.PACKING: PACKING,
 }
-"""Effect → beginnings of the names of summaries that could reveal it; without any of them it stays unseen."""
+"""Class of observables → beginnings of the names of the summaries that belong to it."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +100,9 @@ def reach_of(measurement: Measurement) -> Reach:
         has_discharge=_any(fitted, DISCHARGE),
         has_asymmetry=_any(fitted, ASYMMETRIC),
         has_holdout=bool(measurement.holdout),
-        hidden_effects=tuple(effect for effect, telltales in TELLTALES.items() if not _any(fitted, telltales)),
+        hidden_effects=tuple(
+            name for name, kind in EFFECTS.items() if not any(_any(fitted, TELLTALES[one]) for one in kind.telltales)
+        ),
         warnings=(),
     )
     return Reach(**{**vars(reach), "warnings": _warnings(reach)})

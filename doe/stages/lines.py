@@ -35,7 +35,7 @@ def screening_line(result: ScreeningResult) -> str:
         text += f"; smallest effect seen, all factors at once, {size}"
     lost = result.no_pile_analysis.significant() if result.no_pile_analysis is not None else ()
     if lost:
-        text += f"; the share without a pile depends on {', '.join(lost)}"
+        text += f"; the share of valid pours depends on {', '.join(lost)}"
     if result.not_testable:
         text += f"; not testable: {', '.join(entry.factor for entry in result.not_testable)}"
     if result.selected:
@@ -65,7 +65,7 @@ def surface_line(result: SurfaceResult) -> str:
 def optimum_line(result: OptimumResult) -> str:
     """One line of what the optimum is."""
     values = ", ".join(f"{path} = {value:.4g}" for path, value in result.values.items())
-    return f"{values}. {result.single.statement}"
+    return f"{'chosen by rule: ' if result.single.unidentified else ''}{values}. {result.single.statement}"
 
 
 def verification_line(result: VerificationResult) -> str:

@@ -6,17 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from doe.errors import StatisticsError
-from doe.pilot import EqualVariance, Noise, Resolution, equal_variance, replicate_noise, resolution
+from doe.pilot import BIAS_LIMIT_DEG, EqualVariance, Noise, Resolution, equal_variance, replicate_noise, resolution
 from doe.profile import Profile
 from doe.record import Record
 from doe.runner import FloatArray, Run, Runner, Setting, responses
 from doe.separation import EstimatorChoice, choose_estimator
-from doe.stages.sizing import StageSize, sized
+from doe.stages.sizing import SCREENING_ROWS, StageSize, sized
 from doe.study import Study
 from doe.target import is_angle
-
-BIAS_LIMIT_DEG = 5.0
-"""An estimator that misses the angle of made-up piles by more, however they are filled, is not taken."""
 
 Bias = dict[str, tuple[tuple[float, float], ...]]
 """Estimator → its error [°] on piles of known angle, (mean, standard error) for each way to fill a cone with bodies."""
@@ -68,7 +65,9 @@ def pilot(study: Study, profile: Profile, runner: Runner, bias: Bias) -> PilotRe
         choice=choice,
         profile=after,
         sizes=sizes,
-        resolutions=tuple(resolution(noise[target].sigma, n, factors=len(study.factors)) for n in (1, 2, 3, 5, 10, 20)),
+        resolutions=tuple(
+            resolution(noise[target].sigma, n, SCREENING_ROWS, len(study.factors)) for n in (1, 2, 3, 5, 10, 20)
+        ),
         notes=tuple(notes),
     )
 

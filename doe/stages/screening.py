@@ -145,7 +145,9 @@ def analysed(
         if not spare:
             raise
         found = analyse_screening(design, names, values, [*dummies, *spare])
-        note = f"Too many rows gave no pile; {', '.join(spare)} (not testable) were given up to analyse the others."
+        note = (
+            f"Too many rows have no valid pour; {', '.join(spare)} (not testable) were given up to analyse the others."
+        )
         return dataclasses.replace(found, notes=(*found.notes, note))
 
 

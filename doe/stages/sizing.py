@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 from doe.designs import box_behnken
 from doe.power import (
+    FloatArray,
     replicates_for_difference,
     replicates_for_linear_effect,
     replicates_for_main_effect,
@@ -23,9 +24,9 @@ from doe.power import (
 )
 from doe.profile import Profile
 from doe.record import Record
-from doe.study import CALIBRATED, Study
+from doe.study import CALIBRATED, COLUMNS, Study
 
-SCREENING_ROWS = 28
+SCREENING_ROWS = COLUMNS + 1
 ASSUMPTION_ROWS = 12
 CENTRE_RUNS = 5
 """Centre points of the Box–Behnken design."""
@@ -64,6 +65,24 @@ class _Rule:
     resolved: Callable[[float, int], float]
 
 
+def surface_design(factors: int = CALIBRATED) -> FloatArray:
+    """Coded points of the Box–Behnken design of the response surface, shape (points, factors)."""
+    return box_behnken(factors, centre=CENTRE_RUNS).astype(float)
+
+
+def planned_runs(study: Study, profile: Profile) -> dict[str, int]:
+    """Valid runs that each stage will make, replacements of failed runs not counted."""
+    return {
+        "pilot": profile.pilot_runs + profile.change_runs * len(study.changes),
+        "screening": SCREENING_ROWS * profile.screening_replicates,
+        "assumptions": ASSUMPTION_ROWS * profile.assumption_replicates if study.assumptions else 0,
+        "scan": len(study.scan_values) * profile.scan_replicates,
+        "ascent": profile.ascent_steps * profile.ascent_replicates,
+        "surface": len(surface_design()) * profile.surface_replicates,
+        "verification": profile.verification_runs,
+    }
+
+
 def sized(
     study: Study, profile: Profile, screening_sigma: float, target_sigma: float
 ) -> tuple[Profile, tuple[StageSize, ...]]:
@@ -86,7 +105,7 @@ def sized(
 
 
 def _rules(study: Study, screening_sigma: float, target_sigma: float) -> list[_Rule]:
-    edge = box_behnken(CALIBRATED, centre=CENTRE_RUNS).astype(float)
+    edge = surface_design()
     screening = _two_level("screening", "screening_replicates", screening_sigma, SCREENING_ROWS, len(study.factors))
     rules = [screening]
     if study.assumptions:

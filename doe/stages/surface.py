@@ -10,13 +10,12 @@ import numpy as np
 from doe.ascent import Region
 from doe.canonical import Canonical, canonical_analysis
 from doe.compromise import Compromise, find_compromise
-from doe.designs import box_behnken
 from doe.optimum import Optimum, find_optimum
 from doe.power import smallest_effect
 from doe.profile import Profile
 from doe.record import Record
 from doe.runner import FloatArray, Run, Runner, Setting, no_pile_shares, responses
-from doe.stages.sizing import CENTRE_RUNS
+from doe.stages.sizing import surface_design
 from doe.study import Factor, Study
 from doe.surface import Surface, fit_surface
 from doe.surface_anova import SurfaceAnova, analyse_surface
@@ -53,8 +52,8 @@ class OptimumResult(Record):
 def surface(
     study: Study, profile: Profile, runner: Runner, factors: tuple[Factor, ...], region: Region
 ) -> SurfaceResult:
-    """Run the 12 edge points and 5 centre points around the bracket and fit the model of each target."""
-    design = box_behnken(len(factors), centre=CENTRE_RUNS).astype(float)
+    """Run the edge points and centre points around the bracket and fit the model of each target."""
+    design = surface_design(len(factors))
     natural = region.natural(design)
     settings = [
         Setting(

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from doe.audit import Printed, printed, printed_or_none
+from doe.csv_table import csv_table
 from doe.errors import AuditError
 from doe.text_file import read_text
 
@@ -69,25 +68,19 @@ def read_table(folder: Path, name: str) -> Table:
         raise AuditError(f"{name!r} is not the name of a file beside study.toml")
     path = folder / name
     text = read_text(path, MOST_BYTES, AuditError)
-    try:
-        rows = [(number, row) for number, row in _lines(text) if any(cell.strip() for cell in row)]
-    except csv.Error as error:
-        raise AuditError(f"{path}: {error}") from None
-    if len(rows) < 2:
+    table = csv_table(text, lambda line, what: AuditError(f"{path}, line {line}: {what}"))
+    if len(table.rows) < 2:
         raise AuditError(f"{path}: a line of column names and at least one row are needed")
-    header = [cell.strip() for cell in rows[0][1]]
+    (_, header), *rows = table.rows
     if len(set(header)) < len(header) or "" in header:
         raise AuditError(f"{path}: column names must be there and differ: {', '.join(header)}")
-    for number, row in rows[1:]:
+    for number, row in rows:
         if len(row) != len(header):
             raise AuditError(f"{path}, line {number}: {len(row)} cells; the table has {len(header)} columns")
-    cells = zip(*(row for _, row in rows[1:]), strict=True)
-    columns = {title: tuple(cell.strip() for cell in column) for title, column in zip(header, cells, strict=True)}
-    return Table(name, columns, tuple(number for number, _ in rows[1:]))
-
-
-def _lines(text: str) -> list[tuple[int, list[str]]]:
-    """Line number and cells; lines that begin with # are remarks."""
-    kept = [(number, line) for number, line in enumerate(text.splitlines(), 1) if not line.lstrip().startswith("#")]
-    reader = csv.reader(io.StringIO("\n".join(line for _, line in kept)), strict=True)
-    return [(kept[min(reader.line_num, len(kept)) - 1][0], row) for row in reader]
+    # Numbers as printed, but with a point: everything behind reads their digits. Words keep their commas.
+    cells = zip(
+        *([plain if printed_or_none(plain := table.plain(cell)) else cell for cell in row] for _, row in rows),
+        strict=True,
+    )
+    columns = dict(zip(header, cells, strict=True))
+    return Table(name, columns, tuple(number for number, _ in rows))

@@ -21,7 +21,7 @@ def calibrate(
     store: Path | None = typer.Option(None, help="SQLite file that keeps every run."),
     record: Path | None = typer.Option(None, help="Folder for .rrd recordings of the verification pours."),
     threads: int | None = typer.Option(None, min=1, help="CPU threads; all if not given."),
-    tries: int = typer.Option(3, min=1, max=20, help="Seeds tried for one replicate that gives no pile."),
+    tries: int = typer.Option(3, min=1, max=20, help="Seeds tried for one replicate that gives no valid pour."),
     fail_above: float | None = typer.Option(None, min=0.0, help="Exit with 3 above this relative error in percent."),
 ) -> None:
     """Calibrate a material: pilot, screening, ascent, response surface, optimum, verification, report."""

@@ -30,10 +30,13 @@ def new(
 ) -> None:
     """Write a commented file that runs as it is.
 
-    NAME.toml for a material, NAME_study.toml for a study (and NAME.toml beside it, where that is missing).
+    NAME.toml for a material, NAME_study.toml for a study (and NAME.toml beside it, where that is missing; a NAME
+    that ends in _study means the same). Files that are there are never overwritten.
     """
+    import shlex
+
     from explorer.errors import CommandError
-    from explorer.scene.starter_files import write_material, write_study
+    from explorer.scene.starter_files import STUDY_ENDING, write_material, write_study
 
     if kind == Kind.MATERIAL and material is not None:
         raise CommandError("--material: belongs to `new study`")
@@ -47,4 +50,9 @@ def new(
         written = [write_material(out, name)] if kind == Kind.MATERIAL else write_study(out, name, material)
     for path in written:
         typer.echo(f"wrote {path}")
-    typer.echo(f"try it: explorer simulate {written[-1]}")
+    file = str(written[-1])
+    command = ["simulate", file]
+    if kind == Kind.STUDY:
+        results = Path("results") / written[-1].stem.removesuffix(STUDY_ENDING)
+        command = ["calibrate", "--headless", "--study", file, "--profile", "quick", "--out", str(results)]
+    typer.echo(f"try it: explorer {shlex.join(command)}")

@@ -13,20 +13,32 @@ def runs(
     study: str | None = typer.Option(None, help="Only the runs of this study."),
     store: Path | None = typer.Option(None, help="SQLite file that keeps the runs."),
 ) -> None:
-    """List or export the stored runs."""
-    from doe.store import Store, default_store, write_csv
+    """List or export the stored runs, with the readings of this version of the program."""
+    from doe.store import Store, StoreError, default_store, observables_in_rig, observables_of, write_csv
     from explorer.errors import CommandError
     from explorer.tables.text_table import text_table
 
     path = store or default_store()
+    # A store of another version of the physics has another name there.
+    others = sorted(set(path.parent.glob("*.sqlite")) - {path}) if store is None else []
     if not path.is_file():
-        raise CommandError(f"{path}: no store of runs there yet; `explorer calibrate --headless` makes one")
-    kept = Store(path)
+        beside = f"; other stores there: {', '.join(other.name for other in others)}" if others else ""
+        raise CommandError(f"{path}: no store of runs there yet; `explorer calibrate --headless` makes one{beside}")
+    kept = Store(path, pouring=False)
     if csv:
-        write_csv(kept.runs(study), sys.stdout)
+        # All of them first: what is read anew is written back.
+        write_csv(
+            [kept.read(run, observables_in_rig(run), observables_of) for run in list(kept.runs(study))], sys.stdout
+        )
         return
+    typer.echo(f"{path}: {kept.version}")
     counted: dict[tuple[str, str, str], int] = {}
     for run in kept.runs(study):
         counted[run.study, run.stage, run.outcome] = counted.get((run.study, run.stage, run.outcome), 0) + 1
     rows = [[*key, str(number)] for key, number in counted.items()]
     typer.echo(text_table(["study", "stage", "outcome", "runs"], rows))
+    for other in others:
+        try:
+            typer.echo(f"{other.name}: {Store(other, pouring=False).version}; `--store {other}` lists it")
+        except StoreError as error:
+            typer.echo(f"note: {error}", err=True)

@@ -16,7 +16,9 @@ def serve(
     seed: int = typer.Option(1, min=0, help="Seed of the first pour."),
     store: Path | None = typer.Option(None, help="SQLite file that keeps the runs of the page's calibration."),
     record: Path | None = typer.Option(
-        None, metavar="FILE.rrd", help="Record the session: the first pour here, the k-th in FILE_k.rrd."
+        None,
+        metavar="FILE.rrd",
+        help="Record the session: the first pour here, the k-th in FILE_k.rrd. Ctrl-C names them.",
     ),
     replay: Path | None = typer.Option(None, metavar="FILE.rrd", help="Play a recording on the page instead."),
 ) -> None:

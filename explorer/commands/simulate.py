@@ -64,6 +64,7 @@ def simulate(
         raise CommandError(f"--checkpoint: {checkpoint}: no folder {checkpoint.absolute().parent}")
     if record:
         from explorer.logs.pour_recorder import recorder_of
+        from explorer.logs.recording import recorded_lines
     scene = with_settings(load_scene(source, material), set_)
     if scene.rig.name in BENCH_RIGS:
         if record or checkpoint or resume or replicates > 1:
@@ -81,7 +82,12 @@ def simulate(
     started = perf_counter()
     with ExitStack() as stack:
         folder = stack.enter_context(appearing(out)) if out else None
-        recorder = stack.enter_context(recorder_of(record, seeds)) if record else None
+        recorder = recorder_of(record, seeds) if record else None
+        if recorder:
+            if not json:
+                # Also after Ctrl-C: it is called once the files are closed.
+                stack.callback(lambda: typer.echo("\n".join(recorded_lines(recorder.pours))))
+            stack.enter_context(recorder)
         table = None if json else RunTable(typer.echo)
         records: dict[int, Record] = {}
         kept = CheckpointWriter(checkpoint, CHECKPOINT_INTERVAL) if checkpoint else None

@@ -6,9 +6,6 @@ from pathlib import Path
 
 import typer
 
-CAMPAIGN = "tests.blind.campaign"
-"""The laboratories belong to the tests, so that nothing of a truth is within reach of the diagnosis."""
-
 
 def validate_diagnosis(
     n: int = typer.Option(327, "--n", min=1, help="Data sets; 327 are three rounds of all cases."),
@@ -19,19 +16,11 @@ def validate_diagnosis(
     store: Path | None = typer.Option(None, help="SQLite file that keeps every pour."),
     threads: int | None = typer.Option(None, min=1, help="Worker processes; one per core if not given."),
 ) -> None:
-    """Diagnose made-up data with known truths and print how often the answer is right. Needs the source checkout."""
-    import importlib
+    """Diagnose made-up data with known truths and print how often the answer is right."""
     import math
-    import sys
 
-    from explorer.errors import CommandError
+    from doe.validation.campaign import CampaignOrder, run_campaign
+    from explorer.tables.validation import campaign_text
 
-    root = Path(__file__).parents[2]
-    if not root.joinpath(*CAMPAIGN.split(".")).with_suffix(".py").is_file():
-        raise CommandError(f"validate-diagnosis: {root} has no tests/blind; run it from a source checkout")
-    # Worker processes take this path over.
-    if str(root) not in sys.path:
-        sys.path.insert(0, str(root))
-    campaign = importlib.import_module(CAMPAIGN)
-    order = campaign.CampaignOrder(out, n, store, minutes if minutes is not None else math.inf, threads)
-    typer.echo(campaign.campaign_text(campaign.run_campaign(order, typer.echo)))
+    order = CampaignOrder(out, n, store, minutes if minutes is not None else math.inf, threads)
+    typer.echo(campaign_text(run_campaign(order, typer.echo)))

@@ -6,7 +6,7 @@ from explorer.report.content import Facts, Table
 from explorer.report.design.effects import curvature, effect_table
 from explorer.report.design.model import diagnostics, fit_summary
 from explorer.report.design.sections import factor_table, in_short
-from explorer.report.design.target import shape, target
+from explorer.report.design.target import settings_table, shape, target
 from explorer.report.findings import Plain
 from explorer.report.sections.surface import anova_table
 from explorer.tables.text_table import text_table
@@ -28,6 +28,9 @@ def analysis_text(result: Plain) -> str:
             # The answer stands first and again under its own heading in a report; a terminal needs it once.
             parts.append("\n".join(f"{what}: {words}" for what, words in facts if words not in told))
             told |= {words for _, words in facts}
+    if result["optimum"] is not None:
+        found = settings_table(result)
+        parts.append(f"{_table(found)}\n{found.caption}")
     parts += [f"note: {note}" for note in result["notes"]]
     if result["surface"] is not None:
         parts += [f"note: {note}" for note in result["surface"]["anova"][0]["notes"]]

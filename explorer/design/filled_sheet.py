@@ -1,24 +1,23 @@
 """Reading a filled sheet: from this program, from a spreadsheet that saved it, or from any CSV with a factors file.
 
-Comma, semicolon or tab between cells; with the last two also a decimal comma. A cell that cannot be read is named by
-its line in the file (the row of a spreadsheet) and its column.
+Cells and numbers as `doe.csv_table` reads them. A cell that cannot be read is named by its line in the file (the row of
+a spreadsheet) and its column.
 """
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from doe.csv_table import CsvTable, csv_table
 from doe.errors import StudyFileError
 from doe.text_file import read_text
 from explorer.design.factors_file import RESERVED, Factor, make_factor, no_repeats
 from explorer.errors import CommandError
 
-DELIMITERS = (",", ";", "\t")
 MISSING = ("", "NA", "-", "–")
 MOST_BYTES = 10_000_000
 HEADER_CELL = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<unit>[^\]]*)\])?$")
@@ -26,7 +25,10 @@ HEADER_CELL = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<unit>[^\]]*)\])?$")
 
 @dataclass(frozen=True)
 class Sheet:
-    """A sheet as it stands: cells by line, before one response is chosen. ``lines``: their numbers in the file."""
+    """A sheet as it stands: cells by line, before one response is chosen. ``lines``: their numbers in the file.
+
+    ``table``: what it was read from.
+    """
 
     path: Path
     design: str
@@ -35,7 +37,7 @@ class Sheet:
     units: dict[str, str]
     cells: tuple[tuple[str, ...], ...]
     lines: tuple[int, ...]
-    decimal_comma: bool
+    table: CsvTable
 
     @property
     def responses(self) -> list[str]:
@@ -44,15 +46,11 @@ class Sheet:
 
     def number(self, position: int, column: str) -> float:
         """A cell as a number, NaN where it is empty; raises CommandError with line and column."""
-        text = self.cells[position][self.columns[column]].strip()
+        text = self.cells[position][self.columns[column]]
         if text in MISSING:
             return math.nan
-        plain = text.replace(",", ".") if self.decimal_comma else text
-        try:
-            value = float(plain.replace("−", "-"))
-        except ValueError:
-            value = math.inf
-        if "_" in plain or not math.isfinite(value):
+        value = self.table.number(text)
+        if math.isnan(value):
             raise CommandError(
                 f"{self.path}, line {self.lines[position]}, column {column}: {short(text)} is not a number; "
                 "allowed: a number, or an empty cell for a missing run"
@@ -65,15 +63,16 @@ def read_sheet(path: Path, factors: Sequence[Factor] = ()) -> Sheet:
 
     Raises CommandError with one line: file, line, column, what is allowed.
     """
-    design, declared, rest = _comments(path, read_text(path, MOST_BYTES, CommandError))
+    text = read_text(path, MOST_BYTES, CommandError)
+    table = csv_table(text, lambda line, what: CommandError(f"{path}, line {line}: {what}"))
+    design, declared = _declarations(path, table)
     known = tuple(factors) or declared
     if not known:
         raise CommandError(f"{path}: no line '# factor | name | low | high | unit'; allowed: with --factors FILE")
-    if not rest:
+    if not table.rows:
         raise CommandError(f"{path}: no header line with the names of the columns")
-    delimiter = max(DELIMITERS, key=rest[0][1].count)
-    parsed = [(line, _row(path, line, text, delimiter)) for line, text in rest]
-    header = [HEADER_CELL.match(cell.strip()) for cell in parsed[0][1]]
+    (_, names), *runs = table.rows
+    header = [HEADER_CELL.match(name) for name in names]
     titles = [(match["name"], match["unit"] or "") for match in header if match is not None]
     columns = _columns(path, titles)
     units = dict(titles)
@@ -86,34 +85,21 @@ def read_sheet(path: Path, factors: Sequence[Factor] = ()) -> Sheet:
                 "allowed: one unit"
             )
     cells, lines = [], []
-    for line, row in parsed[1:]:
-        if any(cell.strip() for cell in row[len(titles) :]):
+    for line, row in runs:
+        if len(row) > len(titles):
             raise CommandError(f"{path}, line {line}: {len(row)} cells; allowed: {len(titles)} as in the header")
-        if any(cell.strip() for cell in row):
-            cells.append(tuple([*row, *[""] * len(titles)][: len(titles)]))
-            lines.append(line)
+        cells.append((*row, *[""] * (len(titles) - len(row))))
+        lines.append(line)
     if not cells:
         raise CommandError(f"{path}: no line with a run below the header")
-    return Sheet(path, design, known, columns, units, tuple(cells), tuple(lines), delimiter != ",")
+    return Sheet(path, design, known, columns, units, tuple(cells), tuple(lines), table)
 
 
-def _row(path: Path, line: int, text: str, delimiter: str) -> list[str]:
-    try:
-        return next(csv.reader([text], delimiter=delimiter), [])
-    except csv.Error as error:
-        raise CommandError(f"{path}, line {line}: cannot be read as cells: {error}") from None
-
-
-def _comments(path: Path, text: str) -> tuple[str, tuple[Factor, ...], list[tuple[int, str]]]:
-    """Design and factors of the comments, and all other lines with their numbers."""
-    design, factors, rest = "", [], []
-    for line, content in enumerate(text.splitlines(), 1):
-        bare = content.strip().strip('"').rstrip(",;\t\"' ")
-        if not bare.startswith("#"):
-            if content.strip():
-                rest.append((line, content))
-            continue
-        parts = [part.strip() for part in bare.lstrip("# ").split("|")]
+def _declarations(path: Path, table: CsvTable) -> tuple[str, tuple[Factor, ...]]:
+    """The design and the factors that the comments declare."""
+    design, factors = "", []
+    for line, comment in table.comments:
+        parts = [part.strip() for part in comment.lstrip("# ").split("|")]
         if parts[0] == "design" and len(parts) > 1:
             design = parts[1]
         if parts[0] == "factor":
@@ -122,7 +108,7 @@ def _comments(path: Path, text: str) -> tuple[str, tuple[Factor, ...], list[tupl
         no_repeats(tuple(factors), ())
     except StudyFileError as error:
         raise CommandError(f"{path}: {error}") from None
-    return design, tuple(factors), rest
+    return design, tuple(factors)
 
 
 def _declared(path: Path, line: int, parts: list[str]) -> Factor:

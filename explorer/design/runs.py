@@ -120,5 +120,5 @@ def _rows(sheet: Sheet, used: npt.NDArray[np.int64], coded: Array) -> list[list[
 def _label(sheet: Sheet, position: int) -> str:
     """What a run is called: its number in the sheet, else its line."""
     if "run" in sheet.columns:
-        return sheet.cells[position][sheet.columns["run"]].strip()[:20] or f"line {sheet.lines[position]}"
+        return sheet.cells[position][sheet.columns["run"]][:20] or f"line {sheet.lines[position]}"
     return f"line {sheet.lines[position]}"

@@ -29,7 +29,7 @@ from explorer.errors import CommandError
 from explorer.files.run_result import versions
 from explorer.files.whole_file import write_whole
 from explorer.report.diagnosis import write_diagnosis_report
-from solver import EFFECTS, Crew, code_version
+from solver import EFFECTS, Crew
 
 SCHEMA = 1
 
@@ -146,7 +146,7 @@ def result_of(measurement: Measurement, order: DiagnoseOrder, found: Diagnosis, 
             "units": units,
             "pours": {"run": found.pours, "settings": found.settings},
             "timing": {"total_s": total_s},
-            "versions": {**versions(), "solver": code_version()},
+            "versions": versions(),
         }
     )
 

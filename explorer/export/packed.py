@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import io
 import tempfile
-import zipfile
 from pathlib import Path
 
 from explorer.background.printed import printed
+from explorer.files.exports import zipped
 
 
 def packed_export(scene: Path, program: str, seed: int) -> bytes:
@@ -18,8 +17,5 @@ def packed_export(scene: Path, program: str, seed: int) -> bytes:
     with tempfile.TemporaryDirectory() as apart:
         folder = Path(apart) / f"{scene.stem}_{program}"
         printed(["export", str(scene), str(folder), "--to", program, "--seed", str(seed)])
-        file = io.BytesIO()
-        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
-            for path in sorted(one for one in folder.rglob("*") if one.is_file()):
-                archive.write(path, path.relative_to(apart))
-        return file.getvalue()
+        written = sorted(one for one in folder.rglob("*") if one.is_file())
+        return zipped({str(path.relative_to(apart)): path for path in written})

@@ -1,11 +1,14 @@
-"""What a person takes along of the pour on the screen: bodies as a table, their shapes as a mesh, a picture as PNG."""
+"""What a person takes along: bodies as a table, their shapes as a mesh, a picture as PNG, several files as one."""
 
 from __future__ import annotations
 
 import csv
 import io
 import struct
+import zipfile
 import zlib
+from collections.abc import Mapping
+from pathlib import Path
 from typing import cast
 
 import numpy as np
@@ -57,6 +60,15 @@ def bodies_stl(frame: Frame, scene: Scene) -> bytes:
     vertices = np.concatenate(corners).reshape(-1, 3)
     mesh = trimesh.Trimesh(MM * vertices, np.arange(len(vertices)).reshape(-1, 3), process=False)
     return cast(bytes, mesh.export(file_type="stl"))
+
+
+def zipped(files: Mapping[str, Path]) -> bytes:
+    """A .zip archive of ``files``, by their names in it."""
+    archive = io.BytesIO()
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as entries:
+        for name, path in files.items():
+            entries.write(path, name)
+    return archive.getvalue()
 
 
 def png(pixels: npt.NDArray[np.uint8]) -> bytes:

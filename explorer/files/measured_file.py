@@ -1,13 +1,13 @@
 """One measured file as a curve in the picture of a pile: a scan (.npz), the points of an outline (.csv), a photograph.
 
 .npz   xyz (n, 3) [m], radius (n,) [m]: spheres of the bodies on the plate, as in a measured data set
-.csv   a line u_m,z_m, then one point per line: to the right and above the plate [m]; # starts a comment
+.csv   a line u_m,z_m, then one point per line: to the right and above the plate [m]; # starts a comment;
+       cells and numbers as `doe.csv_table` reads them
 .jpg   (.jpeg, .png) a photograph along the plate, read like `explorer measure` does; it needs the length of a pixel
 """
 
 from __future__ import annotations
 
-import csv
 import io
 import zipfile
 from functools import partial
@@ -17,6 +17,7 @@ from tempfile import NamedTemporaryFile
 import numpy as np
 import numpy.typing as npt
 
+from doe.csv_table import CsvTable, csv_table
 from explorer.errors import CommandError
 from explorer.files.measured_curves import MeasuredCurve
 from solver.observables.outline import outline
@@ -101,20 +102,29 @@ def scanned_spheres(content: bytes) -> Spheres:
 
 def _points(name: str, content: bytes) -> MeasuredCurve:
     try:
-        lines = [line for line in content.decode().splitlines() if line.strip() and not line.startswith("#")]
-        head, *rows = csv.reader(lines)
-        points = np.array([[float(entry) for entry in row] for row in rows])
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise CommandError("not a text file in UTF-8") from None
-    except (ValueError, csv.Error) as error:
-        raise CommandError(f"allowed are a line u_m,z_m and numbers below it: {str(error)[:120]}") from None
-    if [entry.strip() for entry in head] != COLUMNS or points.ndim != 2 or points.shape[1] != 2:
-        raise CommandError(f"allowed is a line u_m,z_m and two numbers per line below it, not {','.join(head)[:40]!r}")
+    table = csv_table(text, lambda line, what: CommandError(f"line {line}: {what}"))
+    line, head = table.rows[0] if table.rows else (1, [])
+    if head != COLUMNS:
+        raise CommandError(f"line {line}: {','.join(head)[:40]!r}; allowed is a line u_m,z_m, and points below it")
+    points = np.array([_point(table, line, cells) for line, cells in table.rows[1:]])
     if not 2 <= len(points) <= MOST_POINTS:
         raise CommandError(f"{len(points)} points; allowed: 2 … {MOST_POINTS}")
     _check_places(points, "u_m, z_m")
     ordered = points[np.argsort(points[:, 0], kind="stable")]
     return MeasuredCurve(name, ordered[:, 0], ordered[:, 1])
+
+
+def _point(table: CsvTable, line: int, cells: list[str]) -> list[float]:
+    if len(cells) != len(COLUMNS):
+        raise CommandError(f"line {line}: {len(cells)} cells; allowed: 2, one each for u_m,z_m")
+    point = [table.number(cell) for cell in cells]
+    for column, cell, value in zip(COLUMNS, cells, point, strict=True):
+        if np.isnan(value):
+            raise CommandError(f"line {line}, column {column}: {cell[:40]!r}; allowed: a finite number in m")
+    return point
 
 
 def _check_places(numbers: Array, what: str) -> None:

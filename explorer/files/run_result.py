@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from solver import Record, Scene, Trace, parameters, value
+from solver import PHYSICS, Record, Scene, Trace, parameters, value
 from solver.observables import Value, observe
 
 RUNTIME = ("taichi", "numpy")
@@ -56,9 +56,10 @@ def parameter_values(scene: Scene) -> dict[str, dict[str, Any]]:
 
 
 def versions() -> dict[str, str | None]:
-    """Versions of this package, of what calculates, and of Python; None for one that is not installed."""
+    """Versions of this package, of its physics, of what calculates, and of Python; None for one not installed."""
     return {
         "repose-explorer": package_version("repose-explorer"),
+        "physics": str(PHYSICS),
         **{name: package_version(name) for name in RUNTIME},
         "python": platform.python_version(),
     }

@@ -12,18 +12,19 @@ from typing import TYPE_CHECKING, Self
 from explorer.files.new_file import check_new_file
 from explorer.logs.blueprint import motion_curves
 from explorer.logs.pour_log import PourLog
+from explorer.logs.recording import FRAME_INTERVAL, RecordedPour
 from explorer.outcomes import outcome_text
 from solver import Outcome, Record
 from solver.observables import observe
 from solver.observables.pile import angle_of_repose
 from solver.observables.reading import PileReading
-from solver.record_builder import member_spheres, pile_of
+from solver.record_builder import lying, member_spheres, pile_of
 
 if TYPE_CHECKING:
     from solver.pour import Pour
 
-FRAME_INTERVAL, ANGLE_INTERVAL = 0.02, 0.1
-"""Simulated time [s] between frames, and between readings of the angle."""
+ANGLE_INTERVAL = 0.1
+"""Simulated time [s] between readings of the angle."""
 
 
 def recorder_of(path: Path, seeds: Sequence[int]) -> PourRecorder:
@@ -41,12 +42,20 @@ class PourRecorder:
     def __init__(self, paths: Sequence[Path]) -> None:
         self._paths = paths
         self._open: dict[int, _Recording] = {}
+        self._pours: dict[int, RecordedPour] = {}
+
+    @property
+    def pours(self) -> tuple[RecordedPour, ...]:
+        """What has been recorded so far, in the order of the pours."""
+        return tuple(self._pours[k] for k in sorted(self._pours))
 
     def sample(self, k: int, pour: Pour) -> None:
         """Log the present state of pour ``k`` if a frame is due (always when it has ended)."""
         if k not in self._open:
             self._open[k] = _Recording(PourLog(self._paths[k], pour.scene, pour.seed))
-        self._open[k].sample(pour)
+            self._pours[k] = RecordedPour(self._paths[k])
+        if self._open[k].sample(pour):
+            self._pours[k] = self._pours[k].with_frame(pour.time)
 
     def finish(self, k: int, record: Record) -> None:
         """Log the outcome of pour ``k`` and close its file."""
@@ -76,14 +85,15 @@ class _Recording:
         self._frame_due = self._angle_due = -math.inf
         self._phase = ""
 
-    def sample(self, pour: Pour) -> None:
+    def sample(self, pour: Pour) -> bool:
+        """Log the present state if it is due; whether a frame with a body was logged."""
         self.time = pour.time
         if pour.phase != self._phase:
             self._phase = pour.phase
             self.log.event(pour.time, f"phase: {pour.phase}", step=pour.steps)
         ended = pour.outcome != Outcome.RUNNING
         if not ended and pour.time < self._frame_due:
-            return
+            return False
         # Half a sample early is in time: samples do not fall on multiples of the interval exactly.
         slack = 0.5 * pour.scene.numerics.sample_interval
         self._frame_due = pour.time + FRAME_INTERVAL - slack
@@ -93,11 +103,11 @@ class _Recording:
             self._angle_due = pour.time + ANGLE_INTERVAL - slack
             curves["angle_of_repose_deg"] = _angle_deg(pour)
         # The last finite state stays on the screen when a run has diverged.
-        if finite:
-            surfaces = pour.surface_poses()
-            self.log.frame(
-                pour.time, pour.bodies(), curves, step=pour.steps, gate_shut=pour.gate_shut, surfaces=surfaces
-            )
+        if not finite:
+            return False
+        bodies, surfaces = pour.bodies(), pour.surface_poses()
+        self.log.frame(pour.time, bodies, curves, step=pour.steps, gate_shut=pour.gate_shut, surfaces=surfaces)
+        return bool(bodies.inside.any())
 
 
 def _curves(sample: Mapping[str, float]) -> Mapping[str, float]:
@@ -106,4 +116,5 @@ def _curves(sample: Mapping[str, float]) -> Mapping[str, float]:
 
 def _angle_deg(pour: Pour) -> float:
     bodies = pour.bodies()
-    return angle_of_repose(PileReading(pile_of(pour.container, bodies, member_spheres(pour.scene, bodies)))).value
+    pile = pile_of(bodies, member_spheres(pour.scene, bodies), lying(pour.container, bodies))
+    return angle_of_repose(PileReading(pile)).value

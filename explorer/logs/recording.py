@@ -1,9 +1,11 @@
-"""What a recording holds: shapes, what moved when, curves, events and texts."""
+"""What a recording holds: shapes, what moved when, curves, events and texts; and which files it consists of."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +15,8 @@ Floats = npt.NDArray[np.float32]
 
 SAME_TIME = 1e-6
 """[s]; recorded times are whole nanoseconds, those of a slider rounded to this."""
+FRAME_INTERVAL = 0.02
+"""Simulated time [s] between frames that are kept."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +99,41 @@ class Recording:
     parameters: str
     outcome: str
     """Markdown, as is ``parameters``; empty where the pour was cut off."""
+
+
+@dataclass(frozen=True)
+class RecordedPour:
+    """A file that holds one pour. ``began``, ``ended``: simulated times [s] of its first and last frame with a body."""
+
+    path: Path
+    began: float = math.nan
+    ended: float = math.nan
+
+    def with_frame(self, time: float) -> RecordedPour:
+        """The same with a further frame at ``time`` [s]."""
+        return replace(self, began=time if math.isnan(self.began) else self.began, ended=time)
+
+    @property
+    def plays(self) -> bool:
+        """False for a file that was ended within its first frame: it holds a moment at most."""
+        return self.ended - self.began > FRAME_INTERVAL
+
+    @property
+    def length(self) -> str:
+        """How much it holds, in words."""
+        if math.isnan(self.began):
+            return "no body yet"
+        if self.ended == self.began:
+            return f"a single moment, at {self.ended:.3f} s"
+        return f"{self.ended - self.began:.3f} s, from {self.began:.3f} to {self.ended:.3f} s"
+
+
+def recorded_lines(pours: Sequence[RecordedPour]) -> list[str]:
+    """How many pours were recorded, then a line per file with its length."""
+    if not pours:
+        return ["nothing was recorded: no pour had begun"]
+    head = "1 pour recorded:" if len(pours) == 1 else f"{len(pours)} pours recorded:"
+    return [head, *(f"{pour.path}: {pour.length}" for pour in pours)]
 
 
 def index_at(times: Array, time: float) -> int | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import count
 from pathlib import Path
 
 from explorer.files.new_file import check_new_file
@@ -11,16 +12,16 @@ from explorer.live.frames import Frame
 from explorer.live.messages import SessionState, Status
 from explorer.logs.blueprint import motion_curves
 from explorer.logs.pour_log import PourLog
+from explorer.logs.recording import FRAME_INTERVAL, RecordedPour
 from explorer.outcomes import outcome_text
 from explorer.scene.changes import changes
 from solver.scene import Scene
 
-FRAME_INTERVAL = 0.02
-"""Simulated time [s] between frames that are kept."""
-
 
 class SessionRecorder:
     """Records into ``path``; the k-th pour of the session (a restart begins one) into ``<stem>_<k>.rrd``.
+
+    A name that is taken is passed over. ``pours`` names the files.
 
     A pour that is brought back repeats what has been recorded, so nothing is added until it is past that. Where it has
     other parameters than were recorded for its time, it is another pour, with a file of its own from there on.
@@ -31,11 +32,17 @@ class SessionRecorder:
     def __init__(self, path: Path) -> None:
         check_new_file(path, suffix=".rrd")
         self._path = path
-        self._pours = 0
+        self._pours: list[RecordedPour] = []
         self._log: PourLog | None = None
         self._last: Status | None = None
-        self._frame_due = self._until = -math.inf
+        self._newest: tuple[Frame, Status] | None = None
+        self._frame_due = self._until = self._logged = -math.inf
         self._scenes: list[tuple[float, Scene]] = []
+
+    @property
+    def pours(self) -> tuple[RecordedPour, ...]:
+        """What has been recorded so far, a file per pour, in the order of their beginnings."""
+        return tuple(self._pours)
 
     def take(self, frame: Frame, status: Status) -> None:
         """Log what is new in ``frame`` and ``status``; two of different pours are left for the next call."""
@@ -60,20 +67,32 @@ class SessionRecorder:
             log.event(frame.time, text)
         ended = status.state == SessionState.ENDED
         just_ended = ended and last.state != SessionState.ENDED
+        self._newest = (frame, status)
         if just_ended or frame.time >= self._frame_due:
             self._frame_due = frame.time + FRAME_INTERVAL
-            curves = {name: observed.value for name, observed in status.observables.items()}
-            curves |= motion_curves(status.entered_mass, status.discharged_mass, status.kinetic_energy, status.contacts)
-            log.frame(frame.time, frame, curves, gate_shut=status.gate_shut, surfaces=frame.surfaces)
+            self._log_newest()
         if just_ended:
             log.outcome(frame.time, outcome_text(status.outcome, status.message), status.observables)
         self._last = status
 
     def close(self) -> None:
-        """End the last file."""
+        """End the last file, with the newest frame in it."""
         if self._log is not None:
+            self._log_newest()
             self._log.close()
             self._log = None
+
+    def _log_newest(self) -> None:
+        """Log the newest frame, unless it has been."""
+        if self._log is None or self._newest is None or self._newest[0].time <= self._logged:
+            return
+        frame, status = self._newest
+        curves = {name: observed.value for name, observed in status.observables.items()}
+        curves |= motion_curves(status.entered_mass, status.discharged_mass, status.kinetic_energy, status.contacts)
+        self._log.frame(frame.time, frame, curves, gate_shut=status.gate_shut, surfaces=frame.surfaces)
+        self._logged = frame.time
+        if frame.inside.any():
+            self._pours[-1] = self._pours[-1].with_frame(frame.time)
 
     def _recorded_scene(self, time: float) -> Scene:
         """The scene that was in force at ``time`` [s] of what has been recorded."""
@@ -82,11 +101,18 @@ class SessionRecorder:
 
     def _begin(self, status: Status) -> PourLog:
         self.close()
-        self._pours += 1
-        self._frame_due = self._until = -math.inf
+        self._newest = None
+        self._frame_due = self._until = self._logged = -math.inf
         self._scenes = [(status.time, status.scene)]
-        name = self._path.stem if self._pours == 1 else f"{self._path.stem}_{self._pours}"
-        return PourLog(self._path.with_name(f"{name}.rrd"), status.scene, status.seed)
+        path = self._path if not self._pours else self._next_path()
+        log = PourLog(path, status.scene, status.seed)
+        self._pours.append(RecordedPour(path))
+        return log
+
+    def _next_path(self) -> Path:
+        """The next name of a file that is not there yet."""
+        names = (self._path.with_stem(f"{self._path.stem}_{k}") for k in count(len(self._pours) + 1))
+        return next(path for path in names if not path.exists())
 
 
 def news(before: Status, now: Status) -> Iterator[str]:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from explorer.report.content import Table
 from explorer.report.findings import Plain, deciding_error, factor_effects, half_width, sigma_of, significant
+from explorer.report.identified import settings
 from explorer.report.units_for_people import (
     MISSING,
     enumeration,
@@ -13,8 +14,6 @@ from explorer.report.units_for_people import (
     observable_label,
     observed,
     parameter_label,
-    parameter_range,
-    parameter_value,
     signed,
     unit_of_observable,
 )
@@ -24,7 +23,7 @@ Cell = Callable[[Plain], str]
 
 
 def comparison(one: Plain, other: Plain, names: tuple[str, str]) -> tuple[Table, Table, Table]:
-    """Tables of findings, of the optimum with its 95 % set, and of effects with 95 % intervals."""
+    """Tables of findings, of what the target says of each factor, and of effects with 95 % intervals."""
     return _findings(one, other, names), _optima(one, other, names), _effects(one, other, names)
 
 
@@ -49,7 +48,11 @@ def _optima(one: Plain, other: Plain, names: tuple[str, str]) -> Table:
     found = [_optimum(result) for result in (one, other)]
     order = list(dict.fromkeys(path for cells in found for path in cells))
     rows = tuple((parameter_label(path), *(cells.get(path, MISSING) for cells in found)) for path in order)
-    return Table(("optimum", *names), rows, "In brackets: 95 % set of the chosen point.")
+    caption = (
+        "Value, in brackets its 95 % set; where the target does not identify it, the range that gives the target, in "
+        "brackets the value chosen by rule."
+    )
+    return Table(("optimum", *names), rows, caption)
 
 
 def _effects(one: Plain, other: Plain, names: tuple[str, str]) -> Table:
@@ -104,13 +107,9 @@ def _difference(result: Plain) -> str:
 
 
 def _optimum(result: Plain) -> dict[str, str]:
-    found, values = result["optimum"]["single"], result["optimum"]["values"]
-    cells = {}
-    for k, factor in enumerate(result["optimum"]["factors"]):
-        path = factor["path"]
-        low, high = found["point_low"][k], found["point_high"][k]
-        cells[path] = f"{parameter_value(path, values[path])} ({parameter_range(path, low, high)})"
-    return cells
+    found = result["optimum"]
+    pairs = zip(found["factors"], settings(found), strict=True)
+    return {factor["path"]: setting.answer for factor, setting in pairs}
 
 
 def _effects_of(result: Plain) -> dict[str, tuple[float, str]]:

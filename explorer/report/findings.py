@@ -13,6 +13,8 @@ from typing import Any, Literal
 from scipy import stats
 
 from doe.power import smallest_effect
+from doe.study import TRIES
+from solver import Outcome
 
 Plain = dict[str, Any]
 ErrorName = Literal["replicates", "dummies"]
@@ -68,8 +70,8 @@ def sigma_of(result: Plain, observable: str) -> float | None:
 
 
 def values_of(runs: Iterable[Plain], observable: str) -> list[float]:
-    """An observable over the runs that gave a pile and in which it could be measured."""
-    found = [run["observables"].get(observable) for run in runs if run["outcome"] == "at_rest"]
+    """An observable over the valid runs in which it could be measured."""
+    found = [run["observables"].get(observable) for run in runs if Outcome(run["outcome"]).valid]
     return [value for value in found if value is not None]
 
 
@@ -101,9 +103,14 @@ def outcomes_by_stage(result: Plain) -> dict[str, Counter[str]]:
     return found
 
 
-def failed_share(outcomes: Counter[str]) -> float:
-    """Share of the runs that gave no pile."""
-    return 1.0 - outcomes["at_rest"] / outcomes.total()
+def valid_count(outcomes: Counter[str]) -> int:
+    """Number of valid runs among counted outcomes."""
+    return sum(count for outcome, count in outcomes.items() if Outcome(outcome).valid)
+
+
+def seeds_tried(result: Plain) -> int:
+    """Seeds tried for one replicate; the default where an older result does not say."""
+    return result["study"].get("tries", TRIES)
 
 
 def target_observable(result: Plain) -> str:

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from plotly.offline import get_plotlyjs
 
 from explorer.report.content import Block, Bullets, Caution, Code, Facts, Figure, Folded, Section, Spec, Table, Text
+from explorer.report.figures.style import CONFIG
 from explorer.report.page_style import SCRIPT, STYLE
 from explorer.report.units_for_people import MISSING
 
@@ -47,7 +48,8 @@ def page(title: str, subtitle: str, sections: Sequence[Section]) -> str:
 {body}
 </main>
 <script id="plotly">{get_plotlyjs()}</script>
-<script>{SCRIPT}</script>
+<script>const config = {json.dumps(CONFIG)};
+{SCRIPT}</script>
 </body>
 </html>
 """

@@ -56,8 +56,7 @@ function template() {
 }
 const charts = [...document.querySelectorAll("figure > script")].map(source => {
   const place = source.nextElementSibling, chart = JSON.parse(source.textContent);
-  const options = { displaylogo: false, responsive: true, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
-  Plotly.newPlot(place, chart.data, { ...chart.layout, template: template() }, options);
+  Plotly.newPlot(place, chart.data, { ...chart.layout, template: template() }, { ...config, responsive: true });
   return place;
 });
 dark.addEventListener("change", () => charts.forEach(place => Plotly.relayout(place, { template: template() })));

@@ -17,6 +17,7 @@ from explorer.report.figures.surface_3d import height_over, solutions
 from explorer.report.figures.verification import verification
 from explorer.report.figures.walks import ascent_path, scan
 from explorer.report.findings import ErrorName, Plain
+from explorer.report.identified import cloud_caution
 from explorer.report.plot import Plot, Plots
 from explorer.report.units_for_people import observable_label
 
@@ -81,7 +82,11 @@ def _surface(result: Plain) -> Named:
 def _optimum(result: Plain) -> Named:
     yield (
         "Optimum and its refits",
-        Plot(lambda: stacked(cloud(result)), "Each dot: the optimum of one resampling.", 2.0),
+        Plot(
+            lambda: stacked(cloud(result)),
+            f"Each dot: the point chosen from one resampling. {cloud_caution(result['optimum'])}".rstrip(),
+            2.0,
+        ),
     )
     yield "Ranges of the optimum", Plot(lambda: short_rows(ranges(result)), "Shares of the screened ranges.", 0.9)
 

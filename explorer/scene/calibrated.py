@@ -8,6 +8,7 @@ from typing import Any
 
 from doe.study import load_study, with_profile
 from explorer.errors import CommandError
+from explorer.report.identified import settings
 from solver import ParameterError, Scene, with_values
 
 RESULT = "result.json"
@@ -21,6 +22,9 @@ def is_calibration(source: str) -> bool:
 def calibrated_scene(source: str) -> tuple[Scene, str]:
     """The scene at the optimum of the calibration in folder ``source``, and a caution; empty where none is due.
 
+    It is due where the surface is not better than noise, and where the target leaves factors open: their values are
+    then chosen by rule, and the ranges that give the target are told.
+
     Raises CommandError for a result that is not one of `explorer calibrate`, ParameterError or AssetNotFoundError where
     its study is not there any more or has changed so that the optimum does not fit it.
     """
@@ -31,11 +35,16 @@ def calibrated_scene(source: str) -> tuple[Scene, str]:
         name = str(study["file"]) if Path(study["file"]).is_file() else str(study["name"])
         values = {str(key): float(value) for key, value in result["optimum"]["values"].items()}
         trusted = bool(result["optimum"]["single"]["better_than_noise"])
+        open_factors = [setting for setting in settings(result["optimum"]) if not setting.identified]
     except (json.JSONDecodeError, UnicodeDecodeError, KeyError, TypeError, AttributeError, ValueError, OSError):
         raise CommandError(f"{path}: is not the result of `explorer calibrate`") from None
     try:
         scene = with_values(with_profile(load_study(name), profile)[0].scene, dict(values))
     except ParameterError as error:
         raise ParameterError(f"{path}: {error}") from None
-    caution = "" if trusted else f"{path}: its response surface is not better than noise, so this is not a calibration"
-    return scene, caution
+    if not trusted:
+        return scene, f"{path}: its response surface is not better than noise, so this is not a calibration"
+    if not open_factors:
+        return scene, ""
+    answers = "; ".join(f"{setting.label} {setting.answer}" for setting in open_factors)
+    return scene, f"{path}: the target does not identify every factor: {answers}"

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from doe.study import load_study
-from solver import ParameterError, Scene, load_material, read_toml, with_set_up
+from solver import ParameterError, Scene, is_material, load_material, read_toml, with_set_up
 from solver.assets import AssetKind, AssetNotFoundError, asset_path, shipped_assets
 from solver.rigs import BENCH_RIGS, RIGS
 from solver.scene import with_rig
@@ -51,7 +51,7 @@ def load_scene(source: str, material: str | None = None) -> Scene:
     if material is not None:
         raise ParameterError(f"--material {material}: {path} has a material of its own; only a rig takes one")
     table = read_toml(path)
-    if "materials" in table or "body" in table:
+    if is_material(table):
         return material_scene(str(path))
     if "target" in table or "factor" in table:
         return study_scene(path)

@@ -10,11 +10,12 @@ from pathlib import Path
 
 from explorer.errors import CommandError
 from explorer.scene.file import load_scene
-from solver import Parameter, Scene, parameters, value
+from solver import Parameter, Scene, is_material, parameters, read_toml, value
 from solver.assets import shipped_assets
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
 NAME = re.compile(r"[A-Za-z0-9_-]+")
+STUDY_ENDING = "_study"
 SPAN = 0.2
 """Half the width of a factor's range, as a fraction of its reference."""
 MOST_FACTORS = 8
@@ -37,15 +38,19 @@ def new_path(folder: Path, name: str) -> Path:
 def write_study(folder: Path, name: str, material: str | None) -> list[Path]:
     """Write ``NAME_study.toml`` into ``folder``, and before it the material where that is missing.
 
-    ``material`` is the path or shipped name of what to calibrate; None means ``NAME.toml`` in ``folder``.
+    ``name`` may be that of the study's file: a trailing ``_study`` is dropped. ``material`` is the path or shipped
+    name of what to calibrate; None means ``NAME.toml`` in ``folder``.
     """
-    study = folder / f"{_checked(name)}_study.toml"
+    name = name.removesuffix(STUDY_ENDING) or name
+    study = folder / f"{_checked(name)}{STUDY_ENDING}.toml"
     if study.exists():
         raise CommandError(f"{study}: exists already; choose another name")
     if material is not None:
         named = material if _is_shipped(material) else str(Path(material).expanduser().absolute())
         return [_write_new(study, study_text(study, named, load_scene("funnel", material)))]
     own = folder / f"{name}.toml"
+    if own.exists() and not is_material(read_toml(own)):
+        raise CommandError(f"{own} is there and is not a material; choose another name, or name one with --material")
     written = [] if own.exists() else [write_material(folder, name)]
     return [*written, _write_new(study, study_text(study, own.name, load_scene("funnel", str(own))))]
 

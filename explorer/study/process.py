@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from doe.study import TRIES, with_profile
+from doe.study import TRIES, load_study, with_profile
 from explorer.background.command_process import PROGRAM, BackgroundError, CommandProcess, CommandStatus
 from explorer.background.output_folders import finished, new_folder, newest_unfinished
 from explorer.background.stage_progress import given_up
@@ -19,7 +19,6 @@ from explorer.background.waiting_line import WaitingLine
 from explorer.files.whole_file import write_whole
 from explorer.study.edit import StudyEdits, edited_study
 
-PROFILES = ("quick", "standard", "full")
 ENDINGS = {0: "report", 3: "above the error limit; report"}
 """Exit codes of ``calibrate`` after a complete chain."""
 RESULT, PARTIAL = "result.json", "partial.json"
@@ -148,11 +147,7 @@ class CalibrationProcess:
         return finished(self._folder, RESULT)
 
     def _order(self, profile: str, edits: StudyEdits) -> Order:
-        if profile not in PROFILES:
-            raise BackgroundError(f"profile: {profile!r} is not one of {', '.join(PROFILES)}")
-        if not edits:
-            return Order(profile, edits, "")
-        text, study = edited_study(self.study_file, edits)
+        text, study = edited_study(self.study_file, edits) if edits else ("", load_study(str(self.study_file)))
         with_profile(study, profile)
         return Order(profile, edits, text)
 
@@ -168,7 +163,7 @@ class CalibrationProcess:
     def _last(self) -> Path:
         out = self._process.out
         if out is None:
-            stems = {self._stem(profile): profile for profile in PROFILES}
+            stems = {self._stem(profile): profile for profile in load_study(str(self.study_file)).profiles}
             found = newest_unfinished(self._folder, tuple(stems), RESULT)
             if found is None:
                 raise BackgroundError("no study has been stopped before its end; there is nothing to resume")

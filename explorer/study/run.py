@@ -10,11 +10,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from doe.campaign import SCHEMA, STAGES, CampaignResult, planned_runs, run_campaign, summary_of_runs
+from doe.campaign import SCHEMA, STAGES, CampaignResult, run_campaign, summary_of_runs
 from doe.partial import PartialStages
 from doe.profile import Profile
 from doe.record import plain
 from doe.runner import PourRunner, Run
+from doe.stages.sizing import planned_runs
 from doe.store import Store, default_store
 from doe.study import TRIES, Study, load_study, with_profile
 from explorer.errors import CommandError
@@ -23,7 +24,7 @@ from explorer.files.whole_file import write_whole
 from explorer.report import write_report
 from explorer.study.partial_result import PartialResult
 from explorer.study.progress import Progress, told_of_pauses
-from solver import Crew, code_version
+from solver import Crew
 from solver.arch import chosen
 from solver.observables.made_up import estimator_bias
 
@@ -134,7 +135,7 @@ def result_of(
                 "runs_per_minute": 60.0 * runs["total"] / max(total_s, 1e-9),
                 "reused_runs": sum(run.reused for _, run in found.all_runs()),
             },
-            "versions": {**versions(), "solver": code_version()},
+            "versions": versions(),
             "shapes": [
                 {"body": body.name, "mass": body.mass, "spheres": body.spheres, "fit": asdict(body.clump.fit)}
                 for body in study.scene.bodies

@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from doe.profile import Profile
-from doe.store import run_key
 from doe.study import Factor, load_study, with_profile
 from explorer.errors import CommandError
-from solver import Scene, code_version, with_values
+from solver import Scene, pour_key, with_values
 
 Plain = dict[str, Any]
 Values = dict[str, float | str]
@@ -64,7 +63,7 @@ def scene_of(result: Plain, run: StudyRun) -> tuple[Scene, bool]:
     study = replace(load_study(str(result["study"]["file"])), profiles={profile.name: profile})
     study, _ = with_profile(study, profile.name)
     scene = with_values(study.scene, settings_of(result, run.stage, run.label))
-    return scene, run_key(scene, run.seed, code_version()) == run.key
+    return scene, pour_key(scene, run.seed) == run.key
 
 
 def _begun(result: Plain) -> list[str]:

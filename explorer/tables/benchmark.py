@@ -27,8 +27,8 @@ HEADER = (
 RATIO_NOTE = "ratio: steps per second over LIGGGHTS's in the same run (over one worker's for the batch)"
 
 
-def table_text(measurements: Sequence[Measurement]) -> str:
-    """All measurements, and how the cost of a bed grows."""
+def table_text(measurements: Sequence[Measurement], complete: bool = True) -> str:
+    """All measurements, and how the cost of a bed grows; says so where some are missing."""
     lines = [text_table(HEADER, [_row(one, _ratio(one, measurements)) for one in measurements]), RATIO_NOTE]
     rest = [one for one in measurements if one.case == "pour to rest"]
     peers = [one for one in measurements if one.engine.startswith("liggghts") and one.case.startswith("pour")]
@@ -42,13 +42,16 @@ def table_text(measurements: Sequence[Measurement]) -> str:
     exponent = growth(list(measurements))
     if not math.isnan(exponent):
         lines.append(f"beds: wall time per step grows as (number of spheres)^{exponent:.3f}")
+    if not complete:
+        lines.append(f"incomplete: the run was stopped; measured so far: {len(measurements)}")
     return "\n".join(lines)
 
 
-def result_of(measurements: Sequence[Measurement]) -> dict[str, Any]:
+def result_of(measurements: Sequence[Measurement], complete: bool = True) -> dict[str, Any]:
     """The same as plain data, with the machine and the versions."""
     return {
         "format": 1,
+        "complete": complete,
         "version": package_version("repose-explorer"),
         "machine": {
             "processor": platform.machine(),

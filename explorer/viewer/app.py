@@ -11,6 +11,7 @@ from types import FrameType
 
 from explorer.diagnosis.process import DiagnoseProcess
 from explorer.files.user_data import data_folder
+from explorer.logs.recording import recorded_lines
 from explorer.scene.source import SceneSource
 from explorer.session import Session
 from explorer.study.process import CalibrationProcess
@@ -49,7 +50,7 @@ def serve(
         study_file: the study that the page can run, None for a page without.
         store: file of the runs of study and diagnosis; None for the default store.
         record_path: new file (``.rrd``) that the session is recorded into; a restart begins another beside
-            it.
+            it. All of them are named on the terminal at the end.
         source: where ``scene`` came from, for the command line that repeats it.
         ready: called with the address once the page can be opened.
 
@@ -60,7 +61,10 @@ def serve(
     """
     with stopped_by_signals() as stop, ExitStack() as ending:
         # Ended in reverse order, with the signals still caught: a second one must not leave processes behind.
-        recorder = ending.enter_context(closing(session_recorder(record_path))) if record_path else None
+        recorder = session_recorder(record_path) if record_path else None
+        if recorder:
+            ending.callback(lambda: print("\n".join(recorded_lines(recorder.pours)), flush=True))
+            ending.enter_context(closing(recorder))
         server = guarded_server(host, port, LABEL)
         ending.callback(server.stop)
         study = _study(study_file, store)

@@ -1,7 +1,7 @@
 """Physical effects that the base model lacks: one file each, all off until an amplitude is set.
 
 To add one: a file with a frozen dataclass of ``ContactEffect``, ``BodyEffect`` or ``SetUpEffect`` (``effect.py``), and
-its line here. Files, ``--set``, page, studies, diagnosis and the contract tests follow.
+its two lines here. Files, ``--set``, page, studies, diagnosis and the contract tests follow.
 """
 
 from solver.effects.adhesion_jkr import AdhesionJKR
@@ -9,7 +9,7 @@ from solver.effects.adhesion_sjkr import AdhesionSJKR
 from solver.effects.air_drag import AirDrag
 from solver.effects.capillary_bridge import CapillaryBridge
 from solver.effects.density_error import DensityError
-from solver.effects.effect import BodyEffect, ContactEffect, Effect, SetUpEffect, Stage
+from solver.effects.effect import BodyEffect, ContactEffect, Effect, SetUpEffect, Stage, Telltale
 from solver.effects.funnel_offset import FunnelOffset
 from solver.effects.kinetic_friction import KineticFriction
 from solver.effects.plastic_contact import PlasticContact
@@ -60,4 +60,5 @@ __all__ = [
     "Effect",
     "SetUpEffect",
     "Stage",
+    "Telltale",
 ]

@@ -8,7 +8,7 @@ Source: Johnson, Kendall & Roberts 1971, Proc. R. Soc. A 324:301. Some codes tak
 
 from dataclasses import dataclass
 
-from solver.effects.effect import ContactEffect, Stage
+from solver.effects.effect import ContactEffect, Stage, Telltale
 from solver.effects.jkr import adhere, grip
 from solver.effects.kernel import kernel_function
 from solver.params import param
@@ -31,6 +31,7 @@ class AdhesionJKR(ContactEffect):
     strongest = 5.0
     literature = "0.1–5 J/m² in published calibrations of moist seeds and residues (effective, not a material constant)"
     lever = "pour a lighter fraction; turn the plate over; vary the mass"
+    telltales = (Telltale.SHAPE,)
     stage = Stage.ADHESION
     act = staticmethod(stick)
 

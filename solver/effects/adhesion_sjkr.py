@@ -11,7 +11,7 @@ Source: LIGGGHTS-PUBLIC documentation, "cohesion model sjkr".
 import math
 from dataclasses import dataclass
 
-from solver.effects.effect import ContactEffect, Stage
+from solver.effects.effect import ContactEffect, Stage, Telltale
 from solver.effects.kernel import kernel_function
 from solver.params import param
 
@@ -40,5 +40,6 @@ class AdhesionSJKR(ContactEffect):
     strongest = 1e6
     literature = "10⁴–10⁶ J/m³ in published calibrations with shear moduli near 10⁷–10⁸ Pa"
     lever = "vary the load on a contact: shear under a weight against free flow"
+    telltales = (Telltale.SHAPE,)
     stage = Stage.ADHESION
     act = staticmethod(pull_by_area)

@@ -15,7 +15,7 @@ Source: Haider & Levenspiel 1989, Powder Technology 58:63.
 import math
 from dataclasses import dataclass
 
-from solver.effects.effect import BodyEffect
+from solver.effects.effect import BodyEffect, Telltale
 from solver.effects.kernel import kernel_function, ti
 from solver.params import param
 
@@ -75,4 +75,5 @@ class AirDrag(BodyEffect):
     strongest = 2.0
     literature = "1 is air; the coefficient of odd shapes is known within a factor of two"
     lever = "drop height; a fan; the time a single body falls"
+    telltales = (Telltale.FLOW,)
     act = staticmethod(drag)

@@ -14,7 +14,7 @@ sphere of a clump that touches has a bridge of its own.
 import math
 from dataclasses import dataclass
 
-from solver.effects.effect import ContactEffect, Stage
+from solver.effects.effect import ContactEffect, Stage, Telltale
 from solver.effects.kernel import kernel_function, ti
 from solver.params import param
 
@@ -57,6 +57,7 @@ class CapillaryBridge(ContactEffect):
     strongest = 0.072
     literature = "clean water at 20 °C, 0.072 N/m, is the largest of the liquids that wet plant material"
     lever = "a moisture series; soap in the water lowers γ; the pull outlasts the touch"
+    telltales = (Telltale.SHAPE,)
     stage = Stage.ADHESION
     act = staticmethod(bridge)
 

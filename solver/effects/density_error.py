@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from solver.body import Body, Members
-from solver.effects.effect import SetUpEffect
+from solver.effects.effect import SetUpEffect, Telltale
 from solver.params import param
 
 
@@ -24,6 +24,7 @@ class DensityError(SetUpEffect):
     strongest = 0.3
     literature = "moisture of stored seeds 5–25 % dry basis; density by displacement within 5 %"
     lever = "weigh a counted number of bodies"
+    telltales = (Telltale.PACKING,)
 
     def applied(self, scene: Any) -> Any:
         """``scene`` with the density of all materials that bodies are made of changed."""

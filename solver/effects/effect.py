@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
-from enum import IntEnum
+from enum import IntEnum, StrEnum
 from typing import Any, ClassVar
 
 
@@ -34,6 +34,19 @@ class Stage(IntEnum):
     """Adds a torque against turning about the normal."""
 
 
+class Telltale(StrEnum):
+    """A class of observables that can reveal an effect."""
+
+    SHAPE = "shape"
+    """Of the pile or the free surface: angles, slopes, heights, footprint."""
+    FLOW = "flow"
+    """Discharge over time, bodies that strayed, the surface of a moving bed."""
+    ASYMMETRY = "asymmetry"
+    """One side against the other: left and right angle, centroid."""
+    PACKING = "packing"
+    """How much room a mass takes: solid fraction, bulk density, heights, discharge."""
+
+
 @dataclass(frozen=True)
 class Effect:
     """Base of all effects; the class attributes say what a report and a diagnosis need to know."""
@@ -47,6 +60,8 @@ class Effect:
     """Where that bound comes from."""
     lever: ClassVar[str]
     """The experiment that reveals it."""
+    telltales: ClassVar[tuple[Telltale, ...]]
+    """Observables that can reveal it; it stays hidden in data that hold none of them."""
 
     @property
     def on(self) -> bool:

@@ -9,7 +9,7 @@ the edge of the domain, which stays centred on the funnel. Vanishes for both →
 from dataclasses import dataclass, replace
 from typing import Any
 
-from solver.effects.effect import SetUpEffect
+from solver.effects.effect import SetUpEffect, Telltale
 from solver.params import param
 
 
@@ -25,6 +25,7 @@ class FunnelOffset(SetUpEffect):
     strongest = 0.02
     literature = "a stand set up by eye is off by 2–10 mm"
     lever = "centre the funnel with a plumb line"
+    telltales = (Telltale.ASYMMETRY,)
 
     def applied(self, scene: Any) -> Any:
         """``scene`` measured from a point displaced by −(dx, dy) from the funnel's axis."""

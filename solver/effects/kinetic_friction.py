@@ -9,7 +9,7 @@ Source: exponential form of Bo & Pavelescu 1982, Wear 82:277 (in LAMMPS- and Aba
 
 from dataclasses import dataclass
 
-from solver.effects.effect import ContactEffect, Stage
+from solver.effects.effect import ContactEffect, Stage, Telltale
 from solver.effects.kernel import kernel_function, ti
 from solver.params import param
 
@@ -35,5 +35,6 @@ class KineticFriction(ContactEffect):
     strongest = 0.5
     literature = "μ_k/μ_s = 0.5–0.9 for seeds and grains on metal and on themselves"
     lever = "inclined plane: the angle at which a sliding body stops, beside the one at which it starts"
+    telltales = (Telltale.FLOW,)
     stage = Stage.TANGENTIAL
     act = staticmethod(lowered_limit)

@@ -15,7 +15,7 @@ adhesion model (Morrissey 2013, thesis, Edinburgh), without its adhesive branch.
 
 from dataclasses import dataclass
 
-from solver.effects.effect import ContactEffect, Stage
+from solver.effects.effect import ContactEffect, Stage, Telltale
 from solver.effects.kernel import kernel_function, ti
 from solver.params import param
 
@@ -42,6 +42,7 @@ class PlasticContact(ContactEffect):
     strongest = 0.8
     literature = "λ = 0.2–0.8 for food and soft plant material in EEPA calibrations"
     lever = "drop test at several heights: a rebound lower than the damping explains, and alike at every speed"
+    telltales = (Telltale.SHAPE,)
     stage = Stage.NORMAL
     act = staticmethod(unload_stiffer)
     memory = 1

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-from solver.effects.effect import SetUpEffect
+from solver.effects.effect import SetUpEffect, Telltale
 from solver.params import param
 
 
@@ -26,6 +26,7 @@ class PlateTilt(SetUpEffect):
     strongest = 5.0
     literature = "a bench that nobody levelled is off by 1–3°; 5° is seen by eye"
     lever = "turn the plate by 180°; a spirit level"
+    telltales = (Telltale.ASYMMETRY,)
 
     def applied(self, scene: Any) -> Any:
         """``scene`` with gravity turned."""

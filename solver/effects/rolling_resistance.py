@@ -12,7 +12,7 @@ spheres of clumps it stands for what their shape lacks: edges and roughness fine
 
 from dataclasses import dataclass
 
-from solver.effects.effect import ContactEffect, Stage
+from solver.effects.effect import ContactEffect, Stage, Telltale
 from solver.effects.kernel import kernel_function, ti
 from solver.effects.spring import capped, turned_with
 from solver.params import param
@@ -48,6 +48,7 @@ class RollingResistance(ContactEffect):
     strongest = 0.3
     literature = "0.01–0.25 in published calibrations of seeds and crop residues; ≤ 0.3"
     lever = "roll a single body off a slope; it acts at every mass and size alike"
+    telltales = (Telltale.SHAPE,)
     stage = Stage.ROLLING
     act = staticmethod(rolling_torque)
     memory = 3

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from solver.body import DIMENSIONS, Body, Members
-from solver.effects.effect import SetUpEffect
+from solver.effects.effect import SetUpEffect, Telltale
 from solver.params import ParameterError, param
 
 
@@ -28,6 +28,7 @@ class ShapeElongation(SetUpEffect):
     strongest = 0.4
     literature = "aspect ratios within a variety scatter by 5–15 %; a mean from few bodies may be off by 0.1–0.4"
     lever = "measure the outline of more bodies; packing density"
+    telltales = (Telltale.PACKING,)
 
     def applied(self, scene: Any) -> Any:
         """``scene`` with every component stretched."""

@@ -9,7 +9,7 @@ Source: log-normal sizes of comminuted and natural grains, e.g. Allen 1997, Part
 from dataclasses import dataclass, replace
 from typing import Any
 
-from solver.effects.effect import SetUpEffect
+from solver.effects.effect import SetUpEffect, Telltale
 from solver.params import ParameterError, param
 from solver.sizes import MOST_SPREAD, SizeDistribution
 
@@ -25,6 +25,7 @@ class SizeDispersion(SetUpEffect):
     strongest = 0.3
     literature = "0.03–0.15 within a variety of seeds, up to 0.3 in unsieved mixtures"
     lever = "sieve, and pour one class; segregation over the radius"
+    telltales = (Telltale.PACKING,)
 
     def applied(self, scene: Any) -> Any:
         """``scene`` with the spread added, in squares, to that of every component."""

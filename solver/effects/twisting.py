@@ -10,7 +10,7 @@ Source: Marshall 2009, Journal of Computational Physics 228:1541; LAMMPS `pair g
 
 from dataclasses import dataclass
 
-from solver.effects.effect import ContactEffect, Stage
+from solver.effects.effect import ContactEffect, Stage, Telltale
 from solver.effects.kernel import kernel_function, ti
 from solver.params import param
 
@@ -38,6 +38,7 @@ class Twisting(ContactEffect):
     strongest = 10.0
     literature = "1 for smooth spheres (Marshall 2009); up to 10 for contacts wider than Hertz's, such as flats"
     lever = "spin a single body about a vertical axis on the plate"
+    telltales = (Telltale.SHAPE,)
     stage = Stage.TWISTING
     act = staticmethod(twisting_torque)
     memory = 1

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial.chebyshev import chebfit
 
-from solver.effects.effect import ContactEffect, Stage
+from solver.effects.effect import ContactEffect, Stage, Telltale
 from solver.effects.kernel import kernel_function, ti
 from solver.laws.restitution import normal_damping
 from solver.params import param
@@ -72,6 +72,7 @@ class VelocityDependentRestitution(ContactEffect):
     strongest = 2.0
     literature = "1 for viscoelastic spheres; restitution of seeds falls by 0.05–0.2 from 1 to 3 m/s"
     lever = "drop test from several heights"
+    telltales = (Telltale.FLOW,)
     stage = Stage.NORMAL
     act = staticmethod(damp_by_speed)
     memory = 1

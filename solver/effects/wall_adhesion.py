@@ -8,7 +8,7 @@ Source: as ``adhesion_jkr``.
 
 from dataclasses import dataclass
 
-from solver.effects.effect import ContactEffect, Stage
+from solver.effects.effect import ContactEffect, Stage, Telltale
 from solver.effects.jkr import adhere, grip
 from solver.effects.kernel import kernel_function
 from solver.params import param
@@ -33,6 +33,7 @@ class WallAdhesion(ContactEffect):
     strongest = 5.0
     literature = "0.1–5 J/m² between moist plant material and steel"
     lever = "another plate and funnel material; what is left in the funnel"
+    telltales = (Telltale.SHAPE,)
     stage = Stage.ADHESION
     act = staticmethod(stick_to_wall)
 

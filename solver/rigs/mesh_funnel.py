@@ -12,7 +12,6 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-import trimesh
 
 from solver.assets import AssetNotFoundError, asset_path
 from solver.mesh_file import LENGTH_UNITS, SUFFIXES
@@ -130,6 +129,8 @@ class MeshFunnel(PourRig):
 @lru_cache(maxsize=8)
 def _placed(file: Path, metres_per_unit: float, wall: str, stamp: int) -> Placed:
     """The mesh in ``file`` as it was at ``stamp``."""
+    import trimesh
+
     try:
         shell = load_mesh(file, wall, metres_per_unit)
     except ParameterError as error:

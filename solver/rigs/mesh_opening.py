@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-import trimesh
+
+if TYPE_CHECKING:
+    import trimesh
 
 Array = npt.NDArray[np.float64]
 
@@ -30,6 +33,8 @@ class Opening:
 
 def cut(mesh: trimesh.Trimesh, height: float) -> Array:
     """Segments in which the plane z = ``height`` cuts ``mesh``: ends (x, y) [m], shape (n, 2, 2)."""
+    import trimesh
+
     found = trimesh.intersections.mesh_plane(mesh, (0.0, 0.0, 1.0), (0.0, 0.0, height))  # type: ignore[no-untyped-call]
     return np.asarray(found, dtype=np.float64).reshape(-1, 2, 3)[:, :, :2]
 

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import cast
 
 import numpy as np
-import trimesh
 
 from solver.params import ParameterError
 
@@ -79,6 +78,8 @@ def load_mesh(path: Path, material: str, metres_per_unit: float, pose: Pose = Po
 
     Raises ParameterError for a file that cannot be read, and for one without a triangle of positive area.
     """
+    import trimesh
+
     try:
         mesh = cast(trimesh.Trimesh, trimesh.load(path, force="mesh"))
     except Exception as error:  # trimesh passes on whatever its readers raise

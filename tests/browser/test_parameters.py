@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from explorer.logs.recording_reader import read_recording
 from tests.browser import test_page as shared
 from tests.browser.test_page import SMALL_POUR, positions, simulated_time, slider, state, wait_for
 
@@ -101,6 +102,39 @@ def test_the_scene_file_is_downloaded(page):
     with page.expect_download() as download:
         page.get_by_role("button", name="Scene (TOML)").click()
     assert download.value.suggested_filename == "scene.toml"
+
+
+def test_record_restart_stop_and_download_gives_the_whole_pour(page, tmp_path):
+    def tab(name):
+        page.get_by_role("tab", name=name).click()
+
+    def record(button):
+        page.get_by_role("button", name=button, exact=True).click()
+
+    tab("Pour")
+    wait_for(lambda: state(page) == "ended")
+    tab("Take along")
+    record("Start")
+    page.get_by_text("Recording into").wait_for()
+    press(page, "r")
+    page.get_by_text("(pour 2 of this recording)").wait_for()
+    tab("Pour")
+    wait_for(lambda: state(page) == "ended")
+    end = simulated_time(page)
+    tab("Take along")
+    record("Stop")
+    page.get_by_text("2 pours recorded:").wait_for()
+    with page.expect_download() as download:
+        record("Download")
+    # The pile that lay there before the restart is no more than a moment, in a file of its own.
+    assert download.value.suggested_filename.endswith("_2.rrd")
+    download.value.save_as(tmp_path / "pour.rrd")
+    found = read_recording(tmp_path / "pour.rrd")
+    there = [sum(len(one.at(moment).scale) for one in found.components) for moment in (found.times[0], found.times[-1])]
+    assert 0 < there[0] < 0.2 * there[1]
+    # The page shows milliseconds.
+    assert found.times[-1] == pytest.approx(end, abs=1e-3)
+    assert "at rest" in found.outcome
 
 
 def test_the_console_has_nothing_to_complain_about(page):

@@ -11,11 +11,12 @@ from doe.study import ESTIMATORS
 class FormulaRunner:
     """angle = ``formula(values)`` + noise; a share ``jam`` of the runs jams. ``calls`` counts runs per stage.
 
-    ``others`` gives estimators a formula of their own (with the same noise).
+    ``others`` gives estimators a formula of their own (with the same noise). ``ended``: outcome of the runs that do
+    not jam.
     """
 
-    def __init__(self, formula, sigma=1.0, jam=0.0, others=None):
-        self.formula, self.sigma, self.jam, self.others = formula, sigma, jam, others or {}
+    def __init__(self, formula, sigma=1.0, jam=0.0, others=None, ended="at_rest"):
+        self.formula, self.sigma, self.jam, self.others, self.ended = formula, sigma, jam, others or {}, ended
         self.calls = {}
 
     def run(self, stage, settings):
@@ -37,7 +38,7 @@ class FormulaRunner:
         rng = np.random.default_rng(seed)
         noise = self.sigma * rng.normal()
         angle = self.formula(setting.values) + noise
-        outcome = "jammed" if rng.uniform() < self.jam else "at_rest"
+        outcome = "jammed" if rng.uniform() < self.jam else self.ended
         seen = {name: angle + 0.1 * k * rng.normal() for k, name in enumerate(ESTIMATORS)}
         seen |= {name: formula(setting.values) + noise for name, formula in self.others.items()}
         seen["bulk_density_kg_m3"] = 150.0 + 5.0 * angle + rng.normal()

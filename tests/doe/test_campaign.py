@@ -6,11 +6,13 @@ import json
 import numpy as np
 import pytest
 
-from doe.campaign import STAGES, planned_runs, run_campaign, summary_of_runs
+from doe.campaign import STAGES, run_campaign, summary_of_runs
 from doe.errors import StudyStopped
-from doe.power import smallest_effect
+from doe.power import smallest_effect, smallest_main_effect
 from doe.profile import Profile
 from doe.stages.lines import screening_line
+from doe.stages.pilot import pilot
+from doe.stages.sizing import planned_runs
 from doe.study import load_study
 from doe.target import Target
 from tests.doe.formula_runner import FormulaRunner
@@ -54,6 +56,22 @@ def test_stages_come_in_order_and_make_the_planned_runs(study, campaign):
     assert valid == planned
     assert sum(runner.calls.values()) == summary_of_runs(result)["total"] > sum(planned.values())
     assert summary_of_runs(result)["by_outcome"]["jammed"] > 0
+
+
+def test_the_plan_counts_the_points_of_the_surface_that_is_run(study, monkeypatch):
+    monkeypatch.setattr("doe.stages.sizing.CENTRE_RUNS", 3)
+    runner = FormulaRunner(planted, sigma=0.8)
+    run_campaign(study, PROFILE, runner, BIAS)
+    assert planned_runs(study, PROFILE)["surface"] == runner.calls["surface"] == (12 + 3) * PROFILE.surface_replicates
+
+
+def test_the_pilot_tells_what_the_screening_s_own_design_resolves(study, monkeypatch):
+    monkeypatch.setattr("doe.stages.pilot.SCREENING_ROWS", 12)
+    profile = dataclasses.replace(PROFILE, change_runs=2)
+    fewer = pilot(study, profile, FormulaRunner(planted, sigma=0.8), BIAS)
+    sigma, factors = fewer.noise[study.targets[0].observable].sigma, len(study.factors)
+    assert fewer.resolutions[1].main_effect == smallest_main_effect(sigma, 2, 12)
+    assert fewer.resolutions[1].main_effect_bonferroni == smallest_main_effect(sigma, 2, 12, comparisons=factors)
 
 
 def test_planted_factors_are_found_and_the_others_are_not(campaign):

@@ -31,12 +31,21 @@ def test_the_optimum_hits_the_target_next_to_the_reference():
     assert found.distance == pytest.approx(0.5, abs=1e-5)
 
 
+def test_a_target_that_identifies_every_factor_has_a_solution_and_no_rule():
+    """A hill 24 − 4 (G'² + mu'² + e'²): 23.9 lies within 0.16 half-widths of its top."""
+    found = find_optimum(surface(0.01, 3, (24, 0, 0, 0, 0, 0, 0, -4, -4, -4)), 23.9, [50.0, 0.6, 0.6])
+    assert found.unidentified == ()
+    assert "the solution nearest to the reference" in found.statement
+    assert "rule" not in found.statement
+
+
 def test_a_target_that_depends_on_one_factor_leaves_the_others_unidentified():
     found = find_optimum(surface(0.05, 3, (24, 2, 0, 0, 0, 0, 0, 0, 0, 0)), 25.0, [50.0, 0.6, 0.6])
     assert found.unidentified == ("mu", "e")
     assert found.solution_share[0] < 0.1
     assert found.solution_share[1:] == pytest.approx([1, 1], abs=0.01)
-    assert "does not identify mu, e" in found.statement
+    assert "does not identify mu, e: the model gives it with mu in 0.5 … 0.7, e in 0.55 … 0.65" in found.statement
+    assert "Chosen by rule, nearest to the reference" in found.statement
 
 
 def test_without_noise_the_solution_range_is_that_of_the_plane():

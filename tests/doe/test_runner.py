@@ -1,11 +1,19 @@
 """Settings become pours: seeds, replacement of failed runs, and reuse from the store."""
 
+import dataclasses
+from contextlib import closing
+
 import numpy as np
 import pytest
+import trimesh
 
 from doe.runner import TRIES, PourRunner, Run, Setting, no_pile_shares, responses, seed_of
-from doe.store import Store
+from doe.store import Store, StoreError
 from solver import load_material, with_values
+from solver.observables import REGISTRY, Observable, Value
+from solver.rigs import Funnel
+from solver.shape import Solid
+from tests.solver.observables.made_up import empty_pile, record_of
 
 TINY = {"body.spheres": "coarse", "rig.mass": "1.5g", "insertion.rate": "100g/s"}
 
@@ -64,3 +72,46 @@ def test_pours_are_stored_reused_and_replaced(tmp_path):
     more = PourRunner(scene, store, "test", 1, tries=TRIES + 1).run("stage", settings)
     assert [run.attempt for run in more[1]] == list(range(TRIES + 1))
     assert [run.reused for run in more[1]] == [True] * TRIES + [False]
+
+
+def never(queue, room):
+    """In place of pours, where none may be run."""
+    raise AssertionError(f"{len(queue)} pours were asked for")
+
+
+@pytest.mark.usefixtures("taichi")
+def test_a_new_observable_is_read_off_all_stored_pours_without_pouring(tmp_path, monkeypatch):
+    scene = with_values(load_material("sunflower_extract"), TINY)
+    with closing(Store(tmp_path / "runs.sqlite")) as store:
+        settings = [Setting("good", {}, 3), Setting("rough", {"pair.seed.seed.static_friction": 0.9}, 2)]
+        first = PourRunner(scene, store, "test", 1).run("stage", settings)
+        poured = sum(len(runs) for runs in first)
+
+        heaviest = Observable("heaviest_kg", "kg", "", lambda record: Value(record.bodies.mass.max(), "kg"), "record")
+        monkeypatch.setitem(REGISTRY, heaviest.name, heaviest)
+        monkeypatch.setattr(Funnel, "observables", (*Funnel.observables, heaviest.name))
+        again = PourRunner(scene, store, "test", 1, pours=never).run("stage", settings)
+        assert all(run.reused for runs in again for run in runs)
+        flat = ([run for runs in rows for run in runs] for rows in (again, first))
+        for run, other in zip(*flat, strict=True):
+            assert run.observables["heaviest_kg"] == pytest.approx(max(body.mass for body in scene.bodies))
+            assert {name: run.observables[name] for name in other.observables} == other.observables
+        assert [run.observables.keys() >= {"heaviest_kg"} for run in store.runs()] == [True] * poured
+
+
+def test_a_mesh_that_is_changed_while_it_is_poured_ends_the_study(tmp_path):
+    """Which of the two was poured nobody can say, so it is kept under neither."""
+    mesh = tmp_path / "grain.stl"
+    trimesh.creation.box((9e-3, 7e-3, 6e-3)).export(mesh)
+    scene = with_values(load_material("sunflower_extract"), TINY)
+    bodies = tuple(dataclasses.replace(body, shape=Solid("mesh", file=str(mesh))) for body in scene.bodies)
+    scene = dataclasses.replace(scene, bodies=bodies)
+
+    def changed(queue, room):
+        trimesh.creation.box((9e-3, 7e-3, 7e-3)).export(mesh)
+        yield queue.popleft(), record_of(empty_pile(), np.zeros(1), np.zeros(1), poured_mass=1.0)
+
+    with closing(Store(tmp_path / "runs.sqlite")) as store:
+        with pytest.raises(StoreError, match="stage, good: a mesh file was changed while it was poured; begin again"):
+            PourRunner(scene, store, "test", 1, pours=changed).run("stage", [Setting("good", {}, 1)])
+        assert list(store.runs()) == []

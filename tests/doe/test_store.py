@@ -1,29 +1,46 @@
-"""The store keeps every run and finds it again by what was run, and by nothing else."""
+"""The store keeps every pour raw and finds it again by what was poured; readings are read off it, never poured."""
 
 import csv
 import dataclasses
 import io
+import multiprocessing as mp
+import sqlite3
+from contextlib import closing
 
 import pytest
 
-from doe.store import Store, StoredRun, StoreError, run_key, write_csv
-from solver import load_material, with_values
+from doe import store as module
+from doe.store import READINGS, RIG, Store, StoredRun, StoreError, observables_in_rig, observables_of, write_csv
+from solver import PHYSICS
+from tests.doe import golden_readings
 
+RAW = (golden_readings.RAW_POURS / "trefoils.npz").read_bytes()
 RUN = StoredRun(
     key="k1",
     study="s",
     stage="pilot",
     label="reference",
     seed=7,
-    code_version="0+abc",
+    physics=PHYSICS,
     outcome="at_rest",
     message="",
-    parameters={"rig.mass": 0.03, "body.spheres": "coarse"},
+    parameters={RIG: "funnel", "rig.mass": 0.03, "body.spheres": "coarse"},
+    readings=READINGS,
     observables={"angle_of_repose_deg": 21.5, "residual_mass_kg": None},
     dt=1e-6,
     steps=10,
     wall_s=0.5,
+    raw=RAW,
 )
+NEVER = None
+"""In place of a reader that must not be asked."""
+
+
+@pytest.fixture
+def store(tmp_path):
+    with closing(Store(tmp_path / "runs.sqlite")) as opened:
+        opened.add(RUN)
+        yield opened
 
 
 def test_a_run_comes_back_as_it_went_in(tmp_path):
@@ -42,14 +59,79 @@ def test_two_connections_see_each_others_runs(tmp_path):
     assert two.find("k2") is None
 
 
-def test_the_key_changes_with_anything_that_changes_the_bits():
-    scene = load_material("sunflower_extract")
-    key = run_key(scene, 1, "v")
-    assert key == run_key(load_material("sunflower_extract"), 1, "v")
-    assert key != run_key(scene, 2, "v")
-    assert key != run_key(scene, 1, "w")
-    assert key != run_key(with_values(scene, {"pair.seed.seed.restitution": 0.571}), 1, "v")
-    assert key != run_key(with_values(scene, {"body.spheres": "coarse"}), 1, "v")
+def test_what_is_kept_is_not_read_again(store):
+    assert store.read(RUN, ("angle_of_repose_deg",), NEVER) is RUN
+
+
+def test_a_new_name_is_read_off_the_raw_pour_and_kept_beside_the_others(store):
+    """No pour: the reader gets the record that was stored."""
+    found = store.read(RUN, ("angle_of_repose_deg", "widest_m"), lambda record: {"widest_m": record.pile.mass.size})
+    assert found.observables == RUN.observables | {"widest_m": 70.0}
+    assert store.find("k1").observables == found.observables
+    assert store.read(store.find("k1"), ("widest_m", "residual_mass_kg"), NEVER).observables == found.observables
+
+
+def test_readings_of_an_older_version_are_replaced(store, monkeypatch):
+    monkeypatch.setattr(module, "READINGS", READINGS + 1)
+    found = store.read(RUN, ("angle_of_repose_deg",), observables_of)
+    assert found.readings == READINGS + 1
+    assert found.observables.keys() == set(observables_in_rig(RUN))
+    assert found.observables["angle_of_repose_deg"] != 21.5
+    kept = store.find("k1")
+    assert (kept.readings, kept.observables, kept.raw) == (found.readings, found.observables, RAW)
+
+
+def test_what_cannot_be_read_is_none(store):
+    assert store.read(RUN, ("gone",), lambda record: {"gone": float("nan")}).observables["gone"] is None
+
+
+def test_a_raw_pour_that_is_damaged_is_one_clear_line(store):
+    with pytest.raises(StoreError, match=r"runs\.sqlite: run k1: not a raw pour"):
+        store.read(dataclasses.replace(RUN, raw=RAW[:500]), ("new",), observables_of)
+
+
+def test_a_store_of_an_older_physics_stays_readable_and_nothing_is_poured_into_it(tmp_path, store, monkeypatch):
+    monkeypatch.setattr(module, "PHYSICS", PHYSICS + 1)
+    store.close()
+    with pytest.raises(StoreError, match=rf"runs\.sqlite: a store of physics {PHYSICS}, and .* physics {PHYSICS + 1};"):
+        Store(tmp_path / "runs.sqlite")
+    with closing(Store(tmp_path / "runs.sqlite", pouring=False)) as old:
+        assert old.version.startswith(f"old, of physics {PHYSICS}; this program pours by physics {PHYSICS + 1}")
+        (run,) = old.runs()
+        found = old.read(run, ("angle_of_repose_cone_deg",), observables_of)
+        assert found.observables["angle_of_repose_cone_deg"] == pytest.approx(7.1, abs=0.05)
+        # It is read, and left as it is.
+        assert old.find("k1").observables == RUN.observables
+    monkeypatch.undo()
+    with closing(Store(tmp_path / "runs.sqlite")) as again:
+        assert again.find("k1") is not None
+
+
+def test_a_store_from_before_raw_pours_is_listed_as_old(tmp_path):
+    path = tmp_path / "runs.sqlite"
+    with closing(sqlite3.connect(path)) as database, database:
+        database.execute(
+            "CREATE TABLE runs (key TEXT PRIMARY KEY, created REAL NOT NULL, study TEXT NOT NULL, stage TEXT NOT NULL,"
+            " label TEXT NOT NULL, seed INTEGER NOT NULL, code_version TEXT NOT NULL, outcome TEXT NOT NULL,"
+            " message TEXT NOT NULL, parameters TEXT NOT NULL, observables TEXT NOT NULL, dt REAL NOT NULL,"
+            " steps INTEGER NOT NULL, wall_s REAL NOT NULL)"
+        )
+        row = ("k", 1.0, "s", "pilot", "reference", 7, "0+abc", "at_rest", "", "{}", '{"a": 21.5}', 1e-6, 10, 0.5)
+        database.execute(f"INSERT INTO runs VALUES ({', '.join('?' * len(row))})", row)
+    with pytest.raises(StoreError, match="a store of physics 0"):
+        Store(path)
+    with closing(Store(path, pouring=False)) as old:
+        assert old.version.startswith("old, of a program that kept no raw pours")
+        (run,) = old.runs()
+        assert (run.key, run.observables, run.physics, run.raw) == ("k", {"a": 21.5}, 0, b"")
+        assert old.read(run, ("b",), NEVER) is run
+
+
+def test_a_store_of_a_newer_program_is_refused_by_name(tmp_path):
+    with closing(sqlite3.connect(tmp_path / "r")) as database, database:
+        database.execute("PRAGMA user_version = 9")
+    with pytest.raises(StoreError, match=r"r: a store of format 9, made by a newer version .*; allowed: up to 1"):
+        Store(tmp_path / "r")
 
 
 def test_a_file_that_is_no_store_is_one_clear_line(tmp_path):
@@ -71,3 +153,40 @@ def test_csv_has_a_column_per_parameter_and_observable(tmp_path):
     assert rows[1]["apex_height_m"] == "0.02"
     assert rows[1]["rig.mass"] == "0.03"
     assert [run.key for run in store.runs("other")] == ["k2"]
+
+
+def test_what_is_kept_is_not_overwritten_by_another_reader(store):
+    """A reader that knows of a misread scale was here before."""
+    found = store.read(RUN, ("new_m",), lambda record: {"angle_of_repose_deg": 1.0, "new_m": 2.0})
+    assert found.observables == RUN.observables | {"new_m": 2.0}
+
+
+def test_another_program_s_database_is_left_alone(tmp_path):
+    path = tmp_path / "photos.sqlite"
+    with closing(sqlite3.connect(path)) as database, database:
+        database.execute("CREATE TABLE pictures (name TEXT)")
+    before = path.read_bytes()
+    for pouring in (True, False):
+        with pytest.raises(StoreError, match=r"photos\.sqlite: is the database of another program .*'pictures'"):
+            Store(path, pouring=pouring)
+    assert path.read_bytes() == before
+
+
+def test_what_the_database_complains_of_later_is_one_line(store, tmp_path):
+    with closing(sqlite3.connect(tmp_path / "runs.sqlite")) as database, database:
+        database.execute("DROP TABLE pours")
+    for ask in (lambda: store.find("k1"), lambda: list(store.runs()), lambda: store.add(RUN)):
+        with pytest.raises(StoreError, match=r"runs\.sqlite: cannot be used as a store of runs \(no such table"):
+            ask()
+
+
+def opened(path):
+    Store(path).close()
+    return True
+
+
+def test_many_processes_may_make_a_store_at_once(tmp_path):
+    """Four at a time, six times: whoever comes second waits, and none fails."""
+    with mp.get_context("spawn").Pool(4) as pool:
+        for k in range(6):
+            assert pool.map(opened, [tmp_path / f"{k}.sqlite"] * 4, chunksize=1) == [True] * 4

@@ -118,6 +118,8 @@ def test_bodies_touched_by_a_factor(path, bodies):
         (lambda t: t["profile"]["quick"].update(pilot_runs=True), "pilot_runs: True"),
         (lambda t: t["profile"]["full"].update(resolution_deg=0.0), r"resolution_deg: 0 must be positive"),
         (lambda t: t["profile"].update(quick=3), "quick: a table is needed"),
+        (lambda t: t["profile"].update({"a/b": {}}), r"profile: 'a/b' is no name; allowed: .* no / and no"),
+        (lambda t: t["profile"].update({"": {}}), "profile: '' is no name; allowed: 1 to 60 characters"),
     ],
 )
 def test_bad_study_files_say_what_is_allowed(change, says):

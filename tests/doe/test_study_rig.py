@@ -7,9 +7,8 @@ import pytest
 
 from doe.errors import StudyFileError
 from doe.runner import Run
-from doe.store import run_key
 from doe.study import study_from, with_profile
-from solver import ParameterError, value
+from solver import ParameterError, pour_key, value
 from tests.doe.test_study import PATH, TABLE
 
 
@@ -65,6 +64,6 @@ def test_a_drum_that_ran_for_its_time_is_a_valid_run():
 def test_runs_in_different_rigs_have_different_keys():
     lifted = study_in({"name": "lifting_cylinder"}, "angle_of_repose_deg").scene
     funnel = study_in({"name": "funnel"}, "angle_of_repose_deg").scene
-    assert run_key(lifted, 1, "v") != run_key(funnel, 1, "v")
+    assert pour_key(lifted, 1) != pour_key(funnel, 1)
     faster = dataclasses.replace(lifted, rig=dataclasses.replace(lifted.rig, lift_speed=0.03))
-    assert run_key(lifted, 1, "v") != run_key(faster, 1, "v")
+    assert pour_key(lifted, 1) != pour_key(faster, 1)

@@ -1,11 +1,16 @@
-"""Finished studies with a planted truth, from every stage significant to nothing found, for the tests of the report."""
+"""Finished studies with a planted truth, from every stage significant to nothing found, for the tests of the report.
+
+And what a reader sees of a report: the text of its page, the tables of its Markdown.
+"""
 
 import dataclasses
 import json
+import re
 
 from doe.campaign import run_campaign
 from doe.profile import Profile
 from doe.study import load_study
+from explorer.report import report_markdown
 from explorer.study.run import result_of
 from tests.doe.formula_runner import FormulaRunner
 
@@ -49,6 +54,7 @@ CASES = {
     ),
     "missing row": (STUDY, PROFILE, RowWithoutPile(planted, sigma=0.8)),
     "no assumptions, no scan": (BARE, PROFILE, FormulaRunner(planted, sigma=0.8)),
+    "ended measured": (BARE, PROFILE, FormulaRunner(planted, sigma=0.8, jam=0.05, ended="measured")),
 }
 
 
@@ -57,3 +63,23 @@ def result_of_case(name):
     study, profile, runner = CASES[name]
     result = result_of(study, profile, run_campaign(study, profile, runner, BIAS), 912.5)
     return json.loads(json.dumps(result, allow_nan=False))
+
+
+def visible(page):
+    """Text of a page as a reader sees it."""
+    return re.sub(r"<[^>]+>", " ", re.sub(r"<(script|style)[^>]*>.*?</\1>", " ", page, flags=re.DOTALL))
+
+
+def tables_in(markdown):
+    """Every table of a Markdown text as rows of unescaped cells, by its first header cells."""
+    found = {}
+    for block in markdown.split("\n\n"):
+        if block.startswith("|"):
+            lines = [re.split(r"(?<!\\)\|", line)[1:-1] for line in block.splitlines()]
+            rows = [[re.sub(r"\\(.)", r"\1", cell.strip()) for cell in line] for line in lines]
+            found.setdefault(tuple(rows[0]), rows[2:])
+    return found
+
+
+def table(result, *start):
+    return next(rows for header, rows in tables_in(report_markdown(result)).items() if header[: len(start)] == start)

@@ -11,6 +11,20 @@ from solver import asset_path, load_material
 SCENE = load_material("sunflower_extract")
 
 
+OWN_PROFILES = ("first look", "thesis-2", "fine")
+
+
+def study_with_own_profiles(folder):
+    """The shipped study with other names for its profiles, as a file in ``folder``."""
+    text = asset_path("studies", "sunflower_extract").read_text(encoding="utf-8")
+    for shipped, own in zip(("quick", "standard", "full"), OWN_PROFILES, strict=True):
+        assert f"[profile.{shipped}]" in text
+        text = text.replace(f"[profile.{shipped}]", f'[profile."{own}"]')
+    path = folder / "my study.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
 class FakeStudy:
     """Keeps what it was asked; its status and its folders are what the test says."""
 

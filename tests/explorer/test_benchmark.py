@@ -1,5 +1,6 @@
 """The benchmark's table, its figures from known measurements, and a short real run of each of our cases."""
 
+import json
 import math
 
 import numpy as np
@@ -75,6 +76,41 @@ def test_a_bed_keeps_its_spheres_in_contact():
     run = measure_bed(bed, 1)
     assert run.contacts == 2 * n * (n - 1) + n * n + 4 * n  # between spheres, with the floor, with the walls
     assert SPACING > 2 * RADIUS
+
+
+@pytest.mark.parametrize(("failure", "code"), [(KeyboardInterrupt, 130), (RuntimeError("no room"), 1)])
+def test_a_run_that_stops_keeps_what_it_has_measured(monkeypatch, tmp_path, failure, code):
+    kept, seen = tmp_path / "bench.json", []
+
+    def stops(options):
+        seen.append(json.loads(kept.read_text()))
+        raise failure
+        yield
+
+    cases = {"pour": lambda options: iter(TWO_BEDS[:2]), "bed": stops, "batch": lambda options: seen.append("batch")}
+    monkeypatch.setattr("explorer.benchmark.CASES", cases)
+    result = CliRunner().invoke(app, ["bench", "--json", str(kept)])
+    assert result.exit_code == code
+    found = json.loads(kept.read_text())
+    # Kept before the next case begins; and nothing is run after the one that stopped.
+    assert seen == [found]
+    assert (found["complete"], [row["engine"] for row in found["measurements"]]) == (
+        False,
+        ["ours, nothing sleeps", "liggghts 3.8"],
+    )
+    assert list(tmp_path.iterdir()) == [kept]
+    lines = result.stdout.splitlines()
+    assert [line.split()[-1] for line in lines[1:3]] == ["2.00", "1.00"]
+    assert lines[-1] == "incomplete: the run was stopped; measured so far: 2"
+
+
+def test_a_run_to_its_end_is_complete(monkeypatch, tmp_path):
+    monkeypatch.setattr("explorer.benchmark.CASES", {"bed": lambda options: iter(TWO_BEDS)})
+    result = CliRunner().invoke(app, ["bench", "--json", str(tmp_path / "bench.json")])
+    assert result.exit_code == 0
+    found = json.loads((tmp_path / "bench.json").read_text())
+    assert (found["complete"], len(found["measurements"])) == (True, 3)
+    assert "incomplete" not in result.stdout
 
 
 @pytest.mark.parametrize(

@@ -31,6 +31,40 @@ def test_the_grains_of_the_template_come_to_rest(taichi, tmp_path):
     assert json.loads(poured.stdout)["outcome"] == "at_rest"
 
 
+@pytest.mark.parametrize("name", ["lentil", "lentil_study"])
+def test_a_study_is_named_with_or_without_its_ending(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = explorer("new", "study", name)
+    assert result.stdout.splitlines() == [
+        "wrote lentil.toml",
+        "wrote lentil_study.toml",
+        "try it: explorer calibrate --headless --study lentil_study.toml --profile quick --out results/lentil",
+    ]
+    assert load_study("lentil_study.toml").scene.title == "lentil"
+    # A second one would have to overwrite the first.
+    assert refused(explorer("new", "study", name)) == "lentil_study.toml: exists already; choose another name"
+
+
+def test_a_material_in_place_of_a_study_is_told_by_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert explorer("new", "material", "lentil").exit_code == 0
+    for command in (("calibrate", "--headless"), ("serve",)):
+        line = refused(explorer(*command, "--study", "lentil.toml"))
+        assert line.startswith("lentil.toml is a material, not a study; ")
+        assert "`explorer new study lentil`" in line
+    assert [path.name for path in tmp_path.iterdir()] == ["lentil.toml"]
+
+
+def test_a_file_that_is_not_a_material_is_not_taken_for_one(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert explorer("new", "study", "lentil").exit_code == 0
+    (tmp_path / "lentil_study.toml").rename(tmp_path / "bean.toml")
+    before = (tmp_path / "bean.toml").read_text()
+    assert "bean.toml is there and is not a material" in refused(explorer("new", "study", "bean"))
+    assert (tmp_path / "bean.toml").read_text() == before
+    assert not (tmp_path / "bean_study.toml").exists()
+
+
 def test_material_can_become_a_mesh(tmp_path):
     """The commented line of the template, uncommented, with a user's own STL beside it."""
     assert explorer("new", "material", "bolts", "--out", tmp_path).exit_code == 0

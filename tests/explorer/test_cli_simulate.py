@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from explorer.files.run_result import result_of
+from explorer.logs.recording import FRAME_INTERVAL
+from explorer.logs.recording_reader import read_recording
 from explorer.scene.file import load_scene, with_settings
-from solver import Outcome, run_pour
+from solver import Outcome, run_pour, run_pours
 from solver.observables import Value, observe
 from tests.explorer.command_line import TINY, explorer, settings
 
@@ -57,7 +59,7 @@ def test_the_numbers_are_the_solver_s(simulation, record):
         assert (entry["mean"], entry["sd"], entry["n"]) == (None, None, 0)
     assert None in {entry["value"] for entry in printed["observables"].values()}
     assert printed["parameters"]["rig.mass"] == {"value": 0.001, "unit": "kg"}
-    assert set(printed["versions"]) == {"repose-explorer", "taichi", "numpy", "python"}
+    assert set(printed["versions"]) == {"repose-explorer", "physics", "taichi", "numpy", "python"}
     assert printed["wall_s"] > 0.0
 
 
@@ -123,6 +125,27 @@ def test_a_run_that_breaks_off_leaves_no_folder(failure, code, tmp_path, monkeyp
     result = explorer("simulate", "funnel", "--out", tmp_path / "run")
     assert result.exit_code == code
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.usefixtures("taichi")
+def test_the_recordings_of_a_run_that_is_interrupted_are_named(tmp_path, monkeypatch):
+    def interrupted(jobs, **options):
+        yield next(pours(jobs, **options))
+        raise KeyboardInterrupt
+
+    pours = run_pours
+    monkeypatch.setattr("solver.run.run_pours", interrupted)
+    result = explorer("simulate", "funnel", *settings(TINY), "--replicates", 2, "--record", tmp_path / "pour.rrd")
+    assert result.exit_code == 130
+    head, *files = result.stdout.splitlines()[-3:]
+    assert head == "2 pours recorded:"
+    # TINY ends after 0.1 s; a pour that is cut off lacks less than one interval between frames.
+    for k, line in enumerate(files, start=1):
+        path, length = line.split(": ")
+        assert path == str(tmp_path / f"pour_{k}.rrd")
+        times = read_recording(tmp_path / f"pour_{k}.rrd").times
+        assert length == f"{times[-1] - times[0]:.3f} s, from {times[0]:.3f} to {times[-1]:.3f} s"
+        assert 0.1 - FRAME_INTERVAL < times[-1] < 0.1 + FRAME_INTERVAL
 
 
 def test_an_empty_folder_is_filled(record, tmp_path, monkeypatch):

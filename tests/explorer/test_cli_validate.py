@@ -1,19 +1,15 @@
-"""``explorer validate-diagnosis``: what it says where it cannot run, and before it has anything to say."""
+"""``explorer validate-diagnosis``: the table of the sets that are there, and where its code lives."""
 
+import os
+import shutil
+import subprocess
+import sys
+import tomllib
 from pathlib import Path
 
-from explorer.commands import validate_diagnosis
 from tests.explorer.command_line import explorer
 
-
-def test_without_a_checkout_one_line_says_so(monkeypatch, tmp_path):
-    monkeypatch.setattr(validate_diagnosis, "__file__", str(tmp_path / "site" / "explorer" / "commands" / "one.py"))
-    result = explorer("validate-diagnosis", "--out", str(tmp_path / "out"))
-    assert result.exit_code == 2
-    assert result.stderr.strip() == (
-        f"error: validate-diagnosis: {tmp_path / 'site'} has no tests/blind; run it from a source checkout"
-    )
-    assert not (tmp_path / "out").exists()
+ROOT = Path(__file__).parents[2]
 
 
 def test_sets_that_are_there_are_only_counted(tmp_path):
@@ -26,3 +22,21 @@ def test_sets_that_are_there_are_only_counted(tmp_path):
     assert result.exit_code == 0
     assert "an effect blamed where none is: ≤ 2 %; found 0/2 = 0.0 %" in result.stdout
     assert not Path(tmp_path / "none.sqlite").exists()
+
+
+def test_an_installed_program_can_run_it(tmp_path):
+    """All that the command imports, and the declared model, lie in the packages of a wheel."""
+    packages = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    for package in packages["tool"]["hatch"]["build"]["targets"]["wheel"]["packages"]:
+        shutil.copytree(ROOT / package, tmp_path / package)
+    shutil.copytree(ROOT / "assets", tmp_path / "solver/assets", ignore=shutil.ignore_patterns("pictures"))
+    command = [sys.executable, "-m", "explorer", "validate-diagnosis", "--minutes", "0", "--store", "s.sqlite"]
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    result = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert "0 data sets judged" in result.stdout
+    program = "from doe.validation import laboratory; laboratory.declared_model(); print(laboratory.__file__)"
+    result = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
+    )
+    assert result.stdout.startswith(str(tmp_path))

@@ -101,13 +101,23 @@ def calibrations(tmp_path_factory):
 def test_a_calibration_is_exported_at_its_optimum(calibrations, tmp_path):
     folder = calibrations["planted"]
     result = explorer("export", folder, tmp_path / "edem", "--to", "edem")
-    assert (result.exit_code, result.stderr) == (0, ""), result.output
+    assert result.exit_code == 0, result.output
+    # The one target leaves all three factors open.
+    assert result.stderr.startswith(f"note: {folder}/result.json: the target does not identify every factor: ")
+    assert result.stderr.count("(chosen by rule: ") == 3
     values = json.loads((folder / "result.json").read_text())["optimum"]["values"]
     assert "pair.seed.seed.static_friction" in values
     with (tmp_path / "edem" / "interactions.csv").open(newline="", encoding="utf-8") as file:
         seeds = next(csv.DictReader(file))
     assert float(seeds["static_friction"]) == pytest.approx(values["pair.seed.seed.static_friction"], rel=1e-6)
     assert float(seeds["static_friction"]) != 0.57
+
+
+def test_an_identified_optimum_is_exported_without_a_note(calibrations, tmp_path):
+    result = json.loads((calibrations["planted"] / "result.json").read_text())
+    result["optimum"]["single"]["unidentified"] = []
+    (tmp_path / "result.json").write_text(json.dumps(result))
+    assert explorer("export", tmp_path, tmp_path / "edem", "--to", "edem").stderr == ""
 
 
 def test_an_optimum_in_noise_is_exported_with_a_note(calibrations, tmp_path):

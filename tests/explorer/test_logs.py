@@ -3,7 +3,7 @@
 import signal
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from explorer.live.frames import Frame
 from explorer.live.messages import SessionState, Status
 from explorer.logs.pour_log import PourLog
 from explorer.logs.pour_recorder import recorder_of
+from explorer.logs.recording import RecordedPour, recorded_lines
 from explorer.logs.recording_reader import read_recording
 from explorer.logs.session_recorder import SessionRecorder
 from explorer.scene.file import load_scene, with_settings
@@ -285,6 +286,54 @@ def test_a_pour_that_goes_on_with_other_parameters_after_going_back_has_a_file_o
     assert len(rows(tmp_path / "live.rrd", "/world/bodies/seed", "InstancePoses3D:translations")) == 4
     assert len(rows(tmp_path / "live_2.rrd", "/world/bodies/seed", "InstancePoses3D:translations")) == 2
     assert texts(tmp_path / "live_2.rrd") == ["brought back to 0.250 s, and on with other parameters"]
+
+
+def test_the_newest_frame_of_every_pour_is_recorded(scene, tmp_path):
+    """Although it comes within 20 ms of the one before, in which none is due: a file has its whole length."""
+    recorder = SessionRecorder(tmp_path / "live.rrd")
+    for generation, times in ((1, (0.0, 0.1, 0.11)), (2, (0.0, 0.05, 0.0625, 0.0625))):
+        for time in times:
+            recorder.take(frame(1, generation, time), status(scene, generation, time=time))
+    recorder.close()
+    first, second = recorder.pours
+    assert read_recording(first.path).times == pytest.approx([0.0, 0.1, 0.11])
+    assert read_recording(second.path).times == pytest.approx([0.0, 0.05, 0.0625])
+    assert (first.length, second.length) == ("0.110 s, from 0.000 to 0.110 s", "0.062 s, from 0.000 to 0.062 s")
+
+
+def test_the_last_frame_comes_after_the_word_that_the_pour_has_ended(scene, tmp_path):
+    recorder = SessionRecorder(tmp_path / "live.rrd")
+    recorder.take(frame(1, 1, 0.1), status(scene, 1, time=0.1))
+    ended = replace(status(scene, 1, time=0.115), state=SessionState.ENDED, outcome=Outcome.AT_REST)
+    recorder.take(frame(2, 1, 0.11), ended)
+    recorder.take(frame(3, 1, 0.115), ended)
+    recorder.close()
+    assert read_recording(tmp_path / "live.rrd").times == pytest.approx([0.1, 0.11, 0.115])
+
+
+def test_a_file_of_another_recording_is_passed_over(scene, tmp_path):
+    (tmp_path / "live_2.rrd").write_text("mine")
+    recorder = SessionRecorder(tmp_path / "live.rrd")
+    for generation in (1, 2, 3):
+        recorder.take(frame(1, generation, 0.0), status(scene, generation))
+    recorder.close()
+    assert [pour.path.name for pour in recorder.pours] == ["live.rrd", "live_3.rrd", "live_4.rrd"]
+    assert (tmp_path / "live_2.rrd").read_text() == "mine"
+
+
+def test_what_a_recording_holds_is_told_in_words(tmp_path):
+    empty = RecordedPour(tmp_path / "a.rrd")
+    moment = RecordedPour(tmp_path / "b.rrd").with_frame(1.911)
+    pour = moment.with_frame(1.95)
+    assert recorded_lines([empty, moment, pour]) == [
+        "3 pours recorded:",
+        f"{tmp_path}/a.rrd: no body yet",
+        f"{tmp_path}/b.rrd: a single moment, at 1.911 s",
+        f"{tmp_path}/b.rrd: 0.039 s, from 1.911 to 1.950 s",
+    ]
+    assert [one.plays for one in (empty, moment, moment.with_frame(1.92), pour)] == [False, False, False, True]
+    assert recorded_lines([pour])[0] == "1 pour recorded:"
+    assert recorded_lines([]) == ["nothing was recorded: no pour had begun"]
 
 
 def test_a_session_s_outcome_is_recorded_once(scene, tmp_path):

@@ -12,7 +12,7 @@ from scipy import stats
 from doe.campaign import run_campaign
 from doe.partial import PartialStages
 from explorer.report.diagnosis_plots import diagnosis_plots
-from explorer.report.figures.effects import errors_at_hand, pareto_against
+from explorer.report.figures.effects import all_effects, errors_at_hand, pareto_against
 from explorer.report.figures.main_effects import main_effects
 from explorer.report.figures.model import chosen_point, model_of
 from explorer.report.figures.noise import noise_of_estimators
@@ -20,6 +20,7 @@ from explorer.report.figures.profiler import prediction, profiler
 from explorer.report.figures.style import short_rows, stacked
 from explorer.report.figures.surface import residual_quantiles
 from explorer.report.figures.surface_3d import height_over, solutions
+from explorer.report.findings import factor_effects
 from explorer.report.study_plots import study_plots
 from explorer.study.partial_result import PartialResult
 from explorer.study.process import PARTIAL
@@ -119,6 +120,22 @@ def test_main_effects_differ_by_the_effect(result):
     assert np.mean(spec["data"][0]["y"]) == pytest.approx(analysis["mean"])
 
 
+@pytest.mark.parametrize("case", ["planted", "no assumptions, no scan"])
+def test_each_mark_of_the_effects_chart_has_its_own_entry_in_the_legend(case):
+    found = reported_studies.result_of_case(case)
+    traces = all_effects(found)["data"]
+    # plotly gives the legend the symbol of a trace's first point, so a trace has one symbol for all its points.
+    symbols = {trace["name"]: trace["marker"]["symbol"] for trace in traces if trace.get("showlegend", True)}
+    assert all(isinstance(symbol, str) for symbol in symbols.values())
+    assert len(set(symbols.values())) == len(symbols) == len(traces)
+    drawn = {x: trace["marker"]["symbol"] for trace in traces for x in trace["x"]}
+    for name, part in (("factors", found["screening"]), ("assumptions about the set-up", found["assumptions"])):
+        untestable = {entry["factor"] for entry in part["not_testable"]} if part else set()
+        for effect in factor_effects(part["analysis"]) if part else []:
+            meaning = f"{name}, not testable" if effect["name"] in untestable else name
+            assert drawn[effect["effect"]] == symbols[meaning]
+
+
 def test_the_model_of_a_result_is_the_fitted_one(result):
     model, fitted = model_of(result, 0), result["surface"]["models"][0]
     at = np.array(fitted["points"])
@@ -157,7 +174,7 @@ def test_the_solution_surface_lies_where_the_model_gives_the_target(result):
     sheet = solutions(result, 0)["data"][0]
     assert sheet["isomin"] == sheet["isomax"] == result["study"]["targets"][0]["mean"]
     assert min(sheet["value"]) < sheet["isomin"] < max(sheet["value"])
-    chosen = next(trace for trace in solutions(result, 0)["data"] if trace["name"] == "optimum")
+    chosen = next(trace for trace in solutions(result, 0)["data"] if trace["name"] == "chosen by rule")
     place = [trace[0] for trace in (chosen["x"], chosen["y"], chosen["z"])]
     near = np.linalg.norm(
         (np.column_stack([sheet["x"], sheet["y"], sheet["z"]]) - place)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import sys
 import time
 
@@ -16,6 +17,7 @@ from explorer.study.edit import StudyEdits
 from explorer.study.process import CalibrationProcess
 from solver import asset_path
 from tests.explorer.background import only_folder, wait_for
+from tests.explorer.study_panel_at_hand import study_with_own_profiles
 
 PROGRAM = """
 import json, pathlib, sys, time
@@ -37,9 +39,10 @@ BEHAVIOUR
 def study(tmp_path, behaviour=""):
     program = tmp_path / "program.py"
     program.write_text(PROGRAM.replace("BEHAVIOUR", behaviour))
-    return CalibrationProcess(
-        tmp_path / "my study.toml", tmp_path / "out", tmp_path / "runs.sqlite", (sys.executable, str(program))
-    )
+    file = tmp_path / "my study.toml"
+    if not file.exists():
+        shutil.copy(asset_path("studies", "sunflower_extract"), file)
+    return CalibrationProcess(file, tmp_path / "out", tmp_path / "runs.sqlite", (sys.executable, str(program)))
 
 
 def test_a_study_runs_to_its_end_at_lower_priority(tmp_path):
@@ -103,12 +106,30 @@ def test_above_the_error_limit_is_a_finished_study(tmp_path):
 
 def test_what_cannot_be_started_or_resumed(tmp_path):
     process = study(tmp_path)
-    with pytest.raises(BackgroundError, match="profile: 'fast' is not one of quick, standard, full"):
+    with pytest.raises(ValueError, match=r"my study\.toml: profile: 'fast' is not one of quick, standard, full$"):
         process.start("fast")
     with pytest.raises(BackgroundError, match="nothing to resume"):
         process.resume()
     process.cancel()
     assert process.status().state == "idle"
+
+
+def test_profiles_are_those_of_the_study_file_whatever_their_names(tmp_path):
+    study_with_own_profiles(tmp_path)
+    process = study(tmp_path, "time.sleep(0 if '--resume' in arguments else 60)")
+    with pytest.raises(ValueError, match=r"'quick' is not one of first look, thesis-2, fine$"):
+        process.start("quick")
+    process.start("first look")
+    wait_for(lambda: process.status().done == 3)
+    process.queue("thesis-2", StudyEdits(target={"mean": 26.0}))
+    assert process.waiting() == ("thesis-2, changed",)
+    process.clear_queue()
+    process.close()
+    later = study(tmp_path, "pass")
+    later.resume()
+    wait_for(lambda: later.status().state == "finished")
+    arguments = json.loads((only_folder(tmp_path) / "arguments.json").read_text())
+    assert arguments[arguments.index("--profile") + 1] == "first look"
 
 
 def test_a_later_page_resumes_the_newest_study_that_has_no_result(tmp_path):

@@ -12,6 +12,7 @@ from solver import asset_path
 from tests.doe.formula_runner import FormulaRunner
 from tests.doe.test_campaign import planted
 from tests.explorer.command_line import explorer
+from tests.explorer.study_panel_at_hand import study_with_own_profiles
 
 
 class Formula(FormulaRunner):
@@ -114,7 +115,7 @@ def test_a_study_that_cannot_be_analysed_ends_in_one_line(tmp_path, monkeypatch)
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (("--profile", "huge"), "quick, standard, full"),
+        (("--profile", "huge"), "sunflower_extract.toml: profile: 'huge' is not one of quick, standard, full\n"),
         (("--study", "nowhere.toml"), "sunflower_extract"),
         (("--fail-above", "-1"), "fail-above"),
     ],
@@ -124,6 +125,17 @@ def test_bad_orders_are_one_line_and_leave_nothing(tmp_path, options, says):
     assert refused.exit_code == 2
     assert says in refused.stderr
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.usefixtures("formula")
+def test_a_study_with_its_own_profiles_is_asked_for_by_their_names(tmp_path):
+    file = study_with_own_profiles(tmp_path)
+    options = ("--study", str(file), "--store", str(tmp_path / "runs.sqlite"), "--out", str(tmp_path / "out"))
+    refused = explorer("calibrate", "--headless", *options)
+    assert refused.exit_code == 2
+    assert refused.stderr == f"error: {file}: profile: 'standard' is not one of first look, thesis-2, fine\n"
+    assert explorer("calibrate", "--headless", "--profile", "first look", *options).exit_code == 0
+    assert json.loads((tmp_path / "out" / "result.json").read_text())["study"]["profile"]["name"] == "first look"
 
 
 def test_without_headless_it_says_where_to_go(tmp_path):

@@ -6,10 +6,9 @@ import pytest
 
 from doe.campaign import run_campaign
 from doe.runner import Setting
-from doe.store import run_key
 from doe.study import load_study, with_profile
 from explorer.study.runs import STAGES, scene_of, settings_of, study_runs
-from solver import code_version, with_values
+from solver import pour_key, with_values
 from tests.doe.formula_runner import FormulaRunner
 from tests.explorer import reported_studies
 
@@ -29,7 +28,7 @@ class Keyed(FormulaRunner):
         run = super()._once(stage, row, setting, replicate, attempt)
         if replicate:  # one of each setting is enough, and quicker
             return run
-        key = run_key(with_values(self.scene, setting.values), run.seed, code_version())
+        key = pour_key(with_values(self.scene, setting.values), run.seed)
         return dataclasses.replace(run, key=key)
 
 

@@ -1,5 +1,7 @@
 """The tab of what is taken along: command line, downloads, recordings."""
 
+import io
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,13 +9,16 @@ import numpy as np
 import pytest
 
 from explorer.errors import CommandError
+from explorer.live.messages import SessionState
+from explorer.logs.recording import RecordedPour
+from explorer.logs.recording_reader import read_recording
 from explorer.scene.file import load_scene
 from explorer.scene.source import SceneSource, material_source
 from explorer.viewer.actions import Actions
 from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.output.output_panel import DOWNLOAD, START, STOP, OutputPanel, command_html, picture
-from explorer.viewer.output.recording_switch import HTML, RRD, RecordingSwitch
+from explorer.viewer.output.recording_switch import HTML, RRD, RecordingSwitch, session_recorder
 from explorer.viewer.output.scene_playback import BYTES_PER_BODY
 from tests.explorer.page_session import PageSession, finished, frame_of
 from tests.explorer.test_viewer_controls import event
@@ -44,20 +49,23 @@ class FileRecorder:
     def __init__(self, path):
         self.path, self.frames = path, 0
 
+    @property
+    def pours(self):
+        return (RecordedPour(self.path, 0.0, 1.0),)
+
     def take(self, frame, status):
         self.frames += 1
 
     def close(self):
         self.path.write_text(f"{self.frames} frames")
-        self.path.with_name(f"{self.path.stem}_2{self.path.suffix}").write_text("second pour")
 
 
 class Bench:
-    def __init__(self, server, folder):
+    def __init__(self, server, folder, recorder=FileRecorder):
         self.session, self.actions, self.browser = PageSession(SOURCE), Actions(), Browser()
         self.session.newest = frame_of([0, 1, 2], [[0.0, 0.0, 0.01 * k] for k in range(3)])
         self.background = BackgroundWork(self.actions.post)
-        self.recording = RecordingSwitch(server, folder, self.background, FileRecorder)
+        self.recording = RecordingSwitch(server, folder, self.background, recorder)
         self.panel = OutputPanel(
             server, self.session, self.recording, folder / "kept", self.actions.post, self.background
         )
@@ -75,6 +83,18 @@ class Bench:
             frame = replace(frame_of([0], [[0.0, 0.0, 0.01 * number]]), number=number)
             self.recording.take(frame, self.session.now)
 
+    def pour(self, times, **others):
+        """The present pour at ``times`` [s], with a body more at each."""
+        generation = self.session.now.generation
+        for n, time in enumerate(times, start=1):
+            frame = frame_of([0] * n, [[0.0, 0.0, 0.01 * k] for k in range(n)], generation=generation)
+            status = replace(self.session.now, time=time, **others)
+            self.recording.take(replace(frame, time=time), status)
+
+    def told(self):
+        self.panel.show(self.session.status(), "")
+        return self.panel._state.content
+
 
 @pytest.fixture(scope="module")
 def server():
@@ -86,6 +106,12 @@ def server():
 @pytest.fixture
 def bench(server, tmp_path):
     return Bench(server, tmp_path / "recordings")
+
+
+@pytest.fixture
+def recorded(server, tmp_path):
+    """A bench that records for real."""
+    return Bench(server, tmp_path / "recordings", session_recorder)
 
 
 def test_the_command_line_follows_what_is_on_the_screen(bench):
@@ -156,9 +182,65 @@ def test_a_recording_is_begun_ended_and_sent(bench):
     bench.take(2)
     assert bench.record(DOWNLOAD) == ""
     path = bench.recording.path
-    assert bench.browser.sent == {path.name: b"3 frames", f"{path.stem}_2.rrd": b"second pour"}
-    bench.panel.show(bench.session.status(), "")
-    assert f"Recorded: {path}" in bench.panel._state.content
+    assert bench.browser.sent == {path.name: b"3 frames"}
+    assert f"1 pour recorded:<br>{path}: 1.000 s" in bench.told()
+
+
+def test_a_pour_that_is_begun_while_recording_is_what_is_downloaded(recorded, tmp_path):
+    """Record, restart, stop, download: a moment of the pour before, and then the pour that a person wanted."""
+    assert recorded.record(START) == ""
+    recorded.pour([1.911], state=SessionState.ENDED)
+    recorded.session.restart()
+    recorded.pour([0.0, 0.02, 0.05, 0.06])
+    first = recorded.recording.path
+    second = first.with_stem(f"{first.stem}_2")
+    assert f"Recording into {second} (pour 2 of this recording)" in recorded.told()
+    assert recorded.record(STOP) == ""
+    told = recorded.told()
+    assert "2 pours recorded:" in told
+    assert f"{first}: a single moment, at 1.911 s" in told
+    assert f"{second}: 0.060 s, from 0.000 to 0.060 s" in told
+    assert f"Download sends {second.name}" in told
+
+    assert recorded.record(DOWNLOAD) == ""
+    ((name, content),) = recorded.browser.sent.items()
+    assert name == second.name
+    (tmp_path / name).write_bytes(content)
+    found = read_recording(tmp_path / name)
+    assert found.times == pytest.approx([0.0, 0.02, 0.05, 0.06])
+    (body,) = found.components
+    # From its first body on.
+    assert [len(body.at(time).scale) for time in found.times] == [1, 2, 3, 4]
+    # The moment before the restart is not lost either.
+    assert read_recording(first).times == pytest.approx([1.911])
+
+
+def test_several_pours_are_downloaded_in_one_file(recorded, tmp_path):
+    assert recorded.record(START) == ""
+    recorded.pour([0.0, 0.1, 0.2])
+    recorded.session.restart()
+    recorded.pour([0.0, 0.05])
+    recorded.session.restart()
+    recorded.pour([0.0])
+    assert recorded.record(STOP) == ""
+    assert "3 pours recorded:" in recorded.told()
+    assert "Download sends all in one ZIP file" in recorded.told()
+    assert recorded.record(DOWNLOAD) == ""
+    ((name, content),) = recorded.browser.sent.items()
+    stem = recorded.recording.path.stem
+    assert name == f"{stem}.zip"
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        assert archive.namelist() == [f"{stem}.rrd", f"{stem}_2.rrd", f"{stem}_3.rrd"]
+        archive.extractall(tmp_path)
+    ends = [read_recording(tmp_path / name).times[-1] for name in archive.namelist()]
+    assert ends == pytest.approx([0.2, 0.05, 0.0])
+
+
+def test_a_recording_without_a_frame_is_none(recorded):
+    assert recorded.record(START) == ""
+    assert recorded.record(STOP) == ""
+    assert recorded.record(DOWNLOAD) == "recording: nothing was recorded yet"
+    assert "ecorded" not in recorded.told()
 
 
 def test_the_scene_as_a_web_page_holds_what_moved(server, bench):

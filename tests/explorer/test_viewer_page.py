@@ -7,8 +7,10 @@ from dataclasses import replace
 import pytest
 
 from explorer.diagnosis.process import DiagnoseProcess
-from explorer.live.messages import Event
+from explorer.live.messages import Event, SessionState, Status
+from explorer.logs.recording_reader import read_recording
 from explorer.scene.source import material_source, rig_source
+from explorer.viewer.app import serve
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.page import Page
 from solver.scene import value
@@ -38,6 +40,11 @@ class Session(PageSession):
         pass
 
     def set_speed(self, factor):
+        pass
+
+
+class ClosableSession(Session):
+    def close(self):
         pass
 
 
@@ -106,6 +113,37 @@ def test_a_recording_of_the_page_holds_the_changes(running, tmp_path):
         if "TextLog:text" in batch.schema.names:
             texts += [text for row in batch["TextLog:text"].to_pylist() for text in row or ()]
     assert f"{FRICTION}: 0.57 → 0.2" in texts
+
+
+class RestartedPage:
+    """Stands in for the page: it hands its recorder two pours, and ends."""
+
+    def __init__(self, server, session, study, name, diagnosis, recorder):
+        self._recorder = recorder
+
+    def run(self, stop):
+        for generation, times in ((1, (1.0,)), (2, (0.0, 0.5))):
+            for now in times:
+                status = Status(SessionState.RUNNING, "", SOURCE.scene, 1, generation, 1.0, time=now)
+                frame = frame_of([0], [[0.0, 0.0, 0.01]], generation=generation)
+                self._recorder.take(replace(frame, time=now), status)
+
+    def close(self):
+        pass
+
+
+def test_the_end_of_serve_names_every_file_that_it_recorded(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    monkeypatch.setattr("explorer.viewer.app.Page", RestartedPage)
+    monkeypatch.setattr("explorer.viewer.app.Session", lambda: ClosableSession(SOURCE))
+    path = tmp_path / "live.rrd"
+    serve(SOURCE.scene, port=0, record_path=path, ready=lambda address: None)
+    assert capsys.readouterr().out.splitlines()[-3:] == [
+        "2 pours recorded:",
+        f"{path}: a single moment, at 1.000 s",
+        f"{tmp_path / 'live_2.rrd'}: 0.500 s, from 0.000 to 0.500 s",
+    ]
+    assert read_recording(tmp_path / "live_2.rrd").times == pytest.approx([0.0, 0.5])
 
 
 def test_an_event_that_is_no_change_is_no_mark(running):

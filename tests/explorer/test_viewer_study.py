@@ -6,6 +6,8 @@ import math
 import plotly.io
 import pytest
 
+from doe.stages.sizing import planned_runs
+from doe.study import load_study
 from explorer.background.command_process import CommandStatus
 from explorer.background.stage_progress import StageProgress, TriedRun
 from explorer.report.plot import Plot
@@ -17,10 +19,18 @@ from explorer.viewer.study.plot_theme import Drawn
 from explorer.viewer.study.plot_view import NOTHING, PlotView
 from explorer.viewer.study.profiler_panel import TITLE as PROFILER
 from explorer.viewer.study.stage_table import stages_markdown
-from explorer.viewer.study.study_panel import StudyPanel
+from explorer.viewer.study.study_panel import NONE, StudyPanel
 from explorer.viewer.theme import ThemeSwitch
 from tests.explorer import reported_studies
-from tests.explorer.study_panel_at_hand import FakeSession, FakeStudy, PanelAtHand, drawn, written
+from tests.explorer.study_panel_at_hand import (
+    OWN_PROFILES,
+    FakeSession,
+    FakeStudy,
+    PanelAtHand,
+    drawn,
+    study_with_own_profiles,
+    written,
+)
 
 EVIL = "<img src=x> *bold* | `code`"
 
@@ -52,6 +62,21 @@ def test_the_buttons_ask_for_what_they_say(table):
         *(("start", "quick"), "pause", "cancel", "resume", "retry", ("queue", "quick"), "clear_queue", "go_on"),
     ]
     assert not table.study.asked[0][2]
+
+
+def test_the_profiles_of_the_study_file_are_offered_and_started(server, tmp_path, monkeypatch):
+    monkeypatch.setattr(FakeStudy, "study_file", study_with_own_profiles(tmp_path))
+    table = PanelAtHand(server)
+    chosen = table.panel._profile
+    assert chosen.options == OWN_PROFILES
+    study = load_study(str(table.study.study_file))
+    runs = sum(planned_runs(study, study.profiles["first look"]).values())
+    assert chosen.hint.startswith(f"first look: coarse shapes, {runs} runs; thesis-2: standard shapes, ")
+    assert "fine: standard shapes, as many runs as the pilot asks for" in chosen.hint
+    table.press("Start")
+    chosen.value = "thesis-2"
+    table.press("Queue")
+    assert [one[:2] for one in table.study.asked] == [("start", "first look"), ("queue", "thesis-2")]
 
 
 def test_an_empty_page_says_what_to_do(table):
@@ -229,5 +254,6 @@ def test_a_study_file_that_cannot_be_read_leaves_the_page_standing(server, tmp_p
     table.study_file = tmp_path / "gone.toml"
     panel = StudyPanel(server, table, "gone", Actions().post, FakeSession())
     assert "cannot be read" in panel._order._told.content
+    assert panel._profile.options == (NONE,)
     assert not panel._order.edits
     panel.show("")

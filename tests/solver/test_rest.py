@@ -13,7 +13,7 @@ from solver.material_file import load_material
 from solver.observables import observe_pile
 from solver.pour import Pour
 from solver.record import Outcome
-from solver.record_builder import pile_of
+from solver.record_builder import lying, pile_of
 from solver.run import Job, capacity_for, run_pours
 from solver.scene import with_values
 from solver.world import Batch
@@ -56,7 +56,10 @@ def test_a_pile_at_rest_stays_at_rest(scene, seed):
     assert apex_of(pour) == pytest.approx(apex, rel=LIMIT)
     moved = np.linalg.norm(after.bodies.position - before.bodies.position, axis=1) > MOVED
     assert {before.bodies.component_names[k] for k in before.bodies.component[moved]} <= {"petiole"}
-    piles = [pile_of(pour.container, record.bodies, record.spheres, moved) for record in (before, after)]
+    piles = [
+        pile_of(record.bodies, record.spheres, lying(pour.container, record.bodies, moved))
+        for record in (before, after)
+    ]
     assert len(piles[0].mass) == len(piles[1].mass)
     first, last = (observe_pile(pile)["angle_of_repose_deg"].value for pile in piles)
     assert last == pytest.approx(first, rel=LIMIT)

@@ -14,7 +14,7 @@ from doe.diagnose.simulation.profiles import profile_names, profile_of_record
 from doe.measurement.measurement import Condition
 from doe.measurement.summaries import summaries_of_record, summary_names
 from doe.runner import Pours, seed_of, stored_run
-from doe.store import Store, StoredRun, run_key
+from doe.store import Reader, Store, StoredRun
 from solver import (
     EFFECTS,
     Job,
@@ -22,7 +22,7 @@ from solver import (
     ParameterError,
     Record,
     Scene,
-    code_version,
+    pour_key,
     with_values,
 )
 
@@ -97,7 +97,9 @@ class ModelPours:
     ) -> None:
         self._conditions, self._paths, self._store = tuple(conditions), tuple(paths), store
         self._pours, self._on_pour, self._root = pours, on_pour, root
-        self._known: dict[tuple[Point, int], Pour] = {}
+        self._known: dict[Place, Pour] = {}
+        self._keys: dict[Place, str] = {}
+        """Of the pours that are asked for."""
         self.run_now = 0
         """Pours that were really run, not found in the store."""
 
@@ -196,36 +198,41 @@ class ModelPours:
         """Whether the pour is known, here or in the store."""
         place = point, condition
         if place not in self._known:
-            stored = self._store.find(
-                run_key(self.scene(point, condition), self.seed(point, condition), code_version())
-            )
-            found = None if stored is None else self._stored(stored, condition)
-            if found is not None:
-                self._known[place] = found
+            self._keys[place] = pour_key(self.scene(point, condition), self.seed(point, condition))
+            stored = self._store.find(self._keys[place])
+            if stored is not None:
+                asked = self._conditions[condition]
+                names = (*profile_names(asked), *summary_names(asked))
+                self._known[place] = _pour(asked, self._store.read(stored, names, reader(asked)))
         return place in self._known
-
-    def _stored(self, stored: StoredRun, condition: int) -> Pour | None:
-        names = summary_names(self._conditions[condition])
-        if any(name not in stored.observables for name in names):
-            return None
-        return Pour(
-            _numbers(stored, names), stored.outcome, _numbers(stored, profile_names(self._conditions[condition]))
-        )
 
     def _keep(self, what: str, point: Point, condition: int, job: Job, record: Record) -> Pour:
         asked = self._conditions[condition]
-        numbers = tuple(float(x) for x in summaries_of_record(asked, record))
-        heights = profile_of_record(asked, record)
-        pour = Pour(numbers, str(record.outcome), heights)
-        seen = dict(zip((*profile_names(asked), *summary_names(asked)), (*heights, *numbers), strict=True))
-        self._store.add(stored_run(job, record, "diagnose", what, f"{point.sequence} {point.number}", seen))
-        return pour
+        key, label = self._keys[point, condition], f"{point.sequence} {point.number}"
+        stored = stored_run(job, record, "diagnose", what, label, reader(asked), key)
+        self._store.add(stored)
+        return _pour(asked, stored)
 
 
-def _numbers(stored: StoredRun, names: Sequence[str]) -> tuple[float, ...]:
-    """What a stored run holds under ``names``; NaN for what it could not read, or does not hold."""
-    found = (stored.observables.get(name) for name in names)
-    return tuple(math.nan if x is None else x for x in found)
+def reader(condition: Condition) -> Reader:
+    """What a diagnosis reads off a pour of ``condition``: its profile and its summaries."""
+
+    def read(record: Record) -> dict[str, float]:
+        heights, numbers = profile_of_record(condition, record), summaries_of_record(condition, record)
+        names = (*profile_names(condition), *summary_names(condition))
+        return dict(zip(names, (*heights, *numbers.tolist()), strict=True))
+
+    return read
+
+
+def _pour(condition: Condition, stored: StoredRun) -> Pour:
+    """What is kept of a stored pour of ``condition``; NaN for what could not be read."""
+
+    def numbers(names: Sequence[str]) -> tuple[float, ...]:
+        found = (stored.observables[name] for name in names)
+        return tuple(math.nan if x is None else x for x in found)
+
+    return Pour(numbers(summary_names(condition)), stored.outcome, numbers(profile_names(condition)))
 
 
 def effect_values(effect: str, amplitude: Sequence[float]) -> dict[str, float]:

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from explorer.report.content import Block, Facts, Figure, Section, Table, Text
 from explorer.report.design.charts import ridge
+from explorer.report.figures.model import reference_name
 from explorer.report.figures.optimum import cloud, ranges
 from explorer.report.figures.surface_3d import solutions
 from explorer.report.findings import Plain
+from explorer.report.identified import GIVES_TARGET, cloud_caution, rule, settings
 from explorer.report.units_for_people import (
-    MISSING,
     enumeration,
     number,
     observed,
-    parameter_label,
-    parameter_range,
     parameter_value,
     percent,
 )
@@ -39,7 +38,7 @@ def target(result: Plain) -> Section | None:
     ]  # fmt: skip
     if not found["target_standard_error"]:
         facts.append(("The target itself", "taken as exact; `--target-error` states its standard error"))
-    blocks: list[Block] = [Facts(tuple(facts)), _settings(result)]
+    blocks: list[Block] = [Facts(tuple(facts)), settings_table(result)]
     surface = solutions(result, 0)
     if surface is not None:
         blocks.append(Figure("solutions", surface, "Every setting on the green surface gives the target."))
@@ -47,10 +46,22 @@ def target(result: Plain) -> Section | None:
     if 1 < len(result["factors"]) <= MOST_PANELS:
         caption = (
             f"{len(found['bootstrap_points'])} refits to resampled {found['resampling']}; each dot is the solution "
-            f"nearest the reference. {percent(found['share_reached'])} of the refits reach the target."
+            f"nearest the reference. {percent(found['share_reached'])} of the refits reach the target. "
+            + cloud_caution(result["optimum"])
         )
-        blocks.append(Figure("cloud", cloud(result), caption))
+        blocks.append(Figure("cloud", cloud(result), caption.rstrip()))
     return Section("Target", tuple(blocks))
+
+
+def settings_table(result: Plain) -> Table:
+    """Every factor at the target: its value where it is identified, the range that gives the target, its reference."""
+    rows = tuple(
+        (*setting.cells, parameter_value(factor["path"], factor["reference"]))
+        for setting, factor in zip(settings(result["optimum"]), result["factors"], strict=True)
+    )
+    header = ("letter", "factor", "identified", GIVES_TARGET, "of low … high", "setting", "95 % set", "reference")
+    nearest = "Of all settings that give the target, the one nearest the reference."
+    return Table(header, rows, rule(result["optimum"], reference_name(result)) or nearest)
 
 
 def shape(result: Plain) -> Section | None:
@@ -110,25 +121,3 @@ def _stationary(result: Plain, canonical: Plain) -> list[tuple[str, str]]:
         ("Stationary point", f"a {kind} {place} the region: {enumeration(at)} (coded {coded})"),
         ("Model there", observed(result["response"]["path"], canonical["stationary_response"])),
     ]
-
-
-def _settings(result: Plain) -> Table:
-    found = result["optimum"]["single"]
-    rows = tuple(
-        (
-            factor["name"],
-            parameter_label(factor["path"]),
-            parameter_value(factor["path"], found["point"][k]),
-            parameter_range(factor["path"], found["point_low"][k], found["point_high"][k]),
-            parameter_range(factor["path"], found["solution_low"][k], found["solution_high"][k]),
-            MISSING if found["solution_low"][k] is None else percent(found["solution_share"][k]),
-            "no" if factor["name"] in found["unidentified"] else "yes",
-            parameter_value(factor["path"], factor["reference"]),
-        )
-        for k, factor in enumerate(result["factors"])
-    )
-    header = (
-        *("letter", "factor", "setting", "95 % set", "range while the model gives the target", "of low … high"),
-        *("identified", "reference"),
-    )
-    return Table(header, rows, "Of all settings that give the target, the one nearest the reference.")

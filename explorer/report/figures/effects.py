@@ -120,33 +120,36 @@ def all_effects(result: Plain) -> Spec:
     """Effects of factors and assumptions with 95 % intervals in one chart, sorted by size."""
     response = result["screening"]["response"]
     unit = unit_of_observable(response)
-    groups = [("factors", result["screening"], FACTOR)]
+    groups = [("factors", result["screening"], FACTOR, "circle")]
     if result["assumptions"] is not None:
-        groups.append(("assumptions about the set-up", result["assumptions"], ASSUMPTION))
-    untestable = {entry["factor"] for _, part, _ in groups for entry in part["not_testable"]}
+        groups.append(("assumptions about the set-up", result["assumptions"], ASSUMPTION, "diamond"))
     order: list[tuple[float, str]] = []
     traces = []
-    for name, part, colour in groups:
+    for group, part, colour, symbol in groups:
         titles, analysis = _titles(part), part["analysis"]
+        untestable = {entry["factor"] for entry in part["not_testable"]}
         effects = factor_effects(analysis)[::-1]
-        rows = [label(titles[effect["name"]]) for effect in effects]
-        order += [(abs(effect["effect"]), row) for effect, row in zip(effects, rows, strict=True)]
-        widths = [half_width(analysis, effect) for effect in effects]
-        symbols = ["circle-open" if effect["name"] in untestable else "circle" for effect in effects]
-        traces.append(
-            points(
-                [unit.of(effect["effect"]) for effect in effects],
-                rows,
-                name,
-                colour,
-                marker={"symbol": symbols},
-                error_x=error_bars([None if w is None else unit.of(w) for w in widths], colour),
-                hovertemplate="%{y}<br>%{x:+.2f}" + unit.symbol + "<extra></extra>",
+        order += [(abs(effect["effect"]), label(titles[effect["name"]])) for effect in effects]
+        # A trace of its own for each mark: the legend shows the mark of a trace's first point.
+        for name, mark, is_hollow in (
+            (group, symbol, False),
+            (f"{group}, not testable", f"{symbol}-open", True),
+        ):
+            shown = [effect for effect in effects if (effect["name"] in untestable) is is_hollow]
+            if not shown:
+                continue
+            widths = [half_width(analysis, effect) for effect in shown]
+            traces.append(
+                points(
+                    [unit.of(effect["effect"]) for effect in shown],
+                    [label(titles[effect["name"]]) for effect in shown],
+                    name,
+                    colour,
+                    marker={"symbol": mark},
+                    error_x=error_bars([None if w is None else unit.of(w) for w in widths], colour),
+                    hovertemplate="%{y}<br>%{x:+.2f}" + unit.symbol + "<extra></extra>",
+                )
             )
-        )
-    if untestable:
-        hollow = {"symbol": "circle-open"}
-        traces.append(points([None], [None], "factor on fewer than 5 bodies: not testable", FACTOR, marker=hollow))
     layout: Json = {
         "xaxis": axis("effect, low → high, on " + observable_title(response), zeroline=True, zerolinewidth=1.5),
         "yaxis": axis("", categoryorder="array", categoryarray=[row for _, row in sorted(order)])

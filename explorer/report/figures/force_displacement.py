@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import plotly.graph_objects as go
-
 from doe.laboratory import CurveFit, LabResult
 from explorer.errors import CommandError
-from explorer.report.content import Spec
+from explorer.report.content import Figure, Section, Spec
 from explorer.report.figures.style import CHOSEN, FACTOR, Json, axis, chart, label
+from explorer.report.html import page
 
 PANEL_HEIGHT = 420
 
@@ -18,13 +17,10 @@ def write_curves(path: Path, result: LabResult) -> None:
     """Write one chart per component and quantity to a page that needs nothing else; CommandError without curves."""
     if not result.curves:
         raise CommandError("--plot: single readings only, no curve to draw")
-    charts = [
-        go.Figure(spec).to_html(full_html=False, include_plotlyjs=k == 0, config={"displaylogo": False})
-        for k, spec in enumerate(curve_charts(result).values())
-    ]
-    title = label(f"{result.test}: {Path(result.file).name}")
-    head = f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{title}</title></head>'
-    path.write_text(f"{head}<body><h1>{title}</h1>{''.join(charts)}</body></html>\n", encoding="utf-8")
+    figures = tuple(Figure(f"curves-{k + 1}", spec, "") for k, spec in enumerate(curve_charts(result).values()))
+    title = f"{result.test}: {Path(result.file).name}"
+    text = page(title, "Force–displacement curves of a bench test", (Section("Curves", figures),))
+    path.write_text(text, encoding="utf-8")
 
 
 def curve_charts(result: LabResult) -> dict[str, Spec]:

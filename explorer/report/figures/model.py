@@ -14,6 +14,7 @@ from scipy import stats
 
 from doe.surface import second_order_terms
 from explorer.report.findings import Plain
+from explorer.report.identified import BY_RULE, all_identified
 
 Array = npt.NDArray[np.float64]
 
@@ -74,6 +75,11 @@ def chosen_point(result: Plain) -> list[float] | None:
 def reference_name(result: Plain) -> str:
     """What the reference values of the factors are called."""
     return str(result["study"].get("reference_name", "measured parameters"))
+
+
+def chosen_name(result: Plain) -> str:
+    """What the chosen point of a result that has one is called."""
+    return "optimum" if all_identified(result["optimum"]) else BY_RULE
 
 
 def section_point(result: Plain) -> list[float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import combinations
 
 from explorer.report.content import Spec
-from explorer.report.figures.model import reference_name
+from explorer.report.figures.model import chosen_name, reference_name
 from explorer.report.figures.style import (
     CHOSEN,
     CLOUD,
@@ -22,6 +22,7 @@ from explorer.report.figures.style import (
     suffix,
 )
 from explorer.report.findings import Plain
+from explorer.report.identified import BY_RULE, GIVES_TARGET, is_identified
 from explorer.report.units_for_people import axis_title, parameter_label, parameter_range, unit_of_parameter
 
 
@@ -46,7 +47,7 @@ def cloud(result: Plain) -> Spec:
         traces += [
             points([p[i] for p in refits], [p[j] for p in refits], "bootstrap refits", FACTOR, marker=dots, **shown),
             points([measured[i]], [measured[j]], reference_name(result), DUMMY, marker=cross, **shown),
-            points([chosen[i]], [chosen[j]], "optimum", CHOSEN, marker=star, **shown),
+            points([chosen[i]], [chosen[j]], chosen_name(result), CHOSEN, marker=star, **shown),
         ]
         for direction, k, other in (("x", i, "y"), ("y", j, "x")):
             title = axis_title(factors[k]["path"], factors[k]["name"])
@@ -56,27 +57,33 @@ def cloud(result: Plain) -> Spec:
 
 
 def ranges(result: Plain) -> Spec:
-    """Per factor, as a share of its screened range: region, solution surface, 95 % set, optimum, measured value."""
+    """Per factor, as a share of its screened range: region, range that gives the target, optimum, measured value.
+
+    An identified factor has the 95 % set of its optimum as well; of any other the point is a hollow star.
+    """
     found, factors, region = result["optimum"]["single"], result["optimum"]["factors"], result["surface"]["region"]
     rows = [label(f"{factor['name']} · {parameter_label(factor['path'])}") for factor in factors]
     low = [c - h for c, h in zip(region["centre"], region["half_width"], strict=True)]
     high = [c + h for c, h in zip(region["centre"], region["half_width"], strict=True)]
+    known = [is_identified(found, k) for k in range(len(factors))]
+    set_low, set_high = (_where(known, found[end]) for end in ("point_low", "point_high"))
     bars = (
         ("region of the surface", low, high, DUMMY, 22),
-        ("reached while the model stays at the target", found["solution_low"], found["solution_high"], TARGET, 12),
-        ("95 % set of the optimum (bootstrap)", found["point_low"], found["point_high"], CHOSEN, 5),
+        (GIVES_TARGET, found["solution_low"], found["solution_high"], TARGET, 12),
+        ("95 % set of the optimum (bootstrap)", set_low, set_high, CHOSEN, 5),
     )
     traces: list[Json] = []
     for name, lows, highs, colour, width in bars:
         for k, (factor, row) in enumerate(zip(factors, rows, strict=True)):
-            if lows[k] is None or highs[k] is None:
+            least, greatest = lows[k], highs[k]
+            if least is None or greatest is None:
                 continue
-            text = parameter_range(factor["path"], lows[k], highs[k])
+            text = parameter_range(factor["path"], least, greatest)
             traces.append(
                 {
                     "type": "scatter",
                     "mode": "lines",
-                    "x": [_share(factor, lows[k]), _share(factor, highs[k])],
+                    "x": [_share(factor, least), _share(factor, greatest)],
                     "y": [row, row],
                     "name": name,
                     "legendgroup": name,
@@ -89,16 +96,23 @@ def ranges(result: Plain) -> Spec:
     chosen = [result["optimum"]["values"][factor["path"]] for factor in factors]
     for name, values, colour, symbol in (
         (reference_name(result), found["reference"], "#ffffff", "diamond"),
-        ("optimum", chosen, CHOSEN, "star"),
+        ("optimum", _where(known, chosen), CHOSEN, "star"),
+        (BY_RULE, _where([not one for one in known], chosen), CHOSEN, "star-open"),
     ):
-        shares = [_share(factor, value) for factor, value in zip(factors, values, strict=True)]
+        shares = [None if v is None else _share(factor, v) for factor, v in zip(factors, values, strict=True)]
         outlined = {"symbol": symbol, "size": 12, "line": {"color": INK, "width": 1.2}}
-        traces.append(points(shares, rows, name, colour, marker=outlined))
+        if any(share is not None for share in shares):
+            traces.append(points(shares, rows, name, colour, marker=outlined))
     layout = {
         "xaxis": axis("share of the screened range [%]", range=[-3, 103]),
         "yaxis": axis("", categoryorder="array", categoryarray=rows[::-1]),
     }
     return chart(traces, layout, 190 + 52 * len(rows))
+
+
+def _where(shown: list[bool], values: list[float]) -> list[float | None]:
+    """The values that are shown, None for the others."""
+    return [value if show else None for show, value in zip(shown, values, strict=True)]
 
 
 def _share(factor: Plain, value: float) -> float:

@@ -27,6 +27,20 @@ BELOW_TO_ABOVE = [[0.0, FACTOR], [0.5, "#efece6"], [1.0, ASSUMPTION]]
 """Colour scale of a surface: below, at and above the target."""
 
 
+CONFIG: Json = {
+    "displaylogo": False,
+    "modeBarButtonsToRemove": ["select2d", "lasso2d"],
+    "showSendToCloud": False,
+    "plotlyServerURL": "",
+}
+"""plotly.js's options for every chart, in a report and on the live page.
+
+By default plotly.js 4 (plotly 7) offers "Share chart…", which uploads the data to cloud.plotly.com, and a logo that
+links to plotly.com. Charts hold unpublished data, so both are off. The library's text keeps that address as a default;
+the empty plotlyServerURL overrides it, and the button's own code stops where there is none.
+"""
+
+
 def label(text: str) -> str:
     """Text for a chart; plotly reads a little HTML, so names are escaped."""
     return html.escape(text, quote=False)

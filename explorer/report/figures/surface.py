@@ -9,7 +9,7 @@ from scipy import stats
 
 from doe.surface import second_order_terms
 from explorer.report.content import Spec
-from explorer.report.figures.model import chosen_point, reference_name, section_point
+from explorer.report.figures.model import chosen_name, chosen_point, reference_name, section_point
 from explorer.report.figures.style import (
     BELOW_TO_ABOVE,
     CHOSEN,
@@ -77,7 +77,7 @@ def contours(result: Plain, index: int) -> Spec:
             | {"name": "model = target", "showlegend": panel == 0}
         )
         traces += [line_at_target] if has_target else []
-        traces += _marks(surface, optimum, factors, (i, j), scale, axes, panel == 0, reference_name(result))
+        traces += _marks(result, optimum, factors, (i, j), scale, axes, panel == 0)
         layout[f"xaxis{suffix(panel)}"] = axis(
             axis_title(factors[i]["path"], factors[i]["name"]), domain=domains[panel], anchor=f"y{suffix(panel)}"
         )
@@ -147,17 +147,16 @@ def _slice(coefficients: np.ndarray, fixed: np.ndarray, i: int, j: int) -> np.nd
 
 
 def _marks(
-    surface: Plain,
+    result: Plain,
     optimum: np.ndarray | None,
     factors: list[Plain],
     pair: tuple[int, int],
     scale: list[float],
     axes: Json,
     in_legend: bool,
-    reference_is: str,
 ) -> list[Json]:
     """Runs of the design, the measured parameters where they lie in the region, and the optimum if there is one."""
-    i, j = pair
+    surface, (i, j) = result["surface"], pair
     natural = np.array(surface["natural"])[:, pair] / scale
     reference = np.array([factors[i]["reference"], factors[j]["reference"]]) / scale
     low = (np.array(surface["region"]["centre"]) - surface["region"]["half_width"])[list(pair)] / scale
@@ -169,11 +168,11 @@ def _marks(
     marks = [points(natural[:, 0].tolist(), natural[:, 1].tolist(), "points of the design", INK, marker=runs, **shown)]
     if ((low <= reference) & (reference <= high)).all():
         x, y = (float(value) for value in reference)
-        marks.append(points([x], [y], reference_is, INK, marker=diamond, **shown))
+        marks.append(points([x], [y], reference_name(result), INK, marker=diamond, **shown))
     if optimum is None:
         return marks
     at = np.array([optimum[i], optimum[j]]) / scale
-    return [*marks, points([float(at[0])], [float(at[1])], "optimum", CHOSEN, marker=star, **shown)]
+    return [*marks, points([float(at[0])], [float(at[1])], chosen_name(result), CHOSEN, marker=star, **shown)]
 
 
 def _colours(level: float, reach: float, title: str) -> Json:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from explorer.report.content import Spec
-from explorer.report.figures.model import chosen_point, model_of, reference_name, section_point
+from explorer.report.figures.model import chosen_name, chosen_point, model_of, reference_name, section_point
 from explorer.report.figures.style import (
     BELOW_TO_ABOVE,
     CHOSEN,
@@ -61,7 +61,7 @@ def height_over(result: Plain, index: int, pair: tuple[int, int]) -> Spec:
     if chosen is not None:
         height = [unit.of(float(model.mean(model.coded(chosen))))]
         star = {"size": 7, "color": CHOSEN, "symbol": "diamond"}
-        traces.append(_dots([[chosen[i] / sizes[0]], [chosen[j] / sizes[1]], height], "optimum", star))
+        traces.append(_dots([[chosen[i] / sizes[0]], [chosen[j] / sizes[1]], height], chosen_name(result), star))
     titles = [axis_title(surface["factors"][k]["path"], surface["factors"][k]["name"]) for k in pair]
     return _in_space(traces, [*titles, observable_title(target["observable"])])
 
@@ -96,7 +96,7 @@ def solutions(result: Plain, index: int) -> Spec | None:
         open_diamond = {"size": 6, "color": "#ffffff", "symbol": "diamond", "line": {"color": INK, "width": 2}}
         traces.append(_dots([[float(v)] for v in measured], reference_name(result), open_diamond))
         star = {"size": 7, "color": CHOSEN, "symbol": "diamond"}
-        traces.append(_dots([[float(v)] for v in chosen], "optimum", star))
+        traces.append(_dots([[float(v)] for v in chosen], chosen_name(result), star))
     return _in_space(traces, [axis_title(factor["path"], factor["name"]) for factor in factors])
 
 

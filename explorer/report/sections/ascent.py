@@ -53,4 +53,4 @@ def _steps(walk: Plain, observable: str, factors: list[Plain]) -> Table:
         *(f"{factor['name']} {parameter_label(factor['path'])}" for factor in factors),
         *("valid pours", "mean", "sd", "standard error", "relative error [%]"),
     )
-    return Table(header, tuple(rows), f"{observable_label(observable)}, given a pile.")
+    return Table(header, tuple(rows), f"{observable_label(observable)}; valid pours only.")

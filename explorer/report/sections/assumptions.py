@@ -31,7 +31,7 @@ def assumptions(result: Plain) -> Section | None:
         blocks += [
             Text(
                 f"{part['analysis']['rows']}-run design beside the screening, {part['analysis']['runs']} valid pours, "
-                f"response: {observable_label(part['response'])}, given a pile."
+                f"response: {observable_label(part['response'])}."
             ),
             Bullets(declared),
             effect_table(part),
@@ -69,10 +69,10 @@ def scan(result: Plain) -> Section | None:
             )
         )
     text = (
-        f"Everything else at the reference setting; {observable_label(observable)}, given a pile. Two values have to "
-        f"differ by {observed(observable, scanned['smallest_difference'])} to be told apart with chance 0.8."
+        f"Everything else at the reference setting; {observable_label(observable)}, valid pours only. Two values "
+        f"have to differ by {observed(observable, scanned['smallest_difference'])} to be told apart with chance 0.8."
     )
     if all(noise is None for noise in scanned["noise"]):
         text += " One pour per value: no interval can be drawn."
-    table = Table((parameter_label(path), "mean", "95 %", "sd of one pour", "no pile"), tuple(rows))
+    table = Table((parameter_label(path), "mean", "95 %", "sd of one pour", "not valid"), tuple(rows))
     return Section(f"Over the {parameter_label(path)}", (Text(text), Figure("scan", scan_chart(result), ""), table))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from doe.factors import MIN_BODIES
 from explorer.report.content import Block, Figure, Section, Text
 from explorer.report.figures.effects import all_effects
 from explorer.report.findings import Plain
@@ -18,5 +19,7 @@ def effects(result: Plain) -> Section:
     if result["assumptions"] is not None:
         statement = assumption_statement(result)
         blocks.append(Text(f"What the calibration hangs on: {statement}."))
-    caption = "Effect = mean at the high level − mean at the low level, given a pile."
+    caption = "Effect = mean at the high level − mean at the low level; valid pours only."
+    if any(part is not None and part["not_testable"] for part in (result["screening"], result["assumptions"])):
+        caption += f" Not testable: acts on fewer than {MIN_BODIES} bodies."
     return Section(title, (*blocks, Figure("effects", all_effects(result), caption)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from doe.pilot import BIAS_LIMIT_DEG
 from explorer.report.content import Block, Bullets, Figure, Section, Table, Text
 from explorer.report.figures.noise import noise_of_estimators
 from explorer.report.findings import Plain
@@ -46,7 +47,7 @@ def noise(result: Plain) -> Section:
                 for row in pilot["resolutions"]
             ),
             f"What replicates resolve in {observable_label(target)}, chance 0.8 at level 0.05; main effects in the "
-            "28-run design.",
+            f"{result['screening']['analysis']['rows']}-run design.",
         ),
     ]
     spread = pilot["equal_variance"]
@@ -86,7 +87,7 @@ def _estimators(pilot: Plain) -> Table:
     caption = (
         f"{next(iter(pilot['noise'].values()))['runs']} seeds at the reference setting. Bias: its range over what it "
         "may mean that bodies fill a cone (centre, half or all of a body inside); an estimator is left out only if it "
-        "misses by more than 5° under every reading."
+        f"misses by more than {BIAS_LIMIT_DEG:g}° under every reading."
     )
     return Table(header, tuple(rows), caption)
 

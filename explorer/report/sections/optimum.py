@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from explorer.report.content import Block, Figure, Section, Table, Text
+from explorer.report.figures.model import reference_name
 from explorer.report.figures.optimum import cloud, ranges
 from explorer.report.findings import Plain
+from explorer.report.identified import GIVES_TARGET, cloud_caution, is_identified, rule, settings
 from explorer.report.units_for_people import (
     enumeration,
     fixed,
     observable_label,
     observed,
-    parameter_label,
     parameter_range,
     parameter_value,
     percent,
@@ -19,7 +20,7 @@ from explorer.report.units_for_people import (
 
 
 def optimum(result: Plain) -> Section:
-    """Chosen setting with its 95 % set, the width of the solution surface and unidentified parameters."""
+    """Chosen setting, the 95 % sets of identified parameters and the ranges that give the target."""
     found = result["optimum"]
     blocks: list[Block] = [Text(_statement(result)), _settings(result)]
     if found["compromise"] is not None:
@@ -31,7 +32,8 @@ def optimum(result: Plain) -> Section:
             "cloud",
             cloud(result),
             f"{len(single['bootstrap_points'])} refits to resampled {single['resampling']}; each dot is the solution "
-            f"nearest the measured parameters. {percent(single['share_reached'])} of the refits reach the target.",
+            f"nearest the measured parameters. {percent(single['share_reached'])} of the refits reach the target. "
+            f"{cloud_caution(found)}".rstrip(),
         ),
     ]
     return Section("Optimum", tuple(blocks))
@@ -53,14 +55,19 @@ def _statement(result: Plain) -> str:
             f"{observed(name, single['predicted'])} ({between})."
         )
     if single["unidentified"]:
-        text += f" The target does not identify {enumeration(single['unidentified'])}."
+        text += (
+            f" The target does not identify {enumeration(single['unidentified'])}: the answer is the range that gives "
+            "the target, and the value in it is chosen by rule."
+        )
     text += (
         f" In {percent(single['compatible_share'])} of the region the predicted mean is compatible with the target "
         "at 95 %."
     )
     error = single["target_standard_error"]
+    any_identified = any(is_identified(single, k) for k in range(len(single["names"])))
+    including = "The 95 % set and this share include" if any_identified else "This share includes"
     text += (
-        f" The 95 % set and this share include the target's own standard error, {observed(name, error)}."
+        f" {including} the target's own standard error, {observed(name, error)}."
         if error
         else " The target is taken as exact: the study states no standard deviation and number of measurements."
     )
@@ -71,29 +78,20 @@ def _statement(result: Plain) -> str:
 
 def _settings(result: Plain) -> Table:
     found = result["optimum"]
-    single = found["single"]
-    rows = []
-    for k, factor in enumerate(found["factors"]):
-        path = factor["path"]
-        rows.append(
-            (
-                factor["name"],
-                parameter_label(path),
-                parameter_value(path, found["values"][path]),
-                parameter_range(path, single["point_low"][k], single["point_high"][k]),
-                parameter_range(path, single["solution_low"][k], single["solution_high"][k]),
-                percent(single["solution_share"][k]),
-                "no" if factor["name"] in single["unidentified"] else "yes",
-                parameter_value(path, factor["reference"]),
-                parameter_range(path, factor["low"], factor["high"]),
-            )
+    rows = tuple(
+        (
+            *setting.cells,
+            parameter_value(factor["path"], factor["reference"]),
+            parameter_range(factor["path"], factor["low"], factor["high"]),
         )
-    header = (
-        *("factor", "parameter", "optimum", "95 % set", "range on the solution surface", "of the region"),
-        *("identified", "measured", "screened"),
+        for setting, factor in zip(settings(found), found["factors"], strict=True)
     )
-    caption = "Intervals and ranges of the first target alone." if found["compromise"] is not None else ""
-    return Table(header, tuple(rows), caption)
+    header = (
+        *("factor", "parameter", "identified", GIVES_TARGET, "of the region", "optimum", "95 % set"),
+        *("measured", "screened"),
+    )
+    first_alone = "Intervals and ranges of the first target alone." if found["compromise"] is not None else ""
+    return Table(header, rows, f"{rule(found, reference_name(result))} {first_alone}".strip())
 
 
 def _compromise(result: Plain) -> list[Block]:

@@ -6,17 +6,19 @@ from explorer.report.content import Block, Caution, Facts, Section, Table
 from explorer.report.findings import (
     Plain,
     deciding_error,
-    failed_share,
     hangs_on,
     outcomes_by_stage,
     paths,
     resolved_by_surface,
     resolved_by_verification,
+    seeds_tried,
     sigma_of,
     significant,
     standard_error,
     target_observable,
+    valid_count,
 )
+from explorer.report.identified import settings
 from explorer.report.units_for_people import (
     code,
     duration,
@@ -26,7 +28,6 @@ from explorer.report.units_for_people import (
     observable_label,
     observed,
     parameter_label,
-    parameter_value,
     percent,
 )
 
@@ -102,9 +103,8 @@ def _facts(result: Plain) -> list[tuple[str, str]]:
     analysis = result["screening"]["analysis"]
     error = deciding_error(analysis)
     chosen = [
-        f"{factor['name']} ({parameter_label(factor['path'])}) = "
-        f"{parameter_value(factor['path'], result['optimum']['values'][factor['path']])}"
-        for factor in result["optimum"]["factors"]
+        f"{one.name} ({one.label})" + (f" = {one.chosen}" if one.identified else f": {one.answer}")
+        for one in settings(result["optimum"])
     ]
     outcomes = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in sorted(totals["by_outcome"].items()))
     return [
@@ -113,7 +113,7 @@ def _facts(result: Plain) -> list[tuple[str, str]]:
             f"{code(study['name'])}, profile {profile['name']}: {number(1e3 * profile['mass'])} g, "
             f"{profile['spheres']} shapes",
         ),
-        ("Runs", f"{totals['total']} pours: {outcomes}; {percent(1 - totals['valid'] / totals['total'], 1)} no pile"),
+        ("Runs", f"{totals['total']} pours: {outcomes}; {percent(1 - totals['valid'] / totals['total'], 1)} not valid"),
         (
             "Noise of one pour",
             f"σ = {observed(observable, noise['sigma'])} (95 % interval {observed(observable, noise['low'])} … "
@@ -172,15 +172,17 @@ def _resolutions(result: Plain) -> Table:
         )
     if result["assumptions"] is not None:
         sizes["assumptions"] = _of_screening(result["assumptions"], response)
-    rows = [
-        (stage, str(seen.total()), str(seen["at_rest"]), percent(failed_share(seen), 1), sizes.get(stage, "–"))
-        for stage, seen in outcomes.items()
-    ]
+    rows = []
+    for stage, seen in outcomes.items():
+        pours, valid = seen.total(), valid_count(seen)
+        rows.append((stage, str(pours), str(valid), percent(1 - valid / pours, 1), sizes.get(stage, "–")))
+    tries = seeds_tried(result)
     return Table(
-        ("stage", "pours", "gave a pile", "no pile", "smallest effect it could see"),
+        ("stage", "pours", "valid", "not valid", "smallest effect it could see"),
         tuple(rows),
-        "Smallest effect: found with chance 0.8 at level 0.05, one effect at a time. All angles are given a pile: "
-        "a pour that left none is kept with its outcome and replaced by the next seed, at most twice.",
+        "Smallest effect: found with chance 0.8 at level 0.05, one effect at a time. Every mean is over "
+        "valid pours; one that is not valid is kept with its outcome. "
+        f"For one replicate at most {tries} {'seed is' if tries == 1 else 'seeds are'} tried.",
     )
 
 

@@ -9,6 +9,7 @@ import csv
 
 from explorer.report.content import Section, Table, Text
 from explorer.report.findings import Plain, deciding_error, mean_and_sd, significant
+from explorer.report.identified import GIVES_TARGET, settings
 from explorer.report.units_for_people import (
     MISSING,
     enumeration,
@@ -16,7 +17,6 @@ from explorer.report.units_for_people import (
     observed,
     p_value,
     parameter_label,
-    parameter_range,
     parameter_value,
 )
 from solver import asset_path
@@ -45,23 +45,17 @@ def paper(result: Plain) -> Section | None:
 
 
 def _optimum(result: Plain) -> Table:
-    values = result["optimum"]["values"]
-    single, order = result["optimum"]["single"], [factor["name"] for factor in result["optimum"]["factors"]]
+    found = {setting.name: setting for setting in settings(result["optimum"])}
     rows = []
     for factor in result["study"]["factors"]:
-        if factor["name"] not in PRINTED_OPTIMUM and factor["name"] not in order:
+        name, path = factor["name"], factor["path"]
+        if name not in PRINTED_OPTIMUM and name not in found:
             continue
-        path, at = factor["path"], order.index(factor["name"]) if factor["name"] in order else None
-        rows.append(
-            (
-                factor["name"],
-                parameter_label(path),
-                parameter_value(path, PRINTED_OPTIMUM.get(factor["name"])),
-                parameter_value(path, values.get(path)),
-                MISSING if at is None else parameter_range(path, single["point_low"][at], single["point_high"][at]),
-            )
-        )
-    return Table(("factor", "parameter", "paper's optimum", "optimum here", "95 % set here"), tuple(rows))
+        here = found.get(name)
+        ours = (MISSING,) * 3 if here is None else (here.value, here.confidence_set, here.feasible)
+        rows.append((name, parameter_label(path), parameter_value(path, PRINTED_OPTIMUM.get(name)), *ours))
+    header = ("factor", "parameter", "paper's optimum", "optimum here", "95 % set here", f"{GIVES_TARGET} here")
+    return Table(header, tuple(rows))
 
 
 def _verification(result: Plain) -> Table:

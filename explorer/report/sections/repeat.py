@@ -7,7 +7,7 @@ from pathlib import Path
 
 from doe.study import TRIES
 from explorer.report.content import Block, Code, Section, Table, Text
-from explorer.report.findings import Plain, outcomes_by_stage
+from explorer.report.findings import Plain, outcomes_by_stage, seeds_tried
 from explorer.report.units_for_people import MISSING, duration, enumeration, fixed, number, percent
 from solver.assets import shipped_assets
 
@@ -39,8 +39,9 @@ def repeat(result: Plain) -> Section:
     """Command line, time per stage and versions."""
     study, timing = result["study"], result["timing"]
     command = f"explorer calibrate --headless --study {_study(study)} --profile {shlex.quote(study['profile']['name'])}"
-    if study.get("tries", TRIES) != TRIES:
-        command += f" --tries {study['tries']}"
+    tries = seeds_tried(result)
+    if tries != TRIES:
+        command += f" --tries {tries}"
     times = [(stage, duration(seconds)) for stage, seconds in timing["stage_s"].items()]
     times.append(("all", duration(timing["total_s"])))
     rate = f"{number(timing['runs_per_minute'])} pours per minute."

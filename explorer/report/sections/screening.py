@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from doe.factors import MIN_BODIES
 from explorer.report.content import Block, Bullets, Facts, Figure, Folded, Section, Table, Text
 from explorer.report.figures.effects import half_normal, pareto
 from explorer.report.findings import (
@@ -34,7 +35,7 @@ def screening(result: Plain) -> Section:
     blocks: list[Block] = [
         Text(
             f"{analysis['rows']}-run Plackett–Burman design over {len(part['factors'])} factors, "
-            f"{analysis['runs']} valid pours, response: {observable_label(response)}, given a pile."
+            f"{analysis['runs']} valid pours, response: {observable_label(response)}."
         ),
         Facts(tuple(_verdicts(part))),
     ]
@@ -63,7 +64,7 @@ def not_testable(part: Plain) -> list[Block]:
         f"{entry['factor'].replace('_', ' ')} ({parameter_label(entry['path'])}): acts on {entry['bodies']:.0f} bodies"
         for entry in part["not_testable"]
     )
-    return [Text("Not testable, because they touch fewer than 5 bodies of the mixture:"), Bullets(names)]
+    return [Text(f"Not testable, because they touch fewer than {MIN_BODIES} bodies of the mixture:"), Bullets(names)]
 
 
 def effect_table(part: Plain) -> Table:
@@ -123,7 +124,7 @@ def row_table(part: Plain) -> Table:
             )
         )
     columns = ", ".join(part["columns"])
-    return Table(("row", "levels", "valid pours", "mean", "sd", "no pile"), tuple(rows), f"Levels of {columns}.")
+    return Table(("row", "levels", "valid pours", "mean", "sd", "not valid"), tuple(rows), f"Levels of {columns}.")
 
 
 def _verdicts(part: Plain) -> list[tuple[str, str]]:
@@ -154,9 +155,9 @@ def _verdicts(part: Plain) -> list[tuple[str, str]]:
 
 def _no_pile_note(part: Plain) -> list[str]:
     if part["no_pile_analysis"] is None:
-        return ["Every pour gave a pile, so the share without one has no effects."]
+        return ["Every pour is valid, so no factor changes the share of valid pours."]
     found = significant(part["no_pile_analysis"], "dummies", "p_holm")
     return [
-        f"Share of pours without a pile: mean {percent(part['no_pile_analysis']['mean'], 1)} per row; factors that "
+        f"Share of pours that are not valid: mean {percent(part['no_pile_analysis']['mean'], 1)} per row; factors that "
         f"change it (against the dummies, after Holm): {enumeration(found)}."
     ]

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from itertools import combinations
 
 from explorer.report.content import Block, Bullets, Facts, Figure, Folded, Section, Table, Text
 from explorer.report.figures.surface import contours, fit
-from explorer.report.findings import Plain, mean_and_sd, resolved_by_surface, values_of
+from explorer.report.findings import Plain, mean_and_sd, resolved_by_surface, valid_count, values_of
 from explorer.report.units_for_people import (
     fixed,
     number,
@@ -80,7 +81,7 @@ def _of_target(result: Plain, index: int, observable: str) -> list[Block]:
     blocks: list[Block] = [
         Facts(
             (
-                ("Model of", f"{name}, given a pile"),
+                ("Model of", f"{name}; valid pours only"),
                 ("R²", f"{fixed(anova['r_squared'], 3)}; adjusted {fixed(anova['r_squared_adjusted'], 3)}; predicted "
                        f"{fixed(anova['r_squared_predicted'], 3)}, by whole points "
                        f"{fixed(anova['r_squared_predicted_by_row'], 3)}"),
@@ -129,10 +130,10 @@ def _points(part: Plain) -> Table:
             mean, sd = mean_and_sd(values)
             means += [observed(observable, mean), observed(observable, sd)]
         settings = (parameter_value(f["path"], v) for f, v in zip(part["factors"], natural, strict=True))
-        valid = sum(run["outcome"] == "at_rest" for run in runs)
+        valid = valid_count(Counter(run["outcome"] for run in runs))
         rows.append((str(k + 1), *settings, str(valid), *means, percent(lost)))
     measured = [word for name in part["observables"] for word in (f"mean {observable_label(name)}", "sd")]
-    header = ("point", *(factor["name"] for factor in part["factors"]), "valid pours", *measured, "no pile")
+    header = ("point", *(factor["name"] for factor in part["factors"]), "valid pours", *measured, "not valid")
     return Table(header, tuple(rows))
 
 

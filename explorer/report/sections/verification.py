@@ -29,7 +29,7 @@ def verification(result: Plain) -> Section:
     blocks: list[Block] = [
         Text(
             f"{len(stage['runs'])} pours at the optimum with {seeds} seeds that no other stage used; "
-            f"{percent(stage['no_pile_share'], 1)} gave no pile. Angles are given a pile."
+            f"{percent(stage['no_pile_share'], 1)} are not valid. Means are over valid pours."
         )
     ]
     for index, (target, test) in enumerate(zip(stage["targets"], stage["tests"], strict=True)):

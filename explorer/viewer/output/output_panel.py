@@ -10,9 +10,10 @@ from typing import Any
 import viser
 
 from explorer.errors import CommandError
-from explorer.files.exports import bodies_csv, bodies_stl, png
+from explorer.files.exports import bodies_csv, bodies_stl, png, zipped
 from explorer.live.frames import Frame
 from explorer.live.messages import Status
+from explorer.logs.recording import recorded_lines
 from explorer.scene.source import SceneSource, command_line
 from explorer.scene.text import material_toml
 from explorer.session import Session
@@ -70,7 +71,10 @@ class OutputPanel:
             "file for any browser.",
         )
         self._switch = gui.add_button_group(
-            "Record", (START, STOP, DOWNLOAD), hint="Recordings stay in the folder named below."
+            "Record",
+            (START, STOP, DOWNLOAD),
+            hint="Every pour that is begun meanwhile has a file of its own; Download sends several as a ZIP file. "
+            "Recordings stay in the folder named below.",
         )
         self._state = gui.add_html("")
 
@@ -137,9 +141,16 @@ class OutputPanel:
             files = self._recording.files()
             size = sum(file.stat().st_size for file in files)
             if size > MOST_SENT:
-                raise CommandError(f"recording: {size / 1e6:.0f} MB are too much to send; fetch {files[0]}")
-            for file in files:
-                send_file(client, file.name, file.read_bytes())
+                listed = ", ".join(map(str, files))
+                raise CommandError(f"recording: {size / 1e6:.0f} MB are too much to send; fetch {listed}")
+            if len(files) == 1:
+                send_file(client, files[0].name, files[0].read_bytes())
+            else:
+                self._background.start(
+                    "packing the recording",
+                    lambda: zipped({file.name: file for file in files}),
+                    lambda made: send_file(client, f"{files[0].stem}.zip", made),
+                )
 
 
 def picture(client: Any) -> bytes:
@@ -166,10 +177,17 @@ def command_html(source: SceneSource, scene: Scene, seed: int) -> str:
 
 
 def recording_html(recording: RecordingSwitch, busy_with: str, notice: str) -> str:
-    """What is being recorded or done, and where the file is."""
+    """What is being recorded or done, and where the files are."""
     lines = [notice, f"Busy {busy_with}." if busy_with else ""]
+    pours = recording.pours
     if recording.running:
-        lines.append(f"Recording into {recording.path}")
-    elif recording.path is not None:
+        so_far = f" (pour {len(pours)} of this recording)" if len(pours) > 1 else ""
+        lines.append(f"Recording into {pours[-1].path if pours else recording.path}{so_far}")
+    elif pours:
+        lines += recorded_lines(pours)
+        if len(pours) > 1 and not busy_with:
+            files = recording.files()
+            lines.append(f"Download sends {files[0].name}" if len(files) == 1 else "Download sends all in one ZIP file")
+    elif recording.path is not None and recording.path.is_file():
         lines.append(f"Recorded: {recording.path}")
     return small_html("<br>".join(escape(line) for line in lines if line))

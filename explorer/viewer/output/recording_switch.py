@@ -13,6 +13,7 @@ from explorer.errors import CommandError
 from explorer.files.whole_file import write_whole
 from explorer.live.frames import Frame
 from explorer.live.messages import Status
+from explorer.logs.recording import RecordedPour
 from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.output.scene_playback import ScenePlayback
 
@@ -20,13 +21,17 @@ RRD, HTML = "rerun (.rrd)", "web page (.html)"
 
 
 class Recorder(Protocol):
-    """Something that keeps what the page shows."""
+    """Something that keeps what the page shows, a file per pour."""
+
+    @property
+    def pours(self) -> tuple[RecordedPour, ...]:
+        """What has been recorded so far."""
 
     def take(self, frame: Frame, status: Status) -> None:
         """Called about 30 times a second with the newest frame and the newest status."""
 
     def close(self) -> None:
-        """End the recording; its file is then whole."""
+        """End the recording; its files are then whole."""
 
 
 def session_recorder(path: Path) -> Recorder:
@@ -48,8 +53,9 @@ class RecordingSwitch:
         open_rrd: Callable[[Path], Recorder] = session_recorder,
     ) -> None:
         self._server, self._folder, self._open_rrd, self._background = server, folder, open_rrd, background
-        self._recorder: Recorder | None = None
+        self._recorder: Recorder | ScenePlayback | None = None
         self._path: Path | None = None
+        self._pours: tuple[RecordedPour, ...] = ()
 
     @property
     def running(self) -> bool:
@@ -58,8 +64,15 @@ class RecordingSwitch:
 
     @property
     def path(self) -> Path | None:
-        """First file of the present or last recording; a new pour continues in another beside it (rerun only)."""
+        """First file of the present or last recording; None before there was one."""
         return self._path
+
+    @property
+    def pours(self) -> tuple[RecordedPour, ...]:
+        """Files of the present or last recording of rerun's, one per pour; a web page is one file of all pours."""
+        if self._recorder is None or isinstance(self._recorder, ScenePlayback):
+            return self._pours
+        return self._recorder.pours
 
     def begin(self, kind: str) -> None:
         """Begin a recording of one of the two kinds; CommandError while one is running, or for another kind."""
@@ -86,11 +99,11 @@ class RecordingSwitch:
             self._recorder = None
             self._background.start("packing the recording", lambda: write_whole(path, recorder.html()), lambda _: None)
             return
-        # In this order: whoever sees that nothing is recorded any more may open the file.
+        # In this order: whoever sees that nothing is recorded any more may open the files.
         try:
             recorder.close()
         finally:
-            self._recorder = None
+            self._pours, self._recorder = recorder.pours, None
 
     def take(self, frame: Frame, status: Status) -> None:
         """Hand on what the page shows, if it is being recorded; a web page that is full is ended."""
@@ -101,10 +114,16 @@ class RecordingSwitch:
             self.end()
 
     def files(self) -> tuple[Path, ...]:
-        """Files of the last recording; CommandError where there is none, or while it is being written."""
+        """What a person takes along of the last recording: all its files, or the one that plays if only one does.
+
+        CommandError where there is none, or while it is being written.
+        """
         if self.running or self._background.busy_with:
             raise CommandError("recording: stop it first, and wait until it is written")
-        found = [] if self._path is None else sorted(self._folder.glob(f"{self._path.stem}*{self._path.suffix}"))
+        that_play = [pour for pour in self._pours if pour.plays]
+        found = [pour.path for pour in (that_play if len(that_play) == 1 else self._pours)]
+        if not found and self._path is not None and self._path.is_file():
+            found = [self._path]  # a web page
         if not found:
             raise CommandError("recording: nothing was recorded yet")
         return tuple(found)
@@ -117,5 +136,5 @@ class RecordingSwitch:
         elif recorder is not None:
             recorder.close()
 
-    def _take_up(self, path: Path, recorder: Recorder) -> None:
-        self._path, self._recorder = path, recorder
+    def _take_up(self, path: Path, recorder: Recorder | ScenePlayback) -> None:
+        self._path, self._recorder, self._pours = path, recorder, ()

@@ -7,7 +7,7 @@ from typing import Any
 
 import viser
 
-from doe.study import Factor, Study, load_study
+from doe.study import Factor, Study
 from explorer.report.units_for_people import (
     number,
     observable_label,
@@ -27,11 +27,14 @@ LARGEST = 1e12
 
 
 class OrderPanel:
-    """Inputs for one factor at a time, and for the first target; ``edits`` is what was changed."""
+    """Inputs for one factor at a time, and for the first target; ``edits`` is what was changed.
 
-    def __init__(self, server: viser.ViserServer, file: Path, post: Post) -> None:
+    ``study`` is that of ``file``, None where it cannot be read.
+    """
+
+    def __init__(self, server: viser.ViserServer, file: Path, study: Study | None, post: Post) -> None:
         gui = server.gui
-        self._file, self._study = file, _loaded(file)
+        self._file, self._study = file, study
         self._ranges: dict[str, dict[str, float]] = {}
         self._target: dict[str, float] = {}
         self._told = gui.add_markdown("")
@@ -152,10 +155,3 @@ def edits_markdown(study: Study, edits: StudyEdits) -> str:
 def number_on_screen(value: float) -> float:
     """Six digits: what a number box shows."""
     return float(f"{value:.6g}")
-
-
-def _loaded(file: Path) -> Study | None:
-    try:
-        return load_study(str(file))
-    except ValueError:
-        return None

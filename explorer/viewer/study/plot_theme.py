@@ -8,10 +8,10 @@ from importlib.resources import files
 from typing import Any
 
 from explorer.report.content import Spec
+from explorer.report.figures.style import CONFIG
 
 NAMES = {True: "plotly_dark", False: "plotly_white"}
 NOTHING = "rgba(0, 0, 0, 0)"
-MODE_BAR = {"displaylogo": False, "modeBarButtonsToRemove": ["select2d", "lasso2d"]}
 
 
 class Drawn:
@@ -24,7 +24,7 @@ class Drawn:
             # The page keeps zoom and angle of view from figure to figure; they are this chart's own.
             if key.startswith(("xaxis", "yaxis", "scene")):
                 layout[key] = {**entry, "uirevision": name}
-        self._content = {"data": spec["data"], "layout": layout, "config": MODE_BAR}
+        self._content = {"data": spec["data"], "layout": layout, "config": CONFIG}
 
     def to_json(self) -> str:
         """The chart as plotly.js reads it."""

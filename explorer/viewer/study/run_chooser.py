@@ -77,7 +77,7 @@ def listed(result: Plain, stage: str) -> dict[str, StudyRun]:
 def run_text(run: StudyRun, observable: str) -> str:
     """One run in a line, e.g. "row 3 · 24.3° · seed 17"."""
     value = run.observables.get(observable)
-    seen = observed(observable, value) if value is not None and _valid(run) else ""
+    seen = observed(observable, value) if value is not None and Outcome(run.outcome).valid else ""
     return " · ".join(part for part in (run.label, seen or run.outcome.replace("_", " "), f"seed {run.seed}") if part)
 
 
@@ -90,10 +90,6 @@ def run_markdown(result: Plain, run: StudyRun) -> str:
     setting = f"{', '.join(parts[:CHANGES_SHOWN])}{more}" if parts else "everything at the reference values"
     seen = f"{escaped(observable_label(name))} {escaped(observed(name, run.observables.get(name)))}"
     return f"{escaped(run.outcome.replace('_', ' '))}; {seen}. Set: {setting}."
-
-
-def _valid(run: StudyRun) -> bool:
-    return run.outcome in {str(outcome) for outcome in Outcome if outcome.valid}
 
 
 def _offer(dropdown: Any, options: tuple[str, ...]) -> None:

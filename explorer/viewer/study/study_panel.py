@@ -7,11 +7,13 @@ from pathlib import Path
 
 import viser
 
+from doe.stages.sizing import planned_runs
+from doe.study import Study, load_study
 from explorer.background.result_file import ResultFile
 from explorer.report.findings import Plain
 from explorer.report.study_plots import study_plots
 from explorer.session import Session
-from explorer.study.process import PARTIAL, PROFILES, RESULT, StudyProcess
+from explorer.study.process import PARTIAL, RESULT, StudyProcess
 from explorer.viewer.actions import Post
 from explorer.viewer.study.comparison_panel import ComparisonPanel
 from explorer.viewer.study.order_panel import OrderPanel
@@ -24,9 +26,10 @@ from explorer.viewer.study.stage_table import stages_markdown
 from solver import Scene, canonical, parameters, with_values
 
 PRESENT = "present or newest study"
+NONE = "(the study cannot be read)"
 EMPTY = (
-    "No charts yet: they come as soon as a stage can be analysed. Press *Start* (*quick* takes some minutes and shows "
-    "the whole chain), or add a folder with a finished study below."
+    "No charts yet: they come as soon as a stage can be analysed. Press *Start*, or add a "
+    "folder with a finished study below."
 )
 
 
@@ -44,6 +47,7 @@ class StudyPanel:
     ) -> None:
         gui = server.gui
         self._study, self._session = study, session
+        loaded = _loaded(study.study_file)
         self._alive, self._over = ResultFile(PARTIAL, RESULT), ResultFile(RESULT, PARTIAL)
         self._shown: Hashable = None
         self._trouble = ""
@@ -51,11 +55,11 @@ class StudyPanel:
         gui.add_markdown(f"**{escaped(name)}** — screening, steepest ascent, response surface, optimum, verification.")
         self._profile = gui.add_dropdown(
             "Profile",
-            PROFILES,
-            hint="quick: coarse shapes, less mass, one run per row; standard: 30 g, 3 seeds",
+            (NONE,) if loaded is None else tuple(loaded.profiles),
+            hint=None if loaded is None else "; ".join(profile_text(loaded, name) for name in loaded.profiles),
         )
         with gui.add_folder("Ranges and target of the next study", expand_by_default=False):
-            self._order = OrderPanel(server, study.study_file, post)
+            self._order = OrderPanel(server, study.study_file, loaded, post)
         acts = {"Start": self._start, "Pause / go on": self._pause, "Cancel": study.cancel}
         more = {"Resume": study.resume, "Retry": study.retry, "Queue": self._queue, "Clear queue": study.clear_queue}
         self._view = ProcessView(server, "Study", acts, post, more)
@@ -141,6 +145,15 @@ class StudyPanel:
         set_live(self._session, values)
 
 
+def profile_text(study: Study, name: str) -> str:
+    """What a profile of the study spends, e.g. "quick: coarse shapes, 83 runs"."""
+    profile = study.profiles[name]
+    runs = "as many runs as the pilot asks for"
+    if profile.resolution_deg is None:
+        runs = f"{sum(planned_runs(study, profile).values())} runs"
+    return f"{name}: {profile.spheres} shapes, {runs}"
+
+
 def set_live(session: Session, values: Mapping[str, float | str]) -> None:
     """Give the live pour ``values`` (by path, SI): at once if all of them can act on a running pour, else anew."""
     scene: Scene = session.status().scene
@@ -149,3 +162,10 @@ def set_live(session: Session, values: Mapping[str, float | str]) -> None:
         session.set_parameters(values)
     else:
         session.restart(with_values(scene, dict(values)))
+
+
+def _loaded(file: Path) -> Study | None:
+    try:
+        return load_study(str(file))
+    except ValueError:
+        return None

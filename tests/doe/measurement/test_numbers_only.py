@@ -6,10 +6,10 @@ import numpy as np
 
 from doe.diagnose.declare import complete_rows, declare, observe
 from doe.measurement import load_measurement
+from doe.validation.laboratory import MODEL, OBSERVABLES, write_folder
 from solver import EFFECTS
 from solver.assets import measurement_folder
-from tests.blind.disguise import disguise
-from tests.blind.laboratory import MODEL, OBSERVABLES, write_folder
+from tests.doe.validation.disguise import disguise
 
 
 def asked(folder):

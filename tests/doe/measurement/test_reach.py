@@ -5,8 +5,9 @@ import pytest
 
 from doe.measurement import load_measurement, reach_of
 from doe.measurement.reach import TELLTALES
-from solver import EFFECTS
+from solver import EFFECTS, Telltale
 from solver.assets import measurement_folder
+from solver.effects.plate_tilt import PlateTilt
 from tests.doe.measurement.folders import MEASUREMENT, changed, write
 
 HEAD = "replicate,observable,x,value\n"
@@ -73,5 +74,19 @@ def test_shipped_pours_can_show_every_effect_and_the_drum_no_tilt():
     assert any("one replicate" in warning for warning in drum.warnings)
 
 
-def test_every_effect_has_its_telltales():
-    assert set(TELLTALES) == set(EFFECTS)
+class LeaningStand(PlateTilt):
+    """An effect that nothing in this package has heard of."""
+
+    name = "leaning_stand"
+
+
+def test_a_new_effect_says_itself_what_reveals_it(tmp_path, monkeypatch):
+    monkeypatch.setitem(EFFECTS, "leaning_stand", LeaningStand)
+    assert "leaning_stand" in reach(tmp_path).hidden_effects
+    table = HEAD + "1,centroid_x_m,,0.1\n2,centroid_x_m,,0.2\n"
+    assert "leaning_stand" not in reach(tmp_path, table).hidden_effects
+
+
+def test_every_class_of_observables_has_its_summaries():
+    assert set(TELLTALES) == set(Telltale)
+    assert all(TELLTALES.values())

@@ -9,7 +9,7 @@ import re
 import pytest
 
 from solver.assets import asset_path
-from solver.effects import BODY_EFFECTS, CONTACT_EFFECTS, EFFECTS, SET_UP_EFFECTS, ContactEffect, SetUpEffect
+from solver.effects import BODY_EFFECTS, CONTACT_EFFECTS, EFFECTS, SET_UP_EFFECTS, ContactEffect, SetUpEffect, Telltale
 from solver.effects.columns import COLUMNS, COUPLE, KEPT, MEMORY, effect_table, kernel_effects
 from solver.effects.set_up import actual
 from solver.material_file import load_material, scene_from
@@ -44,6 +44,8 @@ def test_class_and_parameters_are_complete(name):
     assert kind.__doc__
     for text in (kind.literature, kind.lever):
         assert len(text) > 10
+    assert kind.telltales
+    assert set(kind.telltales) <= set(Telltale)
     for path, parameter in declared(kind, name).items():
         assert parameter.unit in UNITS, path
         assert parameter.low < parameter.high < float("inf"), path

@@ -117,6 +117,7 @@ def record_of(
         "",
         bodies,
         pile.spheres,
+        np.ones(n, dtype=bool),
         pile,
         trace,
         entries_of(pile.component, []),

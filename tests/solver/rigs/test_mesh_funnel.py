@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from doe.store import run_key
 from solver.material_file import load_material
 from solver.params import ParameterError
+from solver.pour_key import pour_key
 from solver.record import Outcome
 from solver.rigs import Funnel, MeshFunnel
 from solver.run import run_pour
@@ -100,9 +100,9 @@ def test_the_file_is_a_parameter_like_others(tmp_path):
         with pytest.raises(ParameterError, match=f"rig.mesh.*{words}"):
             with_values(scene, {"rig.mesh": value})
     # Another surface under the same name is another run.
-    key = run_key(own, 1, "code")
+    key = pour_key(own, 1)
     (tmp_path / "own.stl").write_bytes(exported(cone(outlet=32.0)))
-    assert run_key(own, 1, "code") != key
+    assert pour_key(own, 1) != key
     (tmp_path / "own.stl").unlink()
     with pytest.raises(ParameterError, match="neither a file"):
         own.rig.surfaces()

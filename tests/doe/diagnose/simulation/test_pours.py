@@ -1,8 +1,8 @@
 """Which pours are the same: model, number and condition, not the number alone."""
 
+import dataclasses
 import math
 from contextlib import closing
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,8 +14,9 @@ from doe.diagnose.simulation.plan import Point
 from doe.diagnose.simulation.pours import ModelPours, Pour
 from doe.diagnose.simulation.ranges import whitened_shift
 from doe.store import Store
+from doe.validation.laboratory import OBSERVABLES, declared_model
 from solver import Outcome, value
-from tests.blind.laboratory import OBSERVABLES, declared_model
+from tests.solver.observables.made_up import empty_pile, record_of
 
 FRICTION = "pair.grain.grain.static_friction"
 
@@ -28,16 +29,15 @@ def poured(monkeypatch, tmp_path):
 
     def run(queue, room):
         while queue:
-            jobs.append(queue.popleft())
-            yield (
-                jobs[-1],
-                SimpleNamespace(
-                    scene=jobs[-1].scene, outcome=Outcome.MEASURED, message="", dt=1e-6, steps=1, wall_s=0.0
-                ),
-            )
+            job = queue.popleft()
+            jobs.append(job)
+            friction = float(value(job.scene, FRICTION))
+            # What is read is read off the raw pour, which knows no friction: the mass stands for it.
+            record = record_of(empty_pile(), np.zeros(1), np.zeros(1), poured_mass=friction)
+            yield job, dataclasses.replace(record, scene=job.scene, outcome=Outcome.MEASURED)
 
     def summaries(asked, record):
-        return np.full(len(module.summary_names(asked)), float(value(record.scene, FRICTION)))
+        return np.full(len(module.summary_names(asked)), record.poured_mass)
 
     monkeypatch.setattr(module, "summaries_of_record", summaries)
     with closing(Store(tmp_path / "runs.sqlite")) as store:
@@ -94,3 +94,25 @@ def test_an_effect_under_which_no_pour_ends_is_infinitely_far():
     centre = [(Pour(tuple(row), "measured"),) for row in np.random.default_rng(0).normal(size=(8, 2))]
     for moved in (Pour((math.nan, 1.0), "measured"), Pour((1.0, 1.0), "jammed")):
         assert whitened_shift(declared, centre, [(moved,)]) == math.inf
+
+
+def test_a_new_summary_is_read_off_all_stored_pours_without_pouring(poured):
+    """A data set of the same set-up that offers more: the pours of the first serve it as they are."""
+    pours, jobs = poured
+    points = [at(0.5), at(0.6), at(0.7, 1)]
+    pours.run("first", points)
+    (condition,) = pours._conditions
+    # Fewer numbers were measured first, then more: in the order of a laboratory that looks again.
+    for observations in (condition.observations[:3], condition.observations[:5]):
+        smaller = dataclasses.replace(condition, observations=observations)
+        other = ModelPours([smaller], [FRICTION], pours._store, pours._pours)
+        found = other.run("second", points)
+        width = len(module.summary_names(smaller))
+        assert [row[0].summaries for row in found] == [(f,) * width for f in (0.5, 0.6, 0.7)]
+        assert other.run_now == 0
+    taller = dataclasses.replace(condition.observations[0], observable="centre_height_m")
+    more = dataclasses.replace(condition, observations=(*condition.observations, taller))
+    assert "centre_height_m" in module.summary_names(more)
+    other = ModelPours([more], [FRICTION], pours._store, pours._pours)
+    assert other.run("third", points)[0][0].summaries == (0.5,) * len(module.summary_names(more))
+    assert (other.run_now, len(jobs)) == (0, 3)

@@ -1,0 +1,137 @@
+"""Where the work is done: pours in a crew, pours with an outside effect and verdicts in processes beside it.
+
+Every pour is kept in the store, by scene, seed, physics and outside effect, so that nothing is poured twice.
+"""
+
+import math
+import multiprocessing as mp
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from multiprocessing.pool import Pool
+from typing import Any
+
+from doe.measurement import Condition, readings_of_record
+from doe.runner import stored_run
+from doe.store import Store, read_off
+from doe.validation.laboratory import OBSERVABLES, Reading
+from doe.validation.outside import AMPLITUDE, OUTSIDE, magnified, outside_pour
+from solver import Crew, Job, Outcome, Record, Scene, begin_worker, pour_key
+
+
+class OutOfTimeError(Exception):
+    """The time that was given is over; what has been poured is kept."""
+
+
+@dataclass(frozen=True)
+class Order:
+    """One pour that a laboratory asks for. ``outside``: name of an outside effect, or none."""
+
+    scene: Scene
+    seed: int
+    condition: Condition
+    outside: str = ""
+
+    @property
+    def variant(self) -> str:
+        """What its pour has that its scene does not say."""
+        return f"{self.outside} {AMPLITUDE[self.outside]!r}, outside {OUTSIDE}" if self.outside else ""
+
+    @property
+    def key(self) -> str:
+        """Its key in the store."""
+        return pour_key(self.scene, self.seed, self.variant)
+
+    def reader(self, record: Record) -> dict[str, float]:
+        """What the laboratory reads off the pour as it was."""
+        seen = magnified(record, 1.0 + AMPLITUDE[self.outside]) if self.outside == "misread_scale" else record
+        return {name: float(x) for name, x in readings_of_record(self.condition, seen).items()}
+
+
+class WorkPlace:
+    """Workers and a deadline [s] on ``time.monotonic``; a context that ends the workers."""
+
+    def __init__(self, store: Store, workers: int, deadline: float = math.inf) -> None:
+        self.store, self.workers, self.deadline = store, workers, deadline
+        self.poured = 0
+        self._stack = ExitStack()
+        self._crew: Crew | None = None
+        self._pool: Pool | None = None
+
+    def __enter__(self) -> "WorkPlace":
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self._stack.__exit__(*error)
+
+    @property
+    def crew(self) -> Crew:
+        """The crew, started when it is first needed."""
+        if self._crew is None:
+            self._crew = self._stack.enter_context(Crew(self.workers))
+        return self._crew
+
+    def look_at_the_clock(self, *_: Any) -> None:
+        """Raise OutOfTimeError after the deadline."""
+        if time.monotonic() > self.deadline:
+            raise OutOfTimeError
+
+    def pour(self, orders: Sequence[Order], room: Sequence[Scene]) -> list[Reading | None]:
+        """Readings of the pours in order, None for one that broke off. ``room``: scenes that nearly all fit into."""
+        wanted = [order for order in {order.key: order for order in orders}.values() if not self._known(order)]
+        plain = [order for order in wanted if not order.outside]
+        queue = deque(Job(order.scene, order.seed, tag=k) for k, order in enumerate(plain))
+        # A pair of effects may need more bodies than any single one.
+        scenes = [*room, *(job.scene for job in queue)]
+        for job, record in self.crew.run_queue(queue, scenes) if queue else ():
+            self._keep(plain[job.tag], record)
+        strange = [order for order in wanted if order.outside]
+        tasks = [(order.outside, order.scene, order.seed, AMPLITUDE[order.outside]) for order in strange]
+        for order, record in zip(strange, self.map(_outside, tasks), strict=True):
+            self._keep(order, record)
+        return [self._reading(order) for order in orders]
+
+    def map(self, function: Callable[[Any], Any], tasks: Sequence[Any]) -> Iterator[Any]:
+        """``function`` of every task, in order, in the processes beside the crew."""
+        if not tasks:
+            return
+        if self._pool is None:
+            self._pool = self._stack.enter_context(mp.get_context("spawn").Pool(self.workers, begin_worker))
+        for result in self._pool.imap(function, tasks):
+            yield result
+            self.look_at_the_clock()
+
+    def _known(self, order: Order) -> bool:
+        return self.store.find(order.key) is not None
+
+    def _reading(self, order: Order) -> Reading | None:
+        stored = self.store.find(order.key)
+        assert stored is not None
+        if not Outcome(stored.outcome).valid:
+            return None
+        if order.outside:
+            # Off the raw pour: what is kept may have been read by somebody whose scale is right.
+            found = read_off(stored.raw, order.reader)
+        else:
+            found = self.store.read(stored, OBSERVABLES, order.reader).observables
+        return {name: math.nan if x is None else x for name, x in found.items()}
+
+    def _keep(self, order: Order, record: Record) -> None:
+        job = Job(order.scene, order.seed)
+        stored = stored_run(
+            job, record, "blind", order.condition.name, order.outside, order.reader, order.key, order.variant
+        )
+        self.store.add(stored)
+        self.poured += 1
+        self.look_at_the_clock()
+
+
+def _outside(task: tuple[str, Scene, int, float]) -> Record:
+    return outside_pour(*task)
+
+
+def complete(readings: Iterable[Reading | None]) -> list[Reading]:
+    """Pours that came to their end and of which everything could be read."""
+    return [one for one in readings if one is not None and all(math.isfinite(x) for x in one.values())]

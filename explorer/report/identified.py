@@ -1,0 +1,114 @@
+"""What a target says of each factor: its value where the target identifies it, else the range that gives the target.
+
+The optimum is one point that a rule picks among all settings that give the target. Its 95 % set tells how far that pick
+scatters from refit to refit; it tells what is known of a factor only where the target identifies the factor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from explorer.report.findings import Plain
+from explorer.report.units_for_people import (
+    MISSING,
+    enumeration,
+    parameter_label,
+    parameter_range,
+    parameter_value,
+    percent,
+)
+
+BY_RULE = "chosen by rule"
+GIVES_TARGET = "range that gives the target"
+"""What `Setting.feasible` is called in tables and charts."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One factor at the optimum, in words.
+
+    ``chosen``: the value. ``confidence_set``: its 95 % set, a dash where the factor is not identified. ``feasible``:
+    the range over which the model gives the target, ``feasible_share``: the part of the region that it takes.
+    """
+
+    name: str
+    label: str
+    identified: bool
+    chosen: str
+    confidence_set: str
+    feasible: str
+    feasible_share: str
+
+    @property
+    def value(self) -> str:
+        """The chosen value, called what it is."""
+        return self.chosen if self.identified else f"{self.chosen} ({BY_RULE})"
+
+    @property
+    def cells(self) -> tuple[str, ...]:
+        """Name, label, whether it is identified, range that gives the target and its share, value, 95 % set."""
+        yes_or_no = "yes" if self.identified else "no"
+        return (
+            *(self.name, self.label, yes_or_no),
+            *(self.feasible, self.feasible_share, self.value, self.confidence_set),
+        )
+
+    @property
+    def answer(self) -> str:
+        """The value with its 95 % set; of a factor that is not identified the range first."""
+        if self.identified:
+            return f"{self.chosen} ({self.confidence_set})"
+        return self.value if self.feasible == MISSING else f"{self.feasible} ({BY_RULE}: {self.chosen})"
+
+
+def settings(optimum: Plain) -> tuple[Setting, ...]:
+    """Every factor of an optimum, in its order."""
+    return tuple(_setting(optimum, k) for k in range(len(optimum["factors"])))
+
+
+def is_identified(single: Plain, k: int) -> bool:
+    """Whether the target identifies factor ``k``; one that is out of reach identifies none."""
+    return single["reached"] and single["names"][k] not in single["unidentified"]
+
+
+def all_identified(optimum: Plain) -> bool:
+    """Whether the target identifies every factor, so that the point is more than a choice."""
+    return all(is_identified(optimum["single"], k) for k in range(len(optimum["factors"])))
+
+
+def rule(optimum: Plain, reference: str) -> str:
+    """How the point was chosen, as a sentence for below a table; empty where every factor is identified."""
+    if all_identified(optimum):
+        return ""
+    if optimum["compromise"] is not None:
+        how = "the setting of least weighted misfit over all targets"
+    elif optimum["single"]["reached"]:
+        how = f"nearest the {reference} among the settings that give the target"
+    else:
+        how = "where the model comes nearest the target"
+    return f"{BY_RULE.capitalize()}: {how}; not an estimate, so it has no 95 % set."
+
+
+def cloud_caution(optimum: Plain) -> str:
+    """What the scatter of the refits does not tell, as a sentence; empty where every factor is identified."""
+    open_ = [s.name for s in settings(optimum) if not s.identified]
+    if not open_:
+        return ""
+    return f"The target does not identify {enumeration(open_)}: there the scatter is that of the rule's choice."
+
+
+def _setting(optimum: Plain, k: int) -> Setting:
+    single, factor = optimum["single"], optimum["factors"][k]
+    path, identified = factor["path"], is_identified(single, k)
+    low, high = single["solution_low"][k], single["solution_high"][k]
+    return Setting(
+        name=factor["name"],
+        label=parameter_label(path),
+        identified=identified,
+        chosen=parameter_value(path, optimum["values"][path]),
+        confidence_set=parameter_range(path, single["point_low"][k], single["point_high"][k])
+        if identified
+        else MISSING,
+        feasible=parameter_range(path, low, high),
+        feasible_share=MISSING if low is None else percent(single["solution_share"][k]),
+    )

@@ -1,0 +1,67 @@
+"""Cells, comments and numbers of a CSV file in every dialect that a spreadsheet writes."""
+
+import math
+
+import pytest
+
+from doe.csv_table import csv_table
+
+
+def table(text, **more):
+    return csv_table(text, lambda line, what: ValueError(f"line {line}: {what}"), **more)
+
+
+@pytest.mark.parametrize(
+    ("text", "number"),
+    [("name,x\na,1.5\n", "1.5"), ("name;x\na;1,5\n", "1,5"), ("name\tx\na\t1,5\n", "1,5"), ("name;x\na;1.5\n", "1.5")],
+)
+def test_the_header_says_what_stands_between_cells_and_whether_a_comma_is_decimal(text, number):
+    found = table(text)
+    assert found.rows == ((1, ["name", "x"]), (2, ["a", number]))
+    assert found.number(number) == 1.5
+
+
+def test_a_comma_is_no_decimal_sign_where_it_stands_between_cells():
+    found = table('name,x\na,"1,5"\n')
+    assert found.rows[1] == (2, ["a", "1,5"])
+    assert math.isnan(found.number("1,5"))
+
+
+@pytest.mark.parametrize("text", ["", "steep", "nan", "inf", "1_000", "1.234,5", "1,2,3", "1e999", "0x10"])
+def test_what_is_no_finite_number_is_nan(text):
+    assert math.isnan(table("name;x\n").number(text))
+
+
+def test_a_typographic_minus_is_a_minus():
+    assert table("x,y\n").number("−1.5") == table("x;y\n").number("−1,5") == -1.5
+
+
+def test_comments_are_kept_apart_also_quoted_and_filled_up_by_a_spreadsheet():
+    text = '# plain\n"# factor | a | 0,5; or so";;;\n  # padded;;;\nx;y\n1;2\n#3;4\n'
+    found = table(text)
+    assert found.comments == ((1, "# plain"), (2, "# factor | a | 0,5; or so"), (3, "# padded"), (6, "#3;4"))
+    assert [line for line, _ in found.rows] == [4, 5]
+
+
+def test_a_comment_behind_a_row_ends_it_only_where_that_is_asked_for():
+    text = 'x,y # one, two; three; four; "five"\n1,2 # said, "so"\n3,"# four"\n'
+    assert table(text, trailing_comments=True).rows == ((1, ["x", "y"]), (2, ["1", "2"]), (3, ["3", "# four"]))
+    assert table("x,y\n1,no #2\n").rows[1] == (2, ["1", "no #2"])
+
+
+def test_empty_rows_and_columns_that_a_spreadsheet_adds_are_left_out():
+    found = table(";;;\nx;y;;\n\n1;2;;\n;;;\n3;;;\n4;5;;6\n")
+    assert found.rows == ((2, ["x", "y"]), (4, ["1", "2"]), (6, ["3", ""]), (7, ["4", "5", "", "6"]))
+
+
+def test_a_row_over_several_lines_is_named_by_its_first():
+    assert table('x,y\n1,"two\nlines"\n3,4\n').rows[1:] == ((2, ["1", "two\nlines"]), (4, ["3", "4"]))
+
+
+def test_a_quote_that_never_ends_is_refused_by_the_line_where_it_begins():
+    with pytest.raises(ValueError, match=r"^line 3: cannot be read as cells: "):
+        table('x,y\n1,2\n3,"4\n5,6\n')
+
+
+def test_nothing_but_comments_has_no_rows():
+    assert table("# only\n\n").rows == table("").rows == ()

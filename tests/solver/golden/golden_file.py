@@ -1,0 +1,203 @@
+"""The golden file: digests of the bits of every case, on which machines they were taken, and what a difference means.
+
+``golden.json``    physics, defaults of all parameters, and per kind of machine (instruction sets of the processor,
+                   versions of Taichi and NumPy) the digest of every case; ``before``: the same of the physics before
+``first_steps.npz``  state of each case after its first steps, for machines whose bits are not known
+
+``python -m tests.solver.golden.golden_file`` (``make golden``) records what is new. It refuses bits that changed under
+the same number of the physics, and a raised number under which nothing changed.
+"""
+
+import json
+import platform
+import re
+import sys
+import tempfile
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from solver import backend
+from solver.version import FITTING, PHYSICS
+
+FILE = Path(__file__).with_name("golden.json")
+FIRST_STEPS = Path(__file__).with_name("first_steps.npz")
+TOLERANCE = 1e-12
+"""On another processor. A change by one unit in the last place grows to 1e-12 rad/s of 5 rad/s over the first steps."""
+INSTRUCTION_SETS = re.compile(r"sse|ssse|avx|fma|f16c|bmi|popcnt|movbe|adx|amx|neon|asimd|sve")
+
+Digests = dict[str, str]
+Numbers = dict[str, npt.NDArray[np.float64]]
+
+
+class RefusalError(Exception):
+    """The bits and the number of the physics do not belong together."""
+
+
+@dataclass(frozen=True)
+class Bits:
+    """Digests of all cases on one kind of machine."""
+
+    machine: dict[str, str]
+    digests: Digests
+
+
+@dataclass(frozen=True)
+class Golden:
+    """Contents of the file. ``defaults``: of every declared parameter, by path."""
+
+    physics: int
+    defaults: dict[str, Any]
+    machines: tuple[Bits, ...] = ()
+    before: "Golden | None" = None
+    first_steps: Numbers = field(default_factory=dict)
+    fitting: int = FITTING
+
+    def on(self, machine: dict[str, str]) -> Digests | None:
+        """The digests taken on such a machine, or None."""
+        return next((bits.digests for bits in self.machines if bits.machine == machine), None)
+
+
+def this_machine() -> dict[str, str]:
+    """What the bits of a program may differ by."""
+    cpuinfo = Path("/proc/cpuinfo")
+    text = cpuinfo.read_text() if cpuinfo.exists() else ""
+    found = re.search(r"^(?:flags|Features)\s*:\s*(.*)$", text, re.MULTILINE)
+    flags = sorted(name for name in (found[1].split() if found else ()) if INSTRUCTION_SETS.match(name))
+    instructions = " ".join([platform.machine(), *flags])
+    return {"instructions": instructions, "taichi": version("taichi"), "numpy": version("numpy")}
+
+
+def taken(folder: Path) -> Golden:
+    """What the solver of today does; ``folder``: an empty one."""
+    from tests.solver.golden import cases
+
+    early, late = cases.everything(folder)
+    return Golden(PHYSICS, cases.defaults(), (Bits(this_machine(), cases.digests(late)),), None, early)
+
+
+def changed(one: dict[str, Any], other: dict[str, Any]) -> list[str]:
+    """Names in both whose values differ."""
+    return [name for name in one if name in other and one[name] != other[name]]
+
+
+def apart(known: Numbers, now: Numbers) -> list[str]:
+    """Cases in both whose first steps differ by more than ``TOLERANCE``."""
+    return [
+        name
+        for name in known
+        if name in now
+        and (known[name].shape != now[name].shape or (np.abs(now[name] - known[name]) > _slack(known[name])).any())
+    ]
+
+
+def _slack(state: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """``TOLERANCE`` of the largest value of each column, or of 1 SI unit if that is more."""
+    slack: npt.NDArray[np.float64] = TOLERANCE * np.maximum(1.0, np.abs(state).max(axis=0))
+    return slack
+
+
+def contradiction(golden: Golden, now: Golden) -> str | None:
+    """How a number and the bits of ``now``, taken on one machine, contradict each other; None: they do not."""
+    differing, what = _differing(golden, now)
+    if golden.on(now.machines[0].machine) is None and now.physics > golden.physics:
+        return None  # what changed may show after the first steps only, and its bits are not known here
+    line = at_odds("PHYSICS", golden.physics, now.physics, differing, what)
+    if line is None and golden.on(now.machines[0].machine) is not None:
+        shapes = [name for name in differing if name.startswith("shape")]
+        line = at_odds("FITTING", golden.fitting, now.fitting, shapes, "member spheres")
+    return line
+
+
+def at_odds(version: str, recorded: int, now: int, differing: Sequence[str], what: str) -> str | None:
+    """How a version and what it stands for contradict each other; None: both changed, or neither.
+
+    ``differing`` names the cases whose ``what`` is not as recorded.
+    """
+    if now < recorded:
+        return f"{version} is {now}, below the recorded {recorded}"
+    if now > recorded and not differing:
+        return f"{version} is {now} and was {recorded}, but nothing changed: put it back"
+    if now == recorded and differing:
+        return (
+            f"{what} changed under the same {version} = {now}: {', '.join(differing)}. "
+            f"Undo that, or raise {version} and record it (make golden)"
+        )
+    return None
+
+
+def unrecorded(golden: Golden, now: Golden) -> str | None:
+    """What the golden file does not hold yet, or holds for nothing; None: it is up to date."""
+    if now.physics != golden.physics:
+        return f"PHYSICS is {now.physics} and the golden file is of {golden.physics}: record it (make golden)"
+    names = set(golden.defaults) ^ set(now.defaults) | set(now.machines[0].digests) ^ set(golden.machines[0].digests)
+    if not names:
+        return None
+    return f"in the golden file or in the program only: {', '.join(sorted(names))}; record it (make golden)"
+
+
+def _differing(golden: Golden, now: Golden) -> tuple[list[str], str]:
+    """Cases and defaults that differ, and by what they were compared."""
+    (today,) = now.machines
+    known = golden.on(today.machine)
+    defaults = [f"default of {path}" for path in changed(golden.defaults, now.defaults)]
+    if known is None:
+        return apart(golden.first_steps, now.first_steps) + defaults, "first steps (this machine's bits are not known)"
+    return changed(known, today.digests) + defaults, "bits"
+
+
+def recorded(golden: Golden | None, now: Golden) -> Golden:
+    """The golden file with ``now`` in it. Raises RefusalError where number and bits contradict each other."""
+    if golden is None:
+        return now
+    if (line := contradiction(golden, now)) is not None:
+        raise RefusalError(line)
+    if now.physics > golden.physics:
+        return replace(now, before=replace(golden, before=None, first_steps={}))
+    (today,) = now.machines
+    # A machine that has not run a new case is recorded again when it does.
+    others = [bits for bits in golden.machines if bits.machine != today.machine]
+    kept = [bits for bits in others if set(bits.digests) == set(today.digests)]
+    return replace(now, machines=(today, *kept), before=golden.before)
+
+
+def read() -> Golden:
+    """The golden file that is kept."""
+    with np.load(FIRST_STEPS) as file:
+        return replace(_golden(json.loads(FILE.read_text(encoding="utf-8"))), first_steps=dict(file))
+
+
+def _golden(table: dict[str, Any]) -> Golden:
+    machines = tuple(Bits(**bits) for bits in table["machines"])
+    before = _golden(table["before"]) if table["before"] else None
+    return Golden(table["physics"], table["defaults"], machines, before, fitting=table["fitting"])
+
+
+def write(golden: Golden) -> None:
+    """Replace the golden file."""
+    table = asdict(replace(golden, first_steps={}))
+    FILE.write_text(json.dumps(table, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    np.savez_compressed(FIRST_STEPS, allow_pickle=False, **golden.first_steps)
+
+
+def main() -> int:
+    """Take all bits and record them; 1 where that is refused."""
+    backend.init(threads=2)
+    with tempfile.TemporaryDirectory() as folder:
+        now = taken(Path(folder))
+    try:
+        write(recorded(read() if FILE.exists() else None, now))
+    except RefusalError as error:
+        print(error, file=sys.stderr)
+        return 1
+    print(f"{FILE.name}: physics {now.physics}, {len(now.machines[0].digests)} cases")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,47 @@
+"""What a world is set up with arrives in the field of its name: the kernel reads its columns by position."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver.laboratory import ROOM, bench
+from solver.layout import layout
+from solver.rigs import Funnel
+from solver.world import SETTINGS, Batch
+
+pytestmark = pytest.mark.usefixtures("taichi")
+
+DT = 1.25e-5
+GRAVITY = (0.5, -1.5, -9.0)
+
+
+def test_every_setting_is_read_from_its_own_column():
+    scene = bench(gravity=GRAVITY)
+    scene = replace(
+        scene,
+        rig=Funnel(outlet_height=0.07, inlet_diameter=0.13, domain_half_width=0.31, wall="wall"),
+        numerics=replace(scene.numerics, skin=1.5e-4, sleep_speed=2.5e-4, sleep_time=0.0125),
+    )
+    bodies = layout(scene, np.zeros(3, dtype=np.int32))
+    batch = Batch(ROOM)
+    batch.load(0, scene, bodies, DT, (True,) * len(scene.rig.surfaces()))
+    world = {name.removeprefix("world."): values for name, values in batch.take(0).items() if name.startswith("world.")}
+    world |= dict(zip(("gravity_x", "gravity_y", "gravity_z"), world["gravity"], strict=True))
+    inside = scene.rig.container(0.0)
+    expected = {
+        "dt": DT,
+        "skin": 1.5e-4,
+        "cell": 2.0 * bodies.numbers[0, 4] + 1.5e-4,
+        "sleep_speed": 2.5e-4,
+        "sleep_time": 0.0125,
+        "domain": 0.31,
+        "outlet": inside.height,
+        "inlet_radius": inside.radius,
+        "gravity_x": 0.5,
+        "gravity_y": -1.5,
+        "gravity_z": -9.0,
+    }
+    assert len({float(value) for value in expected.values()}) == len(expected)  # or two could change places unseen
+    assert set(SETTINGS) == set(expected)
+    assert {name: float(world[name]) for name in SETTINGS} == expected
