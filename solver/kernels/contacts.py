@@ -83,11 +83,14 @@ def touch_of(s: ti.template(), w, k, n, overlap, velocity, omega, a, elastic, da
 
 
 @ti.func
-def respond(s: ti.template(), w, k, n, overlap, velocity, omega):
+def respond(s: ti.template(), w, k, n, overlap, velocity, omega, still):
     """Force [N] and torque [N m] on body a of entry ``k``, energy that it takes and what of it its spring keeps [J].
 
     ``velocity`` is that of a relative to its partner at the contact, ``omega`` the relative angular velocity (only
     effects ask for it). A torque comes from effects alone; it acts on both bodies, in opposite directions.
+
+    If ``still``, nothing moves in the entry and no step passes: what it keeps stays as it is, and no energy goes. Such
+    an entry is evaluated whenever the list is built, so anything else would let the list's length act on the motion.
     """
     dt, mass = s.world.dt[w], s.contact.reduced_mass[w, k]
     law = s.law.row[w, s.contact.law[w, k]]
@@ -105,8 +108,8 @@ def respond(s: ti.template(), w, k, n, overlap, velocity, omega):
     touch = Touch(force=0.0)
     if ti.static(s.effects):
         touch = touch_of(s, w, k, n, overlap, velocity, omega, contact_radius, hertz, damper)
-        touch = pass_stage(s, w, k, touch, Stage.NORMAL)
-        touch = pass_stage(s, w, k, touch, Stage.ADHESION)
+        touch = pass_stage(s, w, k, touch, Stage.NORMAL, still)
+        touch = pass_stage(s, w, k, touch, Stage.ADHESION, still)
         contact_radius, elastic, damper = touch.radius, touch.elastic, touch.damper
         floor, pull = touch.floor, touch.pull
         if overlap <= 0.0 and touch.held == 0:
@@ -120,31 +123,35 @@ def respond(s: ti.template(), w, k, n, overlap, velocity, omega):
     if ti.static(s.effects):
         touch.force = f_n
         touch.limit = law[2] * ti.max(0.0, f_n + pull)
-        touch = pass_stage(s, w, k, touch, Stage.TANGENTIAL)
+        touch = pass_stage(s, w, k, touch, Stage.TANGENTIAL, still)
         limit = touch.limit
     old, last_loss = s.contact.spring[w, k], s.contact.loss[w, k]
     spring, f_t = tangential_force(law, contact_radius, before, old, n, v_t, inertia, limit, dt)
     force, torque = f_n * n + f_t, Vec3(0.0, 0.0, 0.0)
+    if ti.static(s.effects):
+        touch = pass_stage(s, w, k, touch, Stage.ROLLING, still)
+        touch = pass_stage(s, w, k, touch, Stage.TWISTING, still)
+        torque = touch.torque
     # Work against the damper and the tangential force, at the mean of the velocities before and after the step: half of
     # it now, half when the next velocity is known; less what has gone into the spring.
-    loss = (hertz - f_n) * n - f_t
-    taken = 0.5 * dt * (loss + last_loss).dot(velocity)
-    stored = spring_energy_gain(law, old.norm_sqr(), before, spring.norm_sqr(), contact_radius)
-    if ti.static(s.effects):
-        touch = pass_stage(s, w, k, touch, Stage.ROLLING)
-        touch = pass_stage(s, w, k, touch, Stage.TWISTING)
-        torque = touch.torque
-        taken -= 0.5 * dt * (torque + last_couple(s, w, k)).dot(omega)
-        last_half = 0.5 * dt * (last_loss.dot(velocity) - last_couple(s, w, k).dot(omega))
-        keep(s, w, k, torque, hertz_radius)
-    s.contact.spring[w, k] = spring
-    s.contact.radius[w, k] = contact_radius
-    s.contact.expected[w, k] = v_n + dt * f_n / mass
-    s.contact.loss[w, k] = loss
+    taken, stored = 0.0, 0.0
+    if not still:
+        loss = (hertz - f_n) * n - f_t
+        taken = 0.5 * dt * (loss + last_loss).dot(velocity)
+        stored = spring_energy_gain(law, old.norm_sqr(), before, spring.norm_sqr(), contact_radius)
+        if ti.static(s.effects):
+            taken -= 0.5 * dt * (torque + last_couple(s, w, k)).dot(omega)
+            last_half = 0.5 * dt * (last_loss.dot(velocity) - last_couple(s, w, k).dot(omega))
+            keep(s, w, k, torque, hertz_radius)
+        s.contact.spring[w, k] = spring
+        s.contact.radius[w, k] = contact_radius
+        s.contact.expected[w, k] = v_n + dt * f_n / mass
+        s.contact.loss[w, k] = loss
     if ti.static(s.effects):
         if released == 1:
-            s.contact.spring[w, k], s.contact.radius[w, k] = old, before
-            lose(s, w, k, law)
+            if not still:
+                s.contact.spring[w, k], s.contact.radius[w, k] = old, before
+                lose(s, w, k, law)
             force, torque = Vec3(0.0, 0.0, 0.0), Vec3(0.0, 0.0, 0.0)
             taken, stored = last_half, 0.0
     return force, torque, taken, stored
@@ -170,7 +177,7 @@ def push(s: ti.template(), w):
         if lasts(s, w, k, overlap):
             a, b, i = s.contact.a[w, k], s.contact.b[w, k], s.contact.i[w, k]
             radius = s.member.radius[w, i]
-            if overlap > largest * radius:
+            if item < live and overlap > largest * radius:
                 largest = overlap / radius
             n = Vec3(hit[0], hit[1], hit[2])
             point = s.member.centre[w, i] - n * (radius - 0.5 * overlap)
@@ -184,7 +191,7 @@ def push(s: ti.template(), w):
             else:
                 velocity -= surface_velocity(s, w, -1 - b, point)
                 omega -= s.wall.omega[w, -1 - b]
-            force, torque, taken, stored = respond(s, w, k, n, overlap, velocity, omega)
+            force, torque, taken, stored = respond(s, w, k, n, overlap, velocity, omega, item >= live)
             dissipated += taken
             dissipated -= stored
             if b < 0:

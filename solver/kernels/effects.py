@@ -17,8 +17,8 @@ BODY_ACTS = tuple(kind.act for kind in BODY_EFFECTS)
 
 
 @ti.func
-def pass_stage(s: ti.template(), w, k, touch, stage: ti.template()):
-    """``touch``, entry ``k`` of the list, after the effects of one stage."""
+def pass_stage(s: ti.template(), w, k, touch, stage: ti.template(), still):
+    """``touch``, entry ``k`` of the list, after the effects of one stage; what they keep stays as it is if ``still``."""
     for index in ti.static(range(len(CONTACT_EFFECTS))):
         if ti.static(CONTACT_EFFECTS[index].stage == stage):
             row = s.contact.law[w, k]
@@ -27,8 +27,9 @@ def pass_stage(s: ti.template(), w, k, touch, stage: ti.template()):
                 if ti.static(MEMORIES[index] > 0):
                     m = ti.Vector([s.memory.number[w, k, MEMORY[index] + d] for d in ti.static(range(MEMORIES[index]))])
                     touch, m = CONTACT_ACTS[index](p, m, touch)
-                    for d in ti.static(range(MEMORIES[index])):
-                        s.memory.number[w, k, ti.static(MEMORY[index] + d)] = m[d]
+                    if not still:
+                        for d in ti.static(range(MEMORIES[index])):
+                            s.memory.number[w, k, ti.static(MEMORY[index] + d)] = m[d]
                 else:
                     touch, _ = CONTACT_ACTS[index](p, Vec3(0.0, 0.0, 0.0), touch)
     return touch

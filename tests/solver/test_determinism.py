@@ -1,4 +1,4 @@
-"""Same seed, same bits: whatever the threads, the slot and who used it before, the launches, the onlookers.
+"""Same seed, same bits: whatever the threads, the slot and who used it before, the launches, the onlookers, the list.
 
 Bodies sleep and wake in all of these pours. ``test_pour.py`` has the plainest cases, ``test_snapshot.py`` restarts.
 """
@@ -16,6 +16,7 @@ from solver.pour import Pour
 from solver.run import Job, capacity_for, run_pours
 from solver.scene import with_values
 from solver.world import SUMMARY_COLUMNS, Batch
+from tests.solver.effects.cases import all_felt
 from tests.solver.pour_digests import HEAP, JOBS, SHUT, WORLDS, digest, digests
 
 pytestmark = pytest.mark.usefixtures("taichi")
@@ -84,6 +85,31 @@ def test_launches_of_any_length(alone, seed):
     chunks = (int(np.exp(generator.uniform(0.0, np.log(2000.0)))) for _ in iter(int, 1))
     record, _ = watched(SHUT, 2, chunks=chunks)
     assert digest(record) == alone
+
+
+@pytest.mark.parametrize("skin", ["0.2mm", "1.01mm", "3mm"])
+def test_a_contact_list_of_any_reach(alone, skin):
+    """The list is built more often or less; sleeping contacts are evaluated at every build."""
+    record, _ = watched(with_values(SHUT, {"numerics.skin": skin}), 2)
+    assert digest(record) == alone
+
+
+def test_a_contact_list_of_any_reach_with_every_effect():
+    """What effects keep of a sleeping contact stays as it is, too."""
+    scene = with_values(all_felt(HEAP), {"numerics.max_time": "1.2s"})
+    thin, thick = (with_values(scene, {"numerics.skin": skin}) for skin in ("0.5mm", "2mm"))
+    room_for_both = capacity_for([thin, thick], 1)
+    found = []
+    for one in (thin, thick):
+        pour = Pour(Batch(room_for_both), 0, one, 1)
+        asleep = 0
+        while n := pour.steps_due():
+            row = pour.batch.advance(np.array([n], dtype=np.int32))[0]
+            asleep = max(asleep, row[ASLEEP])
+            pour.after(n, row)
+        assert asleep > 5
+        found.append(digest(pour.record()))
+    assert found[0] == found[1]
 
 
 def test_looking_changes_nothing(alone):
