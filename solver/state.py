@@ -21,8 +21,8 @@ Mat3 = ti.types.matrix(3, 3, ti.f64)
 WORLD = {
     "dt": ti.f64,  # time step [s]
     "gravity": Vec3,  # [m/s²]
-    "skin": ti.f64,  # reach of the contact list beyond touching [m]
-    "moved": ti.f64,  # largest travel of a body or wall since the list was built [m]
+    "skin": ti.f64,  # reach of the contact list beyond touching, which margins are measured in [m]
+    "outdated": ti.i32,  # 1: the list has to be built before the next step
     "loaded": ti.i32,  # bodies that will enter
     "bodies": ti.i32,  # bodies that have entered
     "walls": ti.i32,  # walls of the rig
@@ -69,6 +69,7 @@ BODY = {
     "drag_factors": Vec4,  # a, b, c, d of its drag coefficient (`effects/air_drag.py`)
     "swing": ti.f64,  # largest distance of a member's centre from the centre of mass [m]
     "travel": ti.f64,  # bound on the motion of any of its members' centres since the list was built [m]
+    "margin": ti.f64,  # how far that may be while the list holds [m]
     "first": ti.i32,  # index of the first member sphere
     "members": ti.i32,  # number of member spheres
     "kind": ti.i32,  # contact class
@@ -128,6 +129,7 @@ WALL = {
     "moving": ti.i32,  # 1: the velocities are not zero
     "extent": ti.f64,  # distance of its furthest point from the origin that a turn displaces [m]
     "travel": ti.f64,  # bound on the motion of any of its points since the list was built [m]
+    "margin": ti.f64,  # how far that may be while the list holds [m]
     "kind": ti.i32,  # contact class
     "active": ti.i32,
     "force": Vec3,  # force of the bodies on the wall at the last step [N]

@@ -10,6 +10,7 @@ from solver.body import Body
 from solver.effects.columns import effect_table, kernel_effects, reach_of_pulls
 from solver.kernels import changing, loading, reading, touching
 from solver.kernels.batch import advance, measure, take_out
+from solver.kernels.neighbours import MOST
 from solver.laws.hertz_mindlin import constants
 from solver.layout import Layout
 from solver.moving_state import Moving
@@ -87,7 +88,7 @@ def settings_of(scene: Scene, bodies: Layout, dt: float) -> dict[str, float]:
     return {
         "dt": dt,
         "skin": numerics.skin,
-        "cell": 2.0 * float(bodies.numbers[:, 4].max()) + numerics.skin,
+        "cell": 2.0 * float(bodies.numbers[:, 4].max()) + 2.0 * MOST * numerics.skin,
         "sleep_speed": numerics.sleep_speed if any(scene.gravity) else 0.0,
         "sleep_time": numerics.sleep_time,
         "domain": scene.rig.domain_half_width,

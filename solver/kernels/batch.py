@@ -12,7 +12,7 @@ from solver.kernels.walls import clear_walls, move_walls
 @ti.func
 def step(s: ti.template(), w):
     """One time step of world ``w``."""
-    if 2.0 * s.world.moved[w] > s.world.skin[w]:
+    if s.world.outdated[w] == 1:
         rebuild(s, w)
     if s.world.stirred[w] == 1:
         list_bodies(s, w)
@@ -77,5 +77,5 @@ def take_out(s: ti.template(), world_index: ti.i32) -> ti.i32:
                 if outside:
                     s.body.alive[w, b] = 0
                     s.world.taken_out[w] = s.world.taken_out[w] + body_energy(s, w, b)
-                    s.world.moved[w] = s.world.skin[w]
+                    s.world.outdated[w] = 1
     return lost

@@ -25,7 +25,7 @@ def bucket(s: ti.template(), c):
 
 @ti.func
 def fill_grid(s: ti.template(), w):
-    """Sort the bodies into the hashed grid by their centres. A cell is as long as the largest body and the skin."""
+    """Sort bodies into the hashed grid by their centres. Cells are as long as the largest body, grip and margins."""
     for h in range(s.grid.bucket.shape[1]):
         s.grid.bucket[w, h] = -1
     for b in range(s.world.bodies[w]):
@@ -37,16 +37,17 @@ def fill_grid(s: ti.template(), w):
 
 @ti.func
 def find_near(s: ti.template(), w, a):
-    """Bodies after ``a`` whose bounding boxes are within the skin of its own, ascending; returns how many."""
-    skin = s.world.skin[w] + s.world.grip[w]
-    low, high = s.body.low[w, a] - skin, s.body.high[w, a] + skin
+    """Bodies after ``a`` whose bounding boxes are within both margins of its own, ascending; returns how many."""
+    reach = s.body.margin[w, a] + s.world.grip[w]
+    low, high = s.body.low[w, a] - reach, s.body.high[w, a] + reach
     home = ti.floor(s.body.position[w, a] / s.world.cell[w], ti.i32)
     near = 0
     for c in range(27):
         h = bucket(s, home + Ints3(c % 3 - 1, (c // 3) % 3 - 1, c // 9 - 1))
         b = s.grid.bucket[w, h]
         while b > a:  # a bucket's bodies descend
-            other_low, other_high = s.body.low[w, b], s.body.high[w, b]
+            margin = s.body.margin[w, b]
+            other_low, other_high = s.body.low[w, b] - margin, s.body.high[w, b] + margin
             apart = 0
             for d in ti.static(range(3)):
                 if other_low[d] > high[d] or other_high[d] < low[d]:

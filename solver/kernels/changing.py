@@ -10,7 +10,7 @@ from solver.state import Vec3, Vec4, Vec5
 def disturb(s: ti.template(), w):
     """Wake every body and build the contact list again at the next step."""
     rouse_all(s, w)
-    s.world.moved[w] = s.world.skin[w]
+    s.world.outdated[w] = 1
 
 
 @ti.kernel
@@ -27,10 +27,10 @@ def load_law(s: ti.template(), w: ti.i32, table: Table, kinds: ti.i32):
 def load_effects(s: ti.template(), w: ti.i32, table: Table, grip: ti.f64):
     """Parameters of the effects of every pair of kinds, row a · kinds + b, and how far apart [m] a pull may hold."""
     rouse_all(s, w)
-    # A cell is as long as the largest body, the skin and the grip.
+    # A cell is as long as the largest body with its margins, and the grip.
     s.world.cell[w] = s.world.cell[w] + (grip - s.world.grip[w])
     s.world.grip[w] = grip
-    s.world.moved[w] = s.world.skin[w]
+    s.world.outdated[w] = 1
     ti.loop_config(serialize=ti.static(serial()))
     for k in range(table.shape[0]):
         for column in range(table.shape[1]):
@@ -52,7 +52,7 @@ def load_state(s: ti.template(), w: ti.i32, b: ti.i32, pose: Row):
     s.body.listed[w, b] = 0
     s.body.alive[w, b] = 1
     s.world.bodies[w] = ti.max(s.world.bodies[w], b + 1)
-    s.world.moved[w] = s.world.skin[w]
+    s.world.outdated[w] = 1
 
 
 @ti.kernel

@@ -18,7 +18,7 @@ BODY_ACTS = tuple(kind.act for kind in BODY_EFFECTS)
 
 @ti.func
 def pass_stage(s: ti.template(), w, k, touch, stage: ti.template(), still):
-    """``touch``, entry ``k`` of the list, after the effects of one stage; what they keep stays as it is if ``still``."""
+    """``touch``, entry ``k`` of the list, after the effects of one stage; ``still``: what they keep stays as it is."""
     for index in ti.static(range(len(CONTACT_EFFECTS))):
         if ti.static(CONTACT_EFFECTS[index].stage == stage):
             row = s.contact.law[w, k]

@@ -26,7 +26,7 @@ def load_world(s: ti.template(), w: ti.i32, settings: Row):
     s.world.inlet_radius[w] = settings[7]
     s.world.gravity[w] = Vec3(settings[8], settings[9], settings[10])
     s.world.grip[w] = 0.0
-    s.world.moved[w] = settings[1]
+    s.world.outdated[w] = 1
     s.world.bodies[w] = 0
     s.world.walls[w] = 0
     s.world.primitives[w] = 0
@@ -88,6 +88,7 @@ def load_walls(s: ti.template(), w: ti.i32, poses: Table, marks: IntTable, grids
         s.wall.moving[w, k] = 0
         s.wall.extent[w, k] = 0.0
         s.wall.travel[w, k] = 0.0
+        s.wall.margin[w, k] = 0.0
         s.wall.force[w, k] = Vec3(0.0, 0.0, 0.0)
         s.wall.torque[w, k] = Vec3(0.0, 0.0, 0.0)
         s.wall.kind[w, k] = marks[k, 0]

@@ -67,4 +67,5 @@ def move(s: ti.template(), w, b):
         speed += ti.sqrt(spin.dot(spin)) * s.body.swing[w, b]
     travel = s.body.travel[w, b] + dt * speed
     s.body.travel[w, b] = travel
-    s.world.moved[w] = ti.max(s.world.moved[w], travel)
+    if travel > s.body.margin[w, b]:
+        s.world.outdated[w] = 1

@@ -1,9 +1,10 @@
 """The contact list of a world: pairs of member spheres, and spheres near a surface, that may touch soon.
 
 Bodies near each other are found by the body grid, then sorted out member against box, then member against member, so
-the cost grows with the number of bodies. The list reaches as far as a pull may hold (``grip``) and the skin beyond; it
-holds while no two points have approached by more than the skin. Tangential springs, and what effects keep of a contact,
-are carried over by merging two ordered lists.
+the cost grows with the number of bodies. The list reaches as far as a pull may hold (``grip``) and the margins of both
+partners beyond; it holds while nothing has travelled further than its own margin. A margin is as wide as a body moves
+in ``AHEAD`` steps: one fast body does not make the list long for all the others. Tangential springs, and what effects
+keep of a contact, are carried over by merging two ordered lists.
 """
 
 from solver.backend import ti
@@ -11,6 +12,19 @@ from solver.kernels.body_grid import bound, fill_grid, find_near
 from solver.kernels.geometry import nearest_on_triangle, offset, rotation
 from solver.kernels.walls import from_primitive, into_wall
 from solver.state import Vec3
+
+AHEAD = 60.0
+"""Steps that a body at its present speed takes to use up its margin."""
+LEAST, MOST = 0.1, 1.5
+"""Limits of a margin, in skins: a body at rest may be hit, and a fast one needs no room for what is far away."""
+
+
+@ti.func
+def bodily_margin(s: ti.template(), w, b):
+    """How far [m] the members of body ``b`` may travel until the list is built again."""
+    speed = s.body.velocity[w, b].norm() + s.body.spin[w, b].norm() * s.body.swing[w, b]
+    skin = s.world.skin[w]
+    return ti.min(ti.max(AHEAD * s.world.dt[w] * speed, LEAST * skin), MOST * skin)
 
 
 @ti.func
@@ -114,9 +128,11 @@ def carry_over(s: ti.template(), w, n_old):
 @ti.func
 def list_members(s: ti.template(), w, i, near):
     """Entries of member ``i`` with members of the ``near`` bodies."""
-    centre, reach = s.member.centre[w, i], s.member.radius[w, i] + s.world.skin[w] + s.world.grip[w]
+    centre = s.member.centre[w, i]
+    own = s.member.radius[w, i] + s.body.margin[w, s.member.body[w, i]] + s.world.grip[w]
     for k in range(near):
         b = s.body.near[w, k]
+        reach = own + s.body.margin[w, b]
         low, high = s.body.low[w, b], s.body.high[w, b]
         apart = 0
         for d in ti.static(range(3)):
@@ -133,17 +149,20 @@ def list_members(s: ti.template(), w, i, near):
 @ti.func
 def list_primitives(s: ti.template(), w, i):
     """Entries of member ``i`` with planes and revolved segments."""
+    own = s.member.radius[w, i] + s.body.margin[w, s.member.body[w, i]] + s.world.grip[w]
     for p in range(s.world.primitives[w]):
-        if s.wall.active[w, s.surface.wall[w, p]] == 1:
+        wall = s.surface.wall[w, p]
+        if s.wall.active[w, wall] == 1:
             distance = from_primitive(s, w, p, s.member.centre[w, i])[3]
-            if distance < s.member.radius[w, i] + s.world.skin[w] + s.world.grip[w]:
+            if distance < own + s.wall.margin[w, wall]:
                 append(s, w, i, s.member.body.shape[1] + p, 0, 0)
 
 
 @ti.func
 def collect_triangles(s: ti.template(), w, k, i):
     """Add the triangles of mesh wall ``k`` near member ``i`` to ``candidate``, ascending; returns how many."""
-    reach = s.member.radius[w, i] + s.world.skin[w] + s.world.grip[w]
+    margin = s.body.margin[w, s.member.body[w, i]] + s.wall.margin[w, k]
+    reach = s.member.radius[w, i] + margin + s.world.grip[w]
     local = into_wall(s, w, k, s.member.centre[w, i])
     cells = s.wall.cells[w, k]
     low = ti.floor((local - reach - s.wall.low[w, k]) / s.wall.cell[w, k], ti.i32)
@@ -198,15 +217,18 @@ def rebuild(s: ti.template(), w):
     n_old = keep_history(s, w)
     s.world.contacts[w] = 0
     s.world.candidates[w] = 0
-    s.world.moved[w] = 0.0
+    s.world.outdated[w] = 0
     s.world.rebuilds[w] = s.world.rebuilds[w] + 1
     s.world.stirred[w] = 1
     for k in range(s.world.walls[w]):
         s.wall.travel[w, k] = 0.0
+        # One that stands still has the list built as soon as it is set in motion.
+        s.wall.margin[w, k] = 0.5 * s.world.skin[w] * s.wall.moving[w, k]
     for b in range(s.world.bodies[w]):
         s.body.listed[w, b] = 0
         s.body.travel[w, b] = 0.0
         if s.body.alive[w, b] == 1:
+            s.body.margin[w, b] = bodily_margin(s, w, b)
             place_members(s, w, b, True)
             bound(s, w, b)
     fill_grid(s, w)

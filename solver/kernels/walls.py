@@ -37,7 +37,8 @@ def move_walls(s: ti.template(), w):
             s.wall.turn[w, k] = rotation(s.wall.quaternion[w, k])
             speed = s.wall.velocity[w, k].norm() + omega.norm() * s.wall.extent[w, k]
             s.wall.travel[w, k] = s.wall.travel[w, k] + dt * speed
-            s.world.moved[w] = ti.max(s.world.moved[w], s.wall.travel[w, k])
+            if s.wall.travel[w, k] > s.wall.margin[w, k]:
+                s.world.outdated[w] = 1
 
 
 @ti.func

@@ -1,7 +1,7 @@
 """The contact list against all pairs in NumPy: random clumps, sizes 1 : 50, anywhere in space.
 
-An entry is a pair of member spheres of different bodies with a gap below the skin. Bodies are found through a grid
-whose cells share buckets by a hash: the more bodies far from one another, the more cells collide.
+An entry is a pair of member spheres of different bodies with a gap below the margins of both. Bodies are found through
+a grid whose cells share buckets by a hash: the more bodies far from one another, the more cells collide.
 """
 
 import dataclasses
@@ -13,13 +13,16 @@ from hypothesis import strategies as st
 
 from solver.body import Body, Members
 from solver.insertion import random_quaternion, rotation_matrix
+from solver.kernels.neighbours import AHEAD, LEAST, MOST
 from solver.laboratory import GRAIN, ROOM, WALL, Laboratory, scene_of
 from solver.material import Pair
 
 pytestmark = pytest.mark.usefixtures("taichi")
 
 ROUNDING = 1e-9
-"""A gap nearer to the skin than this [m] may be on either side of it: 1 km from the origin a place resolves 1e-13 m."""
+"""A gap nearer to the margins than this [m] may be on either side: 1 km from the origin a place resolves 1e-13 m."""
+DT = 1e-9
+"""[s]"""
 PAIRS = (Pair("grain", "grain", 0.5, 0.5), Pair("grain", "wall", 0.5, 0.5))
 
 
@@ -45,13 +48,15 @@ def cloud(seed, sizes, members, spread, origin, skin, couples=False):
     )
     scene = scene_of(bodies, (GRAIN, WALL), PAIRS)
     scene = dataclasses.replace(scene, numerics=dataclasses.replace(scene.numerics, skin=skin))
-    lab = Laboratory(scene, range(len(bodies)), dt=1e-9, plate=False)
+    lab = Laboratory(scene, range(len(bodies)), dt=DT, plate=False)
     places = origin + generator.uniform(-0.5, 0.5, (len(bodies), 3)) * spread
     if couples:
         places[1::2] = places[::2] + np.array(sizes)[::2, None] * generator.uniform(-0.5, 0.5, (len(bodies) // 2, 3))
     turns = np.array([random_quaternion(generator) for _ in bodies])
-    for b, (place, turn) in enumerate(zip(places, turns, strict=True)):
-        lab.put(b, place, quaternion=turn)
+    # Margins from the least to the most; the list is built before anything moves.
+    speeds = generator.uniform(0.0, 1.2, len(bodies)) * MOST * skin / (AHEAD * DT)
+    for b, (place, turn, speed) in enumerate(zip(places, turns, speeds, strict=True)):
+        lab.put(b, place, velocity=(speed, 0.0, 0.0), quaternion=turn)
     assert lab.run(1)["overflow"] == 0
     clumps = [body.clump for body in bodies]
     centres = [
@@ -69,12 +74,15 @@ def gaps(centres, radii, owner):
 
 
 def check(arrays, centres, radii, owner, skin):
-    """The list holds every pair nearer than the skin, none that is further, each once, and in order."""
+    """The list holds every pair nearer than both margins, none that is further, each once, and in order."""
+    margin = arrays["body.margin"][owner]
+    assert LEAST * skin <= margin.min() <= margin.max() <= MOST * skin
+    reach = margin[:, None] + margin[None]
     listed = np.zeros((len(radii), len(radii)), dtype=int)
     np.add.at(listed, (arrays["contact.i"], arrays["contact.j"]), 1)
     between = gaps(centres, radii, owner)
-    near = between < skin
-    certain = np.abs(between - skin) > ROUNDING
+    near = between < reach
+    certain = np.abs(between - reach) > ROUNDING
     assert listed.max(initial=0) <= 1
     assert np.array_equal(listed[certain] == 1, near[certain])
     order = arrays["contact.i"].astype(np.int64) * len(radii) + arrays["contact.j"]
@@ -116,11 +124,12 @@ def test_the_check_sees_a_missing_and_a_foreign_entry():
     arrays, *spheres = cloud(3, sizes, 4, 0.06, np.zeros(3), 1e-3)
     entries = len(arrays["contact.i"])
     assert check(arrays, *spheres, 1e-3) == entries > 10
-    short = {name: np.delete(arrays[name], 5) for name in ("contact.i", "contact.j")}
+    short = arrays | {name: np.delete(arrays[name], 5) for name in ("contact.i", "contact.j")}
     with pytest.raises(AssertionError):
         check(short, *spheres, 1e-3)
+    narrow = arrays | {"body.margin": 0.9 * arrays["body.margin"]}
     with pytest.raises(AssertionError):
-        check(arrays, *spheres, 0.8e-3)
+        check(narrow, *spheres, 0.9e-3)
 
 
 @pytest.mark.parametrize("far", [0.0, -1e3])

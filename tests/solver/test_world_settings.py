@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from solver.kernels.neighbours import MOST
 from solver.laboratory import ROOM, bench
 from solver.layout import layout
 from solver.rigs import Funnel
@@ -32,7 +33,7 @@ def test_every_setting_is_read_from_its_own_column():
     expected = {
         "dt": DT,
         "skin": 1.5e-4,
-        "cell": 2.0 * bodies.numbers[0, 4] + 1.5e-4,
+        "cell": 2.0 * bodies.numbers[0, 4] + 2.0 * MOST * 1.5e-4,
         "sleep_speed": 2.5e-4,
         "sleep_time": 0.0125,
         "domain": 0.31,
