@@ -143,7 +143,7 @@ class Rooms:
 
     def __init__(self) -> None:
         self._capacity: Capacity | None = None
-        self._batches: dict[bool, Batch] = {}
+        self._batches: dict[tuple[bool, ...], Batch] = {}
 
     def make(self, scenes: Sequence[Scene]) -> None:
         """Make room for ``scenes``, and leave what is there."""
@@ -154,12 +154,11 @@ class Rooms:
 
     def for_scene(self, scene: Scene) -> Batch:
         """The batch for ``scene``."""
-        from solver.effects.columns import kernel_effects
-        from solver.world import Batch
+        from solver.world import Batch, compiled_in
 
         assert self._capacity is not None, "room is made before the first job"
-        effects = kernel_effects(scene)
-        wanted = replace(self._capacity, effects=effects)
-        if effects not in self._batches or self._batches[effects].capacity != wanted:
-            self._batches[effects] = Batch(wanted)
-        return self._batches[effects]
+        variant = compiled_in([scene])
+        wanted, name = replace(self._capacity, **variant), tuple(variant.values())
+        if name not in self._batches or self._batches[name].capacity != wanted:
+            self._batches[name] = Batch(wanted)
+        return self._batches[name]

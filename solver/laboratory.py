@@ -14,7 +14,6 @@ import numpy as np
 import numpy.typing as npt
 
 from solver.body import Body, Members
-from solver.effects.columns import kernel_effects
 from solver.effects.set_up import actual
 from solver.layout import layout
 from solver.material import Material, Pair
@@ -25,7 +24,7 @@ from solver.scene import Scene
 from solver.state import Capacity
 from solver.time_step import time_step
 from solver.wall_tables import wall_tables
-from solver.world import SUMMARY_COLUMNS, Batch
+from solver.world import SUMMARY_COLUMNS, Batch, compiled_in
 
 Array = npt.NDArray[np.float64]
 Triple = Sequence[float] | Array
@@ -119,7 +118,7 @@ class Laboratory:
         self.n = len(order)
         self.dt = dt or time_step(self.scene)
         surfaces = self.scene.rig.surfaces()
-        self.batch = Batch(dataclasses.replace(room_for(surfaces), effects=kernel_effects(self.scene)))
+        self.batch = Batch(dataclasses.replace(room_for(surfaces), **compiled_in([self.scene])))
         self.batch.load(0, self.scene, layout(self.scene, order), self.dt, active or [plate] * len(surfaces))
 
     def put(

@@ -7,8 +7,8 @@ assumed = [paths of values that nobody measured]
 [materials.<name>]       density, and two of youngs_modulus, shear_modulus, poisson_ratio (SI or with a unit)
 [[body]]                 name, material, mass_fraction, shape, … (`solver.body_table`)
 [pair.<a>.<b>]           static_friction, restitution
-[rig] [insertion] [numerics] [effect.<name>]     optional: another rig than the default funnel, settings, effects that
-                                 are switched on (see set_up.py)
+[rig] [insertion] [numerics] [contact] [effect.<name>]     optional: another rig than the default funnel, settings,
+                                 conventions of the contact law, effects that are switched on (see set_up.py)
 """
 
 from __future__ import annotations

@@ -88,6 +88,9 @@ def put(state: Any, w: int, kept: Moving) -> None:
         contacts, end = sections[2].entries, sections[-1].end
         row = kept.row if kept.effects else np.append(kept.row, _memory_without_effects(state, kept.row, sections[2]))
         keeping.unpack_memory(state.memory.number, w, contacts, end, row)
+    if state.sharing:
+        # Which entries belong to one pair is found out when the list is built.
+        state.world.outdated[w] = 1
 
 
 def _memory_without_effects(state: Any, row: Array, contacts: _Section) -> Array:

@@ -46,6 +46,7 @@ def _decisive(scene: Scene) -> dict[str, Any]:
         "rig": [scene.rig.name, scene.rig.wall, *_set(scene.rig)],
         "insertion": _set(scene.insertion),
         "numerics": _set(scene.numerics),
+        **({"contact": changed} if (changed := _set(scene.contact)) else {}),
         "effects": [[effect.name, *_set(effect)] for effect in scene.effects],
         "gravity": scene.gravity,
         "axis": scene.axis,

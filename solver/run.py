@@ -11,14 +11,13 @@ import numpy as np
 
 from solver import backend
 from solver.checkpoint import Checkpoint, resumed
-from solver.effects.columns import kernel_effects
 from solver.effects.set_up import actual
 from solver.pour import Pour
 from solver.record import Record
 from solver.scene import Scene, body_counts
 from solver.state import Capacity
 from solver.wall_tables import wall_tables
-from solver.world import Batch, wall_materials
+from solver.world import Batch, compiled_in, wall_materials
 
 CONTACTS_PER_MEMBER = 16
 """Room in the contact list: entries per member sphere. A bed of long bodies holds 2–4."""
@@ -67,7 +66,7 @@ def capacity_for(scenes: Sequence[Scene], worlds: int) -> Capacity:
         triangles=max(1, *(len(table.corners) for table in tables)),
         cells=max(1, *(len(table.first) for table in tables)),
         cell_items=max(1, *(len(table.items) for table in tables)),
-        effects=any(kernel_effects(scene) for scene in scenes),
+        **compiled_in(scenes),
     ).rounded()
 
 

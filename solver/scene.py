@@ -7,7 +7,7 @@ Parameter paths (the same grammar in ``--set``, study files, sliders and the sto
     body.<body>.mass_fraction | thickness | …           (dimensions of the solid)
     body.<body>.size_distribution | size_spread          (of the linear size about the declared one)
     body.spheres                                         (coarse, standard, fine or a number: for all bodies)
-    rig.<name>   insertion.<name>   numerics.<name>
+    rig.<name>   insertion.<name>   numerics.<name>   contact.<name>
     effect.<effect>.<name>                               (of ``solver/effects/``; all off at first)
 
 Which rig it is (``rig.name`` in files and ``--set``) is no parameter: another rig has others (:func:`with_rig`).
@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from solver.body import SPHERES, Body, body_parameters, counts, with_body_value, with_densities
+from solver.contact_model import ContactModel
 from solver.effects import EFFECTS, Effect
 from solver.effects.set_up import actual
 from solver.insertion import Insertion
@@ -40,6 +41,7 @@ class Scene:
     rig: Rig = Funnel()
     insertion: Insertion = Insertion()
     numerics: Numerics = Numerics()
+    contact: ContactModel = ContactModel()
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     assumed: tuple[str, ...] = ()
     effects: tuple[Effect, ...] = ()
@@ -142,6 +144,7 @@ def parameters(scene: Scene) -> dict[str, Parameter]:
         names = tuple(body.name for body in scene.bodies)
         found["rig.body"] = Parameter("rig.body", "1", 0, 0, "The component that is measured.", choices=names)
     found |= declared(scene.numerics, "numerics")
+    found |= declared(scene.contact, "contact")
     for name, kind in EFFECTS.items():
         found |= declared(kind, f"effect.{name}")
     return found

@@ -1,4 +1,4 @@
-"""The tables of a file that lie over a material: ``[rig]``, ``[insertion]``, ``[numerics]`` and ``[effect.<name>]``.
+"""Tables of a file that lie over a material: ``[rig]``, ``[insertion]``, ``[numerics]``, ``[contact]``, ``[effect.…]``.
 
 Keys are the last parts of parameter paths (``outlet_height`` in ``[rig]`` is ``rig.outlet_height``); ``name`` in
 ``[rig]`` chooses the rig.
@@ -13,7 +13,7 @@ from typing import Any
 from solver.params import ParameterError
 from solver.scene import Scene, with_rig, with_values
 
-TABLES = ("rig", "insertion", "numerics", "effect")
+TABLES = ("rig", "insertion", "numerics", "contact", "effect")
 MESH = "rig.mesh"
 """Path of the parameter that names a file."""
 

@@ -60,6 +60,9 @@ def put(state: Any, w: int, arrays: Arrays) -> None:
         else:
             whole[w, : len(kept)] = np.where(kept < 0, room - 1 - kept, kept) if key == "contact.j" else kept
         field.from_numpy(whole)
+    if state.sharing:
+        # Which entries belong to one pair is found out when the list is built.
+        state.world.outdated[w] = 1
 
 
 def _used(state: Any, w: int) -> dict[str, int]:

@@ -45,6 +45,9 @@ WORLD = {
     "taken_out": ti.f64,  # kinetic and potential energy of bodies that were taken out [J]
     "domain": ti.f64,  # bodies beyond |x| or |y| of this are taken out [m]
     "grip": ti.f64,  # distance at which effects may still hold surfaces that have touched [m]
+    "clump_rule": ti.i32,  # place in ``contact_model.CLUMP_RULES``
+    "tangential_law": ti.i32,  # place in ``contact_model.TANGENTIAL_LAWS``
+    "tangential_dashpot": ti.i32,  # place in ``contact_model.TANGENTIAL_DASHPOTS``
     "outlet": ti.f64,  # height of the outlet [m]
     "inlet_radius": ti.f64,  # radius of the feed opening [m]
 }
@@ -119,6 +122,14 @@ CONTACT = {
     "live": ti.i32,  # list of the entries that have a body awake or a moving wall, ascending; then the others
 }
 """Per entry of the contact list, ordered by (i, j), shape (worlds, contacts)."""
+
+PAIR = {
+    "lead": ti.i32,  # first entry of the list with the same two bodies (or body and wall)
+    "overlap": ti.f64,  # at a lead: sum of the overlaps δ of all contacts of the pair [m]
+    "normal": Vec3,  # at a lead: sum of δ n [m]
+    "point": Vec3,  # at a lead: sum of δ times the contact's place relative to the first body's centre [m²]
+}
+"""Per entry of the contact list where contacts of a pair share (``clump_rules.py``), shape (worlds, contacts)."""
 
 WALL = {
     "origin": Vec3,  # pose: local frame → world [m]
@@ -198,6 +209,8 @@ class Capacity:
     triangles: int = 1
     effects: bool = False
     """Whether effects are compiled in: the base model is faster without."""
+    sharing: bool = False
+    """Whether the rule is compiled in by which contacts of a pair of clumps share."""
     cells: int = 1
     """Cells of all meshes' grids, and one more."""
     cell_items: int = 1
@@ -261,6 +274,11 @@ class State:
         self.law = Group({"row": Vec5}, (c.worlds, c.kinds * c.kinds))
         # Parameters of effects by contact class, and what they keep of a contact (``effects/columns.py``).
         self.effects = c.effects
+        self.sharing = c.sharing
+        self.pair = Group(PAIR, (c.worlds, c.contacts) if c.sharing else (1, 1))
+        # Entry at which a partner of the body at hand was last met, while the list is built.
+        met = (c.worlds, max(c.bodies, c.walls)) if c.sharing else (1, 1)
+        self.lead = Group({"body": ti.i32, "wall": ti.i32}, met)
         room = (c.worlds, c.contacts, KEPT) if c.effects else (1, 1, 1)
         self.effect = Group({"row": ti.f64}, (c.worlds, c.kinds * c.kinds, COLUMNS[-1] + 1))
         self.memory = Group({"number": ti.f64, "kept": ti.f64}, room)

@@ -54,6 +54,9 @@ SETTINGS = (
     "domain",
     "outlet",
     "inlet_radius",
+    "clump_rule",
+    "tangential_law",
+    "tangential_dashpot",
     "gravity_x",
     "gravity_y",
     "gravity_z",
@@ -81,6 +84,14 @@ def law_table(scene: Scene) -> Array:
     return table
 
 
+def compiled_in(scenes: Sequence[Scene]) -> dict[str, bool]:
+    """What kernels for ``scenes`` need beside the base model, by field of :class:`Capacity`."""
+    return {
+        "effects": any(kernel_effects(scene) for scene in scenes),
+        "sharing": any(scene.contact.clump_rule == "local_mass_shared" for scene in scenes),
+    }
+
+
 def settings_of(scene: Scene, bodies: Layout, dt: float) -> dict[str, float]:
     """What a world is set up with, by ``SETTINGS``."""
     numerics, inside = scene.numerics, scene.rig.container(0.0)
@@ -94,6 +105,7 @@ def settings_of(scene: Scene, bodies: Layout, dt: float) -> dict[str, float]:
         "domain": scene.rig.domain_half_width,
         "outlet": inside.height,
         "inlet_radius": inside.radius,
+        **dict(zip(("clump_rule", "tangential_law", "tangential_dashpot"), scene.contact.numbers, strict=True)),
     } | gravity
 
 
@@ -113,6 +125,8 @@ class Batch:
         for name, needed in (("bodies", len(bodies.numbers)), ("members", len(bodies.spheres))):
             if needed > getattr(self.capacity, name):
                 raise ValueError(f"{needed} {name} do not fit into a batch of {getattr(self.capacity, name)}")
+        if scene.contact.clump_rule == "local_mass_shared" and not self.capacity.sharing:
+            raise ValueError("contact.clump_rule: the batch was made for rules by which contacts do not share")
         settings = settings_of(scene, bodies, dt)
         loading.load_world(s, w, np.array([settings[name] for name in SETTINGS]))
         loading.load_bodies(s, w, bodies.numbers, bodies.places, bodies.spheres, bodies.owner)

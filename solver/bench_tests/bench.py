@@ -9,13 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from solver.body import Body, Members
-from solver.effects.columns import kernel_effects
 from solver.laboratory import ROOM
 from solver.layout import layout
 from solver.rigs.rig import Rig
 from solver.scene import Scene
 from solver.time_step import time_step
-from solver.world import SUMMARY_COLUMNS, Batch
+from solver.world import SUMMARY_COLUMNS, Batch, compiled_in
 
 Array = npt.NDArray[np.float64]
 
@@ -48,7 +47,7 @@ class Bench:
         numerics = dataclasses.replace(scene.numerics, sleep_speed=0.0)
         self.scene = dataclasses.replace(scene, rig=rig, bodies=(specimen,), numerics=numerics)
         self.dt = time_step(self.scene)
-        self.batch = Batch(dataclasses.replace(ROOM, effects=kernel_effects(self.scene)))
+        self.batch = Batch(dataclasses.replace(ROOM, **compiled_in([self.scene])))
         order = np.zeros(1, dtype=np.int32)
         self.batch.load(0, self.scene, layout(self.scene, order), self.dt, (True,) * len(rig.surfaces()))
 

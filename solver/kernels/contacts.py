@@ -4,6 +4,7 @@ from solver.backend import ti
 from solver.effects import Stage
 from solver.effects.columns import COLUMNS
 from solver.effects.touch import Touch
+from solver.kernels.clump_rules import BODY_MASS, SHARED, contact_point, local_mass, share, shared_point, sum_pairs
 from solver.kernels.effects import forget, keep, last_couple, pass_stage
 from solver.kernels.meeting import lasts, meet
 from solver.kernels.walls import surface_velocity
@@ -48,7 +49,7 @@ def push_wall(s: ti.template(), w, k, point, force, couple, held):
 
 
 @ti.func
-def touch_of(s: ti.template(), w, k, n, overlap, velocity, omega, a, elastic, damper):
+def touch_of(s: ti.template(), w, k, n, overlap, velocity, omega, a, elastic, damper, mass):
     """What effects see of entry ``k`` before they act."""
     row = s.contact.law[w, k]
     law = s.law.row[w, row]
@@ -57,7 +58,7 @@ def touch_of(s: ti.template(), w, k, n, overlap, velocity, omega, a, elastic, da
         normal=n,
         overlap=overlap,
         reduced_radius=s.contact.reduced_radius[w, k],
-        mass=s.contact.reduced_mass[w, k],
+        mass=mass,
         v_n=v_n,
         v_t=velocity - v_n * n,
         omega=omega,
@@ -72,7 +73,7 @@ def touch_of(s: ti.template(), w, k, n, overlap, velocity, omega, a, elastic, da
         adhesive=elastic,
         work=0.0,
         damper=damper,
-        shear_damper=law[4] * ti.sqrt(a * s.contact.reduced_mass[w, k]),
+        shear_damper=law[4] * ti.sqrt(a * mass),
         floor=0.0,
         pull=0.0,
         held=0,
@@ -83,16 +84,17 @@ def touch_of(s: ti.template(), w, k, n, overlap, velocity, omega, a, elastic, da
 
 
 @ti.func
-def respond(s: ti.template(), w, k, n, overlap, velocity, omega, still):
+def respond(s: ti.template(), w, k, n, overlap, velocity, omega, mass, part, still):
     """Force [N] and torque [N m] on body a of entry ``k``, energy that it takes and what of it its spring keeps [J].
 
     ``velocity`` is that of a relative to its partner at the contact, ``omega`` the relative angular velocity (only
     effects ask for it). A torque comes from effects alone; it acts on both bodies, in opposite directions.
+    ``mass`` [kg] is what the dashpots damp, ``part`` the contact's share in its pair (``clump_rules.py``).
 
     If ``still``, nothing moves in the entry and no step passes: what it keeps stays as it is, and no energy goes. Such
     an entry is evaluated whenever the list is built, so anything else would let the list's length act on the motion.
     """
-    dt, mass = s.world.dt[w], s.contact.reduced_mass[w, k]
+    dt = s.world.dt[w]
     law = s.law.row[w, s.contact.law[w, k]]
     before = s.contact.radius[w, k]
     v_n = velocity.dot(n)
@@ -105,9 +107,11 @@ def respond(s: ti.template(), w, k, n, overlap, velocity, omega, still):
     hertz = normal_spring_force(law, contact_radius, pressed)
     damper = normal_damper(law, ti.sqrt(contact_radius * mass), before, pressed, v_n, dt)
     elastic, floor, pull, released, last_half = hertz, 0.0, 0.0, 0, 0.0
+    if ti.static(s.sharing):
+        elastic, damper = part * hertz, part * damper
     touch = Touch(force=0.0)
     if ti.static(s.effects):
-        touch = touch_of(s, w, k, n, overlap, velocity, omega, contact_radius, hertz, damper)
+        touch = touch_of(s, w, k, n, overlap, velocity, omega, contact_radius, elastic, damper, mass)
         touch = pass_stage(s, w, k, touch, Stage.NORMAL, still)
         touch = pass_stage(s, w, k, touch, Stage.ADHESION, still)
         contact_radius, elastic, damper = touch.radius, touch.elastic, touch.damper
@@ -126,7 +130,10 @@ def respond(s: ti.template(), w, k, n, overlap, velocity, omega, still):
         touch = pass_stage(s, w, k, touch, Stage.TANGENTIAL, still)
         limit = touch.limit
     old, last_loss = s.contact.spring[w, k], s.contact.loss[w, k]
-    spring, f_t = tangential_force(law, contact_radius, before, old, n, v_t, inertia, limit, dt)
+    displaced, uncapped = s.world.tangential_law[w], s.world.tangential_dashpot[w]
+    spring, f_t = tangential_force(
+        law, contact_radius, before, old, n, v_t, inertia, limit, dt, part, displaced, uncapped
+    )
     force, torque = f_n * n + f_t, Vec3(0.0, 0.0, 0.0)
     if ti.static(s.effects):
         touch = pass_stage(s, w, k, touch, Stage.ROLLING, still)
@@ -170,6 +177,9 @@ def push(s: ti.template(), w):
     live, entries = s.world.live[w], s.world.live[w]
     if s.world.stirred[w] == 1:
         entries = s.world.contacts[w]
+    if ti.static(s.sharing):
+        if s.world.clump_rule[w] == SHARED:
+            sum_pairs(s, w, entries)
     for item in range(entries):
         k = s.contact.live[w, item]
         hit = meet(s, w, k)
@@ -180,7 +190,7 @@ def push(s: ti.template(), w):
             if item < live and overlap > largest * radius:
                 largest = overlap / radius
             n = Vec3(hit[0], hit[1], hit[2])
-            point = s.member.centre[w, i] - n * (radius - 0.5 * overlap)
+            point = contact_point(s, w, i, n, overlap)
             arm, other_arm = point - s.body.position[w, a], Vec3(0.0, 0.0, 0.0)
             omega = s.body.omega[w, a]
             velocity = s.body.velocity[w, a] + omega.cross(arm)
@@ -191,7 +201,15 @@ def push(s: ti.template(), w):
             else:
                 velocity -= surface_velocity(s, w, -1 - b, point)
                 omega -= s.wall.omega[w, -1 - b]
-            force, torque, taken, stored = respond(s, w, k, n, overlap, velocity, omega, item >= live)
+            mass, part = s.contact.reduced_mass[w, k], 1.0
+            if s.world.clump_rule[w] != BODY_MASS:
+                place = point
+                if ti.static(s.sharing):
+                    if s.world.clump_rule[w] == SHARED:
+                        place = shared_point(s, w, k, n, point)
+                        part = share(s, w, k, n, overlap)
+                mass = local_mass(s, w, a, b, place, n)
+            force, torque, taken, stored = respond(s, w, k, n, overlap, velocity, omega, mass, part, item >= live)
             dissipated += taken
             dissipated -= stored
             if b < 0:

@@ -24,7 +24,10 @@ def load_world(s: ti.template(), w: ti.i32, settings: Row):
     s.world.domain[w] = settings[5]
     s.world.outlet[w] = settings[6]
     s.world.inlet_radius[w] = settings[7]
-    s.world.gravity[w] = Vec3(settings[8], settings[9], settings[10])
+    s.world.clump_rule[w] = ti.cast(settings[8], ti.i32)
+    s.world.tangential_law[w] = ti.cast(settings[9], ti.i32)
+    s.world.tangential_dashpot[w] = ti.cast(settings[10], ti.i32)
+    s.world.gravity[w] = Vec3(settings[11], settings[12], settings[13])
     s.world.grip[w] = 0.0
     s.world.outdated[w] = 1
     s.world.bodies[w] = 0

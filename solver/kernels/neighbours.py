@@ -9,6 +9,7 @@ keep of a contact, are carried over by merging two ordered lists.
 
 from solver.backend import ti
 from solver.kernels.body_grid import bound, fill_grid, find_near
+from solver.kernels.clump_rules import find_leads
 from solver.kernels.geometry import nearest_on_triangle, offset, rotation
 from solver.kernels.walls import from_primitive, into_wall
 from solver.state import Vec3
@@ -240,3 +241,5 @@ def rebuild(s: ti.template(), w):
                 list_primitives(s, w, i)
                 list_patches(s, w, i)
     carry_over(s, w, n_old)
+    if ti.static(s.sharing):
+        find_leads(s, w)

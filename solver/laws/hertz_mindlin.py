@@ -6,7 +6,10 @@ Notation: grain i is pushed by j; normal n from j to i; overlap δ > 0 when touc
     tangential    k_t = 8 G* a; elastic force T (stored in the world frame):
                   turned with the normal, its length restored; scaled by a/a_prev on unloading;
                   T ← T − k_t v_t dt, capped at μ F_n
-                  F_t = T − c_t √(k_t m*) v_t while sticking, T while slipping
+                  F_t = T − c_t √(k_t m*) v_t while sticking, T while slipping; capped at μ F_n as well
+
+Two choices of ``contact_model.py`` are conventions of other programs: ``mindlin`` scales T by a/a_prev on loading too,
+which keeps the displacement T/k_t (LIGGGHTS ``tangential history``), and ``uncapped`` leaves the dashpot beside μ F_n.
 
 R* comes from the member spheres, m* from the bodies. c_n(e) inverts this contact exactly (`restitution.py`), so that
 the restitution that comes out is the one that was asked for; c_t = 2 √(5/6) |β|, β = ln e / √(ln² e + π²) (Tsuji 1992
@@ -78,9 +81,14 @@ def normal_force(elastic, damper, v_n, v_expected, mass, dt, floor):
 
 
 @ti.func
-def tangential_force(law, a, a_before, spring, n, v_t, inertia, limit, dt):
-    """New tangential spring [N] and force on i [N], both within Coulomb's ``limit`` [N]; ``inertia`` is √(a m*)."""
-    stiffness = 8.0 * law[1] * a
+def tangential_force(law, a, a_before, spring, n, v_t, inertia, limit, dt, part, displaced, uncapped):
+    """New tangential spring [N] and force on i [N], within Coulomb's ``limit`` [N]; ``inertia`` is √(a m*).
+
+    ``part`` is the contact's share in the stiffness and damping of its pair of bodies. If ``displaced``, the spring
+    keeps its displacement when the contact area changes, instead of its force while loading; if ``uncapped``, the limit
+    holds for the spring alone.
+    """
+    stiffness = 8.0 * law[1] * a * part
     length2 = spring.dot(spring)
     if length2 > 0.0:
         out_of_plane = spring.dot(n)
@@ -91,7 +99,10 @@ def tangential_force(law, a, a_before, spring, n, v_t, inertia, limit, dt):
             scale = 0.0
             if share < 1.0:
                 scale = 1.0 / ti.sqrt(1.0 - share)
-        spring = (spring - out_of_plane * n) * (scale * ti.min(1.0, a / a_before))
+        growth = a / a_before
+        if displaced == 0:
+            growth = ti.min(1.0, growth)
+        spring = (spring - out_of_plane * n) * (scale * growth)
     spring -= stiffness * dt * v_t
     size2 = spring.dot(spring)
     force = Vec3(0.0, 0.0, 0.0)
@@ -99,9 +110,9 @@ def tangential_force(law, a, a_before, spring, n, v_t, inertia, limit, dt):
         spring *= limit / ti.sqrt(size2)
         force = spring
     else:
-        force = spring - law[4] * inertia * v_t
+        force = spring - law[4] * inertia * part * v_t
         total2 = force.dot(force)
-        if total2 > limit * limit:
+        if uncapped == 0 and total2 > limit * limit:
             force *= limit / ti.sqrt(total2)
     return spring, force
 

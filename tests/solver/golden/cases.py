@@ -26,6 +26,7 @@ import trimesh
 from solver import clump
 from solver.assets import measurement_folder
 from solver.bench_tests import BENCH_TESTS
+from solver.contact_model import ContactModel
 from solver.effects import EFFECTS, SET_UP_EFFECTS
 from solver.effects.columns import kernel_effects
 from solver.insertion import Insertion
@@ -40,7 +41,7 @@ from solver.run import capacity_for
 from solver.scene import Scene, pour_rig, with_rig, with_values
 from solver.shape import Kind, Solid, mass_properties
 from solver.time_step import time_step
-from solver.world import Batch
+from solver.world import SUMMARY_COLUMNS, Batch
 from tests.solver.effects.cases import IN_KERNELS, felt, with_effects
 
 Array = npt.NDArray[np.float64]
@@ -51,6 +52,8 @@ FIRST = 200
 """Steps after which states are compared on another processor."""
 CLUMPS, HEAP_STEPS = 12, 4000
 """0.1 s."""
+OF_THE_LIST = ("rebuilds", "contacts")
+"""Columns of a summary that say how the contact list is kept, which is no physics."""
 POUR_TIME = 1.0
 """[s]; enough for every rig to begin to act, and for the drum to be watched."""
 TREFOIL = with_values(
@@ -73,6 +76,9 @@ FEW = {
     },
 }
 """Settings of each rig in which a dozen bodies are enough; what is not listed is poured as it is."""
+CONVENTIONS = {"local_mass": "clump_rule", "mindlin": "tangential_law", "uncapped": "tangential_dashpot"}
+"""Choice → the parameter of ``contact`` that has it."""
+SHARED = with_values(TREFOIL, {"contact.clump_rule": "local_mass_shared"})
 SHAPES: Mapping[str, tuple[float, ...]] = {
     "ellipsoid": (12e-3, 8e-3, 5e-3),
     "box": (10e-3, 8e-3, 5e-3),
@@ -90,6 +96,8 @@ def pours() -> dict[str, Scene]:
         for protocol in pour_rig(scene).protocols:
             found[f"pour, {name}, {protocol}"] = with_values(scene, {"insertion.protocol": protocol})
     funnel = found["pour, funnel, pour_through"]
+    # The first bodies sleep while the last ones fall, and the contact list is built again and again.
+    found["pour, half of it asleep"] = with_values(funnel, {"rig.mass": 6e-3, "insertion.rate": 0.01})
     several = {"body.spheres": "coarse", "rig.mass": 4e-3, "insertion.rate": 0.1, "insertion.lead": 0.02}
     several |= {"numerics.duration": 0.8, "body.seed.size_distribution": "uniform", "body.seed.size_spread": 0.1}
     found["pour of a mixture of solids"] = with_values(load_material("sunflower_extract"), several)
@@ -99,7 +107,8 @@ def pours() -> dict[str, Scene]:
 def heap_numbers(scenes: Mapping[str, Scene], worlds: int = 1, first: int = 0) -> tuple[Numbers, Numbers]:
     """States of heaps after ``FIRST`` and after ``HEAP_STEPS`` steps, in a batch of ``worlds`` from ``first`` on."""
     effects = any(map(kernel_effects, scenes.values()))
-    batch = Batch(dataclasses.replace(ROOM, worlds=worlds, effects=effects))
+    sharing = any(scene.contact.clump_rule == "local_mass_shared" for scene in scenes.values())
+    batch = Batch(dataclasses.replace(ROOM, worlds=worlds, effects=effects, sharing=sharing))
     steps = np.zeros(worlds, dtype=np.int32)
     for w, scene in enumerate(scenes.values(), start=first):
         batch.load(w, scene, layout(scene, np.zeros(CLUMPS, dtype=np.int32)), time_step(scene), (True, True, False))
@@ -116,6 +125,7 @@ def heap_numbers(scenes: Mapping[str, Scene], worlds: int = 1, first: int = 0) -
     early = states()
     rows = batch.advance(np.where(steps > 0, HEAP_STEPS - FIRST, 0).astype(np.int32))
     late = states()
+    rows = np.delete(rows, [SUMMARY_COLUMNS.index(name) for name in OF_THE_LIST], axis=1)
     return early, {name: np.append(late[name], rows[w]) for w, name in enumerate(scenes, start=first)}
 
 
@@ -136,7 +146,7 @@ def pour_numbers(scenes: Mapping[str, Scene]) -> tuple[Numbers, Numbers]:
 
 
 def _all_of(pour: Pour) -> Array:
-    curves = [value for sample in pour.samples for value in sample.values()]
+    curves = [x for sample in pour.samples for name, x in sample.items() if name not in OF_THE_LIST]
     surface = [height for _, heights in pour._free_surface for height in heights]
     decided = [pour.steps, pour.gate_opened, pour.entered, *pour.outcome.value.encode()]
     state = pour.batch.bodies(pour.w, pour.entered).ravel()
@@ -174,7 +184,7 @@ def defaults() -> dict[str, float | str]:
     """Declared default of every parameter that has one, by path: the key of a stored pour leaves these out."""
     kinds = {"insertion": Insertion, "numerics": Numerics} | {f"rig[{n}]": k for n, k in (RIGS | BENCH_RIGS).items()}
     kinds |= {f"effect.{name}": kind for name, kind in EFFECTS.items()}
-    kinds |= {"material": Material, "pair": Pair}
+    kinds |= {"material": Material, "pair": Pair, "contact": ContactModel}
     return {
         f"{prefix}.{field.name}": field.default
         for prefix, kind in kinds.items()
@@ -187,6 +197,7 @@ def everything(folder: Path) -> tuple[Numbers, Numbers]:
     """Early and late numbers of all cases; those without steps have late ones only. ``folder``: an empty one."""
     plain, beside = {"heap, alone": TREFOIL}, {"heap, second of three": TREFOIL}
     moved = {f"heap with {name}": with_effects(TREFOIL, felt(name)) for name in IN_KERNELS}
+    moved |= {f"heap, {name}": with_values(TREFOIL, {f"contact.{key}": name}) for name, key in CONVENTIONS.items()}
     poured = pours()
     # A batch with room for a mesh is another kernel.
     meshes = {name: poured.pop(name) for name in [*poured] if "mesh" in name}
@@ -196,6 +207,7 @@ def everything(folder: Path) -> tuple[Numbers, Numbers]:
         heap_numbers(plain),
         heap_numbers(beside, worlds=3, first=1),
         heap_numbers(moved, worlds=len(moved)),
+        heap_numbers({"heap, local_mass_shared": SHARED}),
         pour_numbers(poured),
         pour_numbers(meshes),
     ):
