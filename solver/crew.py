@@ -2,7 +2,8 @@
 
 In one process all worlds wait at the end of a launch for the slowest, and while Python feeds and samples one world the
 other cores rest: two threads of :func:`solver.run.run_queue` do the work of 1.5, two workers that of 2. The bits are
-the same. A worker ends with its pipe: at :meth:`Crew.close`, or when the process that made it is gone.
+the same. Of workers that need kernels which nobody has compiled yet, one compiles them and the others wait. A worker
+ends with its pipe: at :meth:`Crew.close`, or when the process that made it is gone.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import TYPE_CHECKING, Any
 
-from solver.scene import Scene
+from solver.scene import Scene, with_values
 
 if TYPE_CHECKING:
     from solver.record import Record
@@ -113,10 +114,10 @@ def begin_worker() -> None:
 
 def _work(pipe: Connection) -> None:
     """Run what comes through ``pipe``: a list of scenes makes room for them, a job is answered by its record."""
-    begin_worker()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # at once: what follows is imported for a second
     from solver.run import run_job
 
-    rooms = Rooms()
+    rooms, begun = Rooms(), False
     while True:
         try:
             order = pipe.recv()
@@ -125,6 +126,9 @@ def _work(pipe: Connection) -> None:
         try:
             if isinstance(order, list):
                 rooms.make(order)
+                if not begun:
+                    rooms.begin(order)
+                    begun = True
                 continue
             answer: Any = run_job(rooms.for_scene(order.scene), order)
         except Exception as error:  # whatever it is, the process in charge has to know
@@ -152,14 +156,39 @@ class Rooms:
         needed = capacity_for(scenes, 1)
         self._capacity = needed if self._capacity is None else self._capacity.joined(needed)
 
+    def begin(self, scenes: Sequence[Scene]) -> None:
+        """Start Taichi, with the kernels that ``scenes`` run in, compiled by this process or another one."""
+        from solver.kernel_cache import compiled_once
+        from solver.run import Job, run_job
+
+        by_size = {self.size(scene): scene for scene in scenes}
+        # Without effects first: kernels differ by what was allocated before.
+        sizes = sorted(by_size, key=lambda size: size.effects)
+        with compiled_once(sizes) as mine:
+            begin_worker()
+            for size in sizes:
+                batch = self.for_scene(by_size[size])
+                batch.summary()  # allocates it before the next one
+                if size in mine:
+                    run_job(batch, Job(briefly(by_size[size]), seed=1))
+
     def for_scene(self, scene: Scene) -> Batch:
         """The batch for ``scene``."""
-        from solver.effects.columns import kernel_effects
         from solver.world import Batch
 
+        wanted = self.size(scene)
+        if wanted.effects not in self._batches or self._batches[wanted.effects].capacity != wanted:
+            self._batches[wanted.effects] = Batch(wanted)
+        return self._batches[wanted.effects]
+
+    def size(self, scene: Scene) -> Capacity:
+        """Sizes of the batch for ``scene``."""
+        from solver.effects.columns import kernel_effects
+
         assert self._capacity is not None, "room is made before the first job"
-        effects = kernel_effects(scene)
-        wanted = replace(self._capacity, effects=effects)
-        if effects not in self._batches or self._batches[effects].capacity != wanted:
-            self._batches[effects] = Batch(wanted)
-        return self._batches[effects]
+        return replace(self._capacity, effects=kernel_effects(scene))
+
+
+def briefly(scene: Scene) -> Scene:
+    """``scene`` cut off as soon as it may be: what takes long is to compile its kernels."""
+    return with_values(scene, {"numerics.max_time": 0.1})
