@@ -16,9 +16,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
+from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from solver.scene import Scene, with_values
+import numpy as np
+
+from solver.scene import Scene
 
 if TYPE_CHECKING:
     from solver.record import Record
@@ -26,7 +29,8 @@ if TYPE_CHECKING:
     from solver.state import Capacity
     from solver.world import Batch
 
-
+MOMENTS = 3
+"""Moments of decision of a pour after which its kernels are compiled."""
 GONE = "a worker process has ended before its work was done"
 
 
@@ -78,6 +82,53 @@ class Crew:
         self.close(at_once=error[0] is not None)
 
 
+def warm_up(rooms: Sequence[Sequence[Scene]], workers: int | None = None) -> Iterator[tuple[int, float | None]]:
+    """Have the kernels compiled and kept that a crew needs for the scenes of each room.
+
+    Args:
+        rooms: scenes that are to be run by one crew, as in :meth:`Crew.run_queue`.
+        workers: processes at once, by default one per core.
+
+    Yields:
+        (number of the room, seconds that it took) as each is done; None for kernels that were kept already, or by
+        another room.
+
+    Raises:
+        RuntimeError: a worker's error, or one died.
+    """
+    from solver.kernel_cache import missing
+
+    alike: dict[tuple[Capacity, ...], list[int]] = {}
+    for k, room in enumerate(rooms):
+        alike.setdefault(tuple(Rooms().make(room)), []).append(k)
+    waiting = deque(alike.items())
+    busy: dict[Connection, tuple[list[int], BaseProcess, float]] = {}
+    try:
+        while waiting or busy:
+            while waiting and len(busy) < (workers or os.cpu_count() or 1):
+                sizes, numbers = waiting.popleft()
+                if not missing(sizes):
+                    yield from ((k, None) for k in numbers)
+                    continue
+                # A process for each: kernels depend on what was allocated before.
+                process, pipe = _worker()
+                busy[pipe] = numbers, process, perf_counter()
+                _send(pipe, list(rooms[numbers[0]]))
+                _send(pipe, None)
+            for pipe in [ready for ready in wait(list(busy)) if isinstance(ready, Connection)] if busy else []:
+                _answer(pipe)
+                numbers, process, began = busy.pop(pipe)
+                pipe.close()
+                process.join()
+                yield numbers[0], perf_counter() - began
+                yield from ((k, None) for k in numbers[1:])
+    finally:
+        for pipe, (_, process, _) in busy.items():
+            process.kill()
+            pipe.close()
+            process.join()
+
+
 def _worker() -> tuple[BaseProcess, Connection]:
     ours, theirs = mp.Pipe()
     process = mp.get_context("spawn").Process(target=_work, args=(theirs,), name="pours")
@@ -113,7 +164,10 @@ def begin_worker() -> None:
 
 
 def _work(pipe: Connection) -> None:
-    """Run what comes through ``pipe``: a list of scenes makes room for them, a job is answered by its record."""
+    """Run what comes through ``pipe``: a list of scenes makes room for them, a job is answered by its record.
+
+    None is answered by None: what came before is done.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # at once: what follows is imported for a second
     from solver.run import run_job
 
@@ -125,12 +179,10 @@ def _work(pipe: Connection) -> None:
             return
         try:
             if isinstance(order, list):
-                rooms.make(order)
-                if not begun:
-                    rooms.begin(order)
-                    begun = True
+                (rooms.make if begun else rooms.begin)(order)
+                begun = True
                 continue
-            answer: Any = run_job(rooms.for_scene(order.scene), order)
+            answer: Any = None if order is None else run_job(rooms.for_scene(order.scene), order)
         except Exception as error:  # whatever it is, the process in charge has to know
             answer = error
         try:
@@ -149,46 +201,51 @@ class Rooms:
         self._capacity: Capacity | None = None
         self._batches: dict[bool, Batch] = {}
 
-    def make(self, scenes: Sequence[Scene]) -> None:
-        """Make room for ``scenes``, and leave what is there."""
+    def make(self, scenes: Sequence[Scene]) -> list[Capacity]:
+        """Make room for ``scenes``, and leave what is there; returns the sizes of their batches."""
         from solver.run import capacity_for
 
         needed = capacity_for(scenes, 1)
         self._capacity = needed if self._capacity is None else self._capacity.joined(needed)
+        # Without effects first: kernels depend on what was allocated before.
+        return sorted({self._size(scene) for scene in scenes}, key=lambda size: size.effects)
 
     def begin(self, scenes: Sequence[Scene]) -> None:
-        """Start Taichi, with the kernels that ``scenes`` run in, compiled by this process or another one."""
+        """Make room for ``scenes`` and start Taichi, with kernels that this process or another one compiles."""
         from solver.kernel_cache import compiled_once
-        from solver.run import Job, run_job
 
-        by_size = {self.size(scene): scene for scene in scenes}
-        # Without effects first: kernels differ by what was allocated before.
-        sizes = sorted(by_size, key=lambda size: size.effects)
+        sizes = self.make(scenes)
+        examples = {self._size(scene): scene for scene in scenes}
         with compiled_once(sizes) as mine:
             begin_worker()
             for size in sizes:
-                batch = self.for_scene(by_size[size])
+                batch = self.for_scene(examples[size])
                 batch.summary()  # allocates it before the next one
                 if size in mine:
-                    run_job(batch, Job(briefly(by_size[size]), seed=1))
+                    _pour_for_a_moment(batch, examples[size])
 
     def for_scene(self, scene: Scene) -> Batch:
         """The batch for ``scene``."""
         from solver.world import Batch
 
-        wanted = self.size(scene)
+        wanted = self._size(scene)
         if wanted.effects not in self._batches or self._batches[wanted.effects].capacity != wanted:
             self._batches[wanted.effects] = Batch(wanted)
         return self._batches[wanted.effects]
 
-    def size(self, scene: Scene) -> Capacity:
-        """Sizes of the batch for ``scene``."""
+    def _size(self, scene: Scene) -> Capacity:
         from solver.effects.columns import kernel_effects
 
         assert self._capacity is not None, "room is made before the first job"
         return replace(self._capacity, effects=kernel_effects(scene))
 
 
-def briefly(scene: Scene) -> Scene:
-    """``scene`` cut off as soon as it may be: what takes long is to compile its kernels."""
-    return with_values(scene, {"numerics.max_time": 0.1})
+def _pour_for_a_moment(batch: Batch, scene: Scene) -> None:
+    """Compile the kernels of a pour, all but a few small ones that its later moments need."""
+    from solver.pour import Pour
+
+    pour = Pour(batch, 0, scene, seed=1)
+    for _ in range(MOMENTS):
+        if due := pour.steps_due():
+            pour.after(due, batch.advance(np.array([due], dtype=np.int32))[0])
+    pour.bodies()

@@ -21,6 +21,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from solver.arch import chosen
 from solver.backend import keep_compiled, kernel_folder
 
 if TYPE_CHECKING:
@@ -46,7 +47,8 @@ def compiled_once(capacities: Sequence[Capacity]) -> Iterator[list[Capacity]]:
     when it is needed, as if this were not here.
     """
     with ExitStack() as locks:
-        absent = missing(capacities) if os.environ.get("TI_OFFLINE_CACHE") != "0" else []
+        kept_at_all = chosen() == "cpu" and os.environ.get("TI_OFFLINE_CACHE") != "0"
+        absent = missing(capacities) if kept_at_all else []
         # In one order everywhere, so that no two processes wait for each other.
         places = sorted((_place(capacities[: capacities.index(one) + 1]), one) for one in absent)
         claimed = [one for place, one in places if _claimed(place, locks)]
