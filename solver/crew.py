@@ -11,8 +11,10 @@ from __future__ import annotations
 import multiprocessing as mp
 import os
 import signal
+import sys
 from collections import deque
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
@@ -132,7 +134,8 @@ def warm_up(rooms: Sequence[Sequence[Scene]], workers: int | None = None) -> Ite
 def _worker() -> tuple[BaseProcess, Connection]:
     ours, theirs = mp.Pipe()
     process = mp.get_context("spawn").Process(target=_work, args=(theirs,), name="pours")
-    process.start()
+    with deaf_to_interrupts():
+        process.start()
     theirs.close()
     return process, ours
 
@@ -152,6 +155,23 @@ def _answer(pipe: Connection) -> Any:
     if isinstance(answer, BaseException):
         raise RuntimeError(f"a pour broke off: {answer!r}") from answer
     return answer
+
+
+@contextmanager
+def deaf_to_interrupts() -> Iterator[None]:
+    """Processes that are started within do not hear Ctrl-C, from their first moment on.
+
+    It reaches the whole group. A process can ignore it by itself only once it has imported what it runs, and until
+    then would print a traceback.
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def begin_worker() -> None:

@@ -67,10 +67,12 @@ def test_what_a_killed_process_compiled_is_kept(folder):
 
 
 def test_a_copy_that_hangs_is_ended(monkeypatch):
+    copies, fork = [], os.fork
     monkeypatch.setattr(backend, "LONGEST_WRITE", 0.0)
+    monkeypatch.setattr(os, "fork", lambda: copies.append(fork()) or copies[-1])
     assert not backend._done_by_a_copy(signal.pause)
     with pytest.raises(ChildProcessError):
-        os.waitpid(-1, os.WNOHANG)
+        os.waitpid(copies[0], os.WNOHANG)
 
 
 @pytest.mark.parametrize(("work", "done"), [(int, True), (lambda: 1 / 0, False)], ids=["done", "failed"])
