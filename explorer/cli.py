@@ -32,6 +32,7 @@ from explorer.commands import (
     simulate,
     validate_diagnosis,
     verify,
+    warm_up,
 )
 
 BAD_INPUT, INTERRUPTED = 2, 130
@@ -129,6 +130,7 @@ app.command()(export.export)
 app.command()(replay.replay)
 app.command()(verify.verify)
 app.command()(bench.bench)
+app.command()(warm_up.warm_up)
 app.command()(validate_diagnosis.validate_diagnosis)
 app.add_typer(measurements.app, name="measurements")
 

@@ -37,7 +37,7 @@ from solver.toml_table import read_toml
 from solver.version import PHYSICS
 
 if TYPE_CHECKING:
-    from solver.crew import Crew, begin_worker
+    from solver.crew import Crew, begin_worker, warm_up
     from solver.photograph import PhotographedPile, PhotographError, open_picture, read_photograph
     from solver.pour import Pour
     from solver.run import Job, capacity_for, run_pour, run_pours, run_queue
@@ -57,6 +57,7 @@ _LATE = {
     "run_pour": "solver.run",
     "run_pours": "solver.run",
     "run_queue": "solver.run",
+    "warm_up": "solver.crew",
 }
 
 
@@ -124,6 +125,7 @@ __all__ = [
     "slope_angle_deg",
     "unpacked",
     "value",
+    "warm_up",
     "with_rig",
     "with_set_up",
     "with_settings",

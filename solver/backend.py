@@ -2,12 +2,21 @@
 
 Fields and arrays may be touched only by the thread that called :func:`init`; a second ``ti.init`` would wipe them,
 so :func:`init` is idempotent and refuses another thread.
+
+Taichi keeps compiled kernels in a folder for the next program, but writes them at its normal end only: a program that
+is killed in its first minute would compile again for ever. So :func:`keep_compiled` has them written at once.
 """
 
 import contextlib
 import io
 import os
+import select
+import signal
 import threading
+import time
+import warnings
+from collections.abc import Callable
+from pathlib import Path
 
 os.environ.setdefault("ENABLE_TAICHI_HEADER_PRINT", "0")
 
@@ -19,8 +28,17 @@ from solver.params import ParameterError
 
 LANES_ON_CPU = 512
 """Taichi gives a CPU thread at least this many iterations of a loop in a row."""
+WORTH_KEEPING = 0.25
+"""Seconds of compilation after which kernels are written. The big kernel takes 3 s and more to compile, all others
+together 0.5 s, and to read all of them back takes 0.07 s; Taichi tells no other difference between the two."""
+LONGEST_WRITE = 10.0
+"""Seconds that writing may take (0.1 is usual)."""
+STALE_LOCK = 60.0
+"""Age [s] of a lock in the folder of kernels at which whoever made it is gone: it is held for a moment only."""
 
 _owner: int | None = None
+_written = 0.0
+"""What Taichi had spent on compilation [s] when kernels were last written."""
 
 
 def init(threads: int | None = None) -> None:
@@ -37,6 +55,7 @@ def init(threads: int | None = None) -> None:
     arch = getattr(ti, chosen())
     options = {} if threads is None else {"cpu_max_num_threads": threads}
     ti.set_logging_level(ti.ERROR)
+    _drop_stale_lock()
     # ti.init prints a banner that no option silences; it would stand in front of JSON on standard output.
     with contextlib.redirect_stdout(io.StringIO()):
         ti.init(
@@ -63,3 +82,70 @@ def serial() -> bool:
 def lanes() -> int:
     """Loop iterations per world (see ``kernels/batch.py``): one on a GPU, whose threads take one each."""
     return LANES_ON_CPU if impl.current_cfg().arch == ti.cpu else 1
+
+
+def kernel_folder() -> Path:
+    """Where Taichi keeps compiled kernels."""
+    return Path(os.environ.get("TI_OFFLINE_CACHE_FILE_PATH") or impl.default_cfg().offline_cache_file_path)
+
+
+def keep_compiled(least: float = WORTH_KEEPING) -> bool:
+    """Have the kernels written that were compiled since the last time, if that took ``least`` seconds or more.
+
+    Taichi writes them in ``Program.finalize`` only, after which a program is over. So a copy of this process does it
+    and ends, while this one waits and goes on. Nothing is done where a copy would not be safe: beside other threads of
+    Python or with several of Taichi (they are not copied, and what they had locked stays locked), on a GPU and on
+    Windows.
+
+    Returns:
+        Whether all kernels that took long to compile are written.
+    """
+    global _written
+    program = impl.get_runtime().prog
+    spent = program.get_total_compilation_time()
+    if spent - _written < least:
+        return True
+    if not (serial() and impl.current_cfg().offline_cache and hasattr(os, "fork") and threading.active_count() == 1):
+        return False
+    # Also where it fails, or a full disk would be asked again after every launch; a normal end writes once more.
+    _written = spent
+    return _done_by_a_copy(program.finalize)
+
+
+def _done_by_a_copy(work: Callable[[], object]) -> bool:
+    """Let a copy of this process do ``work`` and end at once; True if it has within ``LONGEST_WRITE``."""
+    reading, writing = os.pipe()
+    with warnings.catch_warnings():
+        # Python 3.12 counts the idle threads of Taichi's compiler, which the copy has no use for.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        copy = os.fork()
+    if copy == 0:
+        failed = 1
+        try:
+            work()
+            failed = 0
+        finally:
+            # Not by SystemExit: buffers, handlers and children of the original are none of the copy's business.
+            os._exit(failed)
+    os.close(writing)
+    ended = False
+    try:
+        # The copy alone holds the other end, which closes when it ends, however it does.
+        ended = bool(select.select([reading], [], [], LONGEST_WRITE)[0])
+    finally:
+        os.close(reading)
+        if not ended:
+            os.kill(copy, signal.SIGKILL)
+        _, status = os.waitpid(copy, 0)
+    return ended and status == 0
+
+
+def _drop_stale_lock() -> None:
+    """Remove the lock of a process that was killed while it read or wrote the list of kernels.
+
+    Taichi waits for such a lock a quarter of a second and then neither reads nor writes: every start would compile.
+    """
+    lock = kernel_folder() / "ticache.lock"
+    with contextlib.suppress(OSError):
+        if time.time() - lock.stat().st_mtime > STALE_LOCK:
+            lock.unlink()

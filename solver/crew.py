@@ -2,7 +2,8 @@
 
 In one process all worlds wait at the end of a launch for the slowest, and while Python feeds and samples one world the
 other cores rest: two threads of :func:`solver.run.run_queue` do the work of 1.5, two workers that of 2. The bits are
-the same. A worker ends with its pipe: at :meth:`Crew.close`, or when the process that made it is gone.
+the same. Of workers that need kernels which nobody has compiled yet, one compiles them and the others wait. A worker
+ends with its pipe: at :meth:`Crew.close`, or when the process that made it is gone.
 """
 
 from __future__ import annotations
@@ -10,12 +11,17 @@ from __future__ import annotations
 import multiprocessing as mp
 import os
 import signal
+import sys
 from collections import deque
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
+from time import perf_counter
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from solver.scene import Scene
 
@@ -25,7 +31,8 @@ if TYPE_CHECKING:
     from solver.state import Capacity
     from solver.world import Batch
 
-
+MOMENTS = 3
+"""Moments of decision of a pour after which its kernels are compiled."""
 GONE = "a worker process has ended before its work was done"
 
 
@@ -77,10 +84,58 @@ class Crew:
         self.close(at_once=error[0] is not None)
 
 
+def warm_up(rooms: Sequence[Sequence[Scene]], workers: int | None = None) -> Iterator[tuple[int, float | None]]:
+    """Have the kernels compiled and kept that a crew needs for the scenes of each room.
+
+    Args:
+        rooms: scenes that are to be run by one crew, as in :meth:`Crew.run_queue`.
+        workers: processes at once, by default one per core.
+
+    Yields:
+        (number of the room, seconds that it took) as each is done; None for kernels that were kept already, or by
+        another room.
+
+    Raises:
+        RuntimeError: a worker's error, or one died.
+    """
+    from solver.kernel_cache import missing
+
+    alike: dict[tuple[Capacity, ...], list[int]] = {}
+    for k, room in enumerate(rooms):
+        alike.setdefault(tuple(Rooms().make(room)), []).append(k)
+    waiting = deque(alike.items())
+    busy: dict[Connection, tuple[list[int], BaseProcess, float]] = {}
+    try:
+        while waiting or busy:
+            while waiting and len(busy) < (workers or os.cpu_count() or 1):
+                sizes, numbers = waiting.popleft()
+                if not missing(sizes):
+                    yield from ((k, None) for k in numbers)
+                    continue
+                # A process for each: kernels depend on what was allocated before.
+                process, pipe = _worker()
+                busy[pipe] = numbers, process, perf_counter()
+                _send(pipe, list(rooms[numbers[0]]))
+                _send(pipe, None)
+            for pipe in [ready for ready in wait(list(busy)) if isinstance(ready, Connection)] if busy else []:
+                _answer(pipe)
+                numbers, process, began = busy.pop(pipe)
+                pipe.close()
+                process.join()
+                yield numbers[0], perf_counter() - began
+                yield from ((k, None) for k in numbers[1:])
+    finally:
+        for pipe, (_, process, _) in busy.items():
+            process.kill()
+            pipe.close()
+            process.join()
+
+
 def _worker() -> tuple[BaseProcess, Connection]:
     ours, theirs = mp.Pipe()
     process = mp.get_context("spawn").Process(target=_work, args=(theirs,), name="pours")
-    process.start()
+    with deaf_to_interrupts():
+        process.start()
     theirs.close()
     return process, ours
 
@@ -102,6 +157,23 @@ def _answer(pipe: Connection) -> Any:
     return answer
 
 
+@contextmanager
+def deaf_to_interrupts() -> Iterator[None]:
+    """Processes that are started within do not hear Ctrl-C, from their first moment on.
+
+    It reaches the whole group. A process can ignore it by itself only once it has imported what it runs, and until
+    then would print a traceback.
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def begin_worker() -> None:
     """Make this a worker process: one CPU thread, and Ctrl-C left to the process in charge."""
     # It reaches the whole group; the process in charge decides, and its end closes the pipe.
@@ -112,11 +184,14 @@ def begin_worker() -> None:
 
 
 def _work(pipe: Connection) -> None:
-    """Run what comes through ``pipe``: a list of scenes makes room for them, a job is answered by its record."""
-    begin_worker()
+    """Run what comes through ``pipe``: a list of scenes makes room for them, a job is answered by its record.
+
+    None is answered by None: what came before is done.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # at once: what follows is imported for a second
     from solver.run import run_job
 
-    rooms = Rooms()
+    rooms, begun = Rooms(), False
     while True:
         try:
             order = pipe.recv()
@@ -124,9 +199,10 @@ def _work(pipe: Connection) -> None:
             return
         try:
             if isinstance(order, list):
-                rooms.make(order)
+                (rooms.make if begun else rooms.begin)(order)
+                begun = True
                 continue
-            answer: Any = run_job(rooms.for_scene(order.scene), order)
+            answer: Any = None if order is None else run_job(rooms.for_scene(order.scene), order)
         except Exception as error:  # whatever it is, the process in charge has to know
             answer = error
         try:
@@ -145,20 +221,52 @@ class Rooms:
         self._capacity: Capacity | None = None
         self._batches: dict[tuple[bool, ...], Batch] = {}
 
-    def make(self, scenes: Sequence[Scene]) -> None:
-        """Make room for ``scenes``, and leave what is there."""
+    def make(self, scenes: Sequence[Scene]) -> list[Capacity]:
+        """Make room for ``scenes``, and leave what is there; returns the sizes of their batches."""
         from solver.run import capacity_for
 
         needed = capacity_for(scenes, 1)
         self._capacity = needed if self._capacity is None else self._capacity.joined(needed)
+        # Without effects first: kernels depend on what was allocated before.
+        return sorted({self._size(scene) for scene in scenes}, key=lambda size: (size.effects, size.sharing))
+
+    def begin(self, scenes: Sequence[Scene]) -> None:
+        """Make room for ``scenes`` and start Taichi, with kernels that this process or another one compiles."""
+        from solver.kernel_cache import compiled_once
+
+        sizes = self.make(scenes)
+        examples = {self._size(scene): scene for scene in scenes}
+        with compiled_once(sizes) as mine:
+            begin_worker()
+            for size in sizes:
+                batch = self.for_scene(examples[size])
+                batch.summary()  # allocates it before the next one
+                if size in mine:
+                    _pour_for_a_moment(batch, examples[size])
 
     def for_scene(self, scene: Scene) -> Batch:
         """The batch for ``scene``."""
-        from solver.world import Batch, compiled_in
+        from solver.world import Batch
+
+        wanted = self._size(scene)
+        variant = (wanted.effects, wanted.sharing)
+        if variant not in self._batches or self._batches[variant].capacity != wanted:
+            self._batches[variant] = Batch(wanted)
+        return self._batches[variant]
+
+    def _size(self, scene: Scene) -> Capacity:
+        from solver.world import compiled_in
 
         assert self._capacity is not None, "room is made before the first job"
-        variant = compiled_in([scene])
-        wanted, name = replace(self._capacity, **variant), tuple(variant.values())
-        if name not in self._batches or self._batches[name].capacity != wanted:
-            self._batches[name] = Batch(wanted)
-        return self._batches[name]
+        return replace(self._capacity, **compiled_in([scene]))
+
+
+def _pour_for_a_moment(batch: Batch, scene: Scene) -> None:
+    """Compile the kernels of a pour, all but a few small ones that its later moments need."""
+    from solver.pour import Pour
+
+    pour = Pour(batch, 0, scene, seed=1)
+    for _ in range(MOMENTS):
+        if due := pour.steps_due():
+            pour.after(due, batch.advance(np.array([due], dtype=np.int32))[0])
+    pour.bodies()

@@ -15,7 +15,6 @@ import re
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtri
 
 from solver.params import ParameterError, parse_quantity
 from solver.toml_table import as_table, refuse_unknown
@@ -41,6 +40,8 @@ def measured_spread(table: dict[str, Any], where: str) -> float:
 
 def quantile_spread(quantiles: dict[float, float]) -> float:
     """Spread of the log-normal sizes with these quantiles: percent below → diameter [m]."""
+    from scipy.special import ndtri  # here: few materials have measured sizes
+
     deviate = ndtri(np.array(list(quantiles)) / 100.0)
     log_size = np.log(np.array(list(quantiles.values())))
     offset = deviate - deviate.mean()

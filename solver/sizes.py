@@ -19,7 +19,6 @@ from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import ndtr, ndtri
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]
@@ -72,6 +71,8 @@ class SizeDistribution:
             return np.ones(len(probability))
         if self.kind == "uniform":
             return 1.0 + math.sqrt(3.0) * self.spread * (2.0 * probability - 1.0)
+        from scipy.special import ndtr, ndtri  # here: most bodies have one size, and scipy takes 0.3 s to load
+
         mean, deviation = _log_normal(self.spread)
         normal = np.clip(ndtri(ndtr(-CUT) + probability * (ndtr(CUT) - ndtr(-CUT))), -CUT, CUT)
         return np.exp(mean + deviation * normal)
@@ -113,4 +114,6 @@ def _moment(k: int, mean: float, deviation: float) -> float:
 
 
 def _share(k: int, deviation: float) -> float:
+    from scipy.special import ndtr
+
     return float(ndtr(CUT - k * deviation) - ndtr(-CUT - k * deviation))

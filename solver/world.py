@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from solver import moving_state, snapshot
+from solver import backend, moving_state, snapshot
 from solver.body import Body
 from solver.effects.columns import effect_table, kernel_effects, reach_of_pulls
 from solver.kernels import changing, loading, reading, touching
@@ -198,6 +198,7 @@ class Batch:
         """Run world w for ``steps[w]`` steps."""
         self._steps[:] = steps
         advance(self._s, self._steps)
+        backend.keep_compiled()
 
     def advance(self, steps: Ints) -> Array:
         """:meth:`run`, and :meth:`summary` of what it came to."""

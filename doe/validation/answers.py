@@ -20,7 +20,7 @@ from doe.diagnose.follow_up.held_out import POURS, compared, contenders_for, pre
 from doe.diagnose.follow_up.holdout import HoldoutCondition, holdout_errors
 from doe.diagnose.runs import Declared, Runs
 from doe.diagnose.simulation.plan import Point
-from doe.diagnose.simulation.pours import ModelPours
+from doe.diagnose.simulation.pours import ModelPours, room_of
 from doe.diagnose.simulation.screen import Screened
 from doe.measurement import Condition, Measurement, load_measurement, summary_names
 from doe.measurement.summaries import summaries
@@ -145,7 +145,7 @@ class Answers:
         for attempt in range(TRIES):
             numbers = range(REPLICATES * (attempt + 1))
             orders = [order for k in short for c in conditions for order in self.orders(truths[k], c, numbers)]
-            readings = iter(self.place.pour(orders, self.laboratory(conditions).room()))
+            readings = iter(self.place.pour(orders, room_of(conditions)))
             for k in short:
                 data[k] = {c.name: complete(next(readings) for _ in numbers)[:REPLICATES] for c in conditions}
             short = [k for k in short if any(len(one) < REPLICATES for one in (data[k] or {}).values())]
@@ -160,7 +160,7 @@ class Answers:
         return [Order(laboratory.scene(p, c), laboratory.seed(p, c), condition, outside) for p in points]
 
     def laboratory(self, conditions: Sequence[Condition]) -> ModelPours:
-        """Scenes, seeds and room of the laboratories' pours: other seeds than the emulator's and the confirmation's."""
+        """Scenes and seeds of the laboratories' pours: other seeds than the emulator's and the confirmation's."""
         paths = [parameter.path for parameter in self.measurement.parameters]
         return ModelPours(conditions, paths, self.place.store, self.place.crew.run_queue, root=ROOT)
 

@@ -79,6 +79,9 @@ def simulate(
         typer.echo(json_text(data) if json else bench_text(data))
         return
     seeds = range(seed, seed + replicates)
+    if replicates == 1:
+        # A world is computed by one thread, and with one its kernels are those of the page and of workers.
+        threads = 1
     started = perf_counter()
     with ExitStack() as stack:
         folder = stack.enter_context(appearing(out)) if out else None

@@ -54,7 +54,7 @@ def moments(scene: Scene, seed: int, every: float | None) -> tuple[tuple[Moment,
             moment = _moment(pour)
             (found if due else last).append(moment)
 
-    ((_, record),) = run_queue(deque([Job(scene, seed)]), [scene], worlds=1, on_sample=look)
+    ((_, record),) = run_queue(deque([Job(scene, seed)]), [scene], threads=1, worlds=1, on_sample=look)
     return (*found, *last), record
 
 

@@ -9,6 +9,7 @@ from explorer.live.details import detail_reader, shared_details
 from explorer.live.frames import FrameReader, shared_block
 from explorer.live.messages import Close, Command, Report
 from explorer.live.process import run
+from solver.crew import deaf_to_interrupts
 
 CLOSE_WAIT = 3.0
 """Seconds that it has to end by itself."""
@@ -32,8 +33,9 @@ class SolverProcess:
             target=run, args=(self._commands, reporting, frames, details, asking), name="explorer-solver", daemon=True
         )
         self._reader = context.Process(target=read_angles, args=(answering,), name="explorer-angles", daemon=True)
-        for process in (self._reader, self._solver):
-            process.start()
+        with deaf_to_interrupts():
+            for process in (self._reader, self._solver):
+                process.start()
         # With these gone every line has one process at either end, which hears when the other one ends.
         for end in (asking, answering, reporting):
             end.close()

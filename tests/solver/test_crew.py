@@ -1,5 +1,6 @@
 """Worker processes: the same bits as in this process, errors that arrive, and nothing left behind."""
 
+import multiprocessing as mp
 import os
 import signal
 from collections import deque
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 
 from solver import load_material, with_values
-from solver.crew import Crew, Rooms
+from solver.crew import Crew, Rooms, deaf_to_interrupts
 from solver.run import Job, run_pours
 
 HEAP = with_values(
@@ -64,6 +65,20 @@ def test_nothing_is_left_after_close():
     ((process, _),) = crew._workers
     crew.close()
     assert process.exitcode == 0
+
+
+def hears_interrupts(pipe):
+    pipe.send(signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ()))
+
+
+def test_a_process_is_deaf_to_interrupts_from_its_first_moment():
+    ours, theirs = mp.Pipe()
+    process = mp.get_context("spawn").Process(target=hears_interrupts, args=(theirs,))
+    with deaf_to_interrupts():
+        process.start()
+    assert not ours.recv()
+    process.join()
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
 def test_a_scene_without_effects_in_the_kernels_has_a_room_without_them(taichi):

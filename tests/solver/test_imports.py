@@ -9,7 +9,8 @@ from solver import load_material, run_pour, with_values
 small = {"body.spheres": "coarse", "rig.mass": "1g", "numerics.max_time": 0.1}
 scene = with_values(load_material("sunflower_extract"), small)
 run_pour(scene, 1)
-print(*sorted({"trimesh", "scipy.spatial", "scipy.optimize", "scipy.stats"} & set(sys.modules)))
+late = {"trimesh", "scipy.spatial", "scipy.special", "scipy.ndimage", "scipy.optimize", "scipy.stats"}
+print(*sorted(late & set(sys.modules)))
 """
 
 

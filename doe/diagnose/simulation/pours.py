@@ -83,6 +83,21 @@ def once(points: Sequence[Point]) -> Search[Rows]:
     return (yield points)
 
 
+def room_of(conditions: Sequence[Condition]) -> list[Scene]:
+    """Scenes that need as much room as most points: every condition at the ends of each effect, where it can be.
+
+    The same at every stage, so that a worker compiles its batches once.
+    """
+    room: list[Scene] = []
+    for condition in conditions:
+        for name, kind in EFFECTS.items():
+            for share in (-1.0, 1.0):
+                ends = effect_values(name, [share * kind.strongest for _ in kind.amplitudes])
+                with contextlib.suppress(ParameterError):
+                    room.append(with_values(condition.scene, ends))
+    return room
+
+
 class ModelPours:
     """Runs points of one declared model under its conditions. Points asked for before are not run again."""
 
@@ -146,7 +161,7 @@ class ModelPours:
         for k in range(len(searches)):
             queue.extend(resumed(k))
         left = len(queue)
-        room = self.room() + [job.scene for job in queue] + self._possible(widest, asked)
+        room = room_of(self._conditions) + [job.scene for job in queue] + self._possible(widest, asked)
         for job, record in self._pours(queue, room) if queue else ():
             k, (point, c) = wanted[job.tag]
             self._known[point, c] = self._keep(what, point, c, job, record)
@@ -170,20 +185,6 @@ class ModelPours:
     def seed(self, point: Point, condition: int) -> int:
         """Seed of the pour of ``point`` in a condition."""
         return seed_of(self._root, point.sequence, point.number, condition, 0)
-
-    def room(self) -> list[Scene]:
-        """Scenes that need as much room as most points: every condition at the ends of each effect, where it can be.
-
-        The same at every stage, so that a worker compiles its batches once.
-        """
-        room: list[Scene] = []
-        for condition in self._conditions:
-            for name, kind in EFFECTS.items():
-                for share in (-1.0, 1.0):
-                    ends = effect_values(name, [share * kind.strongest for _ in kind.amplitudes])
-                    with contextlib.suppress(ParameterError):
-                        room.append(with_values(condition.scene, ends))
-        return room
 
     def _possible(self, points: Sequence[Point], where: Sequence[int]) -> list[Scene]:
         """Scenes of ``points``, less those that there cannot be."""

@@ -1,0 +1,72 @@
+"""``explorer warm-up``: compile the kernels that other commands need, before somebody waits for them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import typer
+
+if TYPE_CHECKING:
+    from solver import Scene
+
+MANY_BODIES = 2000
+"""A measurement with more pours for hours, beside which a compilation of seconds is nothing."""
+AN_EFFECT = {"effect.rolling_resistance.rolling_friction": 0.1}
+"""Which one does not matter: all are compiled in, or none."""
+
+
+def warm_up(
+    sources: list[str] = typer.Argument(
+        None,
+        metavar="[RIG_OR_FILE]...",
+        help="What is to be poured, as for simulate; without it, all that is shipped: rigs, study and diagnoses.",
+    ),
+    threads: int | None = typer.Option(None, min=1, help="CPU threads; all by default."),
+) -> None:
+    """Compile the solver now: later commands find it compiled. What is compiled already is left as it is."""
+    from explorer.errors import CommandError
+    from solver import warm_up as compiled
+    from solver.arch import chosen
+
+    if chosen() != "cpu":
+        raise CommandError(f"warm-up: what is compiled for {chosen()} is kept by no command; leave --arch out")
+    rooms = _rooms_of(sources) if sources else _shipped_rooms()
+    names = list(rooms)
+    for number, seconds in compiled(list(rooms.values()), threads):
+        did = "there already" if seconds is None else f"compiled in {seconds:.1f} s"
+        typer.echo(f"{names[number]}: {did}")
+
+
+def _rooms_of(sources: list[str]) -> dict[str, list[Scene]]:
+    """Name of a room → its scenes: every source without effects, with them, and with effects that come later."""
+    from explorer.scene.file import load_scene
+    from solver import with_values
+    from solver.effects.columns import kernel_effects
+
+    rooms: dict[str, list[Scene]] = {}
+    for source in sources:
+        scene = with_values(load_scene(source), {})
+        if not kernel_effects(scene):
+            acting = with_values(scene, AN_EFFECT)
+            rooms[f"{source}, effects off"] = [scene]
+            rooms[f"{source}, effects on"] = [acting]
+            rooms[f"{source}, effects off and on"] = [scene, acting]
+        else:
+            rooms[f"{source}, effects on"] = [scene]
+    return rooms
+
+
+def _shipped_rooms() -> dict[str, list[Scene]]:
+    from doe.diagnose.simulation.pours import room_of
+    from doe.measurement.load import load_measurement
+    from explorer.scene.file import DEFAULT_STUDY, load_scene
+    from solver import RIGS, body_counts
+    from solver.assets import measurement_folder, shipped_measurements
+
+    rooms = _rooms_of([DEFAULT_STUDY])
+    rooms |= {f"{rig}, effects off": [load_scene(rig)] for rig in RIGS}
+    for name in shipped_measurements():
+        conditions = load_measurement(measurement_folder(name)).fit
+        if max(sum(body_counts(condition.scene)) for condition in conditions) <= MANY_BODIES:
+            rooms[f"diagnosis of {name}"] = room_of(conditions)
+    return rooms
