@@ -40,7 +40,7 @@ BEDS = {
 }
 """Number of spheres → small beds along x and y, and copies of what they make."""
 USUAL_BEDS = (1_000, 10_000, 100_000)
-"""Without the largest, which takes minutes and 8 GiB of memory."""
+"""Without the largest, which takes minutes to put together."""
 SPHERE_STEPS = {"ours": 2e7, "liggghts": 2e7, "yade": 4e6}
 """Length of a bed's run: some seconds for each engine."""
 BATCH_POURS = 32

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
+
+if TYPE_CHECKING:
+    from solver.verification import Row
 
 
 def verify(
@@ -44,14 +48,18 @@ def verify(
             raise CommandError(f"--peers: runs {', '.join(BY_ANY_ENGINE)}, and --only names none of them")
         installed("liggghts")
     rows = list(rows_of(chosen))
+
+    def keep(beside: dict[str, list[Row]]) -> None:
+        if json:
+            write_whole(json, json_text(result_of(rows, beside)) + "\n")
+
+    keep({})
     typer.echo(table_text(rows, every))
-    found = {
-        engine.name: list(verify_engine(engine, shared)) for engine in ([liggghts_engine(peer_limit)] if peers else [])
-    }
-    if json:
-        write_whole(json, json_text(result_of(rows, found)) + "\n")
     if peers:
-        typer.echo(peers_text(rows, found))
+        engine = liggghts_engine(peer_limit)
+        beside = {engine.name: list(verify_engine(engine, shared))}
+        keep(beside)
+        typer.echo(peers_text(rows, beside))
     typer.echo(summary_text(rows))
     if not all(row.passed for row in rows):
         raise typer.Exit(1)
