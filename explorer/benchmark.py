@@ -1,20 +1,24 @@
-"""Benchmark cases, ours and the peers' one after the other in one run, each in a process of its own."""
+"""Benchmark cases, ours and the peers' in turn in one run, each in a process of its own."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import multiprocessing
+import statistics
 import tempfile
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from explorer.export import bed as peer_bed
+from explorer.export.deck import Deck
 from explorer.export.deck_of_scene import deck_of
 from explorer.export.decks import WRITERS
-from explorer.export.run import PeerRun, run_liggghts, run_yade
+from explorer.export.run import PeerRun, PeerTimeout, run_liggghts, run_yade
 from explorer.scene.file import load_scene
 from solver.benchmark import Bed, Measurement, measure_batch, measure_bed, measure_pour, wide_bed
 from solver.benchmark.packed_bed import RADIUS, bed_name, bed_scene
@@ -23,12 +27,25 @@ from solver.time_step import time_step
 POUR = "seed_pour"
 """The shipped set-up on which engines are compared."""
 SEED = 1
-BEDS = {1_000: (1, 1), 10_000: (2, 5), 100_000: (10, 10)}
-"""Number of spheres → copies of the small bed along x and y."""
+SHORT = 0.5
+"""Simulated time of the short pour [s]."""
+OFTEN = 8
+"""Pours of ours in a round of it, so that both engines take seconds and meet the same other work of the machine."""
+TO_REST = "pour to rest"
+BEDS = {
+    1_000: ((1, 1), (1, 1)),
+    10_000: ((2, 5), (1, 1)),
+    100_000: ((10, 10), (1, 1)),
+    1_000_000: ((10, 10), (2, 5)),
+}
+"""Number of spheres → small beds along x and y, and copies of what they make."""
+USUAL_BEDS = (1_000, 10_000, 100_000)
+"""Without the largest, which takes minutes to put together."""
 SPHERE_STEPS = {"ours": 2e7, "liggghts": 2e7, "yade": 4e6}
 """Length of a bed's run: some seconds for each engine."""
 BATCH_POURS = 32
-PEERS: dict[str, Callable[[Path], PeerRun]] = {"liggghts": run_liggghts, "yade": run_yade}
+LONG, FEW = 60.0, 3
+"""A case whose first round takes longer than this [s] has so many rounds at most."""
 
 
 @dataclass(frozen=True)
@@ -39,37 +56,69 @@ class Options:
     """Simulated time of the pour [s]."""
     beds: tuple[int, ...]
     peers: tuple[str, ...]
+    rounds: int = 5
+    """How often the engines take turns on a case."""
+    peer_limit: float = math.inf
+    """Wall time after which a peer's run is stopped [s]."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """All rounds of one engine on one case."""
+
+    rounds: tuple[Measurement, ...]
+
+    @property
+    def median(self) -> Measurement:
+        """The first round with the median wall time of all."""
+        return dataclasses.replace(self.rounds[0], wall_s=statistics.median(one.wall_s for one in self.rounds))
+
+    def ratios(self, other: Result) -> list[float]:
+        """Steps per second over the other's, round by round, so that what slows both for a while cancels out."""
+        both = zip(self.rounds, other.rounds, strict=False)
+        return [one.steps_per_s / two.steps_per_s for one, two in both if not (one.timed_out or two.timed_out)]
+
+
+def results(measurements: Sequence[Measurement]) -> list[Result]:
+    """Measurements of the same case and engine together, in order of their first."""
+    found: dict[tuple[str, str], list[Measurement]] = {}
+    for one in measurements:
+        found.setdefault((one.case, one.engine), []).append(one)
+    return [Result(tuple(rounds)) for rounds in found.values()]
+
+
+def short_cases(options: Options) -> Iterator[Measurement]:
+    """The beginning of the seed pour: what says within a minute whether a ratio has fallen."""
+    scene = load_scene(POUR)
+    deck: Deck = apart(_deck, scene, SHORT)
+    case = f"short pour, {SHORT:g} s"
+    yield from _in_turn(options, [_our_pour(case, scene, deck, SHORT, True, OFTEN), *_peer_pours(case, deck, options)])
 
 
 def pour_cases(options: Options) -> Iterator[Measurement]:
     """The seed pour: ours to rest, ours and the peers' for the same simulated time at the same time step."""
-    scene = load_scene(POUR)
-    yield apart(measure_pour, "pour to rest", scene, SEED, None, True)
-    case = f"pour, {options.duration:g} s"
-    yield apart(measure_pour, case, scene, SEED, options.duration, True)
-    ours = apart(measure_pour, case, scene, SEED, options.duration, False)
-    yield ours
-    deck = apart(_deck, scene, options.duration)
-    for engine in options.peers:
-        with tempfile.TemporaryDirectory() as folder:
-            WRITERS[engine](Path(folder), deck)
-            run = PEERS[engine](Path(folder))
-        yield _of_peer(case, run, ours.bodies, ours.spheres, deck.dt)
+    scene, time_s = load_scene(POUR), options.duration
+    deck: Deck = apart(_deck, scene, time_s)
+    case = f"pour, {time_s:g} s"
+    ours = [_our_pour(case, scene, deck, time_s, sleeping) for sleeping in (True, False)]
+
+    def to_rest() -> Measurement:
+        found: Measurement = apart(measure_pour, TO_REST, scene, SEED, None, True)
+        return found
+
+    yield from _in_turn(options, [to_rest, *ours, *_peer_pours(case, deck, options)])
 
 
 def bed_cases(options: Options) -> Iterator[Measurement]:
-    """Packed beds at rest, where every sphere has contacts at every step; ours without sleep."""
+    """Packed beds at rest, numbered at random, where every sphere has contacts at every step; ours without sleep."""
     for n in options.beds:
-        bed = apart(wide_bed, BEDS[n])
-        steps = max(20, round(SPHERE_STEPS["ours"] / n))
-        ours = apart(measure_bed, bed, steps)
-        yield ours
+        bed = apart(wide_bed, *BEDS[n])
+        runs: list[Run] = [_our_bed(bed, _bed_steps("ours", n))]
         for engine in options.peers:
-            theirs = _peer_bed(bed, max(20, round(SPHERE_STEPS[engine] / n)))
-            with tempfile.TemporaryDirectory() as folder:
-                peer_bed.BED_WRITERS[engine](Path(folder), theirs)
-                run = PEERS[engine](Path(folder))
-            yield _of_peer(bed_name(n), run, n, n, theirs.dt)
+            theirs = _peer_bed(bed, _bed_steps(engine, n))
+            writer = peer_bed.BED_WRITERS[engine]
+            runs.append(_peer_run(bed_name(n), engine, writer, theirs, (n, n), theirs.dt, options.peer_limit))
+        yield from _in_turn(options, runs)
 
 
 def batch_cases(options: Options) -> Iterator[Measurement]:
@@ -81,10 +130,14 @@ def batch_cases(options: Options) -> Iterator[Measurement]:
 
 
 CASES: dict[str, Callable[[Options], Iterator[Measurement]]] = {
+    "short": short_cases,
     "pour": pour_cases,
     "bed": bed_cases,
     "batch": batch_cases,
 }
+PEERS = ("liggghts", "yade")
+
+Run = Callable[[], Measurement]
 
 
 def apart(function: Callable[..., Any], *arguments: Any) -> Any:
@@ -94,10 +147,24 @@ def apart(function: Callable[..., Any], *arguments: Any) -> Any:
         return pool.submit(function, *arguments).result()
 
 
-def growth(measurements: list[Measurement]) -> float:
-    """Exponent of wall time per step over the number of spheres, between the smallest and the largest of our beds."""
+def growth(measurements: Sequence[Measurement], engine: str = "ours") -> float:
+    """Exponent of wall time per step over the number of spheres, between an engine's smallest and largest bed.
+
+    Parameters
+    ----------
+    measurements
+        Of any cases; medians of their rounds are taken.
+    engine
+        How the names of the engine begin.
+
+    Returns
+    -------
+    log(t₂/t₁)/log(N₂/N₁); NaN with fewer than two beds.
+    """
+    medians = [one.median for one in results(measurements)]
     beds = sorted(
-        (m for m in measurements if m.case.startswith("bed") and m.engine.startswith("ours")), key=lambda m: m.spheres
+        (m for m in medians if m.case.startswith("bed") and m.engine.lower().startswith(engine) and not m.timed_out),
+        key=lambda m: m.spheres,
     )
     if len(beds) < 2:
         return math.nan
@@ -105,7 +172,84 @@ def growth(measurements: list[Measurement]) -> float:
     return math.log(first.steps_per_s / last.steps_per_s) / math.log(last.spheres / first.spheres)
 
 
-def _deck(scene: Any, duration: float) -> Any:
+def _in_turn(options: Options, runs: Sequence[Run]) -> Iterator[Measurement]:
+    """One run of each, then the next round; one that timed out has no further round."""
+    left, done, rounds = list(runs), 0, options.rounds
+    while done < rounds:
+        begin = time.perf_counter()
+        for run in list(left):
+            one = run()
+            if one.timed_out:
+                left.remove(run)
+            yield one
+        done += 1
+        if time.perf_counter() - begin > LONG:
+            rounds = min(rounds, FEW)
+
+
+def _our_pour(case: str, scene: Any, deck: Deck, duration: float, sleeping: bool, times: int = 1) -> Run:
+    bodies, spheres = _size(deck)
+
+    def run() -> Measurement:
+        found: Measurement = apart(measure_pour, case, scene, SEED, duration, sleeping, times)
+        return dataclasses.replace(found, bodies=bodies, spheres=spheres)
+
+    return run
+
+
+def _our_bed(bed: Bed, steps: int) -> Run:
+    def run() -> Measurement:
+        found: Measurement = apart(measure_bed, bed, steps)
+        return found
+
+    return run
+
+
+def _bed_steps(engine: str, n: int) -> int:
+    return max(20, round(SPHERE_STEPS[engine] / n))
+
+
+def _peer_pours(case: str, deck: Deck, options: Options) -> list[Run]:
+    return [
+        _peer_run(case, engine, WRITERS[engine], deck, _size(deck), deck.dt, options.peer_limit)
+        for engine in options.peers
+    ]
+
+
+def _peer_run(
+    case: str,
+    engine: str,
+    write: Callable[[Path, Any], None],
+    what: Any,
+    size: tuple[int, int],
+    dt: float,
+    limit: float,
+) -> Run:
+    """What writes ``what`` and has it run by ``engine`` for ``limit`` [s] at most; ``size``: bodies, spheres."""
+
+    def run() -> Measurement:
+        with tempfile.TemporaryDirectory() as folder:
+            write(Path(folder), what)
+            try:
+                done = _run_peer(engine, Path(folder), None if math.isinf(limit) else limit)
+            except PeerTimeout:
+                return Measurement(case, engine, *size, 0, limit, 0.0, math.nan, math.nan, timed_out=True)
+        name, simulated = f"{done.engine} {done.version}", done.steps * dt
+        return Measurement(case, name, *size, done.steps, done.wall_s, simulated, math.nan, math.nan)
+
+    return run
+
+
+def _run_peer(engine: str, folder: Path, limit: float | None) -> PeerRun:
+    return run_yade(folder, limit=limit) if engine == "yade" else run_liggghts(folder, limit=limit)
+
+
+def _size(deck: Deck) -> tuple[int, int]:
+    """Bodies and member spheres of a deck."""
+    return deck.bodies, sum(len(deck.members(body)) for body in range(deck.bodies))
+
+
+def _deck(scene: Any, duration: float) -> Deck:
     """What the peers are told: the bodies enter as they did in our own run."""
     from solver import run_pour
     from solver.scene import with_values
@@ -124,8 +268,3 @@ def _peer_bed(bed: Bed, steps: int) -> peer_bed.Bed:
         dt=time_step(bed_scene(bed.box)),
         steps=steps,
     )
-
-
-def _of_peer(case: str, run: PeerRun, bodies: int, spheres: int, dt: float) -> Measurement:
-    name = f"{run.engine} {run.version}"
-    return Measurement(case, name, bodies, spheres, run.steps, run.wall_s, run.steps * dt, math.nan, math.nan)

@@ -274,14 +274,14 @@ class State:
         self.law = Group({"row": Vec5}, (c.worlds, c.kinds * c.kinds))
         # Parameters of effects by contact class, and what they keep of a contact (``effects/columns.py``).
         self.effects = c.effects
-        self.sharing = c.sharing
-        self.pair = Group(PAIR, (c.worlds, c.contacts) if c.sharing else (1, 1))
-        # Entry at which a partner of the body at hand was last met, while the list is built.
-        met = (c.worlds, max(c.bodies, c.walls)) if c.sharing else (1, 1)
-        self.lead = Group({"body": ti.i32, "wall": ti.i32}, met)
         room = (c.worlds, c.contacts, KEPT) if c.effects else (1, 1, 1)
         self.effect = Group({"row": ti.f64}, (c.worlds, c.kinds * c.kinds, COLUMNS[-1] + 1))
         self.memory = Group({"number": ti.f64, "kept": ti.f64}, room)
+        self.sharing = c.sharing
+        if c.sharing:
+            self.pair = Group(PAIR, (c.worlds, c.contacts))
+            # Entry at which a partner of the body at hand was last met, while the list is built.
+            self.lead = Group({"body": ti.i32, "wall": ti.i32}, (c.worlds, max(c.bodies, c.walls)))
 
 
 def _field(dtype, shape):

@@ -48,7 +48,10 @@ PARTS = {
     "trefoils": Part((*SLOW, "tests/explorer/test_trefoils.py"), nightly=False),
     "rates of the verdict": Part((*SLOW, "tests/doe/diagnose/test_rates.py"), nightly=False),
     "other engines, 18 pours each": Part((*SLOW, "-s", "tests/peers/test_same_pile.py"), nightly=False),
-    "benchmark": Part((sys.executable, "-m", "explorer", "bench"), nightly=False),
+    "benchmark": Part(
+        (sys.executable, "-m", "explorer", "bench", "--table", "docs/benchmark.md", "--json", "docs/benchmark.json"),
+        nightly=False,
+    ),
     "pictures": Part((sys.executable, "-m", "tests.browser.pictures"), nightly=False),
 }
 """In the order in which they run. Those that are not nightly take too long for it, or want an idle machine."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -12,27 +12,41 @@ if TYPE_CHECKING:
 
 
 def bench(
-    only: list[str] = typer.Option([], metavar="CASE", help="Only this case: pour, bed or batch; may be repeated."),
+    only: list[str] = typer.Option(
+        [], metavar="CASE", help="Only this case: short, pour, bed or batch; may be repeated."
+    ),
     duration: float = typer.Option(4.0, metavar="S", help="Simulated time of the pour [s].", min=0.2, max=30.0),
-    spheres: list[int] = typer.Option([], metavar="N", help="Beds to run: 1000, 10000, 100000; may be repeated."),
+    spheres: list[int] = typer.Option(
+        [], metavar="N", help="Beds to run: 1000, 10000, 100000 (these are the usual ones), 1000000; may be repeated."
+    ),
+    rounds: int = typer.Option(5, metavar="N", help="How often the engines take turns on a case.", min=1, max=99),
     peers: bool = typer.Option(True, help="Run LIGGGHTS and YADE too, where they are installed."),
+    peer_limit: float = typer.Option(
+        900.0, metavar="S", help="Wall time after which a peer's run is stopped, and printed as timed out [s].", min=1.0
+    ),
     json: Path | None = typer.Option(
         None, "--json", metavar="FILE", help="Write every measurement to this file, each as soon as it is made."
+    ),
+    table: Path | None = typer.Option(
+        None, metavar="FILE.md", help="Write the table with date and machine to this file, anew with every measurement."
+    ),
+    against: Path | None = typer.Option(
+        None, metavar="FILE.json", help="Warn of ratios to LIGGGHTS 10 % below those of this earlier --json."
     ),
 ) -> None:
     """Time the solver, and LIGGGHTS and YADE on the same cases.
 
-    One core, the same bodies, time step and simulated time. Leave the machine alone meanwhile; with both peers it
-    takes about ten minutes. Where it is interrupted or a case fails, what was measured before is kept and marked
-    as incomplete.
+    One core, the same bodies, time step and simulated time, in turns. Leave the machine alone meanwhile; it takes
+    about ten minutes per peer. Where it is interrupted or a case fails, what was measured before is kept and marked
+    as incomplete. A ratio that has fallen is a warning; it does not change the exit code.
     """
     import shutil
 
-    from explorer.benchmark import BEDS, CASES, PEERS, Options
+    from explorer.benchmark import BEDS, CASES, PEERS, USUAL_BEDS, Options
     from explorer.errors import CommandError
     from explorer.files.run_folder import json_text
     from explorer.files.whole_file import write_whole
-    from explorer.tables.benchmark import result_of, table_text
+    from explorer.tables.benchmark import fallen, machine, markdown, result_of, table_text
 
     for name in only:
         if name not in CASES:
@@ -40,25 +54,37 @@ def bench(
     for n in spheres:
         if n not in BEDS:
             raise CommandError(f"--spheres: {n} is not one of {', '.join(map(str, BEDS))}")
-    if json and not json.absolute().parent.is_dir():
-        raise CommandError(f"--json: {json}: no folder {json.absolute().parent}")
+    for option, path in (("--json", json), ("--table", table)):
+        if path and not path.absolute().parent.is_dir():
+            raise CommandError(f"{option}: {path}: no folder {path.absolute().parent}")
+    committed = _earlier(against) if against else None
     installed = tuple(name for name in PEERS if peers and shutil.which(name))
     if peers and len(installed) < len(PEERS):
         missing = ", ".join(name for name in PEERS if name not in installed)
         typer.echo(f"not installed, left out: {missing}", err=True)
-    options = Options(duration, tuple(sorted(spheres)) or tuple(BEDS), installed)
+    beds = tuple(sorted(spheres)) or USUAL_BEDS
+    options = Options(duration, beds, installed, rounds=rounds, peer_limit=peer_limit)
     measurements: list[Measurement] = []
+    before = machine()
+    words = [*(f"--only {name}" for name in only), *(f"--spheres {n}" for n in spheres)]
+    words += [f"--duration {duration:g}"] if duration != 4.0 else []
+    words += [f"--rounds {rounds}"] if rounds != 5 else []
 
     def keep(complete: bool) -> None:
+        found_at = before | {"load_after": machine()["load_after"]}
         if json:
-            write_whole(json, json_text(result_of(measurements, complete)) + "\n")
+            write_whole(json, json_text(result_of(measurements, complete, found_at)) + "\n")
+        if table:
+            write_whole(table, markdown(measurements, found_at, complete, words))
 
     complete = False
     try:
         for name in CASES:
             if name in only or not only:
                 for one in CASES[name](options):
-                    typer.echo(f"{one.case}, {one.engine}: {1e6 / one.steps_per_s:.2f} µs per step", err=True)
+                    speed = f"timed out after {one.wall_s:g} s" if one.timed_out else None
+                    speed = speed or f"{1e6 / one.steps_per_s:.2f} µs per step"
+                    typer.echo(f"{one.case}, {one.engine}: {speed}", err=True)
                     measurements.append(one)
                     keep(complete=False)
         complete = True
@@ -66,3 +92,21 @@ def bench(
     finally:
         if measurements:
             typer.echo(table_text(measurements, complete))
+    if committed is not None:
+        typer.echo("\n".join(fallen(measurements, committed, str(against))))
+
+
+def _earlier(path: Path) -> dict[str, Any]:
+    """What an earlier run wrote; a :class:`CommandError` in one line where it is no such file."""
+    import json
+
+    from explorer.errors import CommandError
+
+    try:
+        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        rows = [(row["case"], row["engine"], row["ratio"]) for row in found["measurements"]]
+    except (OSError, ValueError, KeyError, TypeError) as problem:
+        raise CommandError(f"--against: {path}: not what --json of this command writes ({problem})") from None
+    if not any(ratio for _, _, ratio in rows):
+        raise CommandError(f"--against: {path}: has no ratio to LIGGGHTS")
+    return found

@@ -3,25 +3,35 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
+
+if TYPE_CHECKING:
+    from solver.verification import Row
 
 
 def verify(
     only: list[str] = typer.Option([], metavar="NAME", help="Run only this part, e.g. T4; may be repeated."),
     json: Path | None = typer.Option(None, "--json", metavar="FILE", help="Write every row to this file."),
     every: bool = typer.Option(False, "--all", help="Print every point, not only the furthest of each curve."),
+    peers: bool = typer.Option(False, "--peers", help="Run T4, T5, T6 and T8 in LIGGGHTS too; print what ours misses."),
+    peer_limit: float = typer.Option(
+        120.0, metavar="S", help="Wall time after which a run of LIGGGHTS is stopped [s].", min=1.0
+    ),
 ) -> None:
     """Check the solver against known answers.
 
     Chung & Ooi (2011) T1 to T8, restitution and invariants. Exit code 0 if every limit is kept, 1 if not; a row
-    without a limit is shown for comparison.
+    without a limit is shown for comparison. With --peers the exit code is still that of our rows.
     """
     from explorer.errors import CommandError
+    from explorer.export.impacts import liggghts_engine
+    from explorer.export.run import installed
     from explorer.files.run_folder import json_text
     from explorer.files.whole_file import write_whole
-    from explorer.tables.verification import result_of, summary_text, table_text
-    from solver.verification import FAMILIES
+    from explorer.tables.verification import peers_text, result_of, summary_text, table_text
+    from solver.verification import BY_ANY_ENGINE, FAMILIES, verify_engine
     from solver.verification import verify as rows_of
 
     by_lower_case = {name.lower(): name for name in FAMILIES}
@@ -31,10 +41,25 @@ def verify(
     if json and not json.absolute().parent.is_dir():
         raise CommandError(f"--json: {json}: no folder {json.absolute().parent}")
     wanted = {by_lower_case[name.lower()] for name in only}
-    rows = list(rows_of([name for name in FAMILIES if name in wanted or not wanted]))
-    if json:
-        write_whole(json, json_text(result_of(rows)) + "\n")
+    chosen = [name for name in FAMILIES if name in wanted or not wanted]
+    shared = [name for name in chosen if name in BY_ANY_ENGINE]
+    if peers:
+        if not shared:
+            raise CommandError(f"--peers: runs {', '.join(BY_ANY_ENGINE)}, and --only names none of them")
+        installed("liggghts")
+    rows = list(rows_of(chosen))
+
+    def keep(beside: dict[str, list[Row]]) -> None:
+        if json:
+            write_whole(json, json_text(result_of(rows, beside)) + "\n")
+
+    keep({})
     typer.echo(table_text(rows, every))
+    if peers:
+        engine = liggghts_engine(peer_limit)
+        beside = {engine.name: list(verify_engine(engine, shared))}
+        keep(beside)
+        typer.echo(peers_text(rows, beside))
     typer.echo(summary_text(rows))
     if not all(row.passed for row in rows):
         raise typer.Exit(1)

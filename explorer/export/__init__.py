@@ -7,8 +7,9 @@ triangles.py    cone and gate as triangles, STL
 liggghts.py     LIGGGHTS-PUBLIC 3.8 (in.liggghts)
 yade.py         YADE 2023 (yade_pour.py, copied into the folder, reads deck.json)
 bed.py          a bed of equal spheres for both, for timing
+impacts.py      single impacts in LIGGGHTS, for the verification
 frames.py       what the engines write: spheres of one moment
-run.py          run a folder with the installed engine and time its stepping loop
+run.py          run a folder with the installed engine, for a limited time, and time its stepping loop
 moments.py      a pour at given moments;  paraview.py them as VTK files
 material_table.py   a material as CSV for EDEM, with the convention of every coefficient
 """

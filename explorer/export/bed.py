@@ -21,9 +21,11 @@ from explorer.export.liggghts import (
     INPUT,
     WRITE_FINAL,
     ContactLaw,
+    FreeSpheres,
     gravity_lines,
     run_lines,
     settings_lines,
+    write_spheres,
 )
 from explorer.export.yade import SCRIPTS, write_law
 
@@ -89,7 +91,10 @@ def write_liggghts_bed(folder: Path, bed: Bed) -> None:
         WRITE_FINAL,
     ]
     (folder / INPUT).write_text("\n".join(lines) + "\n", encoding="ascii")
-    _write_data(folder / DATA, bed, room)
+    n = len(bed.radius)
+    density, still = np.full(n, bed.density), np.zeros((n, 3))
+    spheres = FreeSpheres(np.ones(n, dtype=np.int64), bed.radius, density, bed.position, bed.velocity, still)
+    write_spheres(folder / DATA, spheres, 2, room)
 
 
 def write_yade_bed(folder: Path, bed: Bed) -> None:
@@ -108,16 +113,3 @@ BED_WRITERS: dict[str, Callable[[Path, Bed], None]] = {"liggghts": write_liggght
 def sphere_mass(bed: Bed) -> Array:
     """4/3 π r³ ρ [kg], shape (n,)."""
     return 4.0 / 3.0 * math.pi * bed.radius**3 * bed.density
-
-
-def _write_data(path: Path, bed: Bed, room: Array) -> None:
-    """The state as ``read_data`` takes it for ``atom_style granular``: id, type, diameter, density, place."""
-    sides = [f"{low:.12g} {high:.12g} {a}lo {a}hi" for a, low, high in zip("xyz", *room, strict=True)]
-    places = [
-        f"{k} 1 {2.0 * r:.15g} {bed.density:.15g} {x:.15g} {y:.15g} {z:.15g}"
-        for k, (r, (x, y, z)) in enumerate(zip(bed.radius, bed.position, strict=True), start=1)
-    ]
-    speeds = [f"{k} {x:.15g} {y:.15g} {z:.15g} 0 0 0" for k, (x, y, z) in enumerate(bed.velocity, start=1)]
-    head = ["a bed of spheres", "", f"{len(bed.radius)} atoms", "2 atom types", "", *sides]
-    text = "\n".join([*head, "", "Atoms", "", *places, "", "Velocities", "", *speeds])
-    path.write_text(text + "\n", encoding="ascii")

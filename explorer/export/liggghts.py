@@ -126,6 +126,51 @@ class ContactLaw:
         return [f"fix rolling all property/global coefficientRollingFriction peratomtypepair {n} {table}"]
 
 
+@dataclass(frozen=True)
+class FreeSpheres:
+    """Single spheres (n of them) as ``read_data`` takes them, no clumps."""
+
+    type: npt.NDArray[np.int64]
+    """Number of the material, from 1, shape (n,)."""
+    radius: Array
+    """[m], shape (n,)."""
+    density: Array
+    """[kg/m³], shape (n,)."""
+    position: Array
+    """[m], shape (n, 3)."""
+    velocity: Array
+    """[m/s], shape (n, 3)."""
+    spin: Array
+    """[rad/s], shape (n, 3)."""
+
+
+def write_spheres(path: Path, spheres: FreeSpheres, types: int, box: Array) -> None:
+    """Write ``spheres`` as ``read_data`` takes them for ``atom_style granular``: numbered from 1 in their order.
+
+    Parameters
+    ----------
+    path
+        File to write.
+    spheres
+        What stands in it.
+    types
+        Number of materials, walls included.
+    box
+        Corners (low, high) of the room [m], shape (2, 3).
+    """
+    sides = [f"{low:.12g} {high:.12g} {a}lo {a}hi" for a, low, high in zip("xyz", *box, strict=True)]
+    columns = (spheres.type, spheres.radius, spheres.density, spheres.position)
+    places = [
+        f"{k} {kind} {2.0 * r:.15g} {density:.15g} {x:.15g} {y:.15g} {z:.15g}"
+        for k, (kind, r, density, (x, y, z)) in enumerate(zip(*columns, strict=True), start=1)
+    ]
+    moving = np.hstack([spheres.velocity, spheres.spin])
+    speeds = [" ".join([str(k), *(f"{value:.15g}" for value in row)]) for k, row in enumerate(moving, start=1)]
+    head = ["single spheres", "", f"{len(places)} atoms", f"{types} atom types", "", *sides]
+    text = "\n".join([*head, "", "Atoms", "", *places, "", "Velocities", "", *speeds])
+    path.write_text(text + "\n", encoding="ascii")
+
+
 def gravity_lines(gravity: tuple[float, float, float]) -> list[str]:
     """The acceleration [m/s²] as a magnitude and a direction."""
     size = math.hypot(*gravity)

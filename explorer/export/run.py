@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import signal
 import subprocess
 import time
 from dataclasses import dataclass
@@ -15,6 +16,10 @@ from explorer.export.frames import FINAL, Frame, final_frame
 from explorer.export.liggghts import INPUT
 
 LOOP = re.compile(r"Loop time of ([\d.eE+-]+) (?:s |on \d+ procs )?for (\d+) steps")
+
+
+class PeerTimeout(CommandError):
+    """Another engine ran longer than it was given; it has been stopped."""
 
 
 @dataclass(frozen=True)
@@ -31,48 +36,55 @@ class PeerRun:
     final: Frame
 
 
-def run_liggghts(folder: Path, dump_every: int = 0) -> PeerRun:
-    """Run ``in.liggghts`` in ``folder``; one process.
+def run_liggghts(folder: Path, dump_every: int = 0, limit: float | None = None) -> PeerRun:
+    """Run ``in.liggghts`` in ``folder``; one process, stopped after ``limit`` [s] of wall time.
 
     Raises:
+        PeerTimeout: it took longer than ``limit``.
         CommandError: LIGGGHTS is not installed, or it failed (the line says why).
     """
-    program = _installed("liggghts")
+    program = installed("liggghts")
     log = "log.liggghts"
     options = ["-var", "dump_every", str(dump_every)]
-    output, elapsed = _run([program, "-in", INPUT, "-log", log, "-nocite", *options], folder, {})
+    output, elapsed = _run([program, "-in", INPUT, "-log", log, "-nocite", *options], folder, {}, limit)
     version = re.search(r"Version (LIGGGHTS\S* \S+?),", output)
     return _finished("liggghts", version[1] if version else "unknown", folder, output, elapsed)
 
 
-def run_yade(folder: Path, threads: int = 1, dump_every: int = 0) -> PeerRun:
-    """Run the YADE script in ``folder``.
+def run_yade(folder: Path, threads: int = 1, dump_every: int = 0, limit: float | None = None) -> PeerRun:
+    """Run the YADE script in ``folder``, stopped after ``limit`` [s] of wall time.
 
     Raises:
+        PeerTimeout: it took longer than ``limit``.
         CommandError: YADE is not installed, or it failed (the line says why).
     """
-    program = _installed("yade")
+    program = installed("yade")
     script = next((path.name for path in sorted(folder.glob("yade_*.py"))), None)
     if script is None:
         raise CommandError(f"{folder}: holds no yade_*.py; export it with --to yade")
     command = [program, "-n", "-x", f"-j{threads}", script, *([str(dump_every)] if dump_every else [])]
-    output, elapsed = _run(command, folder, {"OMP_WAIT_POLICY": "passive"})
+    output, elapsed = _run(command, folder, {"OMP_WAIT_POLICY": "passive"}, limit)
     version = re.search(r"Welcome to Yade (\S+)", output)
     return _finished("yade", f"YADE {version[1]}" if version else "unknown", folder, output, elapsed)
 
 
-def _installed(name: str) -> str:
+def installed(name: str) -> str:
+    """Path of the program ``name``; :class:`CommandError` where it is not on ``PATH``."""
     program = shutil.which(name)
     if program is None:
         raise CommandError(f"{name}: not installed (Debian: apt install {name})")
     return program
 
 
-def _run(command: list[str], folder: Path, environment: dict[str, str]) -> tuple[str, float]:
-    """Output and duration [s] of a program; the final state of an earlier run is removed first."""
+def _run(command: list[str], folder: Path, environment: dict[str, str], limit: float | None) -> tuple[str, float]:
+    """Output and duration [s] of a program; the final state of an earlier run is removed first.
+
+    It has a process group of its own, which is killed at ``limit`` [s] and whenever this function is left early:
+    a wrapper script (YADE's) would die alone and leave its child at work.
+    """
     (folder / FINAL).unlink(missing_ok=True)
-    started = time.perf_counter()
-    done = subprocess.run(
+    name, started = Path(command[0]).name, time.perf_counter()
+    process = subprocess.Popen(
         command,
         cwd=folder,
         env=os.environ | environment,
@@ -81,12 +93,21 @@ def _run(command: list[str], folder: Path, environment: dict[str, str]) -> tuple
         stderr=subprocess.STDOUT,
         text=True,
         errors="replace",
-        check=False,
+        start_new_session=True,
     )
+    try:
+        output, _ = process.communicate(timeout=limit)
+    except subprocess.TimeoutExpired as late:
+        raise PeerTimeout(f"{name}: stopped after {limit:g} s, which it had not ended by") from late
+    finally:
+        # Not yet reaped, so the number is still that of this group.
+        if process.returncode is None:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.communicate()
     elapsed = time.perf_counter() - started
-    if done.returncode != 0 or not (folder / FINAL).is_file():
-        raise CommandError(f"{Path(command[0]).name} failed in {folder}: {_reason(done.stdout)}")
-    return done.stdout, elapsed
+    if process.returncode != 0 or not (folder / FINAL).is_file():
+        raise CommandError(f"{name} failed in {folder}: {_reason(output)}")
+    return output, elapsed
 
 
 def _reason(output: str) -> str:

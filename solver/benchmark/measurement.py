@@ -20,11 +20,13 @@ class Measurement:
     """Touching contacts at the end; NaN where the engine does not tell."""
     mean_contacts: float
     """The same over the run, sampled; NaN where the engine does not tell."""
+    timed_out: bool = False
+    """The engine was stopped at its time limit, ``wall_s``, before it said how many steps it had made."""
 
     @property
     def steps_per_s(self) -> float:
-        """Steps per second of wall time."""
-        return self.steps / self.wall_s
+        """Steps per second of wall time; NaN if it timed out."""
+        return float("nan") if self.timed_out else self.steps / self.wall_s
 
     @property
     def sphere_steps_per_s(self) -> float:

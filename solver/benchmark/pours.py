@@ -21,10 +21,28 @@ WARM_UP = {"numerics.max_time": 0.1}
 """A run as short as the declared range allows compiles every kernel."""
 
 
-def measure_pour(case: str, scene: Scene, seed: int, duration: float | None, sleeping: bool) -> Measurement:
-    """One pour on one thread for ``duration`` [s] of simulated time, or to rest if None.
+def measure_pour(
+    case: str, scene: Scene, seed: int, duration: float | None, sleeping: bool, times: int = 1
+) -> Measurement:
+    """One pour on one thread, ``times`` over; steps, wall time and simulated time are those of all together.
 
-    For a duration the run goes on when the pile is at rest, as other engines' runs do.
+    Parameters
+    ----------
+    case
+        Name of the case.
+    scene, seed
+        What is poured.
+    duration
+        Simulated time of a pour [s]; it goes on when the pile is at rest, as other engines' runs do. None: to rest.
+    sleeping
+        Whether bodies may fall asleep.
+    times
+        How often the pour is run: a short one is over before the clock tells much.
+
+    Raises
+    ------
+    RuntimeError
+        A pour ended otherwise than at rest, jammed, or at its time limit.
     """
     backend.init(threads=1)
     values: dict[str, float] = {} if sleeping else {"numerics.sleep_speed": 0.0}
@@ -34,17 +52,18 @@ def measure_pour(case: str, scene: Scene, seed: int, duration: float | None, sle
     scene = with_values(scene, values)
     batch = Batch(capacity_for([scene], 1))
     _drive(batch, Pour(batch, 0, with_values(scene, WARM_UP), seed))
-    pour = Pour(batch, 0, scene, seed)
-    begin = time.perf_counter()
-    contacts = _drive(batch, pour)
-    wall = time.perf_counter() - begin
-    if pour.outcome not in (Outcome.AT_REST, Outcome.TIME_LIMIT, Outcome.JAMMED):
-        raise RuntimeError(f"{case}: the pour ended with {pour.outcome}: {pour.message}")
+    wall, steps, simulated = 0.0, 0, 0.0
+    for _ in range(times):
+        pour = Pour(batch, 0, scene, seed)
+        begin = time.perf_counter()
+        contacts = _drive(batch, pour)
+        wall += time.perf_counter() - begin
+        if pour.outcome not in (Outcome.AT_REST, Outcome.TIME_LIMIT, Outcome.JAMMED):
+            raise RuntimeError(f"{case}: the pour ended with {pour.outcome}: {pour.message}")
+        steps, simulated = steps + pour.steps, simulated + pour.time
     spheres = sum(len(scene.bodies[k].clump.radii) for k in pour.supply.order)
-    name = "ours" if sleeping else "ours, nothing sleeps"
-    return Measurement(
-        case, name, len(pour.supply.order), spheres, pour.steps, wall, pour.time, contacts[-1], float(np.mean(contacts))
-    )
+    name, touching = "ours" if sleeping else "ours, nothing sleeps", float(np.mean(contacts))
+    return Measurement(case, name, len(pour.supply.order), spheres, steps, wall, simulated, contacts[-1], touching)
 
 
 def measure_batch(case: str, scene: Scene, seeds: Sequence[int], workers: int) -> Measurement:

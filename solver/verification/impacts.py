@@ -1,9 +1,12 @@
-"""Single impacts on a rigid plane, many at once in one laboratory; and their elastic closed forms."""
+"""Single impacts on a rigid plane or on a free sphere, many at once in one laboratory; and their elastic closed forms.
+
+The tests ask an :class:`Engine` for them: ``OURS``, or another program, whose rows then stand beside ours.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,8 +44,25 @@ class Impact:
 
 
 @dataclass(frozen=True)
+class Target:
+    """A free sphere at rest that is hit instead of the plane."""
+
+    material: Material
+    radius: float
+    """[m]"""
+
+    @property
+    def mass(self) -> float:
+        """Of the solid sphere [kg]."""
+        return 4.0 / 3.0 * math.pi * self.radius**3 * self.material.density
+
+
+@dataclass(frozen=True)
 class Rebound:
-    """After the impact; speeds [m/s], ``v_n`` away from the plane, signs of the others as before."""
+    """After the impact; speeds [m/s], ``v_n`` away from the plane, signs of the others as before.
+
+    After the impact on a target, ``v_n`` and ``v_t`` are relative to the point of it that was touched.
+    """
 
     v_n: float
     v_t: float
@@ -88,3 +108,47 @@ def rebounds(impacts: Sequence[Impact], dt: float | None = None) -> list[Rebound
         Rebound(v_n=row[9], v_t=row[7], surface_speed=-row[11] * one.radius)
         for row, one in zip(lab.state(), impacts, strict=True)
     ]
+
+
+def struck(impacts: Sequence[Impact], target: Target) -> list[Rebound]:
+    """Run ``impacts`` on a target each, side by side; they share material, radius, speed, restitution and friction."""
+    one, n = impacts[0], len(impacts)
+    ball, heavy = sphere(one.radius, one.material, name="ball"), sphere(target.radius, target.material, name="target")
+    names = ("ball", "target", "wall")
+    pairs = [Pair(a, b, one.friction, one.restitution) for k, a in enumerate(names) for b in names[k:]]
+    scene = scene_of((ball, heavy), (one.material, target.material, RIGID), pairs)
+    dt = struck_time(one, target) / STEPS_PER_CONTACT
+    lab = Laboratory(scene, [0] * n + [1] * n, dt, plate=False)
+    for k, impact in enumerate(impacts):
+        y = 3.0 * k * target.radius
+        place, spin = (0.0, y, impact.radius + target.radius), (0.0, -impact.surface_speed / impact.radius, 0.0)
+        lab.put(k, place, velocity=(impact.v_t, 0.0, -impact.v_n), spin=spin)
+        lab.put(n + k, (0.0, y, 0.0))
+    lab.run_apart(8 * STEPS_PER_CONTACT, STEPS_PER_CONTACT // 4)
+    rows = lab.state()
+    touched = rows[n:, 7] + target.radius * rows[n:, 11]
+    return [
+        Rebound(v_n=row[9] - other[9], v_t=row[7] - speed, surface_speed=-row[11] * one.radius)
+        for row, other, speed in zip(rows[:n], rows[n:], touched, strict=True)
+    ]
+
+
+def struck_time(impact: Impact, target: Target) -> float:
+    """Duration [s] of the impact on ``target`` if it were elastic and the target far heavier."""
+    e_star = effective_youngs_modulus(impact.material, target.material)
+    radius = impact.radius * target.radius / (impact.radius + target.radius)
+    return 2.943 * hertz_depth(impact.mass, impact.v_n, e_star, radius) / impact.v_n
+
+
+@dataclass(frozen=True)
+class Engine:
+    """A program that runs impacts: the solver, the solver under another law, or a peer."""
+
+    name: str
+    rebounds: Callable[[Sequence[Impact]], list[Rebound]]
+    """Impacts on the rigid plane, in any mixture."""
+    struck: Callable[[Sequence[Impact], Target], list[Rebound]]
+    """Impacts that differ in their spins only, each on a target of its own."""
+
+
+OURS = Engine("ours", rebounds, struck)

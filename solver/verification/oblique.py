@@ -26,7 +26,7 @@ from solver.verification.chung_ooi import (
     Curve,
     span,
 )
-from solver.verification.impacts import Impact, Rebound, rebounds
+from solver.verification.impacts import OURS, Engine, Impact, Rebound
 from solver.verification.one_contact import Convention, integrated
 from solver.verification.row import Row, of_scale, of_value
 
@@ -51,14 +51,20 @@ class Outcome:
 QUANTITIES = (("e_t", "restitution"), ("spin [rad/s]", "spin"), ("rebound angle [°]", "angle"))
 
 
-def t4() -> Iterator[Row]:
-    """Both materials, every angle."""
+def t4(engine: Engine = OURS) -> Iterator[Row]:
+    """Both materials, every angle: closed form while sliding, else the printed curves."""
     for material in (OXIDE, ALUMINIUM):
-        ours = _outcomes(material, RESTITUTION, ANGLES)
+        found = _outcomes(material, RESTITUTION, ANGLES, engine)
         tables = (T4_RESTITUTION, T4_SPIN, T4_ANGLE)
         for (label, name), table in zip(QUANTITIES, tables, strict=True):
             if material.name in table:
-                yield from _curve(f"{label}, {material.name}", table[material.name], name, ours)
+                yield from _curve(f"{label}, {material.name}", table[material.name], name, found)
+
+
+def t4_law() -> Iterator[Row]:
+    """Both materials, every angle: the same law integrated without the solver."""
+    for material in (OXIDE, ALUMINIUM):
+        ours = _outcomes(material, RESTITUTION, ANGLES)
         expected = _read(ANGLES, integrated(_impacts(material, RESTITUTION, ANGLES)))
         for label, name in QUANTITIES:
             scale = (span(tuple((t, getattr(expected[t], name)) for t in ANGLES)), "span")
@@ -76,7 +82,7 @@ def t4() -> Iterator[Row]:
 
 
 def t4_conventions() -> Iterator[Row]:
-    """The sticking part of e_t again, and the measurement; nothing here is judged.
+    """The sticking part of e_t again; nothing here is judged.
 
     With e = 1: what is left of the difference has nothing to do with damping. And another law, integrated without the
     solver: it keeps a displacement instead of a force and damps no tangential motion. The printed curve is near to it.
@@ -92,11 +98,15 @@ def t4_conventions() -> Iterator[Row]:
                 yield of_scale("T4 e = 1", name, value, elastic[theta].restitution, scale, None, DIGITISED, at)
                 law = f"{name}, displacement law"
                 yield of_scale("T4 convention", law, value, other[theta].restitution, scale, None, DIGITISED, at)
-    ours = _outcomes(OXIDE, RESTITUTION, tuple(theta for theta, _ in T4_EXPERIMENT))
+
+
+def t4_experiment(engine: Engine = OURS) -> Iterator[Row]:
+    """The measurement of Kharaz, Gorham & Salman (2001); not judged."""
+    found = _outcomes(OXIDE, RESTITUTION, tuple(theta for theta, _ in T4_EXPERIMENT), engine)
     for theta, value in T4_EXPERIMENT:
         scale = (span(T4_EXPERIMENT), "span")
-        at, mine = f"θ = {theta:g}°", ours[theta].restitution
-        yield of_scale("T4 experiment", f"e_t, {OXIDE.name}", value, mine, scale, None, "Kharaz et al. 2001", at)
+        at, here = f"θ = {theta:g}°", found[theta].restitution
+        yield of_scale("T4 experiment", f"e_t, {OXIDE.name}", value, here, scale, None, "Kharaz et al. 2001", at)
 
 
 def slides(theta: float, restitution: float) -> bool:
@@ -112,15 +122,15 @@ def closed_form(theta: float, restitution: float) -> Outcome:
     return Outcome(1.0 - slip / v_t, -2.5 * slip / RADIUS, angle)
 
 
-def _curve(quantity: str, curve: Curve, name: str, ours: dict[float, Outcome]) -> Iterator[Row]:
+def _curve(quantity: str, curve: Curve, name: str, found: dict[float, Outcome]) -> Iterator[Row]:
     scale = (span(curve), "span")
     for theta, value in curve:
-        at, mine = f"θ = {theta:g}°", getattr(ours[theta], name)
+        at, here = f"θ = {theta:g}°", getattr(found[theta], name)
         if slides(theta, RESTITUTION):
             exact = getattr(closed_form(theta, RESTITUTION), name)
-            yield of_value("T4", f"{quantity}, sliding", exact, mine, SLIDING_LIMIT, "impulses, closed form", at)
+            yield of_value("T4", f"{quantity}, sliding", exact, here, SLIDING_LIMIT, "impulses, closed form", at)
         else:
-            yield of_scale("T4", f"{quantity}, sticking", value, mine, scale, TABLE_LIMIT, DIGITISED, at)
+            yield of_scale("T4", f"{quantity}, sticking", value, here, scale, TABLE_LIMIT, DIGITISED, at)
 
 
 def _impacts(material: Material, restitution: float, angles: Angles) -> list[Impact]:
@@ -130,8 +140,8 @@ def _impacts(material: Material, restitution: float, angles: Angles) -> list[Imp
     ]
 
 
-def _outcomes(material: Material, restitution: float, angles: Angles) -> dict[float, Outcome]:
-    return _read(angles, rebounds(_impacts(material, restitution, angles)))
+def _outcomes(material: Material, restitution: float, angles: Angles, engine: Engine = OURS) -> dict[float, Outcome]:
+    return _read(angles, engine.rebounds(_impacts(material, restitution, angles)))
 
 
 def _read(angles: Angles, out: list[Rebound]) -> dict[float, Outcome]:

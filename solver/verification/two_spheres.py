@@ -8,7 +8,7 @@ case B with the same stiffness. In the law of this solver both have the same dim
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from solver.laboratory import Laboratory, scene_of, sphere
 from solver.material import Material, Pair, effective_youngs_modulus
@@ -20,9 +20,10 @@ from solver.verification.chung_ooi import (
     T6_BETA,
     T8_B_SPAN,
     T8_B_TAIL,
+    Curve,
     span,
 )
-from solver.verification.impacts import STEPS_PER_CONTACT, hertz_depth, rebounds
+from solver.verification.impacts import OURS, STEPS_PER_CONTACT, Engine, Target, hertz_depth
 from solver.verification.row import Row, of_scale, of_value
 from solver.verification.spinning import FRICTION, RADIUS, RESTITUTION, SPEED, beta, spinning
 
@@ -58,45 +59,28 @@ def t7() -> Iterator[Row]:
             yield of_value("T7", f"e out, {name}", RESTITUTION, out[9] / SPEED, RESTITUTION_LIMIT, put_in, at)
 
 
-def t8() -> Iterator[Row]:
-    """Case A against our T6, case B against the tail of the printed curve."""
+def t8(engine: Engine = OURS) -> Iterator[Row]:
+    """Case A against T6 by the same engine, case B against the tail of the printed curve."""
     curve = T6_BETA[ALUMINIUM.name]
-    abscissae = [x for x, _ in curve]
     planes = spinning(ALUMINIUM, curve, RESTITUTION)
-    ours = [beta(before, after) for before, after in zip(planes, rebounds(planes), strict=True)]
-    for x, value, mine in zip(abscissae, ours, _on_target(TARGET_FACTOR, abscissae), strict=True):
-        yield of_scale("T8", "β, case A", value, mine, (span(curve), "span"), LIMIT, "our T6", f"x = {x:g}")
-    tail = [x for x, _ in T8_B_TAIL]
-    for (x, value), mine in zip(T8_B_TAIL, _on_target(1.0, tail), strict=True):
-        yield of_scale("T8", "β, case B, tail", value, mine, (T8_B_SPAN, "span"), LIMIT, DIGITISED, f"x = {x:g}")
+    on_plane = [beta(before, after) for before, after in zip(planes, engine.rebounds(planes), strict=True)]
+    for (x, _), value, value_a in zip(curve, on_plane, _on_target(engine, TARGET_FACTOR, curve), strict=True):
+        yield of_scale("T8", "β, case A", value, value_a, (span(curve), "span"), LIMIT, "our T6", f"x = {x:g}")
+    for (x, value), value_b in zip(T8_B_TAIL, _on_target(engine, 1.0, T8_B_TAIL), strict=True):
+        yield of_scale("T8", "β, case B, tail", value, value_b, (T8_B_SPAN, "span"), LIMIT, DIGITISED, f"x = {x:g}")
 
 
-def _on_target(stiffness: float, abscissae: Sequence[float]) -> list[float]:
-    """β at the abscissae x of spheres that fall on targets ``stiffness`` times as stiff."""
+def _on_target(engine: Engine, stiffness: float, curve: Curve) -> list[float]:
+    """β at the abscissae of ``curve`` of spheres that fall on targets ``stiffness`` times as stiff."""
     heavy = Material(
         "target",
         ALUMINIUM.density * TARGET_FACTOR,
         ALUMINIUM.shear_modulus * stiffness,
         ALUMINIUM.poisson_ratio,
     )
-    small, target = sphere(RADIUS, ALUMINIUM, name="ball"), sphere(TARGET_RADIUS, heavy, name="target")
-    names = ("ball", "target", "wall")
-    pairs = [Pair(a, b, FRICTION, RESTITUTION) for k, a in enumerate(names) for b in names[k:]]
-    e_star = effective_youngs_modulus(ALUMINIUM, heavy)
-    dt = _time_step(small.mass, SPEED, e_star, RADIUS * TARGET_RADIUS / (RADIUS + TARGET_RADIUS))
-    n = len(abscissae)
-    scene = scene_of((small, target), (ALUMINIUM, heavy, RIGID), pairs)
-    lab = Laboratory(scene, [0] * n + [1] * n, dt, plate=False)
-    slips = [3.5 * FRICTION * (1.0 + RESTITUTION) * SPEED / x for x in abscissae]
-    for k, slip in enumerate(slips):
-        y = 3.0 * k * TARGET_RADIUS
-        spin = (0.0, -slip / RADIUS, 0.0)
-        lab.put(k, (0.0, y, RADIUS + TARGET_RADIUS), velocity=(0.0, 0.0, -SPEED), spin=spin)
-        lab.put(n + k, (0.0, y, 0.0))
-    lab.run_apart(8 * STEPS_PER_CONTACT, STEPS_PER_CONTACT // 4)
-    rows = lab.state()
-    slip_after = rows[:n, 7] - RADIUS * rows[:n, 11] - rows[n:, 7] - TARGET_RADIUS * rows[n:, 11]
-    return [float(-after / before) for after, before in zip(slip_after, slips, strict=True)]
+    impacts = spinning(ALUMINIUM, curve, RESTITUTION)
+    after = engine.struck(impacts, Target(heavy, TARGET_RADIUS))
+    return [beta(before, one) for before, one in zip(impacts, after, strict=True)]
 
 
 def _time_step(mass: float, speed: float, e_star: float, radius: float) -> float:

@@ -4,7 +4,16 @@ import json
 
 import pytest
 
-from explorer.tables.verification import HEADER, curves, furthest, result_of, summary_text, table_text
+from explorer.tables.verification import (
+    HEADER,
+    MISSED_ALONE,
+    curves,
+    furthest,
+    peers_text,
+    result_of,
+    summary_text,
+    table_text,
+)
 from solver.verification.row import of_value
 from tests.explorer.command_line import explorer, refused
 
@@ -71,3 +80,47 @@ def test_refused(arguments, words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     line = refused(explorer("verify", *arguments))
     assert all(word in line for word in words)
+
+
+def sticking(test, ours, at, limit=1.0):
+    return of_value(test, "β, sticking", 2.0, ours, limit, "made up", at)
+
+
+def test_what_ours_misses_stands_beside_the_other_engines_number():
+    rows = [sticking("T4", 2.1, "a"), sticking("T4", 2.1, "b"), sticking("T5", 2.1, "a"), sticking("T5", 2.0, "b")]
+    peer = [sticking("T4", 2.0, "a"), sticking("T4", 2.2, "b"), sticking("T5", 2.0, "a"), sticking("T5", 2.3, "b")]
+    header, *lines = peers_text([*rows, point(2.1)], {"LIGGGHTS": peer}).splitlines()
+    assert "LIGGGHTS keeps it" in header
+    assert lines[0].split()[-7:] == ["2", "2.1", "5", "2", "0", "1", "yes"]
+    assert lines[1].split()[-7:] == ["2", "2.1", "5", "2.2", "10", "1", "NO"]
+    assert lines[3] == "of 4 points that LIGGGHTS ran too, ours misses 3: 1 with LIGGGHTS, 2 alone"
+    assert lines[4:6] == ["by ours alone: T4: β, sticking, a", f"    {MISSED_ALONE['T4']}"]
+    assert lines[6:8] == ["by ours alone: T5: β, sticking, a", "    no reason is known: a bug until one is"]
+    assert lines[8:] == ["by LIGGGHTS alone: T5, β, sticking, b"]
+
+
+def test_plain_data_has_the_other_engines_numbers():
+    rows, peer = [sticking("T4", 2.1, "a"), point(2.0)], [sticking("T4", 2.04, "a")]
+    first, second = result_of(rows, {"LIGGGHTS": peer})["rows"]
+    assert first["peers"]["LIGGGHTS"] == {"value": 2.04, "error_percent": pytest.approx(2.0), "ok": False}
+    assert "peers" not in second
+
+
+def test_peers_without_an_engine_is_one_line(monkeypatch):
+    monkeypatch.setenv("PATH", "/nowhere")
+    assert refused(explorer("verify", "--peers")) == "liggghts: not installed (Debian: apt install liggghts)"
+
+
+def test_peers_needs_a_part_that_another_engine_can_run():
+    assert "T4, T5, T6, T8" in refused(explorer("verify", "--only", "slope", "--peers"))
+
+
+@pytest.mark.usefixtures("taichi")
+@pytest.mark.peers("liggghts")
+def test_peers_are_printed_and_written(tmp_path):
+    path = tmp_path / "verification.json"
+    result = explorer("verify", "--only", "T8", "--peers", "--json", path)
+    assert result.exit_code == 1, result.output
+    assert "of 20 points that LIGGGHTS ran too, ours misses 3: 3 with LIGGGHTS, 0 alone" in result.stdout
+    rows = json.loads(path.read_text(encoding="utf-8"))["rows"]
+    assert all("LIGGGHTS" in row["peers"] for row in rows)
