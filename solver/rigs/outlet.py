@@ -1,0 +1,102 @@
+"""The opening that a rig empties through, seen from above, and what lies across it when nothing moves any more.
+
+A body lies across the outlet if its centre of mass is over the opening and parts of it reach the edge on opposite sides
+of that centre: it cannot fall, whatever else is there. What is held by several bodies none of which does is an arch.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from solver.record import Bodies, Spheres
+
+Array = npt.NDArray[np.float64]
+
+EDGE = 0.99
+"""Share of the half width from which on a body reaches the edge: one between upright walls just touches them."""
+
+
+class Outlet(Protocol):
+    """An opening about the z axis."""
+
+    def from_middle(self, place: Array) -> Array:
+        """Distance of ``place`` (n, 2) [m] from the middle, as a share of the half width, shape (n,)."""
+        ...
+
+    @property
+    def half_width(self) -> float:
+        """Half of the narrowest way across [m]."""
+        ...
+
+
+@dataclass(frozen=True)
+class RoundOutlet:
+    """A circle; of an opening that is not round, the largest within it."""
+
+    half_width: float
+
+    def from_middle(self, place: Array) -> Array:
+        """See :class:`Outlet`."""
+        return np.hypot(place[:, 0], place[:, 1]) / self.half_width
+
+
+@dataclass(frozen=True)
+class Slot:
+    """A slot along y."""
+
+    half_width: float
+
+    def from_middle(self, place: Array) -> Array:
+        """See :class:`Outlet`."""
+        return np.abs(place[:, 0]) / self.half_width
+
+
+@dataclass(frozen=True)
+class Obstruction:
+    """A body that lies across the outlet."""
+
+    component: str
+    mass: float
+    """Its own [kg]."""
+    above: float
+    """Of the other bodies over the outlet [kg]; in a rig that is to be empty, of all that are in it."""
+
+
+def obstruction(
+    outlet: Outlet, height: float, bodies: Bodies, spheres: Spheres, held: npt.NDArray[np.bool_], keeps: bool
+) -> Obstruction | None:
+    """The lowest body across ``outlet``, whose edge is at ``height`` [m]; None where there is none.
+
+    ``spheres``: the member spheres of ``bodies``. ``held``: which bodies are in the container, shape (n,). ``keeps``:
+    whether bodies beside the outlet belong there, so that only those over it are held up.
+
+    A body across the outlet that lies on others which hang lower is part of an arch, and is none. Its centre of mass
+    may be just below the edge: the parts of it that bear on the edge are not.
+    """
+    share = outlet.from_middle(bodies.position[:, :2])
+    lowest = np.full(bodies.mass.size, np.inf)
+    np.minimum.at(lowest, spheres.body, spheres.centre[:, 2] - spheres.radius)
+    for b in np.argsort(bodies.position[:, 2], kind="stable"):
+        mine = (spheres.body == b) & (spheres.centre[:, 2] + spheres.radius >= height)
+        if not bodies.inside[b] or share[b] >= 1.0 or not mine.any():
+            continue
+        others = held & (np.arange(held.size) != b)
+        if (bodies.position[others, 2] < lowest[b]).any():
+            return None
+        if _reaches_both_sides(outlet, spheres.centre[mine, :2], spheres.radius[mine], bodies.position[b, :2]):
+            above = others & (share < 1.0) if keeps else others
+            name = bodies.component_names[bodies.component[b]]
+            return Obstruction(name, float(bodies.mass[b]), float(bodies.mass[above].sum()))
+    return None
+
+
+def _reaches_both_sides(outlet: Outlet, place: Array, radius: Array, middle: Array) -> bool:
+    """Whether discs at ``place`` (n, 2) of ``radius`` (n,) [m] reach the edge on opposite sides of ``middle`` (2,)."""
+    at_edge = outlet.from_middle(place) + radius / outlet.half_width >= EDGE
+    arms = place[at_edge] - middle
+    return bool((arms @ arms.T < 0.0).any())
