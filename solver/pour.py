@@ -37,7 +37,7 @@ from solver.rigs.rig import Container, Switch
 from solver.scene import Scene, pour_rig
 from solver.supply import Supply
 from solver.time_step import time_step
-from solver.verdict import RUNNING, Moment, may_be_over, read_now, stalled, verdict
+from solver.verdict import RUNNING, Moment, may_be_over, stalled, verdict
 from solver.world import SUMMARY_COLUMNS, Batch, law_table
 
 SETTLE_LIMIT = 1.0
@@ -273,9 +273,8 @@ class Pour:
 
     def _told(self) -> Verdict:
         """What the pour, if it has ended, has left: read off the raw pour, so that a stored one tells the same."""
-        if not (self.ended[0].valid and self.rig.leaves_heap):
+        if self.ended[0] != Outcome.AT_REST or not self.rig.leaves_heap:
             return self.ended
-        self.outcome, self.message = self.ended
         kept = unpacked(packed(self.record()))
         return kept.outcome, kept.message
 
@@ -312,9 +311,7 @@ class Pour:
             room=self.batch.capacity.contacts,
             poured_mass=self.supply.mass,
         )
-        numerics = self.scene.numerics
-        ends = may_be_over(moment) or (numerics.duration > 0.0 and read_now(numerics, self.time))
-        return replace(moment, across=self._across()) if ends else moment
+        return replace(moment, across=self._across()) if may_be_over(moment) else moment
 
     def _ramp_steps(self) -> int:
         """Steps between two changes of the constants."""

@@ -18,8 +18,8 @@ class Outcome(StrEnum):
     """How a run ended and what it left.
 
     Valid are ``AT_REST``, a pile, and ``MEASURED``: a rig that keeps moving has run for its time, or a pour was read
-    after ``numerics.duration``. Where the rig is read for its heap's angle of repose and what lies there is none, a run
-    that ended in either way is ``NO_HEAP`` (``observables/heap.py``).
+    after ``numerics.duration``. Where the rig is read for its heap's angle of repose and what came to rest is no heap,
+    the outcome is ``NO_HEAP`` (``observables/heap.py``).
     """
 
     RUNNING = "running"

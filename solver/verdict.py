@@ -98,12 +98,8 @@ def _ended(rig: PourRig, numerics: Numerics, moment: Moment) -> Verdict:
         over = limited and moment.acting is not None and moment.acting >= rig.running_time
         return (Outcome.MEASURED, "") if over else RUNNING
     if numerics.duration > 0.0 and limited:
-        if not read_now(numerics, moment.time):
-            return RUNNING
-        across = moment.across
-        if across is not None and across.above > 0.0 and moment.stalled:
-            return Outcome.OBSTRUCTED, _across(across, rig, moment)
-        return Outcome.MEASURED, ""
+        # Less a hair: the sum of many steps must not miss the moment by rounding.
+        return (Outcome.MEASURED, "") if moment.time >= numerics.duration - 1e-9 else RUNNING
     return _come_to_rest(rig, numerics, moment)
 
 
@@ -114,29 +110,24 @@ def _come_to_rest(rig: PourRig, numerics: Numerics, moment: Moment) -> Verdict:
     empty = row["hanging"] == 0
     if not (may_be_over(moment) and (empty or moment.stalled)):
         return RUNNING
-    left = f"{_grams(row['in_funnel'])} ({_share(row['in_funnel'], moment)} of the charge)"
+    left = f"{_grams(row['in_funnel'])}, {_share(row['in_funnel'], moment)} of the charge"
     stay = moment.blocked or row["hanging"] > numerics.hanging_bodies
     if across is not None and (across.above > 0.0 or (stay and not rig.keeps_material)):
         return Outcome.OBSTRUCTED, _across(across, rig, moment)
     if rig.keeps_material:
         stuck = row["discharged"] == 0.0
-        return (Outcome.JAMMED, f"nothing passes the outlet: {left} stay") if stuck else (Outcome.AT_REST, "")
+        return (Outcome.JAMMED, f"nothing passes the outlet: {left}, stay") if stuck else (Outcome.AT_REST, "")
     if stay:
         return Outcome.JAMMED, f"{row['hanging']:.0f} bodies ({left}) stay in the {_name(rig)}"
     if across is not None:
         return Outcome.AT_REST, _across(across, rig, moment)
-    return Outcome.AT_REST, "" if empty else f"{left} hang in the {_name(rig)}"
+    return Outcome.AT_REST, "" if empty else f"{left}, hang in the {_name(rig)}"
 
 
 def may_be_over(moment: Moment) -> bool:
     """Whether the rig has got all that it takes and has done all that it does, and what counts is slow."""
     fed = moment.acting is not None and moment.acted and (moment.missing == 0 or moment.blocked)
     return fed and moment.quiet
-
-
-def read_now(numerics: Numerics, time: float) -> bool:
-    """Whether ``numerics.duration`` has passed at ``time`` [s]; less a hair, as a sum of many steps is rounded."""
-    return time >= numerics.duration - 1e-9
 
 
 def _name(rig: PourRig) -> str:

@@ -37,9 +37,7 @@ def why_no_heap(pile: Pile) -> str:
     # Both heights may be the same number of pixels: rounding must not decide that one is lower.
     least = LEAST_HEIGHT * thickness
     if height < least * (1.0 - 1e-9):
-        return (
-            f"a flat layer {1e3 * height:.2f} mm high; a heap has {LEAST_HEIGHT:g} grain thicknesses, {1e3 * least:.2f} mm"
-        )
+        return f"a flat layer {1e3 * height:.2f} mm high; a heap has {LEAST_HEIGHT:g} grain thicknesses, {1e3 * least:.2f} mm"
     fitted = reading.flank_grains[np.isfinite(reading.flank_grains)]
     if not fitted.size:
         return "no flank of it can be fitted"
@@ -52,10 +50,11 @@ def why_no_heap(pile: Pile) -> str:
 def told(rig: PourRig, ended: Verdict, pile: Pile) -> Verdict:
     """Outcome and message of a run in ``rig`` that ``ended`` and left ``pile``.
 
-    That of ``ended``, but ``NO_HEAP`` for a valid end without a heap in a rig that is read for one.
+    That of ``ended``, but ``NO_HEAP`` for a pile at rest that is no heap in a rig that is read for one. A pour that is
+    read at a given time (``MEASURED``) is read as it stands then, as the pile was that it is compared with.
     """
     outcome, message = ended
-    if not (outcome.valid and rig.leaves_heap):
+    if outcome != Outcome.AT_REST or not rig.leaves_heap:
         return ended
     why = why_no_heap(pile)
     return (Outcome.NO_HEAP, f"{why}; {message}" if message else why) if why else ended

@@ -1,7 +1,8 @@
 """The opening that a rig empties through, seen from above, and what lies across it when nothing moves any more.
 
-A body lies across the outlet if its centre of mass is over the opening and parts of it reach the edge on opposite sides
-of that centre: it cannot fall, whatever else is there. What is held by several bodies none of which does is an arch.
+A body lies across the outlet if its centre of mass is over the opening, and two parts of it reach the edge, on opposite
+sides of that centre and on opposite sides of the opening (more than a quarter turn apart): it cannot fall, whatever
+else is there. What is held by several bodies none of which does, along the edge or beside each other, is an arch.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ EDGE = 0.99
 class Outlet(Protocol):
     """An opening about the z axis."""
 
-    def from_middle(self, place: Array) -> Array:
-        """Distance of ``place`` (n, 2) [m] from the middle, as a share of the half width, shape (n,)."""
+    def across(self, place: Array) -> Array:
+        """``place`` (n, 2) [m] without what lies along the opening, shape (n, 1 or 2): its length counts."""
         ...
 
     @property
@@ -40,9 +41,9 @@ class RoundOutlet:
 
     half_width: float
 
-    def from_middle(self, place: Array) -> Array:
+    def across(self, place: Array) -> Array:
         """See :class:`Outlet`."""
-        return np.hypot(place[:, 0], place[:, 1]) / self.half_width
+        return place
 
 
 @dataclass(frozen=True)
@@ -51,9 +52,9 @@ class Slot:
 
     half_width: float
 
-    def from_middle(self, place: Array) -> Array:
+    def across(self, place: Array) -> Array:
         """See :class:`Outlet`."""
-        return np.abs(place[:, 0]) / self.half_width
+        return place[:, :1]
 
 
 @dataclass(frozen=True)
@@ -78,18 +79,18 @@ def obstruction(
     A body across the outlet that lies on others which hang lower is part of an arch, and is none. Its centre of mass
     may be just below the edge: the parts of it that bear on the edge are not.
     """
-    share = outlet.from_middle(bodies.position[:, :2])
+    over = np.linalg.norm(outlet.across(bodies.position[:, :2]), axis=1) < outlet.half_width
     lowest = np.full(bodies.mass.size, np.inf)
     np.minimum.at(lowest, spheres.body, spheres.centre[:, 2] - spheres.radius)
     for b in np.argsort(bodies.position[:, 2], kind="stable"):
         mine = (spheres.body == b) & (spheres.centre[:, 2] + spheres.radius >= height)
-        if not bodies.inside[b] or share[b] >= 1.0 or not mine.any():
+        if not bodies.inside[b] or not over[b] or not mine.any():
             continue
         others = held & (np.arange(held.size) != b)
         if (bodies.position[others, 2] < lowest[b]).any():
             return None
         if _reaches_both_sides(outlet, spheres.centre[mine, :2], spheres.radius[mine], bodies.position[b, :2]):
-            above = others & (share < 1.0) if keeps else others
+            above = others & over if keeps else others
             name = bodies.component_names[bodies.component[b]]
             return Obstruction(name, float(bodies.mass[b]), float(bodies.mass[above].sum()))
     return None
@@ -97,6 +98,7 @@ def obstruction(
 
 def _reaches_both_sides(outlet: Outlet, place: Array, radius: Array, middle: Array) -> bool:
     """Whether discs at ``place`` (n, 2) of ``radius`` (n,) [m] reach the edge on opposite sides of ``middle`` (2,)."""
-    at_edge = outlet.from_middle(place) + radius / outlet.half_width >= EDGE
-    arms = place[at_edge] - middle
-    return bool((arms @ arms.T < 0.0).any())
+    from_middle = outlet.across(place)
+    at_edge = np.linalg.norm(from_middle, axis=1) + radius >= EDGE * outlet.half_width
+    arms, ends = (place - middle)[at_edge], from_middle[at_edge]
+    return bool(((arms @ arms.T < 0.0) & (ends @ ends.T < 0.0)).any())

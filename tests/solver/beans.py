@@ -13,13 +13,16 @@ BEANS = with_values(dataclasses.replace(TREFOIL, title="beans", bodies=(BEAN,)),
 
 
 def two_layers() -> Scene:
-    """A cylinder in which the beans lie two deep, lifted."""
+    """Smooth beans that lie two deep when the cylinder around them has been lifted."""
     lifted = with_rig(BEANS, "lifting_cylinder")
     values = {"rig.diameter": 0.08, "rig.cylinder_height": 0.05, "rig.lift_speed": 0.05, "rig.lift_height": 0.05}
-    return with_values(lifted, values | {"rig.mass": 90 * BEAN.mass, "insertion.rate": 0.1})
+    smooth = {"pair.grain.grain.static_friction": 0.2, "pair.grain.steel.static_friction": 0.2}
+    return with_values(lifted, values | smooth | {"rig.mass": 60 * BEAN.mass, "insertion.rate": 0.1})
 
 
 def heap() -> Scene:
-    """As many beans again and rougher, out of a funnel, which pile up."""
+    """Three times as many and rough, in a narrower cylinder: they stay piled up."""
     rough = {"pair.grain.grain.static_friction": 0.9, "pair.grain.steel.static_friction": 0.9}
-    return with_values(BEANS, rough | {"rig.mass": 180 * BEAN.mass, "insertion.rate": 0.1, "rig.outlet_height": 0.05})
+    values = {"rig.diameter": 0.06, "rig.cylinder_height": 0.1, "rig.lift_speed": 0.05, "rig.lift_height": 0.1}
+    lifted = with_rig(BEANS, "lifting_cylinder")
+    return with_values(lifted, rough | values | {"rig.mass": 180 * BEAN.mass, "insertion.region_radius": 0.03})
