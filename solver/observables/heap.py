@@ -37,7 +37,8 @@ def why_no_heap(pile: Pile) -> str:
     # Both heights may be the same number of pixels: rounding must not decide that one is lower.
     least = LEAST_HEIGHT * thickness
     if height < least * (1.0 - 1e-9):
-        return f"a flat layer {1e3 * height:.2f} mm high; a heap has {LEAST_HEIGHT:g} grain thicknesses, {1e3 * least:.2f} mm"
+        limit = f"{LEAST_HEIGHT:g} grain thicknesses, {1e3 * least:.2f} mm"
+        return f"a flat layer {1e3 * height:.2f} mm high; a heap has {limit}"
     fitted = reading.flank_grains[np.isfinite(reading.flank_grains)]
     if not fitted.size:
         return "no flank of it can be fitted"

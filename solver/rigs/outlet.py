@@ -1,8 +1,9 @@
 """The opening that a rig empties through, seen from above, and what lies across it when nothing moves any more.
 
 A body lies across the outlet if its centre of mass is over the opening, and two parts of it reach the edge, on opposite
-sides of that centre and on opposite sides of the opening (more than a quarter turn apart): it cannot fall, whatever
-else is there. What is held by several bodies none of which does, along the edge or beside each other, is an arch.
+sides of that centre, so that the line between them crosses the opening within 0.71 half widths of its middle (of a
+circle: cuts off more than a quarter turn of the edge). It cannot fall, whatever else is there. What is held by several
+bodies none of which does, along the edge or beside each other, is an arch.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ Array = npt.NDArray[np.float64]
 
 EDGE = 0.99
 """Share of the half width from which on a body reaches the edge: one between upright walls just touches them."""
+CHORD = 0.5**0.5
+"""Share of the half width within which its line passes the middle."""
 
 
 class Outlet(Protocol):
@@ -97,8 +100,15 @@ def obstruction(
 
 
 def _reaches_both_sides(outlet: Outlet, place: Array, radius: Array, middle: Array) -> bool:
-    """Whether discs at ``place`` (n, 2) of ``radius`` (n,) [m] reach the edge on opposite sides of ``middle`` (2,)."""
+    """Whether discs at ``place`` (n, 2) of ``radius`` (n,) [m] reach the edge on opposite sides of ``middle`` (2,).
+
+    And whether the line between them crosses the opening.
+    """
     from_middle = outlet.across(place)
     at_edge = np.linalg.norm(from_middle, axis=1) + radius >= EDGE * outlet.half_width
-    arms, ends = (place - middle)[at_edge], from_middle[at_edge]
-    return bool(((arms @ arms.T < 0.0) & (ends @ ends.T < 0.0)).any())
+    arms, start = (place - middle)[at_edge], from_middle[at_edge]
+    way = start[None, :, :] - start[:, None, :]
+    length2 = np.maximum((way**2).sum(axis=2), 1e-30)
+    share = np.clip(-(start[:, None, :] * way).sum(axis=2) / length2, 0.0, 1.0)
+    nearest = np.linalg.norm(start[:, None, :] + share[:, :, None] * way, axis=2)
+    return bool(((arms @ arms.T < 0.0) & (nearest <= CHORD * outlet.half_width)).any())

@@ -123,7 +123,7 @@ def time_step_text(status: Status) -> str:
 
 
 def condition(status: Status) -> str:
-    """How the pour stands in a word: at rest, no heap, jammed, obstructed, unstable, capped (slower than wanted), or nothing special."""
+    """How the pour stands, in a word of ``CONDITIONS``, or capped (slower than wanted), or nothing special."""
     return CONDITIONS.get(status.outcome, "capped" if status.capped else "")
 
 

@@ -15,6 +15,7 @@ from solver.scene import with_values
 from solver.set_up import with_settings
 from solver.world import Batch
 from tests.explorer.beads import bead_scene
+from tests.solver.beans import BEANS
 
 pytestmark = pytest.mark.usefixtures("taichi")
 
@@ -168,10 +169,15 @@ def test_what_stays_in_a_draw_down_box_and_what_falls_add_up():
 
 
 def test_a_slot_that_lets_nothing_through_is_a_jam():
-    narrow = with_settings(BOX, {"rig.slot_width": "12mm", "rig.mass": "8g"})
-    record = run(narrow).on().pour
-    assert record.outcome == Outcome.JAMMED
-    assert "nothing passes" in record.message
+    """Beans are held by an arch; seeds, longer than the slot is wide, by one that lies across it."""
+    held = {"rig.name": "draw_down_box", "rig.slot_width": "9mm", "rig.mass": "8g"}
+    rough = {"pair.grain.grain.static_friction": 0.9, "pair.grain.steel.static_friction": 0.9}
+    beans = run(with_settings(BEANS, held | rough)).on().pour
+    assert beans.outcome == Outcome.JAMMED
+    assert beans.message == "nothing passes the outlet: 7.93 g, 100 % of the charge, stay"
+    seeds = run(with_settings(BOX, {"rig.slot_width": "12mm", "rig.mass": "8g"})).on().pour
+    assert seeds.outcome == Outcome.OBSTRUCTED
+    assert "lies across the outlet of the draw down box and holds up" in seeds.message
 
 
 @pytest.fixture(scope="module")
