@@ -147,4 +147,5 @@ def _grams(mass: float) -> str:
 
 
 def _share(mass: float, moment: Moment) -> str:
-    return f"{100.0 * mass / moment.poured_mass:.2g} %"
+    percent = 100.0 * mass / moment.poured_mass
+    return f"{percent:.0f} %" if percent >= 10.0 else f"{percent:.1g} %"

@@ -98,7 +98,7 @@ def test_an_arch_of_bodies_that_are_narrower_than_the_outlet_is_a_jam():
     record = run_pour(scene, 3)
     assert record.outcome == Outcome.JAMMED
     stay = record.poured_mass - record.trace.discharged_mass[-1]
-    told = f"bodies ({1e3 * stay:.3g} g, {100 * stay / record.poured_mass:.2g} % of the charge) stay in the funnel"
+    told = f"bodies ({1e3 * stay:.3g} g, {100 * stay / record.poured_mass:.0f} % of the charge) stay in the funnel"
     assert told in record.message
 
 
