@@ -32,7 +32,7 @@ def why_no_heap(pile: Pile) -> str:
     """Why ``pile`` is no heap, in words and numbers; empty for a heap. Its coordinates have to be finite."""
     reading = PileReading(pile)
     if not reading.is_pile:
-        return f"{pile.mass.size or 'no'} body lies on the plate"
+        return f"{pile.mass.size or 'no'} body lies still on the plate"
     height, thickness = apex_height(reading).value, reading.grain_thickness
     # Both heights may be the same number of pixels: rounding must not decide that one is lower.
     least = LEAST_HEIGHT * thickness

@@ -106,8 +106,8 @@ def test_the_grains_of_a_flank_are_those_whose_tops_the_line_goes_through():
 
 
 def test_what_is_too_little_to_be_a_pile_is_no_heap():
-    assert why_no_heap(empty_pile()) == "no body lies on the plate"
-    assert why_no_heap(balls(np.array([[0.0, 0.0, 3e-3]]))) == "1 body lies on the plate"
+    assert why_no_heap(empty_pile()) == "no body lies still on the plate"
+    assert why_no_heap(balls(np.array([[0.0, 0.0, 3e-3]]))) == "1 body lies still on the plate"
 
 
 def test_a_cone_of_seeds_is_a_heap():
