@@ -1,8 +1,8 @@
 """The store: every pour that finished, kept raw in one SQLite file and found again by what was poured.
 
 A pour is kept once and for all under the key of what decides its bits (`solver.pour_key`). What is read off it, its
-observables and the summaries of a diagnosis, is kept beside it with the version of the readings, and read anew from the
-raw pour where that version has changed or a name is missing: a new observable costs no pour.
+outcome, its observables and the summaries of a diagnosis, is kept beside it with the version of the readings, and read
+anew from the raw pour where that version has changed or a name is missing: a new observable costs no pour.
 
 A file belongs to one version of the physics. One of an older version stays readable; nothing is poured into it.
 """
@@ -26,9 +26,12 @@ import platformdirs
 
 from solver import PHYSICS, RIGS, RawPourError, Record, observe, unpacked
 
-READINGS = 1
-"""Version of what is read off a raw pour. Raise it when an observable, a summary or a profile comes to give another
-number for the same pour; a new name needs no new version. `tests/doe/golden_readings.json` holds it to that."""
+READINGS = 2
+"""Version of what is read off a raw pour. Raise it when an outcome, an observable, a summary or a profile comes to be
+another for the same pour; a new name needs no new version. `tests/doe/golden_readings.json` holds it to that.
+
+2: a flat layer is `no_heap` where a heap's angle of repose is asked for.
+"""
 
 SCHEMA_VERSION = 1
 SCHEMA = """
@@ -67,10 +70,11 @@ class StoredRun:
     seed: int
     physics: int
     outcome: str
+    """Read off the raw pour, as ``message`` is: what the pour ended as, and whether it left a heap."""
     message: str
     parameters: dict[str, Any]
     readings: int
-    """Version of the readings that ``observables`` are of."""
+    """Version of the readings that the outcome and ``observables`` are of."""
     observables: Readings
     dt: float
     steps: int
@@ -98,7 +102,10 @@ def read_off(raw: bytes, reader: Reader) -> Readings:
     Always off the raw pour, never off the record that it was packed from: a reading is the same number whether it is
     taken when the pour ends or years later.
     """
-    seen = reader(unpacked(raw))
+    return _numbers(reader(unpacked(raw)))
+
+
+def _numbers(seen: Mapping[str, float]) -> Readings:
     return {name: float(number) if math.isfinite(number) else None for name, number in seen.items()}
 
 
@@ -171,10 +178,17 @@ class Store:
         return f"{age}, of {made}; this program pours by physics {PHYSICS} and adds nothing to it"
 
     def find(self, key: str) -> StoredRun | None:
-        """The run with that key, or None."""
+        """The run with that key, or None; its outcome is of the present version of the readings.
+
+        Raises StoreError for a raw pour that cannot be read.
+        """
         with self._told():
             row = self._db.execute(f"SELECT {_COLUMNS} FROM pours WHERE key = ?", (key,)).fetchone()
-        return _from_row(row) if row else None
+        run = _from_row(row) if row else None
+        if run is None or run.readings == READINGS or not run.raw:
+            return run
+        record = self._record(run)
+        return dataclasses.replace(run, outcome=str(record.outcome), message=record.message)
 
     def add(self, run: StoredRun) -> None:
         """Keep a run; on disk when this returns."""
@@ -187,7 +201,7 @@ class Store:
             self._db.execute(f"INSERT OR REPLACE INTO pours ({_COLUMNS}) VALUES ({marks})", [values[n] for n in _NAMES])
 
     def read(self, run: StoredRun, names: Iterable[str], reader: Reader) -> StoredRun:
-        """Return ``run`` with the readings ``names`` of the present version.
+        """Return ``run`` with its outcome and the readings ``names`` of the present version.
 
         Those that are kept, if they are of that version and all of ``names`` are there. Otherwise ``reader`` reads the
         raw pour again, and what it finds is kept, but for a store of an older physics. A run without a raw pour is
@@ -196,16 +210,25 @@ class Store:
         present = run.readings == READINGS
         if not run.raw or (present and run.observables.keys() >= set(names)):
             return run
-        try:
-            seen = read_off(run.raw, reader)
-        except RawPourError as error:
-            raise StoreError(f"{self.path}: run {run.key[:12]}: {error}") from None
+        record = self._record(run)
         # What is kept was read by whoever knew the pour best.
         kept = run.observables if present else {}
-        run = dataclasses.replace(run, readings=READINGS, observables=seen | kept)
+        run = dataclasses.replace(
+            run,
+            outcome=str(record.outcome),
+            message=record.message,
+            readings=READINGS,
+            observables=_numbers(reader(record)) | kept,
+        )
         if self.physics == PHYSICS:
             self.add(run)
         return run
+
+    def _record(self, run: StoredRun) -> Record:
+        try:
+            return unpacked(run.raw)
+        except RawPourError as error:
+            raise StoreError(f"{self.path}: run {run.key[:12]}: {error}") from None
 
     def runs(self, study: str | None = None) -> Iterator[StoredRun]:
         """All runs, oldest first; of one study if named. Read with the version that they were read with."""

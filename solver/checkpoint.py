@@ -35,7 +35,6 @@ PLAIN = (
     "steps",
     "_time_base",
     "_steps_base",
-    "message",
     "samples",
     "_moving",
     "_quiet_samples",
@@ -68,7 +67,7 @@ def fingerprint(scene: Scene) -> str:
 def checkpoint_of(pour: Pour) -> Checkpoint:
     """The present state of ``pour``, between two launches."""
     decided: dict[str, Any] = {name: getattr(pour, name) for name in PLAIN}
-    decided["outcome"] = pour.outcome.value
+    decided["ended"], decided["told"] = pour.ended, (pour.outcome, pour.message)
     decided["random"] = pour.supply.random.bit_generator.state
     decided["done"] = len(pour.rig.actions()) - len(pour._to_do)
     decided["table"] = pour._table.tolist()
@@ -96,7 +95,8 @@ def resumed(batch: Batch, w: int, scene: Scene, kept: Checkpoint) -> Pour:
     decided = kept.decided
     for name in PLAIN:
         setattr(pour, name, decided[name])
-    pour.outcome = Outcome(decided["outcome"])
+    (ended, why), (told, message) = decided["ended"], decided["told"]
+    pour.ended, pour.outcome, pour.message = (Outcome(ended), why), Outcome(told), message
     pour.supply.random.bit_generator.state = decided["random"]
     pour._to_do = list(pour.rig.actions())[decided["done"] :]
     pour._inside = pour.container

@@ -33,7 +33,7 @@ class Numerics:
     )
     sleep_time: float = param(0.05, unit="s", low=1e-3, high=5.0, doc="How long it has to be that slow before.")
     hanging_bodies: float = param(
-        1.0, low=0.0, high=1e3, doc="Number of bodies that may be left hanging in the funnel without a jam."
+        1.0, low=0.0, high=1e3, doc="Number of bodies that may be left hanging in the funnel, holding up no other."
     )
     max_time: float = param(8.0, unit="s", low=0.1, high=60.0, doc="Simulated time after which a run is cut off.")
     duration: float = param(

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 import time as clock
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +18,8 @@ import numpy.typing as npt
 from solver.contacts import Contacts, contacts_from
 from solver.effects.set_up import actual
 from solver.observables.free_surface import surface_heights
-from solver.record import Bodies, Outcome, Phase, Record
+from solver.raw_pour import packed, unpacked
+from solver.record import Bodies, Outcome, Phase, Record, Verdict
 from solver.record_builder import (
     bodies_of,
     entries_of,
@@ -30,11 +32,12 @@ from solver.record_builder import (
     trace_of,
 )
 from solver.retune import RAMP_STEPS, RAMP_TIME, Ramp, spring_ratio
+from solver.rigs.outlet import Obstruction, obstruction
 from solver.rigs.rig import Container, Switch
 from solver.scene import Scene, pour_rig
 from solver.supply import Supply
 from solver.time_step import time_step
-from solver.verdict import Moment, stalled, verdict
+from solver.verdict import RUNNING, Moment, may_be_over, stalled, verdict
 from solver.world import SUMMARY_COLUMNS, Batch, law_table
 
 SETTLE_LIMIT = 1.0
@@ -63,7 +66,7 @@ class Pour:
         self._supplied = 0.0
         self.steps = 0
         self._time_base, self._steps_base = 0.0, 0
-        self.outcome, self.message = Outcome.RUNNING, ""
+        self.ended = self.outcome, self.message = RUNNING
         self.samples: list[Summary] = []
         self._free_surface: list[tuple[float, npt.NDArray[np.float64]]] = []
         self._moving, self._quiet_samples = 0.0, 0
@@ -102,7 +105,7 @@ class Pour:
     @property
     def phase(self) -> Phase:
         """Where the pour is."""
-        if self.outcome == Outcome.AT_REST:
+        if self.ended[0] == Outcome.AT_REST:
             return Phase.AT_REST
         if self.supply.missing > 0 or self.gate_shut:
             return Phase.FILL
@@ -157,8 +160,8 @@ class Pour:
         self._set_table(self._ramp.table(self.time))
         self._ramp_left = self._ramp_steps()
         self._quiet_samples = 0
-        if self.outcome in (Outcome.AT_REST, Outcome.JAMMED):
-            self.outcome, self.message = Outcome.RUNNING, ""
+        if self.ended[0] in (Outcome.AT_REST, Outcome.JAMMED, Outcome.OBSTRUCTED):
+            self.ended = self.outcome, self.message = RUNNING
 
     def move_to(self, batch: Batch) -> None:
         """Go on in ``batch``, in the same world, with the same bits: for instance in one with effects compiled in."""
@@ -193,6 +196,7 @@ class Pour:
             seed=self.seed,
             outcome=self.outcome,
             message=self.message,
+            ended=self.ended,
             bodies=bodies,
             spheres=spheres,
             in_pile=in_pile,
@@ -253,7 +257,8 @@ class Pour:
         self._moving = max(row["speed"], row["funnel_speed"] if self.gate_shut else 0.0)
         self._quiet_samples = self._quiet_samples + 1 if self._moving < self.scene.numerics.rest_speed else 0
         self._watch()
-        self.outcome, self.message = verdict(self.rig, self.scene.numerics, self._moment(row))
+        self.ended = verdict(self.rig, self.scene.numerics, self._moment(row))
+        self.outcome, self.message = self._told()
         waiting = self.time > self.supply.last_entry + SETTLE_LIMIT
         if self.gate_shut and (self.supply.missing == 0 or self._blocked()) and (self._quiet() or waiting):
             self._began, self._quiet_samples = self.time, 0
@@ -266,6 +271,13 @@ class Pour:
             spheres = member_spheres(self.scene, self.bodies())
             self._free_surface.append((self.time, surface_heights(spheres, watch.half_width) - watch.height))
 
+    def _told(self) -> Verdict:
+        """What the pour, if it has ended, has left: read off the raw pour, so that a stored one tells the same."""
+        if self.ended[0] != Outcome.AT_REST or not self.rig.leaves_heap:
+            return self.ended
+        kept = unpacked(packed(self.record()))
+        return kept.outcome, kept.message
+
     def _quiet(self) -> bool:
         numerics = self.scene.numerics
         return self._quiet_samples * numerics.sample_interval >= numerics.rest_time
@@ -274,8 +286,19 @@ class Pour:
         """The next body has been due for long and finds no place: the rig is full to the feed opening."""
         return self.supply.overdue(self.time, SETTLE_LIMIT)
 
+    def _across(self) -> Obstruction | None:
+        """What lies across the outlet now."""
+        outlet, inside = self.rig.outlet, self.container
+        if outlet is None:
+            return None
+        bodies = self.bodies()
+        there = np.hypot(bodies.position[:, 0], bodies.position[:, 1]) < inside.radius
+        held = bodies.inside & there & (bodies.position[:, 2] > inside.height)
+        spheres = member_spheres(self.scene, bodies)
+        return obstruction(outlet, inside.height, bodies, spheres, held, self.rig.keeps_material)
+
     def _moment(self, row: Summary) -> Moment:
-        return Moment(
+        moment = Moment(
             time=self.time,
             row=row,
             acting=None if self._began is None else self.time - self._began,
@@ -286,7 +309,9 @@ class Pour:
             stalled=stalled(self.samples, self.scene.numerics, max(self.supply.last_entry, self.gate_opened)),
             speed=self._moving,
             room=self.batch.capacity.contacts,
+            poured_mass=self.supply.mass,
         )
+        return replace(moment, across=self._across()) if may_be_over(moment) else moment
 
     def _ramp_steps(self) -> int:
         """Steps between two changes of the constants."""

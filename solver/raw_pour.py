@@ -2,8 +2,8 @@
 
 A raw pour is a compressed NumPy archive (``.npz``):
 
-    head                                JSON text: format, physics, outcome, message, seed, times, rig, and the bodies
-                                        by the member spheres that they were poured with
+    head                                JSON text: format, physics, how the motion ended (outcome and message), seed,
+                                        times, rig, and the bodies by the member spheres that they were poured with
     component, inside, in_pile (n,)     of the n bodies that entered: which component, whether they are still in the
                                         domain, whether they belong to the pile
     mass, scale (n,)                    [kg], linear size relative to the declared one
@@ -30,6 +30,7 @@ import numpy as np
 import numpy.typing as npt
 
 from solver.body import Body, Members
+from solver.observables.heap import told
 from solver.params import declared
 from solver.record import Bodies, FreeSurface, Outcome, Record, Trace
 from solver.record_builder import entries_of, measured_from, member_spheres, pile_of
@@ -66,9 +67,9 @@ def packed(record: Record) -> bytes:
     head = {
         "format": FORMAT,
         "physics": PHYSICS,
-        **{name: getattr(record, name) for name in ("seed", "message", "gate_opened", "poured_mass", "dt", "steps")},
-        "wall_s": record.wall_s,
-        "outcome": str(record.outcome),
+        **{name: getattr(record, name) for name in ("seed", "gate_opened", "poured_mass", "dt", "steps", "wall_s")},
+        "outcome": str(record.ended[0]),
+        "message": record.ended[1],
         "title": record.scene.title,
         "axis": record.scene.axis,
         "rig": _of_rig(pour_rig(record.scene)),
@@ -97,7 +98,8 @@ def packed(record: Record) -> bytes:
 def unpacked(raw: bytes) -> Record:
     """Return the record of a raw pour, on which observables read the same numbers every time.
 
-    Its scene holds the rig and the bodies by their member spheres; velocities are NaN and no entries are listed. Raises
+    Its outcome is how the motion ended, and what is read off the pile that it left (``observables/heap.py``). Its scene
+    holds the rig and the bodies by their member spheres; velocities are NaN and no entries are listed. Raises
     RawPourError for bytes that are no raw pour, or one of another format or of a rig that is not known.
     """
     try:
@@ -124,15 +126,19 @@ def unpacked(raw: bytes) -> Record:
         inside=arrays["inside"],
     )
     spheres = member_spheres(scene, bodies)
+    pile = measured_from(pile_of(bodies, spheres, arrays["in_pile"]), scene.axis)
+    ended = Outcome(head["outcome"]), head["message"]
+    outcome, message = told(pour_rig(scene), ended, pile)
     return Record(
         scene=scene,
         seed=head["seed"],
-        outcome=Outcome(head["outcome"]),
-        message=head["message"],
+        outcome=outcome,
+        message=message,
+        ended=ended,
         bodies=bodies,
         spheres=spheres,
         in_pile=arrays["in_pile"],
-        pile=measured_from(pile_of(bodies, spheres, arrays["in_pile"]), scene.axis),
+        pile=pile,
         trace=_trace_of(arrays),
         entries=entries_of(bodies.component, []),
         gate_opened=head["gate_opened"],

@@ -15,13 +15,19 @@ Ints = npt.NDArray[np.int32]
 
 
 class Outcome(StrEnum):
-    """How a run ended. Valid are ``AT_REST``, a pile, and ``MEASURED``: a rig that keeps moving has run for its time,
-    or a pour was read after ``numerics.duration``."""
+    """How a run ended and what it left.
+
+    Valid are ``AT_REST``, a pile, and ``MEASURED``: a rig that keeps moving has run for its time, or a pour was read
+    after ``numerics.duration``. Where the rig is read for its heap's angle of repose and what came to rest is no heap,
+    the outcome is ``NO_HEAP`` (``observables/heap.py``).
+    """
 
     RUNNING = "running"
     AT_REST = "at_rest"
     MEASURED = "measured"
+    NO_HEAP = "no_heap"
     JAMMED = "jammed"
+    OBSTRUCTED = "obstructed"
     TIME_LIMIT = "time_limit"
     LOST_BODY = "lost_body"
     NON_FINITE = "non_finite"
@@ -32,6 +38,10 @@ class Outcome(StrEnum):
     def valid(self) -> bool:
         """True if what is read off the run counts."""
         return self in (Outcome.AT_REST, Outcome.MEASURED)
+
+
+Verdict = tuple[Outcome, str]
+"""Outcome and message; the message is empty where the outcome says all."""
 
 
 class Phase(StrEnum):
@@ -177,7 +187,10 @@ class Record:
     scene: Scene
     seed: int
     outcome: Outcome
+    """What is told: that of ``ended``, or ``NO_HEAP``."""
     message: str
+    ended: Verdict
+    """How the motion ended, whatever it left. This is what a raw pour keeps; the rest is read off the pile."""
     bodies: Bodies
     spheres: Spheres
     in_pile: npt.NDArray[np.bool_]

@@ -14,7 +14,7 @@ from solver.moving_state import Moving
 from solver.pour import Pour
 from solver.scene import Scene
 
-DECIDED = (*(name for name in PLAIN if name != "samples"), "outcome", "_table", "_ramp", "_inside")
+DECIDED = (*(name for name in PLAIN if name != "samples"), "ended", "outcome", "message", "_table", "_ramp", "_inside")
 """What a pour has decided, in values that it replaces and never changes."""
 
 

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from solver.numerics import Numerics
-from solver.record import Outcome
+from solver.record import Outcome, Verdict
+from solver.rigs.outlet import Obstruction
 from solver.rigs.rig import PourRig
 
-Verdict = tuple[Outcome, str]
 RUNNING: Verdict = (Outcome.RUNNING, "")
 STALL_TIME = 0.5
 """A container that has let nothing out for this long [s] is done, even if what is stuck in it rocks: twice the time
@@ -41,6 +41,10 @@ class Moment:
     """Largest speed of what counts [m/s]."""
     room: int
     """Entries that the contact list holds."""
+    poured_mass: float
+    """The charge: mass that was to be poured [kg]."""
+    across: Obstruction | None = None
+    """What lies across the outlet; looked for only where everything may be over."""
 
 
 def verdict(rig: PourRig, numerics: Numerics, moment: Moment) -> Verdict:
@@ -100,16 +104,48 @@ def _ended(rig: PourRig, numerics: Numerics, moment: Moment) -> Verdict:
 
 
 def _come_to_rest(rig: PourRig, numerics: Numerics, moment: Moment) -> Verdict:
-    """All is at rest: a pile, or a jam where more stays in the container than belongs there."""
-    row = moment.row
-    fed = moment.acting is not None and moment.acted and (moment.missing == 0 or moment.blocked)
+    """All is at rest: a pile; an outlet with a body across it that holds up others; or a jam, where more stays in the
+    container than belongs there."""
+    row, across = moment.row, moment.across
     empty = row["hanging"] == 0
-    if not (fed and moment.quiet and (empty or moment.stalled)):
+    if not (may_be_over(moment) and (empty or moment.stalled)):
         return RUNNING
-    left, where = f"{1e3 * row['in_funnel']:.3g} g", rig.name.replace("_", " ")
+    left = f"{_grams(row['in_funnel'])}, {_share(row['in_funnel'], moment)} of the charge"
+    stay = moment.blocked or row["hanging"] > numerics.hanging_bodies
+    if across is not None and (across.above > 0.0 or (stay and not rig.keeps_material)):
+        return Outcome.OBSTRUCTED, _across(across, rig, moment)
     if rig.keeps_material:
         stuck = row["discharged"] == 0.0
-        return (Outcome.JAMMED, f"nothing passes the outlet: {left} stay") if stuck else (Outcome.AT_REST, "")
-    if moment.blocked or row["hanging"] > numerics.hanging_bodies:
-        return Outcome.JAMMED, f"{row['hanging']:.0f} bodies ({left}) stay in the {where}"
-    return Outcome.AT_REST, "" if empty else f"{left} hang in the {where}"
+        return (Outcome.JAMMED, f"nothing passes the outlet: {left}, stay") if stuck else (Outcome.AT_REST, "")
+    if stay:
+        return Outcome.JAMMED, f"{row['hanging']:.0f} bodies ({left}) stay in the {_name(rig)}"
+    if across is not None:
+        return Outcome.AT_REST, _across(across, rig, moment)
+    return Outcome.AT_REST, "" if empty else f"{left}, hang in the {_name(rig)}"
+
+
+def may_be_over(moment: Moment) -> bool:
+    """Whether the rig has got all that it takes and has done all that it does, and what counts is slow."""
+    fed = moment.acting is not None and moment.acted and (moment.missing == 0 or moment.blocked)
+    return fed and moment.quiet
+
+
+def _name(rig: PourRig) -> str:
+    return rig.name.replace("_", " ")
+
+
+def _across(across: Obstruction, rig: PourRig, moment: Moment) -> str:
+    """E.g. "one petiole lies across the outlet of the funnel and holds up 4.1 g, 14 % of the charge"."""
+    body = f"one {across.component} ({_grams(across.mass)}) lies across the outlet of the {_name(rig)}"
+    if across.above == 0.0:
+        return f"{body}, with nothing above it"
+    return f"{body} and holds up {_grams(across.above)}, {_share(across.above, moment)} of the charge"
+
+
+def _grams(mass: float) -> str:
+    return f"{1e3 * mass:.3g} g"
+
+
+def _share(mass: float, moment: Moment) -> str:
+    percent = 100.0 * mass / moment.poured_mass
+    return f"{percent:.0f} %" if percent >= 10.0 else f"{percent:.1g} %"

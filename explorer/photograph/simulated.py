@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from explorer.errors import CommandError
+from explorer.outcomes import outcome_text
 from explorer.scene.file import load_scene
 from solver.observables.outline import Outline, flank_feet, outline
 from solver.observables.repose import AZIMUTHS_DEG
@@ -70,7 +71,9 @@ def _spheres(source: str) -> list[Spheres]:
 
     record = run_pour(scene, SEED)
     if not record.outcome.valid:
-        raise CommandError(f"--from-simulation {source}: the pour gave no pile: {record.outcome}: {record.message}")
+        raise CommandError(
+            f"--from-simulation {source}: the pour gave no pile: {outcome_text(record.outcome, record.message)}"
+        )
     return [record.pile.spheres]
 
 

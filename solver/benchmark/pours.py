@@ -58,7 +58,7 @@ def measure_pour(
         begin = time.perf_counter()
         contacts = _drive(batch, pour)
         wall += time.perf_counter() - begin
-        if pour.outcome not in (Outcome.AT_REST, Outcome.TIME_LIMIT, Outcome.JAMMED):
+        if pour.ended[0] not in (Outcome.AT_REST, Outcome.TIME_LIMIT, Outcome.JAMMED, Outcome.OBSTRUCTED):
             raise RuntimeError(f"{case}: the pour ended with {pour.outcome}: {pour.message}")
         steps, simulated = steps + pour.steps, simulated + pour.time
     spheres = sum(len(scene.bodies[k].clump.radii) for k in pour.supply.order)

@@ -40,14 +40,12 @@ def radius_holding(share: float, radius: Array, mass: Array) -> float:
     return float(np.interp(share * mass.sum(), held, radius[order]))
 
 
-def body_thickness(pile: Pile) -> float:
-    """Smallest extent of a body along its principal axes [m], median over the bodies; NaN for an empty pile.
+def body_thicknesses(pile: Pile) -> Array:
+    """Smallest extent of each body along its principal axes [m], shape (n,): of the body in its own size.
 
     Principal axes of the member spheres' centres; a flat body that lies on the plate is this high.
     """
     spheres = pile.spheres
-    if spheres.radius.size == 0:
-        return float("nan")
     _, body = np.unique(spheres.body, return_inverse=True)
     members = np.bincount(body).astype(np.float64)
     mean = np.stack([np.bincount(body, spheres.centre[:, k]) for k in range(3)], axis=1) / members[:, None]
@@ -59,4 +57,18 @@ def body_thickness(pile: Pile) -> float:
     top, bottom = np.full(members.size, -np.inf), np.full(members.size, np.inf)
     np.maximum.at(top, body, along + spheres.radius)
     np.minimum.at(bottom, body, along - spheres.radius)
-    return float(np.median(top - bottom))
+    return top - bottom
+
+
+def body_thickness(pile: Pile) -> float:
+    """Median of :func:`body_thicknesses` [m]; NaN for an empty pile."""
+    return float(np.median(body_thicknesses(pile))) if pile.mass.size else float("nan")
+
+
+def grain_thickness(pile: Pile) -> float:
+    """Mean of :func:`body_thicknesses` [m], weighted by mass; NaN for an empty pile.
+
+    By mass, because mass fills the pile: by number, the many fines of a mixture would set the scale of a heap of few
+    coarse bodies. Bodies of one mass weigh alike.
+    """
+    return float(np.average(body_thicknesses(pile), weights=pile.mass)) if pile.mass.size else float("nan")

@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from solver.observables import footprint
 from solver.observables.outline import Outline, outline_of
-from solver.observables.repose import AZIMUTHS_DEG, flank_angles_deg
-from solver.observables.silhouette import PIXEL, Image, largest_part, left_edge, silhouette
+from solver.observables.repose import AZIMUTHS_DEG, flank_angles_deg, flank_lines
+from solver.observables.silhouette import PIXEL, Image, largest_part, left_edge, silhouette, top_bodies
 from solver.observables.surface import HeightMap, height_map
 
 if TYPE_CHECKING:
@@ -66,9 +66,29 @@ class PileReading:
         return flank_angles_deg(largest_part(silhouette(self.pile.spheres, azimuth_deg)), PIXEL)
 
     @cached_property
+    def flank_grains(self) -> Array:
+        """Bodies whose tops the line of a flank is fitted through, shape (azimuths, 2); NaN for a flank without one."""
+        counts = np.full((len(AZIMUTHS_DEG), 2), np.nan)
+        if not self.is_pile:
+            return counts
+        for k, (azimuth, image) in enumerate(zip(AZIMUTHS_DEG, self.silhouettes, strict=True)):
+            tops = top_bodies(self.pile.spheres, azimuth, image)
+            for side, line in enumerate(flank_lines(image, PIXEL)):
+                if line is not None:
+                    first, last = sorted(int(u / PIXEL) for u in line.u)
+                    within = tops[first : last + 1]
+                    counts[k, side] = np.unique(within[within >= 0]).size
+        return counts
+
+    @cached_property
     def thickness(self) -> float:
         """Thickness of a body [m]."""
         return footprint.body_thickness(self.pile)
+
+    @cached_property
+    def grain_thickness(self) -> float:
+        """The same as a mean over the pile's mass [m]: what the height of a heap is compared with."""
+        return footprint.grain_thickness(self.pile)
 
     @cached_property
     def centre(self) -> Array:

@@ -7,6 +7,7 @@ first.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,6 +24,23 @@ PIXEL = 0.25e-3
 EIGHT_NEIGHBOURS = np.ones((3, 3), dtype=bool)
 
 
+@dataclass(frozen=True, eq=False)
+class _Strips:
+    """Spheres cut into the columns of an image of ``rows`` and ``columns`` pixels (k strips)."""
+
+    rows: int
+    columns: int
+    sphere: npt.NDArray[np.int64]
+    """Index of the sphere that a strip is of, shape (k,)."""
+    column: npt.NDArray[np.int64]
+    first: npt.NDArray[np.int64]
+    """Lowest covered row, shape (k,)."""
+    past: npt.NDArray[np.int64]
+    """Row above the highest covered one, shape (k,)."""
+    top: Array
+    """Upper end in pixels, not rounded, shape (k,)."""
+
+
 def silhouette(spheres: Spheres, azimuth_deg: float, pixel: float = PIXEL) -> Image:
     """Image of the union of ``spheres`` on a grid of ``pixel`` [m], shape (rows, columns).
 
@@ -33,6 +51,32 @@ def silhouette(spheres: Spheres, azimuth_deg: float, pixel: float = PIXEL) -> Im
     """
     if spheres.radius.size == 0:
         return np.zeros((0, 0), dtype=bool)
+    cut = _strips(spheres, azimuth_deg, pixel)
+    # A sphere covers the rows first <= row < past of a column: mark +1 and -1 there, then sum up the column.
+    strip = cut.column * (cut.rows + 1)
+    size = cut.columns * (cut.rows + 1)
+    edges = np.bincount(strip + cut.first, minlength=size) - np.bincount(strip + cut.past, minlength=size)
+    covered: Image = np.cumsum(edges.reshape(cut.columns, cut.rows + 1), axis=1)[:, : cut.rows] > 0
+    return covered.T
+
+
+def top_bodies(spheres: Spheres, azimuth_deg: float, image: Image, pixel: float = PIXEL) -> npt.NDArray[np.int64]:
+    """Body whose surface is the top of ``image`` in each of its columns, shape (columns,); -1 over an empty column.
+
+    ``image``: the silhouette of ``spheres`` from that azimuth, or a part of it.
+    """
+    found = np.full(image.shape[1], -1, dtype=np.int64)
+    if spheres.radius.size == 0:
+        return found
+    cut = _strips(spheres, azimuth_deg, pixel)
+    # What sticks out above the image's own part belongs to another part of the silhouette.
+    on_top = np.flatnonzero(cut.past == column_tops(image)[cut.column])
+    on_top = on_top[np.argsort(cut.top[on_top], kind="stable")]
+    found[cut.column[on_top]] = spheres.body[cut.sphere[on_top]]
+    return np.where(image.any(axis=0), found, -1)
+
+
+def _strips(spheres: Spheres, azimuth_deg: float, pixel: float) -> _Strips:
     u = _across(spheres, azimuth_deg) / pixel
     z = spheres.centre[:, 2] / pixel
     radius = spheres.radius / pixel
@@ -40,7 +84,6 @@ def silhouette(spheres: Spheres, azimuth_deg: float, pixel: float = PIXEL) -> Im
 
     columns = int(np.ceil((u + radius).max()))
     rows = max(int(np.ceil((z + radius).max())), 1)
-    # A sphere covers the rows first <= row < past of a column: mark +1 and -1 there, then sum up the column.
     first_column = np.ceil(u - radius - 0.5).astype(np.int64)
     column = first_column[:, None] + np.arange(int(np.ceil(2.0 * radius.max())) + 1)
     half_chord_squared = radius[:, None] ** 2 - (column + 0.5 - u[:, None]) ** 2
@@ -48,11 +91,7 @@ def silhouette(spheres: Spheres, azimuth_deg: float, pixel: float = PIXEL) -> Im
     half_chord = np.sqrt(half_chord_squared[hit])
     first = np.clip(np.ceil(z[sphere] - half_chord - 0.5), 0, rows).astype(np.int64)
     past = np.clip(np.floor(z[sphere] + half_chord + 0.5), first, rows).astype(np.int64)
-    strip = column[hit] * (rows + 1)
-    size = columns * (rows + 1)
-    edges = np.bincount(strip + first, minlength=size) - np.bincount(strip + past, minlength=size)
-    covered: Image = np.cumsum(edges.reshape(columns, rows + 1), axis=1)[:, :rows] > 0
-    return covered.T
+    return _Strips(rows, columns, sphere, column[hit], first, past, z[sphere] + half_chord)
 
 
 def left_edge(spheres: Spheres, azimuth_deg: float, pixel: float = PIXEL) -> float:

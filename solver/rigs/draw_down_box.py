@@ -21,6 +21,7 @@ from dataclasses import dataclass
 
 from solver.params import ParameterError, param
 from solver.rigs.feed import BoxFeed
+from solver.rigs.outlet import Slot
 from solver.rigs.rig import DISCHARGE, Action, Container, PourRig, Switch
 from solver.rigs.surface import Surface, horizontal, rectangle
 from solver.rigs.turns import FACING_MINUS_Y, FACING_PLUS_Y, turned_plane
@@ -97,6 +98,11 @@ class DrawDownBox(PourRig):
     def container(self, since: float) -> Container:
         """The upper box and the upper half of the way through the slot, where a body may lie across it."""
         return Container(self.floor, math.hypot(self.width, self.depth) / 2.0)
+
+    @property
+    def outlet(self) -> Slot:
+        """The slot."""
+        return Slot(self.slot_width / 2.0)
 
     def actions(self) -> tuple[Action, ...]:
         """The slot opens."""

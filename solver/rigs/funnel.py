@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 from solver.params import ParameterError, param
 from solver.rigs.feed import RoundFeed
+from solver.rigs.outlet import RoundOutlet
 from solver.rigs.rig import DISCHARGE, PILE, Action, Container, PourRig, Switch
 from solver.rigs.surface import Revolved, Surface, horizontal
 
@@ -66,6 +67,11 @@ class Funnel(PourRig):
     def container(self, since: float) -> Container:
         """Above the outlet, within the radius of the feed opening."""
         return Container(self.outlet_height, self.inlet_diameter / 2.0)
+
+    @property
+    def outlet(self) -> RoundOutlet:
+        """The narrow end of the cone."""
+        return RoundOutlet(self.outlet_diameter / 2.0)
 
     def actions(self) -> tuple[Action, ...]:
         """The gate opens."""

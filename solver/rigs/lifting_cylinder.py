@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 from solver.params import ParameterError, param
 from solver.rigs.feed import RoundFeed
+from solver.rigs.outlet import RoundOutlet
 from solver.rigs.rig import DISCHARGE, PILE, Action, Container, Move, PourRig
 from solver.rigs.surface import Revolved, Surface, horizontal
 
@@ -69,6 +70,11 @@ class LiftingCylinder(PourRig):
     def container(self, since: float) -> Container:
         """Above the lower edge of the cylinder, which rises, within its radius."""
         return Container(min(self.lift_speed * since, self.lift_height), self.diameter / 2.0)
+
+    @property
+    def outlet(self) -> RoundOutlet:
+        """The lower end of the cylinder."""
+        return RoundOutlet(self.diameter / 2.0)
 
     def actions(self) -> tuple[Action, ...]:
         """The cylinder rises, then stands still."""

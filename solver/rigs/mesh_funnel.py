@@ -18,6 +18,7 @@ from solver.mesh_file import LENGTH_UNITS, SUFFIXES
 from solver.params import ParameterError, param
 from solver.rigs.feed import RoundFeed
 from solver.rigs.mesh_opening import Opening, cut, middle, opening, shut
+from solver.rigs.outlet import RoundOutlet
 from solver.rigs.rig import DISCHARGE, PILE, Action, Container, PourRig, Switch
 from solver.rigs.surface import Pose, Revolved, Surface, TriangleMesh, horizontal, load_mesh
 
@@ -96,6 +97,11 @@ class MeshFunnel(PourRig):
     def container(self, since: float) -> Container:
         """Above the outlet, as far from the axis as the mesh reaches."""
         return Container(self.outlet_height, self.placed.reach)
+
+    @property
+    def outlet(self) -> RoundOutlet:
+        """The largest circle in the opening at the bottom."""
+        return RoundOutlet(self.placed.outlet.nearest)
 
     def actions(self) -> tuple[Action, ...]:
         """The gate opens."""

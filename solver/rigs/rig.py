@@ -14,6 +14,7 @@ from types import MappingProxyType
 from typing import Protocol
 
 from solver.rigs.feed import Feed
+from solver.rigs.outlet import Outlet
 from solver.rigs.surface import Surface
 
 NOTHING: Mapping[str, float | str] = MappingProxyType({})
@@ -194,9 +195,19 @@ class PourRig(Rig, Protocol):
         return False
 
     @property
+    def leaves_heap(self) -> bool:
+        """Whether a heap's angle of repose is asked for: a flat layer is then no result (``Outcome.NO_HEAP``)."""
+        return "angle_of_repose_deg" in self.observables
+
+    @property
     def keeps_material(self) -> bool:
         """Whether what stays in the container at rest belongs to the result. Otherwise it is a jam."""
         return False
+
+    @property
+    def outlet(self) -> Outlet | None:
+        """The opening at the container's lower end that everything leaves through; None: there is none."""
+        return None
 
     @property
     def running_time(self) -> float | None:

@@ -27,7 +27,7 @@ PATIENCE_MS = 120_000
 ALL_TABS = tuple(
     (name, name.lower().replace(" ", "_")) for name in ("Pour", "Look", "Take along", "Calibrate", "Diagnose")
 )
-SETTLED = ("at rest", "ended", "jammed")
+SETTLED = ("at rest", "no heap", "ended", "jammed", "obstructed")
 
 
 @contextmanager

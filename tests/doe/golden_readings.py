@@ -1,4 +1,4 @@
-"""What is read off a few kept raw pours: every observable of their rigs, and what a diagnosis reads.
+"""What is read off a few kept raw pours: their outcomes, every observable of their rigs, and what a diagnosis reads.
 
 ``golden_readings.json`` holds the numbers with the version of the readings. ``python -m tests.doe.golden_readings``
 (``make golden``) records what is new, and refuses numbers that changed under the same version. The raw pours in
@@ -15,6 +15,7 @@ from doe.measurement.load import load_measurement
 from doe.store import READINGS, observables_of, read_off
 from solver import Scene, load_material, packed, run_pour, unpacked, with_values
 from solver.assets import measurement_folder
+from tests.solver.beans import two_layers
 from tests.solver.golden.cases import FEW, TREFOIL, pours
 from tests.solver.golden.golden_file import at_odds
 
@@ -25,7 +26,8 @@ TOLERANCE = 1e-9
 DIAGNOSED = {"trefoils": "trefoil_1", "drum": "granudrum_mcc"}
 """Raw pour → data set for which a diagnosis reads it."""
 
-Numbers = dict[str, float | None]
+Numbers = dict[str, float | str | None]
+OUTCOME = "outcome"
 
 
 def scenes() -> dict[str, Scene]:
@@ -36,6 +38,7 @@ def scenes() -> dict[str, Scene]:
         "trefoils": with_values(TREFOIL, {"rig.mass": 8e-3, "insertion.rate": 0.1}),
         "mixture": mixture,
         "box": with_values(poured["pour, draw_down_box, fill_then_open"], {"rig.mass": 12e-3}),
+        "layer": two_layers(),
         "drum": with_values(
             poured["pour, rotating_drum, fill_then_open"], FEW["rotating_drum"] | {"rig.averaging_turns": 0.1}
         ),
@@ -43,11 +46,11 @@ def scenes() -> dict[str, Scene]:
 
 
 def numbers() -> Numbers:
-    """Every number of every raw pour, as "<raw pour>: <name>"."""
+    """The outcome and every number of every raw pour, as "<raw pour>: <name>"."""
     found: Numbers = {}
     for name in sorted(path.stem for path in RAW_POURS.glob("*.npz")):
         raw = (RAW_POURS / f"{name}.npz").read_bytes()
-        seen = read_off(raw, observables_of)
+        seen: Numbers = {OUTCOME: str(unpacked(raw).outcome), **read_off(raw, observables_of)}
         if name in DIAGNOSED:
             condition = load_measurement(measurement_folder(DIAGNOSED[name])).conditions[0]
             seen |= read_off(raw, reader(condition))
@@ -60,9 +63,9 @@ def differing(one: Numbers, other: Numbers) -> list[str]:
     return [name for name in one if name in other and not _equal(one[name], other[name])]
 
 
-def _equal(one: float | None, other: float | None) -> bool:
-    if one is None or other is None:
-        return one is other
+def _equal(one: float | str | None, other: float | str | None) -> bool:
+    if not isinstance(one, float) or not isinstance(other, float):
+        return one == other
     return math.isclose(one, other, rel_tol=TOLERANCE, abs_tol=1e-3 * TOLERANCE)
 
 

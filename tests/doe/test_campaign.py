@@ -132,18 +132,24 @@ def test_target_out_of_reach_gives_the_nearest_value(study):
         assert result.optimum.values[factor.path] == pytest.approx(factor.high, rel=0.02)
 
 
-def test_rows_without_a_pile_are_missing_and_the_rest_is_analysed(study):
+@pytest.mark.parametrize("outcome", ["jammed", "no_heap", "obstructed"])
+def test_rows_without_a_pile_are_missing_and_the_rest_is_analysed(study, outcome):
     class Jamming(FormulaRunner):
         def _once(self, stage, row, setting, replicate, attempt):
             run = super()._once(stage, row, setting, replicate, attempt)
             stuck = stage == "screening" and row in (3, 8, 11, 20)
-            return dataclasses.replace(run, outcome="jammed") if stuck else run
+            return dataclasses.replace(run, outcome=outcome) if stuck else run
 
     result = run_campaign(study, PROFILE, Jamming(planted, sigma=0.8), BIAS)
     assert result.screening.analysis.missing_rows == (3, 8, 11, 20)
     assert "given up" in result.screening.analysis.notes[-1]
     assert {"X4", "X7", "X16"} <= set(result.screening.analysis.significant())
     assert result.screening.no_pile_share[3] == 1.0
+
+
+def test_a_study_of_flat_layers_ends_with_a_line_that_says_so(study):
+    with pytest.raises(StudyStopped, match=r"stopped in the pilot stage: .*\(the last runs: \d+ no_heap\)"):
+        run_campaign(study, PROFILE, FormulaRunner(planted, ended="no_heap"), BIAS)
 
 
 def test_full_profile_is_sized_by_the_pilot(study):

@@ -47,7 +47,8 @@ def test_a_failed_run_counts_for_the_no_pile_share_and_not_for_the_response():
 
 @pytest.mark.usefixtures("taichi")
 def test_pours_are_stored_reused_and_replaced(tmp_path):
-    scene = with_values(load_material("sunflower_extract"), TINY)
+    # Eight grams make a heap; a gram and a half lie flat.
+    scene = with_values(load_material("sunflower_extract"), TINY | {"rig.mass": "8g"})
     store = Store(tmp_path / "runs.sqlite")
     seen = []
     runner = PourRunner(scene, store, "test", 1, on_run=lambda stage, run, left: seen.append((run, left)))

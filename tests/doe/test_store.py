@@ -81,6 +81,23 @@ def test_readings_of_an_older_version_are_replaced(store, monkeypatch):
     assert (kept.readings, kept.observables, kept.raw) == (found.readings, found.observables, RAW)
 
 
+LAYER = (golden_readings.RAW_POURS / "layer.npz").read_bytes()
+
+
+def test_a_pour_stored_as_a_pile_is_told_as_what_it_left_without_pouring(store):
+    """Two layers of beans, stored when a pile at rest was valid whatever its height."""
+    old = dataclasses.replace(RUN, key="layer", readings=READINGS - 1, raw=LAYER)
+    assert old.outcome == "at_rest"
+    store.add(old)
+    found = store.find("layer")
+    assert (found.outcome, found.readings) == ("no_heap", READINGS - 1)
+    assert found.message.startswith("a flat layer 12.00 mm high")
+    read = store.read(found, ("angle_of_repose_deg",), observables_of)
+    assert (read.outcome, read.readings) == ("no_heap", READINGS)
+    (kept,) = (run for run in store.runs() if run.key == "layer")
+    assert (kept.outcome, kept.message, kept.readings, kept.raw) == ("no_heap", found.message, READINGS, LAYER)
+
+
 def test_what_cannot_be_read_is_none(store):
     assert store.read(RUN, ("gone",), lambda record: {"gone": float("nan")}).observables["gone"] is None
 

@@ -26,7 +26,7 @@ def test_material_and_study_run(taichi, tmp_path):
 def test_the_grains_of_the_template_come_to_rest(taichi, tmp_path):
     """Grains that are nearly round roll off the plate, since nothing resists rolling: no pile, and no study of one."""
     assert explorer("new", "study", "pellets", "--out", tmp_path).exit_code == 0
-    quick = settings({"body.spheres": "coarse", "rig.mass": "6g"})
+    quick = settings({"body.spheres": "coarse", "rig.mass": "12g"})
     poured = explorer("simulate", tmp_path / "pellets_study.toml", "--json", *quick)
     assert json.loads(poured.stdout)["outcome"] == "at_rest"
 

@@ -15,7 +15,7 @@ from explorer.live.frames import MAX_BODIES
 from explorer.live.messages import SessionState
 from explorer.session import SPEED_RANGE, Session, SessionError
 from solver.params import ParameterError
-from solver.record import Outcome
+from solver.record import Outcome, Phase
 from solver.scene import value, with_values
 from solver.shape import Solid
 from solver.time_step import time_step
@@ -75,7 +75,8 @@ def test_a_pour_runs_to_rest(session):
     session.set_speed(10.0)
     session.play()
     status = wait_for_state(session, SessionState.ENDED)
-    assert status.outcome == Outcome.AT_REST
+    assert status.outcome == Outcome.NO_HEAP  # six beads
+    assert status.phase == Phase.AT_REST
     assert status.bodies == status.bodies_planned == 6
     assert status.discharged_mass == pytest.approx(status.poured_mass)
     assert status.poured_mass == pytest.approx(6 * MASS)
@@ -83,7 +84,7 @@ def test_a_pour_runs_to_rest(session):
     frame = session.frame()
     assert frame.position.shape == (6, 3)
     assert frame.position[:, 2].max() < status.scene.rig.outlet_height
-    assert [event.text for event in session.new_events()] == ["at rest"]
+    assert [event.text for event in session.new_events()] == ["no heap: no body lies still on the plate"]
     assert session.new_events() == ()
 
 

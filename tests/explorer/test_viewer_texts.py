@@ -76,6 +76,8 @@ def test_the_time_step_is_told_against_its_limit():
         ({"capped": True}, "capped"),
         ({"state": SessionState.ENDED, "outcome": Outcome.AT_REST}, "at rest"),
         ({"state": SessionState.ENDED, "outcome": Outcome.JAMMED}, "jammed"),
+        ({"state": SessionState.ENDED, "outcome": Outcome.NO_HEAP}, "no heap"),
+        ({"state": SessionState.ENDED, "outcome": Outcome.OBSTRUCTED}, "obstructed"),
         ({"state": SessionState.ENDED, "outcome": Outcome.NON_FINITE}, "unstable"),
         ({"state": SessionState.ENDED, "outcome": Outcome.OVERLAP_LIMIT}, "unstable"),
     ],

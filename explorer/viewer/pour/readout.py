@@ -27,7 +27,9 @@ OUTCOME_WORDS = {
     Outcome.RUNNING: "still running",
     Outcome.AT_REST: "at rest: a valid pile",
     Outcome.MEASURED: "measured: the run lasted its time",
+    Outcome.NO_HEAP: "at rest: no heap, a flat layer or a few grains",
     Outcome.JAMMED: "jammed: material stays in the rig",
+    Outcome.OBSTRUCTED: "obstructed: a body lies across the outlet",
     Outcome.TIME_LIMIT: "cut off: still moving at the time limit",
     Outcome.LOST_BODY: "lost a body through the plate",
     Outcome.NON_FINITE: "diverged: a number is not finite",
@@ -45,11 +47,14 @@ STATE_WORDS = {
 }
 CONDITIONS = {
     Outcome.AT_REST: "at rest",
+    Outcome.NO_HEAP: "no heap",
     Outcome.JAMMED: "jammed",
+    Outcome.OBSTRUCTED: "obstructed",
     Outcome.NON_FINITE: "unstable",
     Outcome.OVERLAP_LIMIT: "unstable",
 }
-"""One word for how a pour stands, beside what the solver does."""
+"""In a word or two how a pour stands, beside what the solver does."""
+WARNINGS = ("no heap", "jammed", "obstructed", "unstable")
 TROUBLE = (SessionState.FAILED, SessionState.DIED)
 
 STYLE = """<style>
@@ -118,7 +123,7 @@ def time_step_text(status: Status) -> str:
 
 
 def condition(status: Status) -> str:
-    """How the pour stands in a word: at rest, jammed, unstable, capped (slower than wanted), or nothing special."""
+    """How the pour stands, in a word of ``CONDITIONS``, or capped (slower than wanted), or nothing special."""
     return CONDITIONS.get(status.outcome, "capped" if status.capped else "")
 
 
@@ -168,7 +173,7 @@ def _state(status: Status) -> str:
     kind = "state trouble" if status.state in TROUBLE else "state"
     pills = f"<span class='{kind}'>{STATE_WORDS[status.state]}</span>"
     if word := condition(status):
-        kind = "condition trouble" if word in ("jammed", "unstable") else "condition"
+        kind = "condition trouble" if word in WARNINGS else "condition"
         pills += f" <span class='{kind}'>{word}</span>"
     return f"<span>{pills}</span>"
 

@@ -148,7 +148,7 @@ def pour_numbers(scenes: Mapping[str, Scene]) -> tuple[Numbers, Numbers]:
 def _all_of(pour: Pour) -> Array:
     curves = [x for sample in pour.samples for name, x in sample.items() if name not in OF_THE_LIST]
     surface = [height for _, heights in pour._free_surface for height in heights]
-    decided = [pour.steps, pour.gate_opened, pour.entered, *pour.outcome.value.encode()]
+    decided = [pour.steps, pour.gate_opened, pour.entered, *pour.ended[0].value.encode()]
     state = pour.batch.bodies(pour.w, pour.entered).ravel()
     return np.concatenate([state, curves, surface, decided, pour.record().in_pile])
 

@@ -115,6 +115,7 @@ def record_of(
         0,
         Outcome.AT_REST,
         "",
+        (Outcome.AT_REST, ""),
         bodies,
         pile.spheres,
         np.ones(n, dtype=bool),

@@ -122,7 +122,7 @@ def test_a_pour_through_the_mesh_of_a_cone_is_that_through_the_cone(tmp_path):
     t90 = {}
     for name, scene in (("cone", shipped), ("mesh", meshed)):
         records = [run_pour(scene, seed) for seed in (1, 2, 3, 4)]
-        assert [record.outcome for record in records] == [Outcome.AT_REST] * 4
+        assert [record.ended[0] for record in records] == [Outcome.AT_REST] * 4
         t90[name] = []
         for record in records:
             assert record.trace.discharged_mass[-1] == pytest.approx(record.poured_mass)

@@ -167,11 +167,10 @@ def test_what_stays_in_a_draw_down_box_and_what_falls_add_up():
     assert set(seen) == set(BOX.rig.observables)
 
 
-def test_a_slot_that_lets_nothing_through_is_a_jam():
-    narrow = with_settings(BOX, {"rig.slot_width": "12mm", "rig.mass": "8g"})
-    record = run(narrow).on().pour
-    assert record.outcome == Outcome.JAMMED
-    assert "nothing passes" in record.message
+def test_seeds_across_a_slot_that_is_narrower_than_they_are_long_obstruct_it():
+    record = run(with_settings(BOX, {"rig.slot_width": "12mm", "rig.mass": "8g"})).on().pour
+    assert record.outcome == Outcome.OBSTRUCTED
+    assert "one seed (0.346 g) lies across the outlet of the draw down box and holds up" in record.message
 
 
 @pytest.fixture(scope="module")

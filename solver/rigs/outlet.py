@@ -1,0 +1,114 @@
+"""The opening that a rig empties through, seen from above, and what lies across it when nothing moves any more.
+
+A body lies across the outlet if its centre of mass is over the opening, and two parts of it reach the edge, on opposite
+sides of that centre, so that the line between them crosses the opening within 0.71 half widths of its middle (of a
+circle: cuts off more than a quarter turn of the edge). It cannot fall, whatever else is there. What is held by several
+bodies none of which does, along the edge or beside each other, is an arch.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from solver.record import Bodies, Spheres
+
+Array = npt.NDArray[np.float64]
+
+EDGE = 0.99
+"""Share of the half width from which on a body reaches the edge: one between upright walls just touches them."""
+CHORD = 0.5**0.5
+"""Share of the half width within which its line passes the middle."""
+
+
+class Outlet(Protocol):
+    """An opening about the z axis."""
+
+    def across(self, place: Array) -> Array:
+        """``place`` (n, 2) [m] without what lies along the opening, shape (n, 1 or 2): its length counts."""
+        ...
+
+    @property
+    def half_width(self) -> float:
+        """Half of the narrowest way across [m]."""
+        ...
+
+
+@dataclass(frozen=True)
+class RoundOutlet:
+    """A circle; of an opening that is not round, the largest within it."""
+
+    half_width: float
+
+    def across(self, place: Array) -> Array:
+        """See :class:`Outlet`."""
+        return place
+
+
+@dataclass(frozen=True)
+class Slot:
+    """A slot along y."""
+
+    half_width: float
+
+    def across(self, place: Array) -> Array:
+        """See :class:`Outlet`."""
+        return place[:, :1]
+
+
+@dataclass(frozen=True)
+class Obstruction:
+    """A body that lies across the outlet."""
+
+    component: str
+    mass: float
+    """Its own [kg]."""
+    above: float
+    """Of the other bodies over the outlet [kg]; in a rig that is to be empty, of all that are in it."""
+
+
+def obstruction(
+    outlet: Outlet, height: float, bodies: Bodies, spheres: Spheres, held: npt.NDArray[np.bool_], keeps: bool
+) -> Obstruction | None:
+    """The lowest body across ``outlet``, whose edge is at ``height`` [m]; None where there is none.
+
+    ``spheres``: the member spheres of ``bodies``. ``held``: which bodies are in the container, shape (n,). ``keeps``:
+    whether bodies beside the outlet belong there, so that only those over it are held up.
+
+    A body across the outlet that lies on others which hang lower is part of an arch, and is none. Its centre of mass
+    may be just below the edge: the parts of it that bear on the edge are not.
+    """
+    over = np.linalg.norm(outlet.across(bodies.position[:, :2]), axis=1) < outlet.half_width
+    lowest = np.full(bodies.mass.size, np.inf)
+    np.minimum.at(lowest, spheres.body, spheres.centre[:, 2] - spheres.radius)
+    for b in np.argsort(bodies.position[:, 2], kind="stable"):
+        mine = (spheres.body == b) & (spheres.centre[:, 2] + spheres.radius >= height)
+        if not bodies.inside[b] or not over[b] or not mine.any():
+            continue
+        others = held & (np.arange(held.size) != b)
+        if (bodies.position[others, 2] < lowest[b]).any():
+            return None
+        if _reaches_both_sides(outlet, spheres.centre[mine, :2], spheres.radius[mine], bodies.position[b, :2]):
+            above = others & over if keeps else others
+            name = bodies.component_names[bodies.component[b]]
+            return Obstruction(name, float(bodies.mass[b]), float(bodies.mass[above].sum()))
+    return None
+
+
+def _reaches_both_sides(outlet: Outlet, place: Array, radius: Array, middle: Array) -> bool:
+    """Whether discs at ``place`` (n, 2) of ``radius`` (n,) [m] reach the edge on opposite sides of ``middle`` (2,).
+
+    And whether the line between them crosses the opening.
+    """
+    from_middle = outlet.across(place)
+    at_edge = np.linalg.norm(from_middle, axis=1) + radius >= EDGE * outlet.half_width
+    arms, start = (place - middle)[at_edge], from_middle[at_edge]
+    way = start[None, :, :] - start[:, None, :]
+    length2 = np.maximum((way**2).sum(axis=2), 1e-30)
+    share = np.clip(-(start[:, None, :] * way).sum(axis=2) / length2, 0.0, 1.0)
+    nearest = np.linalg.norm(start[:, None, :] + share[:, :, None] * way, axis=2)
+    return bool(((arms @ arms.T < 0.0) & (nearest <= CHORD * outlet.half_width)).any())
