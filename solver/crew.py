@@ -240,7 +240,6 @@ class Rooms:
             begin_worker()
             for size in sizes:
                 batch = self.for_scene(examples[size])
-                batch.summary()  # allocates it before the next one
                 if size in mine:
                     _pour_for_a_moment(batch, examples[size])
 

@@ -282,6 +282,8 @@ class State:
             self.pair = Group(PAIR, (c.worlds, c.contacts))
             # Entry at which a partner of the body at hand was last met, while the list is built.
             self.lead = Group({"body": ti.i32, "wall": ti.i32}, (c.worlds, max(c.bodies, c.walls)))
+        # Allocated now: Taichi takes at most 1024 fields at once, and kernels depend on what was allocated before them.
+        ti.sync()
 
 
 def _field(dtype, shape):
