@@ -15,6 +15,9 @@ class Numerics:
     """Time step, neighbour lists, and the criteria by which a run ends."""
 
     rayleigh_fraction: float = param(0.3, low=0.02, high=0.6, doc="Time step as a fraction of the Rayleigh time.")
+    impact_fraction: float = param(
+        0.35, low=0.02, high=1.0, doc="Time step times the frequency of a body's far end pressed by a 2 m/s impact."
+    )
     skin: float = param(1.0e-3, unit="m", low=1e-5, high=2e-2, doc="Reach of the contact list beyond touching.")
     rest_speed: float = param(
         2e-3,

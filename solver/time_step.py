@@ -3,11 +3,11 @@
 Two limits, the smaller one rules:
 
     Rayleigh    dt = f T_R,  T_R = π R √(ρ/G) / (0.1631 ν + 0.8766)   of the smallest member sphere (EDEM, LIGGGHTS)
-    body        dt = 0.35 √(m_eff / k),  k = 2 E* √(R δ) at the overlap that a 2 m/s impact makes, with the mass that a
+    body        dt = b √(m_eff / k),  k = 2 E* √(R δ) at the overlap that a 2 m/s impact makes, with the mass that a
                 body shows at its far end, 1/m_eff = 1/m + reach²/I (a rod's tip is lighter than the rod)
 
-f is ``numerics.rayleigh_fraction``. With f = 1, and 2 in place of 0.35 (leapfrog: ω dt < 2), the same two are the limit
-of stability. Both limits are proportional to the size of a body, so the smallest that its
+f is ``numerics.rayleigh_fraction``, b ``numerics.impact_fraction``. With f = 1 and b = 2 (leapfrog: ω dt < 2), the same
+two are the limit of stability. Both limits are proportional to the size of a body, so the smallest that its
 distribution of sizes allows is taken, whatever the seed draws. An effect that stiffens contacts shortens both.
 """
 
@@ -22,7 +22,6 @@ from solver.scene import Scene
 
 IMPACT_SPEED = 2.0
 """Speed [m/s] at which the body limit is taken; a fall of 0.2 m."""
-BODY_FRACTION = 0.35
 LEAPFROG = 2.0
 """Largest ω dt of a stable leapfrog step."""
 
@@ -35,7 +34,7 @@ def rayleigh_time(radius: float, material: Material) -> float:
 
 def time_step(scene: Scene) -> float:
     """Time step [s] of ``scene``: the smaller of the Rayleigh and the body limit over all components."""
-    return _smallest(scene, scene.numerics.rayleigh_fraction, BODY_FRACTION)
+    return _smallest(scene, scene.numerics.rayleigh_fraction, scene.numerics.impact_fraction)
 
 
 def stability_limit(scene: Scene) -> float:
