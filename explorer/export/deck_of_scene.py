@@ -57,6 +57,12 @@ def check_exportable(scene: Scene, *engines: str) -> None:
         if effect.on and not held:
             amplitude, where = f"effect.{effect.name}.{effect.amplitudes[0]}", " or ".join(engines)
             raise CommandError(f"{amplitude}: {effect.numbers[0]:g} cannot be exported to {where}; allowed: 0")
+    if scene.contact.clump_rule != "body_mass":
+        # No engine of these damps by the mass that acts at a contact.
+        raise CommandError(
+            f"contact.clump_rule: {scene.contact.clump_rule!r} cannot be exported to {' or '.join(engines)}; "
+            "allowed: body_mass"
+        )
     damping = rolling(scene).rolling_damping
     if rolling(scene).on and damping > 0.0:
         raise CommandError(f"effect.rolling_resistance.rolling_damping: {damping:g} cannot be exported; allowed: 0")
@@ -100,6 +106,8 @@ def assembled(
         friction=friction,
         restitution=restitution,
         rolling_friction=rolling(scene).rolling_friction,
+        tangential_law=scene.contact.tangential_law,
+        tangential_dashpot=scene.contact.tangential_dashpot,
         entries=entries,
         plate=plate,
         meshes=meshes,

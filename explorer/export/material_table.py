@@ -106,6 +106,13 @@ def _bodies(scene: Scene) -> Rows:
     return rows
 
 
+CLUMP_RULES_MEAN = {
+    "body_mass": "dashpots take the mass of the whole body",
+    "local_mass": "dashpots take the mass that acts at the contact",
+    "local_mass_shared": "dashpots take the mass that acts at the contacts, which share stiffness and damping",
+}
+
+
 def _conventions(scene: Scene) -> Rows:
     rolling, on = _rolling(scene)
     rows: Rows = [("quantity", "unit", "here", "in EDEM", "transfers")]
@@ -131,6 +138,21 @@ def _conventions(scene: Scene) -> Rows:
             "damping 2 sqrt(5/6) |beta| sqrt(S_n m*), beta = ln e/sqrt(ln^2 e + pi^2): returns e only if the force may "
             "pull at the end of the contact",
             "yes, if the force may pull; else type in restitution_same_damping, which gives the same damping as here",
+        ),
+        (
+            "clump rule",
+            "-",
+            f"contact.clump_rule = {scene.contact.clump_rule}: {CLUMP_RULES_MEAN[scene.contact.clump_rule]}",
+            CLUMP_RULES_MEAN["body_mass"],
+            "yes" if scene.contact.clump_rule == "body_mass" else "no: restitutions mean another damping there",
+        ),
+        (
+            "tangential law",
+            "-",
+            f"contact.tangential_law = {scene.contact.tangential_law}, contact.tangential_dashpot = "
+            f"{scene.contact.tangential_dashpot}",
+            "a displacement times the present stiffness (mindlin); spring and dashpot within the limit (capped)",
+            "yes" if scene.contact.tangential_law == "mindlin" else "nearly: they differ while a contact sticks",
         ),
         (
             "static friction",

@@ -31,18 +31,20 @@ DIFFERENCES = {
     "liggghts": """\
         Normal force: the same function (limitForce on, and restitutions replaced by those with the same damping).
         Tangential force: LIGGGHTS stores a displacement and multiplies it with the present stiffness, so the force
-        grows while a contact is loaded; ours stores the force. Its tangential damping is stronger, by 18 % at e = 0.5.
+        grows while a contact is loaded{law}. Coulomb's limit holds for its spring
+        alone{dashpot}. Its tangential damping is stronger, by 18 % at e = 0.5.
         Where a body is placed is drawn in a cube of 0.2 nm. Counting of steps: its step k + 1 is our k.""",
     "yade": """\
         Normal force and both dampings: the same functions. Tangential force: YADE does not scale the spring down while
-        a contact unloads. A sphere on an edge between two triangles of the cone is pushed by both.""",
+        a contact unloads{law}. A sphere on an edge between two triangles of the cone is pushed by both.""",
 }
 MODULI = """\
         moduli            Young's modulus and Poisson's ratio; 1/E* = sum of (1 - nu^2)/E, G from both: as here"""
 COMMON = """\
         rolling friction  {rolling}
         mass, inertia     of the true shape, not of overlapping spheres: as here
-        R*, m*            reduced radius of two member spheres (a wall: infinite) and mass of two bodies: as here"""
+        R*, m*            reduced radius of two member spheres (a wall: infinite) and mass of two bodies: as here
+                          (contact.clump_rule = body_mass)"""
 CONVENTIONS = {
     "liggghts": f"""\
 {MODULI}
@@ -98,10 +100,18 @@ def write_readme(folder: Path, engine: str, deck: Deck) -> None:
         run=_block(RUN[engine]),
         files=_block(FILES[engine]),
         conventions=_block(CONVENTIONS[engine].format(rolling=_rolling(deck.rolling_friction))),
-        differences=_block(DIFFERENCES[engine]),
+        differences=_block(_differences(engine, deck)),
         plate="" if deck.plate is None else f" z = {deck.plate:g} m",
     )
     (folder / "README.txt").write_text(text, encoding="utf-8")
+
+
+def _differences(engine: str, deck: Deck) -> str:
+    same = engine == "liggghts" and deck.tangential_law == "mindlin"
+    law = f"{', as' if same else '; not so'} here (contact.tangential_law = {deck.tangential_law})"
+    both = "; here as well" if deck.tangential_dashpot == "uncapped" else ", here for both"
+    dashpot = f"{both} (contact.tangential_dashpot = {deck.tangential_dashpot})"
+    return DIFFERENCES[engine].format(law=law, dashpot=dashpot)
 
 
 def _rolling(friction: float) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import sys
 from collections.abc import Callable
@@ -112,6 +113,7 @@ def described(study: Study, profile: Profile, tries: int = TRIES) -> dict[str, A
         "factors": study.factors,
         "assumptions": study.assumptions,
         "assumed": study.scene.assumed,
+        "contact": dataclasses.asdict(study.scene.contact),
         "changes": study.changes,
         "seed": study.seed,
         "tries": tries,

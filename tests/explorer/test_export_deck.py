@@ -7,6 +7,8 @@ import pytest
 
 from explorer.errors import CommandError
 from explorer.export.deck_of_scene import check_exportable, deck_of
+from explorer.export.readme import _differences
+from solver.contact_model import ContactModel
 from solver.effects import EFFECTS
 from solver.sizes import SizeDistribution
 from tests.solver.observables.made_up import cone, record_of
@@ -47,3 +49,25 @@ def test_effects_of_the_set_up_are_carried_out_first():
     check_exportable(scene.with_effect(EFFECTS["plate_tilt"](tilt_x=2.0)), "yade")
     with pytest.raises(CommandError, match=r"size_distribution: 'log_normal' cannot be exported"):
         check_exportable(scene.with_effect(EFFECTS["size_dispersion"](spread=0.1)), "yade")
+
+
+def test_a_clump_rule_of_no_other_program_is_not_exported():
+    scene = record_of(cone(20.0, 0.05), np.zeros(1), np.zeros(1), 0.03).scene
+    local = dataclasses.replace(scene, contact=ContactModel(clump_rule="local_mass"))
+    with pytest.raises(
+        CommandError, match=r"contact\.clump_rule: 'local_mass' cannot be exported to yade; allowed: body"
+    ):
+        check_exportable(local, "yade")
+
+
+@pytest.mark.parametrize(
+    ("contact", "law", "dashpot"),
+    [
+        (ContactModel(), "not so here (contact.tangential_law = mindlin_rescale)", "here for both"),
+        (ContactModel(tangential_law="mindlin", tangential_dashpot="uncapped"), "as here", "here as well"),
+    ],
+)
+def test_the_readme_of_a_deck_says_which_tangential_law_was_used_here(contact, law, dashpot):
+    text = _differences("liggghts", contact)
+    assert law in text
+    assert dashpot in text

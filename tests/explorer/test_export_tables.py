@@ -55,6 +55,14 @@ def test_a_rolling_friction_is_not_handed_on_as_a_number(tmp_path, settings, cel
     assert row["transfers"].startswith(transfers)
 
 
+@pytest.mark.parametrize(("rule", "transfers"), [("body_mass", "yes"), ("local_mass", "no: ")])
+def test_the_clump_rule_is_named_and_transfers_where_it_is_that_of_edem(tmp_path, rule, transfers):
+    found = tables(tmp_path, [f"contact.clump_rule={rule}"])
+    (row,) = [row for row in found["conventions"] if row["quantity"] == "clump rule"]
+    assert row["here"].startswith(f"contact.clump_rule = {rule}: dashpots take the mass")
+    assert row["transfers"].startswith(transfers)
+
+
 def test_a_restitution_that_no_other_damping_has_is_left_out(tmp_path):
     row = tables(tmp_path, ["pair.seed.seed.restitution=0.06"])["interactions"][0]
     assert (row["restitution"], row["restitution_same_damping"]) == ("0.06", "")

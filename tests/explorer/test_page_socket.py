@@ -160,6 +160,8 @@ def test_keys_colour_the_bodies_and_the_solver_sends_what_that_takes(page, brows
 
 
 def test_a_click_into_the_scene_finds_a_body_and_one_beside_lets_it_go(page, browser):
+    # Drawn anew after the colours of the test before.
+    wait_for(lambda: page.look._drawn is not None)
     frame = page.look._drawn[1]
     top = int(np.argmax(frame.position[:, 2]))
     browser.click(frame.position[top] + [0, 0, 1.0], (0, 0, -1))

@@ -30,6 +30,9 @@ def runs(result: Plain) -> Section:
         Text(text),
         Table(("stage", *(name.replace("_", " ") for name in names), "pours"), tuple(rows)),
     ]
+    if contact := result["study"].get("contact"):
+        named = ", ".join(f"{name.replace('_', ' ')} {choice}" for name, choice in contact.items())
+        blocks.append(Text(f"Contact law: Hertz–Mindlin; {named} (`explorer parameters`, contact.*)."))
     if result["shapes"]:
         blocks.append(_shapes(result["shapes"]))
     return Section("Runs", tuple(blocks))
