@@ -20,11 +20,10 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from solver.body import SPHERES, Body, body_parameters, counts, with_body_value, with_densities
-from solver.contact_model import ContactModel
 from solver.effects import EFFECTS, Effect
 from solver.effects.set_up import actual
 from solver.insertion import Insertion
-from solver.material import Material, Pair
+from solver.material import ContactModel, Material, Pair
 from solver.numerics import Numerics
 from solver.params import Parameter, ParameterError, declared
 from solver.rigs import BENCH_RIGS, RIGS, Funnel, PourRig, Rig

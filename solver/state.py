@@ -45,9 +45,9 @@ WORLD = {
     "taken_out": ti.f64,  # kinetic and potential energy of bodies that were taken out [J]
     "domain": ti.f64,  # bodies beyond |x| or |y| of this are taken out [m]
     "grip": ti.f64,  # distance at which effects may still hold surfaces that have touched [m]
-    "clump_rule": ti.i32,  # place in ``contact_model.CLUMP_RULES``
-    "tangential_law": ti.i32,  # place in ``contact_model.TANGENTIAL_LAWS``
-    "tangential_dashpot": ti.i32,  # place in ``contact_model.TANGENTIAL_DASHPOTS``
+    "clump_rule": ti.i32,  # place in ``material.CLUMP_RULES``
+    "tangential_law": ti.i32,  # place in ``material.TANGENTIAL_LAWS``
+    "tangential_dashpot": ti.i32,  # place in ``material.TANGENTIAL_DASHPOTS``
     "outlet": ti.f64,  # height of the outlet [m]
     "inlet_radius": ti.f64,  # radius of the feed opening [m]
 }

@@ -28,6 +28,7 @@ DOE_PARTS_THAT_MAY_USE_THE_SOLVER = {
     "doe/store.py": "keeps raw pours, and reads observables off them",
     "doe/runner.py": "turns a row of a design into a batch of simulated worlds",
     "doe/factors.py": "checks a factor's path and range against the declared parameters",
+    "doe/economy.py": "changes the numerical settings of a study's scene",
     "doe/study.py": "reads a study file: its material, rig and insertion make a scene",
     "doe/measurement/": "a condition is a scene, and data and runs are read by the same functions",
     "doe/validation/": "laboratories that pour what the diagnosis is then asked about",

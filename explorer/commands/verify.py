@@ -15,7 +15,11 @@ def verify(
     only: list[str] = typer.Option([], metavar="NAME", help="Run only this part, e.g. T4; may be repeated."),
     json: Path | None = typer.Option(None, "--json", metavar="FILE", help="Write every row to this file."),
     every: bool = typer.Option(False, "--all", help="Print every point, not only the furthest of each curve."),
-    peers: bool = typer.Option(False, "--peers", help="Run T4, T5, T6 and T8 in LIGGGHTS too; print what ours misses."),
+    peers: bool = typer.Option(
+        False,
+        "--peers",
+        help="Run T4, T5, T6, T8 in LIGGGHTS and by its law, beside what ours misses.",
+    ),
     peer_limit: float = typer.Option(
         120.0, metavar="S", help="Wall time after which a run of LIGGGHTS is stopped [s].", min=1.0
     ),
@@ -31,7 +35,7 @@ def verify(
     from explorer.files.run_folder import json_text
     from explorer.files.whole_file import write_whole
     from explorer.tables.verification import peers_text, result_of, summary_text, table_text
-    from solver.verification import BY_ANY_ENGINE, FAMILIES, verify_engine
+    from solver.verification import BY_ANY_ENGINE, FAMILIES, OURS_BY_DISPLACEMENT, verify_engine
     from solver.verification import verify as rows_of
 
     by_lower_case = {name.lower(): name for name in FAMILIES}
@@ -57,7 +61,7 @@ def verify(
     typer.echo(table_text(rows, every))
     if peers:
         engine = liggghts_engine(peer_limit)
-        beside = {engine.name: list(verify_engine(engine, shared))}
+        beside = {one.name: list(verify_engine(one, shared)) for one in (engine, OURS_BY_DISPLACEMENT)}
         keep(beside)
         typer.echo(peers_text(rows, beside))
     typer.echo(summary_text(rows))

@@ -72,7 +72,7 @@ class Deck:
     """μ_r of all contacts: a torque spring k_t R*² with its cap at μ_r R* F_n; 0: nothing resists rolling."""
     tangential_law: str
     tangential_dashpot: str
-    """Conventions that the pour was calculated with here (``solver.contact_model``); an engine has its own."""
+    """Conventions that the pour was calculated with here (``solver.material``); an engine has its own."""
     entries: Entries
     plate: float | None
     """Height of the infinite plate [m]; None: there is none."""

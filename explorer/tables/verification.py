@@ -8,7 +8,7 @@ from typing import Any
 
 from explorer.files.run_result import versions
 from explorer.tables.text_table import text_table
-from solver.verification import Row
+from solver.verification import OURS_BY_DISPLACEMENT, Row
 
 HEADER = ("test", "quantity", "points", "at", "reference", "ours", "error %", "limit %", "of", "ok")
 
@@ -18,6 +18,7 @@ MISSED_ALONE = {
     "T6": "LIGGGHTS's curve crosses the printed one here and misses it on either side; ours, without a dashpot beyond "
     "Coulomb's limit, crosses it elsewhere",
 }
+KEPT_BY_CONVENTION = "kept with contact.tangential_law mindlin and contact.tangential_dashpot uncapped: a convention"
 """Why ours misses the sticking part of a test at points where another engine keeps the limit."""
 
 PeerRows = Mapping[str, Sequence[Row]]
@@ -83,6 +84,8 @@ def _peer_text(rows: Sequence[Row], name: str, found: Sequence[Row]) -> str:
         points = [row for row in alone if row.test == test]
         lines.append(f"by ours alone: {test}: " + "; ".join(f"{row.quantity}, {row.at}" for row in points))
         known = MISSED_ALONE.get(test) if all(row.quantity.endswith("sticking") for row in points) else None
+        if known and name == OURS_BY_DISPLACEMENT.name:
+            known = KEPT_BY_CONVENTION
         lines.append(f"    {known or 'no reason is known: a bug until one is'}")
     theirs_alone = [theirs for ours, theirs in both if ours.passed and not theirs.passed]
     for points in curves(theirs_alone):

@@ -19,7 +19,7 @@ from solver.verification import (
     spinning,
     two_spheres,
 )
-from solver.verification.impacts import Engine
+from solver.verification.impacts import OURS_BY_DISPLACEMENT, Engine
 from solver.verification.row import Row
 
 Family = Callable[[], Iterator[Row]]
@@ -81,4 +81,4 @@ def verify_engine(engine: Engine, only: Sequence[str] = tuple(BY_ANY_ENGINE)) ->
             yield from family(engine)
 
 
-__all__ = ["BY_ANY_ENGINE", "FAMILIES", "Engine", "Row", "verify", "verify_engine"]
+__all__ = ["BY_ANY_ENGINE", "FAMILIES", "OURS_BY_DISPLACEMENT", "Engine", "Row", "verify", "verify_engine"]

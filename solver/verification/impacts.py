@@ -7,17 +7,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
 from solver.laboratory import Laboratory, scene_of, sphere
-from solver.material import Material, Pair, effective_youngs_modulus
+from solver.material import ContactModel, Material, Pair, effective_youngs_modulus
 from solver.verification.chung_ooi import RIGID
 
 Array = npt.NDArray[np.float64]
 
+DECLARED_BY_NOBODY = ContactModel()
+"""Conventions of a scene that names none."""
 STEPS_PER_CONTACT = 2000
 """Steps in the time of the elastic contact, about 0.002 of the Rayleigh time: no error of the step is left to see."""
 
@@ -86,7 +89,9 @@ def contact_time(impact: Impact) -> float:
     return 2.943 * hertz_depth(impact.mass, impact.v_n, e_star, impact.radius) / impact.v_n
 
 
-def rebounds(impacts: Sequence[Impact], dt: float | None = None) -> list[Rebound]:
+def rebounds(
+    impacts: Sequence[Impact], dt: float | None = None, contact: ContactModel = DECLARED_BY_NOBODY
+) -> list[Rebound]:
     """Run ``impacts`` side by side in one world; ``dt`` [s] is by default ``STEPS_PER_CONTACT`` in the shortest one."""
     kinds = list(dict.fromkeys((i.material, i.radius, i.restitution, i.friction) for i in impacts))
     bodies = [sphere(radius, material, name=f"ball {k}") for k, (material, radius, _, _) in enumerate(kinds)]
@@ -94,7 +99,7 @@ def rebounds(impacts: Sequence[Impact], dt: float | None = None) -> list[Rebound
     materials = list(dict.fromkeys(i.material for i in impacts))
     # Balls do not meet, but a scene names every pair.
     balls = [Pair(a.name, b.name, 0.0, 1.0) for k, a in enumerate(materials) for b in materials[k:]]
-    scene = scene_of(bodies, (*materials, RIGID), (*walls, *balls))
+    scene = replace(scene_of(bodies, (*materials, RIGID), (*walls, *balls)), contact=contact)
     times = [contact_time(i) for i in impacts]
     dt = dt or min(times) / STEPS_PER_CONTACT
     lab = Laboratory(scene, [kinds.index((i.material, i.radius, i.restitution, i.friction)) for i in impacts], dt)
@@ -110,13 +115,13 @@ def rebounds(impacts: Sequence[Impact], dt: float | None = None) -> list[Rebound
     ]
 
 
-def struck(impacts: Sequence[Impact], target: Target) -> list[Rebound]:
+def struck(impacts: Sequence[Impact], target: Target, contact: ContactModel = DECLARED_BY_NOBODY) -> list[Rebound]:
     """Run ``impacts`` on a target each, side by side; they share material, radius, speed, restitution and friction."""
     one, n = impacts[0], len(impacts)
     ball, heavy = sphere(one.radius, one.material, name="ball"), sphere(target.radius, target.material, name="target")
     names = ("ball", "target", "wall")
     pairs = [Pair(a, b, one.friction, one.restitution) for k, a in enumerate(names) for b in names[k:]]
-    scene = scene_of((ball, heavy), (one.material, target.material, RIGID), pairs)
+    scene = replace(scene_of((ball, heavy), (one.material, target.material, RIGID), pairs), contact=contact)
     dt = struck_time(one, target) / STEPS_PER_CONTACT
     lab = Laboratory(scene, [0] * n + [1] * n, dt, plate=False)
     for k, impact in enumerate(impacts):
@@ -152,3 +157,8 @@ class Engine:
 
 
 OURS = Engine("ours", rebounds, struck)
+DISPLACEMENT_LAW = ContactModel(tangential_law="mindlin", tangential_dashpot="uncapped")
+OURS_BY_DISPLACEMENT = Engine(
+    "ours, mindlin", partial(rebounds, contact=DISPLACEMENT_LAW), partial(struck, contact=DISPLACEMENT_LAW)
+)
+"""The solver with the tangential conventions of LIGGGHTS."""

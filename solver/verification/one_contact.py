@@ -42,6 +42,8 @@ class Convention:
     """When the spring follows a/a_prev; "always" is the law that keeps a displacement ξ, F = k_t(a) ξ."""
     damped: bool = True
     """Whether the tangential motion is damped."""
+    capped: bool = True
+    """Whether Coulomb's limit holds for spring and dashpot together, or for the spring alone."""
 
 
 OURS = Convention()
@@ -75,7 +77,9 @@ def integrated(impacts: Sequence[Impact], convention: Convention = OURS) -> list
         trial = spring - stiffness * root * (u_half + arm * s_half) * dt
         spring = np.clip(trial, -mu * f, mu * f)
         damping = np.where(np.abs(trial) > mu * f, 0.0, tangential * math.sqrt(root) * (u_full + arm * s_full))
-        force = np.clip(spring - damping, -mu * f, mu * f)
+        force = spring - damping
+        if convention.capped:
+            force = np.clip(force, -mu * f, mu * f)
         before = z
         speed = half - 0.5 * dt * f
         u, s = u_half + 0.5 * dt * force, s_half + 1.25 * dt * arm * force
