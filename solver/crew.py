@@ -40,19 +40,20 @@ class Crew:
     """Processes that are started when they are first needed and kept for the next queue."""
 
     def __init__(self, workers: int | None = None) -> None:
-        self._number = workers or os.cpu_count() or 1
-        self._workers: list[tuple[BaseProcess, Connection]] = []
+        self.workers = workers or os.cpu_count() or 1
+        """How many pour at the same time."""
+        self._processes: list[tuple[BaseProcess, Connection]] = []
 
     def run_queue(self, queue: deque[Job], room: Sequence[Scene]) -> Iterator[tuple[Job, Record]]:
         """Run the jobs in ``queue`` and yield (job, record) as each finishes; jobs may be appended meanwhile.
 
         ``room`` lists scenes that any job has to fit into. Raises RuntimeError with a worker's error, or if one died.
         """
-        if not self._workers:
-            self._workers = [_worker() for _ in range(self._number)]
-        for _, pipe in self._workers:
+        if not self._processes:
+            self._processes = [_worker() for _ in range(self.workers)]
+        for _, pipe in self._processes:
             _send(pipe, list(room))
-        idle = [pipe for _, pipe in self._workers]
+        idle = [pipe for _, pipe in self._processes]
         busy: dict[Connection, Job] = {}
         try:
             while queue or busy:
@@ -70,12 +71,12 @@ class Crew:
 
     def close(self, at_once: bool = False) -> None:
         """End the workers; ``at_once`` also those that are in the middle of a pour."""
-        for process, pipe in self._workers:
+        for process, pipe in self._processes:
             pipe.close()
             if at_once:
                 process.kill()
             process.join()
-        self._workers = []
+        self._processes = []
 
     def __enter__(self) -> Crew:
         return self

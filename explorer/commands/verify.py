@@ -23,12 +23,24 @@ def verify(
     peer_limit: float = typer.Option(
         120.0, metavar="S", help="Wall time after which a run of LIGGGHTS is stopped [s].", min=1.0
     ),
+    economy: str | None = typer.Option(
+        None, metavar="STUDY", help="Compare piles with and without an economy of the method, for this study instead."
+    ),
+    change: str = typer.Option("larger_steps", metavar="NAME", help="With --economy: which one."),
+    profile: str = typer.Option("standard", help="With --economy: shapes and mass of this profile of the study."),
+    pours: int = typer.Option(241, min=2, help="With --economy: pours of each kind at each of three settings."),
+    store: Path | None = typer.Option(None, metavar="FILE", help="With --economy: where pours are kept."),
 ) -> None:
     """Check the solver against known answers.
 
     Chung & Ooi (2011) T1 to T8, restitution and invariants. Exit code 0 if every limit is kept, 1 if not; a row
     without a limit is shown for comparison. With --peers the exit code is still that of our rows.
     """
+    if economy is not None:
+        from explorer.study.economy import compare_economy, economy_text
+
+        typer.echo(economy_text(compare_economy(economy, profile, change, pours, store, json, typer.echo)))
+        return
     from explorer.errors import CommandError
     from explorer.export.impacts import liggghts_engine
     from explorer.export.run import installed

@@ -124,3 +124,9 @@ def test_peers_are_printed_and_written(tmp_path):
     assert "of 20 points that LIGGGHTS ran too, ours misses 3: 3 with LIGGGHTS, 0 alone" in result.stdout
     rows = json.loads(path.read_text(encoding="utf-8"))["rows"]
     assert all("LIGGGHTS" in row["peers"] for row in rows)
+
+
+def test_an_economy_that_does_not_exist_is_refused():
+    result = explorer("verify", "--economy", "sunflower_extract", "--change", "magic")
+    assert result.exit_code == 2
+    assert "--change: 'magic' is not one of larger_steps, softer_grains" in result.stderr

@@ -53,7 +53,7 @@ def test_a_worker_that_is_killed_is_named():
     with Crew(1) as crew:
         pours = crew.run_queue(deque([Job(HEAP, 1), Job(HEAP, 2)]), [HEAP])
         next(pours)
-        ((process, _),) = crew._workers
+        ((process, _),) = crew._processes
         os.kill(process.pid, signal.SIGKILL)
         with pytest.raises(RuntimeError, match="a worker process has ended"):
             list(pours)
@@ -62,7 +62,7 @@ def test_a_worker_that_is_killed_is_named():
 def test_nothing_is_left_after_close():
     crew = Crew(1)
     list(crew.run_queue(deque([Job(HEAP, 1)]), [HEAP]))
-    ((process, _),) = crew._workers
+    ((process, _),) = crew._processes
     crew.close()
     assert process.exitcode == 0
 
