@@ -58,7 +58,7 @@ def test_every_scene_is_the_stored_one_to_the_last_bit(keyed):
             scene, same = scene_of(result, run)
             assert same, run
             assert not scene_of(result, dataclasses.replace(run, seed=run.seed + 1))[1]
-    assert scene.rig.mass == 0.012  # of the profile "quick"
+    assert scene.rig.mass == 0.020  # of the profile "quick"
 
 
 def test_a_study_file_that_is_gone_or_a_label_that_nobody_gave_is_one_line(keyed):
