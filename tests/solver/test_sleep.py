@@ -8,6 +8,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from solver.body import Body, Members
 from solver.insertion import rotation_matrix
 from solver.kernels.sleep import BALANCE, WAKE
 from solver.laboratory import EARTH, PLATE, RADIUS, Bench, Laboratory, bench
@@ -243,3 +244,23 @@ def test_a_bead_bounces_off_a_sleeper_as_off_one_that_is_awake():
     assert awake[1, 7] > 0.2
     assert struck[:, 7] == pytest.approx(awake[:, 7], abs=1e-3)  # moves one step late, of the 140 of a contact
     assert struck[:, 11] == pytest.approx(awake[:, 11], rel=1e-2)
+
+
+def test_a_body_on_a_slow_wall_goes_along():
+    """It is slower than what may sleep, and would stand still in space while the wall moves on under it."""
+    flat = Members(((-4e-3, -4e-3, 0.0), (4e-3, -4e-3, 0.0), (0.0, 4e-3, 0.0)), (2e-3,) * 3, 2e-3, (5e-8, 5e-8, 9e-8))
+    scene = bench(Body("grain", "grain", 1.0, flat, 2500.0), gravity=EARTH)
+    went = []
+    for sleep_speed in (0.0, scene.numerics.rest_speed):
+        numerics = dataclasses.replace(scene.numerics, sleep_speed=sleep_speed)
+        lab = Laboratory(dataclasses.replace(scene, numerics=numerics), 1)
+        lab.put(0, (0.0, 0.0, 2e-3))
+        lab.run(int(0.2 / lab.dt))
+        assert lab.run(1)["asleep"] == (sleep_speed > 0.0)
+        start = lab.state()[0, 0]
+        lab.batch.set_motion(0, 0, (0.5 * scene.numerics.rest_speed, 0.0, 0.0), (0.0, 0.0, 0.0))
+        lab.run(int(0.5 / lab.dt))
+        went.append(lab.state()[0, 0] - start)
+    assert went[0] == pytest.approx(0.5e-3, rel=1e-2)
+    # Each time it has fallen asleep, the tangential spring wakes it after some nanometres.
+    assert went[1] == pytest.approx(went[0], abs=1e-6)
