@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+from collections import deque
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -50,7 +53,8 @@ def simulate(
     from explorer.scene.file import load_scene, with_settings
     from explorer.tables.bench_test import bench_data, bench_text, write_bench
     from explorer.tables.pours import RunTable
-    from solver import Job, run_pours
+    from solver import Crew, Job, run_pours
+    from solver.arch import chosen
     from solver.bench_tests import run_bench_test
     from solver.checkpoint import read_checkpoint
     from solver.rigs import BENCH_RIGS
@@ -100,9 +104,16 @@ def simulate(
                 if listener:
                     listener.sample(k, pour)
 
-        for k, finished in run_pours(
-            [Job(scene, s, interrupted=interrupted) for s in seeds], threads=threads, on_sample=sample
-        ):
+        jobs = [Job(scene, s, tag=k, interrupted=interrupted) for k, s in enumerate(seeds)]
+        if replicates > 1 and not (recorder or kept) and chosen() == "cpu":
+            # Nobody looks at them from within, so they run in processes of their own: in one, all wait for the slowest.
+            crew = stack.enter_context(Crew(min(threads or os.cpu_count() or 1, replicates)))
+            ended: Iterator[tuple[int, Record]] = (
+                (job.tag, finished) for job, finished in crew.run_queue(deque(jobs), [scene])
+            )
+        else:
+            ended = run_pours(jobs, threads=threads, on_sample=sample)
+        for k, finished in ended:
             records[k] = finished
             if recorder:
                 recorder.finish(k, finished)
