@@ -22,7 +22,7 @@ from doe.record import Record
 from doe.runner import Run, Runner, Setting, responses
 from doe.study import Study
 from doe.t_tests import Sample, equivalence_test, welch_test
-from solver import Scene, parameters, value
+from solver import Scene, observable_names, parameters, value
 
 MARGIN = 0.3
 """Of a mean, in standard deviations of one pour with the full settings."""
@@ -171,12 +171,13 @@ def compare(
 def judged(study: Study, economy: Economy, rows: Sequence[Sequence[Run]], pours: int) -> EconomyTest:
     """The comparison of what has been poured; ``rows`` as :func:`rows_of` has them."""
     names = list(settings_of(study))
+    asked = [one for one in OBSERVABLES if one in observable_names(study.scene)]
     compared: list[Compared] = []
     shares: list[Shares] = []
     costs = []
     for k, name in enumerate(names):
         full, cheap = rows[2 * k], rows[2 * k + 1]
-        compared += list(_observables(name, full, cheap))
+        compared += list(_observables(name, asked, full, cheap))
         counts = [(sum(run.valid for run in runs), len(runs)) for runs in (full, cheap)]
         table = [[valid, total - valid] for valid, total in counts]
         shares.append(Shares(name, counts[0], counts[1], float(stats.fisher_exact(table)[1])))
@@ -185,14 +186,17 @@ def judged(study: Study, economy: Economy, rows: Sequence[Sequence[Run]], pours:
     return EconomyTest(economy.name, pours, tuple(compared), tuple(shares), float(np.mean(costs)), accepted)
 
 
-def _observables(name: str, full: Sequence[Run], cheap: Sequence[Run]) -> Iterator[Compared]:
-    for observable in OBSERVABLES:
+def _observables(
+    name: str, observables: Sequence[str], full: Sequence[Run], cheap: Sequence[Run]
+) -> Iterator[Compared]:
+    for observable in observables:
         one, two = (_values(runs, observable) for runs in (full, cheap))
-        if len(one) < 2 or len(two) < 2:
-            continue
-        base, other = Sample.of(one), Sample.of(two)
+        base, other = (Sample.of(x) if len(x) else Sample(math.nan, math.nan, 0) for x in (one, two))
         margin = MARGIN * base.sd
-        if margin > 0.0:
+        # What cannot be tested (hardly a valid pour, or no scatter) is not shown to be alike.
+        if min(base.n, other.n) < 2 or not margin > 0.0:
+            yield Compared(name, observable, base, other, margin, math.nan, math.nan, math.nan, False)
+        else:
             test = equivalence_test(welch_test(other, base), margin, ALPHA)
             yield Compared(name, observable, base, other, margin, test.low, test.high, test.p, test.equivalent)
 

@@ -148,4 +148,4 @@ def _grams(mass: float) -> str:
 
 def _share(mass: float, moment: Moment) -> str:
     percent = 100.0 * mass / moment.poured_mass
-    return f"{percent:.0f} %" if percent >= 10.0 else f"{percent:.1g} %"
+    return f"{percent:.0f} %" if percent >= 1.0 else f"{percent:.1g} %"

@@ -36,12 +36,17 @@ def verify(
     Chung & Ooi (2011) T1 to T8, restitution and invariants. Exit code 0 if every limit is kept, 1 if not; a row
     without a limit is shown for comparison. With --peers the exit code is still that of our rows.
     """
+    from explorer.errors import CommandError
+
+    if json and not json.absolute().parent.is_dir():
+        raise CommandError(f"--json: {json}: no folder {json.absolute().parent}")
     if economy is not None:
+        if only or peers or every:
+            raise CommandError("--economy: compares piles and nothing else; leave --only, --peers and --all out")
         from explorer.study.economy import compare_economy, economy_text
 
         typer.echo(economy_text(compare_economy(economy, profile, change, pours, store, json, typer.echo)))
         return
-    from explorer.errors import CommandError
     from explorer.export.impacts import liggghts_engine
     from explorer.export.run import installed
     from explorer.files.run_folder import json_text
@@ -54,8 +59,6 @@ def verify(
     for name in only:
         if name.lower() not in by_lower_case:
             raise CommandError(f"--only: {name!r} is not one of {', '.join(FAMILIES)}")
-    if json and not json.absolute().parent.is_dir():
-        raise CommandError(f"--json: {json}: no folder {json.absolute().parent}")
     wanted = {by_lower_case[name.lower()] for name in only}
     chosen = [name for name in FAMILIES if name in wanted or not wanted]
     shared = [name for name in chosen if name in BY_ANY_ENGINE]

@@ -155,6 +155,8 @@ def fallen(measurements: Sequence[Measurement], committed: Mapping[str, Any], na
                 f"warning: {key[0]}, {key[1]}: {ratio:.2f} times as fast as LIGGGHTS, {loss:.0f} % less than the "
                 f"{before[key]:.2f} of {name}"
             )
+    if not compared:
+        return [f"warning: no ratio to LIGGGHTS could be compared with {name}: LIGGGHTS or the case is missing"]
     return lines or [f"{compared} ratios to LIGGGHTS compared with {name}: none is more than {100 * FALL:.0f} % lower"]
 
 

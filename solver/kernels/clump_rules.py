@@ -11,6 +11,8 @@ sphere off the centre of its body moves less than the whole:
                         stiffness and damping. Its mass is taken at its own point where it is alone in its direction,
                         at the mean of the points (weights δ_j) where all normals agree, and in between as they agree,
                         (S·n_k)/Σδ_j. Shares change without a jump when a sphere touches or lets go.
+                        The energy account takes springs as if they did not share: it closes, but what it calls elastic
+                        is too much by the shares, and what it calls dissipated too little while bodies are pressed.
 
 The locally reduced mass, and one contact per pair as the cure of too much stiffness and damping: Berry, Zhang & Haeri
 2023, Powder Technology 416:118209 (DOI 10.1016/j.powtec.2022.118209). The weights are ours.

@@ -216,8 +216,6 @@ def list_patches(s: ti.template(), w, i):
 def rebuild(s: ti.template(), w):
     """Build the contact list of world ``w``; entries come out ordered by (i, j)."""
     n_old = keep_history(s, w)
-    s.world.contacts[w] = 0
-    s.world.candidates[w] = 0
     s.world.outdated[w] = 0
     s.world.rebuilds[w] = s.world.rebuilds[w] + 1
     s.world.stirred[w] = 1
@@ -233,13 +231,22 @@ def rebuild(s: ti.template(), w):
             place_members(s, w, b, True)
             bound(s, w, b)
     fill_grid(s, w)
-    for a in range(s.world.bodies[w]):
-        if s.body.alive[w, a] == 1:
-            near = find_near(s, w, a)
-            for i in range(s.body.first[w, a], s.body.first[w, a] + s.body.members[w, a]):
-                list_members(s, w, i, near)
-                list_primitives(s, w, i)
-                list_patches(s, w, i)
+    for narrow in range(2):
+        if narrow == 0 or s.world.overflow[w] == 1:
+            # A dense bed that moves fast as a whole may not fit; with the least margins it is built more often.
+            s.world.overflow[w] = 0
+            s.world.contacts[w] = 0
+            s.world.candidates[w] = 0
+            for a in range(s.world.bodies[w]):
+                if narrow == 1:
+                    s.body.margin[w, a] = LEAST * s.world.skin[w]
+            for a in range(s.world.bodies[w]):
+                if s.body.alive[w, a] == 1:
+                    near = find_near(s, w, a)
+                    for i in range(s.body.first[w, a], s.body.first[w, a] + s.body.members[w, a]):
+                        list_members(s, w, i, near)
+                        list_primitives(s, w, i)
+                        list_patches(s, w, i)
     carry_over(s, w, n_old)
     if ti.static(s.sharing):
         find_leads(s, w)

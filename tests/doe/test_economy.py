@@ -102,3 +102,23 @@ def test_settings_are_the_centre_and_the_two_softest_corners():
     assert found["centre"] == {}
     assert found["soft, least friction"]["pair.seed.seed.static_friction"] == 0.47
     assert found["soft, most friction"]["pair.seed.seed.static_friction"] == 0.72
+
+
+@pytest.mark.parametrize("outcomes", [("jammed", "jammed"), ("at_rest", "jammed")])
+def test_pours_that_cannot_be_compared_prove_nothing(outcomes):
+    rows = [
+        [Run(row.label, k, 0, k, outcome, "", dict.fromkeys(OBSERVABLES, 20.0 + k), 1.0, "") for k in range(4)]
+        for row, outcome in zip(rows_of(STUDY, LARGER, 4), outcomes * 3, strict=True)
+    ]
+    found = judged(STUDY, LARGER, rows, 4)
+    assert len(found.compared) == 3 * len(OBSERVABLES)
+    assert not any(one.equivalent for one in found.compared)
+    assert not found.accepted
+
+
+def test_without_any_scatter_nothing_is_shown():
+    rows = [
+        [Run(row.label, k, 0, k, "at_rest", "", dict.fromkeys(OBSERVABLES, 30.0), 1.0, "") for k in range(4)]
+        for row in rows_of(STUDY, LARGER, 4)
+    ]
+    assert not judged(STUDY, LARGER, rows, 4).accepted

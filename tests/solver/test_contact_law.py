@@ -40,7 +40,9 @@ def shear(inputs: ti.types.ndarray(dtype=ti.f64, ndim=1), out: ti.types.ndarray(
         old = Vec3(inputs[7], inputs[8], inputs[9])
         n = Vec3(inputs[10], inputs[11], inputs[12])
         v_t = Vec3(inputs[13], inputs[14], inputs[15])
-        spring, force = tangential_force(law, inputs[5], inputs[6], old, n, v_t, inputs[16], inputs[17], inputs[18])
+        spring, force = tangential_force(
+            law, inputs[5], inputs[6], old, n, v_t, inputs[16], inputs[17], inputs[18], 1.0, 0, 0
+        )
         for d in ti.static(range(3)):
             out[d] = spring[d]
             out[3 + d] = force[d]

@@ -3,7 +3,10 @@
 import multiprocessing as mp
 import os
 import signal
+import subprocess
+import sys
 from collections import deque
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -79,6 +82,13 @@ def test_a_process_is_deaf_to_interrupts_from_its_first_moment():
     assert not ours.recv()
     process.join()
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
+def test_so_is_the_first_one_of_a_program():
+    """With it multiprocessing starts its resource tracker, and lets Ctrl-C through again."""
+    name = "tests.solver.test_crew"
+    code = f"from {name} import test_a_process_is_deaf_to_interrupts_from_its_first_moment as t; t()"
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=Path(__file__).parents[2])
 
 
 def test_a_scene_without_effects_in_the_kernels_has_a_room_without_them(taichi):

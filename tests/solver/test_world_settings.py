@@ -14,6 +14,8 @@ from solver.world import SETTINGS, Batch
 pytestmark = pytest.mark.usefixtures("taichi")
 
 DT = 1.25e-5
+CONVENTIONS = {"clump_rule": "local_mass", "tangential_law": "mindlin", "tangential_dashpot": "uncapped"}
+"""Second choice of each convention of the contact law."""
 GRAVITY = (0.5, -1.5, -9.0)
 
 
@@ -39,10 +41,24 @@ def test_every_setting_is_read_from_its_own_column():
         "domain": 0.31,
         "outlet": inside.height,
         "inlet_radius": inside.radius,
+        "clump_rule": 0.0,
+        "tangential_law": 0.0,
+        "tangential_dashpot": 0.0,
         "gravity_x": 0.5,
         "gravity_y": -1.5,
         "gravity_z": -9.0,
     }
-    assert len({float(value) for value in expected.values()}) == len(expected)  # or two could change places unseen
+    # Or two could change places unseen; the three that name a choice have a test of their own.
+    assert len({float(value) for value in expected.values()}) == len(expected) - len(CONVENTIONS) + 1
     assert set(SETTINGS) == set(expected)
     assert {name: float(world[name]) for name in SETTINGS} == expected
+
+
+@pytest.mark.parametrize("name", CONVENTIONS)
+def test_a_convention_of_the_contact_law_is_read_from_its_own_column(name):
+    scene = bench()
+    scene = replace(scene, contact=replace(scene.contact, **{name: CONVENTIONS[name]}))
+    batch = Batch(ROOM)
+    batch.load(0, scene, layout(scene, np.zeros(1, dtype=np.int32)), DT, (True,))
+    world = batch.take(0)
+    assert {one: int(world[f"world.{one}"]) for one in CONVENTIONS} == {one: int(one == name) for one in CONVENTIONS}

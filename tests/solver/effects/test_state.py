@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from solver.effects.columns import COUPLE, HERTZ, MEMORY
+from solver.kernels.neighbours import MOST
 from solver.laboratory import EARTH, RADIUS, ROOM, Laboratory
 from solver.time_step import time_step
 from tests.solver.effects.cases import (
@@ -87,7 +88,7 @@ def test_the_list_may_be_built_often_or_seldom(whole):
         # Summed over other launches, the energies are the same sums.
         assert last["dissipated"] == row["dissipated"]
         rebuilds.append(last["rebuilds"])
-    assert rebuilds[0] > 10 * rebuilds[1] > 0
+    assert rebuilds[0] > 5 * rebuilds[1] > 0
 
 
 def test_from_a_batch_without_effects_into_one_that_others_have_used():
@@ -132,7 +133,7 @@ def test_a_grip_that_comes_later_widens_the_search():
         assert later[name] == pytest.approx(at_once[name])
     assert later["world.cell"] > 2 * RADIUS + 4e-3
     batch.set_effects(0, scene_with(gravity=EARTH))
-    assert batch.take(0)["world.cell"] == pytest.approx(2 * RADIUS + 1e-3)
+    assert batch.take(0)["world.cell"] == pytest.approx(2 * RADIUS + 2 * MOST * 1e-3)
 
 
 SLEEPY = {"sleep_speed": 2e-3, "gravity": EARTH, "restitution": 0.3}
