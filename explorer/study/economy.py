@@ -19,7 +19,7 @@ from explorer.tables.text_table import text_table
 from solver import Crew
 
 Say = Callable[[str], None]
-SEED = 1
+SEED = 20261123
 """Root of the seeds of all pours."""
 TIMED = 2
 """Pours of each kind after which it is said how long all of them take."""
