@@ -22,7 +22,7 @@ from doe.record import Record
 from doe.runner import Run, Runner, Setting, responses
 from doe.study import Study
 from doe.t_tests import Sample, equivalence_test, welch_test
-from solver import Scene, observable_names, parameters, value
+from solver import Scene, observable_names, parameters, value, with_values
 
 MARGIN = 0.3
 """Of a mean, in standard deviations of one pour with the full settings."""
@@ -139,18 +139,12 @@ def settings_of(study: Study) -> dict[str, dict[str, float | str]]:
 
 def rows_of(study: Study, economy: Economy, pours: int) -> list[Setting]:
     """Each setting without and with ``economy``, in turns."""
-    changed = economy.values(study.scene)
     rows = []
     for name, values in settings_of(study).items():
         # A corner may set what the economy scales.
-        cheap = {path: factor_on(values.get(path), path, economy, study.scene, new) for path, new in changed.items()}
+        cheap = economy.values(with_values(study.scene, values))
         rows += [Setting(name, values, pours), Setting(f"{name}, {economy.name}", {**values, **cheap}, pours)]
     return rows
-
-
-def factor_on(own: float | str | None, path: str, economy: Economy, scene: Scene, new: float) -> float:
-    """The value of ``path`` under ``economy`` at a setting that has ``own`` in place of the scene's."""
-    return new if own is None else new / value(scene, path) * float(own)
 
 
 def compare(

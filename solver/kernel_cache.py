@@ -34,8 +34,8 @@ if sys.platform != "win32":
 def missing(capacities: Sequence[Capacity]) -> list[Capacity]:
     """Those of ``capacities``, allocated in this order by one thread, whose kernels are not known to be kept."""
     there = set(_kernels())
-    places = [(capacity, _place(capacities[: k + 1])) for k, capacity in enumerate(capacities)]
-    return [capacity for capacity, place in places if not _listed(place) or not _listed(place) <= there]
+    listed = [_listed(_place(capacities[: k + 1])) for k in range(len(capacities))]
+    return [one for one, kernels in zip(capacities, listed, strict=True) if not kernels or not kernels <= there]
 
 
 @contextmanager

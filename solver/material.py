@@ -74,6 +74,11 @@ class ContactModel:
     )
 
     @property
+    def shares(self) -> bool:
+        """Whether contacts of one pair of bodies share, which kernels have to be compiled for."""
+        return self.clump_rule == "local_mass_shared"
+
+    @property
     def numbers(self) -> tuple[float, float, float]:
         """Places of the three in their lists of choices, as the kernels take them."""
         return (

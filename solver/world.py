@@ -88,7 +88,7 @@ def compiled_in(scenes: Sequence[Scene]) -> dict[str, bool]:
     """What kernels for ``scenes`` need beside the base model, by field of :class:`Capacity`."""
     return {
         "effects": any(kernel_effects(scene) for scene in scenes),
-        "sharing": any(scene.contact.clump_rule == "local_mass_shared" for scene in scenes),
+        "sharing": any(scene.contact.shares for scene in scenes),
     }
 
 
@@ -125,7 +125,7 @@ class Batch:
         for name, needed in (("bodies", len(bodies.numbers)), ("members", len(bodies.spheres))):
             if needed > getattr(self.capacity, name):
                 raise ValueError(f"{needed} {name} do not fit into a batch of {getattr(self.capacity, name)}")
-        if scene.contact.clump_rule == "local_mass_shared" and not self.capacity.sharing:
+        if scene.contact.shares and not self.capacity.sharing:
             raise ValueError("contact.clump_rule: the batch was made for rules by which contacts do not share")
         settings = settings_of(scene, bodies, dt)
         loading.load_world(s, w, np.array([settings[name] for name in SETTINGS]))

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from doe.economy import ALPHA, ECONOMIES, MARGIN, POWER, EconomyTest, compare, rows_of
+from doe.economy import ALPHA, ECONOMIES, MARGIN, POWER, EconomyTest, compare, pours_needed, rows_of
 from doe.runner import PourRunner
 from doe.store import Store, default_store
 from doe.study import load_study, with_profile
@@ -58,14 +58,15 @@ def compare_economy(
     study, _ = with_profile(load_study(study_name), profile_name)
     rows = rows_of(study, economy, TIMED)
     kept = Store(store or default_store())
-    said: list[int] = []
 
     def told(found: EconomyTest) -> None:
         if out is not None:
             write_whole(out, json_text(found.to_dict()) + "\n")
-        if found.pours not in said:
-            said.append(found.pours)
-            say(f"{found.pours} of {pours} pours of each kind: {_state(found)}")
+        alike = sum(one.equivalent for one in found.compared)
+        say(
+            f"{found.pours} of {pours} pours of each kind: {alike} of {len(found.compared)} means equivalent so far, "
+            f"cost {found.cost:.2f}"
+        )
 
     try:
         with Crew() as crew:
@@ -75,7 +76,8 @@ def compare_economy(
             minutes = each * pours * len(rows) / crew.workers / 60.0
             say(
                 f"{economy.name}: {economy.reason}; {pours} pours of each kind at {len(rows) // 2} settings, about "
-                f"{minutes:.0f} min (margin {MARGIN:g} SD of one pour, alpha {ALPHA:g}; power {POWER:g} takes 241)"
+                f"{minutes:.0f} min (margin {MARGIN:g} SD of one pour, "
+                f"alpha {ALPHA:g}; power {POWER:g} takes {pours_needed()})"
             )
             return compare(study, economy, runner, pours, told)
     finally:
@@ -99,8 +101,3 @@ def economy_text(found: EconomyTest) -> str:
     verdict = "accepted" if found.accepted else "not accepted"
     text.append(f"{found.economy}: {verdict}; a pour costs {found.cost:.2f} of a full one ({found.pours} of each kind)")
     return "\n".join(text)
-
-
-def _state(found: EconomyTest) -> str:
-    alike = sum(one.equivalent for one in found.compared)
-    return f"{alike} of {len(found.compared)} means equivalent so far, cost {found.cost:.2f}"

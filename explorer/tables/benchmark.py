@@ -251,7 +251,7 @@ def _markdown_row(result: Result, ratios: Sequence[float]) -> tuple[str, ...]:
         str(len(result.rounds)),
         f"timed out after {one.wall_s:g} s"
         if one.timed_out
-        else _range(times, ".4g" if one.timed_out or max(times) < 1000.0 else ".0f"),
+        else _range(times, ".4g" if max(times) < 1000.0 else ".0f"),
         "1" if _liggghts(result) else _range(ratios, ".2f") if ratios else "–",
         f"{asked:g}" if asked else "",
     )

@@ -237,9 +237,9 @@ def rebuild(s: ti.template(), w):
             s.world.overflow[w] = 0
             s.world.contacts[w] = 0
             s.world.candidates[w] = 0
-            for a in range(s.world.bodies[w]):
-                if narrow == 1:
-                    s.body.margin[w, a] = LEAST * s.world.skin[w]
+            if narrow == 1:
+                for b in range(s.world.bodies[w]):
+                    s.body.margin[w, b] = LEAST * s.world.skin[w]
             for a in range(s.world.bodies[w]):
                 if s.body.alive[w, a] == 1:
                     near = find_near(s, w, a)

@@ -1,5 +1,7 @@
 """The contact list never misses a contact, and surfaces are where they should be."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
@@ -7,10 +9,13 @@ from scipy.optimize import minimize_scalar
 from solver.backend import ti
 from solver.insertion import rotation_matrix
 from solver.kernels.geometry import nearest_on_revolved
+from solver.laboratory import RADIUS, ROOM, UPRIGHT, Laboratory, bench
+from solver.layout import layout
 from solver.material_file import load_material
 from solver.run import Job, run_pours
 from solver.scene import with_values
 from solver.state import Vec3, Vec4
+from solver.world import SUMMARY_COLUMNS, Batch
 
 pytestmark = pytest.mark.usefixtures("taichi")
 
@@ -89,3 +94,16 @@ def test_skin_changes_no_bit():
     assert records[0].steps == records[1].steps > 10_000
     assert np.array_equal(records[0].bodies.position, records[1].bodies.position)
     assert np.array_equal(records[0].bodies.quaternion, records[1].bodies.quaternion)
+
+
+def test_a_list_that_does_not_fit_is_built_with_narrow_margins():
+    """A crowd that flies as one: nobody comes nearer, and yet every margin is wide."""
+    lab = Laboratory(bench(), 1, plate=False)
+    crowd = 2.3 * RADIUS * np.stack(np.meshgrid(*[np.arange(4.0)] * 3), axis=-1).reshape(-1, 3)
+    batch = Batch(dataclasses.replace(ROOM, contacts=100))
+    batch.load(0, lab.scene, layout(lab.scene, np.zeros(len(crowd), dtype=np.int32)), lab.dt, [False])
+    for b, place in enumerate(crowd):
+        batch.enter(0, b, place, UPRIGHT, np.array([3.0, 0.0, 0.0]), np.zeros(3))
+    row = dict(zip(SUMMARY_COLUMNS, batch.advance(np.array([200], dtype=np.int32))[0], strict=True))
+    assert row["overflow"] == 0
+    assert batch.bodies(0, len(crowd))[:, 0] == pytest.approx(crowd[:, 0] + 3.0 * 200 * lab.dt)

@@ -106,7 +106,7 @@ def pours() -> dict[str, Scene]:
 def heap_numbers(scenes: Mapping[str, Scene], worlds: int = 1, first: int = 0) -> tuple[Numbers, Numbers]:
     """States of heaps after ``FIRST`` and after ``HEAP_STEPS`` steps, in a batch of ``worlds`` from ``first`` on."""
     effects = any(map(kernel_effects, scenes.values()))
-    sharing = any(scene.contact.clump_rule == "local_mass_shared" for scene in scenes.values())
+    sharing = any(scene.contact.shares for scene in scenes.values())
     batch = Batch(dataclasses.replace(ROOM, worlds=worlds, effects=effects, sharing=sharing))
     steps = np.zeros(worlds, dtype=np.int32)
     for w, scene in enumerate(scenes.values(), start=first):
