@@ -21,6 +21,7 @@ from explorer.commands import (
     diagnose,
     export,
     lab,
+    limit,
     measure,
     measurements,
     new,
@@ -132,6 +133,7 @@ app.command()(verify.verify)
 app.command()(bench.bench)
 app.command()(warm_up.warm_up)
 app.command()(validate_diagnosis.validate_diagnosis)
+app.command()(limit.limit)
 app.add_typer(measurements.app, name="measurements")
 
 

@@ -15,6 +15,16 @@ from solver.material_file import is_material, load_material
 from solver.observables import Value, observable_names, observe
 from solver.observables.free_surface import slope_angle_deg
 from solver.observables.named import Named, all_names, named, observe_named, observe_scan
+from solver.observables.surface import HeightMap, height_map
+from solver.observables.surface_features import (
+    PROFILE_NAMES,
+    SURFACE_NAMES,
+    Frame,
+    frame_of,
+    profile_features,
+    surface_features,
+    without_holes,
+)
 from solver.params import Parameter, ParameterError, parse_quantity
 from solver.pour_key import pour_key
 from solver.raw_pour import RawPourError, packed, unpacked
@@ -70,13 +80,17 @@ def __getattr__(name: str) -> Any:
 __all__ = [
     "EFFECTS",
     "PHYSICS",
+    "PROFILE_NAMES",
     "RIGS",
+    "SURFACE_NAMES",
     "AssetNotFoundError",
     "Batch",
     "Bodies",
     "Body",
     "Crew",
     "Entries",
+    "Frame",
+    "HeightMap",
     "Job",
     "Members",
     "Named",
@@ -102,6 +116,8 @@ __all__ = [
     "body_counts",
     "canonical",
     "capacity_for",
+    "frame_of",
+    "height_map",
     "is_material",
     "load_material",
     "named",
@@ -116,6 +132,7 @@ __all__ = [
     "pour_key",
     "pour_rig",
     "poured_mass",
+    "profile_features",
     "read_photograph",
     "read_toml",
     "run_pour",
@@ -123,6 +140,7 @@ __all__ = [
     "run_queue",
     "scanned_pile",
     "slope_angle_deg",
+    "surface_features",
     "unpacked",
     "value",
     "warm_up",
@@ -130,4 +148,5 @@ __all__ = [
     "with_set_up",
     "with_settings",
     "with_values",
+    "without_holes",
 ]

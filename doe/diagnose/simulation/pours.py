@@ -11,8 +11,8 @@ from typing import TypeVar
 
 from doe.diagnose.simulation.plan import Point
 from doe.diagnose.simulation.profiles import profile_names, profile_of_record
+from doe.measurement.features import feature_set, features_of_record
 from doe.measurement.measurement import Condition
-from doe.measurement.summaries import summaries_of_record, summary_names
 from doe.runner import Pours, seed_of, stored_run
 from doe.store import Reader, Store, StoredRun
 from solver import (
@@ -62,6 +62,8 @@ class Pour:
     outcome: str
     profile: tuple[float, ...] = ()
     """Mean heights [m] for a picture (`profiles`); nothing is decided by them."""
+    surface: tuple[float, ...] = ()
+    """The features of the pile's surface (``doe/measurement/features.py``), which follow the summaries."""
 
     @property
     def valid(self) -> bool:
@@ -203,7 +205,7 @@ class ModelPours:
             stored = self._store.find(self._keys[place])
             if stored is not None:
                 asked = self._conditions[condition]
-                names = (*profile_names(asked), *summary_names(asked))
+                names = (*profile_names(asked), *feature_set(asked).names)
                 self._known[place] = _pour(asked, self._store.read(stored, names, reader(asked)))
         return place in self._known
 
@@ -216,11 +218,11 @@ class ModelPours:
 
 
 def reader(condition: Condition) -> Reader:
-    """What a diagnosis reads off a pour of ``condition``: its profile and its summaries."""
+    """What a diagnosis reads off a pour of ``condition``: its profile, its summaries, and features of its surface."""
 
     def read(record: Record) -> dict[str, float]:
-        heights, numbers = profile_of_record(condition, record), summaries_of_record(condition, record)
-        names = (*profile_names(condition), *summary_names(condition))
+        heights, numbers = profile_of_record(condition, record), features_of_record(condition, record)
+        names = (*profile_names(condition), *feature_set(condition).names)
         return dict(zip(names, (*heights, *numbers.tolist()), strict=True))
 
     return read
@@ -233,7 +235,13 @@ def _pour(condition: Condition, stored: StoredRun) -> Pour:
         found = (stored.observables[name] for name in names)
         return tuple(math.nan if x is None else x for x in found)
 
-    return Pour(numbers(summary_names(condition)), stored.outcome, numbers(profile_names(condition)))
+    features = feature_set(condition)
+    return Pour(
+        numbers(features.scalars),
+        stored.outcome,
+        numbers(profile_names(condition)),
+        numbers(features.profile + features.surface),
+    )
 
 
 def effect_values(effect: str, amplitude: Sequence[float]) -> dict[str, float]:

@@ -1,0 +1,214 @@
+"""Reference pours of a declared model: so many of every effect that what it does to a pile is known, not estimated.
+
+A ruler (``ruler.py``) and the limit of any diagnosis (``limit.py``) are made of them. All pours have the calibrated
+parameters at their measured means; what a parameter does is known from pours ``SIDE`` deviations to either side.
+
+Pours come in rounds, each of the same number of every kind, so that a reference can be made in pieces and stopped
+after any round. First a pilot finds, for every direction of an effect, the amplitude that shifts the summaries of a
+data set of ``REPLICATES`` pours by about ``STRONG`` standard errors.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.diagnose.runs import Declared, Effect
+from doe.diagnose.simulation.plan import Point, middle
+from doe.diagnose.simulation.pours import ModelPours, Rows, Search
+from doe.diagnose.simulation.ranges import whitened_shift
+from doe.record import Record
+
+FloatArray = npt.NDArray[np.float64]
+
+Blocks = tuple[FloatArray, ...]
+"""Per fitted condition the features of the pours, (n_c, d_c)."""
+
+CONSTANT = 1e-9
+"""Standard deviation, as a share of the feature's size, below which it says nothing."""
+ROOT = 2
+"""Root of the seeds: other pours than those of a diagnosis (0) and of the made-up laboratories (1)."""
+STRONG = 12.0
+"""Shift [standard errors] wanted of the larger amplitude; the smaller one is half of it."""
+ENOUGH, TOO_MUCH = 10.0, 15.0
+"""Shifts that will do in its place."""
+TRIAL, TRIALS = 6, 5
+"""Pours of an amplitude that is tried, and amplitudes that are tried at most."""
+LEAST_STEP = 0.05
+"""An amplitude shrinks by no more than this factor at once: the answer to a strong effect may saturate."""
+SIDE = 1.5
+"""Standard deviations by which a parameter is moved; of one that has none, this many sixths of its range."""
+
+FIRST_BASE = 48
+"""Pours of the base model that the pilot takes its covariance from."""
+PER_ROUND = {"strong": 8, "weak": 4, "other": 4, "base": 16, "parameter": 2}
+"""Pours of each kind in a round: of each effect at either amplitude, of its other directions, of the base model, and of
+each parameter on either side."""
+
+
+@dataclass(frozen=True)
+class Direction(Record):
+    """One way in which an effect can act: its amplitudes are multiples of ``full``, the ends of its range."""
+
+    effect: str
+    name: str
+    """The effect's, with the sign or the axis where there are several."""
+    full: tuple[float, ...]
+    first: bool
+    """Whether it is the first of its effect: the others get fewer pours."""
+
+    def at(self, share: float) -> tuple[float, ...]:
+        """The amplitude [natural units] at ``share`` of the range."""
+        return tuple(share * end for end in self.full)
+
+
+@dataclass(frozen=True)
+class Level(Record):
+    """A direction with the share of its range at which it was found to shift by about ``STRONG``."""
+
+    direction: Direction
+    share: float
+    shift: float
+    """[standard errors], by the few pours of the pilot."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Reference pours: what acts → blocks of complete pours; ``parameters``: names of those that are calibrated."""
+
+    pours: Mapping[str, Blocks]
+    parameters: tuple[str, ...]
+
+    def first(self, numbers: Sequence[int]) -> Sample:
+        """The same with the first ``numbers[c]`` features of each condition."""
+        return Sample(
+            {
+                name: tuple(block[:, :number] for block, number in zip(blocks, numbers, strict=True))
+                for name, blocks in self.pours.items()
+            },
+            self.parameters,
+        )
+
+    def varying(self) -> Sample:
+        """The same without features that are constant in the base model's pours."""
+        keep = []
+        for block in self.pours["base"]:
+            size = np.maximum(np.abs(block).max(axis=0), np.finfo(float).tiny)
+            keep.append(block.std(axis=0) > CONSTANT * size)
+        return Sample(
+            {
+                name: tuple(block[:, kept] for block, kept in zip(blocks, keep, strict=True))
+                for name, blocks in self.pours.items()
+            },
+            self.parameters,
+        )
+
+
+def directions_of(effect: Effect) -> list[Direction]:
+    """Up and, where there is one, down; of two amplitudes along x and along y (the rest follows by symmetry)."""
+    if effect.amplitudes == 2:
+        return [
+            Direction(effect.name, f"{effect.name} x", (effect.high[0], 0.0), True),
+            Direction(effect.name, f"{effect.name} y", (0.0, effect.high[1]), False),
+        ]
+    if effect.low[0] < 0.0:
+        return [
+            Direction(effect.name, f"{effect.name} +", effect.high, True),
+            Direction(effect.name, f"{effect.name} -", effect.low, False),
+        ]
+    return [Direction(effect.name, effect.name, effect.high, True)]
+
+
+def base_points(declared: Declared, number: int) -> list[Point]:
+    """The first ``number`` pours of the base model."""
+    return [Point("reference base", k, middle(declared.parameters)) for k in range(number)]
+
+
+def effect_points(declared: Declared, direction: Direction, share: float, number: int) -> list[Point]:
+    """The first ``number`` pours of an effect at ``share`` of its range."""
+    amplitude = direction.at(share)
+    name = f"reference {direction.effect}@{'_'.join(f'{one:.6g}' for one in amplitude)}"
+    effects = ((direction.effect, amplitude),)
+    return [Point(name, k, middle(declared.parameters), effects) for k in range(number)]
+
+
+def parameter_points(declared: Declared, number: int) -> list[list[Point]]:
+    """The first ``number`` pours with each parameter moved, below and above its mean in turn."""
+    found = []
+    for j, parameter in enumerate(declared.parameters):
+        step = SIDE * (parameter.sd if parameter.sd is not None else (parameter.high - parameter.low) / 6.0)
+        for sign in (-1.0, 1.0):
+            theta = list(middle(declared.parameters))
+            theta[j] += sign * step
+            name = f"reference {parameter.name} {sign * SIDE:+g}"
+            found.append([Point(name, k, tuple(theta)) for k in range(number)])
+    return found
+
+
+def level_of(declared: Declared, direction: Direction, base: Rows) -> Search[Level]:
+    """The share of the range at which ``direction`` shifts by about ``STRONG``; 1 where all of it does less."""
+    share, below, above = 1.0, 0.0, math.inf
+    level = Level(direction, 1.0, math.inf)
+    for _ in range(TRIALS):
+        pours = yield effect_points(declared, direction, share, TRIAL)
+        shift = whitened_shift(declared, base, pours)
+        level = Level(direction, share, shift)
+        if shift > TOO_MUCH:
+            above = share
+            inward = share * max(LEAST_STEP, STRONG / shift)
+            share = max(inward, math.sqrt(below * above)) if below > 0.0 else inward
+        elif shift < ENOUGH and share < 1.0:
+            below = share
+            outward = share * STRONG / max(shift, 1.0)
+            share = min(1.0, outward if math.isinf(above) else min(outward, math.sqrt(below * above)))
+        else:
+            break
+    return level
+
+
+def find_levels(declared: Declared, pours: ModelPours) -> list[Level]:
+    """The levels of every direction of every effect."""
+    base = pours.run("reference: base model", base_points(declared, FIRST_BASE))
+    directions = [direction for effect in declared.effects for direction in directions_of(effect)]
+    searches = [level_of(declared, direction, base) for direction in directions]
+    widest = [point for direction in directions for point in effect_points(declared, direction, 1.0, 1)]
+    return pours.answered("reference: amplitudes", searches, widest=widest)
+
+
+def reference_sample(declared: Declared, levels: Sequence[Level], rounds: int, pours: ModelPours) -> Sample:
+    """Features of ``rounds`` rounds; pours that came to no valid end, or of which one cannot be read, are left out."""
+    kinds = points_of(declared, levels, rounds)
+    rows = iter(pours.run(f"reference: round {rounds}", [point for points in kinds.values() for point in points]))
+    found: dict[str, Blocks] = {}
+    for kind, points in kinds.items():
+        poured = [next(rows) for _ in points]
+        blocks = []
+        for c in range(len(declared.conditions)):
+            features = [(*row[c].summaries, *row[c].surface) for row in poured if row[c].valid]
+            block = np.array([one for one in features if np.isfinite(one).all()], dtype=np.float64)
+            blocks.append(block.reshape(len(block), -1))
+        found[kind] = tuple(blocks)
+    return Sample(found, tuple(parameter.name for parameter in declared.parameters))
+
+
+def points_of(declared: Declared, levels: Sequence[Level], rounds: int) -> Mapping[str, list[Point]]:
+    """All pours of ``rounds`` rounds, by what acts in them.
+
+    Keys: "base", "<direction> strong", "<direction> weak" (first directions only), "<parameter> -", "<parameter> +".
+    """
+    found = {"base": base_points(declared, FIRST_BASE + rounds * PER_ROUND["base"])}
+    for level in levels:
+        direction = level.direction
+        number = rounds * PER_ROUND["strong" if direction.first else "other"]
+        found[f"{direction.name} strong"] = effect_points(declared, direction, level.share, number)
+        if direction.first:
+            weak = rounds * PER_ROUND["weak"]
+            found[f"{direction.name} weak"] = effect_points(declared, direction, 0.5 * level.share, weak)
+    sides = iter(parameter_points(declared, rounds * PER_ROUND["parameter"]))
+    for parameter in declared.parameters:
+        found[f"{parameter.name} -"], found[f"{parameter.name} +"] = next(sides), next(sides)
+    return found

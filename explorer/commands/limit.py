@@ -1,0 +1,29 @@
+"""``explorer limit``: how often could any diagnosis name the right effect, from data of each kind?"""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+
+import typer
+
+
+def limit(
+    folder: str = typer.Argument(
+        "",
+        metavar="[DIR]",
+        help="Folder with measurement.toml, or a shipped data set's name; only what it declares "
+        "is used. The made-up laboratory's model if not given.",
+    ),
+    rounds: int = typer.Option(8, min=1, help="Rounds of reference pours; 8 give 96 of each effect."),
+    out: Path = typer.Option(Path("limit.json"), help="File for the strengths, the pairs that look alike, the limits."),
+    store: Path | None = typer.Option(None, help="SQLite file that keeps every pour; the same command goes on."),
+    threads: int | None = typer.Option(None, min=1, help="Worker processes; one per core if not given."),
+) -> None:
+    """Pour every effect many times and print the Bayes limit: what scalars, profiles and scans can tell at best."""
+    from explorer.diagnosis.limit import LimitOrder, limit_text, run_limit
+    from solver.assets import measurement_folder
+
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    order = LimitOrder(measurement_folder(folder) if folder else None, rounds, out, store, threads)
+    typer.echo(limit_text(run_limit(order, typer.echo)))

@@ -1,0 +1,93 @@
+"""The limit of a diagnosis, from its order to its file and its tables."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from doe.diagnose.declare import declare
+from doe.diagnose.limit import LimitStudy, confused, limit_study
+from doe.diagnose.reference import ROOT, find_levels, reference_sample
+from doe.diagnose.ruler import Strength
+from doe.diagnose.simulation.pours import Ended, ModelPours
+from doe.measurement import load_measurement
+from doe.measurement.features import OFFERS, feature_set
+from doe.store import Store, default_store
+from doe.validation.laboratory import declared_model
+from explorer.files.run_folder import json_text
+from explorer.files.whole_file import write_whole
+from explorer.tables.text_table import text_table
+from solver import EFFECTS, PHYSICS, Crew
+
+SAID_EVERY = 100
+"""Pours between two lines of progress."""
+
+
+@dataclass(frozen=True)
+class LimitOrder:
+    """What a user asked for; ``folder`` None: the made-up laboratory's model."""
+
+    folder: Path | None
+    rounds: int
+    out: Path
+    store: Path | None = None
+    threads: int | None = None
+
+
+def run_limit(order: LimitOrder, say: Callable[[str], None]) -> LimitStudy:
+    """Pour what is missing, and write what follows; every pour is kept, so an interrupted command goes on."""
+    measurement = load_measurement(order.folder) if order.folder else declared_model()
+    declared = declare(measurement, tuple(EFFECTS))
+    began = time.monotonic()
+
+    def on_pour(what: str, left: int, _: Ended) -> None:
+        if left % SAID_EVERY == 0:
+            say(f"{time.monotonic() - began:.0f} s: {what}, {left} pours to come")
+
+    with ExitStack() as stack:
+        store = Store(order.store or default_store())
+        stack.callback(store.close)
+        crew = stack.enter_context(Crew(order.threads))
+        paths = [parameter.path for parameter in measurement.parameters]
+        pours = ModelPours(measurement.fit, paths, store, crew.run_queue, on_pour, ROOT)
+        levels = find_levels(declared, pours)
+        sample = reference_sample(declared, levels, order.rounds, pours)
+    sets = [feature_set(condition) for condition in measurement.fit]
+    offered = {offer: [one.offered(offer) for one in sets] for offer in OFFERS}
+    found = limit_study(sample, levels, offered)
+    made = {"title": measurement.title, "rounds": order.rounds, "physics": PHYSICS}
+    write_whole(order.out, json_text(made | found.to_dict()) + "\n")
+    return found
+
+
+def limit_text(found: LimitStudy) -> str:
+    """Strengths, pairs that look alike, and limits, as tables."""
+    data = tuple(found.reached[0].strength)
+    strengths = [
+        [one.kind.name, " ".join(f"{a:.3g}" for a in one.amplitude), _with_error(one.ruler), _with_error(one.weak)]
+        + [_with_error(one.strength[name]) for name in data[1:]]
+        for one in found.reached
+    ]
+    head = ("effect", "amplitude", "ruler, σ", "at half of it", *(f"in a {name}, σ" for name in data[1:]))
+    pairs = [
+        [one.data, one.first, one.second, f"{one.cosine:.2f}", f"{confused(one.cosine, 6.0):.1%}"]
+        for one in found.confusable
+    ]
+    limits = [
+        [row.data, str(row.replicates), f"{row.limit.strength:g}", f"{row.limit.right:.1%}", f"{row.limit.named:.1%}"]
+        for row in found.rows
+    ]
+    return "\n\n".join(
+        (
+            text_table(head, strengths),
+            text_table(("data", "effect", "looks like", "cosine", "taken for it at 6 σ"), pairs),
+            text_table(("data", "pours", "strength, σ", "most probable is right", "named, 3 % wrong"), limits),
+        )
+    )
+
+
+def _with_error(strength: Strength | None) -> str:
+    return "" if strength is None else f"{strength.value:.1f} ± {strength.error:.1f}"
