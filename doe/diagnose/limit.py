@@ -170,7 +170,7 @@ def signatures_of(sample: Sample, names: Sequence[str], ruler: Sequence[Strength
     """
     metric = metric_of(sample, replicates)
     shifts = [fold_shifts(sample, name, metric) for name in names]
-    strengths = tuple(strength_of(one) for one in shifts)
+    strengths = tuple(strength_of(sample, name, metric) for name in names)
     gram = np.array([[product(a, b) for b in shifts] for a in shifts])
     size = np.sqrt(np.maximum(np.diag(gram), 1e-6))
     return Signatures(tuple(names), tuple(ruler), strengths, nearest_correlation(gram / np.outer(size, size)))
@@ -202,9 +202,9 @@ def limit_study(
     samples = {data: sample.first(numbers).varying() for data, numbers in offered.items()}
     scalars = next(iter(samples.values()))
     metric = metric_of(scalars)
-    ruler = [strength_of(fold_shifts(scalars, name, metric)) for name in names]
+    ruler = [strength_of(scalars, name, metric) for name in names]
     halves = [f"{one.name} weak" for one in kinds]
-    weak = [strength_of(fold_shifts(scalars, half, metric)) if half in sample.pours else None for half in halves]
+    weak = [strength_of(scalars, half, metric) if half in sample.pours else None for half in halves]
     by_data: dict[str, tuple[Strength, ...]] = {}
     confusable, rows = [], []
     for data, one in samples.items():

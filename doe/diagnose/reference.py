@@ -45,7 +45,7 @@ SIDE = 1.5
 
 FIRST_BASE = 48
 """Pours of the base model that the pilot takes its covariance from."""
-PER_ROUND = {"strong": 8, "weak": 4, "other": 4, "base": 16, "parameter": 2}
+PER_ROUND = {"strong": 8, "weak": 4, "other": 4, "base": 24, "parameter": 4}
 """Pours of each kind in a round: of each effect at either amplitude, of its other directions, of the base model, and of
 each parameter on either side."""
 

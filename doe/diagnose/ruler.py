@@ -10,8 +10,8 @@ Diedrichsen et al. 2016, arXiv 1607.01371, eq. 9):
 
     d² = [ (Σ_f δ_f)ᵀ M (Σ_f δ_f) − Σ_f δ_fᵀ M δ_f ] / (F (F − 1))
 
-Its standard error is the jackknife's over folds. Σ is shrunk to its diagonal as far as its own scatter asks for
-(Schäfer & Strimmer 2005, doi 10.2202/1544-6115.1175).
+Its standard error is the jackknife's over folds and, in quadrature, d/√(2 df), for Σ is itself estimated. Σ is shrunk
+to its diagonal as far as its own scatter asks for (Schäfer & Strimmer 2005, doi 10.2202/1544-6115.1175).
 
 **The ruler** of this project, by which an effect is said to be 6 σ strong, is this distance in the scalars of the
 fitted conditions at ``REPLICATES`` pours each.
@@ -36,9 +36,13 @@ FOLDS = 8
 
 @dataclass(frozen=True)
 class Metric:
-    """``whitening`` W with M = Wᵀ W, so that shifts in its units have unit noise, (D, D)."""
+    """``whitening`` W with M = Wᵀ W, so that shifts in its units have unit noise, (D, D).
+
+    ``freedom``: degrees of freedom of the covariance that it is made of.
+    """
 
     whitening: FloatArray
+    freedom: int
 
     def white(self, shifts: FloatArray) -> FloatArray:
         """Shifts (..., D) in standard errors of a data set."""
@@ -76,18 +80,20 @@ def metric_of(sample: Sample, replicates: int = REPLICATES) -> Metric:
         [_slope(sample, name) for name in sample.parameters] or [np.zeros((_size(sample), 0))]
     )
     covariance = np.zeros((_size(sample), _size(sample)))
-    first = 0
+    first, freedom = 0, sum(len(block) for block in sample.pours["base"])
     for c, base in enumerate(sample.pours["base"]):
         if len(base) < 3:
             raise StatisticsError(f"base: {len(base)} pours of condition {c + 1}; allowed: at least 3")
         last = first + base.shape[1]
-        covariance[first:last, first:last] = shrunk_covariance(_residuals(sample, c)) / replicates
+        residuals, groups = _residuals(sample, c)
+        covariance[first:last, first:last] = shrunk_covariance(residuals) / replicates
+        freedom = min(freedom, len(residuals) - groups)
         first = last
     covariance += sensitivity @ sensitivity.T
     # In units of each feature's standard error: they span ten orders of magnitude.
     scale = np.sqrt(np.diag(covariance))
     factor = np.linalg.cholesky(covariance / np.outer(scale, scale))
-    return Metric(np.linalg.inv(factor) / scale)
+    return Metric(np.linalg.inv(factor) / scale, freedom)
 
 
 def fold_shifts(sample: Sample, name: str, metric: Metric, folds: int = FOLDS) -> FloatArray:
@@ -111,15 +117,17 @@ def product(first: FloatArray, second: FloatArray) -> float:
     return (whole - float((first * second).sum())) / (folds * (folds - 1))
 
 
-def strength_of(shifts: FloatArray) -> Strength:
-    """Length of the shift, zero where its square comes out negative, with the jackknife's standard error over folds."""
+def strength_of(sample: Sample, name: str, metric: Metric) -> Strength:
+    """Length of the shift by ``name``, zero where its square comes out negative, with its standard error."""
+    shifts = fold_shifts(sample, name, metric)
     folds = len(shifts)
     square = product(shifts, shifts)
     value = float(np.sqrt(max(0.0, square)))
     without = np.array([product(rest, rest) for f in range(folds) for rest in [np.delete(shifts, f, axis=0)]])
     spread = float(np.sqrt((folds - 1) / folds * ((without - without.mean()) ** 2).sum()))
     # Of the square; that of its root by the delta method, and of a root near zero by the root of that.
-    return Strength(value, spread / (2.0 * value) if square > spread else float(np.sqrt(spread)))
+    error = spread / (2.0 * value) if square > spread else float(np.sqrt(spread))
+    return Strength(value, float(np.hypot(error, value / np.sqrt(2.0 * metric.freedom))))
 
 
 def shrunk_covariance(residuals: FloatArray) -> FloatArray:
@@ -136,15 +144,15 @@ def shrunk_covariance(residuals: FloatArray) -> FloatArray:
     return np.asarray(shrunk * np.outer(deviation, deviation), dtype=np.float64)
 
 
-def _residuals(sample: Sample, condition: int) -> FloatArray:
-    """Deviations from the mean of their kind, of the base model's pours and of those with a parameter moved."""
+def _residuals(sample: Sample, condition: int) -> tuple[FloatArray, int]:
+    """Deviations from the mean of their kind, of base pours and of those with a parameter moved, and the kinds."""
     kinds = ["base", *(f"{name} {side}" for name in sample.parameters for side in "-+")]
     groups = [sample.pours[kind][condition] for kind in kinds]
     # Each group's mean takes a degree of freedom.
     scaled = [
         (group - group.mean(axis=0)) * np.sqrt(len(group) / (len(group) - 1)) for group in groups if len(group) > 1
     ]
-    return np.concatenate(scaled)
+    return np.concatenate(scaled), len(scaled)
 
 
 def _slope(sample: Sample, parameter: str) -> FloatArray:
