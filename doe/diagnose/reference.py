@@ -10,9 +10,14 @@ data set of ``REPLICATES`` pours by about ``STRONG`` standard errors.
 
 from __future__ import annotations
 
+import io
+import json
 import math
+import zipfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +26,8 @@ from doe.diagnose.runs import Declared, Effect
 from doe.diagnose.simulation.plan import Point, middle
 from doe.diagnose.simulation.pours import ModelPours, Rows, Search
 from doe.diagnose.simulation.ranges import whitened_shift
-from doe.record import Record
+from doe.errors import StatisticsError
+from doe.record import Record, plain
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -108,6 +114,22 @@ class Sample:
         )
 
 
+@dataclass(frozen=True)
+class Reference:
+    """Reference pours of a declared model, of so many rounds."""
+
+    title: str
+    """Of the measurement that declares the model."""
+    physics: int
+    readings: int
+    """Versions of what was poured and of what was read off."""
+    features: tuple[tuple[str, ...], ...]
+    """Names of the columns, per fitted condition."""
+    levels: tuple[Level, ...]
+    rounds: int = 0
+    sample: Sample = Sample({}, ())
+
+
 def directions_of(effect: Effect) -> list[Direction]:
     """Up and, where there is one, down; of two amplitudes along x and along y (the rest follows by symmetry)."""
     if effect.amplitudes == 2:
@@ -179,20 +201,73 @@ def find_levels(declared: Declared, pours: ModelPours) -> list[Level]:
     return pours.answered("reference: amplitudes", searches, widest=widest)
 
 
-def reference_sample(declared: Declared, levels: Sequence[Level], rounds: int, pours: ModelPours) -> Sample:
-    """Features of ``rounds`` rounds; pours that came to no valid end, or of which one cannot be read, are left out."""
-    kinds = points_of(declared, levels, rounds)
-    rows = iter(pours.run(f"reference: round {rounds}", [point for points in kinds.values() for point in points]))
-    found: dict[str, Blocks] = {}
-    for kind, points in kinds.items():
+def extended(found: Reference, declared: Declared, pours: ModelPours) -> Reference:
+    """``found`` with one round more; pours that came to no valid end, or that cannot be read whole, are left out."""
+    before = points_of(declared, found.levels, found.rounds) if found.rounds else {}
+    kinds = points_of(declared, found.levels, found.rounds + 1)
+    new = {kind: points[len(before.get(kind, ())) :] for kind, points in kinds.items()}
+    what = f"reference: round {found.rounds + 1}"
+    rows = iter(pours.run(what, [point for points in new.values() for point in points]))
+    sample: dict[str, Blocks] = {}
+    for kind, points in new.items():
         poured = [next(rows) for _ in points]
         blocks = []
         for c in range(len(declared.conditions)):
             features = [(*row[c].summaries, *row[c].surface) for row in poured if row[c].valid]
-            block = np.array([one for one in features if np.isfinite(one).all()], dtype=np.float64)
-            blocks.append(block.reshape(len(block), -1))
-        found[kind] = tuple(blocks)
-    return Sample(found, tuple(parameter.name for parameter in declared.parameters))
+            complete = [one for one in features if np.isfinite(one).all()]
+            known = found.sample.pours[kind][c : c + 1] if kind in found.sample.pours else ()
+            # Kept in single precision, so that a reference is the same whether it was made at once or in pieces.
+            blocks.append(np.concatenate([*known, np.array(complete, dtype=np.float32).reshape(len(complete), -1)]))
+        sample[kind] = tuple(block.reshape(len(block), -1) for block in blocks)
+    parameters = tuple(parameter.name for parameter in declared.parameters)
+    return replace(found, rounds=found.rounds + 1, sample=Sample(sample, parameters))
+
+
+def save(found: Reference, path: Path) -> None:
+    """Write ``found`` as a compressed NumPy archive: a JSON head, and one array per kind and condition."""
+    head = {
+        **{name: getattr(found, name) for name in ("title", "physics", "readings", "features", "rounds")},
+        "levels": plain(found.levels),
+        "parameters": found.sample.parameters,
+        "kinds": {kind: len(blocks) for kind, blocks in found.sample.pours.items()},
+    }
+    arrays: dict[str, npt.NDArray[Any]] = {"head": np.frombuffer(json.dumps(head).encode(), dtype=np.uint8)}
+    for k, blocks in enumerate(found.sample.pours.values()):
+        arrays |= {f"{k}_{c}": block.astype(np.float32) for c, block in enumerate(blocks)}
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, allow_pickle=False, **arrays)
+    part = path.with_name(path.name + ".part")
+    part.write_bytes(buffer.getvalue())
+    part.replace(path)
+
+
+def load(path: Path) -> Reference:
+    """Read what :func:`save` wrote; raises StatisticsError for anything else, in one line."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            head = json.loads(bytes(file["head"]))
+            pours = {
+                kind: tuple(file[f"{k}_{c}"].astype(np.float64) for c in range(conditions))
+                for k, (kind, conditions) in enumerate(head["kinds"].items())
+            }
+        levels = tuple(
+            Level(
+                Direction(**{**one["direction"], "full": tuple(one["direction"]["full"])}), one["share"], one["shift"]
+            )
+            for one in head["levels"]
+        )
+        features = tuple(tuple(names) for names in head["features"])
+        return Reference(
+            head["title"],
+            head["physics"],
+            head["readings"],
+            features,
+            levels,
+            head["rounds"],
+            Sample(pours, tuple(head["parameters"])),
+        )
+    except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
+        raise StatisticsError(f"{path}: not a file of reference pours ({' '.join(str(error).split())[:100]})") from None
 
 
 def points_of(declared: Declared, levels: Sequence[Level], rounds: int) -> Mapping[str, list[Point]]:

@@ -17,7 +17,10 @@ def limit(
     ),
     rounds: int = typer.Option(8, min=1, help="Rounds of reference pours; 8 give 96 of each effect."),
     out: Path = typer.Option(Path("limit.json"), help="File for the strengths, the pairs that look alike, the limits."),
-    store: Path | None = typer.Option(None, help="SQLite file that keeps every pour; the same command goes on."),
+    reference: Path = typer.Option(
+        Path("reference.npz"), help="File of the pours' features; written after every round, and gone on with."
+    ),
+    store: Path | None = typer.Option(None, help="SQLite file that keeps every pour."),
     threads: int | None = typer.Option(None, min=1, help="Worker processes; one per core if not given."),
 ) -> None:
     """Pour every effect many times and print the Bayes limit: what scalars, profiles and scans can tell at best."""
@@ -25,5 +28,5 @@ def limit(
     from solver.assets import measurement_folder
 
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    order = LimitOrder(measurement_folder(folder) if folder else None, rounds, out, store, threads)
+    order = LimitOrder(measurement_folder(folder) if folder else None, rounds, out, reference, store, threads)
     typer.echo(limit_text(run_limit(order, typer.echo)))

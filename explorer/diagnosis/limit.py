@@ -5,18 +5,20 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from doe.diagnose.declare import declare
 from doe.diagnose.limit import LimitStudy, confused, limit_study
-from doe.diagnose.reference import ROOT, find_levels, reference_sample
+from doe.diagnose.reference import ROOT, Reference, extended, find_levels, load, save
 from doe.diagnose.ruler import Strength
+from doe.diagnose.runs import Declared
 from doe.diagnose.simulation.pours import Ended, ModelPours
-from doe.measurement import load_measurement
+from doe.measurement import Measurement, load_measurement
 from doe.measurement.features import OFFERS, feature_set
-from doe.store import Store, default_store
+from doe.store import READINGS, Store, default_store
 from doe.validation.laboratory import declared_model
+from explorer.errors import CommandError
 from explorer.files.run_folder import json_text
 from explorer.files.whole_file import write_whole
 from explorer.tables.text_table import text_table
@@ -28,19 +30,37 @@ SAID_EVERY = 100
 
 @dataclass(frozen=True)
 class LimitOrder:
-    """What a user asked for; ``folder`` None: the made-up laboratory's model."""
+    """What a user asked for; ``folder`` None: the made-up laboratory's model. ``reference``: file of earlier rounds."""
 
     folder: Path | None
     rounds: int
     out: Path
+    reference: Path
     store: Path | None = None
     threads: int | None = None
 
 
 def run_limit(order: LimitOrder, say: Callable[[str], None]) -> LimitStudy:
-    """Pour what is missing, and write what follows; every pour is kept, so an interrupted command goes on."""
+    """Pour the rounds that are missing, and write what follows. Every pour and every round is kept."""
     measurement = load_measurement(order.folder) if order.folder else declared_model()
     declared = declare(measurement, tuple(EFFECTS))
+    sets = [feature_set(condition) for condition in measurement.fit]
+    nothing = Reference(measurement.title, PHYSICS, READINGS, tuple(one.names for one in sets), ())
+    found = load(order.reference) if order.reference.exists() else nothing
+    _require_same(found, nothing, order.reference)
+    if found.rounds < order.rounds:
+        found = _poured(order, measurement, declared, found, say)
+    offered = {offer: [one.offered(offer) for one in sets] for offer in OFFERS}
+    study = limit_study(found.sample, found.levels, offered)
+    made = {"title": found.title, "rounds": found.rounds, "physics": found.physics, "readings": found.readings}
+    write_whole(order.out, json_text(made | study.to_dict()) + "\n")
+    return study
+
+
+def _poured(
+    order: LimitOrder, measurement: Measurement, declared: Declared, found: Reference, say: Callable[[str], None]
+) -> Reference:
+    """``found`` with the rounds that are missing."""
     began = time.monotonic()
 
     def on_pour(what: str, left: int, _: Ended) -> None:
@@ -53,14 +73,20 @@ def run_limit(order: LimitOrder, say: Callable[[str], None]) -> LimitStudy:
         crew = stack.enter_context(Crew(order.threads))
         paths = [parameter.path for parameter in measurement.parameters]
         pours = ModelPours(measurement.fit, paths, store, crew.run_queue, on_pour, ROOT)
-        levels = find_levels(declared, pours)
-        sample = reference_sample(declared, levels, order.rounds, pours)
-    sets = [feature_set(condition) for condition in measurement.fit]
-    offered = {offer: [one.offered(offer) for one in sets] for offer in OFFERS}
-    found = limit_study(sample, levels, offered)
-    made = {"title": measurement.title, "rounds": order.rounds, "physics": PHYSICS}
-    write_whole(order.out, json_text(made | found.to_dict()) + "\n")
+        if not found.levels:
+            found = replace(found, levels=tuple(find_levels(declared, pours)))
+        while found.rounds < order.rounds:
+            found = extended(found, declared, pours)
+            save(found, order.reference)
+            say(f"{order.reference}: {found.rounds} of {order.rounds} rounds")
     return found
+
+
+def _require_same(found: Reference, now: Reference, path: Path) -> None:
+    for name in ("title", "physics", "readings", "features"):
+        if getattr(found, name) != getattr(now, name):
+            there = getattr(found, name) if name != "features" else "other features"
+            raise CommandError(f"--reference {path}: {name} {there!r} is not that of today; name another file")
 
 
 def limit_text(found: LimitStudy) -> str:

@@ -1,0 +1,328 @@
+"""Scanned surfaces: ``scans/<condition>_<k>.*`` → the height map of replicate k, on the axis of the rig.
+
+    .ply .stl           a surface; its facets are sampled
+    .xyz .txt .csv      points x, y, z in the first three columns, with or without a header
+    .npz                height (n, m), x (n,), y (m,); NaN where nothing was seen
+    .tif .tiff          16 bit, a column per x and a row per y from +y down; 0 where nothing was seen
+
+``[condition.scan]`` of ``measurement.toml`` says what the files do not:
+
+    unit = "mm"         of a surface and of points; metres where it is not stated
+    pixel = "0.5mm"     of an image: edge of a pixel
+    step = "0.01mm"     of an image: height of one count
+    plate = [a, b, c]   the plate z = a + b x + c y, in metres; found from the bare plate in the scan where not stated
+    axis = [x, y]       the rig's axis in the scan's coordinates, in metres; without it the centre of the volume stands
+                        for it, and nothing that depends on the axis (where the pile leans to) is read
+    grid = "0.5mm"      resolution; the spacing of the points where not stated
+    noise = "0.1mm"     standard deviation of one height, where it is known
+
+Only the upper surface is used: the mean of the points within ``SHELL`` pixels of the highest in a pixel.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
+
+from doe.errors import MeasurementError
+from doe.study_table import Table, number, only
+from solver import Frame, HeightMap, ParameterError, parse_quantity
+
+Array = npt.NDArray[np.float64]
+
+KEYS = ("unit", "pixel", "step", "plate", "axis", "grid", "noise")
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
+SURFACES, POINTS, ARRAYS, IMAGES = (".ply", ".stl"), (".xyz", ".txt", ".csv"), (".npz",), (".tif", ".tiff")
+MOST_BYTES = 300_000_000
+MOST_POINTS = 20_000_000
+SHELL = 0.5
+"""Depth below the highest point of a pixel, in pixels, within which points count as upper surface."""
+FEWEST = 200
+"""Points of the smallest scan."""
+PLATE_SHARE = 0.1
+"""Share of the points that has to lie on the bare plate where the plate is to be found."""
+ROUNDS = 30
+
+
+@dataclass(frozen=True)
+class ScanSettings:
+    """What ``[condition.scan]`` says, SI."""
+
+    unit: float = 1.0
+    pixel: float | None = None
+    step: float | None = None
+    plate: tuple[float, float, float] | None = None
+    axis: tuple[float, float] | None = None
+    grid: float | None = None
+    noise: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """Points of an upper surface [m]: x, y about the axis of the rig, z above the plate."""
+
+    points: Array
+    """(n, 3)"""
+    grid: float
+    """Resolution [m]: spacing of the points."""
+    on_axis: bool
+    """Whether the axis is known; else x and y are about the centre of the volume."""
+
+    def height_map(self, frame: Frame, pixel: float) -> HeightMap:
+        """The upper surface over ``frame`` in pixels of ``pixel`` [m]; NaN where nothing was seen."""
+        n = 2 * int(np.ceil(frame.half_width / pixel))
+        place = np.floor(self.points[:, :2] / pixel + n / 2).astype(np.int64)
+        inside = ((place >= 0) & (place < n)).all(axis=1)
+        cell, z = place[inside, 0] * n + place[inside, 1], self.points[inside, 2]
+        top = np.full(n * n, -np.inf)
+        np.maximum.at(top, cell, z)
+        near = z >= top[cell] - SHELL * pixel
+        count = np.bincount(cell[near], minlength=n * n)
+        total = np.bincount(cell[near], weights=z[near], minlength=n * n)
+        height = np.full(n * n, np.nan)
+        height[count > 0] = total[count > 0] / count[count > 0]
+        axis = (np.arange(n) + 0.5 - n / 2) * pixel
+        return HeightMap(height.reshape(n, n), np.hypot(axis[:, None], axis[None, :]), pixel)
+
+
+def scan_settings(table: Table) -> ScanSettings:
+    """Settings from ``[condition.scan]``; raises StudyFileError or ParameterError naming the key."""
+    only(table, KEYS, "scan")
+    unit = table.get("unit", "m")
+    if unit not in UNITS:
+        raise MeasurementError(f"scan.unit: {unit!r}; allowed: {', '.join(UNITS)}")
+
+    def length(key: str) -> float | None:
+        if key not in table:
+            return None
+        value = parse_quantity(table[key], "m", f"scan.{key}")
+        if not value > 0.0:
+            raise MeasurementError(f"scan.{key}: {value:g} m; allowed: more than 0")
+        return value
+
+    def numbers(key: str, n: int) -> tuple[float, ...] | None:
+        if key not in table:
+            return None
+        given = table[key]
+        if not isinstance(given, list) or len(given) != n:
+            raise MeasurementError(f"scan.{key}: {given!r}; allowed: a list of {n} numbers")
+        return tuple(number(one, f"scan.{key}") for one in given)
+
+    plate, axis = numbers("plate", 3), numbers("axis", 2)
+    return ScanSettings(
+        unit=UNITS[unit],
+        pixel=length("pixel"),
+        step=length("step"),
+        plate=None if plate is None else (plate[0], plate[1], plate[2]),
+        axis=None if axis is None else (axis[0], axis[1]),
+        grid=length("grid"),
+        noise=length("noise"),
+    )
+
+
+def scan_files(folder: Path, conditions: Iterable[str]) -> tuple[dict[str, dict[int, Path]], tuple[Path, ...]]:
+    """Files of ``folder/scans`` by condition and replicate, and those that belong to no condition."""
+    found: dict[str, dict[int, Path]] = {name: {} for name in conditions}
+    strangers = []
+    for path in sorted((folder / "scans").glob("*")):
+        name, _, replicate = path.stem.rpartition("_")
+        known = path.suffix.lower() in SURFACES + POINTS + ARRAYS + IMAGES
+        if known and name in found and replicate.isdecimal() and int(replicate) >= 1:
+            if int(replicate) in found[name]:
+                raise MeasurementError(f"{path}: replicate {replicate} has another scan; allowed: one file each")
+            found[name][int(replicate)] = path
+        else:
+            strangers.append(path)
+    return found, tuple(strangers)
+
+
+def read_scans(files: Mapping[int, Path], settings: ScanSettings) -> dict[int, Scan]:
+    """Scans by replicate; MeasurementError in one line that names the file."""
+    return {replicate: read_scan(path, settings) for replicate, path in files.items()}
+
+
+def read_scan(path: Path, settings: ScanSettings) -> Scan:
+    """One scan, on the plate and about the axis."""
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise MeasurementError(f"{path.stat().st_size / 1e6:.0f} MB; allowed: up to {MOST_BYTES / 1e6:.0f} MB")
+        points, grid = _points(path, settings)
+        points = points[np.isfinite(points).all(axis=1)]
+        if not FEWEST <= len(points) <= MOST_POINTS:
+            raise MeasurementError(f"{len(points)} points that are finite; allowed: {FEWEST} to {MOST_POINTS}")
+        a, b, c = settings.plate or found_plate(points)
+        points = points - [0.0, 0.0, a]
+        points[:, 2] -= points[:, :2] @ [b, c]
+        # Heights are taken along the plate's normal; the few degrees of a scanner's frame change x and y by less
+        # than a thousandth.
+        points[:, 2] /= np.sqrt(1.0 + b * b + c * c)
+        grid = settings.grid or grid or spacing(points)
+        points[:, :2] -= settings.axis if settings.axis is not None else _volume_centre(points, grid)
+    except MeasurementError as error:
+        raise MeasurementError(f"{path}: {error}") from None
+    except (OSError, ParameterError) as error:
+        raise MeasurementError(f"{path}: cannot be read ({' '.join(str(error).split())[:120]})") from None
+    return Scan(points, grid, settings.axis is not None)
+
+
+def found_plate(points: Array) -> tuple[float, float, float]:
+    """The bare plate z = a + b x + c y of ``points`` (n, 3) [m]: the plane that the lowest points lie in.
+
+    Least squares, again and again, of the points within three of their median deviations of the last plane. Raises
+    MeasurementError where less than ``PLATE_SHARE`` of the points lie on it.
+    """
+    middle = points[:, :2].mean(axis=0)
+    low = points[points[:, 2] <= np.quantile(points[:, 2], 0.3)]
+    plane, within = np.zeros(3), np.inf
+    for _ in range(ROUNDS):
+        design = np.column_stack([np.ones(len(low)), low[:, :2] - middle])
+        plane = np.linalg.lstsq(design, low[:, 2], rcond=None)[0]
+        off = points[:, 2] - plane[0] - (points[:, :2] - middle) @ plane[1:]
+        below = off[off < 0.0]
+        # What lies under the plane is noise of the plate; what lies above may be grains.
+        within = 3.0 * max(1.4826 * float(np.median(-below)) if below.size else 0.0, 1e-6)
+        chosen = points[np.abs(off) <= within]
+        if len(chosen) < 3 or (len(chosen) == len(low) and np.array_equal(chosen, low)):
+            break
+        low = chosen
+    share = len(low) / len(points)
+    if share < PLATE_SHARE:
+        raise MeasurementError(
+            f"no bare plate is seen ({share:.0%} of the points lie in one plane); state scan.plate = [a, b, c]"
+        )
+    return float(plane[0] - plane[1:] @ middle), float(plane[1]), float(plane[2])
+
+
+def spacing(points: Array) -> float:
+    """Median distance of a point from its nearest neighbour in the plane [m], over a thousand points."""
+    some = points[:: max(1, len(points) // 1000), :2]
+    distance = cKDTree(points[:, :2]).query(some, k=2)[0][:, 1]
+    return float(np.median(distance[distance > 0.0])) if (distance > 0.0).any() else 0.0
+
+
+def _volume_centre(points: Array, grid: float) -> Array:
+    """Mean place over the volume above the plate, of points that are as dense everywhere."""
+    height = np.where(points[:, 2] > 2.0 * grid, points[:, 2], 0.0)
+    if height.sum() <= 0.0:
+        raise MeasurementError("nothing stands on the plate; state scan.axis = [x, y]")
+    return np.asarray(height @ points[:, :2] / height.sum(), dtype=np.float64)
+
+
+def _points(path: Path, settings: ScanSettings) -> tuple[Array, float | None]:
+    """Points (n, 3) [m] and, of a regular grid, its spacing [m]."""
+    suffix = path.suffix.lower()
+    if suffix in SURFACES:
+        return _of_surface(path) * settings.unit, None
+    if suffix in POINTS:
+        return _of_table(path) * settings.unit, None
+    if suffix in ARRAYS:
+        return _of_arrays(path)
+    return _of_image(path, settings)
+
+
+def _of_surface(path: Path) -> Array:
+    """Corners of a surface, and points on its facets as dense as the corners are where these are dense."""
+    import trimesh
+
+    try:
+        found: Any = trimesh.load(path, process=False)
+        parts = list(found.geometry.values()) if isinstance(found, trimesh.Scene) else [found]
+        corners = np.concatenate([np.asarray(part.vertices, dtype=np.float64) for part in parts])
+        facets = [np.asarray(part.triangles) for part in parts if isinstance(part, trimesh.Trimesh) and len(part.faces)]
+    except Exception as error:  # the readers of a damaged file raise anything from KeyError to struct.error
+        raise MeasurementError(f"cannot be read ({' '.join(str(error).split())[:120]})") from None
+    if not facets:
+        return corners
+    return np.concatenate([corners, *(_sampled(one) for one in facets)])
+
+
+def _sampled(triangles: Array) -> Array:
+    """Points inside triangles (n, 3, 3), so dense that none is further from the next than the median edge."""
+    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    longest = np.max([np.linalg.norm(b - a, axis=1), np.linalg.norm(c - b, axis=1), np.linalg.norm(a - c, axis=1)], 0)
+    edge = max(float(np.median(longest)), float(np.ptp(triangles.reshape(-1, 3), axis=0).max()) / 1000.0)
+    parts = np.clip(np.ceil(longest / edge), 1, 1000).astype(np.int64)
+    found = []
+    for k in np.unique(parts):
+        some = parts == k
+        # Barycentric points of a triangle cut into k² equal ones.
+        steps = [(i, j) for i in range(k + 1) for j in range(k + 1 - i)]
+        weight = np.array([(k - i - j, i, j) for i, j in steps], dtype=np.float64) / k
+        if len(weight) * int(some.sum()) > MOST_POINTS:
+            raise MeasurementError("its facets differ too much in size; allowed: a surface of evenly fine facets")
+        found.append(np.einsum("pk,tkd->tpd", weight, triangles[some]).reshape(-1, 3))
+    return np.concatenate(found)
+
+
+def _of_table(path: Path) -> Array:
+    """The first three columns of a table of numbers, separated by commas, semicolons or blanks."""
+    text = path.read_text(encoding="utf-8-sig", errors="replace")
+    rows = [line.replace(";", " ").replace(",", " ").replace("\t", " ") for line in text.splitlines()]
+    rows = [row for row in rows if row.strip() and not row.lstrip().startswith("#")]
+    if rows and not _numeric(rows[0]):
+        rows = rows[1:]
+    try:
+        found = np.loadtxt(rows, usecols=(0, 1, 2), ndmin=2)
+    except (ValueError, IndexError) as error:
+        raise MeasurementError(f"no table of x, y, z ({' '.join(str(error).split())[:100]})") from None
+    return np.asarray(found, dtype=np.float64)
+
+
+def _numeric(row: str) -> bool:
+    try:
+        return len([float(cell) for cell in row.split()]) >= 3
+    except ValueError:
+        return False
+
+
+def _of_arrays(path: Path) -> tuple[Array, float]:
+    try:
+        with np.load(path, allow_pickle=False) as arrays:
+            missing = [name for name in ("height", "x", "y") if name not in arrays]
+            if missing:
+                raise MeasurementError(f"{missing[0]}: missing; allowed: arrays height, x, y")
+            height, x, y = (np.asarray(arrays[name], dtype=np.float64) for name in ("height", "x", "y"))
+    except (EOFError, zipfile.BadZipFile) as error:
+        raise MeasurementError(f"cannot be read as .npz: {error}") from None
+    except ValueError as error:
+        if isinstance(error, MeasurementError):
+            raise
+        raise MeasurementError(f"cannot be read as plain arrays: {error}") from None
+    if x.ndim != 1 or y.ndim != 1 or height.shape != (x.size, y.size) or min(height.shape) < 2:
+        raise MeasurementError(
+            f"height, x, y: shapes {height.shape}, {x.shape}, {y.shape}; allowed: (n, m), (n,), (m,)"
+        )
+    places = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
+    grid = float(max(np.abs(np.diff(x)).max(), np.abs(np.diff(y)).max()))
+    return np.concatenate([places, height[:, :, None]], axis=-1).reshape(-1, 3), grid
+
+
+def _of_image(path: Path, settings: ScanSettings) -> tuple[Array, float]:
+    from PIL import Image, UnidentifiedImageError
+
+    if settings.pixel is None or settings.step is None:
+        raise MeasurementError("scan.pixel and scan.step: missing; an image does not say how large it is")
+    try:
+        with Image.open(path) as image:
+            if image.width * image.height > MOST_POINTS:
+                raise MeasurementError(f"{image.width} × {image.height} pixels; allowed: {MOST_POINTS} in all")
+            if not image.mode.startswith("I"):
+                raise MeasurementError(f"an image of mode {image.mode}; allowed: one channel of 16 bit")
+            counts = np.asarray(image, dtype=np.float64)
+    except (UnidentifiedImageError, OSError, ValueError) as error:
+        if isinstance(error, MeasurementError):
+            raise
+        raise MeasurementError(f"cannot be read as an image ({' '.join(str(error).split())[:100]})") from None
+    rows, columns = counts.shape
+    x = (np.arange(columns) + 0.5 - columns / 2) * settings.pixel
+    y = -(np.arange(rows) + 0.5 - rows / 2) * settings.pixel
+    places = np.stack(np.meshgrid(x, y), axis=-1)
+    height = np.where(counts > 0.0, counts * settings.step, np.nan)
+    return np.concatenate([places, height[:, :, None]], axis=-1).reshape(-1, 3), settings.pixel
