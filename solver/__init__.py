@@ -15,10 +15,14 @@ from solver.material_file import is_material, load_material
 from solver.observables import Value, observable_names, observe
 from solver.observables.free_surface import slope_angle_deg
 from solver.observables.named import Named, all_names, named, observe_named, observe_scan
-from solver.observables.surface import HeightMap, height_map
+from solver.observables.surface import HeightMap, coarsened, height_map
 from solver.observables.surface_features import (
+    ASYMMETRY_NAMES,
+    BULK_NAMES,
+    HISTOGRAM_NAMES,
     PROFILE_NAMES,
     SURFACE_NAMES,
+    TEXTURE_NAMES,
     Frame,
     frame_of,
     profile_features,
@@ -78,11 +82,15 @@ def __getattr__(name: str) -> Any:
 
 
 __all__ = [
+    "ASYMMETRY_NAMES",
+    "BULK_NAMES",
     "EFFECTS",
+    "HISTOGRAM_NAMES",
     "PHYSICS",
     "PROFILE_NAMES",
     "RIGS",
     "SURFACE_NAMES",
+    "TEXTURE_NAMES",
     "AssetNotFoundError",
     "Batch",
     "Bodies",
@@ -116,6 +124,7 @@ __all__ = [
     "body_counts",
     "canonical",
     "capacity_for",
+    "coarsened",
     "frame_of",
     "height_map",
     "is_material",

@@ -7,6 +7,7 @@ mean_of                            every value of the table is the mean of so ma
 [condition.insertion]              protocol, rate, region_radius, region_z, velocity, batch_interval, duration;
                                    region = "cylinder", orientation = "random": the only ones there are
 [condition.domain]                 half_width
+[condition.scan]                   what the files of its scans do not say (`scans`)
 
 The feed of a rig begins at its opening, so region_z must begin there. ``duration`` is the time from the first body to
 the reading; the run is read then, at rest or not. ``batch_interval`` becomes the interval at which a run decides. A
@@ -24,7 +25,7 @@ from doe.measurement.measurement import MeasuredParameter
 from doe.study_table import Table, number, one_of, only, section
 from solver import Scene, canonical, parameters, parse_quantity, pour_rig, value, with_rig, with_settings
 
-KEYS = ("name", "role", "rig", "data", "rig_parameters", "insertion", "domain", "duration", "images", "mean_of")
+KEYS = ("name", "role", "rig", "data", "rig_parameters", "insertion", "domain", "duration", "images", "mean_of", "scan")
 INSERTION = (
     "protocol",
     "rate",

@@ -5,7 +5,8 @@ title, source                free text, never interpreted
 material = "material.toml"   the declared base model, or a shipped material
 [parameters]                 what calibration may move (`parameter_table`)
 [uncertainty]                observable → standard deviation of one value, where replicates cannot give it
-[[condition]]                set-up and table (`condition_table`, `long_form`); scanned piles stand in piles/ (`piles`)
+[[condition]]                set-up and table (`condition_table`, `long_form`)
+piles/, scans/               scanned piles (`piles`) and scanned surfaces (`scans`) of the replicates
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from doe.measurement.measurement import Condition, CrossCheck, MeasuredParameter
 from doe.measurement.observations import read_observations
 from doe.measurement.parameter_table import read_parameters
 from doe.measurement.photographs import photograph_entries, photograph_values
-from doe.measurement.piles import pile_files
+from doe.measurement.piles import pile_files, pile_surfaces
+from doe.measurement.scans import UpperSurface, read_scans, scan_files, scan_settings
 from doe.study_table import Table, entries, one_of, only, required, section, whole
 from solver import AssetNotFoundError, ParameterError, Scene, all_names, load_material, named, parse_quantity, read_toml
 
@@ -58,20 +60,29 @@ def _read(folder: Path, table: Table) -> Measurement:
             bare.append(in_rig(base, str(entry["rig"])))
     measured, notes = read_parameters(section(table, "parameters"), bare)
     uncertainty = _uncertainty(section(table, "uncertainty"))
-    piles, strangers = pile_files(folder, [str(entry["name"]) for entry in given])
+    names = [str(entry["name"]) for entry in given]
+    piles, strangers = pile_files(folder, names)
+    scans, unknown = scan_files(folder, names)
     conditions: list[Condition] = []
     checks: list[CrossCheck] = []
-    ignored = [f"piles/{path.name}: of no condition" for path in strangers]
+    ignored = [f"{path.parent.name}/{path.name}: of no condition" for path in (*strangers, *unknown)]
     for entry in given:
         name = str(entry["name"])
         with _within(entry):
             scene = condition_scene(base, entry, measured)
             mean_of = whole(entry.get("mean_of", 1), "mean_of", 1)
             photographed, unread = photograph_values(folder, photograph_entries(entry.get("images", [])))
+            settings = scan_settings(section(entry, "scan"))
+        surfaces: dict[int, UpperSurface] = {**pile_surfaces(piles[name]), **read_scans(scans[name], settings)}
         replicates, observations, checked, unused = read_observations(
             name, folder / str(entry["data"]), piles[name], photographed, scene, uncertainty
         )
-        conditions.append(Condition(name, entry["role"], scene, replicates, observations, mean_of))
+        if max(surfaces, default=0) > replicates:
+            last = max(surfaces)
+            raise MeasurementError(
+                f"{scans[name][last]}: replicate {last}; allowed: 1 to {replicates}, as in the table"
+            )
+        conditions.append(Condition(name, entry["role"], scene, replicates, observations, mean_of, surfaces))
         checks += checked
         ignored += unused
         ignored += [f"condition {name}: images: {line}" for line in unread]

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from doe.measurement.scans import UpperSurface
 from doe.record import Record
 from solver import Scene
 
@@ -55,6 +57,8 @@ class Condition:
     observations: tuple[Observation, ...]
     mean_of: int = 1
     """Pours behind each listed value: more than one where only their mean was published."""
+    surfaces: Mapping[int, UpperSurface] = field(default_factory=dict)
+    """Upper surfaces of the piles by replicate, from 1 on."""
 
     @property
     def offered(self) -> dict[str, Observation]:

@@ -7,15 +7,41 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from doe.errors import MeasurementError
-from solver import ParameterError, Pile, Scene, named, observe_scan, scanned_pile
+from solver import (
+    HeightMap,
+    ParameterError,
+    Pile,
+    Scene,
+    Spheres,
+    height_map,
+    named,
+    observe_scan,
+    scanned_pile,
+)
 
 Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class PileSurface:
+    """The upper surface of a pile that is known by its spheres; a scanner that sees every point of it from above."""
+
+    spheres: Spheres
+    grid: float = 0.0
+    on_axis: bool = True
+
+    def height_map(self, half_width: float, pixel: float) -> HeightMap:
+        """Heights of the highest spheres within ``half_width`` [m] of the axis."""
+        return height_map(self.spheres, np.zeros(2), half_width, pixel)
+
 
 SCALARS = (
     "angle_of_repose_deg",
@@ -59,22 +85,38 @@ def read_piles(files: Mapping[int, Path], scene: Scene) -> dict[int, Pile]:
 
 def read_pile(path: Path, scene: Scene) -> Pile:
     """One scanned pile; MeasurementError in one line naming file and array."""
+    xyz, radius, body = _arrays(path)
+    try:
+        return scanned_pile(scene, xyz.astype(np.float64), radius.astype(np.float64), body)
+    except ParameterError as error:
+        raise MeasurementError(f"{path}: {error}") from None
+
+
+def pile_surfaces(files: Mapping[int, Path]) -> dict[int, PileSurface]:
+    """Upper surfaces of scanned piles by replicate; of whatever bodies, for from above one sees none."""
+    found = {}
+    for replicate, path in files.items():
+        xyz, radius, body = _arrays(path)
+        n = radius.size
+        if xyz.shape != (n, 3) or not (np.isfinite(xyz).all() and np.isfinite(radius).all()):
+            raise MeasurementError(f"{path}: xyz, radius: shapes {xyz.shape}, {radius.shape}, or not finite")
+        found[replicate] = PileSurface(Spheres(xyz.astype(np.float64), radius.astype(np.float64), body))
+    return found
+
+
+def _arrays(path: Path) -> tuple[npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any]]:
     try:
         with np.load(path, allow_pickle=False) as arrays:
             missing = [name for name in ("xyz", "radius", "body") if name not in arrays]
             if missing:
                 raise MeasurementError(f"{path}: {missing[0]}: missing; allowed: arrays xyz, radius, body")
-            xyz, radius, body = (np.asarray(arrays[name]) for name in ("xyz", "radius", "body"))
+            return np.asarray(arrays["xyz"]), np.asarray(arrays["radius"]), np.asarray(arrays["body"])
     except (OSError, EOFError, zipfile.BadZipFile) as error:
         raise MeasurementError(f"{path}: cannot be read as .npz: {error}") from None
     except ValueError as error:
         if isinstance(error, MeasurementError):
             raise
         raise MeasurementError(f"{path}: cannot be read as plain arrays: {error}") from None
-    try:
-        return scanned_pile(scene, xyz.astype(np.float64), radius.astype(np.float64), body)
-    except ParameterError as error:
-        raise MeasurementError(f"{path}: {error}") from None
 
 
 def pile_values(

@@ -16,7 +16,8 @@
     grid = "0.5mm"      resolution; the spacing of the points where not stated
     noise = "0.1mm"     standard deviation of one height, where it is known
 
-Only the upper surface is used: the mean of the points within ``SHELL`` pixels of the highest in a pixel.
+Only the upper surface is used: in cells as wide as the scan's resolution, the mean of what lies within ``SHELL`` cells
+of the highest point.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ import zipfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -33,7 +34,7 @@ from scipy.spatial import cKDTree
 
 from doe.errors import MeasurementError
 from doe.study_table import Table, number, only
-from solver import Frame, HeightMap, ParameterError, parse_quantity
+from solver import HeightMap, ParameterError, parse_quantity
 
 Array = npt.NDArray[np.float64]
 
@@ -42,12 +43,13 @@ UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 SURFACES, POINTS, ARRAYS, IMAGES = (".ply", ".stl"), (".xyz", ".txt", ".csv"), (".npz",), (".tif", ".tiff")
 MOST_BYTES = 300_000_000
 MOST_POINTS = 20_000_000
-SHELL = 0.5
-"""Depth below the highest point of a pixel, in pixels, within which points count as upper surface."""
+SHELL = 2.0
+"""Depth below the highest point of a cell, in cells, within which points count as upper surface."""
 FEWEST = 200
 """Points of the smallest scan."""
-PLATE_SHARE = 0.1
-"""Share of the points that has to lie on the bare plate where the plate is to be found."""
+PLATE_SHARE, PLATE_DEPTH = 0.2, 0.05
+"""Share of the points that has to lie on the bare plate where the plate is to be found, and how far off it
+they may be, as a share of the scan's height."""
 ROUNDS = 30
 
 
@@ -64,6 +66,21 @@ class ScanSettings:
     noise: float | None = None
 
 
+class UpperSurface(Protocol):
+    """What was seen of a pile from above."""
+
+    @property
+    def grid(self) -> float:
+        """Resolution [m]; 0 where there is no limit to it."""
+
+    @property
+    def on_axis(self) -> bool:
+        """Whether the rig's axis is known."""
+
+    def height_map(self, half_width: float, pixel: float) -> HeightMap:
+        """Heights within ``half_width`` [m] of the axis in pixels of ``pixel`` [m]; NaN where nothing was seen."""
+
+
 @dataclass(frozen=True, eq=False)
 class Scan:
     """Points of an upper surface [m]: x, y about the axis of the rig, z above the plate."""
@@ -75,9 +92,9 @@ class Scan:
     on_axis: bool
     """Whether the axis is known; else x and y are about the centre of the volume."""
 
-    def height_map(self, frame: Frame, pixel: float) -> HeightMap:
-        """The upper surface over ``frame`` in pixels of ``pixel`` [m]; NaN where nothing was seen."""
-        n = 2 * int(np.ceil(frame.half_width / pixel))
+    def height_map(self, half_width: float, pixel: float) -> HeightMap:
+        """The upper surface within ``half_width`` [m] in pixels of ``pixel`` [m]; NaN where nothing was seen."""
+        n = 2 * int(np.ceil(half_width / pixel - 1e-9))
         place = np.floor(self.points[:, :2] / pixel + n / 2).astype(np.int64)
         inside = ((place >= 0) & (place < n)).all(axis=1)
         cell, z = place[inside, 0] * n + place[inside, 1], self.points[inside, 2]
@@ -180,14 +197,14 @@ def found_plate(points: Array) -> tuple[float, float, float]:
     """
     middle = points[:, :2].mean(axis=0)
     low = points[points[:, 2] <= np.quantile(points[:, 2], 0.3)]
-    plane, within = np.zeros(3), np.inf
+    plane, most = np.zeros(3), PLATE_DEPTH * float(np.ptp(points[:, 2]))
     for _ in range(ROUNDS):
         design = np.column_stack([np.ones(len(low)), low[:, :2] - middle])
         plane = np.linalg.lstsq(design, low[:, 2], rcond=None)[0]
         off = points[:, 2] - plane[0] - (points[:, :2] - middle) @ plane[1:]
         below = off[off < 0.0]
         # What lies under the plane is noise of the plate; what lies above may be grains.
-        within = 3.0 * max(1.4826 * float(np.median(-below)) if below.size else 0.0, 1e-6)
+        within = min(most, 3.0 * max(1.4826 * float(np.median(-below)) if below.size else 0.0, 1e-6))
         chosen = points[np.abs(off) <= within]
         if len(chosen) < 3 or (len(chosen) == len(low) and np.array_equal(chosen, low)):
             break
@@ -219,7 +236,8 @@ def _points(path: Path, settings: ScanSettings) -> tuple[Array, float | None]:
     """Points (n, 3) [m] and, of a regular grid, its spacing [m]."""
     suffix = path.suffix.lower()
     if suffix in SURFACES:
-        return _of_surface(path) * settings.unit, None
+        surface, resolution = _of_surface(path)
+        return surface * settings.unit, resolution * settings.unit
     if suffix in POINTS:
         return _of_table(path) * settings.unit, None
     if suffix in ARRAYS:
@@ -227,8 +245,8 @@ def _points(path: Path, settings: ScanSettings) -> tuple[Array, float | None]:
     return _of_image(path, settings)
 
 
-def _of_surface(path: Path) -> Array:
-    """Corners of a surface, and points on its facets as dense as the corners are where these are dense."""
+def _of_surface(path: Path) -> tuple[Array, float]:
+    """Corners of a surface with points on its facets, and the spacing of the corners; in the unit of the file."""
     import trimesh
 
     try:
@@ -238,9 +256,13 @@ def _of_surface(path: Path) -> Array:
         facets = [np.asarray(part.triangles) for part in parts if isinstance(part, trimesh.Trimesh) and len(part.faces)]
     except Exception as error:  # the readers of a damaged file raise anything from KeyError to struct.error
         raise MeasurementError(f"cannot be read ({' '.join(str(error).split())[:120]})") from None
+    if len(corners) < 3:
+        raise MeasurementError(f"{len(corners)} points; allowed: {FEWEST} to {MOST_POINTS}")
+    # An STL file repeats a corner for every facet.
+    resolution = spacing(np.unique(corners, axis=0))
     if not facets:
-        return corners
-    return np.concatenate([corners, *(_sampled(one) for one in facets)])
+        return corners, resolution
+    return np.concatenate([corners, *(_sampled(one) for one in facets)]), resolution
 
 
 def _sampled(triangles: Array) -> Array:

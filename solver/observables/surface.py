@@ -55,6 +55,22 @@ def height_map(spheres: Spheres, centre: Array, half_width: float, pixel: float)
     return HeightMap(height.reshape(n, n), np.hypot(axis[:, None], axis[None, :]), pixel)
 
 
+def coarsened(surface: HeightMap, times: int) -> HeightMap:
+    """``surface`` in pixels ``times`` as wide: each the mean of what is known of it, NaN where nothing is.
+
+    The number of pixels along an edge must be a multiple of twice ``times``, so that the centre stays a corner.
+    """
+    n = surface.height.shape[0] // times
+    blocks = surface.height.reshape(n, times, n, times)
+    known = np.isfinite(blocks)
+    number = known.sum(axis=(1, 3))
+    total = np.where(known, blocks, 0.0).sum(axis=(1, 3))
+    pixel = times * surface.pixel
+    axis = (np.arange(n) + 0.5 - n / 2) * pixel
+    height = np.where(number > 0, total / np.maximum(number, 1), np.nan)
+    return HeightMap(height, np.hypot(axis[:, None], axis[None, :]), pixel)
+
+
 def radial_profile(surface: HeightMap, ring_width: float, rings: int) -> tuple[Array, Array]:
     """Azimuthal mean of a height map: middle radii of rings [m], mean heights in them [m]; shape (rings,)
     each.

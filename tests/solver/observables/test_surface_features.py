@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from solver import Spheres, frame_of, height_map, profile_features, surface_features, without_holes
+from solver import Spheres, coarsened, frame_of, height_map, profile_features, surface_features, without_holes
 from solver.observables.surface import HeightMap
 from solver.observables.surface_features import HISTOGRAM_NAMES, RINGS, SURFACE_NAMES, Frame
 
@@ -110,3 +110,18 @@ def test_a_table_of_heights_over_the_radius_gives_the_rings_of_a_map():
     heights = np.array([found[f"ring_height_{k + 1}_m"] for k in range(RINGS)])
     rings = profile_features(heights, FRAME)
     assert rings == {name: found[name] for name in rings}
+
+
+def test_a_coarsened_map_has_the_means_of_its_blocks_and_the_same_centre():
+    """Means over 2 × 2 pixels, of what is known; a cone's volume and skew stay."""
+    fine = made_up(cone)
+    coarse = coarsened(fine, 2)
+    assert coarse.height[0, 1] == pytest.approx(fine.height[0:2, 2:4].mean())
+    assert coarse.radius.min() == pytest.approx(2.0 * fine.radius.min())
+    one, other = surface_features(fine, FRAME), surface_features(coarse, FRAME)
+    assert other["ring_volume_m3"] == pytest.approx(one["ring_volume_m3"], rel=5e-3)
+    holed = fine.height.copy()
+    holed[0, 2], holed[4:6, 4:6] = np.nan, np.nan
+    found = coarsened(HeightMap(holed, fine.radius, PIXEL), 2).height
+    assert found[0, 1] == pytest.approx(np.nanmean(holed[0:2, 2:4]))
+    assert np.isnan(found[2, 2])

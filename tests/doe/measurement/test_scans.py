@@ -1,0 +1,198 @@
+"""Scans of a made-up surface in every format: the same heights, on the plate and about the axis."""
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+
+from doe.errors import MeasurementError
+from doe.measurement.scans import (
+    Scan,
+    ScanSettings,
+    found_plate,
+    read_scan,
+    scan_files,
+    scan_settings,
+    spacing,
+)
+from solver import Frame, coarsened, surface_features, without_holes
+
+FRAME = Frame(radius=0.03, thickness=0.006)
+GRID, NOISE = 0.5e-3, 0.02e-3
+SLOPE, BASE = 0.45, 0.04
+AXIS = (0.011, -0.007)
+TILT = (0.05, 0.02, -0.01)
+AXIS_TABLE = list(AXIS)
+
+
+def cone(x, y):
+    return SLOPE * np.maximum(0.0, BASE - np.hypot(x, y))
+
+
+def made_up(half_width=0.08):
+    """Places (n,) [m] of a square grid and heights (n, n) of a cone about the axis, on the plate z = 0."""
+    axis = np.arange(-half_width, half_width, GRID) + 0.5 * GRID
+    x, y = np.meshgrid(axis, axis, indexing="ij")
+    rng = np.random.default_rng(1)
+    return axis, cone(x - AXIS[0], y - AXIS[1]) + NOISE * rng.standard_normal(x.shape)
+
+
+def points(tilt=(0.0, 0.0, 0.0)):
+    axis, height = made_up()
+    x, y = np.meshgrid(axis, axis, indexing="ij")
+    z = height + tilt[0] + tilt[1] * x + tilt[2] * y
+    return np.stack([x, y, z], axis=-1).reshape(-1, 3)
+
+
+def volume_and_skew(scan):
+    found = surface_features(without_holes(coarsened(scan.height_map(0.0600, GRID), 3)), FRAME)
+    return found["ring_volume_m3"], found["skew_x_m"], found["skew_y_m"]
+
+
+CONE_VOLUME = np.pi * SLOPE * BASE**3 / 3.0
+
+
+def write(path, places, unit):
+    if path.suffix == ".ply":
+        trimesh.PointCloud(places / unit).export(path)
+    elif path.suffix == ".stl":
+        n = round(len(places) ** 0.5)
+        corner = np.arange(n * n).reshape(n, n)
+        a, b, c, d = corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]
+        faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+        trimesh.Trimesh(places / unit, faces, process=False).export(path)
+    elif path.suffix == ".csv":
+        np.savetxt(path, places / unit, delimiter=",", header="x,y,z", comments="", fmt="%.6f")
+    else:
+        np.savetxt(path, places / unit, fmt="%.6f")
+
+
+@pytest.mark.parametrize("name", ["scan.ply", "scan.stl", "scan.xyz", "scan.csv"])
+def test_points_and_surfaces_give_the_cone(tmp_path, name):
+    """Volume within 1 % (pixels, noise), the axis as stated, the tilted plate found: 0.1 mm over the scan."""
+    path = tmp_path / name
+    write(path, points(TILT), 1e-3)
+    scan = read_scan(path, ScanSettings(unit=1e-3, axis=AXIS))
+    volume, x, y = volume_and_skew(scan)
+    assert volume == pytest.approx(CONE_VOLUME, rel=0.01)
+    assert abs(x) < 0.2e-3
+    assert abs(y) < 0.2e-3
+    assert scan.grid == pytest.approx(GRID, rel=0.05)
+
+
+def test_arrays_and_images_give_the_cone(tmp_path):
+    axis, height = made_up()
+    np.savez(tmp_path / "scan.npz", height=height, x=axis, y=axis)
+    step = 1e-5
+    counts = np.clip(np.rint((height + 1e-3) / step), 1, 65535).astype(np.uint16)
+    # A row per y from +y down, a column per x.
+    Image.fromarray(counts.T[::-1]).save(tmp_path / "scan.tif")
+    for name, settings in (
+        ("scan.npz", ScanSettings(axis=AXIS)),
+        ("scan.tif", ScanSettings(axis=AXIS, pixel=GRID, step=step)),
+    ):
+        volume, x, y = volume_and_skew(read_scan(tmp_path / name, settings))
+        assert volume == pytest.approx(CONE_VOLUME, rel=0.01)
+        assert max(abs(x), abs(y)) < 0.2e-3
+
+
+def test_shadows_are_filled_with_what_stands_at_their_distance(tmp_path):
+    """A third of the points of one quarter is missing: the volume stays within 1 %."""
+    places = points()
+    rng = np.random.default_rng(2)
+    seen = ~((places[:, 0] > AXIS[0]) & (places[:, 1] > AXIS[1]) & (rng.random(len(places)) < 0.33))
+    write(tmp_path / "scan.xyz", places[seen], 1.0)
+    volume, _, _ = volume_and_skew(read_scan(tmp_path / "scan.xyz", ScanSettings(axis=AXIS)))
+    assert volume == pytest.approx(CONE_VOLUME, rel=0.01)
+
+
+def test_without_an_axis_the_centre_of_the_volume_stands_for_it(tmp_path):
+    write(tmp_path / "scan.xyz", points(), 1.0)
+    scan = read_scan(tmp_path / "scan.xyz", ScanSettings())
+    assert not scan.on_axis
+    _, x, y = volume_and_skew(scan)
+    assert max(abs(x), abs(y)) < 0.2e-3
+
+
+def test_a_stated_plate_is_taken():
+    places = points((0.003, 0.0, 0.0))
+    assert found_plate(places) == pytest.approx((0.003, 0.0, 0.0), abs=0.02e-3)
+
+
+def test_a_tilted_plate_is_found_beside_a_large_pile():
+    """The bare plate is half of the scan; the plane is found to a tenth of the noise."""
+    a, b, c = found_plate(points(TILT))
+    x, y = np.array([-0.08, 0.08]), np.array([0.08, -0.08])
+    assert a + b * x + c * y == pytest.approx(TILT[0] + TILT[1] * x + TILT[2] * y, abs=NOISE)
+
+
+def test_only_the_upper_surface_counts():
+    """Points of an underside a body's thickness below change nothing."""
+    top = points()
+    both = np.concatenate([top, top - [0.0, 0.0, 0.006]])
+    one, other = (Scan(places, GRID, True).height_map(FRAME.half_width, GRID).height for places in (top, both))
+    assert np.array_equal(one, other, equal_nan=True)
+
+
+def test_settings_are_read_with_their_units():
+    found = scan_settings({"unit": "mm", "pixel": "0.5mm", "axis": AXIS_TABLE, "plate": [0.0, 0, 0], "noise": "0.1mm"})
+    assert found.unit == 1e-3
+    assert found.pixel == pytest.approx(0.5e-3)
+    assert found.axis == AXIS
+    assert found.plate == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("table", "line"),
+    [
+        ({"unit": "inch"}, r"scan\.unit: 'inch'; allowed: m, cm, mm, um"),
+        ({"axis": [1.0]}, r"scan\.axis: \[1\.0\]; allowed: a list of 2 numbers"),
+        ({"pixel": -1.0}, r"scan\.pixel: -1 m; allowed: more than 0"),
+    ],
+)
+def test_settings_that_cannot_be_are_refused(table, line):
+    with pytest.raises(MeasurementError, match=line):
+        scan_settings(table)
+
+
+def test_files_belong_to_conditions_and_replicates(tmp_path):
+    folder = tmp_path / "scans"
+    folder.mkdir()
+    for name in ("slow_1.ply", "slow_2.xyz", "fast_1.doc", "other_1.ply", "slow_0.ply"):
+        (folder / name).touch()
+    found, strangers = scan_files(tmp_path, ["slow", "fast"])
+    assert {key: sorted(value) for key, value in found.items()} == {"slow": [1, 2], "fast": []}
+    assert sorted(path.name for path in strangers) == ["fast_1.doc", "other_1.ply", "slow_0.ply"]
+    (folder / "slow_1.xyz").touch()
+    with pytest.raises(MeasurementError, match="replicate 1 has another scan"):
+        scan_files(tmp_path, ["slow"])
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "line"),
+    [
+        ("scan.ply", b"no surface", "cannot be read"),
+        ("scan.xyz", b"1 2 3\n", "1 points that are finite; allowed: 200"),
+        ("scan.csv", b"x,y,z\na,b,c\n", "no table of x, y, z"),
+        ("scan.npz", b"PK", "cannot be read as"),
+        ("scan.tif", b"II*", "cannot be read as an image"),
+    ],
+)
+def test_a_file_that_is_none_is_refused_in_one_line(tmp_path, name, content, line):
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(MeasurementError, match=line) as refused:
+        read_scan(path, ScanSettings(pixel=1e-3, step=1e-5))
+    assert str(refused.value).startswith(str(path))
+    assert "\n" not in str(refused.value)
+
+
+def test_a_scan_without_a_bare_plate_asks_for_the_plane():
+    rng = np.random.default_rng(0)
+    steep = np.column_stack([rng.random((5000, 2)) * 0.1, rng.random(5000) * 0.1])
+    with pytest.raises(MeasurementError, match="no bare plate is seen"):
+        found_plate(steep)
+
+
+def test_spacing_of_points_that_all_coincide_is_zero():
+    assert spacing(np.zeros((300, 3))) == 0.0
