@@ -33,14 +33,14 @@ NODES = 24
 """Amplitudes over which the evidence is summed."""
 NOTHING = 0.5
 """Prior that nothing is missing; effects share the rest alike."""
+RISKS = (0.003, 0.01, 0.03, 0.1)
+"""Shares of wrong names among the sets of a strength at which a coverage is stated."""
 RISK = 0.03
-"""Share of wrong names among the sets of a strength at which a coverage is stated."""
+"""The one of them at which an effect's own share is stated."""
 SETS = 4000
 """Made-up data sets of each effect and strength."""
 STRENGTHS = (4.0, 6.0, 10.0)
 """Strengths [σ] for which limits are stated."""
-LISTED = 12
-"""Pairs that are listed for a kind of data."""
 CLASS = 0.95
 """Cosine of two signatures above which data cannot tell the effects apart."""
 
@@ -127,7 +127,7 @@ class LimitStudy(Record):
     reached
         Directions of effects, with their strengths.
     confusable
-        The pairs that are most alike, by kind of data.
+        All pairs, by kind of data and the most alike first.
     rows
         Limits.
     """
@@ -149,16 +149,16 @@ class Limit(Record):
     right
         Share of sets in which the most probable effect is the right one, given that one acts.
     named
-        Share that is named rightly where at most ``RISK`` of the sets get a wrong name.
+        The risk–coverage curve: share that is named rightly where at most each of ``RISKS`` gets a wrong name.
     threshold
-        Posterior probability at which that is so.
+        Posterior probability at which ``RISK`` is kept.
     by_effect
-        ``named`` of each effect.
+        Share of each effect that is named rightly at that threshold.
     """
 
     strength: float
     right: float
-    named: float
+    named: tuple[float, ...]
     threshold: float
     by_effect: Mapping[str, float]
 
@@ -224,7 +224,7 @@ def limit_study(
 
 
 def _most_alike(data: str, kinds: Sequence[Kind], found: Signatures) -> list[Confusable]:
-    """The ``LISTED`` pairs of clear signatures with the largest cosines, of different effects."""
+    """Pairs of clear signatures of different effects, the most alike first."""
     clear = [k for k, one in enumerate(found.ruler) if one.value > 2.0 * one.error]
     pairs = [
         Confusable(data, kinds[i].name, kinds[j].name, float(found.cosines[i, j]))
@@ -232,7 +232,7 @@ def _most_alike(data: str, kinds: Sequence[Kind], found: Signatures) -> list[Con
         for j in clear
         if j < i and kinds[i].effect != kinds[j].effect
     ]
-    return sorted(pairs, key=lambda pair: -abs(pair.cosine))[:LISTED]
+    return sorted(pairs, key=lambda pair: -abs(pair.cosine))
 
 
 def nearest_correlation(cosines: FloatArray) -> FloatArray:
@@ -278,13 +278,15 @@ def limit_of(
     correct = top == true
     order = np.argsort(-p)
     wrong = np.cumsum((weight * ~correct)[order]) / weight.sum()
-    last = int(np.searchsorted(wrong, RISK, side="right"))
-    threshold = float(p[order[min(last, len(p) - 1)]]) if last < len(p) else 0.0
-    named = correct & (p > threshold)
+    coverage = np.cumsum((weight * correct)[order]) / weight.sum()
+    # The last set that may still be named, at each risk.
+    last = np.searchsorted(wrong, RISKS, side="right") - 1
+    threshold = float(p[order[last[RISKS.index(RISK)]]])
+    named = correct & (p >= threshold)
     return Limit(
         strength=strength,
         right=float(np.average(correct, weights=weight)),
-        named=float(np.average(named, weights=weight)),
+        named=tuple(float(coverage[k]) if k >= 0 else 0.0 for k in last),
         threshold=threshold,
         by_effect={
             name: float(np.average(named[true == g], weights=weight[true == g])) for g, name in enumerate(groups)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from doe.diagnose.declare import declare
-from doe.diagnose.limit import LimitStudy, confused, limit_study
+from doe.diagnose.limit import RISKS, LimitStudy, confused, limit_study
 from doe.diagnose.reference import ROOT, Reference, extended, find_levels, load, save
 from doe.diagnose.ruler import Strength
 from doe.diagnose.runs import Declared
@@ -24,6 +24,8 @@ from explorer.files.whole_file import write_whole
 from explorer.tables.text_table import text_table
 from solver import EFFECTS, PHYSICS, Crew
 
+LISTED = 10
+"""Pairs that are shown for a kind of data."""
 SAID_EVERY = 100
 """Pours between two lines of progress."""
 
@@ -99,18 +101,21 @@ def limit_text(found: LimitStudy) -> str:
     ]
     head = ("effect", "amplitude", "ruler, σ", "at half of it", *(f"in a {name}, σ" for name in data[1:]))
     pairs = [
-        [one.data, one.first, one.second, f"{one.cosine:.2f}", f"{confused(one.cosine, 6.0):.1%}"]
-        for one in found.confusable
+        [one.data, one.first, one.second, f"{one.cosine:.2f}", f"{confused(abs(one.cosine), 6.0):.1%}"]
+        for name in data
+        for one in [pair for pair in found.confusable if pair.data == name][:LISTED]
     ]
     limits = [
-        [row.data, str(row.replicates), f"{row.limit.strength:g}", f"{row.limit.right:.1%}", f"{row.limit.named:.1%}"]
+        [row.data, str(row.replicates), f"{row.limit.strength:g}", f"{row.limit.right:.1%}"]
+        + [f"{share:.1%}" for share in row.limit.named]
         for row in found.rows
     ]
+    curve = tuple(f"named, {risk:.1%} wrong" for risk in RISKS)
     return "\n\n".join(
         (
             text_table(head, strengths),
             text_table(("data", "effect", "looks like", "cosine", "taken for it at 6 σ"), pairs),
-            text_table(("data", "pours", "strength, σ", "most probable is right", "named, 3 % wrong"), limits),
+            text_table(("data", "pours", "strength, σ", "most probable is right", *curve), limits),
         )
     )
 
