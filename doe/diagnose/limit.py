@@ -281,7 +281,8 @@ def limit_of(
     coverage = np.cumsum((weight * correct)[order]) / weight.sum()
     # The last set that may still be named, at each risk.
     last = np.searchsorted(wrong, RISKS, side="right") - 1
-    threshold = float(p[order[last[RISKS.index(RISK)]]])
+    kept = last[RISKS.index(RISK)]
+    threshold = float(p[order[kept]]) if kept >= 0 else float("inf")
     named = correct & (p >= threshold)
     return Limit(
         strength=strength,

@@ -29,4 +29,4 @@ def limit(
 
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     order = LimitOrder(measurement_folder(folder) if folder else None, rounds, out, reference, store, threads)
-    typer.echo(limit_text(run_limit(order, typer.echo)))
+    typer.echo(limit_text(*run_limit(order, typer.echo)))

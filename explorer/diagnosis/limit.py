@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from doe.diagnose.declare import declare
-from doe.diagnose.limit import RISKS, LimitStudy, confused, limit_study
+from doe.diagnose.limit import RISK, RISKS, LimitStudy, confused, limit_study
 from doe.diagnose.reference import ROOT, Reference, extended, find_levels, load, save
+from doe.diagnose.replay import Replayed, replay
 from doe.diagnose.ruler import Strength
 from doe.diagnose.runs import Declared
 from doe.diagnose.simulation.pours import Ended, ModelPours
 from doe.measurement import Measurement, load_measurement
 from doe.measurement.features import OFFERS, feature_set
+from doe.record import plain
 from doe.store import READINGS, Store, default_store
 from doe.validation.laboratory import declared_model
 from explorer.errors import CommandError
@@ -24,6 +28,10 @@ from explorer.files.whole_file import write_whole
 from explorer.tables.text_table import text_table
 from solver import EFFECTS, PHYSICS, Crew
 
+TAUGHT, SPLITS = (4, 8), 30
+"""Pours of every effect that teach the rule, and splits of the reference into pours that teach and data."""
+CLEAR = 6.0
+"""Strength [σ] of a reference amplitude from which on half of it is data for the rule."""
 LISTED = 10
 """Pairs that are shown for a kind of data."""
 SAID_EVERY = 100
@@ -42,7 +50,7 @@ class LimitOrder:
     threads: int | None = None
 
 
-def run_limit(order: LimitOrder, say: Callable[[str], None]) -> LimitStudy:
+def run_limit(order: LimitOrder, say: Callable[[str], None]) -> tuple[LimitStudy, tuple[Replayed, ...]]:
     """Pour the rounds that are missing, and write what follows. Every pour and every round is kept."""
     measurement = load_measurement(order.folder) if order.folder else declared_model()
     declared = declare(measurement, tuple(EFFECTS))
@@ -54,9 +62,24 @@ def run_limit(order: LimitOrder, say: Callable[[str], None]) -> LimitStudy:
         found = _poured(order, measurement, declared, found, say)
     offered = {offer: [one.offered(offer) for one in sets] for offer in OFFERS}
     study = limit_study(found.sample, found.levels, offered)
+    replayed = replays(found, study, offered)
     made = {"title": found.title, "rounds": found.rounds, "physics": found.physics, "readings": found.readings}
-    write_whole(order.out, json_text(made | study.to_dict()) + "\n")
-    return study
+    write_whole(order.out, json_text(made | study.to_dict() | {"replayed": plain(replayed)}) + "\n")
+    return study, replayed
+
+
+def replays(found: Reference, study: LimitStudy, offered: Mapping[str, Sequence[int]]) -> tuple[Replayed, ...]:
+    """What the rule of the diagnosis names, taught by few pours of every effect, in data with half the amplitudes."""
+    kinds = [one.kind for one in study.reached]
+    clear = [one.kind for one in study.reached if one.weak is not None and one.ruler.value >= CLEAR]
+    most = min(len(block) for kind in kinds for block in found.sample.pours[f"{kind.name} strong"])
+    rng = np.random.default_rng(0)
+    return tuple(
+        replay(data, found.sample.first(numbers).varying(), kinds, clear, taught, SPLITS, rng)
+        for data, numbers in offered.items()
+        for taught in TAUGHT
+        if taught <= most
+    )
 
 
 def _poured(
@@ -91,8 +114,8 @@ def _require_same(found: Reference, now: Reference, path: Path) -> None:
             raise CommandError(f"--reference {path}: {name} {there!r} is not that of today; name another file")
 
 
-def limit_text(found: LimitStudy) -> str:
-    """Strengths, pairs that look alike, and limits, as tables."""
+def limit_text(found: LimitStudy, replayed: Sequence[Replayed]) -> str:
+    """Strengths, pairs that look alike, limits, and what the rule reaches, as tables."""
     data = tuple(found.reached[0].strength)
     strengths = [
         [one.kind.name, " ".join(f"{a:.3g}" for a in one.amplitude), _with_error(one.ruler), _with_error(one.weak)]
@@ -110,12 +133,19 @@ def limit_text(found: LimitStudy) -> str:
         + [f"{share:.1%}" for share in row.limit.named]
         for row in found.rows
     ]
+    rule = [
+        [one.data, str(one.taught), str(one.sets)]
+        + [f"{share:.1%}" for share in (one.right, *one.named)]
+        + [f"{one.false[RISKS.index(RISK)]} of {one.nulls}"]
+        for one in replayed
+    ]
     curve = tuple(f"named, {risk:.1%} wrong" for risk in RISKS)
     return "\n\n".join(
         (
             text_table(head, strengths),
             text_table(("data", "effect", "looks like", "cosine", "taken for it at 6 σ"), pairs),
             text_table(("data", "pours", "strength, σ", "most probable is right", *curve), limits),
+            text_table(("data", "taught by", "sets", "most probable is right", *curve, "false names"), rule),
         )
     )
 
