@@ -101,17 +101,23 @@ class Sample:
 
     def varying(self) -> Sample:
         """The same without features that are constant in the base model's pours."""
-        keep = []
+        return self.only(self.vary())
+
+    def vary(self) -> tuple[npt.NDArray[np.bool_], ...]:
+        """Per condition, which features vary in the base model's pours."""
+        found = []
         for block in self.pours["base"]:
             size = np.maximum(np.abs(block).max(axis=0), np.finfo(float).tiny)
-            keep.append(block.std(axis=0) > CONSTANT * size)
-        return Sample(
-            {
-                name: tuple(block[:, kept] for block, kept in zip(blocks, keep, strict=True))
-                for name, blocks in self.pours.items()
-            },
-            self.parameters,
-        )
+            found.append(np.asarray(block.std(axis=0) > CONSTANT * size))
+        return tuple(found)
+
+    def only(self, keep: Sequence[npt.NDArray[np.bool_]]) -> Sample:
+        """The same with the features that ``keep`` names in each condition."""
+        pours = {
+            name: tuple(block[:, kept] for block, kept in zip(blocks, keep, strict=True))
+            for name, blocks in self.pours.items()
+        }
+        return Sample(pours, self.parameters)
 
 
 @dataclass(frozen=True)

@@ -91,7 +91,9 @@ def replay(
     directions = [(kind.effect, f"{kind.name} strong", kind.two_sided) for kind in kinds]
     for _ in range(splits):
         first, rest = _split(sample, taught, rng)
-        models = taught_by(first, directions)
+        # What never varies in the pours that teach cannot be weighed.
+        keep = first.vary()
+        models, rest = taught_by(first.only(keep), directions), rest.only(keep)
         for kind in truths:
             answers.append((kind.effect, posterior(models, _data(rest.pours[f"{kind.name} weak"], rng), REPLICATES)))
         for _ in range(NULLS):

@@ -132,3 +132,15 @@ def test_a_replay_of_effects_that_are_alike_is_a_guess():
     found = replay("scan", sample, kinds, kinds, 8, 40, np.random.default_rng(0))
     assert 0.2 < found.right < 0.8
     assert found.named[RISKS.index(0.01)] < 0.2
+
+
+def test_a_feature_that_hardly_ever_varies_does_not_spoil_the_answer():
+    """Constant in the pours that teach, unlike in some that are data: it is left out, and every answer is a number."""
+    shifts = {"a strong": 4.0 * unit(0), "a weak": 2.0 * unit(0)}
+    sample = sample_of(np.random.default_rng(1), shifts)
+    for blocks in sample.pours.values():
+        blocks[0][:, 3] = 0.0
+    sample.pours["base"][0][::40, 3] = 1.0
+    kinds = [Kind("a", "a", False)]
+    found = replay("scan", sample, kinds, kinds, 8, 20, np.random.default_rng(0))
+    assert found.named == (1.0,) * len(RISKS)

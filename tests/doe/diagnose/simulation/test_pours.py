@@ -13,6 +13,8 @@ from doe.diagnose.simulation import pours as module
 from doe.diagnose.simulation.plan import Point
 from doe.diagnose.simulation.pours import ModelPours, Pour
 from doe.diagnose.simulation.ranges import whitened_shift
+from doe.measurement import summary_names
+from doe.measurement.features import feature_set
 from doe.store import Store
 from doe.validation.laboratory import OBSERVABLES, declared_model
 from solver import Outcome, value
@@ -36,10 +38,10 @@ def poured(monkeypatch, tmp_path):
             record = record_of(empty_pile(), np.zeros(1), np.zeros(1), poured_mass=friction)
             yield job, dataclasses.replace(record, scene=job.scene, outcome=Outcome.MEASURED)
 
-    def summaries(asked, record):
-        return np.full(len(module.summary_names(asked)), record.poured_mass)
+    def features(asked, record):
+        return np.full(len(feature_set(asked).names), record.poured_mass)
 
-    monkeypatch.setattr(module, "summaries_of_record", summaries)
+    monkeypatch.setattr(module, "features_of_record", features)
     with closing(Store(tmp_path / "runs.sqlite")) as store:
         yield ModelPours([condition], [FRICTION], store, run), jobs
 
@@ -107,12 +109,12 @@ def test_a_new_summary_is_read_off_all_stored_pours_without_pouring(poured):
         smaller = dataclasses.replace(condition, observations=observations)
         other = ModelPours([smaller], [FRICTION], pours._store, pours._pours)
         found = other.run("second", points)
-        width = len(module.summary_names(smaller))
+        width = len(summary_names(smaller))
         assert [row[0].summaries for row in found] == [(f,) * width for f in (0.5, 0.6, 0.7)]
         assert other.run_now == 0
     taller = dataclasses.replace(condition.observations[0], observable="centre_height_m")
     more = dataclasses.replace(condition, observations=(*condition.observations, taller))
-    assert "centre_height_m" in module.summary_names(more)
+    assert "centre_height_m" in summary_names(more)
     other = ModelPours([more], [FRICTION], pours._store, pours._pours)
-    assert other.run("third", points)[0][0].summaries == (0.5,) * len(module.summary_names(more))
+    assert other.run("third", points)[0][0].summaries == (0.5,) * len(summary_names(more))
     assert (other.run_now, len(jobs)) == (0, 3)
