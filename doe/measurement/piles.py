@@ -97,9 +97,11 @@ def pile_surfaces(files: Mapping[int, Path]) -> dict[int, PileSurface]:
     found = {}
     for replicate, path in files.items():
         xyz, radius, body = _arrays(path)
-        n = radius.size
-        if xyz.shape != (n, 3) or not (np.isfinite(xyz).all() and np.isfinite(radius).all()):
-            raise MeasurementError(f"{path}: xyz, radius: shapes {xyz.shape}, {radius.shape}, or not finite")
+        if xyz.shape != (body.size, 3) or radius.shape != (body.size,):
+            shapes = f"{xyz.shape}, {radius.shape}, {body.shape}"
+            raise MeasurementError(f"{path}: xyz, radius, body: shapes {shapes}; allowed: (n, 3), (n,), (n,)")
+        if not (np.isfinite(xyz).all() and np.isfinite(radius).all()):
+            raise MeasurementError(f"{path}: xyz, radius: not finite; allowed: finite numbers")
         found[replicate] = PileSurface(Spheres(xyz.astype(np.float64), radius.astype(np.float64), body))
     return found
 
