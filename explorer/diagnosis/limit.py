@@ -13,8 +13,8 @@ import numpy as np
 from doe.diagnose.declare import declare
 from doe.diagnose.limit import RISK, RISKS, LimitStudy, confused, limit_study
 from doe.diagnose.reference import ROOT, Reference, extended, find_levels, load, save
-from doe.diagnose.replay import Replayed, replay
-from doe.diagnose.ruler import Strength
+from doe.diagnose.replay import BASE_POURS, NULLS, Replayed, Teaching, Truth, replay
+from doe.diagnose.ruler import REPLICATES, Strength
 from doe.diagnose.runs import Declared
 from doe.diagnose.simulation.pours import Ended, ModelPours
 from doe.measurement import Measurement, load_measurement
@@ -28,10 +28,10 @@ from explorer.files.whole_file import write_whole
 from explorer.tables.text_table import text_table
 from solver import EFFECTS, PHYSICS, Crew
 
-TAUGHT, SPLITS = (4, 8), 30
-"""Pours of every effect that teach the rule, and splits of the reference into pours that teach and data."""
-CLEAR = 6.0
-"""Strength [σ] of a reference amplitude from which on half of it is data for the rule."""
+TEACHINGS, SPLITS = (Teaching(4, 0), Teaching(8, 0), Teaching(8, 12)), 20
+"""What teaches the rule, and splits of the reference into pours that teach and data."""
+BANDS = ((3.5, 5.5), (5.5, 9.0))
+"""Strengths [σ] on the ruler of the effects in the data of a row."""
 LISTED = 10
 """Pairs that are shown for a kind of data."""
 SAID_EVERY = 100
@@ -69,17 +69,33 @@ def run_limit(order: LimitOrder, say: Callable[[str], None]) -> tuple[LimitStudy
 
 
 def replays(found: Reference, study: LimitStudy, offered: Mapping[str, Sequence[int]]) -> tuple[Replayed, ...]:
-    """What the rule of the diagnosis names, taught by few pours of every effect, in data with half the amplitudes."""
-    kinds = [one.kind for one in study.reached]
-    clear = [one.kind for one in study.reached if one.weak is not None and one.ruler.value >= CLEAR]
-    most = min(len(block) for kind in kinds for block in found.sample.pours[f"{kind.name} strong"])
-    rng = np.random.default_rng(0)
-    return tuple(
-        replay(data, found.sample.first(numbers).varying(), kinds, clear, taught, SPLITS, rng)
-        for data, numbers in offered.items()
-        for taught in TAUGHT
-        if taught <= most
-    )
+    """What the rule of the diagnosis names, taught by few pours of every effect."""
+    kinds, pours = [one.kind for one in study.reached], found.sample.pours
+    rows = []
+    for data, numbers in offered.items():
+        sample = found.sample.first(numbers).varying()
+        for teaching in TEACHINGS:
+            needed = {"strong": teaching.all + teaching.more + REPLICATES, "weak": teaching.more + REPLICATES}
+            if min(map(len, pours["base"])) < BASE_POURS + NULLS * REPLICATES or any(
+                min(map(len, pours[f"{kind.name} strong"])) < teaching.all for kind in kinds
+            ):
+                continue
+            for low, high in BANDS:
+                truths = [
+                    one
+                    for one in truths_of(study)
+                    if low <= one.strength < high
+                    and min(map(len, pours[f"{one.kind.name} {one.level}"])) >= needed[one.level]
+                ]
+                if truths:
+                    rows.append(replay(data, sample, kinds, truths, teaching, SPLITS, np.random.default_rng(0)))
+    return tuple(rows)
+
+
+def truths_of(study: LimitStudy) -> list[Truth]:
+    """All that reference pours can be data of."""
+    strong = [Truth(one.kind, "strong", one.ruler.value) for one in study.reached]
+    return strong + [Truth(one.kind, "weak", one.weak.value) for one in study.reached if one.weak is not None]
 
 
 def _poured(
@@ -134,20 +150,26 @@ def limit_text(found: LimitStudy, replayed: Sequence[Replayed]) -> str:
         for row in found.rows
     ]
     rule = [
-        [one.data, str(one.taught), str(one.sets)]
+        [one.data, f"{one.strength:.1f}", _pours(one), str(one.sets)]
         + [f"{share:.1%}" for share in (one.right, *one.named)]
         + [f"{one.false[RISKS.index(RISK)]} of {one.nulls}"]
         for one in replayed
     ]
     curve = tuple(f"named, {risk:.1%} wrong" for risk in RISKS)
+    head_of_rule = ("data", "strength, σ", "taught by", "sets", "most probable is right", *curve, "false names")
     return "\n\n".join(
         (
             text_table(head, strengths),
             text_table(("data", "effect", "looks like", "cosine", "taken for it at 6 σ"), pairs),
             text_table(("data", "pours", "strength, σ", "most probable is right", *curve), limits),
-            text_table(("data", "taught by", "sets", "most probable is right", *curve, "false names"), rule),
+            text_table(head_of_rule, rule),
         )
     )
+
+
+def _pours(found: Replayed) -> str:
+    more = f" + {found.pours:.0f}" if found.teaching.more else ""
+    return f"{found.teaching.all} of each{more}"
 
 
 def _with_error(strength: Strength | None) -> str:
