@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from doe.measurement import Condition, Measurement, Observation, Reach, reach_of
+from doe.measurement.features import PROFILE, SCAN, feature_set, offer_of, resolution
 from doe.record import plain
 from explorer.tables.text_table import text_table
 
@@ -49,7 +50,24 @@ def _condition_text(condition: Condition) -> str:
     rows = [
         (o.observable, o.unit, str(_number_of_values(o)), *_mean_and_sd(o), o.origin) for o in condition.observations
     ]
-    return head + "\n" + text_table(("observable", "unit", "values", "mean", "SD", "from"), rows)
+    table = text_table(("observable", "unit", "values", "mean", "SD", "from"), rows)
+    return "\n".join((head, table, *_pile_lines(condition)))
+
+
+def _pile_lines(condition: Condition) -> Iterator[str]:
+    """What the data show of the pile as a whole, and what a scan would add; nothing of a rig that leaves no pile."""
+    features, offer = feature_set(condition), offer_of(condition)
+    scalars, profile, surface = map(len, (features.scalars, features.profile, features.surface))
+    if not profile:
+        return
+    if offer == SCAN:
+        cells = f" in cells of {1e3 * resolution(condition):.3g} mm" if resolution(condition) > 0.0 else ""
+        scanned = f"surface of {len(condition.surfaces)} of {condition.replicates} piles{cells}"
+        yield f"whole pile: {scanned}: {profile} numbers of its profile and {surface} of its surface"
+    elif offer == PROFILE:
+        yield f"whole pile: heights over the radius: {profile} numbers of its profile; a scan would add {surface}"
+    else:
+        yield f"whole pile: no more than {scalars} scalars; a scan would add {profile + surface} numbers"
 
 
 def _number_of_values(observation: Observation) -> int:
@@ -76,12 +94,19 @@ def _stated(observation: Observation) -> str:
 
 
 def _condition_result(condition: Condition) -> dict[str, Any]:
+    features = feature_set(condition)
     return {
         "name": condition.name,
         "role": condition.role,
         "rig": condition.scene.rig.name,
         "replicates": condition.replicates,
         "observations": plain(condition.observations),
+        "pile": {
+            "offered": offer_of(condition),
+            "scanned": sorted(condition.surfaces),
+            "resolution_m": resolution(condition),
+            "features": {"scalars": features.scalars, "profile": features.profile, "surface": features.surface},
+        },
     }
 
 

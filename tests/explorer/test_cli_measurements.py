@@ -1,7 +1,9 @@
 """`explorer measurements check`: the tables, plain data, and refusals in one line."""
 
 import json
+import re
 
+import numpy as np
 import pytest
 
 from tests.doe.measurement.folders import MEASUREMENT, changed, write
@@ -17,6 +19,7 @@ def test_a_shipped_data_set_by_its_name():
     assert "rig.filled_volume" in text
     assert "effects that nothing here could reveal:" in text
     assert "asymmetry: no" in text
+    assert "whole pile" not in text  # a drum leaves none
     assert "warning: drum_15rpm: one replicate" in text
 
 
@@ -37,6 +40,30 @@ def test_plain_data(tmp_path):
     assert angle["values"] == [20.0, 22.0]
     assert found["parameters"][0]["path"] == "pair.glass.glass.static_friction"
     assert found["reach"]["unknowns"] == 1
+
+
+def test_what_a_scan_adds(tmp_path):
+    """Of one condition a surface of one replicate is there: a cone on a plate; of the other only scalars."""
+    folder = write(tmp_path)
+    (folder / "scans").mkdir()
+    x, y = np.meshgrid(np.arange(-80, 81), np.arange(-80, 81))
+    z = np.maximum(0.0, 20.0 - 0.4 * np.hypot(x, y))
+    points = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+    header = "[condition.scan]\nunit = 'mm'\n[[condition]]\nname = \"fast\""
+    text = changed(MEASUREMENT, '[[condition]]\nname = "fast"', header)
+    (folder / "measurement.toml").write_text(text)
+    np.savetxt(folder / "scans/slow_1.xyz", points)
+    found = explorer("measurements", "check", folder).stdout
+    assert re.search(
+        r"whole pile: surface of 1 of 2 piles in cells of 1 mm: 11 numbers of its profile and \d+ of its surface", found
+    ), found
+    scalars = re.search(r"whole pile: no more than (\d+) scalars; a scan would add (\d+) numbers", found)
+    plain = json.loads(explorer("measurements", "check", folder, "--json").stdout)
+    slow, fast = (condition["pile"] for condition in plain["conditions"])
+    assert (slow["offered"], slow["scanned"], fast["offered"]) == ("scan", [1], "scalars")
+    assert slow["resolution_m"] == pytest.approx(1e-3)
+    assert int(scalars[1]) == len(fast["features"]["scalars"])
+    assert int(scalars[2]) == len(fast["features"]["profile"]) + len(fast["features"]["surface"])
 
 
 @pytest.mark.parametrize("option", [(), ("--json",)])
