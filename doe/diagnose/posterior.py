@@ -61,7 +61,21 @@ class Posterior(Record):
 
 
 def posterior(emulator: Emulator, z: FloatArray, replicates: int) -> Posterior:
-    """The posterior of data of mean ``z`` (D,), by ``emulator.seen``, over ``replicates`` pours in each condition."""
+    """The posterior of a data set.
+
+    Parameters
+    ----------
+    emulator
+        Taught by pours of the base model and of every effect.
+    z
+        Mean of the data's features, whitened, (D,), as ``emulator.seen`` gives it.
+    replicates
+        n, pours of the data in each condition.
+
+    Returns
+    -------
+    Probabilities of nothing, of every effect and of something outside, and each direction's best fit.
+    """
     share = 1.0 / replicates
 
     def log_t(mean: FloatArray, variance: FloatArray) -> FloatArray:
