@@ -101,6 +101,11 @@ def shipped_fits() -> Path:
     return _folder("clumps")
 
 
+def shipped_reference() -> Path:
+    """File of reference pours of the made-up laboratories' model."""
+    return _folder("validation") / "reference_blind.npz"
+
+
 def shipped_measurements() -> tuple[str, ...]:
     """Names of the shipped measured data sets, sorted."""
     return tuple(sorted(path.parent.name for path in _folder("measurements").glob("*/measurement.toml")))

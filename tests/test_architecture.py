@@ -32,14 +32,36 @@ DOE_PARTS_THAT_MAY_USE_THE_SOLVER = {
     "doe/study.py": "reads a study file: its material, rig and insertion make a scene",
     "doe/measurement/": "a condition is a scene, and data and runs are read by the same functions",
     "doe/validation/": "laboratories that pour what the diagnosis is then asked about",
-    "doe/diagnose/declare.py": "turns declared parameters and effects into those of the decision",
-    "doe/diagnose/simulation/pours.py": "turns a point of a plan into a simulated world",
-    "doe/diagnose/follow_up/menu.py": "set-ups that a rig can do",
-    "doe/diagnose/simulation/profiles.py": "pictures of simulated piles by the function that reads measured ones",
+    "doe/diagnose/declared.py": "turns declared parameters and effects into those of the decision",
+    "doe/diagnose/points.py": "looks at a pour's pile from another side",
+    "doe/diagnose/pours.py": "turns a point of a plan into a simulated world",
+    "doe/diagnose/teaching.py": "asks a rig for its symmetries",
+    "doe/diagnose/menu.py": "set-ups that a rig can do",
 }
 
-# In the order of the data: each room may import from those before it.
-DIAGNOSIS_ROOMS = ("simulation", "emulation", "fitting", "decision", "follow_up")
+# In the order of the data: each file of the diagnosis may import from those before it.
+DIAGNOSIS_FILES = (
+    "declared",
+    "points",
+    "pours",
+    "levels",
+    "reference",
+    "ruler",
+    "limit",
+    "emulator",
+    "posterior",
+    "replay",
+    "compared",
+    "teaching",
+    "verdict",
+    "confirm",
+    "holdout",
+    "next_experiment",
+    "menu",
+    "diagnosis",
+)
+# What a laboratory may not take of the diagnosis: the features, the noise model and the emulator that it is read with.
+LABORATORY_FILES = ("doe/validation/laboratory.py", "doe/validation/scanner.py", "doe/validation/outside.py")
 
 TI_INIT_HOME = "solver/backend.py"
 MAX_LINES = 600
@@ -194,12 +216,20 @@ def doe_uses_public_solver_names(source: Source) -> list[str]:
 
 
 def diagnosis_flows_one_way(source: Source) -> list[str]:
-    parts = source.path.split("/")
-    if parts[:2] != ["doe", "diagnose"] or parts[2] not in DIAGNOSIS_ROOMS:
+    path = Path(source.path)
+    if path.parent.as_posix() != "doe/diagnose" or path.stem not in DIAGNOSIS_FILES:
         return []
-    later = DIAGNOSIS_ROOMS[DIAGNOSIS_ROOMS.index(parts[2]) + 1 :]
+    later = DIAGNOSIS_FILES[DIAGNOSIS_FILES.index(path.stem) + 1 :]
     used = {one.module.split(".")[2] for one in imports(source) if one.module.startswith("doe.diagnose.")}
-    return [f"{source.path}: {parts[2]} comes before {room}" for room in later if room in used]
+    return [f"{source.path}: {path.stem} comes before {name}" for name in later if name in used]
+
+
+def a_laboratory_shares_no_code_with_the_diagnosis(source: Source) -> list[str]:
+    if source.path not in LABORATORY_FILES:
+        return []
+    forbidden = ("doe.diagnose", "doe.measurement.features", "doe.measurement.scans", "doe.measurement.piles")
+    used = {one.module for one in imports(source) if one.module.startswith(forbidden)}
+    return [f"{source.path}: a laboratory may not import {module}" for module in sorted(used)]
 
 
 def no_truth_within_reach_of_the_diagnosis(source: Source) -> list[str]:
@@ -247,6 +277,7 @@ PACKAGE_RULES: tuple[Rule, ...] = (
     no_future_annotations_beside_taichi,
     doe_uses_public_solver_names,
     diagnosis_flows_one_way,
+    a_laboratory_shares_no_code_with_the_diagnosis,
     no_truth_within_reach_of_the_diagnosis,
 )
 EVERYWHERE_RULES: tuple[Rule, ...] = (files_stay_short, names_say_something)
@@ -283,7 +314,12 @@ VIOLATIONS: tuple[tuple[Rule, str, str], ...] = (
     (doe_uses_public_solver_names, "doe/runner.py", "from solver.world import World"),
     (doe_uses_public_solver_names, "doe/runner.py", "import solver"),
     (doe_uses_public_solver_names, "doe/runner.py", "from solver import _not_a_public_name"),
-    (diagnosis_flows_one_way, "doe/diagnose/emulation/tails.py", "from doe.diagnose.decision.verdict import Residual"),
+    (diagnosis_flows_one_way, "doe/diagnose/emulator.py", "from doe.diagnose.verdict import Residual"),
+    (
+        a_laboratory_shares_no_code_with_the_diagnosis,
+        "doe/validation/scanner.py",
+        "from doe.measurement.features import features_of_record",
+    ),
     (no_truth_within_reach_of_the_diagnosis, "doe/diagnose/diagnosis.py", "from doe.validation.truth import Truth"),
     (files_stay_short, "doe/anova.py", "x = 1\n" * (MAX_LINES + 1)),
     (names_say_something, "solver/utils.py", ""),
@@ -307,7 +343,12 @@ ALLOWED: tuple[tuple[Rule, str, str], ...] = (
         "from __future__ import annotations\nimport numpy",
     ),
     (doe_uses_public_solver_names, "explorer/session.py", "from solver.world import World"),
-    (diagnosis_flows_one_way, "doe/diagnose/decision/gates.py", "from doe.diagnose.fitting.calibrate import Fit"),
+    (diagnosis_flows_one_way, "doe/diagnose/verdict.py", "from doe.diagnose.posterior import Fit"),
+    (
+        a_laboratory_shares_no_code_with_the_diagnosis,
+        "doe/validation/answers.py",
+        "from doe.diagnose.verdict import verdict_of",
+    ),
     (no_truth_within_reach_of_the_diagnosis, "explorer/diagnosis/run.py", "from doe.validation.truth import Truth"),
     (files_stay_short, "doe/anova.py", "x = 1\n" * MAX_LINES),
     (names_say_something, "solver/shape.py", ""),

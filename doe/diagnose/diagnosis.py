@@ -1,35 +1,48 @@
-"""The whole loop: simulate the declared model, judge the data, confirm by fresh pours, say what to measure next."""
+"""The whole loop: pour what teaches the models, weigh them by the data, confirm by fresh pours, say what comes next."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
-from doe.diagnose.decision.decide import diagnose
-from doe.diagnose.decision.verdict import Verdict
-from doe.diagnose.declare import complete_rows, declare, observe
-from doe.diagnose.emulation.fresh_pours import FreshPours
-from doe.diagnose.follow_up.closer import LOOKS, MODELS, contenders, lost, near_best, poured, with_new
-from doe.diagnose.follow_up.confirm import Confirmed, Model, confirm, fitted
-from doe.diagnose.follow_up.held_out import HeldOut, compared, predictions, ruled_out, upheld
-from doe.diagnose.follow_up.holdout import HoldoutCondition, HoldoutError, holdout_errors
-from doe.diagnose.follow_up.menu import Suggestion, next_experiment
-from doe.diagnose.runs import Declared, Observed
-from doe.diagnose.simulation.budget import Budget
-from doe.diagnose.simulation.pours import ModelPours, OnPour
-from doe.diagnose.simulation.screen import Say, Screened, continued, over_wider_ranges, screen
-from doe.measurement.measurement import Measurement
-from doe.measurement.summaries import summary_names
+import numpy as np
+import numpy.typing as npt
+
+from doe.diagnose.compared import Compared, measured, weighed
+from doe.diagnose.confirm import Confirmed, HeldOut, HeldOutData, Model, confirm, held_out, model_of
+from doe.diagnose.declared import Declared, declare
+from doe.diagnose.holdout import HoldoutCondition, HoldoutError, holdout_errors
+from doe.diagnose.levels import Level
+from doe.diagnose.menu import Menu, Suggestion, next_experiment
+from doe.diagnose.posterior import Posterior
+from doe.diagnose.pours import ModelPours, OnPour
+from doe.diagnose.teaching import Budget, Say, Teacher
+from doe.diagnose.verdict import NO_EFFECT, Verdict, taken_back, verdict_of
+from doe.measurement.features import SCAN, feature_set
+from doe.measurement.measurement import Condition, Measurement
+from doe.measurement.summaries import summaries_of_data, summary_names
+from doe.record import Record
 from doe.runner import Pours
 from doe.store import Store
 
-WIDENINGS = 3
-"""Times that a range may be doubled before the next look."""
-Wanting = Callable[[Verdict, Declared, Declared], tuple[str, ...]]
-"""Effects that want more range: from a verdict, the ranges simulated so far, and the widest."""
+FloatArray = npt.NDArray[np.float64]
+
 FRESH = 8
 """Pours per model and condition in the confirmation, or as many as there are replicates if that is more."""
+SETTLED, QUIET = 0.99, 0.9
+"""Probability of an effect that has had a closer look, and of nothing, from which on no further look is taken."""
+MOST_RIVALS = 4
+"""That the next experiment is chosen for."""
+
+
+@dataclass(frozen=True)
+class Offered(Record):
+    """What a fitted condition's data offer, how many features are compared, and how many more a scan would add."""
+
+    condition: str
+    offer: str
+    features: int
+    scan_would_add: int
 
 
 @dataclass(frozen=True)
@@ -37,18 +50,29 @@ class Diagnosis:
     """What came out. ``fit_error`` and ``holdout_error`` are by fresh pours; the latter is empty without a holdout."""
 
     declared: Declared
+    levels: tuple[Level, ...]
+    offered: tuple[Offered, ...]
     verdict: Verdict
     before: Confirmed
     after: Confirmed
     """The same as ``before`` where no effect is named."""
     fit_error: tuple[HoldoutError, ...]
     holdout_error: tuple[HoldoutError, ...]
-    held_out: tuple[HeldOut, ...]
-    """Contenders beside the named model on held-out data; empty without a name or without such data."""
+    held_out: HeldOut | None
+    """What the held-out data say of the final model; None without such data."""
     suggestions: tuple[Suggestion, ...]
     pours: int
     """Pours that were really run; the others were found in the store."""
     settings: int
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """Fresh pours of the calibrated base model and the final one, and what held-out data say of the latter."""
+
+    before: Confirmed
+    after: Confirmed
+    held_out: HeldOut | None
 
 
 def run_diagnosis(
@@ -64,121 +88,127 @@ def run_diagnosis(
     declared, paths = declare(measurement, effects), [p.path for p in measurement.parameters]
     model = ModelPours(measurement.fit, paths, store, pours, on_pour)
     everywhere = ModelPours(measurement.conditions, paths, store, pours, on_pour)
-    observed = observe(measurement.fit)
-    screened, verdict, fresh = pursued(screen(declared, model, budget, say), declared, observed, model, budget, say)
+    teacher = Teacher(declared, measurement.fit, model, budget, say)
+    compared = pursued(teacher, measurement.fit, budget, say)
+    taught = teacher.lessons().way
+    verdict = verdict_of(
+        compared, declared, teacher.levels, [int((taught == w).sum()) for w in range(len(teacher.ways))]
+    )
     say(f"verdict: {verdict.kind}")
-    held_out = contenders_held_out(verdict, measurement, everywhere)
-    if held_out:
-        if gone := ruled_out(verdict, held_out):
-            verdict = diagnose(screened.declared, screened.runs, observed, fresh=fresh, ruled_out=gone)
-        verdict = upheld(verdict, held_out)
-        say(f"with held-out data: {verdict.kind}")
-    number = max(FRESH, *(condition.replicates for condition in measurement.conditions))
-    widths = [len(summary_names(condition)) for condition in measurement.conditions]
-    confirmed = confirm(tuple(dict.fromkeys(models(verdict))), everywhere, number, widths)
-    before, after = confirmed[0], confirmed[-1]
-    menu = next_experiment(verdict, measurement.fit[0], paths, store, pours, on_pour)
+    confirmed, verdict = concluded(verdict, compared, declared, measurement.conditions, everywhere, say)
+    menu = suggested(verdict, compared.posterior, declared, measurement.fit[0], paths, store, pours, on_pour)
     return Diagnosis(
-        declared=screened.declared,
+        declared=declared,
+        levels=teacher.levels,
+        offered=tuple(offered(condition, c, compared) for c, condition in enumerate(measurement.fit)),
         verdict=verdict,
-        before=before,
-        after=after,
-        fit_error=errors_of(measurement, "fit", before, after),
-        holdout_error=errors_of(measurement, "holdout", before, after),
-        held_out=held_out,
+        before=confirmed.before,
+        after=confirmed.after,
+        fit_error=errors_of(measurement.conditions, "fit", confirmed),
+        holdout_error=errors_of(measurement.conditions, "holdout", confirmed),
+        held_out=confirmed.held_out,
         suggestions=menu.suggestions,
         pours=model.run_now + everywhere.run_now + menu.run_now,
-        settings=len(screened.points),
+        settings=teacher.settings,
     )
 
 
-def pursued(
-    screened: Screened, widest: Declared, observed: Observed, model: ModelPours, budget: Budget, say: Say
-) -> tuple[Screened, Verdict, tuple[FreshPours, ...]]:
-    """The verdict once what is in question has been poured about its fits, over wider ranges where one ends.
-
-    With the runs and the pours that it rests on.
-    """
-    verdict = diagnose(screened.declared, screened.runs, observed)
-    say(f"after screening: {verdict.kind}")
-
-    def widened(find: Wanting, why: str = "", fresh: Sequence[FreshPours] = ()) -> tuple[Screened, Verdict]:
-        """Runs and verdict once the effects that ``find`` tells have wider ranges, as long as it tells any."""
-        now, found = screened, verdict
-        for _ in range(WIDENINGS):
-            names = find(found, now.declared, widest)
-            if not names:
-                break
-            now = over_wider_ranges(now, names, widest, model, budget, say)
-            found = diagnose(now.declared, now.runs, observed, fresh=fresh)
-            say(f"wider range of {', '.join(names)}{why}: {found.kind}")
-        return now, found
-
-    screened, verdict = widened(out_of_sight, ", which could not be seen")
-    fresh: tuple[FreshPours, ...] = ()
-    for look in range(1 + LOOKS):
-        screened, verdict = widened(partial(at_edge, fresh=fresh), fresh=fresh)
-        closer = contenders(verdict, screened.declared, fresh)
-        if look == LOOKS or not closer:
+def pursued(teacher: Teacher, conditions: Sequence[Condition], budget: Budget, say: Say) -> Compared:
+    """Models and data once what is in question has been looked at more closely."""
+    data = [measured(condition) for condition in conditions]
+    displaced = teacher.displaced(data)
+    compared = weighed(teacher.lessons(), teacher.ways, data, displaced)
+    say(f"after screening: {odds(compared.posterior)}")
+    looked: set[str] = set()
+    for _ in range(budget.looks):
+        found = compared.posterior
+        name, p = found.best if found.effects else ("", 0.0)
+        settled = found.nothing >= QUIET or (p >= SETTLED and name in looked)
+        if settled and not any(teacher.ways[way].effect == name for way, _ in teacher.at_end(found)):
             break
-        fresh = with_new(fresh, poured(closer, screened.declared, model, [fresh] * len(closer)))
-        verdict = diagnose(screened.declared, screened.runs, observed, fresh=fresh)
-        say(f"poured about the best fits of {', '.join(one.label for one in closer)}: {verdict.kind}")
-        if names := lost(verdict, [one.label for one in closer]):
-            screened = continued(screened, "second look", names, budget.second_look, model, say)
-            verdict = diagnose(screened.declared, screened.runs, observed, fresh=fresh)
-            say(f"after second look: {verdict.kind}")
-    return screened, verdict, fresh
+        poured = teacher.look(found)
+        if not poured:
+            break
+        looked |= set(poured)
+        compared = weighed(teacher.lessons(), teacher.ways, data, displaced)
+        say(f"after a closer look at {', '.join(poured)}: {odds(compared.posterior)}")
+    return compared
 
 
-def contenders_held_out(verdict: Verdict, measurement: Measurement, pours: ModelPours) -> tuple[HeldOut, ...]:
-    """The named models and their rivals on the held-out conditions of ``pours``."""
-    places = [c for c, condition in enumerate(measurement.conditions) if condition.role == "holdout"]
-    conditions = [measurement.conditions[c] for c in places]
-    data = [complete_rows(condition) for condition in conditions]
-    widths = [len(summary_names(condition)) for condition in conditions]
-    if not data or min(map(len, data)) < 2:
-        return ()
-    return compared(verdict, data, predictions(verdict, pours, widths, places))
+def concluded(
+    verdict: Verdict,
+    compared: Compared,
+    declared: Declared,
+    conditions: Sequence[Condition],
+    pours: ModelPours,
+    say: Say,
+) -> tuple[Conclusion, Verdict]:
+    """The final model beside the base model in ``conditions``, those of ``pours``, and the verdict that it leaves."""
+    fits = compared.posterior.fits
+    asked = [model_of(fits[label], declared) for label in dict.fromkeys(("base", verdict.final))]
+    number = max(FRESH, *(condition.replicates for condition in conditions))
+    confirmed = confirm(asked, pours, number, [len(summary_names(condition)) for condition in conditions])
+    before, after = confirmed[0], confirmed[-1]
+    told = held_out_of(conditions, verdict.final, after)
+    if told is not None and told.contradicted and (verdict.names or verdict.kind == NO_EFFECT):
+        why = f"{told.summary} of {told.condition} is {told.farthest:.1f} standard errors off"
+        verdict = taken_back(verdict, why)
+        say(f"with held-out data: {verdict.kind}")
+    return Conclusion(before, after, told), verdict
 
 
-def out_of_sight(verdict: Verdict, now: Declared, widest: Declared) -> tuple[str, ...]:
-    """Effects that these data cannot see over the range simulated so far, with more of it in the literature.
-
-    A range is found by the whole shift of the summaries; what calibration takes up of it is known only now.
-    """
-    room = with_room(now, widest)
-    return tuple(row.name for row in verdict.effects if row.status == "not identifiable here" and row.name in room)
+def odds(found: Posterior) -> str:
+    """The most probable answers, in words."""
+    everything = {**found.effects, "nothing missing": found.nothing, "something else": found.outside}
+    first = sorted(everything, key=lambda one: -everything[one])[:3]
+    return ", ".join(f"{one} {100.0 * everything[one]:.0f} %" for one in first if everything[one] >= 0.005)
 
 
-def with_room(now: Declared, widest: Declared) -> set[str]:
-    """Effects of which the literature supports more than has been simulated."""
-    pairs = zip(now.effects, widest.effects, strict=True)
-    return {effect.name for effect, end in pairs if max(effect.high) < max(end.high)}
+def suggested(
+    verdict: Verdict,
+    found: Posterior,
+    declared: Declared,
+    condition: Condition,
+    paths: Sequence[str],
+    store: Store,
+    pours: Pours,
+    on_pour: OnPour | None,
+) -> Menu:
+    """What to measure next; empty unless the verdict is ambiguous."""
+    if not verdict.kind.startswith("ambiguous"):
+        return Menu((), 0)
+    weights = {label: found.effects[label] for label in verdict.names[:MOST_RIVALS]}
+    if NO_EFFECT in verdict.kind or len(weights) < 2:
+        weights["base"] = found.nothing
+    rivals: dict[str, Model] = {label: model_of(found.fits[label], declared) for label in weights}
+    return next_experiment(rivals, weights, condition, paths, store, pours, on_pour)
 
 
-def at_edge(verdict: Verdict, now: Declared, widest: Declared, fresh: Sequence[FreshPours]) -> tuple[str, ...]:
-    """Effects near the best, driven to an end of their range, with more in the literature, that pours have borne out.
-
-    Most of those that an emulator alone drives there fall behind when they are poured, and need no more range.
-    """
-    room, known = with_room(now, widest), {one.members for one in fresh}
-    near = near_best([model for model in verdict.models if len(model.members) == 1], MODELS)
-    ends = [m for m in near if m.label in room and any(amplitude.at_edge for amplitude in m.amplitudes)]
-    return tuple(m.label for m in ends if m.members in known)
+def offered(condition: Condition, c: int, compared: Compared) -> Offered:
+    """What the data of a fitted condition offer."""
+    names = feature_set(condition)
+    data = measured(condition)
+    return Offered(condition.name, data.offer, len(compared.names[c]), names.offered(SCAN) - len(data.names))
 
 
-def models(verdict: Verdict) -> tuple[Model, Model]:
-    """The calibrated base model, and the best one that the verdict names (the base model where it names none)."""
-    before = fitted(verdict, "base")
-    return before, fitted(verdict, verdict.names[0]) if verdict.names else before
+def held_out_of(conditions: Sequence[Condition], label: str, final: Confirmed) -> HeldOut | None:
+    """What those of ``conditions`` that are held out say of the final model."""
+    places = [c for c, condition in enumerate(conditions) if condition.role == "holdout"]
+    data = [HeldOutData(conditions[c].name, summary_names(conditions[c]), complete_rows(conditions[c])) for c in places]
+    return held_out(label, data, [final.blocks[c] for c in places])
 
 
-def errors_of(measurement: Measurement, role: str, before: Confirmed, after: Confirmed) -> tuple[HoldoutError, ...]:
+def complete_rows(condition: Condition) -> FloatArray:
+    """The measured replicates of which every summary could be read, (r, d)."""
+    data = summaries_of_data(condition)
+    return np.asarray(data[np.isfinite(data).all(axis=1)], dtype=np.float64)
+
+
+def errors_of(conditions: Sequence[Condition], role: str, found: Conclusion) -> tuple[HoldoutError, ...]:
     """Errors over the conditions of ``role``; those with fewer than two readable pours on any side are left out."""
-    conditions = []
-    for c, condition in enumerate(measurement.conditions):
-        rows = complete_rows(condition), before.blocks[c], after.blocks[c]
+    compared = []
+    for c, condition in enumerate(conditions):
+        rows = complete_rows(condition), found.before.blocks[c], found.after.blocks[c]
         if condition.role == role and min(map(len, rows)) >= 2:
-            conditions.append(HoldoutCondition(condition.name, summary_names(condition), *rows))
-    return holdout_errors(conditions) if conditions else ()
+            compared.append(HoldoutCondition(condition.name, summary_names(condition), *rows))
+    return holdout_errors(compared) if compared else ()

@@ -21,8 +21,9 @@ import numpy.typing as npt
 from scipy.special import logsumexp
 from scipy.stats import norm
 
-from doe.diagnose.reference import Level, Sample
-from doe.diagnose.ruler import REPLICATES, Strength, fold_shifts, metric_of, product, strength_of
+from doe.diagnose.levels import REPLICATES, Level
+from doe.diagnose.reference import Sample
+from doe.diagnose.ruler import Strength, fold_shifts, metric_of, product, strength_of
 from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]

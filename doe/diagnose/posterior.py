@@ -1,106 +1,378 @@
-"""How probable is it that nothing is missing, that one effect is, or that something else is: one posterior.
+"""How probable is it that nothing is missing, that an effect is, or that something else is: one posterior.
 
 The mean z of n pours per condition, whitened by the covariance Σ of one pour, is compared with what each model gives by
-the emulator that they share (``shared_emulator.py``), of mean m(e, a) and variance u(e, a) feature by feature:
+the emulator that they share (``emulator.py``), of mean m(e, a) and variance u(e, a) feature by feature:
 
-    effect e at amplitude a             z ~ t_ν( m(e, a),  diag(u(e, a) + 1/n) + J Jᵀ )
-    nothing missing                     z ~ t_ν( m₀,       diag(u₀ + 1/n) + J Jᵀ )
-    something outside the library       z ~ t_ν( m₀,       diag(u₀ + 1/n + s²) + J Jᵀ )
+    effect e at amplitude a             z ~ t_ν( m(e, a),  diag(u(e, a) + w + r/n) + J Jᵀ + I Iᵀ )
+    nothing missing                     z ~ t_ν( m₀,       diag(u₀ + w + r/n) + J Jᵀ + I Iᵀ )
+    something outside the library       z ~ t_ν( m₀,       diag(u₀ + w + r/n + s²) + J Jᵀ + I Iᵀ )
 
 ν are the degrees of freedom of Σ; its uncertainty is what makes the tails those of Student's t. J is what a parameter
-does per standard deviation of its measurement, so parameters are integrated out. The evidence of an effect is the mean
-over amplitudes, evenly over their logarithm, and over its mirror image where it has one; that of the outside over s.
-Directions of one effect share its prior.
+does per standard deviation of its measurement, w the variance of what is not known of J, so parameters are integrated
+out. I holds the stated errors of instruments, r ≥ 1 is the variance of the data's replicates over the simulated one.
+The evidence of an effect is the mean over amplitudes, evenly over their logarithm, over its signs and over its
+directions in the plane; that of the outside over s. Two effects act by the sum of what each does. The posterior is
+P ∝ p Zᵀ for prior p, evidence Z and temperature T (``TEMPERATURE``): below one it is less sure than the evidence
+says, for features are not quite normal and models not quite linear.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
 
 import numpy as np
 import numpy.typing as npt
+from scipy import stats
 from scipy.special import gammaln, logsumexp
 
-from doe.diagnose.shared_emulator import Emulator
+from doe.diagnose.emulator import ANGLES, Emulator, planar_weights
 from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
 
-NOTHING, OUTSIDE = 0.5, 0.1
-"""Prior probabilities that nothing is missing, for most models are not wrong, and of what no library holds; the effects
-share the rest alike."""
-AMPLITUDES = np.geomspace(0.12, 1.6, 12)
-"""Multiples of the reference amplitude: from where an effect of 12 σ can no longer be seen to where it is
-extrapolated."""
+NOTHING, OUTSIDE, PAIRS = 0.5, 0.1, 0.05
+"""Prior probabilities that nothing is missing, for most models are not wrong, of what no library holds, and of two
+effects at once; single effects share the rest alike, and pairs theirs."""
+TEMPERATURE = 1.0
+"""One of the two numbers that are tuned on development sets; the other is ``verdict.THRESHOLD``."""
+LEAST, STEP, BEYOND = 0.12, 1.15, 1.6
+"""Least multiple of the reference amplitude (an effect of 12 σ can hardly be seen there), factor between two of them,
+and how far beyond what has been poured a model is extrapolated."""
+DIRECTIONS = 24
+"""Directions in the plane over which an effect with two amplitudes is summed."""
 SPREADS = np.geomspace(0.3, 6.0, 6)
 """Shifts by something outside [standard deviations of one pour in every feature]."""
+PAIRED_FROM = 0.3
+"""Probability of something outside from which on pairs of effects are weighed too; they cost seconds."""
+COARSE = 3
+"""Every so many amplitudes and directions of a member of a pair are summed."""
+AT_ONCE = 20_000
+"""Nodes that are weighed at once."""
 
 
 @dataclass(frozen=True)
-class Fit(Record):
-    """The best amplitude of a direction of an effect, and the logarithm of its evidence there."""
+class Data:
+    """What was measured, whitened by an emulator.
 
-    amplitude: float
+    Attributes
+    ----------
+    z
+        Mean of the features, (D,).
+    replicates
+        n, pours in each condition.
+    scatter
+        r, variance of the replicates over that of simulated pours, 1 at least.
+    instrument
+        I, (D, q), or empty.
+    """
+
+    z: FloatArray
+    replicates: float
+    scatter: float = 1.0
+    instrument: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+
+
+@dataclass(frozen=True)
+class Amplitude(Record):
+    """One amplitude of one effect, natural units: posterior mean and 95 % interval.
+
+    ``at_end``: the best one is the largest of those that the models reach, or that the literature supports.
+    """
+
+    effect: str
+    index: int
+    value: float
+    low: float
+    high: float
+    at_end: bool
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model at its best amplitude. ``label``: "base", an effect, or "a+b".
+
+    Attributes
+    ----------
+    amplitudes
+        Of its effects, in order.
+    theta, theta_covariance
+        Posterior of the parameters [standard deviations of their measurements], (k,) and (k, k).
+    z, variance
+        What it gives at its best amplitude and parameters, (D,), and the variance of that beside noise.
+    log_evidence
+        ln Z.
+    p
+        Probability of data at least as far off as these, were the model at its best amplitude true.
+    """
+
+    label: str
+    amplitudes: tuple[Amplitude, ...]
+    theta: FloatArray
+    theta_covariance: FloatArray
+    z: FloatArray
+    variance: FloatArray
     log_evidence: float
+    p: float
 
 
 @dataclass(frozen=True)
-class Posterior(Record):
-    """Probabilities that add up to one. ``effects``: by name. ``fits``: of every direction, by its name."""
+class Level:
+    """The best amplitude of way ``way``, in multiples of its reference amplitude, and its log density there."""
+
+    way: int
+    amplitude: float
+    log_density: float
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Probabilities that add up to one.
+
+    Attributes
+    ----------
+    nothing, outside
+        Of nothing missing, and of something outside the library.
+    effects
+        Of single effects, and of pairs "a+b" where they were weighed.
+    fits
+        Best fit of the base model, of each effect and of the likely pairs.
+    levels
+        Best amplitude of every way.
+    log_outside
+        ln Z of something outside.
+    """
 
     nothing: float
     outside: float
     effects: Mapping[str, float]
     fits: Mapping[str, Fit]
+    levels: tuple[Level, ...]
+    log_outside: float
 
     @property
     def best(self) -> tuple[str, float]:
-        """The most probable effect and its probability."""
+        """The most probable effect, or pair, and its probability."""
         return max(self.effects.items(), key=lambda item: item[1])
 
 
-def posterior(emulator: Emulator, z: FloatArray, replicates: int) -> Posterior:
+@dataclass(frozen=True)
+class _Nodes:
+    """Amplitudes over which the evidence of a model is summed, with the rows of the regression.
+
+    ``natural``: (n, p) of all its effects in turn. ``ends``: where an amplitude is the largest. ``levels``: the way and
+    multiple that a node is, where it is of one way.
+    """
+
+    rows: FloatArray
+    natural: FloatArray
+    ends: npt.NDArray[np.bool_]
+    way: npt.NDArray[np.int64]
+    multiple: FloatArray
+
+    def every(self, step: int) -> _Nodes:
+        """Every ``step``-th node."""
+        some = slice(step // 2, None, step)
+        return _Nodes(self.rows[some], self.natural[some], self.ends[some], self.way[some], self.multiple[some])
+
+
+def posterior(emulator: Emulator, data: Data, temperature: float = TEMPERATURE, pairs: bool = True) -> Posterior:
     """The posterior of a data set.
 
     Parameters
     ----------
     emulator
         Taught by pours of the base model and of every effect.
-    z
-        Mean of the data's features, whitened, (D,), as ``emulator.seen`` gives it.
-    replicates
-        n, pours of the data in each condition.
+    data
+        Whitened by it.
+    temperature
+        T.
+    pairs
+        Whether pairs of effects are weighed where something outside is likely.
 
     Returns
     -------
-    Probabilities of nothing, of every effect and of something outside, and each direction's best fit.
+    Probabilities, and the best fit of every model.
     """
-    share = 1.0 / replicates
+    weigher = _Weigher(emulator, data)
+    base = weigher.row[None]
+    mean, variance = emulator.at(base)
+    spread = weigher.log_t(np.repeat(mean, len(SPREADS), 0), variance + SPREADS[:, None] ** 2)
+    singles = {name: _nodes_of(emulator, name) for name in dict.fromkeys(way.effect for way in emulator.ways)}
+    logs = {name: weigher.densities(nodes.rows) for name, nodes in singles.items()}
+    fits = {"base": weigher.fit("base", (), base, np.zeros((1, 0)), np.zeros(1, bool), weigher.densities(base))}
+    fits |= {
+        name: weigher.fit(name, (name,), nodes.rows, nodes.natural, nodes.ends, logs[name])
+        for name, nodes in singles.items()
+    }
+    share = (1.0 - NOTHING - OUTSIDE - PAIRS) / max(1, len(singles))
+    weighed = {name: _weight(share, fits[name].log_evidence, temperature) for name in singles}
+    nothing = _weight(NOTHING, fits["base"].log_evidence, temperature)
+    log_outside = float(logsumexp(spread)) - math.log(len(SPREADS))
+    outside = _weight(OUTSIDE, log_outside, temperature)
+    if (
+        pairs
+        and len(singles) > 1
+        and math.exp(outside - logsumexp([nothing, outside, *weighed.values()])) > PAIRED_FROM
+    ):
+        found = _pairs(weigher, singles)
+        fits |= found
+        each = PAIRS / (0.5 * len(singles) * (len(singles) - 1))
+        weighed |= {label: _weight(each, fit.log_evidence, temperature) for label, fit in found.items()}
+    total = logsumexp([nothing, outside, *weighed.values()])
+    levels = []
+    for name, nodes in singles.items():
+        for way in np.unique(nodes.way[nodes.way >= 0]):
+            own = np.flatnonzero(nodes.way == way)
+            best = own[logs[name][own].argmax()]
+            levels.append(Level(int(way), float(nodes.multiple[best]), float(logs[name][best])))
+    return Posterior(
+        math.exp(nothing - total),
+        math.exp(outside - total),
+        {label: math.exp(weight - total) for label, weight in weighed.items()},
+        fits,
+        tuple(levels),
+        log_outside,
+    )
 
-    def log_t(mean: FloatArray, variance: FloatArray) -> FloatArray:
-        return _log_t(z - mean, variance + share, emulator.parameters, emulator.freedom)
 
-    mean, variance = (one[None] for one in emulator.base())
-    spread = log_t(mean, variance + SPREADS[:, None] ** 2)
-    evidence: dict[str, list[float]] = {}
-    fits = {}
-    for number, way in enumerate(emulator.ways):
-        amplitudes = np.concatenate([AMPLITUDES, -AMPLITUDES]) if way.two_sided else AMPLITUDES
-        logs = log_t(*emulator.at(number, amplitudes))
-        evidence.setdefault(way.effect, []).append(float(logsumexp(logs)) - np.log(logs.size))
-        fits[way.name] = Fit(float(abs(amplitudes[logs.argmax()])), float(logs.max()))
-    prior = np.log((1.0 - NOTHING - OUTSIDE) / max(1, len(evidence)))
-    weighed = [
-        float(log_t(mean, variance)[0]) + np.log(NOTHING),
-        float(logsumexp(spread)) - np.log(len(SPREADS)) + np.log(OUTSIDE),
-        *(float(logsumexp(found)) - np.log(len(found)) + prior for found in evidence.values()),
-    ]
-    weights = np.exp(np.array(weighed) - logsumexp(weighed)).tolist()
-    return Posterior(weights[0], weights[1], dict(zip(evidence, weights[2:], strict=True)), fits)
+def _weight(prior: float, log_evidence: float, temperature: float) -> float:
+    return math.log(prior) + temperature * log_evidence
 
 
-def _log_t(d: FloatArray, variance: FloatArray, loadings: FloatArray, freedom: int) -> FloatArray:
+def _nodes_of(emulator: Emulator, effect: str) -> _Nodes:
+    """All amplitudes, signs and directions of ``effect``."""
+    ways = [(number, way) for number, way in enumerate(emulator.ways) if way.effect == effect]
+    rows, natural, ends, owner, multiple = [], [], [], [], []
+    planar = [number for number, way in ways if way.angle is not None]
+    if len(planar) == len(ANGLES):
+        by_angle = {emulator.ways[number].angle: number for number in planar}
+        size = float(np.linalg.norm(emulator.ways[planar[0]].unit))
+        top = _top(emulator, planar[0])
+        for direction in range(DIRECTIONS):
+            angle = 2.0 * math.pi * direction / DIRECTIONS
+            weights = {by_angle[one]: weight for one, weight in planar_weights(angle).items()}
+            for a in multiples(top):
+                rows.append(emulator.weighted_row([(weights, a)]))
+                natural.append((a * size * math.cos(angle), a * size * math.sin(angle)))
+                ends.append(a >= top)
+                owner.append(planar[0])
+                multiple.append(a)
+    else:
+        for number, way in ways:
+            top = _top(emulator, number)
+            for a in multiples(top):
+                rows.append(emulator.row({number: a}))
+                natural.append(tuple(a * unit for unit in way.unit))
+                ends.append(a >= top)
+                owner.append(number)
+                multiple.append(a)
+    return _Nodes(np.array(rows), np.array(natural), np.array(ends), np.array(owner), np.array(multiple))
+
+
+def _top(emulator: Emulator, way: int) -> float:
+    return min(emulator.ways[way].most, BEYOND * emulator.reached[way])
+
+
+def multiples(top: float) -> FloatArray:
+    """From ``LEAST`` to ``top``, evenly over the logarithm."""
+    if top <= LEAST:
+        return np.array([top])
+    return np.geomspace(LEAST, top, max(2, 1 + round(math.log(top / LEAST) / math.log(STEP))))
+
+
+def _pairs(weigher: _Weigher, singles: Mapping[str, _Nodes]) -> dict[str, Fit]:
+    """Fits of every two effects acting at once."""
+    base, coarse = weigher.row, {name: nodes.every(COARSE) for name, nodes in singles.items()}
+    found = {}
+    for first, second in combinations(coarse, 2):
+        one, other = coarse[first], coarse[second]
+        i, j = (
+            grid.reshape(-1) for grid in np.meshgrid(*(np.arange(len(n.rows)) for n in (one, other)), indexing="ij")
+        )
+        rows = one.rows[i] + other.rows[j] - base
+        logs = weigher.densities(rows)
+        natural = np.concatenate([one.natural[i], other.natural[j]], axis=1)
+        label = f"{first}+{second}"
+        found[label] = weigher.fit(label, (first, second), rows, natural, one.ends[i] | other.ends[j], logs)
+    return found
+
+
+class _Weigher:
+    """Densities of one data set under rows of the regression."""
+
+    def __init__(self, emulator: Emulator, data: Data) -> None:
+        self._emulator, self._data = emulator, data
+        self.row = emulator.row()
+        instrument = data.instrument if data.instrument.size else np.zeros((len(data.z), 0))
+        self._loadings = np.concatenate([emulator.slopes, instrument], axis=1)
+        self._noise = data.scatter / data.replicates + emulator.slope_variance
+
+    def log_t(self, mean: FloatArray, variance: FloatArray) -> FloatArray:
+        """Log densities (n,) of the data."""
+        return log_t(self._data.z - mean, variance + self._noise, self._loadings, self._emulator.freedom)
+
+    def densities(self, rows: FloatArray) -> FloatArray:
+        """Log densities (n,) of the data under ``rows``."""
+        parts = [
+            self.log_t(*self._emulator.at(rows[first : first + AT_ONCE])) for first in range(0, len(rows), AT_ONCE)
+        ]
+        return np.concatenate(parts)
+
+    def fit(
+        self,
+        label: str,
+        effects: Sequence[str],
+        rows: FloatArray,
+        natural: FloatArray,
+        ends: npt.NDArray[np.bool_],
+        logs: FloatArray,
+    ) -> Fit:
+        """The model at its best node, with what all nodes say of its amplitudes."""
+        best = int(logs.argmax())
+        mean, variance = (one[0] for one in self._emulator.at(rows[best : best + 1]))
+        noise = variance + self._noise
+        d = self._data.z - mean
+        slopes = self._emulator.slopes
+        precision = np.eye(slopes.shape[1]) + slopes.T @ (slopes / noise[:, None])
+        covariance = np.linalg.inv(precision)
+        theta = covariance @ (slopes.T @ (d / noise))
+        full = np.diag(noise) + self._loadings @ self._loadings.T
+        square = float(d @ np.linalg.solve(full, d)) / len(d)
+        weights = np.exp(logs - logsumexp(logs))
+        owners = _owners(effects, self._emulator)
+        amplitudes = tuple(
+            Amplitude(effect, index, *_spread_of(natural[:, column], weights), bool(ends[best]))
+            for column, (effect, index) in enumerate(owners)
+        )
+        return Fit(
+            label,
+            amplitudes,
+            theta,
+            covariance,
+            mean + slopes @ theta,
+            variance,
+            float(logsumexp(logs)) - math.log(len(logs)),
+            float(stats.f.sf(square, len(d), self._emulator.freedom)),
+        )
+
+
+def _owners(effects: Sequence[str], emulator: Emulator) -> list[tuple[str, int]]:
+    sizes = {way.effect: len(way.unit) for way in emulator.ways}
+    return [(effect, index) for effect in effects for index in range(sizes[effect])]
+
+
+def _spread_of(values: FloatArray, weights: FloatArray) -> tuple[float, float, float]:
+    """Mean and 95 % interval of ``values`` of ``weights``, linear between them."""
+    order = np.argsort(values)
+    below = np.cumsum(weights[order]) - 0.5 * weights[order]
+    low, high = np.interp([0.025, 0.975], below, values[order])
+    return float(weights @ values), float(low), float(high)
+
+
+def log_t(d: FloatArray, variance: FloatArray, loadings: FloatArray, freedom: int) -> FloatArray:
     """Log densities (n,) at ``d`` (n, D) of multivariate t of scale diag(``variance``, (n, D)) + L Lᵀ, L = ``loadings``
     (D, k), but for the constant in D alone; by the Woodbury identity.
     """

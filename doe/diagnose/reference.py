@@ -5,29 +5,29 @@ parameters at their measured means; what a parameter does is known from pours ``
 
 Pours come in rounds, each of the same number of every kind, so that a reference can be made in pieces and stopped
 after any round. First a pilot finds, for every direction of an effect, the amplitude that shifts the summaries of a
-data set of ``REPLICATES`` pours by about ``STRONG`` standard errors.
+data set by about 12 standard errors (``levels.py``).
 """
 
 from __future__ import annotations
 
 import io
 import json
-import math
 import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from doe.diagnose.runs import Declared, Effect
-from doe.diagnose.simulation.plan import Point, middle
-from doe.diagnose.simulation.pours import ModelPours, Rows, Search
-from doe.diagnose.simulation.ranges import whitened_shift
+from doe.diagnose.declared import Declared, Effect
+from doe.diagnose.levels import Level, Trials, level_of
+from doe.diagnose.points import Direction, Point, directions_of, middle
+from doe.diagnose.pours import ModelPours
 from doe.errors import StatisticsError
-from doe.record import Record, plain
+from doe.record import plain
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -38,14 +38,7 @@ CONSTANT = 1e-9
 """Standard deviation, as a share of the feature's size, below which it says nothing."""
 ROOT = 2
 """Root of the seeds: other pours than those of a diagnosis (0) and of the made-up laboratories (1)."""
-STRONG = 12.0
-"""Shift [standard errors] wanted of the larger amplitude; the smaller one is half of it."""
-ENOUGH, TOO_MUCH = 10.0, 15.0
-"""Shifts that will do in its place."""
-TRIAL, TRIALS = 6, 5
-"""Pours of an amplitude that is tried, and amplitudes that are tried at most."""
-LEAST_STEP = 0.05
-"""An amplitude shrinks by no more than this factor at once: the answer to a strong effect may saturate."""
+TRIALS = Trials(pours=6, most=5, enough=10.0, too_much=15.0)
 SIDE = 1.5
 """Standard deviations by which a parameter is moved; of one that has none, this many sixths of its range."""
 
@@ -54,32 +47,6 @@ FIRST_BASE = 48
 PER_ROUND = {"strong": 8, "weak": 4, "other": 4, "base": 24, "parameter": 4}
 """Pours of each kind in a round: of each effect at either amplitude, of its other directions, of the base model, and of
 each parameter on either side."""
-
-
-@dataclass(frozen=True)
-class Direction(Record):
-    """One way in which an effect can act: its amplitudes are multiples of ``full``, the ends of its range."""
-
-    effect: str
-    name: str
-    """The effect's, with the sign or the axis where there are several."""
-    full: tuple[float, ...]
-    first: bool
-    """Whether it is the first of its effect: the others get fewer pours."""
-
-    def at(self, share: float) -> tuple[float, ...]:
-        """The amplitude [natural units] at ``share`` of the range."""
-        return tuple(share * end for end in self.full)
-
-
-@dataclass(frozen=True)
-class Level(Record):
-    """A direction with the share of its range at which it was found to shift by about ``STRONG``."""
-
-    direction: Direction
-    share: float
-    shift: float
-    """[standard errors], by the few pours of the pilot."""
 
 
 @dataclass(frozen=True)
@@ -136,27 +103,24 @@ class Reference:
     sample: Sample = Sample({}, ())
 
 
-def directions_of(effect: Effect) -> list[Direction]:
+def reference_directions(effect: Effect) -> list[Direction]:
     """Up and, where there is one, down; of two amplitudes along x and along y (the rest follows by symmetry)."""
-    if effect.amplitudes == 2:
-        return [
-            Direction(effect.name, f"{effect.name} x", (effect.high[0], 0.0), True),
-            Direction(effect.name, f"{effect.name} y", (0.0, effect.high[1]), False),
-        ]
-    if effect.low[0] < 0.0:
-        return [
-            Direction(effect.name, f"{effect.name} +", effect.high, True),
-            Direction(effect.name, f"{effect.name} -", effect.low, False),
-        ]
-    return [Direction(effect.name, effect.name, effect.high, True)]
+    found = directions_of(effect)
+    if effect.amplitudes == 1:
+        return found
+    along_x, along_y = effect.high
+    return [
+        Direction(effect.name, f"{effect.name} x", (along_x, 0.0)),
+        Direction(effect.name, f"{effect.name} y", (0.0, along_y)),
+    ]
 
 
-def base_points(declared: Declared, number: int) -> list[Point]:
+def reference_base(declared: Declared, number: int) -> list[Point]:
     """The first ``number`` pours of the base model."""
     return [Point("reference base", k, middle(declared.parameters)) for k in range(number)]
 
 
-def effect_points(declared: Declared, direction: Direction, share: float, number: int) -> list[Point]:
+def reference_effect(declared: Declared, direction: Direction, share: float, number: int) -> list[Point]:
     """The first ``number`` pours of an effect at ``share`` of its range."""
     amplitude = direction.at(share)
     name = f"reference {direction.effect}@{'_'.join(f'{one:.6g}' for one in amplitude)}"
@@ -164,7 +128,7 @@ def effect_points(declared: Declared, direction: Direction, share: float, number
     return [Point(name, k, middle(declared.parameters), effects) for k in range(number)]
 
 
-def parameter_points(declared: Declared, number: int) -> list[list[Point]]:
+def reference_parameters(declared: Declared, number: int) -> list[list[Point]]:
     """The first ``number`` pours with each parameter moved, below and above its mean in turn."""
     found = []
     for j, parameter in enumerate(declared.parameters):
@@ -177,33 +141,15 @@ def parameter_points(declared: Declared, number: int) -> list[list[Point]]:
     return found
 
 
-def level_of(declared: Declared, direction: Direction, base: Rows) -> Search[Level]:
-    """The share of the range at which ``direction`` shifts by about ``STRONG``; 1 where all of it does less."""
-    share, below, above = 1.0, 0.0, math.inf
-    level = Level(direction, 1.0, math.inf)
-    for _ in range(TRIALS):
-        pours = yield effect_points(declared, direction, share, TRIAL)
-        shift = whitened_shift(declared, base, pours)
-        level = Level(direction, share, shift)
-        if shift > TOO_MUCH:
-            above = share
-            inward = share * max(LEAST_STEP, STRONG / shift)
-            share = max(inward, math.sqrt(below * above)) if below > 0.0 else inward
-        elif shift < ENOUGH and share < 1.0:
-            below = share
-            outward = share * STRONG / max(shift, 1.0)
-            share = min(1.0, outward if math.isinf(above) else min(outward, math.sqrt(below * above)))
-        else:
-            break
-    return level
-
-
 def find_levels(declared: Declared, pours: ModelPours) -> list[Level]:
     """The levels of every direction of every effect."""
-    base = pours.run("reference: base model", base_points(declared, FIRST_BASE))
-    directions = [direction for effect in declared.effects for direction in directions_of(effect)]
-    searches = [level_of(declared, direction, base) for direction in directions]
-    widest = [point for direction in directions for point in effect_points(declared, direction, 1.0, 1)]
+    base = pours.run("reference: base model", reference_base(declared, FIRST_BASE))
+    directions = [direction for effect in declared.effects for direction in reference_directions(effect)]
+    searches = [
+        level_of(declared, direction, base, partial(reference_effect, declared, direction), TRIALS)
+        for direction in directions
+    ]
+    widest = [point for direction in directions for point in reference_effect(declared, direction, 1.0, 1)]
     return pours.answered("reference: amplitudes", searches, widest=widest)
 
 
@@ -258,7 +204,9 @@ def load(path: Path) -> Reference:
             }
         levels = tuple(
             Level(
-                Direction(**{**one["direction"], "full": tuple(one["direction"]["full"])}), one["share"], one["shift"]
+                Direction(one["direction"]["effect"], one["direction"]["name"], tuple(one["direction"]["full"])),
+                one["share"],
+                one["shift"],
             )
             for one in head["levels"]
         )
@@ -281,15 +229,18 @@ def points_of(declared: Declared, levels: Sequence[Level], rounds: int) -> Mappi
 
     Keys: "base", "<direction> strong", "<direction> weak" (first directions only), "<parameter> -", "<parameter> +".
     """
-    found = {"base": base_points(declared, FIRST_BASE + rounds * PER_ROUND["base"])}
+    found = {"base": reference_base(declared, FIRST_BASE + rounds * PER_ROUND["base"])}
+    known: set[str] = set()
     for level in levels:
         direction = level.direction
-        number = rounds * PER_ROUND["strong" if direction.first else "other"]
-        found[f"{direction.name} strong"] = effect_points(declared, direction, level.share, number)
-        if direction.first:
+        first = direction.effect not in known
+        known.add(direction.effect)
+        number = rounds * PER_ROUND["strong" if first else "other"]
+        found[f"{direction.name} strong"] = reference_effect(declared, direction, level.share, number)
+        if first:
             weak = rounds * PER_ROUND["weak"]
-            found[f"{direction.name} weak"] = effect_points(declared, direction, 0.5 * level.share, weak)
-    sides = iter(parameter_points(declared, rounds * PER_ROUND["parameter"]))
+            found[f"{direction.name} weak"] = reference_effect(declared, direction, 0.5 * level.share, weak)
+    sides = iter(reference_parameters(declared, rounds * PER_ROUND["parameter"]))
     for parameter in declared.parameters:
         found[f"{parameter.name} -"], found[f"{parameter.name} +"] = next(sides), next(sides)
     return found

@@ -15,11 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from doe.diagnose.emulator import Emulator, Lessons, Way, emulated
+from doe.diagnose.levels import REPLICATES
 from doe.diagnose.limit import RISKS, Kind
-from doe.diagnose.posterior import Posterior, posterior
-from doe.diagnose.reference import Blocks, Sample
-from doe.diagnose.ruler import REPLICATES
-from doe.diagnose.shared_emulator import Emulator, Group, Way, emulated
+from doe.diagnose.posterior import Data, Posterior, posterior
+from doe.diagnose.reference import SIDE, Blocks, Sample
 from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
@@ -131,7 +131,7 @@ def replay(
     -------
     What came out.
     """
-    ways = tuple(Way(kind.effect, kind.name, kind.two_sided) for kind in kinds)
+    ways = tuple(Way(kind.effect, kind.name) for kind in kinds)
     answers: list[_Answer] = []
     for _ in range(splits):
         mixed = {
@@ -154,7 +154,11 @@ class _Split:
     def __init__(self, sample: Sample, ways: tuple[Way, ...], teaching: Teaching) -> None:
         self.pours = sample.pours
         self._ways, self._teaching = ways, teaching
-        self._moved = [(self.pours[f"{name} -"], self.pours[f"{name} +"]) for name in sample.parameters]
+        k = len(sample.parameters)
+        self._base = [_lesson(_first(self.pours["base"], BASE_POURS), np.zeros(k))]
+        for j, name in enumerate(sample.parameters):
+            for side, sign in (("-", -1.0), ("+", 1.0)):
+                self._base.append(_lesson(self.pours[f"{name} {side}"], sign * SIDE * np.eye(k)[j]))
         self._first = self._taught({(way, "strong"): teaching.all for way in range(len(ways))})
 
     def data_of(self, truth: Truth) -> Blocks:
@@ -166,7 +170,7 @@ class _Split:
         """The posterior after all looks, and the pours that were asked for on the way."""
         counts = {(way, "strong"): self._teaching.all for way in range(len(self._ways))}
         emulator, asked = self._first, 0
-        found = posterior(emulator, emulator.seen(data), REPLICATES)
+        found = posterior(emulator, Data(emulator.seen(data), REPLICATES), pairs=False)
         for _ in range(LOOKS if self._teaching.more else 0):
             wanted = {place: self._most(place[1]) for place in self._in_question(found)}
             new = {place: number for place, number in wanted.items() if counts.get(place, 0) < number}
@@ -175,20 +179,21 @@ class _Split:
             asked += sum(number - counts.get(place, 0) for place, number in new.items())
             counts |= new
             emulator = self._taught(counts)
-            found = posterior(emulator, emulator.seen(data), REPLICATES)
+            found = posterior(emulator, Data(emulator.seen(data), REPLICATES), pairs=False)
         return found, asked
 
     def _in_question(self, found: Posterior) -> list[tuple[int, str]]:
         """Directions, with the level nearer to their best fit of which there are pours."""
         best: dict[str, float] = {}
-        for way in self._ways:
-            best[way.effect] = max(best.get(way.effect, -np.inf), found.fits[way.name].log_evidence)
+        for level in found.levels:
+            effect = self._ways[level.way].effect
+            best[effect] = max(best.get(effect, -np.inf), level.log_density)
         places = []
-        for number, way in enumerate(self._ways):
-            fit = found.fits[way.name]
-            if found.effects[way.effect] > IN_QUESTION and fit.log_evidence > best[way.effect] - BEHIND:
-                levels = [level for level in LEVELS if f"{way.name} {level}" in self.pours]
-                places.append((number, min(levels, key=lambda level: abs(LEVELS[level] - fit.amplitude))))
+        for level in found.levels:
+            way = self._ways[level.way]
+            if found.effects[way.effect] > IN_QUESTION and level.log_density > best[way.effect] - BEHIND:
+                levels = [name for name in LEVELS if f"{way.name} {name}" in self.pours]
+                places.append((level.way, min(levels, key=lambda name: abs(LEVELS[name] - level.amplitude))))
         return places
 
     def _most(self, level: str) -> int:
@@ -196,11 +201,21 @@ class _Split:
         return self._teaching.more + (self._teaching.all if level == "strong" else 0)
 
     def _taught(self, counts: Mapping[tuple[int, str], int]) -> Emulator:
-        groups = [
-            Group(way, LEVELS[level], _first(self.pours[f"{self._ways[way].name} {level}"], number))
-            for (way, level), number in counts.items()
-        ]
-        return emulated(_first(self.pours["base"], BASE_POURS), self._moved, self._ways, groups)
+        lessons = self._base[0]
+        for more in self._base[1:]:
+            lessons = lessons.joined(more)
+        for (way, level), number in counts.items():
+            pours = _first(self.pours[f"{self._ways[way].name} {level}"], number)
+            lessons = lessons.joined(_lesson(pours, np.zeros(lessons.theta.shape[1]), way, LEVELS[level]))
+        return emulated(lessons, self._ways)
+
+
+def _lesson(blocks: Blocks, theta: FloatArray, way: int = -1, amplitude: float = 0.0) -> Lessons:
+    """Pours with parameters ``theta`` (k,); conditions have the same number of them."""
+    n = min(map(len, blocks))
+    return Lessons(
+        np.tile(theta, (n, 1)), np.full(n, way), np.full(n, amplitude), np.ones(n, bool), tuple(b[:n] for b in blocks)
+    )
 
 
 def _first(blocks: Blocks, number: int) -> Blocks:

@@ -24,13 +24,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from doe.diagnose.levels import REPLICATES
 from doe.diagnose.reference import SIDE, Sample
 from doe.errors import StatisticsError
 from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
-REPLICATES = 6
-"""Pours of a data set in each condition, by which strengths are stated."""
 FOLDS = 8
 
 

@@ -13,6 +13,7 @@
     plate = [a, b, c]   the plate z = a + b x + c y, in metres; found from the bare plate in the scan where not stated
     axis = [x, y]       the rig's axis in the scan's coordinates, in metres; without it the centre of the volume stands
                         for it, and nothing that depends on the axis (where the pile leans to) is read
+    axis_error = "1mm"  standard deviation of each coordinate of the axis; ``AXIS_ERROR`` where not stated
     grid = "0.5mm"      resolution; the spacing of the points where not stated
     noise = "0.1mm"     standard deviation of one height, where it is known
 
@@ -38,9 +39,11 @@ from solver import HeightMap, ParameterError, parse_quantity
 
 Array = npt.NDArray[np.float64]
 
-KEYS = ("unit", "pixel", "step", "plate", "axis", "grid", "noise")
+KEYS = ("unit", "pixel", "step", "plate", "axis", "axis_error", "grid", "noise")
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 SURFACES, POINTS, ARRAYS, IMAGES = (".ply", ".stl"), (".xyz", ".txt", ".csv"), (".npz",), (".tif", ".tiff")
+AXIS_ERROR = 1.5e-3
+"""How well [m] a rig's axis is found in the coordinates of a scanner, where nothing is stated: a plumb bob's tip."""
 MOST_BYTES = 300_000_000
 MOST_POINTS = 20_000_000
 SHELL = 2.0
@@ -62,6 +65,7 @@ class ScanSettings:
     step: float | None = None
     plate: tuple[float, float, float] | None = None
     axis: tuple[float, float] | None = None
+    axis_error: float = AXIS_ERROR
     grid: float | None = None
     noise: float | None = None
 
@@ -77,6 +81,10 @@ class UpperSurface(Protocol):
     def on_axis(self) -> bool:
         """Whether the rig's axis is known."""
 
+    @property
+    def axis_error(self) -> float:
+        """Standard deviation of each coordinate of the axis [m]."""
+
     def height_map(self, half_width: float, pixel: float) -> HeightMap:
         """Heights within ``half_width`` [m] of the axis in pixels of ``pixel`` [m]; NaN where nothing was seen."""
 
@@ -91,6 +99,8 @@ class Scan:
     """Resolution [m]: spacing of the points."""
     on_axis: bool
     """Whether the axis is known; else x and y are about the centre of the volume."""
+    axis_error: float = AXIS_ERROR
+    """Standard deviation of each coordinate of the axis [m]."""
 
     def height_map(self, half_width: float, pixel: float) -> HeightMap:
         """The upper surface within ``half_width`` [m] in pixels of ``pixel`` [m]; NaN where nothing was seen."""
@@ -139,6 +149,7 @@ def scan_settings(table: Table) -> ScanSettings:
         step=length("step"),
         plate=None if plate is None else (plate[0], plate[1], plate[2]),
         axis=None if axis is None else (axis[0], axis[1]),
+        axis_error=length("axis_error") or AXIS_ERROR,
         grid=length("grid"),
         noise=length("noise"),
     )
@@ -186,7 +197,7 @@ def read_scan(path: Path, settings: ScanSettings) -> Scan:
         raise MeasurementError(f"{path}: {error}") from None
     except (OSError, ParameterError) as error:
         raise MeasurementError(f"{path}: cannot be read ({' '.join(str(error).split())[:120]})") from None
-    return Scan(points, grid, settings.axis is not None)
+    return Scan(points, grid, settings.axis is not None, settings.axis_error)
 
 
 def found_plate(points: Array) -> tuple[float, float, float]:

@@ -1,47 +1,35 @@
 """The blind campaign: laboratories pour, the diagnosis answers, and the answers are kept.
 
-The declared model is screened once, six times as far as in a diagnosis; each data set is judged from those runs and
-from pours at the best fits of its own contenders. A set takes ``REPLICATES`` pours per fitted condition. Where
-something is named, the held-out condition is measured too and predicted by the contenders; where the name is right,
-also by fresh pours of the calibrated base model and of the named one.
+A set takes ``REPLICATES`` pours per condition and is judged twice, by its table of numbers alone and with its scans.
+The pours that teach belong to the declared model, so that sets share them through the store. Two processes with
+``--shard 1/2`` and ``--shard 2/2`` work on one campaign.
 """
 
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-import numpy as np
-
-from doe.diagnose.declare import declare
-from doe.diagnose.runs import Declared
-from doe.diagnose.simulation.budget import Budget
-from doe.diagnose.simulation.plan import directions
-from doe.diagnose.simulation.pours import Ended, ModelPours
-from doe.diagnose.simulation.screen import Screened, over_wider_ranges, screen
-from doe.measurement import Measurement
+from doe.diagnose.declared import Declared, declare
+from doe.diagnose.limit import limit_study
+from doe.diagnose.reference import load
+from doe.diagnose.teaching import Budget
+from doe.errors import StatisticsError
+from doe.measurement.features import SCALARS, feature_set
 from doe.store import Store, default_store
 from doe.validation.answers import Answers
 from doe.validation.laboratory import MODEL, declared_model
 from doe.validation.outside import AMPLITUDE
-from doe.validation.schedule import STRENGTHS, Case, cases
-from doe.validation.sets import Row, append_row, read_rows
-from doe.validation.truth import ruler
+from doe.validation.schedule import Case, cases
+from doe.validation.sets import Row, append_rows, read_rows
+from doe.validation.truth import Strengths, strengths_of
 from doe.validation.work_place import OutOfTimeError, WorkPlace
 from solver import EFFECTS
 
-SETS = "sets.csv"
-CHUNK = 6
-"""Data sets that are poured, judged and written together."""
-SAID_EVERY = 100
-"""Pours of the emulator between two lines of progress."""
-
-BUDGET = Budget(base=160, middle=32, scaling=2, screening=60, widened=60)
-"""The runs belong to the declared model and are made once for all its data sets: a campaign affords about twice those
-of one diagnosis per effect, and three times those of the base model."""
+SETS = "sets.jsonl"
 
 Say = Callable[[str], None]
 
@@ -50,82 +38,73 @@ Say = Callable[[str], None]
 class CampaignOrder:
     """What is asked for.
 
-    minutes: stop after so long, infinite by default; 0: judge nothing. cases: instead of the schedule's.
+    minutes: stop after so long, infinite by default; 0: judge nothing. shard: every ``of``-th set from the ``shard``-th
+    on. wide: sets of all strengths, for development. cases: instead of the schedule's. strengths: instead of those of
+    the reference pours in the file ``reference``.
     """
 
     out: Path
     number: int
+    root: int = 1
     store: Path | None = None
     minutes: float = float("inf")
     workers: int | None = None
+    shard: int = 1
+    of: int = 1
+    wide: bool = False
     model: Path = MODEL
     effects: tuple[str, ...] = tuple(EFFECTS)
-    budget: Budget = BUDGET
+    budget: Budget = Budget()
     cases: tuple[Case, ...] = ()
+    strengths: Strengths | None = None
+    reference: Path | None = None
 
     @cached_property
     def asked(self) -> tuple[Case, ...]:
         """The data sets."""
-        return self.cases or tuple(cases(self.number, self.effects, tuple(AMPLITUDE)))
+        found = self.cases or tuple(cases(self.root, self.number, tuple(AMPLITUDE), self.wide))
+        return found[self.shard - 1 :: self.of]
 
 
 def run_campaign(order: CampaignOrder, say: Say) -> list[Row]:
-    """Answer the data sets that ``sets.csv`` does not hold yet, until all are there or the time is over."""
+    """Answer the data sets that ``sets.jsonl`` does not hold yet, until all are there or the time is over."""
     order.out.mkdir(parents=True, exist_ok=True)
     path = order.out / SETS
-    known = {row.number for row in read_rows(path)}
-    todo = [case for case in order.asked if case.number not in known]
-    say(f"{path}: {len(known)} data sets are there, {len(todo)} to come")
+    known = {(row.root, row.number) for row in read_rows(path)}
+    todo = [case for case in order.asked if case.seed not in known]
+    say(f"{path}: {len(order.asked) - len(todo)} of {len(order.asked)} data sets are there")
     deadline = time.monotonic() + 60.0 * order.minutes
     if todo and order.minutes > 0.0:
         with ExitStack() as stack:
             store = Store(order.store or default_store())
             stack.callback(store.close)
             place = stack.enter_context(WorkPlace(store, order.workers or os.cpu_count() or 1, deadline))
+            measurement = declared_model(order.model)
+            strengths = order.strengths or reference_strengths(order, declare(measurement, order.effects))
+            answers = Answers(order.model, measurement, strengths, place, order.budget)
             try:
-                _answer(order, todo, place, path, say)
+                for case in todo:
+                    rows = answers.rows(case)
+                    append_rows(path, rows)
+                    for row in rows:
+                        what = f"{row.kind} {row.label} {row.strength:g}, {row.offer}"
+                        say(f"{row.number}: {what}: {row.verdict} ({row.answer}), {row.seconds:.0f} s")
             except OutOfTimeError:
                 say(f"{order.minutes:g} min are over; all pours are kept, and the same command goes on")
-    asked = {case.number for case in order.asked}
-    return [row for row in read_rows(path) if row.number in asked]
+    asked = {case.seed for case in order.asked}
+    return [row for row in read_rows(path) if (row.root, row.number) in asked]
 
 
-def emulated(order: CampaignOrder, measurement: Measurement, place: WorkPlace, say: Say) -> Screened:
-    """The declared model with every effect screened; from the store where it is there."""
-    paths = [parameter.path for parameter in measurement.parameters]
-
-    def on_pour(what: str, left: int, _: Ended) -> None:
-        place.look_at_the_clock()
-        if left > 0 and left % SAID_EVERY == 0:
-            say(f"{what}: {left} pours to come")
-
-    model = ModelPours(measurement.fit, paths, place.store, place.crew.run_queue, on_pour)
-    widest = declare(measurement, order.effects)
-    screened = screen(widest, model, order.budget, say)
-    weak = short_of(max(STRENGTHS), screened, widest)
-    return over_wider_ranges(screened, weak, widest, model, order.budget, say) if weak else screened
-
-
-def short_of(strength: float, screened: Screened, widest: Declared) -> list[str]:
-    """Effects that do not shift by ``strength`` σ in the middle of the box, where the literature supports more."""
-    measure = ruler(screened.declared, screened.runs, widest.effects)
-    middle = np.zeros(len(widest.parameters))
-    names = []
-    for e, (effect, end) in enumerate(zip(screened.declared.effects, widest.effects, strict=True)):
-        if e in measure.emulator.simulated_effects and max(effect.high) < max(end.high):
-            full = [measure.within(e, np.array(way) / effect.scale) for way in directions(effect)]
-            if max(measure.shift(e, middle, amplitude) for amplitude in full) < strength:
-                names.append(effect.name)
-    return names
-
-
-def _answer(order: CampaignOrder, todo: Sequence[Case], place: WorkPlace, path: Path, say: Say) -> None:
-    measurement = declared_model(order.model)
-    screened = emulated(order, measurement, place, say)
-    widest = declare(measurement, order.effects).effects
-    answers = Answers(order.model, measurement, screened, ruler(screened.declared, screened.runs, widest), place)
-    for first in range(0, len(todo), CHUNK):
-        for row in answers.rows(todo[first : first + CHUNK]):
-            append_row(path, row)
-            say(f"{row.number}: {row.kind} {row.label} {row.strength:g}: {row.verdict} ({row.answer})")
-        place.look_at_the_clock()
+def reference_strengths(order: CampaignOrder, declared: Declared) -> Strengths:
+    """Amplitudes of given strengths by the reference pours of the order's model."""
+    if order.reference is None:
+        raise StatisticsError("reference: not given; allowed: a file of reference pours of the laboratories' model")
+    found = load(order.reference)
+    numbers = [feature_set(condition).offered(SCALARS) for condition in declared_model(order.model).fit]
+    study = limit_study(found.sample, found.levels, {SCALARS: numbers})
+    effects = {one.kind.name: one.kind.effect for one in study.reached}
+    cosines: dict[frozenset[str], float] = {}
+    for pair in study.confusable:
+        both = frozenset((effects[pair.first], effects[pair.second]))
+        cosines[both] = max(cosines.get(both, 0.0), abs(pair.cosine))
+    return strengths_of(study.reached, declared, cosines)

@@ -1,107 +1,138 @@
-"""``sets.csv``: one row per data set, appended as it is judged, and what an answer is worth.
+"""``sets.jsonl``: one line per data set and kind of data, appended as it is judged, and what an answer is worth.
 
-right        the effect's name; or ambiguous with it, where all signatures that are named have a cosine above 0.9 to it
-undecided    ambiguous with the truth in it, but the others do look different
-wrong        another name, or ambiguous without the truth
+right        the effect's name, or both of a pair
+undecided    ambiguous with the truth in it
+wrong        another name, or ambiguous without the truth; one of a pair alone
 unexplained  more than noise, and no name
 nothing      no missing effect
 """
 
-import csv
+import json
 import math
-from collections.abc import Callable
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Literal
 
+from doe.record import Record
+
 Answer = Literal["right", "undecided", "wrong", "unexplained", "nothing", "out of reach"]
 
-ALIKE = 0.9
-"""Cosine of signatures above which nobody could tell two effects apart."""
 OUT_OF_REACH = "out of reach: "
 """Start of the verdict on a truth that cannot be, followed by the reason."""
+NONE = "none"
+"""Label of a set in which nothing is missing."""
 
 
 @dataclass(frozen=True)
-class Row:
-    """One data set."""
+class Row(Record):
+    """One data set, judged by data of one kind.
 
+    Attributes
+    ----------
+    root, number
+        They give the truth and the pours.
+    kind, label
+        Of the truth; ``label``: library effect, "a+b", outside effect, or "none".
+    strength
+        That was asked for [σ]; NaN where none was.
+    amplitude
+        Of the truth's library effects, natural units.
+    offer
+        "scalars" or "scan".
+    verdict
+        The answer.
+    nothing, outside, best, best_p, truth_p
+        Probabilities; ``best``: the most probable effect, ``truth_p``: of the truth, NaN where it is no library effect.
+    evidence
+        Logarithms of the evidence of "base", "outside" and every effect, so that the rule can be tuned on what is kept.
+    fits
+        Probability of data as far off, under the best fit of "base" and of ``best``.
+    held_out_p
+        Of the final model on held-out data, NaN where it was not asked.
+    before, after
+        Error ÷ noise floor on the held-out condition, of the calibrated base model and the named one; NaN unless the
+        name is right.
+    pours, seconds
+        Pours that were run for it, and wall time.
+    """
+
+    root: int
     number: int
-    """Seed of the set: it gives truth and pours."""
     kind: str
     label: str
-    """Name of what is true: library effect, "a+b", outside effect, or "none"."""
     strength: float
-    """Shift that was asked for [σ]; NaN where none was."""
     amplitude: str
-    """Of the truth's library effects, natural units."""
-    shift: float
-    """Shift of the measured means [σ], freed from noise."""
+    offer: str
     verdict: str
-    p_detect: float
-    """Smaller p of the two tests of gate 1."""
-    cosine: float
-    """Least cosine of the truth's signature and the named ones."""
+    nothing: float
+    outside: float
+    best: str
+    best_p: float
+    truth_p: float
+    evidence: Mapping[str, float]
+    fits: Mapping[str, float]
+    held_out_p: float
     before: float
-    """Holdout error ÷ noise floor of the calibrated base model; NaN unless the name is right."""
     after: float
-    """The same of the named model."""
     pours: int
     seconds: float
 
     @property
     def answer(self) -> Answer:
         """What the verdict is worth."""
-        return answer_to(self.verdict, self.label, self.cosine)
+        return answer_to(self.verdict, self.label)
+
+    @property
+    def named(self) -> bool:
+        """Whether the verdict accuses an effect: names one, or leaves only effects."""
+        kind, _, rest = self.verdict.partition(":")
+        if kind in ("effect", "effects"):
+            return True
+        return kind == "ambiguous" and not {"no_missing_effect", "unexplained"} & set(rest.split(","))
 
 
-def answer_to(verdict: str, label: str, cosine: float) -> Answer:
+def answer_to(verdict: str, label: str) -> Answer:
     """What ``verdict`` is worth where ``label`` is true, see above."""
     if verdict.startswith(OUT_OF_REACH):
         return "out of reach"
-    kind, _, named = verdict.partition(":")
-    names = {frozenset(name.split("+")) for name in named.split(",")}
-    truth = frozenset(label.split("+"))
+    kind, _, rest = verdict.partition(":")
     if kind == "no_missing_effect":
         return "nothing"
     if kind == "unexplained":
         return "unexplained"
+    names = {frozenset(name.split("+")) for name in rest.split(",")}
+    truth = frozenset(label.split("+"))
     if kind in ("effect", "effects"):
         return "right" if names == {truth} else "wrong"
-    if truth not in names:
-        return "wrong"
-    return "right" if cosine > ALIKE else "undecided"
+    left = {NONE: "no_missing_effect"}.get(label)
+    return "undecided" if truth in names or left in rest.split(",") else "wrong"
 
 
 def read_rows(path: Path) -> list[Row]:
-    """Rows in ``path``, in order of their numbers; none where there is no such file."""
+    """Rows in ``path``, in order of numbers and kinds of data; none where there is no such file."""
     if not path.is_file():
         return []
-    with path.open(newline="", encoding="utf-8") as file:
-        rows = [_row(cells) for cells in csv.DictReader(file)]
-    return sorted(rows, key=lambda row: row.number)
+    rows = [_row(json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
+    return sorted(rows, key=lambda row: (row.root, row.number, row.offer))
 
 
-def append_row(path: Path, row: Row) -> None:
-    """Add ``row`` to the file, which is begun with a header."""
-    names = [field.name for field in fields(Row)]
-    begun = path.is_file()
-    with path.open("a", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        if not begun:
-            writer.writerow(names)
-        writer.writerow([_cell(getattr(row, name)) for name in names])
+def append_rows(path: Path, rows: Sequence[Row]) -> None:
+    """Add ``rows`` to the file, in one write, so that processes that share it do not mix lines."""
+    text = "".join(json.dumps(_rounded(row.to_dict()), ensure_ascii=False) + "\n" for row in rows)
+    with path.open("a", encoding="utf-8") as file:
+        file.write(text)
 
 
-def _cell(value: object) -> str:
+def _rounded(value: Any) -> Any:
     if isinstance(value, float):
-        return "" if math.isnan(value) else f"{value:.6g}"
-    return str(value)
+        return float(f"{value:.6g}")
+    return {key: _rounded(one) for key, one in value.items()} if isinstance(value, dict) else value
 
 
-def _row(cells: dict[str, str]) -> Row:
-    kinds: dict[str, Callable[[str], object]] = {"int": int, "float": lambda text: float(text or "nan"), "str": str}
+def _row(cells: dict[str, Any]) -> Row:
+    floats = {field.name for field in fields(Row) if field.type is float}
     values: dict[str, Any] = {
-        field.name: kinds[getattr(field.type, "__name__", str(field.type))](cells[field.name]) for field in fields(Row)
+        key: math.nan if value is None and key in floats else value for key, value in cells.items()
     }
     return Row(**values)

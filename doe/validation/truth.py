@@ -1,33 +1,29 @@
-"""What is true of one made-up laboratory, drawn by its number: parameters within their measured uncertainty, and what
-acts that the declared model lacks.
+"""What is true of one made-up laboratory, drawn by its root and number: parameters within their measured uncertainty,
+and what acts that the declared model lacks.
 
-A truth's strength is the length of its projected, whitened shift of the summaries (`fitting/signatures.py`), in
-standard errors of a data set of ``REPLICATES`` pours. The emulator's own error is no part of that standard error, so
-that a strength means the same however much was simulated. Where an effect's own pours stray (`emulation/block.py`),
-that is noise, for nobody can say beforehand how far they go in one data set.
+A truth's strength is that of the ruler (``doe/diagnose/ruler.py``), measured once by many reference pours of the model
+at an amplitude and at half of it: between and beyond them s = s₁ (a/a₁)^p, with p from the two.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from doe.diagnose.emulation.emulator import Emulator, fit_emulator
-from doe.diagnose.fitting.calibrate import priors
-from doe.diagnose.fitting.signatures import Whitening, cosine, noise_square, projected, shift_of, whitening_at
-from doe.diagnose.runs import BASE, Declared, Effect, Observed, Runs, select_summaries
-from doe.diagnose.simulation.plan import directions
+from doe.diagnose.declared import Declared
+from doe.diagnose.limit import Reached
 from doe.validation.schedule import Case
-
-FloatArray = npt.NDArray[np.float64]
 
 REPLICATES = 6
 ROOT = 1
-"""Root of every random number of the laboratories; that of the emulator's pours is 0."""
+"""Root of the seeds of the laboratories' pours; that of the diagnosis's pours is 0."""
 DISTINCT = 0.9
 """Cosine of their signatures up to which two effects are made a pair: two that look alike are one to any data."""
+POWERS = (0.7, 2.0)
+"""Range of p: of two strengths with errors it may come out at anything."""
+SEEN = 2.0
+"""Standard errors that a strength is above zero, or nobody knows its amplitude."""
 
 
 @dataclass(frozen=True)
@@ -44,129 +40,80 @@ class Truth:
 
 
 @dataclass(frozen=True)
-class Ruler:
-    """Measures shifts in standard errors of a data set. ``declared``: with the ranges that were simulated.
+class Strengths:
+    """Amplitudes of given strengths.
 
-    ``widest``: the effects as far as the literature goes.
+    ``reached``: by effect, the directions that were measured; ``declared``: the ranges; ``alike``: cosines of two
+    effects in the scalars, by their names.
     """
 
-    emulator: Emulator
+    reached: Mapping[str, tuple[Reached, ...]]
     declared: Declared
-    widest: tuple[Effect, ...]
+    alike: Mapping[frozenset[str], float]
 
-    def frame(self, theta: FloatArray, stray: Sequence[FloatArray] | None = None) -> Whitening:
-        """Whitening by the noise of ``REPLICATES`` pours, and projection, at coded parameters (k,).
+    def amplitude(self, effect: str, strength: float, rng: np.random.Generator) -> tuple[float, ...] | None:
+        """The amplitude [natural units] of ``strength`` σ in a random direction; None beyond the literature."""
+        ranges = next(one for one in self.declared.effects if one.name == effect)
+        found = self.reached[effect]
+        for k in rng.permutation(len(found)):
+            one = found[k]
+            if one.ruler.value <= SEEN * one.ruler.error:
+                continue
+            share = (strength / one.ruler.value) ** (1.0 / self._power(effect, one))
+            size = share * float(np.linalg.norm(one.amplitude))
+            amplitude: tuple[float, ...]
+            if len(one.amplitude) == 2:
+                # The effect of a direction is that of any other, by symmetry.
+                towards = rng.uniform(0.0, 2.0 * math.pi)
+                amplitude = (size * math.cos(towards), size * math.sin(towards))
+                limit = min(*ranges.high, *(-end for end in ranges.low))
+            else:
+                amplitude = (math.copysign(size, one.amplitude[0]),)
+                limit = ranges.high[0] if one.amplitude[0] > 0.0 else -ranges.low[0]
+            if size <= limit:
+                return amplitude
+        return None
 
-        ``stray``: per condition (d_c,), variance beyond noise.
-        """
-        noise = [block.noise.covariance / REPLICATES for block in self.emulator.blocks]
-        if stray is not None:
-            noise = [covariance + np.diag(more) for covariance, more in zip(noise, stray, strict=True)]
-        return whitening_at(self.emulator.predictor(()), theta, noise, priors(self.declared)[1])
-
-    def coded(self, theta: Sequence[float]) -> FloatArray:
-        """Parameters in natural units → coded, within the sampled box."""
-        return np.clip(self.declared.coded(np.array(theta)), self.emulator.theta_low, self.emulator.theta_high)
-
-    def within(self, effect: int, amplitude: FloatArray) -> FloatArray:
-        """Coded amplitudes (m,) within what was simulated."""
-        return np.clip(amplitude, self.emulator.low[effect], self.emulator.high[effect])
-
-    def shift(self, effect: int, theta: FloatArray, amplitude: FloatArray) -> float:
-        """Shift [σ] by an effect at coded amplitudes (m,), freed from what the emulator's error adds on average."""
-        level = float(amplitude @ amplitude)
-        stray = [level * np.where(b.straying[effect], b.excess[effect], 0.0) for b in self.emulator.blocks]
-        frame = self.frame(theta, stray)
-        z = projected(frame, shift_of(self.emulator, effect, theta, amplitude))
-        square = float(z @ z) - noise_square(self.emulator, effect, frame, theta, amplitude)
-        return math.sqrt(max(0.0, square))
-
-    def seen(self, theta: Sequence[float], means: FloatArray) -> float:
-        """Shift [σ] of the measured means (D,) off the base model at the true parameters, freed from noise."""
-        x = self.coded(theta)
-        frame, predictor = self.frame(x), self.emulator.predictor(())
-        z = projected(frame, means - predictor.mean(x))
-        size, first = len(frame.projector), 0
-        covariance = np.zeros((size, size))
-        for factor, error in zip(frame.factors, predictor.mean_covariance(x), strict=True):
-            last = first + len(factor)
-            covariance[first:last, first:last] = np.eye(len(factor)) + factor @ error @ factor.T
-            first = last
-        return float(np.sqrt(max(0.0, z @ z - np.trace(frame.projector @ covariance))))
+    def _power(self, effect: str, one: Reached) -> float:
+        measured = next((r for r in (one, *self.reached[effect]) if r.weak is not None and r.weak.value > 0.0), None)
+        if measured is None or measured.weak is None:
+            return 1.0
+        return float(np.clip(math.log2(measured.ruler.value / measured.weak.value), *POWERS))
 
 
-def ruler(declared: Declared, runs: Runs, widest: tuple[Effect, ...]) -> Ruler:
-    """The ruler of the emulator's runs. Summaries that never vary in the base model are left out."""
-    base = [block[(runs.effect == BASE) & runs.simulated(c)][:REPLICATES] for c, block in enumerate(runs.blocks)]
-    chosen = select_summaries(declared, runs, Observed(tuple(base), tuple(np.zeros(b.shape[1]) for b in base)))
-    return Ruler(fit_emulator(chosen.declared, chosen.runs, chosen.floors), declared, widest)
-
-
-def truth_of(case: Case, ruler: Ruler) -> Truth:
-    """The truth of a case; with ``missing`` where an effect's range does not reach its strength."""
-    rng = np.random.default_rng([ROOT, case.number])
-    theta = drawn_theta(ruler.declared, rng)
+def truth_of(case: Case, strengths: Strengths) -> Truth:
+    """The truth of a case; with ``missing`` where no effect's range reaches its strength."""
+    rng = np.random.default_rng([ROOT, *case.seed])
+    theta = drawn_theta(strengths.declared, rng)
     if case.kind in ("null", "outside"):
         return Truth(case, theta)
-    coded = ruler.coded(theta)
-    names = [effect.name for effect in ruler.declared.effects]
-    if case.kind == "effect":
-        found = amplitude_for(ruler, names.index(case.label), coded, case.strength, rng)
-        if isinstance(found, str):
-            return Truth(case, theta, missing=found)
-        return Truth(case, theta, ((case.label, found),))
-    return drawn_pair(case, theta, ruler, rng)
+    wanted = 2 if case.kind == "pair" else 1
+    found: list[tuple[str, tuple[float, ...]]] = []
+    names = [case.label] if case.label else [effect.name for effect in strengths.declared.effects]
+    for k in rng.permutation(len(names)):
+        amplitude = strengths.amplitude(names[k], case.strength, rng)
+        known = [frozenset((names[k], name)) for name, _ in found]
+        if amplitude is not None and all(strengths.alike.get(pair, 0.0) <= DISTINCT for pair in known):
+            found.append((names[k], amplitude))
+        if len(found) == wanted:
+            return Truth(case, theta, tuple(found))
+    return Truth(case, theta, missing="bounds")
 
 
 def drawn_theta(declared: Declared, rng: np.random.Generator) -> tuple[float, ...]:
-    """Parameters drawn from their independent measurement, or over their range, within what is simulated."""
+    """Parameters drawn from their independent measurement, or over their range, within what is believed."""
     return tuple(
-        rng.uniform(p.low, p.high)
-        if p.mean is None or p.sd is None
-        else float(np.clip(rng.normal(p.mean, p.sd), p.low, p.high))
+        rng.uniform(p.low, p.high) if p.mean is None or p.sd is None else p.within(float(rng.normal(p.mean, p.sd)))
         for p in declared.parameters
     )
 
 
-def amplitude_for(
-    ruler: Ruler, e: int, theta: FloatArray, strength: float, rng: np.random.Generator
-) -> tuple[float, ...] | str:
-    """Amplitudes [natural units] at which effect ``e`` shifts by ``strength`` σ, in a direction drawn at random.
-
-    The first crossing along the direction, by steps of a fiftieth and then by bisection. Where no direction reaches
-    the strength, the reason: the literature's bounds, or the range that was simulated.
-    """
-    effect = ruler.declared.effects[e]
-    if e not in ruler.emulator.simulated_effects:
-        return "not simulated" if effect.unseen is None else "bounds"
-    ways = directions(effect)
-    for k in rng.permutation(len(ways)):
-        direction = ruler.within(e, np.array(ways[k]) / effect.scale)
-        shares = np.linspace(0.0, 1.0, 51)[1:]
-        reached = [s for s in shares if ruler.shift(e, theta, s * direction) >= strength]
-        if reached:
-            low, high = reached[0] - shares[0], reached[0]
-            for _ in range(30):
-                middle = 0.5 * (low + high)
-                enough = ruler.shift(e, theta, middle * direction) >= strength
-                low, high = (low, middle) if enough else (middle, high)
-            return tuple(float(x) for x in high * direction * effect.scale)
-    return "bounds" if np.allclose(effect.high, ruler.widest[e].high) else "range"
-
-
-def drawn_pair(case: Case, theta: tuple[float, ...], ruler: Ruler, rng: np.random.Generator) -> Truth:
-    """Two effects of ``case.strength`` each, whose signatures differ."""
-    coded = ruler.coded(theta)
-    frame = ruler.frame(coded)
-    found: list[tuple[str, tuple[float, ...], FloatArray]] = []
-    for e in rng.permutation(len(ruler.declared.effects)):
-        effect = ruler.declared.effects[e]
-        amplitude = amplitude_for(ruler, int(e), coded, case.strength, rng)
-        if isinstance(amplitude, str):
-            continue
-        z = projected(frame, shift_of(ruler.emulator, int(e), coded, np.array(amplitude) / effect.scale))
-        if not found or abs(cosine(found[0][2], z)) <= DISTINCT:
-            found.append((effect.name, amplitude, z))
-        if len(found) == 2:
-            return Truth(case, theta, tuple((name, a) for name, a, _ in found))
-    return Truth(case, theta, missing="bounds")
+def strengths_of(reached: Sequence[Reached], declared: Declared, cosines: Mapping[frozenset[str], float]) -> Strengths:
+    """From what the reference pours reached."""
+    names = {effect.name for effect in declared.effects}
+    by_effect: dict[str, tuple[Reached, ...]] = {}
+    for one in reached:
+        if one.kind.effect in names:
+            by_effect[one.kind.effect] = (*by_effect.get(one.kind.effect, ()), one)
+    kept = tuple(effect for effect in declared.effects if effect.name in by_effect)
+    return Strengths(by_effect, Declared(declared.parameters, kept, declared.conditions), cosines)

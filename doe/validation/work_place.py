@@ -15,10 +15,10 @@ from typing import Any
 
 from doe.measurement import Condition, readings_of_record
 from doe.runner import stored_run
-from doe.store import Store, read_off
-from doe.validation.laboratory import OBSERVABLES, Reading
+from doe.store import Store
+from doe.validation.laboratory import Sample
 from doe.validation.outside import AMPLITUDE, OUTSIDE, magnified, outside_pour
-from solver import Crew, Job, Outcome, Record, Scene, begin_worker, pour_key
+from solver import Crew, Job, Outcome, Record, Scene, begin_worker, pour_key, unpacked
 
 
 class OutOfTimeError(Exception):
@@ -44,10 +44,13 @@ class Order:
         """Its key in the store."""
         return pour_key(self.scene, self.seed, self.variant)
 
+    def seen(self, record: Record) -> Record:
+        """The pour as the laboratory sees it."""
+        return magnified(record, 1.0 + AMPLITUDE[self.outside]) if self.outside == "misread_scale" else record
+
     def reader(self, record: Record) -> dict[str, float]:
-        """What the laboratory reads off the pour as it was."""
-        seen = magnified(record, 1.0 + AMPLITUDE[self.outside]) if self.outside == "misread_scale" else record
-        return {name: float(x) for name, x in readings_of_record(self.condition, seen).items()}
+        """What the laboratory reads off a pour that it sees."""
+        return {name: float(x) for name, x in readings_of_record(self.condition, record).items()}
 
 
 class WorkPlace:
@@ -73,13 +76,17 @@ class WorkPlace:
             self._crew = self._stack.enter_context(Crew(self.workers))
         return self._crew
 
+    def pours(self, queue: deque[Job], room: Sequence[Scene]) -> Iterator[tuple[Job, Record]]:
+        """Pours of the crew."""
+        return self.crew.run_queue(queue, room)
+
     def look_at_the_clock(self, *_: Any) -> None:
         """Raise OutOfTimeError after the deadline."""
         if time.monotonic() > self.deadline:
             raise OutOfTimeError
 
-    def pour(self, orders: Sequence[Order], room: Sequence[Scene]) -> list[Reading | None]:
-        """Readings of the pours in order, None for one that broke off. ``room``: scenes that nearly all fit into."""
+    def pour(self, orders: Sequence[Order], room: Sequence[Scene]) -> list[Sample | None]:
+        """The pours in order, None for one that broke off. ``room``: scenes that nearly all fit into."""
         wanted = [order for order in {order.key: order for order in orders}.values() if not self._known(order)]
         plain = [order for order in wanted if not order.outside]
         queue = deque(Job(order.scene, order.seed, tag=k) for k, order in enumerate(plain))
@@ -91,7 +98,7 @@ class WorkPlace:
         tasks = [(order.outside, order.scene, order.seed, AMPLITUDE[order.outside]) for order in strange]
         for order, record in zip(strange, self.map(_outside, tasks), strict=True):
             self._keep(order, record)
-        return [self._reading(order) for order in orders]
+        return [self._sample(order) for order in orders]
 
     def map(self, function: Callable[[Any], Any], tasks: Sequence[Any]) -> Iterator[Any]:
         """``function`` of every task, in order, in the processes beside the crew."""
@@ -106,22 +113,27 @@ class WorkPlace:
     def _known(self, order: Order) -> bool:
         return self.store.find(order.key) is not None
 
-    def _reading(self, order: Order) -> Reading | None:
+    def _sample(self, order: Order) -> Sample | None:
         stored = self.store.find(order.key)
         assert stored is not None
         if not Outcome(stored.outcome).valid:
             return None
-        if order.outside:
-            # Off the raw pour: what is kept may have been read by somebody whose scale is right.
-            found = read_off(stored.raw, order.reader)
-        else:
-            found = self.store.read(stored, OBSERVABLES, order.reader).observables
-        return {name: math.nan if x is None else x for name, x in found.items()}
+        # Off the raw pour: what is kept may have been read by somebody whose scale is right.
+        record = order.seen(unpacked(stored.raw))
+        spheres = record.pile.spheres
+        return Sample(order.reader(record), spheres.centre, spheres.radius)
 
     def _keep(self, order: Order, record: Record) -> None:
         job = Job(order.scene, order.seed)
         stored = stored_run(
-            job, record, "blind", order.condition.name, order.outside, order.reader, order.key, order.variant
+            job,
+            record,
+            "blind",
+            order.condition.name,
+            order.outside,
+            lambda one: order.reader(order.seen(one)),
+            order.key,
+            order.variant,
         )
         self.store.add(stored)
         self.poured += 1
@@ -132,6 +144,6 @@ def _outside(task: tuple[str, Scene, int, float]) -> Record:
     return outside_pour(*task)
 
 
-def complete(readings: Iterable[Reading | None]) -> list[Reading]:
+def complete(samples: Iterable[Sample | None]) -> list[Sample]:
     """Pours that came to their end and of which everything could be read."""
-    return [one for one in readings if one is not None and all(math.isfinite(x) for x in one.values())]
+    return [one for one in samples if one is not None and all(math.isfinite(x) for x in one.reading.values())]

@@ -8,11 +8,14 @@ import typer
 
 
 def validate_diagnosis(
-    n: int = typer.Option(327, "--n", min=1, help="Data sets; 327 are three rounds of all cases."),
-    out: Path = typer.Option(Path("validation"), help="Folder for sets.csv, one row per data set."),
+    n: int = typer.Option(370, "--n", min=1, help="Data sets; 370 are a whole test."),
+    root: int = typer.Option(1, "--root", min=1, help="Root of all random numbers: another root, other data sets."),
+    out: Path = typer.Option(Path("validation"), help="Folder for sets.jsonl, two lines per data set."),
     minutes: float | None = typer.Option(
         None, min=0.0, help="Stop after so long; the same command goes on. 0: only the table of what is there."
     ),
+    shard: str = typer.Option("1/1", metavar="K/N", help="Only every N-th set; N processes may share OUT and a store."),
+    wide: bool = typer.Option(False, "--wide", help="Effects of 4 to 40 σ, for development."),
     store: Path | None = typer.Option(None, help="SQLite file that keeps every pour."),
     threads: int | None = typer.Option(None, min=1, help="Worker processes; one per core if not given."),
 ) -> None:
@@ -20,7 +23,23 @@ def validate_diagnosis(
     import math
 
     from doe.validation.campaign import CampaignOrder, run_campaign
+    from explorer.errors import CommandError
     from explorer.tables.validation import campaign_text
+    from solver.assets import shipped_reference
 
-    order = CampaignOrder(out, n, store, minutes if minutes is not None else math.inf, threads)
+    number, _, of = shard.partition("/")
+    if not (number.isdecimal() and of.isdecimal() and 1 <= int(number) <= int(of)):
+        raise CommandError(f"--shard {shard}: allowed: K/N with 1 ≤ K ≤ N, such as 1/2")
+    order = CampaignOrder(
+        out=out,
+        number=n,
+        root=root,
+        store=store,
+        minutes=minutes if minutes is not None else math.inf,
+        workers=threads,
+        shard=int(number),
+        of=int(of),
+        wide=wide,
+        reference=shipped_reference(),
+    )
     typer.echo(campaign_text(run_campaign(order, typer.echo)))

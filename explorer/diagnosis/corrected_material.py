@@ -11,16 +11,17 @@ from solver import EFFECTS, Scene, with_values
 def corrected_toml(measurement: Measurement, diagnosis: Diagnosis) -> str:
     """The final model of ``diagnosis`` in the set-up of the first fitted condition.
 
-    Parameters are those of the final fit; the first effect that the verdict names (both of a pair) stands in
-    ``[effect.<name>]``, and where it names several the heading says that it is one of them. Without a named effect it
-    is the calibrated declared model.
+    Parameters are those of its fit; the effect that the verdict names (both of a pair) stands in ``[effect.<name>]``.
+    Of an ambiguous verdict it is the most probable effect, and the heading says that it is not established. Where
+    nothing is named, or held-out data took it back, it is the calibrated declared model.
     """
-    condition = measurement.fit[0].name
-    rivals = diagnosis.verdict.names
-    one_of = f"\nNOT ESTABLISHED: this is {rivals[0]}, the first of {len(rivals)} rivals." if len(rivals) > 1 else ""
+    condition, verdict = measurement.fit[0].name, diagnosis.verdict
+    one_of = ""
+    if verdict.names and verdict.kind.startswith("ambiguous"):
+        one_of = f"\nNOT ESTABLISHED: this is {verdict.names[0]}, one of several answers."
     heading = (
-        f"{measurement.title or measurement.folder.name}: {diagnosis.verdict.kind}\n"
-        f"{diagnosis.verdict.statement}{one_of}\n"
+        f"{measurement.title or measurement.folder.name}: {verdict.kind}\n"
+        f"{verdict.statement}{one_of}\n"
         f"Set-up of condition {condition}; parameters of the final fit. SI."
     )
     return material_toml(corrected_scene(measurement, diagnosis), heading)
@@ -28,7 +29,7 @@ def corrected_toml(measurement: Measurement, diagnosis: Diagnosis) -> str:
 
 def corrected_scene(measurement: Measurement, diagnosis: Diagnosis) -> Scene:
     """The scene that :func:`corrected_toml` writes."""
-    model = diagnosis.after.model
+    model = (diagnosis.after if diagnosis.verdict.names else diagnosis.before).model
     values: dict[str, float | str] = dict(zip((p.path for p in measurement.parameters), model.theta, strict=True))
     for effect, amplitudes in model.effects:
         names = EFFECTS[effect].amplitudes

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import numpy as np
 
-from doe.diagnose.declare import declare
+from doe.diagnose.declared import Declared, declare
+from doe.diagnose.levels import REPLICATES
 from doe.diagnose.limit import RISK, RISKS, LimitStudy, confused, limit_study
+from doe.diagnose.pours import Ended, ModelPours
 from doe.diagnose.reference import ROOT, Reference, extended, find_levels, load, save
 from doe.diagnose.replay import BASE_POURS, NULLS, Replayed, Teaching, Truth, replay
-from doe.diagnose.ruler import REPLICATES, Strength
-from doe.diagnose.runs import Declared
-from doe.diagnose.simulation.pours import Ended, ModelPours
+from doe.diagnose.ruler import Strength
 from doe.measurement import Measurement, load_measurement
 from doe.measurement.features import OFFERS, feature_set
 from doe.record import plain

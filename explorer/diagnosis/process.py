@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
-from doe.diagnose.simulation.budget import Budget
+from doe.diagnose.teaching import scaled_budget
 from doe.measurement.load import load_measurement
 from explorer.background.command_process import PROGRAM, BackgroundError, CommandProcess, CommandStatus
 from explorer.background.output_folders import finished, new_folder, newest_unfinished
@@ -151,7 +151,7 @@ def _checked(question: Question) -> Question:
     folder = measurement_folder(question.data.strip()).absolute()
     if question.budget is not None:
         # Refused here, before a process is started for it.
-        Budget().scaled(question.budget, len(question.effects or EFFECTS), len(load_measurement(folder).fit))
+        scaled_budget(question.budget, load_measurement(folder), question.effects or tuple(EFFECTS))
     return replace(question, data=str(folder))
 
 

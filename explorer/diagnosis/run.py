@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from doe.diagnose.confirm import Confirmed
 from doe.diagnose.diagnosis import Diagnosis, run_diagnosis
-from doe.diagnose.follow_up.confirm import Confirmed
-from doe.diagnose.follow_up.holdout import HoldoutError
-from doe.diagnose.simulation.budget import Budget
-from doe.diagnose.simulation.profiles import measured_profile
+from doe.diagnose.holdout import HoldoutError
+from doe.diagnose.pours import measured_profile
+from doe.diagnose.teaching import Budget, scaled_budget
 from doe.measurement.load import load_measurement
 from doe.measurement.measurement import Measurement
 from doe.measurement.summaries import summaries
@@ -31,7 +31,7 @@ from explorer.files.whole_file import write_whole
 from explorer.report.diagnosis import write_diagnosis_report
 from solver import EFFECTS, Crew
 
-SCHEMA = 1
+SCHEMA = 2
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> Diagnosis:
     path = order.store or default_store()
     budget = Budget()
     if order.budget is not None:
-        budget = budget.scaled(order.budget, len(names), len(measurement.fit))
+        budget = scaled_budget(order.budget, measurement, names)
     order.out.mkdir(parents=True, exist_ok=True)
     say(
         f"{order.folder}: {len(measurement.fit)} fitted and {len(measurement.holdout)} held-out conditions; store "
@@ -94,33 +94,28 @@ def result_of(measurement: Measurement, order: DiagnoseOrder, found: Diagnosis, 
             "schema": SCHEMA,
             "verdict": verdict.kind,
             "statement": verdict.statement,
+            "names": verdict.names,
+            "probabilities": {"nothing": verdict.nothing, "outside": verdict.outside},
+            "threshold": verdict.threshold,
+            "temperature": verdict.temperature,
+            "taken_back": verdict.taken_back,
+            "final": verdict.final,
             "effects": verdict.effects,
-            "amplitudes": verdict.amplitudes,
-            "gates": verdict.gates,
+            "levels": found.levels,
+            "ranges": found.declared.effects,
             "parameters": verdict.parameters,
-            "freed": verdict.freed,
+            "residuals": verdict.residuals,
+            "where": verdict.where,
+            "similar": verdict.similar,
+            "scatter": verdict.scatter,
+            "left_out": verdict.left_out,
+            "offered": found.offered,
             "error": {
                 role: [_error(row, units) for row in rows]
                 for role, rows in (("fit", found.fit_error), ("holdout", found.holdout_error))
             },
             "held_out": found.held_out,
-            "ruled_out": verdict.ruled_out,
             "next_experiment": found.suggestions,
-            "residuals": verdict.residuals,
-            "where": verdict.where,
-            "signatures": verdict.signatures,
-            "variances": verdict.variances,
-            "limits": verdict.limits,
-            "bootstrap": verdict.bootstrap,
-            "seed": verdict.seed,
-            "t2": {
-                "before": [verdict.t2_before, verdict.df_before],
-                "after": [verdict.t2_after, verdict.df_after],
-            },
-            "dropped": verdict.dropped,
-            "floored": verdict.floored,
-            "drawn_in": verdict.drawn_in,
-            "ranges": found.declared.effects,
             "confirmation": {
                 "before": _confirmed(measurement, found.before),
                 "after": _confirmed(measurement, found.after),

@@ -16,7 +16,7 @@ from explorer.report.units_for_people import MISSING
 
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
 """Content security policy: what would load something from elsewhere is refused by the browser."""
-NUMBER = re.compile(r"^(± )?[−+<]?\d[\d.e−+]*( ?(°|%|mm|MPa|g|s|min|g/s|m/s|kg/m³))?( ± [\d.]+°?)?$")
+NUMBER = re.compile(r"^(± )?[−+<>]?\d[\d.e−+]*( ?(°|%|σ|mm|1/mm|cm²|cm³|MPa|g|s|min|g/s|m/s|kg/m³))?( ± [\d.]+°?)?$")
 
 
 LONGEST_LINE = 60
@@ -57,7 +57,7 @@ def page(title: str, subtitle: str, sections: Sequence[Section]) -> str:
 
 def escaped(text: str) -> str:
     """Text safe inside HTML; what stands between backticks becomes code, and a unit stays with its number."""
-    unbroken = re.sub(r"(?<=\d) (?=[%°]|[mMkg]?[mgs]\b|MPa\b|kg/)", "\u00a0", text)
+    unbroken = re.sub(r"(?<=\d) (?=[%°]|[mMkg]?[mgs]\b|cm[²³]|1/mm|MPa\b|kg/)", "\u00a0", text)
     return re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(unbroken, quote=True))
 
 

@@ -12,26 +12,27 @@ ANSWERS: tuple[Answer, ...] = ("nothing", "right", "undecided", "unexplained", "
 
 
 def campaign_text(rows: Sequence[Row]) -> str:
-    """All tables."""
+    """All tables, for each kind of data."""
     judged = [row for row in rows if row.answer != "out of reach"]
-    parts = [f"{len(judged)} data sets judged, {len(rows) - len(judged)} out of reach", matrix_text(judged)]
-    parts += [effects_text(rows)]
-    parts += ["\n".join(_wrong(judged)) or "no wrong name"]
-    parts += ["\n".join(_out_of_reach(rows)) or "every strength is within reach"]
-    parts += [
-        "\n".join(
-            f"{'met' if t.met else 'no set yet' if t.met is None else 'MISSED':10}  {t.name}: {t.aim}; found {t.found}"
-            for t in targets(judged)
-        )
-    ]
+    offers = sorted({row.offer for row in judged})
+    sets = {(row.root, row.number) for row in rows}
+    parts = [f"{len({(row.root, row.number) for row in judged})} of {len(sets)} data sets within reach"]
+    for offer in offers:
+        own = [row for row in judged if row.offer == offer]
+        parts += [f"with {offer}" if offer == "scalars" else f"with a {offer}", matrix_text(own), effects_text(own)]
+        parts += ["\n".join(_wrong(own)) or "no wrong name"]
+        parts += [
+            "\n".join(
+                f"{'met' if t.met else 'no set yet' if t.met is None else 'MISSED':10}  {t.name}: {t.aim}; "
+                f"found {t.found}"
+                for t in targets(own, offer)
+            )
+        ]
     return "\n\n".join(parts)
 
 
 def matrix_text(rows: Sequence[Row]) -> str:
-    """Truth by answer: number of sets; and the root mean square of the shift that was seen [σ].
-
-    A strength is set by the emulator, whose own error makes what is poured weaker than what was asked for.
-    """
+    """Truth by answer: number of sets."""
     groups = sorted(
         {group_of(row) for row in rows}, key=lambda name: (name[:2] != "no", name[:3] == "out", len(name), name)
     )
@@ -39,21 +40,19 @@ def matrix_text(rows: Sequence[Row]) -> str:
     body = []
     for group in groups:
         own = [row for row in rows if group_of(row) == group]
-        seen = math.sqrt(sum(row.shift**2 for row in own) / len(own))
-        body.append([group, str(len(own)), f"{seen:.1f}", *(str(counted[group, answer]) for answer in ANSWERS)])
-    return text_table(["truth", "sets", "seen σ", *ANSWERS], body)
+        body.append([group, str(len(own)), *(str(counted[group, answer]) for answer in ANSWERS)])
+    return text_table(["truth", "sets", *ANSWERS], body)
 
 
 def effects_text(rows: Sequence[Row]) -> str:
-    """Right names of the sets of each library effect, by strength; "-" where the strength is out of reach."""
+    """Right names of the sets of each library effect, by strength; "-" where there is none."""
     strengths = sorted({row.strength for row in rows if row.kind == "effect"})
     body = []
     for label in sorted({row.label for row in rows if row.kind == "effect"}):
         cells = []
         for strength in strengths:
             own = [r for r in rows if r.kind == "effect" and (r.label, r.strength) == (label, strength)]
-            sets = [row for row in own if row.answer != "out of reach"]
-            cells.append(f"{sum(row.answer == 'right' for row in sets)} of {len(sets)}" if sets else "-")
+            cells.append(f"{sum(row.answer == 'right' for row in own)} of {len(own)}" if own else "-")
         body.append([label, *cells])
     if not body:
         return "no set with a library effect"
@@ -71,12 +70,6 @@ def group_of(row: Row) -> str:
 
 def _wrong(rows: Sequence[Row]) -> Iterator[str]:
     for row in rows:
-        if row.answer == "wrong":
-            strength = "" if math.isnan(row.strength) else f" at {row.strength:g} σ"
-            yield f"wrong, set {row.number}: {row.label}{strength} → {row.verdict} (cosine {row.cosine:.2f})"
-
-
-def _out_of_reach(rows: Sequence[Row]) -> Iterator[str]:
-    counted = Counter((row.verdict, row.label, row.strength) for row in rows if row.answer == "out of reach")
-    for (verdict, label, strength), sets in sorted(counted.items()):
-        yield f"{verdict}, not counted: {label} at {strength:g} σ, {sets} sets"
+        if row.answer == "wrong" or (row.kind in ("null", "outside") and row.named):
+            strength = "" if math.isnan(row.strength) else f" at {row.strength:.3g} σ"
+            yield f"wrong, set {row.root}.{row.number}: {row.label}{strength} → {row.verdict}"

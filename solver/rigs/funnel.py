@@ -39,6 +39,7 @@ class Funnel(PourRig):
     name = "funnel"
     surface_names = ("plate", "cone", "gate")
     observables = PILE + DISCHARGE
+    quarter_turns = True
     protocols = ("pour_through", "fill_then_open")
     refills = True
 

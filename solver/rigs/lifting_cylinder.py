@@ -40,6 +40,7 @@ class LiftingCylinder(PourRig):
     name = "lifting_cylinder"
     surface_names = ("plate", "cylinder")
     observables = PILE + DISCHARGE
+    quarter_turns = True
 
     @property
     def suits(self) -> Mapping[str, float | str]:

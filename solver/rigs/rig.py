@@ -200,6 +200,11 @@ class PourRig(Rig, Protocol):
         return "angle_of_repose_deg" in self.observables
 
     @property
+    def quarter_turns(self) -> bool:
+        """Whether a quarter turn about the z axis leaves the rig, its feed and its domain as they are."""
+        return False
+
+    @property
     def keeps_material(self) -> bool:
         """Whether what stays in the container at rest belongs to the result. Otherwise it is a jam."""
         return False

@@ -2,30 +2,34 @@
 
     y_c = middle_c + u (J_c θ + Σ_k a_k s_kc + e),   e ~ N(0, 1) per pour, u the size of one pour's noise
 
-with coded parameters θ and amplitudes a. No pour is made: "simulated" runs and "fresh pours" are drawn from the same
-formula. ``rolling_resistance`` and ``twisting`` have almost the same signature; ``air_drag`` hardly any;
-``kinetic_friction`` is declared and not simulated.
+with parameters θ in deviations of their measurements and amplitudes a in multiples of the reference ones. No pour is
+made: the pours that teach, the data and the fresh pours are drawn from the same formula. ``rolling_resistance`` and
+``twisting`` have almost the same signature, ``air_drag`` hardly any. Only the first condition has a scan.
 """
 
 import json
-from dataclasses import replace
+import math
 from pathlib import Path
 
 import numpy as np
 
-from doe.diagnose.decision.decide import diagnose
-from doe.diagnose.declare import declare, observe
-from doe.diagnose.diagnosis import Diagnosis, errors_of, models
-from doe.diagnose.follow_up.confirm import Confirmed
-from doe.diagnose.follow_up.menu import Suggestion
-from doe.diagnose.follow_up.next_experiment import MenuItem, Prediction, rank_experiments
-from doe.diagnose.runs import BASE, Runs
+from doe.diagnose.compared import Measured, weighed
+from doe.diagnose.declared import declare
+from doe.diagnose.diagnosis import Diagnosis, Offered, concluded, errors_of
+from doe.diagnose.emulator import Lessons, Way
+from doe.diagnose.levels import Level
+from doe.diagnose.menu import Suggestion
+from doe.diagnose.next_experiment import MenuItem, Prediction, rank_experiments
+from doe.diagnose.points import directions_of, moved
+from doe.diagnose.pours import Pour
+from doe.diagnose.verdict import verdict_of
+from doe.measurement.features import SCALARS, SCAN
 from doe.measurement.measurement import Condition, MeasuredParameter, Measurement, Observation
 from explorer.diagnosis.run import DiagnoseOrder, result_of
 from solver import EFFECTS, load_material, with_values
 
 HOSTILE = "<script>alert('x')</script> & | `co` \"q\" 日本"
-UNITS = {
+SUMMARIES = {
     "angle_of_repose_deg": ("deg", 25.0, 1.2),
     "apex_height_m": ("m", 0.031, 1.5e-3),
     "centre_height_m": ("m", 0.027, 1.2e-3),
@@ -36,59 +40,73 @@ UNITS = {
     "discharge_t90_s": ("s", 1.51, 0.05),
 }
 """Summary → unit, middle, noise of one pour (SI)."""
-MIDDLE, SIZE = (np.array([row[k] for row in UNITS.values()]) for k in (1, 2))
-D, REPLICATES, FRESH = len(UNITS), 6, 16
+SEEN_AS = "@3 x 0.5 mm"
+SURFACE = {
+    "ring_height_3_m": (0.014, 6e-4),
+    "ring_volume_m3": (5.1e-5, 1e-6),
+    "covered_area_m2": (0.0128, 4e-4),
+    "height_q90_m": (0.021, 8e-4),
+    "height_share_4": (0.13, 0.02),
+    "ring_roughness_2_m": (0.0021, 2e-4),
+    "slope": (0.52, 0.04),
+    "curvature_per_m": (210.0, 15.0),
+    "skew_x_m": (0.0, 9e-4),
+    "inner_skew_y_m": (0.0, 0.0),
+}
+"""What a scan adds: middle, noise of one pour (SI). The last never varies."""
+FEATURES = {name: row[1:] for name, row in SUMMARIES.items()} | {f"{k}{SEEN_AS}": row for k, row in SURFACE.items()}
+MIDDLE, SIZE = (np.array([row[k] for row in FEATURES.values()]) for k in (0, 1))
+D, WIDTH = len(SUMMARIES), len(FEATURES)
+REPLICATES, BASE, TAUGHT = 6, 48, 12
 RADIUS = (np.arange(18) + 0.5) * 5e-3
 PARAMETERS = (
     MeasuredParameter("pair.grain.grain.static_friction", 0.47, 0.72, 0.57, 0.05),
     MeasuredParameter("pair.grain.steel.static_friction", 0.4, 1.0, None, None),
 )
-NAMES = (
-    "rolling_resistance",
-    "twisting",
-    "adhesion_sjkr",
-    "plate_tilt",
-    "air_drag",
-    "density_error",
-    "kinetic_friction",
-)
+NAMES = ("rolling_resistance", "twisting", "adhesion_sjkr", "plate_tilt", "air_drag", "density_error")
+SHARE = dict.fromkeys(NAMES, 0.4) | {"air_drag": 1.0}
+"""Of the range, at which an effect was poured."""
+SIGMAS = 14.0
+"""Of six pours in both fitted conditions, by which an effect shifts there."""
+FAINT = 0.1
+"""Share of that by air drag."""
 BENCH = load_material(str(Path(__file__).parents[2] / "assets/measurements/trefoil_1/material.toml"))
 RIGS = {"fit": {}, "fit fast": {"insertion.rate": 0.05}, "holdout": {"rig.outlet_height": 0.09}}
 
 
-def unit(vector):
-    return vector / np.linalg.norm(vector)
+def unit(array):
+    return array / np.linalg.norm(array)
 
 
 class World:
-    """jacobian (2, 3, D): per parameter and condition. signatures: effect → (amplitudes, 3, D) at its end."""
+    """jacobian (2, 3, WIDTH): per parameter and condition. signatures: effect → (amplitudes, 3, WIDTH)."""
 
     def __init__(self, seed=5):
-        draw = np.random.default_rng(seed)
-        self.jacobian = np.array([3.0 * unit(draw.standard_normal((3, D))) for _ in PARAMETERS])
-        self.signatures = {name: self._signature(draw, len(EFFECTS[name].amplitudes)) for name in NAMES}
-        alike = self.signatures["rolling_resistance"] + 0.05 * self._signature(draw, 1)
-        self.signatures["twisting"] = alike
-        self.signatures["air_drag"] *= 0.04
-        self.outside = 7.0 * unit(draw.standard_normal((3, D)))
+        self._draw = np.random.default_rng(seed)
+        self.jacobian = np.array([self._shift(1.5) for _ in PARAMETERS])
+        size = SIGMAS / math.sqrt(REPLICATES)
+        self.signatures = {name: np.array([self._shift(size) for _ in EFFECTS[name].amplitudes]) for name in NAMES}
+        self.signatures["twisting"] = self.signatures["rolling_resistance"] + np.array([self._shift(0.03 * size)])
+        self.signatures["air_drag"] *= FAINT
+        self.outside = self._shift(size)
 
-    @staticmethod
-    def _signature(draw, amplitudes):
-        # 9 pour sigmas are 22 standard errors of six pours, over all three conditions.
-        return np.array([9.0 * unit(draw.standard_normal((3, D))) for _ in range(amplitudes)])
+    def _shift(self, size):
+        """So long in the features that the fitted conditions offer, and as long in the held-out one."""
+        drawn = self._draw.standard_normal((3, WIDTH))
+        offered = np.concatenate([drawn[0], drawn[1, :D]])
+        drawn[:2] *= size / np.linalg.norm(offered)
+        drawn[2] *= size / np.linalg.norm(drawn[2, :D])
+        return drawn
 
-    def shift(self, condition, theta, effects, declared):
-        """In sigma of a pour; theta and amplitudes in natural units."""
-        coded = [p.coded(value) for p, value in zip(declared.parameters, theta, strict=True)]
-        total = np.tensordot(coded, self.jacobian[:, condition], 1)
-        for name, amplitudes in effects:
-            (effect,) = (one for one in declared.effects if one.name == name)
-            total = total + np.tensordot(np.array(amplitudes) / effect.scale, self.signatures[name][:, condition], 1)
+    def shift(self, condition, theta, acting):
+        """In sigma of a pour. acting: effect → multiples of its reference amplitudes."""
+        total = np.tensordot(theta, self.jacobian[:, condition], 1)
+        for name, multiples in acting.items():
+            total = total + np.tensordot(np.array(multiples), self.signatures[name][:, condition], 1)
         return total
 
     def pours(self, draw, condition, number, shift):
-        noise = draw.standard_normal((number, D))
-        return MIDDLE + SIZE * (condition * 0.5 + shift + noise)
+        return MIDDLE + SIZE * (0.5 * condition + shift + draw.standard_normal((number, WIDTH)))
 
 
 def scenes():
@@ -96,8 +114,10 @@ def scenes():
 
 
 def measured_condition(name, role, scene, block):
+    """Summaries, and height profiles for the picture of the pile."""
     observations = [
-        Observation(summary, unit_, None, block[:, k], None) for k, (summary, (unit_, *_)) in enumerate(UNITS.items())
+        Observation(summary, unit_, None, block[:, k], None)
+        for k, (summary, (unit_, *_)) in enumerate(SUMMARIES.items())
     ]
     observations.append(Observation("height_profile_m", "m", RADIUS, profiles(block), None, "piles"))
     return Condition(name, role, scene, len(block), tuple(observations))
@@ -108,75 +128,111 @@ def profiles(block):
     return block[:, [1]] * np.maximum(0.0, 1.0 - RADIUS / block[:, [4]])
 
 
-def simulated(world, declared, draw):
-    """Runs of the two fitted conditions: base, and each effect but the last over its range."""
-    effect = np.concatenate([np.full(90, BASE), np.repeat(np.arange(len(NAMES) - 1), 120)])
-    low, high = (np.array([getattr(p, end) for p in declared.parameters]) for end in ("low", "high"))
-    theta = draw.uniform(low, high, (len(effect), len(low)))
-    amplitude = np.zeros((len(effect), 2))
-    blocks = [np.empty((len(effect), D)) for _ in range(2)]
-    for k, e in enumerate(effect):
-        acting = []
-        if e != BASE:
-            chosen = declared.effects[e]
-            ends = np.where(draw.random(chosen.amplitudes) < 0.5, chosen.low, chosen.high)
-            amplitude[k, : chosen.amplitudes] = ends * draw.choice([0.5, 1.0])
-            acting = [(chosen.name, amplitude[k, : chosen.amplitudes])]
-        for c, block in enumerate(blocks):
-            block[k] = world.pours(draw, c, 1, world.shift(c, theta[k], acting, declared))[0]
-    return Runs(theta, effect, amplitude, tuple(blocks))
+def levels_of(declared):
+    """Every direction of every effect, with the share of its range at which it was poured."""
+    return tuple(
+        Level(direction, SHARE[effect.name], SIGMAS * (FAINT if effect.name == "air_drag" else 1.0))
+        for effect in declared.effects
+        for direction in directions_of(effect)
+    )
 
 
-def diagnosed(effects=(), outside=0.0, theta=(0.57, 0.7), holdout=True, carries_over=True, title="Made up", seed=0):
-    """Measurement and diagnosis. effects: what is in the data, as shares of each range; outside: a shift in no list.
+def lessons_of(world, declared, levels, draw):
+    """Pours of the base model, and of each way at its reference amplitude and at half of it."""
+    theta, ways, multiples, rows = [], [], [], []
+    jobs = [(-1, 0.0, BASE)] + [(w, a, TAUGHT) for w in range(len(levels)) for a in (1.0, 0.5)]
+    for way, multiple, number in jobs:
+        for k in range(number):
+            at = declared.theta(moved(declared, k))
+            acting = {} if way < 0 else {levels[way].direction.effect: along(levels[way].direction, multiple)}
+            theta.append(at)
+            ways.append(way)
+            multiples.append(multiple)
+            rows.append([world.pours(draw, c, 1, world.shift(c, at, acting))[0] for c in range(2)])
+    blocks = tuple(np.array([row[c] for row in rows]) for c in range(2))
+    return Lessons(np.array(theta), np.array(ways), np.array(multiples), np.ones(len(rows), dtype=bool), blocks)
 
-    carries_over: False turns the effect round in the held-out condition.
+
+class FormulaPours:
+    """Stands for ``ModelPours``: fresh pours of the formula, the first of every model broken off."""
+
+    def __init__(self, world, declared, ways, conditions, draw):
+        self._world, self._declared, self._conditions, self._draw = world, declared, conditions, draw
+        self._references = {way.effect: max(map(abs, way.unit)) for way in ways}
+
+    def run(self, what, points, where=None):
+        return [[self._pour(point, c) for c in range(len(self._conditions))] for point in points]
+
+    def _pour(self, point, condition):
+        acting = {name: tuple(a / self._references[name] for a in values) for name, values in point.effects}
+        shift = self._world.shift(condition, self._declared.theta(point.theta), acting)
+        pour = self._world.pours(self._draw, condition, 1, shift)[:, :D]
+        outcome = "measured" if point.number or condition else "jammed"
+        return Pour(tuple(pour[0]), outcome, tuple(profiles(pour)[0]))
+
+
+def along(direction, multiple):
+    """Multiples of the reference amplitudes in a direction: with their signs, zero for the other axis."""
+    return tuple(multiple * float(np.sign(one)) for one in direction.full)
+
+
+def diagnosed(
+    effects=(), outside=0.0, elsewhere=0.0, theta=(0.0, 0.0), holdout=True, carries_over=True, title="Made up", seed=0
+):
+    """Measurement and diagnosis.
+
+    effects: what is in the data, with multiples of the reference amplitudes; outside, elsewhere: so much of a shift in
+    no list, in the fitted conditions and in the held-out one;
+    theta: deviations of the parameters; carries_over: False turns the effect round in the held-out condition.
     """
     draw, world = np.random.default_rng(seed), World()
     roles = ("fit", "fit", "holdout")[: 3 if holdout else 2]
-    empty = [
-        measured_condition(name, role, scene, MIDDLE[None])
-        for name, role, scene in zip(RIGS, roles, scenes(), strict=False)
-    ]
-    measurement = Measurement(Path("data/made up"), title, BENCH, PARAMETERS, tuple(empty), ("photographs: not read",))
+    blocks = []
+    for c, role in enumerate(roles):
+        sign = 1.0 if carries_over or role == "fit" else -1.0
+        acting = {name: tuple(sign * a for a in multiples) for name, multiples in effects}
+        strange = (outside if role == "fit" else elsewhere) * world.outside[c]
+        blocks.append(world.pours(draw, c, REPLICATES, world.shift(c, theta, acting) + strange))
+    conditions = tuple(
+        measured_condition(name, role, scene, block)
+        for name, role, scene, block in zip(RIGS, roles, scenes(), blocks, strict=False)
+    )
+    ignored, notes = ("photographs: not read",), ("mass: clipped",)
+    measurement = Measurement(Path("data/made up"), title, BENCH, PARAMETERS, conditions, ignored, notes)
     declared = declare(measurement, NAMES)
-    truth = [
-        (name, tuple(share * s for s in one.scale))
-        for one in declared.effects
-        for name, share in effects
-        if one.name == name
+    levels = levels_of(declared)
+    ways = [
+        Way(one.direction.effect, one.direction.name, one.direction.at(one.share), 1.0 / one.share, one.direction.angle)
+        for one in levels
     ]
-    conditions = []
-    for c, condition in enumerate(empty):
-        sign = 1.0 if carries_over or condition.role == "fit" else -1.0
-        acting = [(name, tuple(sign * a for a in amplitudes)) for name, amplitudes in truth]
-        shift = world.shift(c, theta, acting, declared) + outside * world.outside[c]
-        block = world.pours(draw, c, REPLICATES, shift)
-        conditions.append(measured_condition(condition.name, condition.role, condition.scene, block))
-    measurement = replace(measurement, conditions=tuple(conditions))
-    verdict = diagnose(declared, simulated(world, declared, draw), observe(measurement.fit), bootstrap=500)
-
-    def confirmed(model):
-        blocks = [
-            world.pours(draw, c, FRESH, world.shift(c, model.theta, model.effects, declared))
-            for c in range(len(conditions))
-        ]
-        return Confirmed(model, tuple(blocks), 1, tuple(map(profiles, blocks)))
-
-    before, after = models(verdict)
-    one = confirmed(before)
-    other = one if after == before else confirmed(after)
+    stated = np.zeros(WIDTH)
+    stated[0] = 0.2
+    offers = [
+        Measured("fit", SCAN, tuple(FEATURES), blocks[0], stated),
+        Measured("fit fast", SCALARS, tuple(SUMMARIES), blocks[1][:, :D], stated[:D]),
+    ]
+    lessons = lessons_of(world, declared, levels, draw)
+    compared = weighed(lessons, ways, offers)
+    taught = [int((lessons.way == w).sum()) for w in range(len(ways))]
+    verdict = verdict_of(compared, declared, levels, taught)
+    fresh = FormulaPours(world, declared, ways, conditions, draw)
+    found, verdict = concluded(verdict, compared, declared, conditions, fresh, lambda line: None)
     return measurement, Diagnosis(
-        declared,
-        verdict,
-        one,
-        other,
-        errors_of(measurement, "fit", one, other),
-        errors_of(measurement, "holdout", one, other),
-        (),
-        suggestions(verdict),
-        321,
-        240,
+        declared=declared,
+        levels=levels,
+        offered=tuple(
+            Offered(name, offer, len(names), more)
+            for name, offer, names, more in zip(RIGS, (SCAN, SCALARS), compared.names, (0, 37), strict=False)
+        ),
+        verdict=verdict,
+        before=found.before,
+        after=found.after,
+        fit_error=errors_of(conditions, "fit", found),
+        holdout_error=errors_of(conditions, "holdout", found),
+        held_out=found.held_out,
+        suggestions=suggestions(verdict),
+        pours=321,
+        settings=240,
     )
 
 
@@ -184,7 +240,7 @@ def suggestions(verdict):
     """A menu of two: one set-up where the rivals differ by two sigma, and one where they do not."""
     if not verdict.kind.startswith("ambiguous"):
         return ()
-    rivals = {name: k for k, name in enumerate(verdict.names)}
+    rivals = {name: k for k, name in enumerate((*verdict.names, "base")[:2])}
     pour = np.eye(3)
     menu = [
         MenuItem(
@@ -195,30 +251,37 @@ def suggestions(verdict):
         for name, gap in (("as it is, poured again", 0.0), ("half the mass", 2.0))
     ]
     ranked = rank_experiments(menu, dict.fromkeys(rivals, 1.0), 6)
-    return tuple(Suggestion(one, tuple(f"{name}: {EFFECTS[name].lever}" for name in rivals)) for one in ranked)
+    levers = tuple(f"{name}: {EFFECTS[name].lever}" for name in verdict.names if name in EFFECTS)
+    return tuple(Suggestion(one, levers) for one in ranked)
 
 
 CASES = {
     "nothing": {},
-    "effect": {"effects": (("adhesion_sjkr", 0.6),)},
-    "two amplitudes": {"effects": (("plate_tilt", 0.5),), "seed": 3},
-    "not carried over": {"effects": (("adhesion_sjkr", 0.6),), "carries_over": False},
-    "no holdout": {"effects": (("adhesion_sjkr", 0.6),), "holdout": False},
-    "pair": {"effects": (("adhesion_sjkr", 0.6), ("density_error", 0.6))},
-    "ambiguous": {"effects": (("rolling_resistance", 0.6),)},
-    "unexplained": {"outside": 1.0},
-    "at the edge": {"theta": (0.57, 1.25)},
-    "hostile": {"effects": (("adhesion_sjkr", 0.6),), "title": HOSTILE},
+    "effect": {"effects": (("adhesion_sjkr", (0.6,)),)},
+    "two amplitudes": {"effects": (("plate_tilt", (0.5, 0.4)),)},
+    "not carried over": {"effects": (("adhesion_sjkr", (0.6,)),), "carries_over": False},
+    "no holdout": {"effects": (("adhesion_sjkr", (0.6,)),), "holdout": False},
+    "pair": {"effects": (("adhesion_sjkr", (0.8,)), ("density_error", (0.8,)))},
+    "ambiguous": {"effects": (("rolling_resistance", (0.6,)),)},
+    "faint": {"effects": (("adhesion_sjkr", (0.3,)),), "seed": 2},
+    "unexplained": {"outside": 0.8, "elsewhere": 0.8},
+    "wrong elsewhere": {"elsewhere": 1.5},
+    "does not fit": {"effects": (("adhesion_sjkr", (1.0,)), ("density_error", (1.0,)))},
+    "at the edge": {"theta": (0.0, 1.8)},
+    "hostile": {"effects": (("adhesion_sjkr", (0.6,)),), "title": HOSTILE},
 }
 EXPECTED = {
     "nothing": "no_missing_effect",
     "effect": "effect:adhesion_sjkr",
     "two amplitudes": "effect:plate_tilt",
-    "not carried over": "effect:adhesion_sjkr",
+    "not carried over": "unexplained",
     "no holdout": "effect:adhesion_sjkr",
     "pair": "effects:adhesion_sjkr+density_error",
     "ambiguous": "ambiguous:rolling_resistance,twisting",
+    "faint": "ambiguous:adhesion_sjkr,no_missing_effect,unexplained",
     "unexplained": "unexplained",
+    "wrong elsewhere": "unexplained",
+    "does not fit": "unexplained",
     "at the edge": "no_missing_effect",
     "hostile": "effect:adhesion_sjkr",
 }

@@ -1,5 +1,6 @@
 """``explorer validate-diagnosis``: the table of the sets that are there, and where its code lives."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -13,15 +14,26 @@ ROOT = Path(__file__).parents[2]
 
 
 def test_sets_that_are_there_are_only_counted(tmp_path):
-    header = "number,kind,label,strength,amplitude,shift,verdict,p_detect,cosine,before,after,pours,seconds"
-    rows = [f"{k},null,none,,,0.5,no_missing_effect,0.4,,,,12,3.5" for k in range(2)]
-    (tmp_path / "sets.csv").write_text("\n".join([header, *rows]) + "\n")
-    result = explorer(
-        "validate-diagnosis", "--n", "2", "--out", str(tmp_path), "--store", str(tmp_path / "none.sqlite")
-    )
+    # Of root 1 the first two sets; what they are does not matter to the count.
+    row = {
+        "root": 1, "kind": "null", "label": "none", "strength": None, "amplitude": "", "verdict": "no_missing_effect",
+        "nothing": 0.9, "outside": 0.02, "best": "air_drag", "best_p": 0.03, "truth_p": None, "evidence": {"base": 0.0},
+        "fits": {"base": 0.4}, "held_out_p": 0.5, "before": None, "after": None, "pours": 12, "seconds": 3.5,
+    }  # fmt: skip
+    lines = [json.dumps(row | {"number": k, "offer": offer}) for k in range(2) for offer in ("scalars", "scan")]
+    (tmp_path / "sets.jsonl").write_text("\n".join(lines) + "\n")
+    arguments = ("--n", "2", "--out", str(tmp_path), "--store", str(tmp_path / "none.sqlite"))
+    result = explorer("validate-diagnosis", *arguments)
     assert result.exit_code == 0
-    assert "an effect blamed where none is: ≤ 2 %; found 0/2 = 0.0 %" in result.stdout
+    assert "effect named where none is: ≤ 0.667 %; found 0/2 = 0.0 %" in result.stdout
     assert not Path(tmp_path / "none.sqlite").exists()
+
+
+def test_a_shard_that_there_is_not_is_refused(tmp_path):
+    for shard in ("3/2", "0/2", "one"):
+        result = explorer("validate-diagnosis", "--n", "2", "--out", str(tmp_path), "--shard", shard)
+        assert result.exit_code != 0
+        assert "allowed: K/N" in result.output
 
 
 def test_an_installed_program_can_run_it(tmp_path):
@@ -34,7 +46,7 @@ def test_an_installed_program_can_run_it(tmp_path):
     environment = {**os.environ, "PYTHONPATH": str(tmp_path)}
     result = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert (result.returncode, result.stderr) == (0, "")
-    assert "0 data sets judged" in result.stdout
+    assert "0 of 0 data sets within reach" in result.stdout
     program = "from doe.validation import laboratory; laboratory.declared_model(); print(laboratory.__file__)"
     result = subprocess.run(
         [sys.executable, "-c", program], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True

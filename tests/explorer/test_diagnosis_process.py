@@ -110,7 +110,10 @@ def test_data_that_are_not_there_are_refused_before_a_start(tmp_path):
     ("question", "trouble"),
     [
         (Question("trefoil_1", ("drag",)), "effects: 'drag' is not one of rolling_resistance"),
-        (Question("trefoil_1", budget=20), "budget: 20 pours; 15 effects in 1 fitted conditions take at least 109"),
+        (
+            Question("trefoil_1", budget=20),
+            "budget: 20 pours; 23 directions of effects in 1 fitted conditions take at least 58",
+        ),
     ],
 )
 def test_a_question_that_cannot_be_asked_is_refused(tmp_path, question, trouble):
@@ -223,9 +226,9 @@ def test_the_panel_asks_and_shows(server, tmp_path):
     panel.show("")
     assert panel._answer.content.startswith(r"**effect:adhesion\_sjkr**")
     assert "/home/me/out/report.html" in panel._view._text.content
-    assert "Signatures of the effects" in panel._plots._choice.options
+    assert "Residuals before and after" in panel._plots._choice.options
     shown = json.loads(panel._plots._chart._plotly_json_str)
-    assert shown["layout"]["xaxis"]["title"]["text"] == "measured − model [σ]"
+    assert shown["layout"]["xaxis"]["title"]["text"] == "probability [%]"
 
 
 def test_an_uploaded_data_set_can_be_diagnosed(server, tmp_path):
@@ -264,17 +267,34 @@ def test_effects_budget_and_queue_are_asked_for_on_the_page(server, tmp_path):
 def test_a_file_that_is_no_diagnosis_is_one_line(server, tmp_path):
     process, actions = FakeDiagnosis(), Actions()
     panel = DiagnosisPanel(server, process, shipped_measurements(), tmp_path / "uploads", actions.post)
-    (tmp_path / "diagnosis.json").write_text('{"verdict": "<script>"}')
+    (tmp_path / "diagnosis.json").write_text('{"schema": 2, "verdict": "<script>"}')
     process.out = tmp_path
     panel.show("")
     assert "cannot be shown" in panel._answer.content
+    assert "<script>" not in panel._answer.content
     assert panel._plots._choice.options == (NOTHING,)
 
 
-def test_the_answer_holds_errors_before_after_and_by_noise_alone():
+def test_a_diagnosis_of_an_older_version_is_one_line(server, tmp_path):
+    process, actions = FakeDiagnosis(), Actions()
+    panel = DiagnosisPanel(server, process, shipped_measurements(), tmp_path / "uploads", actions.post)
+    (tmp_path / "diagnosis.json").write_text('{"schema": 1, "verdict": "no_missing_effect", "gates": []}')
+    process.out = tmp_path
+    panel.show("")
+    assert "made by an older version of the program" in panel._answer.content
+    assert "\n" not in panel._answer.content
+    assert panel._plots._choice.options == (NOTHING,)
+
+
+def test_the_answer_holds_probabilities_and_errors_before_after_and_by_noise_alone():
     for case, role in (("effect", "holdout"), ("no holdout", "fit")):
         result = result_of_case(case)
-        rows = [line.split(" | ") for line in answer_markdown(result).splitlines() if line.startswith("| ")]
+        odds, _, errors = answer_markdown(result).partition("| Error on")
+        shown = [line.strip("| ").split(" | ") for line in odds.splitlines() if line.startswith("| ")]
+        assert shown[0] == ["Answer", "Probability"]
+        assert shown[1] == [r"adhesion\_sjkr", r"\>99.9 %"]
+        assert 4 <= len(shown) <= 6
+        rows = [line.split(" | ") for line in f"| Error on{errors}".splitlines() if line.startswith("| ")]
         assert rows[0] == [
             f"| Error on {'held-out' if role == 'holdout' else 'fitted'} data",
             "Before",

@@ -54,6 +54,14 @@ def test_names_and_titles_may_hold_anything(tmp_path):
     assert read_back(text, tmp_path) == scene
 
 
+def test_a_corrected_model_that_is_not_established_says_so():
+    texts = {case: corrected_toml(*diagnosed(**CASES[case])) for case in ("effect", "ambiguous", "not carried over")}
+    assert "NOT ESTABLISHED: this is twisting, one of several answers." in texts["ambiguous"]
+    assert "[effect.twisting]" in texts["ambiguous"]
+    assert "NOT ESTABLISHED" not in texts["effect"]
+    assert "[effect." not in texts["not carried over"]
+
+
 @pytest.mark.parametrize("case", ["effect", "two amplitudes", "pair", "nothing", "unexplained"])
 def test_the_corrected_model_is_what_the_diagnosis_confirmed(case, tmp_path):
     measurement, found = diagnosed(**CASES[case])

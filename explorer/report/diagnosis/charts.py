@@ -1,15 +1,15 @@
-"""Charts of a diagnosis: errors over the noise floor, residuals with bands, patterns, the pile."""
+"""Charts of a diagnosis: probabilities, errors over the noise floor, residuals with bands, the pile."""
 
 from __future__ import annotations
 
+from scipy import stats
+
 from explorer.report.content import Spec
-from explorer.report.diagnosis.findings import residual_label, summary_label
+from explorer.report.diagnosis.findings import NOTHING, OUTSIDE, feature_label, probabilities, spelled
 from explorer.report.figures.style import (
     ASSUMPTION,
-    BELOW_TO_ABOVE,
     DUMMY,
     FACTOR,
-    INK,
     TARGET,
     Json,
     axis,
@@ -20,19 +20,50 @@ from explorer.report.figures.style import (
     vertical_line,
 )
 from explorer.report.findings import Plain
-from explorer.report.units_for_people import fixed, parameter_label
 
 BEFORE, AFTER, MEASURED = ASSUMPTION, FACTOR, TARGET
 ROW_HEIGHT = 30
 """Height of one row with two bars [px]."""
 BAND = {TARGET: "rgba(77, 173, 112, 0.18)", FACTOR: "rgba(76, 93, 209, 0.18)", ASSUMPTION: "rgba(212, 126, 44, 0.18)"}
 MM = 1e3
+FEWEST, LEAST = 3, 0.005
+"""Answers that are drawn or listed: so many at least, and all of this probability."""
+MOST_RESIDUALS = 40
+"""Features that are drawn; the table holds all."""
+
+
+def likely(result: Plain) -> list[tuple[str, float]]:
+    """The answers that are worth a row, the most probable first."""
+    found = probabilities(result)
+    return [one for k, one in enumerate(found) if k < FEWEST or one[1] >= LEAST]
+
+
+def probability_chart(result: Plain) -> Spec:
+    """Probability of every answer that is worth a row, with the threshold for a name."""
+    rows = likely(result)[::-1]
+    colours = {NOTHING: TARGET, OUTSIDE: DUMMY}
+    trace: Json = {
+        "type": "bar",
+        "orientation": "h",
+        "x": [100.0 * p for _, p in rows],
+        "y": [label(spelled(answer).replace("`", "")) for answer, _ in rows],
+        "marker": {"color": [colours.get(answer, FACTOR) for answer, _ in rows]},
+        "hovertemplate": "%{y}<br>%{x:.2f} %<extra></extra>",
+    }
+    layout: Json = {
+        "xaxis": axis("probability [%]", range=[0, 100]),
+        "yaxis": axis("", tickfont={"size": 12}),
+        "bargap": 0.35,
+        "showlegend": False,
+        "shapes": [vertical_line(100.0 * result["threshold"], DUMMY, dash="dash")],
+    }
+    return chart([trace], layout, 110 + ROW_HEIGHT * len(rows))
 
 
 def error_chart(result: Plain, role: str) -> Spec:
     """Errors before and after divided by the noise floor, one row per observable."""
     rows = [row for row in result["error"][role] if row["noise_floor"]][::-1]
-    names = [label(summary_label(row["observable"])) for row in rows]
+    names = [label(feature_label(row["observable"])) for row in rows]
     traces = [
         points([row[key] / row["noise_floor"] for row in rows], names, words, colour, marker={"size": 10})
         for key, words, colour in (("before", "before", BEFORE), ("after", "after", AFTER))
@@ -45,10 +76,18 @@ def error_chart(result: Plain, role: str) -> Spec:
     return chart(traces, layout, 120 + ROW_HEIGHT * len(rows))
 
 
-def residual_chart(result: Plain, one: float, every: float) -> Spec:
-    """Residuals before and after [σ] with the bands ± ``one`` and ± ``every``."""
-    rows = result["residuals"][::-1]
-    names = [label(residual_label(row["label"])) for row in rows]
+def drawn_residuals(result: Plain) -> list[Plain]:
+    """Rows of the features farthest off, before or after, in their own order."""
+    rows = result["residuals"]
+    sizes = [max(abs(row["z_before"]), abs(row["z_after"])) for row in rows]
+    chosen = sorted(range(len(rows)), key=lambda k: -sizes[k])[:MOST_RESIDUALS]
+    return [rows[k] for k in sorted(chosen)]
+
+
+def residual_chart(result: Plain) -> Spec:
+    """Residuals before and after [σ] with the bands that a right model keeps to."""
+    rows = drawn_residuals(result)[::-1]
+    names = [label(f"{row['condition']} · {feature_label(row['feature'])}") for row in rows]
     traces: list[Json] = [
         {
             "type": "bar",
@@ -61,6 +100,7 @@ def residual_chart(result: Plain, one: float, every: float) -> Spec:
         }
         for key, words, colour in (("z_after", "after", AFTER), ("z_before", "before", BEFORE))
     ]
+    one, every = bands(len(result["residuals"]))
     layout: Json = {
         "xaxis": axis("measured − model [σ]", zeroline=True),
         "yaxis": axis("", tickfont={"size": 11}),
@@ -76,31 +116,9 @@ def residual_chart(result: Plain, one: float, every: float) -> Spec:
     return chart(traces, layout, 120 + ROW_HEIGHT * len(rows))
 
 
-def signature_chart(result: Plain) -> Spec:
-    """Residual and signatures as columns of length one over the fitted numbers, and the parameters' own rows."""
-    drawn = result["signatures"]
-    size = sum(value * value for value in drawn["residual"]) ** 0.5
-    columns = [[value / size for value in drawn["residual"]] if size else drawn["residual"], *drawn["vectors"]]
-    rows = [label(residual_label(row["label"])) for row in result["residuals"]]
-    rows += [label(f"measured {parameter_label(row['name'])}") for row in result["parameters"]]
-    heights = [list(row) for row in zip(*columns, strict=True)]
-    names = ["residual", *drawn["names"]]
-    return _heat_map(heights, names, rows, 150 + 20 * len(rows), "%{y}<br>%{x}: %{z:.2f}")
-
-
-def cosine_chart(result: Plain) -> Spec:
-    """Cosines among residual and signatures, written into their fields."""
-    drawn = result["signatures"]
-    names = ["residual", *drawn["names"]]
-    rows = [[1.0, *drawn["residual_cosine"]]]
-    rows += [[own, *others] for own, others in zip(drawn["residual_cosine"], drawn["cosines"], strict=True)]
-    spec = _heat_map(rows, names, names, 170 + 26 * len(names), "%{y}, %{x}: %{z:.2f}")
-    spec["data"][0] |= {
-        "text": [[fixed(value) for value in row] for row in rows],
-        "texttemplate": "%{text}",
-        "textfont": {"size": 10, "color": INK},
-    }
-    return spec
+def bands(features: int) -> tuple[float, float]:
+    """Half widths [σ] that a right model keeps to with chance 0.95: one feature, and all of them (Bonferroni)."""
+    return float(stats.norm.isf(0.025)), float(stats.norm.isf(0.025 / features))
 
 
 def pile_chart(picture: Plain) -> Spec:
@@ -141,22 +159,3 @@ def pile_chart(picture: Plain) -> Spec:
 
 def _mirrored(values: list[float | None]) -> list[float | None]:
     return [*reversed(values), *values]
-
-
-def _heat_map(rows: list[list[float]], names: list[str], labels: list[str], height: int, hover: str) -> Spec:
-    trace: Json = {
-        "type": "heatmap",
-        "z": rows,
-        "x": [label(name) for name in names],
-        "y": labels,
-        "zmin": -1.0,
-        "zmax": 1.0,
-        "colorscale": BELOW_TO_ABOVE,
-        "hovertemplate": hover + "<extra></extra>",
-        "colorbar": {"thickness": 12},
-    }
-    layout: Json = {
-        "xaxis": axis("", tickangle=-40, tickfont={"size": 11}),
-        "yaxis": axis("", autorange="reversed", tickfont={"size": 11}),
-    }
-    return chart([trace], layout, height)

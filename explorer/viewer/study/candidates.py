@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import viser
 
+from doe.diagnose.teaching import Budget
 from explorer.screen_units import checked
 from solver import EFFECTS
 
 MOST = 100_000
 BY_ITSELF = (
-    "As many pours as the program takes by itself: five settings per effect, then more about the fits that matter."
+    f"As many pours as the program takes by itself: {Budget().base} of the declared model, {Budget().screening} of "
+    f"every direction of an effect, then {Budget().more} at a time of what stays in question."
 )
 
 
@@ -38,6 +40,6 @@ class Candidates:
 
     @property
     def budget(self) -> int | None:
-        """About so many pours for the emulator; None: as many as the program takes by itself."""
+        """About so many pours before the first closer look; None: as many as the program takes by itself."""
         pours = checked(self._pours.value, 0, MOST, "pours")
         return round(pours) or None

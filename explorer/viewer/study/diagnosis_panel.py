@@ -1,4 +1,4 @@
-"""The diagnosis on the page: choose measured data, start, watch, pause, resume; the answer, its charts, older ones."""
+"""The diagnosis on the page: choose measured data, start, watch, pause, resume; the answer, its charts, others."""
 
 from __future__ import annotations
 
@@ -10,8 +10,16 @@ import viser
 from explorer.background.result_file import ResultFile
 from explorer.diagnosis.process import RESULT, DiagnosisProcess, Question
 from explorer.files.uploads import kept_measurements
-from explorer.report.diagnosis.findings import summary_label, summary_value
-from explorer.report.diagnosis.in_short import verdict_sentence
+from explorer.report.diagnosis.answer import verdict_sentence
+from explorer.report.diagnosis.charts import likely
+from explorer.report.diagnosis.findings import (
+    ResultVersionError,
+    chance,
+    checked,
+    feature_label,
+    feature_value,
+    spelled,
+)
 from explorer.report.diagnosis_plots import diagnosis_plots
 from explorer.report.findings import Plain
 from explorer.viewer.actions import Post
@@ -25,6 +33,8 @@ FIRST = "trefoil_2"
 """Chosen at first, where it is shipped: the data set of `make diagnose`."""
 OWN = "folder below"
 """Choice of the list that takes the folder in the text field."""
+ANSWERS = 5
+"""Of the most probable ones, that stand beside the verdict."""
 PRESENT = "present or newest diagnosis"
 EMPTY = (
     "No charts yet: they come with the answer of a diagnosis. Choose measured data above and press *Start*, or add a "
@@ -49,9 +59,9 @@ class DiagnosisPanel:
         self._shipped, self._uploads = tuple(shipped), uploads
         self._shown: Hashable = None
         gui.add_markdown(
-            "Which physical effect do measured data ask for that the declared model lacks? With nothing in the store "
-            "all effects take some 300 pours, for the shipped data about 40 min on two cores; a second data set of the "
-            "same model takes minutes."
+            "Which physical effect do measured data ask for that the declared model lacks, and how sure is that? With "
+            "nothing in the store all effects take about 150 to 400 pours, for the shipped data some 15 to 40 min on "
+            "two cores; a second data set of the same model takes minutes."
         )
         self._data = gui.add_dropdown(
             "Measured data",
@@ -132,6 +142,8 @@ class DiagnosisPanel:
         try:
             answer = "" if result is None else answer_markdown(result)
             plots = {} if result is None else diagnosis_plots(result)
+        except ResultVersionError as error:
+            answer, plots = escaped(f"{folder}: {error}"), {}
         except (KeyError, IndexError, TypeError, ValueError) as error:
             # A folder that somebody named may hold any JSON, also that of another version.
             answer, plots = f"{escaped(str(folder))}: cannot be shown ({escaped(repr(error))})", {}
@@ -140,15 +152,26 @@ class DiagnosisPanel:
 
 
 def answer_markdown(result: Plain) -> str:
-    """The verdict in a sentence and the errors before, after, and by noise alone."""
+    """The verdict in a sentence, the likely answers, and the errors before, after, and by noise alone.
+
+    Raises ResultVersionError for a result of another version of the program.
+    """
+    verdict, sentence = escaped(checked(result)["verdict"]), escaped(verdict_sentence(result).replace("`", ""))
+    odds = "\n".join(
+        f"| {escaped(spelled(one).replace('`', ''))} | {escaped(chance(p))} |" for one, p in _first(result)
+    )
     role, words = ("holdout", "held-out") if result["error"]["holdout"] else ("fit", "fitted")
     rows = "\n".join(
-        f"| {escaped(summary_label(row['observable']))} | "
+        f"| {escaped(feature_label(row['observable']))} | "
         + " | ".join(
-            escaped(summary_value(result, row["observable"], row[key])) for key in ("before", "after", "noise_floor")
+            escaped(feature_value(result, row["observable"], row[key])) for key in ("before", "after", "noise_floor")
         )
         + " |"
         for row in result["error"][role]
     )
     head = f"| Error on {words} data | Before | After | Noise floor |\n|:--|--:|--:|--:|"
-    return f"**{escaped(result['verdict'])}** — {escaped(verdict_sentence(result).replace('`', ''))}\n\n{head}\n{rows}"
+    return f"**{verdict}** — {sentence}\n\n| Answer | Probability |\n|:--|--:|\n{odds}\n\n{head}\n{rows}"
+
+
+def _first(result: Plain) -> list[tuple[str, float]]:
+    return likely(result)[:ANSWERS]

@@ -3,8 +3,8 @@
 import shutil
 
 import numpy as np
-
 from doe.diagnose.declare import complete_rows, declare, observe
+
 from doe.measurement import load_measurement
 from doe.validation.laboratory import MODEL, OBSERVABLES, write_folder
 from solver import EFFECTS

@@ -1,68 +1,95 @@
-"""Strengths against the linear toy world, where amplitude s/20 shifts by s standard errors in closed form."""
+"""Truths of given strengths: the amplitudes that the reference pours ask for, and nothing beyond the literature."""
+
+import math
 
 import numpy as np
 import pytest
 
+from doe.diagnose.declared import Condition, Declared, Effect, Parameter
+from doe.diagnose.limit import Kind, Reached
+from doe.diagnose.ruler import Strength
 from doe.validation.schedule import Case
-from doe.validation.truth import REPLICATES, Ruler, drawn_theta, truth_of
-from tests.doe.diagnose.toy import FULL, known_emulator, make_toy
+from doe.validation.truth import strengths_of, truth_of
 
-SUMMARIES = 12
-COVARIANCE = 0.05
-"""Error of lengths by the toy emulator's covariance of 10 000 degrees of freedom, its correlations shrunk by 1 %."""
-
-
-@pytest.fixture(scope="module")
-def toy():
-    return make_toy(SUMMARIES, seed=3)
-
-
-@pytest.fixture(scope="module")
-def measure(toy):
-    emulator = known_emulator(toy, np.random.default_rng(0), df=10_000)
-    return Ruler(emulator, toy.declared, toy.declared.effects)
+DECLARED = Declared(
+    (Parameter("friction", 0.4, 0.7, 0.5, 0.05), Parameter("restitution", 0.2, 0.8)),
+    (
+        Effect("push", (0.0,), (2.0,)),
+        Effect("density", (-0.3,), (0.3,)),
+        Effect("tilt", (-5.0, -5.0), (5.0, 5.0)),
+        Effect("hidden", (0.0,), (1.0,)),
+    ),
+    (Condition("low", ("height",)),),
+)
 
 
-@pytest.mark.parametrize("strength", [4.0, 6.0, 10.0])
-def test_the_amplitude_gives_the_strength_asked_for(measure, strength):
-    for number, effect in enumerate(measure.declared.effects):
-        truth = truth_of(Case(number, "effect", effect.name, strength), measure)
-        ((name, (amplitude,)),) = truth.effects
-        assert name == effect.name
-        assert amplitude == pytest.approx(strength / FULL, rel=COVARIANCE)
+def reached(effect, name, amplitude, ruler, weak=None):
+    kind = Kind(effect, name, len(amplitude) == 2)
+    return Reached(kind, amplitude, Strength(ruler, 0.3), None if weak is None else Strength(weak, 0.3), {})
 
 
-def test_a_strength_beyond_the_range_is_missing_and_says_whose_fault_it_is(toy, measure):
-    case = Case(0, "effect", "e1", 1.5 * FULL)
-    assert truth_of(case, measure).missing == "bounds"
-    wider = tuple(type(e)(e.name, e.low, tuple(2 * x for x in e.high)) for e in toy.declared.effects)
-    assert truth_of(case, Ruler(measure.emulator, toy.declared, wider)).missing == "range"
+REACHED = (
+    reached("push", "push", (1.0,), 12.0, 6.0),
+    reached("density", "density +", (0.3,), 8.0, 2.0),
+    reached("density", "density -", (-0.3,), 8.0),
+    reached("tilt", "tilt x", (5.0, 0.0), 10.0, 5.0),
+    reached("tilt", "tilt y", (0.0, 5.0), 10.0),
+    reached("hidden", "hidden", (1.0,), 0.2, 0.0),
+)
+STRENGTHS = strengths_of(REACHED, DECLARED, {frozenset(("push", "density")): 0.95})
 
 
-def test_a_truth_follows_from_its_number_alone(measure):
-    one, again, other = (truth_of(Case(n, "effect", "e2", 6.0), measure) for n in (7, 7, 8))
+def case(number, kind="effect", label="", strength=6.0):
+    return Case(9, number, kind, label, strength)
+
+
+def test_the_amplitude_follows_the_strength():
+    """Proportional where half the amplitude was half the strength, as its root where it was a quarter."""
+    ((_, (push,)),) = truth_of(case(0, label="push"), STRENGTHS).effects
+    assert push == pytest.approx(6.0 / 12.0)
+    ((_, (density,)),) = truth_of(case(0, label="density"), STRENGTHS).effects
+    assert abs(density) == pytest.approx(0.3 * math.sqrt(6.0 / 8.0))
+
+
+def test_directions_are_drawn():
+    signs = {np.sign(truth_of(case(k, label="density"), STRENGTHS).effects[0][1][0]) for k in range(20)}
+    assert signs == {-1.0, 1.0}
+    tilts = np.array([truth_of(case(k, label="tilt"), STRENGTHS).effects[0][1] for k in range(40)])
+    assert np.linalg.norm(tilts, axis=1) == pytest.approx(3.0)
+    assert np.abs(tilts.mean(axis=0)).max() < 1.0
+    assert len(np.unique(np.round(np.arctan2(tilts[:, 1], tilts[:, 0]), 3))) == 40
+
+
+def test_what_the_literature_does_not_support_is_missing_and_says_so():
+    assert truth_of(case(0, label="density", strength=10.0), STRENGTHS).missing == "bounds"
+    assert truth_of(case(0, label="hidden", strength=6.0), STRENGTHS).missing == "bounds"
+    assert truth_of(case(0, label="push", strength=23.0), STRENGTHS).effects[0][1][0] <= 2.0
+    assert truth_of(case(0, label="push", strength=25.0), STRENGTHS).missing == "bounds"
+
+
+def test_another_effect_is_drawn_where_one_does_not_reach():
+    drawn = {truth_of(case(k, strength=20.0), STRENGTHS).effects[0][0] for k in range(20)}
+    assert drawn == {"push"}
+
+
+def test_a_truth_follows_from_root_and_number_alone():
+    one, again, other = (truth_of(case(n), STRENGTHS) for n in (7, 7, 8))
     assert one == again
     assert one.theta != other.theta
+    assert truth_of(Case(10, 7, "effect", "", 6.0), STRENGTHS).theta != one.theta
 
 
-def test_pairs_look_different(toy, measure):
-    """Effects 0, 1 and 2, 3 of the toy have signatures at cosine 0.9, where chance decides on which side."""
+def test_pairs_look_different():
+    """Push and density are alike, so a pair has the tilt in it."""
     for number in range(20):
-        (one, a), (other, b) = truth_of(Case(number, "pair", "", 6.0), measure).effects
-        ends = [toy.off[int(name[1:])] for name in (one, other)]
-        assert abs(ends[0] @ ends[1]) <= 0.9 * (1 + COVARIANCE)
-        assert [*a, *b] == pytest.approx([6.0 / FULL] * 2, rel=COVARIANCE)
+        names = {name for name, _ in truth_of(case(number, "pair", strength=7.0), STRENGTHS).effects}
+        assert len(names) == 2
+        assert "tilt" in names
 
 
-def test_what_is_seen_of_a_shift_is_its_strength(toy, measure):
-    """Noise adds 12 - 3 to the square of the shift, and is taken off: none without a shift, 10 with one of 10."""
-    generator = np.random.default_rng(5)
-    theta = drawn_theta(measure.declared, generator)
-    coded = measure.coded(theta)
-    seen = []
-    for _ in range(200):
-        noise = generator.standard_normal(SUMMARIES) / np.sqrt(REPLICATES)
-        seen.append(measure.seen(theta, toy.jacobian @ coded + toy.listed(0, 10.0) + noise) ** 2)
-    # One shift's square has a standard deviation of 2 x 10.
-    assert np.mean(seen) == pytest.approx(100.0, abs=2 * COVARIANCE * 100 + 3 * 20 / np.sqrt(200))
-    assert measure.seen(theta, toy.jacobian @ coded) == 0.0
+def test_parameters_are_drawn_from_their_measurement():
+    theta = np.array([truth_of(case(k, "null", strength=math.nan), STRENGTHS).theta for k in range(400)])
+    assert theta[:, 0].mean() == pytest.approx(0.5, abs=0.01)
+    assert theta[:, 0].std() == pytest.approx(0.05, rel=0.15)
+    assert theta[:, 1].min() > 0.2
+    assert theta[:, 1].std() == pytest.approx(0.6 / math.sqrt(12.0), rel=0.15)

@@ -1,0 +1,205 @@
+"""Which features are compared, and what the data are in them.
+
+A feature is compared where the data offer it in at least two replicates and half of them (in the one that there is),
+where ``READABLE`` of the base model's pours give it, and where it varies at all in the pours. What the data offer is a
+matter of names (``doe/measurement/features.py``), so nothing here looks at a value and chooses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.diagnose.emulator import Emulator, Lessons, Way, emulated
+from doe.diagnose.posterior import Data, Posterior, posterior
+from doe.errors import StatisticsError
+from doe.measurement.features import feature_set, features_of_data, offer_of
+from doe.measurement.measurement import Condition
+from doe.measurement.summaries import summary_uncertainties
+
+FloatArray = npt.NDArray[np.float64]
+
+READABLE = 0.8
+"""Share of the base model's pours in which a feature has to be there."""
+CONSTANT = 1e-9
+"""Scatter within groups of pours, as a share of the feature's size, below which it says nothing."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Features that a condition's data offer: names, replicates (r, d) and the stated error of each, (d,).
+
+    ``scalars``: how many of them are not read off a surface. ``axis_error``: of the scans' axis [m].
+    """
+
+    condition: str
+    offer: str
+    names: tuple[str, ...]
+    values: FloatArray
+    instrument: FloatArray
+    mean_of: int = 1
+    scalars: int = 0
+    axis_error: float = 0.0
+
+    def pours(self, columns: npt.NDArray[np.int64]) -> FloatArray:
+        """The replicates in which all of ``columns`` could be read."""
+        block = self.values[:, columns]
+        return np.asarray(block[np.isfinite(block).all(axis=1)], dtype=np.float64)
+
+
+def measured(condition: Condition, offer: str | None = None) -> Measured:
+    """What ``condition`` offers, or the part of it that data of the kind ``offer`` would have."""
+    names, values = feature_set(condition), features_of_data(condition)
+    most = names.offered(offer_of(condition)) if offer is None else min(names.offered(offer), values.shape[1])
+    stated = np.zeros(most)
+    stated[: len(names.scalars)] = np.nan_to_num(summary_uncertainties(condition))
+    found = offer_of(condition) if offer is None else offer
+    return Measured(
+        condition=condition.name,
+        offer=found,
+        names=names.names[:most],
+        values=values[:, :most],
+        instrument=stated,
+        mean_of=condition.mean_of,
+        scalars=len(names.scalars),
+        axis_error=max((one.axis_error for one in condition.surfaces.values()), default=0.0),
+    )
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Data and models in the same features.
+
+    Attributes
+    ----------
+    conditions, names
+        Of the conditions, and by condition of the features.
+    left_out
+        "condition: feature" of what the data offer and no pour varies or gives.
+    data, emulator, posterior
+        What is weighed, by what, and what came out.
+    blocks
+        Measured replicates, by condition (r, d_c).
+    """
+
+    conditions: tuple[str, ...]
+    names: tuple[tuple[str, ...], ...]
+    left_out: tuple[str, ...]
+    blocks: tuple[FloatArray, ...]
+    data: Data
+    emulator: Emulator
+    posterior: Posterior
+
+
+def weighed(
+    lessons: Lessons, ways: Sequence[Way], conditions: Sequence[Measured], displaced: Sequence[FloatArray] = ()
+) -> Compared:
+    """Weigh all models by the data of the fitted ``conditions``.
+
+    ``displaced``: by condition, what the axis' error along x and along y does to all features of the pours, (2, …).
+
+    Raises StatisticsError where a condition has nothing that can be compared.
+    """
+    columns = [_readable(lessons, c, condition) for c, condition in enumerate(conditions)]
+    taught = _complete(lessons.only(columns))
+    columns = [chosen[_varies(taught, c)] for c, chosen in enumerate(columns)]
+    taught = _complete(lessons.only(columns))
+    left_out = [
+        f"{condition.condition}: {condition.names[k]}"
+        for condition, chosen in zip(conditions, columns, strict=True)
+        for k in sorted(set(range(len(condition.names))) - set(chosen.tolist()))
+    ]
+    for condition, chosen in zip(conditions, columns, strict=True):
+        if chosen.size == 0 or len(condition.pours(chosen)) == 0:
+            raise StatisticsError(f"{condition.condition}: no number of the data varies in the pours and can be read")
+    blocks = tuple(condition.pours(chosen) for condition, chosen in zip(conditions, columns, strict=True))
+    numbers = np.array([len(b) * one.mean_of for b, one in zip(blocks, conditions, strict=True)], dtype=np.float64)
+    weights = numbers / numbers.mean()
+    emulator = emulated(taught, ways, weights.tolist())
+    data = Data(
+        emulator.seen(blocks),
+        float(numbers.mean()),
+        _scatter(emulator, blocks, weights, conditions),
+        _instrument(emulator, blocks, conditions, columns, displaced),
+    )
+    names = tuple(tuple(one.names[k] for k in chosen) for one, chosen in zip(conditions, columns, strict=True))
+    labels = tuple(one.condition for one in conditions)
+    return Compared(labels, names, tuple(left_out), blocks, data, emulator, posterior(emulator, data))
+
+
+def _readable(lessons: Lessons, c: int, condition: Measured) -> npt.NDArray[np.int64]:
+    """Features of a condition that data and pours give."""
+    there = np.isfinite(condition.values).sum(axis=0) >= max(min(2, len(condition.values)), len(condition.values) / 2)
+    base = lessons.blocks[c][lessons.way == -1, : len(condition.names)]
+    # A pour that broke off says nothing of a feature.
+    ended = np.isfinite(base).any(axis=1)
+    return np.flatnonzero(there & (np.isfinite(base[ended]).mean(axis=0) >= READABLE))
+
+
+def _complete(lessons: Lessons) -> Lessons:
+    """Pours of which every condition came to a valid end and could be read."""
+    return lessons.where(np.all([np.isfinite(block).all(axis=1) for block in lessons.blocks], axis=0))
+
+
+def _varies(lessons: Lessons, c: int) -> npt.NDArray[np.bool_]:
+    """Which features of a condition vary within any group of pours that teach the scatter."""
+    own = lessons.where(lessons.own)
+    block, groups = own.blocks[c], own.groups()
+    size = np.abs(block).max(axis=0, initial=0.0)
+    varies = np.zeros(block.shape[1], dtype=bool)
+    for group in np.unique(groups):
+        some = block[groups == group]
+        varies |= np.ptp(some, axis=0) > CONSTANT * size
+    return varies
+
+
+def _scatter(
+    emulator: Emulator, blocks: Sequence[FloatArray], weights: FloatArray, conditions: Sequence[Measured]
+) -> float:
+    """r: variance of the replicates over that of pours, 1 at least, and at most known to be more than the noise of Σ.
+
+    Whitening by a Σ of ν degrees of freedom makes other pours look wider, by about ν/(ν − d − 1) in d features.
+    """
+    square = expected = 0.0
+    first = 0
+    for squash, block, weight, one in zip(emulator.squashes, blocks, weights, conditions, strict=True):
+        d = block.shape[1]
+        last = first + d
+        if len(block) > 1 and one.mean_of == 1:
+            drawn_in = squash(block)
+            left = (drawn_in - drawn_in.mean(axis=0)) @ emulator.whitening[:, first:last].T
+            square += float((left**2).sum()) / weight
+            slack = emulator.freedom / max(0.5 * emulator.freedom, emulator.freedom - d - 1.0)
+            expected += (len(block) - 1) * d * slack
+        first = last
+    return max(1.0, square / expected) if expected > 0.0 else 1.0
+
+
+def _instrument(
+    emulator: Emulator,
+    blocks: Sequence[FloatArray],
+    conditions: Sequence[Measured],
+    columns: Sequence[npt.NDArray[np.int64]],
+    displaced: Sequence[FloatArray],
+) -> FloatArray:
+    """I: what the errors of instruments, which no averaging reduces, do to z, (D, q).
+
+    Stated errors of numbers are independent; that of a scan's axis moves all that is read off the surface together.
+    """
+    size, first, found = len(emulator.whitening), 0, []
+    for c, (squash, block, one, chosen) in enumerate(zip(emulator.squashes, blocks, conditions, columns, strict=True)):
+        slope = squash.slope(block.mean(axis=0))
+        places = np.arange(first, first + len(chosen))
+        first += len(chosen)
+        stated = one.instrument[chosen] * slope
+        for k in np.flatnonzero(stated > 0.0):
+            found.append(stated[k] * np.eye(size)[places[k]])
+        if one.axis_error > 0.0 and displaced:
+            for change in displaced[c][:, chosen]:
+                moved = np.zeros(size)
+                moved[places] = np.where(chosen >= one.scalars, change, 0.0) * slope
+                found.append(moved)
+    return np.asarray(emulator.whitening @ np.array(found).T, dtype=np.float64) if found else np.zeros((size, 0))

@@ -1,0 +1,149 @@
+"""Confirmation by fresh pours: both models at their best fits, in the fitted and in the held-out conditions.
+
+The seeds are those of no pour that taught a model. Held-out data never choose: they report the error, and they may take
+an answer back. The farthest summary of the final model over all held-out conditions is
+
+    |t| = max |measured − poured| / (s √(1/r + 1/m))
+
+with r measured and m fresh pours, s the deviation of a pour pooled over both and f degrees of freedom; Bonferroni's
+p = (number of summaries) P(|t_f| ≥ |t|) below ``CONTRADICTED`` contradicts it. That is strict because the error of the
+fit is not in s, and summary by summary because what is missing shows in what it acts on, not evenly over all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from doe.diagnose.declared import Declared
+from doe.diagnose.points import Point
+from doe.diagnose.posterior import Fit
+from doe.diagnose.pours import ModelPours, Pour
+from doe.record import Record
+
+FloatArray = npt.NDArray[np.float64]
+
+CONTRADICTED = 0.001
+CONSTANT_FLOOR = 1e-3
+"""Least standard deviation of a summary, as a share of its size."""
+
+
+@dataclass(frozen=True)
+class Model(Record):
+    """A calibrated model: parameters in natural units and the amplitudes of the effects that are on."""
+
+    theta: tuple[float, ...]
+    effects: tuple[tuple[str, tuple[float, ...]], ...] = ()
+
+    @property
+    def name(self) -> str:
+        """ "base", or the effects' names."""
+        return "+".join(name for name, _ in self.effects) or "base"
+
+
+def model_of(fit: Fit, declared: Declared) -> Model:
+    """The model of a fit, with parameters and amplitudes within their ranges."""
+    amplitudes: dict[str, tuple[float, ...]] = {}
+    ranges = {effect.name: effect for effect in declared.effects}
+    for one in fit.amplitudes:
+        own = ranges[one.effect]
+        value = min(own.high[one.index], max(own.low[one.index], one.value))
+        amplitudes[one.effect] = (*amplitudes.get(one.effect, ()), value)
+    return Model(declared.natural(fit.theta), tuple(amplitudes.items()))
+
+
+@dataclass(frozen=True)
+class Confirmed:
+    """Summaries of the fresh pours of one model, per condition (n, d_c).
+
+    broken: pours left out because they broke off or left nothing to be read.
+
+    profiles: the height profiles of the same pours, per condition (n, k_c) [m]; k_c = 0 without measured ones.
+    """
+
+    model: Model
+    blocks: tuple[FloatArray, ...]
+    broken: int
+    profiles: tuple[FloatArray, ...] = ()
+
+
+def confirm(
+    models: Sequence[Model],
+    pours: ModelPours,
+    number: int,
+    widths: Sequence[int],
+    where: Sequence[int] | None = None,
+    sequence: str = "confirm",
+) -> tuple[Confirmed, ...]:
+    """Pour each model ``number`` times in every condition of ``pours``, or ``where``; ``widths``: summaries of each.
+
+    Pours of another ``sequence`` have other seeds.
+    """
+    points = [Point(f"{sequence} {number}", k, model.theta, model.effects) for model in models for k in range(number)]
+    # All of them at once, so that no worker waits for the last pour of a model.
+    rows = iter(pours.run(f"{sequence}: {', '.join(model.name for model in models)}", points, where))
+    return tuple(_confirmed(model, [next(rows) for _ in range(number)], widths) for model in models)
+
+
+def _confirmed(model: Model, rows: Sequence[Sequence[Pour]], widths: Sequence[int]) -> Confirmed:
+    blocks, profiles, broken = [], [], 0
+    for c, width in enumerate(widths):
+        valid = [row[c] for row in rows if row[c].valid and np.isfinite(row[c].summaries).all()]
+        broken += len(rows) - len(valid)
+        blocks.append(np.array([pour.summaries for pour in valid]).reshape(len(valid), width))
+        profiles.append(np.array([pour.profile for pour in valid]).reshape(len(valid), -1 if valid else 0))
+    return Confirmed(model, tuple(blocks), broken, tuple(profiles))
+
+
+@dataclass(frozen=True)
+class HeldOut(Record):
+    """What fresh pours of a model say of held-out data: |t| of the farthest summary, which it is, Bonferroni's p."""
+
+    label: str
+    condition: str
+    summary: str
+    farthest: float
+    p: float
+
+    @property
+    def contradicted(self) -> bool:
+        """Whether the data contradict the model."""
+        return self.p < CONTRADICTED
+
+
+@dataclass(frozen=True)
+class HeldOutData:
+    """A held-out condition: its name, names of its summaries, measured replicates (r, d)."""
+
+    condition: str
+    summaries: tuple[str, ...]
+    measured: FloatArray
+
+
+def held_out(label: str, data: Sequence[HeldOutData], poured: Sequence[FloatArray]) -> HeldOut | None:
+    """Compare ``data`` with fresh pours (m, d) of the model ``label``; None where nothing can be compared."""
+    worst: tuple[float, int, str, str] | None = None
+    asked = 0
+    for one, block in zip(data, poured, strict=True):
+        if min(len(one.measured), len(block)) < 2:
+            continue
+        freedom = len(one.measured) + len(block) - 2
+        both = [one.measured - one.measured.mean(axis=0), block - block.mean(axis=0)]
+        floor = CONSTANT_FLOOR * np.abs(np.concatenate([one.measured, block])).max(axis=0)
+        spread = np.maximum(np.sqrt((np.concatenate(both) ** 2).sum(axis=0) / freedom), floor)
+        off = np.abs(one.measured.mean(axis=0) - block.mean(axis=0))
+        varies = spread > 0.0
+        asked += int(varies.sum())
+        t = np.where(varies, off / np.where(varies, spread, 1.0), 0.0) / np.sqrt(1 / len(one.measured) + 1 / len(block))
+        k = int(t.argmax())
+        if worst is None or stats.t.sf(t[k], freedom) < stats.t.sf(worst[0], worst[1]):
+            worst = float(t[k]), freedom, one.condition, one.summaries[k]
+    if worst is None:
+        return None
+    t_most, freedom, condition, summary = worst
+    p = min(1.0, asked * 2.0 * float(stats.t.sf(t_most, freedom)))
+    return HeldOut(label, condition, summary, t_most, p)

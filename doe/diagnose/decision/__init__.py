@@ -1,1 +1,0 @@
-"""From fits to a verdict: the gates, the race, and the tables that say why."""

@@ -1,0 +1,166 @@
+"""What is declared, as a diagnosis takes it: calibrated parameters, candidate effects, conditions with their numbers.
+
+A condition is one rig set-up; its summaries are the d_c numbers read from one pour. Parameters are calibrated within
+[low, high] and are told in units of their ``deviation`` off their ``middle``; an effect is off in the base model, at
+amplitude zero.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.errors import StatisticsError
+from doe.measurement.measurement import MeasuredParameter, Measurement
+from doe.measurement.summaries import summary_names
+from doe.record import Record
+from solver import EFFECTS, ParameterError, Scene, parameters, with_values
+
+FloatArray = npt.NDArray[np.float64]
+
+BOX = 3.0
+"""Standard deviations about an independently measured mean within which a parameter is believed."""
+DRAWN_IN = 0.8
+
+
+@dataclass(frozen=True)
+class Parameter(Record):
+    """A calibrated parameter, natural units: range of measurement, and mean ± sd where it was measured independently.
+
+    Raises StatisticsError unless low < high, and sd > 0 where there is a mean.
+    """
+
+    name: str
+    low: float
+    high: float
+    mean: float | None = None
+    sd: float | None = None
+
+    def __post_init__(self) -> None:
+        if not self.low < self.high:
+            raise StatisticsError(f"{self.name}: low = {self.low:g}, high = {self.high:g}; allowed is low < high")
+        if (self.mean is None) != (self.sd is None) or (self.sd is not None and not self.sd > 0):
+            raise StatisticsError(
+                f"{self.name}: mean = {self.mean}, sd = {self.sd}; allowed are both with sd > 0, or none"
+            )
+
+    @property
+    def middle(self) -> float:
+        """The measured mean, or the middle of the range."""
+        return self.mean if self.mean is not None else (self.low + self.high) / 2.0
+
+    @property
+    def deviation(self) -> float:
+        """The measurement's standard deviation, or that of an even distribution over the range, its width ÷ √12."""
+        return self.sd if self.sd is not None else (self.high - self.low) / math.sqrt(12.0)
+
+    def within(self, value: float) -> float:
+        """``value`` drawn into the range."""
+        return min(self.high, max(self.low, value))
+
+    def natural(self, theta: float) -> float:
+        """Natural units of ``theta`` deviations off the middle, within the range."""
+        return self.within(self.middle + theta * self.deviation)
+
+    def theta(self, value: float) -> float:
+        """Deviations off the middle of a ``value`` in natural units."""
+        return (value - self.middle) / self.deviation
+
+
+@dataclass(frozen=True)
+class Effect(Record):
+    """A candidate effect with one or two amplitudes, each within [low, high] around or above zero (off).
+
+    Raises StatisticsError for another number of amplitudes or a range without zero.
+    """
+
+    name: str
+    low: tuple[float, ...]
+    high: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.low) != len(self.high) or len(self.low) not in (1, 2):
+            raise StatisticsError(f"{self.name}: {len(self.low)} lower, {len(self.high)} upper bounds; allowed: 1 or 2")
+        if not all(low <= 0 <= high and low < high for low, high in zip(self.low, self.high, strict=True)):
+            raise StatisticsError(f"{self.name}: bounds {self.low} to {self.high} must contain 0, where it is off")
+
+    @property
+    def amplitudes(self) -> int:
+        """Return the number of amplitudes."""
+        return len(self.low)
+
+
+@dataclass(frozen=True)
+class Condition(Record):
+    """A set-up and the names of the summaries read from each of its pours."""
+
+    name: str
+    summaries: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Declared(Record):
+    """The declared model: calibrated parameters, candidate effects and conditions with their summaries."""
+
+    parameters: tuple[Parameter, ...]
+    effects: tuple[Effect, ...]
+    conditions: tuple[Condition, ...]
+
+    def natural(self, theta: Sequence[float] | FloatArray) -> tuple[float, ...]:
+        """Parameters in natural units, of ``theta`` (k,) deviations off their middles."""
+        return tuple(p.natural(float(one)) for p, one in zip(self.parameters, theta, strict=True))
+
+    def theta(self, values: Sequence[float]) -> FloatArray:
+        """Deviations (k,) off their middles of parameters in natural units."""
+        return np.array([p.theta(one) for p, one in zip(self.parameters, values, strict=True)])
+
+
+def declare(measurement: Measurement, effects: Sequence[str]) -> Declared:
+    """The declared model: parameters, effects with their widest ranges, fitted conditions."""
+    scenes = [condition.scene for condition in measurement.conditions]
+    return Declared(
+        tuple(box_of(p) for p in measurement.parameters),
+        tuple(widest(name, scenes) for name in effects),
+        tuple(Condition(c.name, summary_names(c)) for c in measurement.fit),
+    )
+
+
+def widest(name: str, scenes: Sequence[Scene]) -> Effect:
+    """The effect from end to end of what the literature supports, drawn in until every scene can be set up with it."""
+    kind, known = EFFECTS[name], parameters(scenes[0])
+    ends = [known[f"effect.{name}.{field}"] for field in kind.amplitudes]
+    low = tuple(max(end.low, -kind.strongest) for end in ends)
+    high = tuple(min(end.high, kind.strongest) for end in ends)
+    while not all(_possible(scene, name, bounds) for scene in scenes for bounds in (low, high)):
+        low, high = tuple(DRAWN_IN * x for x in low), tuple(DRAWN_IN * x for x in high)
+    return Effect(name, low, high)
+
+
+def effect_values(effect: str, amplitude: Sequence[float]) -> dict[str, float]:
+    """Parameter path → value of an effect's amplitudes."""
+    names = EFFECTS[effect].amplitudes
+    return {f"effect.{effect}.{name}": one for name, one in zip(names, amplitude, strict=True)}
+
+
+def _possible(scene: Scene, name: str, amplitude: tuple[float, ...]) -> bool:
+    try:
+        with_values(scene, effect_values(name, amplitude))
+    except ParameterError:
+        return False
+    return True
+
+
+def box_of(measured: MeasuredParameter) -> Parameter:
+    """The range over which a parameter is simulated: as stated, and within ``BOX`` standard deviations of its mean.
+
+    Farther off nobody who trusts the measurement would look.
+    """
+    if measured.mean is None or measured.sd is None:
+        return Parameter(measured.path, measured.low, measured.high)
+    low = max(measured.low, measured.mean - BOX * measured.sd)
+    high = min(measured.high, measured.mean + BOX * measured.sd)
+    return Parameter(measured.path, low, high, measured.mean, measured.sd)

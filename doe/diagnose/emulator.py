@@ -1,0 +1,369 @@
+"""What the features of a pour would be under any effect at any amplitude: one Bayesian regression taught by all pours.
+
+Features are whitened, z = W y with W Σ Wᵀ = I for the covariance Σ of one pour, and turned onto the principal axes of
+the signatures. There a pour with parameters θ [standard deviations of their measurements] and effect e at a times its
+reference amplitude gives, feature by feature,
+
+    z = b + J θ + β_e a + γ_e (a² − a) + ε,    ε ~ N(0, 1)
+    b, J flat,    β_e ~ N(0, v),    γ_e ~ N(0, CURVATURE² v)
+
+b is the base model, J what parameters do, β_e a signature, γ_e how far the answer is from proportional. All pours are
+in one regression: parameters are moved in every one of them, the base model is known better by what the effects do not
+move, and the errors that two models share are in both. What a signature may be is learned from all of them (v, one
+variance along each principal axis): effects of a granular pour move its features along few directions, and what a
+handful of pours shows in the others is mostly their scatter (empirical Bayes; Efron & Morris 1973,
+doi 10.1080/01621459.1973.10481350). Of an eigenvalue of the signatures' scatter only what exceeds the largest that
+noise alone makes, n (1 + √(D/m))² for m signatures of noise n in D features, counts (Marchenko & Pastur 1967,
+doi 10.1070/SM1967v001n04ABEH001994).
+
+Before all this each feature x of a pour becomes  s asinh((x − x̄)/(s σ)),  s = ``SQUASH``: counts and masses that are
+zero in most pours of the base model reach hundreds of its variances under an effect.
+
+An effect with a direction in the plane is poured along +x, +y, −x and −y; between these its coefficients are the
+trigonometric interpolation, exact for what answers as 1, cos φ, sin φ and cos 2φ (``planar_weights``).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.diagnose.ruler import shrunk_covariance
+from doe.errors import StatisticsError
+
+FloatArray = npt.NDArray[np.float64]
+
+CURVATURE = 0.5
+"""Expected share by which the answer at twice an amplitude is off twice the answer; of the reference pours of
+``docs/limit.md`` half an amplitude gives 0.2 to 0.65 of a shift (mean 0.45)."""
+SQUASH = 2.0
+"""Standard deviations of a pour up to which a feature counts in full."""
+FLOOR = 0.3
+"""Share of the signatures' variance off the leading axes, where noise hides it, that is believed there."""
+LEAST_VARIANCE = 1e-3
+"""Of a signature along an axis, where its estimate comes out at nothing."""
+FLAT = 1e-9
+"""Prior precision of what nothing is assumed of."""
+ANGLES = (0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi)
+"""Directions [rad] in the plane in which an effect with two amplitudes is poured."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """One direction in which an effect can act.
+
+    Attributes
+    ----------
+    effect, name
+        The effect's name, and that with its sign or axis.
+    unit
+        Reference amplitude [natural units].
+    most
+        Multiple of it up to which the literature supports the effect.
+    angle
+        Direction in the plane, one of ``ANGLES``; None of an effect with one amplitude.
+    """
+
+    effect: str
+    name: str
+    unit: tuple[float, ...] = (1.0,)
+    most: float = math.inf
+    angle: float | None = None
+
+
+@dataclass(frozen=True)
+class Lessons:
+    """Pours that teach, of which every condition came to a valid end and could be read.
+
+    Attributes
+    ----------
+    theta
+        Parameters [standard deviations from their means], (n, k).
+    way, amplitude
+        Number of the way that acts, −1 for the base model, and multiple of its reference amplitude, (n,).
+    own
+        Which of them count for the covariance of a pour, (n,): not another one of them that is looked at otherwise.
+    blocks
+        Features by condition, (n, d_c).
+    """
+
+    theta: FloatArray
+    way: npt.NDArray[np.int64]
+    amplitude: FloatArray
+    own: npt.NDArray[np.bool_]
+    blocks: tuple[FloatArray, ...]
+
+    def __len__(self) -> int:
+        return len(self.way)
+
+    def joined(self, other: Lessons) -> Lessons:
+        """These and ``other``."""
+        return Lessons(
+            np.concatenate([self.theta, other.theta]),
+            np.concatenate([self.way, other.way]),
+            np.concatenate([self.amplitude, other.amplitude]),
+            np.concatenate([self.own, other.own]),
+            tuple(np.concatenate(pair) for pair in zip(self.blocks, other.blocks, strict=True)),
+        )
+
+    def only(self, columns: Sequence[npt.NDArray[np.int64]]) -> Lessons:
+        """The same with the features ``columns`` of each condition."""
+        kept = tuple(block[:, some] for block, some in zip(self.blocks, columns, strict=True))
+        return replace(self, blocks=kept)
+
+    def where(self, rows: npt.NDArray[np.bool_]) -> Lessons:
+        """Those of the pours."""
+        blocks = tuple(block[rows] for block in self.blocks)
+        return Lessons(self.theta[rows], self.way[rows], self.amplitude[rows], self.own[rows], blocks)
+
+    def groups(self) -> npt.NDArray[np.int64]:
+        """Number of the group, pours of one way at one amplitude, that each pour belongs to, (n,)."""
+        pairs = np.column_stack([self.way, self.amplitude])
+        return np.asarray(np.unique(pairs, axis=0, return_inverse=True)[1].reshape(-1), dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class Squash:
+    """Centre and standard deviation of the features of a condition, (d_c,)."""
+
+    centre: FloatArray
+    deviation: FloatArray
+
+    def __call__(self, pours: FloatArray) -> FloatArray:
+        """Features of pours, (n, d_c), with their far tails drawn in."""
+        return np.asarray(SQUASH * np.arcsinh((pours - self.centre) / (SQUASH * self.deviation)), dtype=np.float64)
+
+    def back(self, drawn_in: FloatArray) -> FloatArray:
+        """The inverse."""
+        return np.asarray(self.centre + SQUASH * self.deviation * np.sinh(drawn_in / SQUASH), dtype=np.float64)
+
+    def slope(self, pours: FloatArray) -> FloatArray:
+        """Derivative at ``pours``."""
+        x = (pours - self.centre) / (SQUASH * self.deviation)
+        return np.asarray(1.0 / (self.deviation * np.sqrt(1.0 + x**2)), dtype=np.float64)
+
+
+@dataclass(frozen=True)
+class Emulator:
+    """All models of a declared scene; D features in all conditions together, k parameters, m ways.
+
+    Attributes
+    ----------
+    ways
+        Directions of effects.
+    parameters
+        k.
+    mean, covariance
+        Of the coefficients (b, J, β_1 … β_m, γ_1 … γ_m) of every feature: (D, 1 + k + 2m) and, squared, (D, …, …).
+    freedom
+        Degrees of freedom of Σ.
+    squashes, whitening
+        From the features of pours to z: by condition, and W (D, D) with its turn.
+    reached
+        Largest multiple of its reference amplitude at which each way was poured.
+    """
+
+    ways: tuple[Way, ...]
+    parameters: int
+    mean: FloatArray
+    covariance: FloatArray
+    freedom: int
+    squashes: tuple[Squash, ...]
+    whitening: FloatArray
+    reached: tuple[float, ...]
+
+    def seen(self, pours: Sequence[FloatArray]) -> FloatArray:
+        """Mean of ``pours``, z (D,)."""
+        return _whitened(self.whitening, [squash(block) for squash, block in zip(self.squashes, pours, strict=True)])
+
+    def features(self, z: FloatArray) -> FloatArray:
+        """Features (..., D) of all conditions, natural units, that ``z`` (..., D) stands for."""
+        drawn_in = np.linalg.solve(self.whitening, np.atleast_2d(z).T).T
+        ends = np.cumsum([len(squash.centre) for squash in self.squashes])[:-1]
+        parts = np.split(drawn_in, ends, axis=1)
+        found = np.concatenate([squash.back(part) for squash, part in zip(self.squashes, parts, strict=True)], axis=1)
+        return found.reshape(z.shape)
+
+    @property
+    def slopes(self) -> FloatArray:
+        """J, what each parameter does per standard deviation of its measurement, (D, k)."""
+        return self.mean[:, 1 : 1 + self.parameters]
+
+    @property
+    def slope_variance(self) -> FloatArray:
+        """What the errors of J add to the variance of z where θ ~ N(0, I), (D,)."""
+        places = np.arange(1, 1 + self.parameters)
+        return np.asarray(self.covariance[:, places, places].sum(axis=1), dtype=np.float64)
+
+    def row(self, acting: Mapping[int, float] | None = None) -> FloatArray:
+        """The row of the regression in which ways act at amplitudes ``acting``, parameters at their means."""
+        return self.weighted_row([({way: 1.0}, amplitude) for way, amplitude in (acting or {}).items()])
+
+    def weighted_row(self, acting: Sequence[tuple[Mapping[int, float], float]]) -> FloatArray:
+        """The row in which weighted means of ways act at an amplitude each."""
+        first, m = 1 + self.parameters, len(self.ways)
+        row = np.zeros(first + 2 * m)
+        row[0] = 1.0
+        for weights, a in acting:
+            for way, weight in weights.items():
+                row[first + way] += weight * a
+                row[first + m + way] += weight * (a**2 - a)
+        return row
+
+    def at(self, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Means and variances of z, (n, D) each, for ``rows`` of the regression."""
+        used = np.flatnonzero(np.any(rows != 0.0, axis=0))
+        some, covariance = rows[:, used], self.covariance[:, used][:, :, used]
+        variance = np.einsum("ni,dij,nj->nd", some, covariance, some, optimize=True)
+        return some @ self.mean[:, used].T, np.asarray(variance, dtype=np.float64)
+
+
+def planar_weights(angle: float) -> dict[float, float]:
+    """Weights of the directions ``ANGLES`` in an effect that acts towards ``angle`` [rad]."""
+    c, s, second = math.cos(angle), math.sin(angle), 0.25 * math.cos(2.0 * angle)
+    return dict(
+        zip(
+            ANGLES,
+            (0.25 + 0.5 * c + second, 0.25 + 0.5 * s - second, 0.25 - 0.5 * c + second, 0.25 - 0.5 * s - second),
+            strict=True,
+        )
+    )
+
+
+def emulated(lessons: Lessons, ways: Sequence[Way], weights: Sequence[float] | None = None) -> Emulator:
+    """The emulator taught by pours.
+
+    Parameters
+    ----------
+    lessons
+        Pours of the base model and at least two of every way.
+    ways
+        Directions of effects.
+    weights
+        By condition, pours of the data there over their mean over the conditions; 1 where they are as many everywhere.
+        A condition with more pours of data counts for more.
+
+    Returns
+    -------
+    The emulator.
+
+    Raises
+    ------
+    StatisticsError
+        Where the base model or a way has fewer than two pours.
+    """
+    names = ["base", *(way.name for way in ways)]
+    for number, name in enumerate(names, start=-1):
+        if (count := int((lessons.way == number).sum())) < 2:
+            raise StatisticsError(f"{name}: {count} pours that count in every condition; allowed: at least 2")
+    k, m = lessons.theta.shape[1], len(ways)
+    base, own = lessons.way == -1, lessons.where(lessons.own)
+    squashes = tuple(_squash(own, c) for c in range(len(lessons.blocks)))
+    drawn_in = [squash(block) for squash, block in zip(squashes, lessons.blocks, strict=True)]
+    whitening, freedom = _whitening([block[lessons.own] for block in drawn_in], own, weights)
+    z = np.concatenate(drawn_in, axis=1) @ whitening.T
+    shift = z - lessons.theta @ _pooled_slopes(z, lessons.groups(), lessons.theta)
+    shift -= shift[base].mean(axis=0)
+    # a β_e of least squares through the origin, way by way, and the variance of its noise.
+    square = np.array([(lessons.amplitude[lessons.way == w] ** 2).sum() for w in range(m)])
+    signatures = np.stack([lessons.amplitude[lessons.way == w] @ shift[lessons.way == w] for w in range(m)] or [z[0]])
+    noise = 1.0 / square + 1.0 / base.sum() if m else np.ones(1)
+    variances, axes = signature_prior(signatures / square[:, None] if m else 0.0 * signatures, noise)
+    rows = np.zeros((len(lessons), 1 + k + 2 * m))
+    rows[:, 0], rows[:, 1 : 1 + k] = 1.0, lessons.theta
+    acting = np.flatnonzero(~base)
+    a = lessons.amplitude[acting]
+    rows[acting, 1 + k + lessons.way[acting]] = a
+    rows[acting, 1 + k + m + lessons.way[acting]] = a**2 - a
+    mean, covariance = regression(rows, z @ axes, k, variances)
+    reached = tuple(float(lessons.amplitude[lessons.way == w].max()) for w in range(m))
+    return Emulator(tuple(ways), k, mean, covariance, freedom, squashes, axes.T @ whitening, reached)
+
+
+def signature_prior(signatures: FloatArray, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Prior variances v (D,) of ``signatures`` (m, D) of ``noise`` variance (m,) along their principal axes, and these.
+
+    Axes are columns (D, D).
+    """
+    m, size = signatures.shape
+    level = float(noise.mean())
+    values, axes = np.linalg.eigh(signatures.T @ signatures / m)
+    leading = np.maximum(values - level * (1.0 + np.sqrt(size / m)) ** 2, 0.0)
+    rest = max(LEAST_VARIANCE, (float(values.sum()) - size * level - float(leading.sum())) / size)
+    return leading + FLOOR * rest, axes
+
+
+def regression(
+    rows: FloatArray, z: FloatArray, parameters: int, variances: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Mean (D, c) and covariance (D, c, c) of the c = 1 + k + 2m coefficients of every feature.
+
+    Parameters
+    ----------
+    rows, z
+        Of each pour, (n, c) and (n, D).
+    parameters
+        k.
+    variances
+        v, (D,).
+    """
+    columns = rows.shape[1]
+    m = (columns - 1 - parameters) // 2
+    precision = np.full((len(variances), columns), FLAT)
+    precision[:, 1 + parameters : 1 + parameters + m] = 1.0 / variances[:, None]
+    precision[:, 1 + parameters + m :] = 1.0 / (CURVATURE**2 * variances[:, None])
+    covariance = np.linalg.inv(rows.T @ rows + precision[:, :, None] * np.eye(columns))
+    mean = np.einsum("dij,jd->di", covariance, rows.T @ z, optimize=True)
+    return np.asarray(mean, dtype=np.float64), np.asarray(covariance, dtype=np.float64)
+
+
+def _squash(own: Lessons, condition: int) -> Squash:
+    """By the mean of the base model's pours, and the deviations within all groups."""
+    block = own.blocks[condition]
+    deviation = np.sqrt((_residuals(block, own.groups(), own.theta) ** 2).mean(axis=0))
+    return Squash(block[own.way == -1].mean(axis=0), np.where(deviation > 0.0, deviation, 1.0))
+
+
+def _whitening(drawn_in: Sequence[FloatArray], own: Lessons, weights: Sequence[float] | None) -> tuple[FloatArray, int]:
+    """W (D, D), block by condition, and the degrees of freedom."""
+    sizes, group = [block.shape[1] for block in drawn_in], own.groups()
+    white = np.zeros((sum(sizes), sum(sizes)))
+    first = 0
+    for c, (size, block) in enumerate(zip(sizes, drawn_in, strict=True)):
+        covariance = shrunk_covariance(_residuals(block, group, own.theta))
+        inverse = np.linalg.inv(np.linalg.cholesky(covariance))
+        white[first : first + size, first : first + size] = inverse * np.sqrt(weights[c] if weights else 1.0)
+        first += size
+    several = np.bincount(group) > 1
+    pours = int(several[group].sum())
+    return white, max(1, pours - int(several.sum()) - own.theta.shape[1])
+
+
+def _pooled_slopes(values: FloatArray, group: npt.NDArray[np.int64], theta: FloatArray) -> FloatArray:
+    """What parameters do within groups, (k, d), by least squares."""
+    inside, moved = _within(values, group), _within(theta, group)
+    return np.asarray(np.linalg.lstsq(moved, inside, rcond=None)[0], dtype=np.float64)
+
+
+def _residuals(values: FloatArray, group: npt.NDArray[np.int64], theta: FloatArray) -> FloatArray:
+    """Scatter within groups, less what parameters do, of the pours that are not alone in theirs."""
+    left = _within(values, group) - _within(theta, group) @ _pooled_slopes(values, group, theta)
+    count = np.bincount(group)[group].astype(np.float64)
+    several = count > 1
+    # Each group's mean takes a degree of freedom.
+    return np.asarray((left * np.sqrt(count / np.maximum(1.0, count - 1.0))[:, None])[several], dtype=np.float64)
+
+
+def _within(values: FloatArray, group: npt.NDArray[np.int64]) -> FloatArray:
+    count = np.bincount(group).astype(np.float64)
+    means = np.zeros((len(count), values.shape[1]))
+    np.add.at(means, group, values)
+    return np.asarray(values - (means / count[:, None])[group], dtype=np.float64)
+
+
+def _whitened(whitening: FloatArray, blocks: Sequence[FloatArray]) -> FloatArray:
+    return np.asarray(whitening @ np.concatenate([block.mean(axis=0) for block in blocks]), dtype=np.float64)

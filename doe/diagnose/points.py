@@ -1,0 +1,142 @@
+"""Which pours a diagnosis asks for: they belong to the declared model and its rigs, not to one data set.
+
+A point is one setting with a number in a fixed sequence, so that the same model asks for the same pours again, and more
+pours continue a sequence instead of beginning another. In all sequences that teach, parameters are moved by one
+deviation to either side, by the Walsh functions of the number: over every four (of three parameters) each is at either
+side as often, and no two go together, so what parameters do costs no pours of its own.
+
+Exact symmetries stand in for pours. In a rig that looks the same after a quarter turn, a pile on a tilted plate turned
+by a quarter is a pile on a plate tilted the other way; and the pile of a displaced funnel is the pile, displaced.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from doe.diagnose.declared import Declared, Effect, Parameter
+from doe.record import Record
+from solver import Record as PourRecord
+
+
+@dataclass(frozen=True)
+class View:
+    """How a pour is looked at: its pile after ``turns`` quarter turns about the rig's axis, then displaced by
+    ``shift`` (x, y) [m].
+    """
+
+    turns: int = 0
+    shift: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def label(self) -> str:
+        """What the name of a number that is read so ends with."""
+        return "" if self == AS_IT_IS else f"|{self.turns} {self.shift[0]:.6g} {self.shift[1]:.6g}"
+
+    def of(self, record: PourRecord) -> PourRecord:
+        """``record`` with its pile so."""
+        pile = record.pile
+        if self == AS_IT_IS:
+            return record
+
+        def seen(places: np.ndarray) -> np.ndarray:
+            x, y, z = places.T
+            for _ in range(self.turns % 4):
+                x, y = -y, x
+            return np.column_stack([x + self.shift[0], y + self.shift[1], z])
+
+        spheres = dataclasses.replace(pile.spheres, centre=seen(pile.spheres.centre))
+        pile = dataclasses.replace(pile, spheres=spheres, position=seen(pile.position))
+        return dataclasses.replace(record, pile=pile)
+
+
+AS_IT_IS = View()
+
+
+@dataclass(frozen=True)
+class Point:
+    """One setting of the declared model. ``sequence`` and ``number`` name it for good and give its seeds."""
+
+    sequence: str
+    number: int
+    theta: tuple[float, ...]
+    """Parameters in natural units, in the order of the declaration."""
+    effects: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    """Names of the effects that are on, with their amplitudes."""
+    view: View = AS_IT_IS
+
+    def seen(self, view: View) -> Point:
+        """The same pour, looked at otherwise."""
+        return dataclasses.replace(self, view=view)
+
+
+@dataclass(frozen=True)
+class Direction(Record):
+    """One way in which an effect can act: its amplitudes are multiples of ``full``, the ends of its range.
+
+    ``angle`` [rad]: of a direction in the plane.
+    """
+
+    effect: str
+    name: str
+    """The effect's, with the sign or the axis where there are several."""
+    full: tuple[float, ...]
+    angle: float | None = None
+
+    def at(self, share: float) -> tuple[float, ...]:
+        """The amplitude [natural units] at ``share`` of the range."""
+        return tuple(share * end for end in self.full)
+
+
+def directions_of(effect: Effect) -> list[Direction]:
+    """Up and, where there is one, down; of two amplitudes along +x, +y, −x and −y."""
+    name = effect.name
+    if effect.amplitudes == 2:
+        (east, north), (west, south) = effect.high, effect.low
+        ends = ((east, 0.0), (0.0, north), (west, 0.0), (0.0, south))
+        signs = ("+x", "+y", "-x", "-y")
+        # One size in all directions, so that one amplitude serves for those between.
+        size = min(abs(a) + abs(b) for a, b in ends)
+        return [
+            Direction(
+                name,
+                f"{name} {sign}",
+                (size * math.copysign(1.0, a) * (a != 0), size * math.copysign(1.0, b) * (b != 0)),
+                k * 0.5 * math.pi,
+            )
+            for k, (sign, (a, b)) in enumerate(zip(signs, ends, strict=True))
+        ]
+    if effect.low[0] < 0.0:
+        return [Direction(name, f"{name} +", effect.high), Direction(name, f"{name} -", effect.low)]
+    return [Direction(name, name, effect.high)]
+
+
+def moved(declared: Declared, number: int) -> tuple[float, ...]:
+    """Parameters [natural units] of pour ``number`` of a sequence: each a deviation off its middle, within range."""
+    return declared.natural([_walsh(number, j + 1) for j in range(len(declared.parameters))])
+
+
+def _walsh(number: int, mask: int) -> float:
+    return -1.0 if (number & mask).bit_count() % 2 else 1.0
+
+
+def base_points(declared: Declared, number: int, first: int = 0) -> list[Point]:
+    """Pours ``first`` … ``number`` − 1 of the base model."""
+    return [Point("base", k, moved(declared, k)) for k in range(first, number)]
+
+
+def effect_points(declared: Declared, direction: Direction, share: float, number: int, first: int = 0) -> list[Point]:
+    """Pours ``first`` … ``number`` − 1 of an effect at ``share`` of its range."""
+    amplitude = direction.at(share)
+    name = f"{direction.effect}@{'_'.join(f'{one:.6g}' for one in amplitude)}"
+    effects = ((direction.effect, amplitude),)
+    return [Point(name, k, moved(declared, k), effects) for k in range(first, number)]
+
+
+def middle(parameters: Sequence[Parameter]) -> tuple[float, ...]:
+    """Every parameter at its independently measured mean, or in the middle of its range."""
+    return tuple(p.middle for p in parameters)

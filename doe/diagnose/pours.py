@@ -1,0 +1,269 @@
+"""Pours of the declared model: points of a plan in, summaries per condition out; every pour is kept in the store."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections import deque
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from doe.diagnose.declared import effect_values
+from doe.diagnose.points import AS_IT_IS, Point, View
+from doe.measurement.features import feature_set, features_of_record
+from doe.measurement.measurement import Condition, Observation
+from doe.runner import Pours, seed_of, stored_run
+from doe.store import Reader, Store, StoredRun
+from solver import (
+    EFFECTS,
+    Job,
+    Outcome,
+    ParameterError,
+    Record,
+    Scene,
+    observe_named,
+    pour_key,
+    with_values,
+)
+
+PROFILE = "height_profile_m"
+ROOT = 0
+"""Root of the seeds: the same for every data set of a model, so that its pours are found again."""
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How one pour ended. ``label``: point and condition.
+
+    No seed is tried again: the other points carry the emulator.
+    """
+
+    label: str
+    seed: int
+    outcome: Outcome
+    message: str
+    replicate: int = 0
+    attempt: int = 0
+
+    @property
+    def valid(self) -> bool:
+        """Whether the run came to its end."""
+        return self.outcome.valid
+
+
+OnPour = Callable[[str, int, Ended], None]
+"""Called with (what is being run, pours still to come, how this one ended)."""
+
+
+@dataclass(frozen=True)
+class Pour:
+    """What one pour of a point in a condition gave; NaN where nothing could be read."""
+
+    summaries: tuple[float, ...]
+    outcome: str
+    profile: tuple[float, ...] = ()
+    """Mean heights [m] for a picture; nothing is decided by them."""
+    surface: tuple[float, ...] = ()
+    """The features of the pile's surface (``doe/measurement/features.py``), which follow the summaries."""
+
+    @property
+    def valid(self) -> bool:
+        """Whether the run came to its end."""
+        return Outcome(self.outcome).valid
+
+
+Rows = list[list[Pour]]
+"""Pours per point and condition."""
+Result = TypeVar("Result")
+Search = Generator[Sequence[Point], Rows, Result]
+"""Asks for pours of points, as often as it needs, and ends with what it has found."""
+Place = tuple[Point, int]
+"""Point and number of a condition."""
+
+
+def once(points: Sequence[Point]) -> Search[Rows]:
+    """The search that asks for ``points`` and ends with their pours."""
+    return (yield points)
+
+
+def room_of(conditions: Sequence[Condition]) -> list[Scene]:
+    """Scenes that need as much room as most points: every condition at the ends of each effect, where it can be.
+
+    The same at every stage, so that a worker compiles its batches once.
+    """
+    room: list[Scene] = []
+    for condition in conditions:
+        for name, kind in EFFECTS.items():
+            for share in (-1.0, 1.0):
+                ends = effect_values(name, [share * kind.strongest for _ in kind.amplitudes])
+                with contextlib.suppress(ParameterError):
+                    room.append(with_values(condition.scene, ends))
+    return room
+
+
+class ModelPours:
+    """Runs points of one declared model under its conditions. Points asked for before are not run again."""
+
+    def __init__(
+        self,
+        conditions: Sequence[Condition],
+        paths: Sequence[str],
+        store: Store,
+        pours: Pours,
+        on_pour: OnPour | None = None,
+        root: int = ROOT,
+    ) -> None:
+        self._conditions, self._paths, self._store = tuple(conditions), tuple(paths), store
+        self._pours, self._on_pour, self._root = pours, on_pour, root
+        self._known: dict[Place, Pour] = {}
+        self._keys: dict[Place, str] = {}
+        """Of the pours that are asked for."""
+        self.run_now = 0
+        """Pours that were really run, not found in the store."""
+
+    def run(self, what: str, points: Sequence[Point], where: Sequence[int] | None = None) -> Rows:
+        """Pours of every point, one per condition, or per condition ``where``."""
+        return self.answered(what, [once(points)], where)[0]
+
+    def answered(
+        self,
+        what: str,
+        searches: Sequence[Search[Result]],
+        where: Sequence[int] | None = None,
+        widest: Sequence[Point] = (),
+    ) -> list[Result]:
+        """What each of ``searches`` ends with. Each is answered as soon as its own pours are there.
+
+        What is asked for in answer to pours goes first, so that a search of many steps does not come last. It has to
+        fit into the room that its first points and the points ``widest`` need.
+        """
+        asked = range(len(self._conditions)) if where is None else where
+        found: dict[int, Result] = {}
+        open_places: dict[int, set[Place]] = {}
+        points: dict[int, Sequence[Point]] = {}
+        wanted: list[tuple[int, Place]] = []
+        queue: deque[Job] = deque()
+
+        def resumed(k: int) -> list[Job]:
+            """Jobs that search ``k`` waits for now; none where it has ended."""
+            try:
+                while True:
+                    rows = [[self._known[point, c] for c in asked] for point in points[k]] if k in points else None
+                    points[k] = next(searches[k]) if rows is None else searches[k].send(rows)
+                    places = dict.fromkeys((point, c) for point in points[k] for c in asked)
+                    if missing := [place for place in places if not self._find(*place)]:
+                        break
+            except StopIteration as end:
+                found[k] = end.value
+                return []
+            open_places[k] = set(missing)
+            first = len(wanted)
+            wanted.extend((k, place) for place in missing)
+            return [Job(self.scene(*one), self.seed(*one), tag=first + n) for n, one in enumerate(missing)]
+
+        for k in range(len(searches)):
+            queue.extend(resumed(k))
+        left = len(queue)
+        room = room_of(self._conditions) + [job.scene for job in queue] + self._possible(widest, asked)
+        for job, record in self._pours(queue, room) if queue else ():
+            k, (point, c) = wanted[job.tag]
+            self._known[point, c] = self._keep(what, point, c, job, record)
+            self.run_now += 1
+            open_places[k].discard((point, c))
+            more = [] if open_places[k] else resumed(k)
+            queue.extendleft(reversed(more))
+            left += len(more) - 1
+            if self._on_pour is not None:
+                label = f"{point.sequence} {point.number}, {self._conditions[c].name}"
+                self._on_pour(what, left, Ended(label, job.seed, record.outcome, record.message))
+        return [found[k] for k in range(len(searches))]
+
+    def scene(self, point: Point, condition: int) -> Scene:
+        """The scene of ``point`` in a condition."""
+        values: dict[str, float | str] = dict(zip(self._paths, point.theta, strict=True))
+        for effect, amplitude in point.effects:
+            values |= effect_values(effect, amplitude)
+        return with_values(self._conditions[condition].scene, values)
+
+    def seed(self, point: Point, condition: int) -> int:
+        """Seed of the pour of ``point`` in a condition."""
+        return seed_of(self._root, point.sequence, point.number, condition, 0)
+
+    def _possible(self, points: Sequence[Point], where: Sequence[int]) -> list[Scene]:
+        """Scenes of ``points``, less those that there cannot be."""
+        scenes: list[Scene] = []
+        for point in points:
+            for c in where:
+                with contextlib.suppress(ParameterError):
+                    scenes.append(self.scene(point, c))
+        return scenes
+
+    def _find(self, point: Point, condition: int) -> bool:
+        """Whether the pour is known, here or in the store."""
+        place = point, condition
+        if place not in self._known:
+            self._keys[place] = pour_key(self.scene(point, condition), self.seed(point, condition))
+            stored = self._store.find(self._keys[place])
+            if stored is not None:
+                asked = self._conditions[condition]
+                names = [name + point.view.label for name in (*profile_names(asked), *feature_set(asked).names)]
+                stored = self._store.read(stored, names, reader(asked, point.view))
+                self._known[place] = _pour(asked, stored, point.view)
+        return place in self._known
+
+    def _keep(self, what: str, point: Point, condition: int, job: Job, record: Record) -> Pour:
+        asked = self._conditions[condition]
+        key, label = self._keys[point, condition], f"{point.sequence} {point.number}"
+        stored = stored_run(job, record, "diagnose", what, label, reader(asked, point.view), key)
+        self._store.add(stored)
+        return _pour(asked, stored, point.view)
+
+
+def measured_profile(condition: Condition) -> Observation | None:
+    """The measured profiles: places x (k,) [m], values (replicates, k) [m]; None where the data offer none."""
+    return condition.offered.get(PROFILE)
+
+
+def profile_names(condition: Condition) -> tuple[str, ...]:
+    """Names under which the k heights of a pour are kept; none where the data offer no profile."""
+    profile = measured_profile(condition)
+    return () if profile is None or profile.x is None else tuple(f"{PROFILE}({x:g})" for x in profile.x)
+
+
+def profile_of_record(condition: Condition, record: Record) -> tuple[float, ...]:
+    """Heights (k,) [m] of a run at the measured places; none where the data offer no profile."""
+    profile = measured_profile(condition)
+    if profile is None or profile.x is None:
+        return ()
+    return tuple(np.asarray(observe_named(record, {PROFILE: profile.x})[PROFILE]).tolist())
+
+
+def reader(condition: Condition, view: View = AS_IT_IS) -> Reader:
+    """What a diagnosis reads off a pour of ``condition``: its profile, its summaries, and features of its surface."""
+
+    def read(record: Record) -> dict[str, float]:
+        record = view.of(record)
+        heights, numbers = profile_of_record(condition, record), features_of_record(condition, record)
+        names = [name + view.label for name in (*profile_names(condition), *feature_set(condition).names)]
+        return dict(zip(names, (*heights, *numbers.tolist()), strict=True))
+
+    return read
+
+
+def _pour(condition: Condition, stored: StoredRun, view: View) -> Pour:
+    """What is kept of a stored pour of ``condition``; NaN for what could not be read."""
+
+    def numbers(names: Sequence[str]) -> tuple[float, ...]:
+        found = (stored.observables[name + view.label] for name in names)
+        return tuple(math.nan if x is None else x for x in found)
+
+    features = feature_set(condition)
+    return Pour(
+        numbers(features.scalars),
+        stored.outcome,
+        numbers(profile_names(condition)),
+        numbers(features.profile + features.surface),
+    )

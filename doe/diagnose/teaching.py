@@ -1,0 +1,273 @@
+"""The pours that teach the models: the base model, every effect at its level, and more of what stays in question.
+
+Measured values come in only in the choice of what is poured more, and at which multiple of its level (a power of two,
+so that data sets of one model ask for the same pours); all pours belong to the declared model.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.diagnose.compared import Measured
+from doe.diagnose.declared import Declared, declare
+from doe.diagnose.emulator import Lessons, Way
+from doe.diagnose.levels import Level, Trials, level_of
+from doe.diagnose.points import AS_IT_IS, Direction, Point, View, base_points, directions_of, effect_points
+from doe.diagnose.posterior import Posterior
+from doe.diagnose.pours import ModelPours, Pour
+from doe.errors import StatisticsError
+from doe.measurement.measurement import Condition, Measurement
+from solver import Scene, pour_rig
+
+FloatArray = npt.NDArray[np.float64]
+Say = Callable[[str], None]
+
+TRIALS = Trials(pours=2, most=5, enough=7.0, too_much=18.0)
+"""Two pours tell a shift of 12 to ± 2; all that are tried teach as well."""
+SHIFTED = 12
+"""Pours of the base model that are looked at from elsewhere, for a displaced funnel."""
+IN_QUESTION = 0.03
+"""Probability of an effect from which on it is in question."""
+FURTHER, FOLLOWED = 5.0, 3
+"""Log evidence over the base model's from which on an effect is followed further whose best fit is at the end of what
+was poured, and how many of these at once: what is strong looks like nothing that was poured."""
+BEHIND = 4.0
+"""Log evidence by which a direction may be behind the best one of its effect and be in question with it."""
+
+
+@dataclass(frozen=True)
+class Budget:
+    """How many pours a diagnosis takes for its models, in each condition."""
+
+    base: int = 24
+    screening: int = 4
+    """Of each direction of an effect."""
+    more: int = 12
+    """At each look, of what stays in question."""
+    looks: int = 3
+
+    def planned(self, directions: int, conditions: int) -> int:
+        """Pours before the first look, amplitudes found at once."""
+        return conditions * (self.base + directions * self.screening)
+
+    def scaled(self, runs: int, directions: int, conditions: int) -> Budget:
+        """The same shares in at most ``runs`` pours. Raises StatisticsError for fewer than ``LEAST`` takes."""
+        least = LEAST.planned(directions, conditions)
+        if runs < least:
+            raise StatisticsError(
+                f"budget: {runs} pours; {directions} directions of effects in {conditions} fitted conditions take at "
+                f"least {least}"
+            )
+        share = runs / self.planned(directions, conditions)
+        # What is held at its least is taken from the rest.
+        while (found := self._shares(share)).planned(directions, conditions) > runs:
+            share *= 0.99
+        return found
+
+    def _shares(self, share: float) -> Budget:
+        own = {name: getattr(self, name) for name in ("base", "screening", "more")}
+        return replace(self, **{key: max(getattr(LEAST, key), round(share * value)) for key, value in own.items()})
+
+
+LEAST = Budget(base=12, screening=2, more=4)
+"""Below that there is no covariance."""
+
+
+def scaled_budget(runs: int, measurement: Measurement, effects: Sequence[str]) -> Budget:
+    """The budget of about ``runs`` pours before the first closer look. Raises StatisticsError for too few."""
+    directions = sum(len(directions_of(effect)) for effect in declare(measurement, effects).effects)
+    return Budget().scaled(runs, directions, len(measurement.fit))
+
+
+class Teacher:
+    """Pours what teaches the models of a declared scene in the set-ups of ``conditions``.
+
+    Raises StatisticsError where the base model comes to no valid end.
+    """
+
+    def __init__(
+        self, declared: Declared, conditions: Sequence[Condition], pours: ModelPours, budget: Budget, say: Say
+    ) -> None:
+        self._declared, self._conditions = declared, tuple(conditions)
+        self._pours, self._budget, self._say = pours, budget, say
+        self._acting: dict[Point, tuple[int, float]] = {}
+        """Way and multiple of every point that was poured."""
+        self._rows: dict[Point, list[Pour]] = {}
+        self._directions = [one for effect in declared.effects for one in directions_of(effect)]
+        self._turned = all(_turns(condition.scene) for condition in conditions)
+        self._heaps = all(pour_rig(condition.scene).leaves_heap for condition in conditions)
+        base = base_points(declared, budget.base)
+        self._keep(base, pours.run("base model", base), -1, 0.0)
+        self._base = [self._rows[point] for point in base]
+        valid = min(sum(row[c].valid for row in self._base) for c in range(len(conditions)))
+        if valid < max(4, len(base) // 3):
+            outcomes = sorted({pour.outcome for row in self._base for pour in row if not pour.valid})
+            raise StatisticsError(
+                f"base model: {valid} of {len(base)} pours end in a valid pile (the others: {', '.join(outcomes)}); "
+                "the declared model does not do what was measured"
+            )
+        say(f"base model: {len(base)} settings")
+        self._levels = self._found_levels()
+        self.ways = tuple(
+            Way(one.effect, one.name, one.at(level.share), 1.0 / level.share, one.angle)
+            for one, level in zip(self._directions, self._levels, strict=True)
+        )
+        self._pour("screening", [(way, 1.0, budget.screening) for way in range(len(self.ways))])
+        say(f"screening: {len(self._rows)} settings of {len(declared.effects)} effects")
+
+    @property
+    def settings(self) -> int:
+        """Settings poured so far."""
+        return len({point.seen(AS_IT_IS) for point in self._rows})
+
+    @property
+    def levels(self) -> tuple[Level, ...]:
+        """Reference amplitudes, way by way."""
+        return tuple(self._levels)
+
+    def look(self, found: Posterior) -> tuple[str, ...]:
+        """Pour more of what ``found`` leaves in question, near its best fits; the effects that were poured."""
+        further = self.at_end(found)
+        wanted = [(way, multiple, self._budget.screening) for way, multiple in further]
+        wanted += [
+            (way, multiple, self._taught(way, multiple) + self._budget.more)
+            for way, multiple in self._in_question(found)
+            if way not in dict(further)
+        ]
+        self._pour("closer look", wanted)
+        return tuple(dict.fromkeys(self.ways[way].effect for way, _, _ in wanted))
+
+    def lessons(self) -> Lessons:
+        """All pours, NaN where one broke off or a feature could not be read."""
+        points = list(self._rows)
+        blocks = []
+        for c in range(len(self._conditions)):
+            rows = [self._rows[point][c] for point in points]
+            block = np.array([(*row.summaries, *row.surface) for row in rows], dtype=np.float64)
+            block[[not row.valid for row in rows]] = np.nan
+            blocks.append(block)
+        way, amplitude = zip(*(self._acting[point] for point in points), strict=True)
+        return Lessons(
+            np.array([self._declared.theta(point.theta) for point in points]).reshape(len(points), -1),
+            np.array(way, dtype=np.int64),
+            np.array(amplitude, dtype=np.float64),
+            np.array([point.view == AS_IT_IS for point in points]),
+            tuple(blocks),
+        )
+
+    def displaced(self, conditions: Sequence[Measured]) -> list[FloatArray]:
+        """By condition, what its scans' axis being off by its error along x and along y does to all features, (2, d).
+
+        Of the same pours, so without noise. Empty where no scan has an axis that could be off.
+        """
+        if not any(one.axis_error > 0.0 for one in conditions):
+            return []
+        found = []
+        for c, one in enumerate(conditions):
+            points = base_points(self._declared, SHIFTED)
+            views = [View(), View(shift=(one.axis_error, 0.0)), View(shift=(0.0, one.axis_error))]
+            seen = self._pours.run("axis of the scans", [p.seen(v) for v in views for p in points], [c])
+            rows = np.array([(*row.summaries, *row.surface) for (row,) in seen]).reshape(3, len(points), -1)
+            change = rows[1:] - rows[0]
+            ended = np.isfinite(change).any(axis=(0, 2))
+            found.append(np.nan_to_num(change[:, ended].mean(axis=1)))
+        return found
+
+    def _found_levels(self) -> list[Level]:
+        """The level of every direction; one for all directions in the plane."""
+        asked = [one for one in self._directions if not one.angle]
+        searches = [level_of(self._declared, one, self._base, partial(self._points, one), TRIALS) for one in asked]
+        widest = [point for one in asked for point in self._points(one, 1.0, 1)]
+        found = self._pours.answered("amplitudes", searches, widest=widest)
+        levels, last = [], iter(found)
+        for one in self._directions:
+            if not one.angle:
+                level = next(last)
+                reach = f"up to {_words(one, level.share)}, which shifts by {level.shift:.1f} standard errors"
+                self._say(f"{one.name}: {reach}")
+            levels.append(replace(level, direction=one))
+        return levels
+
+    def _points(self, direction: Direction, share: float, number: int) -> list[Point]:
+        """Pours of ``direction`` at ``share`` of its range, by whatever stands in for them."""
+        if direction.angle is not None and direction.effect == "funnel_offset" and self._heaps:
+            dx, dy = direction.at(share)
+            return [one.seen(View(shift=(dx, dy))) for one in base_points(self._declared, max(number, SHIFTED))]
+        if direction.angle and self._turned:
+            first = next(one for one in self._directions if one.effect == direction.effect)
+            turns = View(turns=round(direction.angle / (0.5 * math.pi)))
+            return [one.seen(turns) for one in effect_points(self._declared, first, share, number)]
+        return effect_points(self._declared, direction, share, number)
+
+    def _pour(self, what: str, wanted: Iterable[tuple[int, float, int]]) -> None:
+        """Pour ways at multiples of their levels up to so many of each; of a planar effect in all its directions."""
+        asked: list[tuple[int, float, list[Point]]] = []
+        for way, multiple, number in wanted:
+            angle = self.ways[way].angle
+            same = [w for w, one in enumerate(self.ways) if one.effect == self.ways[way].effect]
+            for w in [way] if angle is None else same:
+                share = min(1.0, multiple * self._levels[w].share)
+                asked.append((w, share / self._levels[w].share, self._points(self._directions[w], share, number)))
+        plain = dict.fromkeys(point.seen(AS_IT_IS) for _, _, points in asked for point in points)
+        self._pours.run(what, list(plain))
+        for way, multiple, points in asked:
+            self._keep(points, self._pours.run(what, points), way, multiple)
+
+    def _keep(self, points: Sequence[Point], rows: Sequence[list[Pour]], way: int, multiple: float) -> None:
+        for point, row in zip(points, rows, strict=True):
+            self._rows[point], self._acting[point] = row, (way, multiple)
+
+    def _taught(self, way: int, multiple: float) -> int:
+        return sum(one == (way, multiple) for one in self._acting.values())
+
+    def _in_question(self, found: Posterior) -> list[tuple[int, float]]:
+        """Ways, with the multiples that are poured next to their best fit."""
+        probability: dict[str, float] = {}
+        for label, p in found.effects.items():
+            for name in label.split("+"):
+                probability[name] = probability.get(name, 0.0) + p
+        best: dict[str, float] = {}
+        for level in found.levels:
+            effect = self.ways[level.way].effect
+            best[effect] = max(best.get(effect, -math.inf), level.log_density)
+        leading = max(probability, key=lambda name: probability[name], default="")
+        asked: list[tuple[int, float]] = []
+        for level in found.levels:
+            way = self.ways[level.way]
+            if probability[way.effect] > IN_QUESTION and level.log_density > best[way.effect] - BEHIND:
+                power = math.log2(level.amplitude)
+                powers = {round(power)}
+                if way.effect == leading and level.log_density == best[way.effect]:
+                    # On both sides of the best fit, so that it is no extrapolation.
+                    powers = {math.floor(power), math.ceil(power)}
+                asked += [(level.way, min(2.0**one, way.most)) for one in sorted(powers)]
+        return asked
+
+    def at_end(self, found: Posterior) -> list[tuple[int, float]]:
+        """Ways whose best fit is the largest amplitude that the models reach, with a larger one that there can be."""
+        base = found.fits["base"].log_evidence
+        ends = []
+        for level in sorted(found.levels, key=lambda one: -one.log_density):
+            way, reached = self.ways[level.way], self._reached(level.way)
+            further = min(2.0 * reached, way.most)
+            if level.log_density - base > FURTHER and level.amplitude > reached and further > 1.001 * reached:
+                ends.append((level.way, further))
+        return ends[:FOLLOWED]
+
+    def _reached(self, way: int) -> float:
+        return max(multiple for one, multiple in self._acting.values() if one == way)
+
+
+def _turns(scene: Scene) -> bool:
+    """Whether a quarter turn leaves the declared ``scene`` as it is."""
+    return pour_rig(scene).quarter_turns and scene.gravity[0] == scene.gravity[1] == 0.0 and not any(scene.axis)
+
+
+def _words(direction: Direction, share: float) -> str:
+    return " ".join(f"{one:.3g}" for one in direction.at(share))

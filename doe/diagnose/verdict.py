@@ -1,0 +1,347 @@
+"""The answer: two rules on the posterior, and everything that led to it, as plain records.
+
+kind: ``no_missing_effect``, ``effect:<name>``, ``effects:<a>+<b>``, ``unexplained``, or ``ambiguous:<a>,<b>,…`` with
+all that is still possible, which may be ``no_missing_effect`` and ``unexplained`` among them.
+
+    something is named     if its probability is ``THRESHOLD`` at least and the data are likely under it (``FITS``)
+    no_missing_effect      if that is the most probable by far, or nothing else can be told from it (``NOTHING_FROM``)
+    unexplained            if something outside the library is the most probable, or the best model does not fit
+    ambiguous              else: the smallest set that holds ``CREDIBLE``
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.diagnose.compared import Compared
+from doe.diagnose.declared import Declared, Parameter
+from doe.diagnose.levels import Level
+from doe.diagnose.posterior import TEMPERATURE, Amplitude, Fit, Posterior
+from doe.record import Record
+
+FloatArray = npt.NDArray[np.float64]
+
+THRESHOLD = 0.9
+"""Probability from which on an effect is named: one of the two numbers tuned on development sets."""
+NOTHING_FROM = 0.5
+"""Probability that nothing is missing from which on that is the answer: the prior's, so that data that favour no effect
+accuse none."""
+FITS = 0.002
+"""Probability of data as far off as these, below which a model does not fit: one right model in 500 is lost."""
+CREDIBLE = 0.95
+"""Probability of the set of an ambiguous answer."""
+NO_EFFECT, UNEXPLAINED = "no_missing_effect", "unexplained"
+
+
+@dataclass(frozen=True)
+class EffectRow(Record):
+    """One effect, or a pair that was weighed.
+
+    Attributes
+    ----------
+    name
+        The effect, or "a+b".
+    probability
+        Posterior.
+    log_evidence
+        ln of its evidence over that of the base model.
+    amplitudes
+        At its best fit.
+    p
+        Probability of data as far off as these, were its best fit true.
+    reference
+        The amplitude that its signature was poured at, "+" and "x" direction first; empty of a pair.
+    strength
+        Shift by that amplitude in the features that are compared, after recalibration [standard errors of the data].
+    fitted_strength
+        The same by its best fit.
+    cosine
+        Of its best fit's shift to the residual, after recalibration.
+    pours
+        That taught it, in every condition.
+    """
+
+    name: str
+    probability: float
+    log_evidence: float
+    amplitudes: tuple[Amplitude, ...]
+    p: float
+    reference: tuple[float, ...]
+    strength: float
+    fitted_strength: float
+    cosine: float
+    pours: int
+
+
+@dataclass(frozen=True)
+class ParameterRow(Record):
+    """A calibrated parameter, natural units: its measurement, and its posterior without and with what is named."""
+
+    name: str
+    low: float
+    high: float
+    mean: float | None
+    sd: float | None
+    before: float
+    before_sd: float
+    after: float
+    after_sd: float
+
+
+@dataclass(frozen=True)
+class Residual(Record):
+    """One feature: measured mean, calibrated base model and final model, natural units, and both residuals over the
+    standard deviation of noise, model and instrument, after recalibration.
+    """
+
+    condition: str
+    feature: str
+    measured: float
+    before: float
+    after: float
+    z_before: float
+    z_after: float
+
+
+@dataclass(frozen=True)
+class Place(Record):
+    """A condition: its share of the squared residuals of the base model, and the feature that is farthest off."""
+
+    condition: str
+    share: float
+    feature: str
+    z: float
+
+
+@dataclass(frozen=True)
+class Verdict(Record):
+    """The answer.
+
+    Attributes
+    ----------
+    kind, names, statement
+        See above; ``names``: the effects (or pairs) in it, the most probable first.
+    nothing, outside
+        Probabilities that nothing is missing and that something outside the library is.
+    effects
+        Effects, and pairs where they were weighed, the most probable first.
+    parameters, residuals, where
+        Of the calibrated base model and the final one: what is named, or else the most probable effect if it is in the
+        answer, or else the base model.
+    final
+        Label of the final model.
+    similar
+        Pairs of effects whose best fits shift the data alike: names and cosine, the most alike first.
+    left_out
+        What the data offer and no pour varies or gives.
+    scatter
+        Variance of the measured replicates over that of simulated pours.
+    threshold, temperature
+        The numbers of the rule.
+    taken_back
+        The answer that held-out data took back, or "".
+    """
+
+    kind: str
+    names: tuple[str, ...]
+    statement: str
+    nothing: float
+    outside: float
+    effects: tuple[EffectRow, ...]
+    parameters: tuple[ParameterRow, ...]
+    residuals: tuple[Residual, ...]
+    where: tuple[Place, ...]
+    final: str
+    similar: tuple[tuple[str, str, float], ...]
+    left_out: tuple[str, ...]
+    scatter: float
+    threshold: float = THRESHOLD
+    temperature: float = TEMPERATURE
+    taken_back: str = ""
+
+
+def answer(found: Posterior, threshold: float = THRESHOLD) -> tuple[str, tuple[str, ...], str]:
+    """Kind, names and sentence for a posterior."""
+    name, p = found.best if found.effects else ("", 0.0)
+    if p >= threshold:
+        if found.fits[name].p >= FITS:
+            kind = f"effects:{name}" if "+" in name else f"effect:{name}"
+            text = f"{_spoken(name)} explains what the declared model cannot, with probability {_percent(p)}."
+            return kind, (name,), text
+        text = f"{_spoken(name)} comes nearest, and data as far off it as these come up in less than 1 of 500 cases."
+        return UNEXPLAINED, (), text
+    if found.nothing >= NOTHING_FROM:
+        if found.fits["base"].p >= FITS:
+            text = (
+                f"The data ask for nothing that the declared model lacks, with probability {_percent(found.nothing)}."
+            )
+            return NO_EFFECT, (), text
+        text = "The data do not fit the calibrated declared model, and no effect of the library is nearer to them."
+        return UNEXPLAINED, (), text
+    if found.outside >= max(found.nothing, p):
+        text = (
+            f"Something is missing that no effect of the library explains, with probability {_percent(found.outside)}."
+        )
+        return UNEXPLAINED, (), text
+    everything = {**found.effects, NO_EFFECT: found.nothing, UNEXPLAINED: found.outside}
+    order = sorted(everything, key=lambda one: -everything[one])
+    last = int(np.searchsorted(np.cumsum([everything[one] for one in order]), CREDIBLE)) + 1
+    rivals = order[:last]
+    names = tuple(one for one in rivals if one in found.effects)
+    odds = ", ".join(f"{_spoken(one)} {_percent(everything[one])}" for one in rivals)
+    return f"ambiguous:{','.join(rivals)}", names, f"The data leave several answers: {odds}."
+
+
+def listed(names: Sequence[str]) -> str:
+    """ "a", "a or b" or "a, b or c"."""
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} or {names[-1]}"
+
+
+def verdict_of(compared: Compared, declared: Declared, levels: Sequence[Level], pours: Sequence[int]) -> Verdict:
+    """The verdict with its tables. ``pours``: that taught each way."""
+    found = compared.posterior
+    kind, names, statement = answer(found)
+    final = names[0] if names else "base"
+    before, after = found.fits["base"], found.fits[final]
+    white = _Recalibrated(compared)
+    rows = sorted(found.effects, key=lambda one: -found.effects[one])
+    return Verdict(
+        kind=kind,
+        names=names,
+        statement=statement,
+        nothing=found.nothing,
+        outside=found.outside,
+        effects=tuple(_effect_row(compared, white, label, pours) for label in rows[: len(levels) + 5]),
+        parameters=tuple(_parameter_row(p, j, before, after) for j, p in enumerate(declared.parameters)),
+        residuals=_residuals(compared, before, after),
+        where=_places(compared, white),
+        final=final,
+        similar=_similar(compared, white),
+        left_out=compared.left_out,
+        scatter=compared.data.scatter,
+    )
+
+
+def taken_back(verdict: Verdict, why: str) -> Verdict:
+    """The verdict once held-out data contradict it."""
+    statement = f"The fitted data say: {verdict.statement} The held-out data contradict it: {why}."
+    return replace(verdict, kind=UNEXPLAINED, names=(), statement=statement, taken_back=verdict.kind)
+
+
+class _Recalibrated:
+    """Shifts of z in standard errors of the data, with what recalibration can do taken out."""
+
+    def __init__(self, compared: Compared) -> None:
+        data, emulator = compared.data, compared.emulator
+        loadings = (
+            np.concatenate([emulator.slopes, data.instrument], axis=1) if data.instrument.size else emulator.slopes
+        )
+        noise = np.full(len(data.z), data.scatter / data.replicates)
+        self._factor = np.linalg.inv(np.linalg.cholesky(np.diag(noise) + loadings @ loadings.T))
+        self.base = emulator.at(emulator.row()[None])[0][0]
+        self.residual = self(data.z)
+
+    def __call__(self, z: FloatArray) -> FloatArray:
+        return np.asarray(self._factor @ (z - self.base), dtype=np.float64)
+
+
+def _effect_row(compared: Compared, white: _Recalibrated, label: str, pours: Sequence[int]) -> EffectRow:
+    found, emulator = compared.posterior, compared.emulator
+    fit = found.fits[label]
+    ways = [number for number, way in enumerate(emulator.ways) if way.effect == label]
+    shift = white(fit.z - emulator.slopes @ fit.theta)
+    strength = 0.0
+    if ways:
+        strength = float(np.linalg.norm(white(emulator.at(emulator.row({ways[0]: 1.0})[None])[0][0])))
+    return EffectRow(
+        name=label,
+        probability=found.effects[label],
+        log_evidence=fit.log_evidence - found.fits["base"].log_evidence,
+        amplitudes=fit.amplitudes,
+        p=fit.p,
+        reference=emulator.ways[ways[0]].unit if ways else (),
+        strength=strength,
+        fitted_strength=float(np.linalg.norm(shift)),
+        cosine=_cosine(shift, white.residual),
+        pours=sum(pours[way] for way in ways),
+    )
+
+
+def _similar(compared: Compared, white: _Recalibrated) -> tuple[tuple[str, str, float], ...]:
+    slopes = compared.emulator.slopes
+    singles = {way.effect: compared.posterior.fits[way.effect] for way in compared.emulator.ways}
+    shifts = {name: white(fit.z - slopes @ fit.theta) for name, fit in singles.items()}
+    names = list(shifts)
+    pairs = [(a, b, _cosine(shifts[a], shifts[b])) for k, a in enumerate(names) for b in names[:k]]
+    return tuple(sorted(pairs, key=lambda one: -abs(one[2])))
+
+
+def _cosine(one: FloatArray, other: FloatArray) -> float:
+    size = float(np.linalg.norm(one) * np.linalg.norm(other))
+    return float(one @ other) / size if size > 0.0 else 0.0
+
+
+def _parameter_row(parameter: Parameter, j: int, before: Fit, after: Fit) -> ParameterRow:
+    def of(fit: Fit) -> tuple[float, float]:
+        return parameter.natural(float(fit.theta[j])), parameter.deviation * float(np.sqrt(fit.theta_covariance[j, j]))
+
+    mean, sd = parameter.mean, parameter.sd
+    return ParameterRow(parameter.name, parameter.low, parameter.high, mean, sd, *of(before), *of(after))
+
+
+def _residuals(compared: Compared, before: Fit, after: Fit) -> tuple[Residual, ...]:
+    emulator, data = compared.emulator, compared.data
+    squashed = np.concatenate(
+        [squash(block).mean(axis=0) for squash, block in zip(emulator.squashes, compared.blocks, strict=True)]
+    )
+    inverse = np.linalg.inv(emulator.whitening)
+    measured = emulator.features(data.z)
+    columns = []
+    for fit in (before, after):
+        noise = (
+            np.diag(fit.variance + data.scatter / data.replicates) + data.instrument @ data.instrument.T
+            if data.instrument.size
+            else np.diag(fit.variance + data.scatter / data.replicates)
+        )
+        spread = noise + emulator.slopes @ fit.theta_covariance @ emulator.slopes.T
+        sigma = np.sqrt(np.einsum("ij,jk,ik->i", inverse, spread, inverse, optimize=True))
+        columns.append((emulator.features(fit.z), (squashed - inverse @ fit.z) / sigma))
+    labels = [(condition, name) for condition, names in _conditions(compared) for name in names]
+    (one, z_one), (other, z_other) = columns
+    return tuple(
+        Residual(
+            condition, name, float(measured[k]), float(one[k]), float(other[k]), float(z_one[k]), float(z_other[k])
+        )
+        for k, (condition, name) in enumerate(labels)
+    )
+
+
+def _places(compared: Compared, white: _Recalibrated) -> tuple[Place, ...]:
+    """Shares by condition: of the residual of the features as they are, whitened within the condition."""
+    rows = _residuals(compared, compared.posterior.fits["base"], compared.posterior.fits["base"])
+    totals = {condition: 0.0 for condition, _ in _conditions(compared)}
+    for row in rows:
+        totals[row.condition] += row.z_before**2
+    whole = sum(totals.values()) or 1.0
+    found = []
+    for condition, total in totals.items():
+        worst = max((row for row in rows if row.condition == condition), key=lambda row: abs(row.z_before))
+        found.append(Place(condition, total / whole, worst.feature, worst.z_before))
+    return tuple(sorted(found, key=lambda one: -one.share))
+
+
+def _conditions(compared: Compared) -> list[tuple[str, tuple[str, ...]]]:
+    return list(zip(compared.conditions, compared.names, strict=True))
+
+
+def _spoken(name: str) -> str:
+    words = {NO_EFFECT: "nothing missing", UNEXPLAINED: "something outside the library"}
+    return words.get(name, name.replace("+", " with "))
+
+
+def _percent(p: float) -> str:
+    return f"{100.0 * min(p, 0.999):.0f} %" if p < 0.995 else "over 99 %"

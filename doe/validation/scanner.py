@@ -1,0 +1,115 @@
+"""A made-up scanner: what it hands out of a pile, a grid of heights in a file, with everything that scanners get wrong.
+
+The highest point of the member spheres over every node of a grid, seen from above and from a camera aslant: what the
+pile hides from the camera is missing (shadow), and so are a few round patches (a reflecting grain). Heights have noise,
+and the axis that is told is off by a millimetre or two, the same for all scans of a set. No code is shared with what
+reads the file.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+GRIDS = (0.5e-3, 0.75e-3, 1.0e-3, 1.5e-3, 2.0e-3)
+"""Resolutions that one may buy [m]."""
+NOISE = (0.05e-3, 0.3e-3)
+"""Standard deviation of a height [m]."""
+AXIS_OFF = (1.0e-3, 2.0e-3)
+"""By how much the axis is off [m], in any direction."""
+ELEVATION = (math.radians(50.0), math.radians(80.0))
+"""Of the camera above the plate."""
+PATCHES, PATCH_RADIUS = 6, 3.0e-3
+"""Missing patches of a scan at most, and their largest radius [m]."""
+PLATE_MARGIN = 0.03
+"""Bare plate [m] that is scanned around the pile."""
+FARTHEST = 0.15
+"""Bodies farther than this from the axis [m] are off the scanner's table."""
+
+
+@dataclass(frozen=True)
+class Scanner:
+    """One laboratory's scanner, SI."""
+
+    grid: float
+    noise: float
+    axis_x: float
+    axis_y: float
+    elevation: float
+    azimuth: float
+
+    @staticmethod
+    def drawn(rng: np.random.Generator) -> Scanner:
+        """A scanner that somebody may have."""
+        off, towards = rng.uniform(*AXIS_OFF), rng.uniform(0.0, 2.0 * math.pi)
+        return Scanner(
+            grid=float(rng.choice(GRIDS)),
+            noise=float(rng.uniform(*NOISE)),
+            axis_x=off * math.cos(towards),
+            axis_y=off * math.sin(towards),
+            elevation=float(rng.uniform(*ELEVATION)),
+            azimuth=float(rng.uniform(0.0, 2.0 * math.pi)),
+        )
+
+    def scan(self, centre: Array, radius: Array, rng: np.random.Generator) -> dict[str, Array]:
+        """``height`` (n, n), ``x``, ``y`` (n,) [m] of spheres (m, 3), (m,); NaN where nothing was seen."""
+        near = np.hypot(centre[:, 0], centre[:, 1]) < FARTHEST
+        centre, radius = centre[near], radius[near]
+        reach = PLATE_MARGIN + (float(np.abs(centre[:, :2]).max()) if len(centre) else 0.0)
+        # Nodes do not lie on the axis but anywhere.
+        nodes = np.arange(-math.ceil(reach / self.grid), math.ceil(reach / self.grid) + 1) * self.grid
+        x, y = (np.asarray(nodes + rng.uniform(0.0, self.grid), dtype=np.float64) for _ in range(2))
+        height = tops(centre, radius, x, y)
+        unseen = self._shadow(height)
+        for _ in range(int(rng.integers(0, PATCHES + 1))):
+            px, py = rng.uniform(x[0], x[-1]), rng.uniform(y[0], y[-1])
+            unseen |= np.hypot(x[:, None] - px, y[None, :] - py) < rng.uniform(0.3, 1.0) * PATCH_RADIUS
+        height = height + self.noise * rng.standard_normal(height.shape)
+        height[unseen] = np.nan
+        # The file's origin is where the laboratory believes the axis to be.
+        believed = (np.asarray(x + self.axis_x), np.asarray(y + self.axis_y))
+        return {"height": height, "x": believed[0], "y": believed[1]}
+
+    def _shadow(self, height: Array) -> npt.NDArray[np.bool_]:
+        """Nodes from which the way to the camera is blocked by the pile."""
+        away = np.array([math.cos(self.azimuth), math.sin(self.azimuth)])
+        rise = math.tan(self.elevation) * self.grid
+        blocked = np.zeros(height.shape, dtype=bool)
+        for step in range(1, math.ceil(float(height.max(initial=0.0)) / rise) + 1):
+            i, j = (round(step * part) for part in away)
+            moved = np.zeros_like(height)
+            to = tuple(slice(max(0, -k), height.shape[a] - max(0, k)) for a, k in enumerate((i, j)))
+            come = tuple(slice(max(0, k), height.shape[a] - max(0, -k)) for a, k in enumerate((i, j)))
+            moved[to] = height[come]
+            blocked |= moved > height + step * rise
+        return blocked
+
+    def toml(self) -> str:
+        """The ``[condition.scan]`` that the laboratory writes: its axis is the origin, which it takes for right."""
+        return (
+            f'[condition.scan]\naxis = [0.0, 0.0]\nplate = [0.0, 0.0, 0.0]\ngrid = "{1e3 * self.grid:g}mm"\n'
+            f'noise = "{1e3 * self.noise:.3g}mm"\n'
+        )
+
+
+def tops(centre: Array, radius: Array, x: Array, y: Array) -> Array:
+    """Height [m] of the highest sphere over every node, 0 on the plate, (n, m)."""
+    height = np.zeros((len(x), len(y)))
+    for (cx, cy, cz), r in zip(centre, radius, strict=True):
+        i = slice(*np.searchsorted(x, [cx - r, cx + r]))
+        j = slice(*np.searchsorted(y, [cy - r, cy + r]))
+        square = r**2 - (x[i, None] - cx) ** 2 - (y[None, j] - cy) ** 2
+        cap = cz + np.sqrt(np.maximum(square, 0.0))
+        height[i, j] = np.where(square > 0.0, np.maximum(height[i, j], cap), height[i, j])
+    return height
+
+
+def write_scan(path: Path, arrays: dict[str, Array]) -> None:
+    """Write one scan as ``.npz``."""
+    np.savez_compressed(path, allow_pickle=False, **{name: one.astype(np.float32) for name, one in arrays.items()})

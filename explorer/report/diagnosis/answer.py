@@ -1,0 +1,472 @@
+"""The answer: what is missing and how sure, what else could look the same, what would tell, what stayed unseen."""
+
+from __future__ import annotations
+
+import math
+
+from explorer.report.content import Block, Bullets, Caution, Facts, Figure, Section, Table, Text
+from explorer.report.diagnosis.charts import likely, probability_chart
+from explorer.report.diagnosis.evidence import strained
+from explorer.report.diagnosis.findings import (
+    NOTHING,
+    OUTSIDE,
+    OVERALL,
+    added,
+    amplitudes_of,
+    answers,
+    chance,
+    confirmation,
+    effect_row,
+    feature_in,
+    feature_label,
+    feature_value,
+    kind_of,
+    literature_bound,
+    members,
+    model_words,
+    named,
+    overall,
+    probabilities,
+    probability,
+    share_of_bound,
+    size_text,
+    spelled,
+)
+from explorer.report.findings import Plain
+from explorer.report.units_for_people import MISSING, code, enumeration, fixed, p_value, percent, signed
+from solver.effects import EFFECTS
+
+FAR = 2.0
+"""Error over noise floor beyond which a model is called off: a true one keeps below 1.4 in 95 of 100 cases with eight
+independent numbers (√(χ²₈/8)), and below 1.8 with two."""
+WIDE = 1.5
+"""Variance of the measured replicates over that of simulated pours from which on it is worth a sentence."""
+VISIBLE = 4.0
+"""Shift [standard errors of the data] at which an effect stands out."""
+ALIKE = 0.7
+"""|cosine| of two shifts from which on they are called alike: half of one's square is in the other."""
+MOST_LEVERS = 6
+
+
+# In short
+
+
+def in_short(result: Plain) -> Section:
+    """The answer for a reader who reads nothing else."""
+    blocks: list[Block] = [
+        Text(verdict_sentence(result)),
+        Facts(tuple(_facts(result))),
+        Figure(
+            "probabilities",
+            probability_chart(result),
+            f"Probability of each answer; dashed: {percent(result['threshold'])}, from which on an effect is named.",
+        ),
+        _probability_table(result),
+    ]
+    blocks += [Caution(text) for text in cautions(result)]
+    blocks += [Text("What this does not say:"), Bullets(tuple(limits(result)))]
+    return Section("In short", tuple(blocks))
+
+
+def verdict_sentence(result: Plain) -> str:
+    """The verdict for an engineer, with what held-out data say of it."""
+    if result["taken_back"]:
+        return _taken_back(result)
+    match kind_of(result):
+        case "no_missing_effect":
+            best = probabilities(result)[1]
+            return (
+                "Nothing is missing that these data could show: the calibrated declared model explains them, with "
+                f"probability {_sure(probability(result, NOTHING))}. The next answer is {spelled(best[0])}, "
+                f"{chance(best[1])}."
+            )
+        case "effect":
+            (name,) = named(result)
+            return (
+                f"The declared model lacks {code(name)}, with probability {_sure(probability(result, name))}. It "
+                f"agrees with the fitted data at {_amplitudes(result, name)}. {confirmation_sentence(result)}"
+            )
+        case "effects":
+            (pair,) = named(result)
+            return (
+                f"The declared model lacks two effects at once, {spelled(pair)}, with probability "
+                f"{_sure(probability(result, pair))}; no single effect comes near. They agree with the fitted data at "
+                f"{_amplitudes(result, pair)}. {confirmation_sentence(result)}"
+            )
+        case "ambiguous":
+            left = [f"{spelled(one)} ({chance(probability(result, one))})" for one in answers(result["verdict"])]
+            opening = (
+                "These data"
+                if NOTHING in answers(result["verdict"])
+                else "The declared model lacks something; these data"
+            )
+            return f"{opening} leave {len(left)} answers: {enumeration(left)}. {_asked_for(result)}"
+        case "unexplained":
+            return f"{_unexplained(result)} {_sits(result)}"
+
+
+def confirmation_sentence(result: Plain) -> str:
+    """What conditions that were not fitted say, by fresh simulations."""
+    row = overall(result, "holdout")
+    if row is None:
+        return "No condition was held out, so nothing independent confirms it."
+    numbers = (
+        f"from {feature_value(result, OVERALL, row['before'])} to {feature_value(result, OVERALL, row['after'])}, "
+        f"where noise alone gives {feature_value(result, OVERALL, row['noise_floor'])}"
+    )
+    return {
+        "no holdout": "",
+        "within noise": "The held-out data cannot confirm it: there the declared model is within the noise already.",
+        "confirmed": f"On data that were not fitted the error falls {numbers}.",
+        "not certain": f"On data that were not fitted the error goes {numbers}; noise may make that gain.",
+        "not confirmed": f"The held-out data do not confirm it: there the error goes {numbers}.",
+    }[confirmation(result)]
+
+
+def cautions(result: Plain) -> list[str]:
+    """What keeps the numbers of this diagnosis from meaning more than they do, one sentence each."""
+    found = []
+    state = confirmation(result)
+    if state == "no holdout":
+        found.append(
+            "Without held-out data the error after is counted on the data that chose the model; it is smaller than on "
+            "new ones."
+        )
+    if state == "not confirmed" and named(result):
+        found.append(
+            "The correction does not carry over to the held-out conditions. The effect may stand in for another one, "
+            "or its amplitude may depend on the set-up; do not use the corrected model beyond the fitted conditions."
+        )
+    row = overall(result, "holdout")
+    if row is not None and (row["ratio"] or 0.0) > FAR:
+        model = "even the final model" if added(result) else "the declared model"
+        found.append(
+            f"On held-out data {model} is {fixed(row['ratio'], 1)} times as far off as noise alone "
+            "makes it: it does not hold for those conditions as it does for the fitted ones."
+        )
+    found += strained(result)
+    final = effect_row(result, result["final"])
+    if final is not None:
+        found += [
+            f"{code(one['effect'])} fits best at the largest amplitude that was considered; the true one may be "
+            "larger, and the interval is cut there."
+            for one in final["amplitudes"]
+            if one["at_end"]
+        ]
+    if result["scatter"] > WIDE:
+        found.append(
+            f"Measured pours scatter with {fixed(result['scatter'])} times the variance of simulated ones. The noise "
+            "of the data is widened by that; something in the model or in the measurement differs in scatter, not only "
+            "in the mean."
+        )
+    broken = {name: result["confirmation"][name]["broken"] for name in ("before", "after")}
+    if max(broken.values()):
+        found.append(
+            f"Fresh pours that broke off or left nothing to be read: {broken['before']} of the declared model, "
+            f"{broken['after']} of the final one. Means are those of the others."
+        )
+    return found
+
+
+def limits(result: Plain) -> list[str]:
+    """What the answer leaves open."""
+    found = [
+        f"Only {len(result['ranges'])} effects were considered, and pairs of them only where something "
+        "outside the library would else be likely; whatever else is missing is found as `unexplained` at best."
+    ]
+    kind = kind_of(result)
+    if kind == "no_missing_effect":
+        found.append(
+            "Not found is not absent: the section on what could have been seen says how weak an effect may hide."
+        )
+    if added(result):
+        found.append(
+            "An effect outside the library that changes the same features in the same proportions would look the same."
+        )
+        found.append(
+            "Amplitudes hold together with the declared contact law, shapes and parameter ranges; they are not "
+            "measured constants of the material."
+        )
+    if kind == "unexplained":
+        found.append(
+            "Nothing here tells a physical effect from a mistake in the measurement (a scale, a unit, a wrong set-up); "
+            "look there first."
+        )
+    return found
+
+
+def _taken_back(result: Plain) -> str:
+    fitted, told = answers(result["taken_back"]), result["held_out"]
+    first = " or ".join(f"{spelled(one)} ({chance(probability(result, one))})" for one in fitted)
+    return (
+        f"The fitted data give {first}, but the held-out data contradict it, so it is taken back: "
+        f"{feature_label(told['summary'])} of condition {told['condition']} is {fixed(told['farthest'], 1)} standard "
+        f"errors from fresh pours of {model_words(told['label'])} (p = {p_value(told['p'])}, corrected for the number "
+        "of summaries). The answer is that something is missing or wrong that none of the effects explains in all "
+        f"conditions. {confirmation_sentence(result) if added(result) else ''}".rstrip()
+    )
+
+
+def _unexplained(result: Plain) -> str:
+    best, p = probabilities(result)[0]
+    row = effect_row(result, best)
+    if row is not None:
+        return (
+            f"The declared model lacks something. {spelled(best)} comes nearest ({chance(p)}), and yet does not "
+            f"fit: data as far off it as these have p = {p_value(row['p'])}."
+        )
+    if best == OUTSIDE:
+        return (
+            f"The declared model lacks something that none of the {len(result['ranges'])} effects explains, with "
+            f"probability {_sure(p)}."
+        )
+    return "The calibrated declared model does not fit the data, and no effect comes nearer to them."
+
+
+def _sits(result: Plain) -> str:
+    """Where the residual is, in a sentence."""
+    worst = result["where"][0]
+    return (
+        f"{percent(worst['share'])} of the squared residual is in condition {worst['condition']}; farthest off there "
+        f"is {feature_label(worst['feature'])}, by {signed(worst['z'], 1)} σ."
+    )
+
+
+def _amplitudes(result: Plain, label: str) -> str:
+    row = effect_row(result, label)
+    assert row is not None
+    found = [
+        f"{amplitudes_of([one for one in row['amplitudes'] if one['effect'] == name])}, {share} of the strongest that "
+        "the literature supports"
+        for name, share in zip(members(label), _of_bounds(row), strict=True)
+    ]
+    return "; and ".join(found)
+
+
+def _of_bounds(row: Plain) -> list[str]:
+    """Amplitudes over the strongest that the literature supports, effect by effect."""
+    values = {
+        name: [one["value"] for one in row["amplitudes"] if one["effect"] == name] for name in members(row["name"])
+    }
+    return [percent(share_of_bound(name, own)) for name, own in values.items()]
+
+
+def _asked_for(result: Plain) -> str:
+    if not result["next_experiment"]:
+        return "No change of the rig that was tried would tell them apart."
+    best = result["next_experiment"][0]["experiment"]
+    if best["replicates"] is None:
+        return f"Most telling would be {code(best['name'])}, though no hundred pours of it settle the question."
+    pours = best["replicates"]
+    return f"{pours} pour{'s' * (pours > 1)} of {code(best['name'])} would tell them apart at odds of 20 : 1."
+
+
+def _facts(result: Plain) -> list[tuple[str, str]]:
+    compared = {row["condition"]: row["features"] for row in result["offered"]}
+    measured = ", ".join(
+        f"{row['condition']} ({'fitted' if row['role'] == 'fit' else 'held out'}, {row['replicates']} pours, "
+        + (
+            f"{compared[row['condition']]} features compared)"
+            if row["condition"] in compared
+            else f"{len(row['summaries'])} summaries predicted)"
+        )
+        for row in result["measured"]
+    )
+    facts = [("Verdict", code(result["verdict"])), ("Measured", measured)]
+    row = effect_row(result, result["final"])
+    if row is not None:
+        bounds = "; ".join(
+            f"{code(name)} up to {literature_bound(name)} ({EFFECTS[name].literature})" for name in members(row["name"])
+        )
+        facts.append((f"Amplitude of {spelled(row['name'])}", _amplitudes(result, row["name"])))
+        facts.append(("Supported by the literature", bounds))
+    facts += [("Largest residual", f"{feature_in(one)}, {signed(one['z'])} σ") for one in _worst(result)]
+    for role, words in (("holdout", "Error on held-out data"), ("fit", "Error on fitted data")):
+        total = overall(result, role)
+        if total is not None:
+            facts.append((words, _error_words(result, total)))
+    facts.append(
+        (
+            "Rests on",
+            f"{result['pours']['settings']} simulated settings ({result['pours']['run']} pours run now, the others "
+            "found in the store); errors by fresh pours, not by the regression",
+        )
+    )
+    return facts
+
+
+def _worst(result: Plain) -> list[Plain]:
+    return sorted(result["where"], key=lambda one: -abs(one["z"]))[:1]
+
+
+def _error_words(result: Plain, row: Plain) -> str:
+    floor = f"noise floor {feature_value(result, OVERALL, row['noise_floor'])}"
+    if not added(result):
+        inside = f"{percent(row['coverage_before'])} of the pours inside the model's 90 % interval"
+        return f"{feature_value(result, OVERALL, row['before'])}, {floor}; {inside}"
+    inside = f"{percent(row['coverage_before'])} → {percent(row['coverage_after'])}"
+    return (
+        f"{feature_value(result, OVERALL, row['before'])} before, {feature_value(result, OVERALL, row['after'])} "
+        f"after, {floor}; {inside} of the pours inside the model's 90 % interval"
+    )
+
+
+def _probability_table(result: Plain) -> Table:
+    rows = []
+    for answer, p in likely(result):
+        row = effect_row(result, answer)
+        if row is None:
+            rows.append((spelled(answer), chance(p), MISSING, MISSING))
+        else:
+            rows.append((spelled(answer), chance(p), amplitudes_of(row["amplitudes"]), ", ".join(_of_bounds(row))))
+    rest = max(0.0, 1.0 - sum(p for _, p in likely(result)))
+    rows.append(("all other answers together", chance(rest), MISSING, MISSING))
+    return Table(
+        ("answer", "probability", "amplitude", "of the literature's bound"),
+        tuple(rows),
+        f"An effect is named from {percent(result['threshold'])} on.",
+    )
+
+
+def _sure(p: float) -> str:
+    return "over 99 %" if p >= 0.995 else percent(p)
+
+
+# What else could look the same
+
+
+def rivals(result: Plain) -> Section:
+    """Effects that shift the data alike, and the experiments that would tell the answers apart."""
+    blocks: list[Block] = [Text(_alike_words(result))]
+    pairs = _alike(result)
+    if pairs:
+        rows = tuple((code(a), code(b), signed(cosine), chance(probability(result, b))) for a, b, cosine in pairs)
+        header = ("effect", "looks like", "cosine", "probability of the latter")
+        blocks.append(Table(header, rows, "Of the shifts by their best fits, after recalibration."))
+    blocks += _ranked(result)
+    names = _in_question(result)
+    if names:
+        blocks.append(Text("Experiments that reveal one effect by itself:"))
+        blocks.append(Bullets(tuple(f"{code(name)}: {EFFECTS[name].lever}" for name in names)))
+    more = [f"{row['scan_would_add']} in {row['condition']}" for row in result["offered"] if row["scan_would_add"]]
+    if more:
+        blocks.append(
+            Text(f"Scans of the piles would add features: {enumeration(more)}. More features tell more answers apart.")
+        )
+    if kind_of(result) == "unexplained":
+        blocks.append(
+            Text(
+                "Before looking for new physics: pour the same set-up again, check scale and units of what was "
+                "measured, and the set-up itself. A condition with another outlet height or feed rate shows whether "
+                "the residual goes with the rig or with the material."
+            )
+        )
+    return Section("What else could look the same, and what would tell", tuple(blocks))
+
+
+def _alike_words(result: Plain) -> str:
+    names = _asked(result)
+    if not names:
+        return (
+            f"Two effects whose best fits shift the features with a |cosine| of {fixed(ALIKE, 1)} or more are hard to "
+            "tell apart by data like these."
+        )
+    those = enumeration([code(name) for name in names])
+    near = sorted({b for _, b, _ in _alike(result)})
+    if not near:
+        return f"No other effect shifts these features as {those} would (all |cosine| below {fixed(ALIKE, 1)})."
+    return (
+        f"What shifts the features much as {those} would, with a |cosine| of {fixed(ALIKE, 1)} or more, is told apart "
+        "only by the rest of the pattern; fewer or noisier data would not do."
+    )
+
+
+def _alike(result: Plain) -> list[tuple[str, str, float]]:
+    """Pairs (effect in the answer, other, cosine); among all effects where the answer names none."""
+    names = set(_asked(result))
+    found = []
+    for first, second, cosine in result["similar"]:
+        if abs(cosine) < ALIKE or (names and not names & {first, second}):
+            continue
+        found.append((first, second, cosine) if not names or first in names else (second, first, cosine))
+    return found
+
+
+def _asked(result: Plain) -> list[str]:
+    """Single effects in the answer, also in one that was taken back."""
+    labels = [one for one in answers(result["taken_back"] or result["verdict"]) if one not in (NOTHING, OUTSIDE)]
+    return list(dict.fromkeys(name for label in labels for name in members(label)))
+
+
+def _in_question(result: Plain) -> list[str]:
+    """Effects in the answer and those that look like them; none where it holds no effect."""
+    names = _asked(result)
+    return list(dict.fromkeys([*names, *(other for _, other, _ in _alike(result) if names)]))[:MOST_LEVERS]
+
+
+def _ranked(result: Plain) -> list[Block]:
+    rows = tuple(
+        (
+            code(row["experiment"]["name"]),
+            fixed(row["experiment"]["score"]),
+            f"{fixed(row['experiment']['separation'])} σ",
+            "more than 100" if row["experiment"]["replicates"] is None else str(row["experiment"]["replicates"]),
+        )
+        for row in result["next_experiment"]
+    )
+    if not rows:
+        return []
+    blocks: list[Block] = [
+        Text("Set-ups of the first fitted condition, poured with every answer that is left; the most telling first:"),
+        Table(
+            ("set-up", "score", "least separation of one pour", "pours for odds of 20 : 1"),
+            rows,
+            "Score: expected information of six pours, 0 where nothing is learnt. Separation: distance of the two "
+            "models that are closest, in σ of one pour and of the prediction.",
+        ),
+    ]
+    if all(row["experiment"]["score"] <= 0.0 for row in result["next_experiment"]):
+        blocks.append(Caution("No score is above zero: none of these set-ups is expected to tell the answers apart."))
+    return blocks
+
+
+# What could have been seen
+
+
+def could_have_seen(result: Plain) -> Section | None:
+    """About which amplitude of every effect would have stood out; None where something was found."""
+    if kind_of(result) != "no_missing_effect":
+        return None
+    rows = []
+    for name in (one["name"] for one in result["ranges"]):
+        row = effect_row(result, name)
+        seen = (MISSING, MISSING)
+        if row is not None:
+            seen = f"{fixed(strength_at_end(result, row), 1)} σ", visible_from(result, row)
+        rows.append((code(name), *seen, EFFECTS[name].lever))
+    text = (
+        f"An effect that shifts the features by {fixed(VISIBLE, 0)} standard errors of these data, recalibration "
+        "counted, stands out of the noise; to be named it has to be unlike the others as well. Weaker ones may act."
+    )
+    caption = "By proportion to the shift of the reference amplitude, which was poured; never beyond the range."
+    header = ("effect", "strength at the end of its range", "stands out from about", "what reveals it")
+    return Section("What could have been seen", (Text(text), Table(header, tuple(rows), caption)))
+
+
+def strength_at_end(result: Plain, row: Plain) -> float:
+    """Shift [σ] by the largest amplitude of an effect's range, in proportion to that of its reference amplitude."""
+    return float(row["strength"]) * _end(result, row) / math.hypot(*row["reference"])
+
+
+def visible_from(result: Plain, row: Plain) -> str:
+    """The amplitude that shifts by ``VISIBLE``, in words; says so where the range ends before."""
+    if strength_at_end(result, row) < VISIBLE:
+        return "not for certain, even at its bound"
+    return size_text(row["name"], math.hypot(*row["reference"]) * VISIBLE / row["strength"])
+
+
+def _end(result: Plain, row: Plain) -> float:
+    """Size of the end of the range in the direction of the reference amplitude."""
+    (bounds,) = (one for one in result["ranges"] if one["name"] == row["name"])
+    ends = zip(row["reference"], bounds["low"], bounds["high"], strict=True)
+    return min(abs(low if one < 0.0 else high) for one, low, high in ends if one != 0.0)

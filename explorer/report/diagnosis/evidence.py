@@ -1,0 +1,265 @@
+"""What the answer rests on: errors and piles by fresh pours, residuals, what every effect could do, and parameters."""
+
+from __future__ import annotations
+
+from explorer.report.content import Block, Caution, Figure, Folded, Section, Table, Text
+from explorer.report.diagnosis.charts import bands, drawn_residuals, error_chart, pile_chart, residual_chart
+from explorer.report.diagnosis.findings import (
+    BASE,
+    OVERALL,
+    added,
+    amplitudes_of,
+    chance,
+    feature_label,
+    feature_value,
+    final_model,
+    literature_bound,
+    model_words,
+    reference_text,
+    simulated_range,
+    spelled,
+)
+from explorer.report.findings import Plain
+from explorer.report.units_for_people import (
+    MISSING,
+    code,
+    fixed,
+    p_value,
+    parameter_label,
+    parameter_range,
+    parameter_value,
+    percent,
+    signed,
+)
+from solver.effects import EFFECTS
+
+FAR_OFF = 2.0
+"""Standard deviations of its measurement by which a calibrated parameter is said to be off."""
+ERROR_HEADER = (
+    "observable",
+    "before",
+    "after",
+    "noise floor",
+    "after / floor",
+    "skill",
+    "95 % interval",
+    "inside 90 %, before",
+    "after",
+)
+ERROR_CAPTION = (
+    "Before and after: root mean square over the conditions of (mean of fresh pours − measured mean), of the "
+    "calibrated declared model and of the final one. Noise floor: what a perfect model would show, from the "
+    "standard errors of both means. Skill: 1 − (after² − floor²)/(before² − floor²); 1 is perfect (noise may take it "
+    "above), 0 no gain, – where the declared model is within the noise already. Inside 90 %: share of measured pours "
+    "in the model's 90 % predictive interval."
+)
+
+
+def error(result: Plain) -> Section:
+    """Tables for held-out and fitted conditions; the held-out ones come first and open."""
+    blocks: list[Block] = []
+    if added(result):
+        blocks.append(Text(f"After: {final_model(result)}."))
+    else:
+        blocks.append(
+            Text("No effect was added, so before and after are the same model, and there is no skill to state.")
+        )
+    if result["error"]["holdout"]:
+        blocks += [
+            Text("On held-out conditions, which no model was fitted to:"),
+            _error_table(result, "holdout", ERROR_CAPTION),
+            Figure(
+                "error",
+                error_chart(result, "holdout"),
+                "Errors as multiples of the noise floor; a perfect model lies about 1.",
+            ),
+            Folded("On fitted conditions", (_error_table(result, "fit", ""),)),
+        ]
+    else:
+        blocks.append(Caution("No condition is held out. The table below is on the data that were fitted."))
+        blocks.append(_error_table(result, "fit", ERROR_CAPTION))
+    return Section("Error before and after", tuple(blocks))
+
+
+def _error_table(result: Plain, role: str, caption: str) -> Table:
+    return Table(ERROR_HEADER, tuple(_error_row(result, row) for row in result["error"][role]), caption)
+
+
+def _error_row(result: Plain, row: Plain) -> tuple[str, ...]:
+    name = row["observable"]
+    known = added(result) and row["skill_low"] is not None
+    interval = f"{fixed(row['skill_low'])} … {fixed(row['skill_high'])}" if known else MISSING
+    return (
+        feature_label(name) + (" (in measured σ)" if name == OVERALL else ""),
+        *(feature_value(result, name, row[key]) for key in ("before", "after", "noise_floor")),
+        fixed(row["ratio"]),
+        fixed(row["skill"]) if added(result) else MISSING,
+        interval,
+        percent(row["coverage_before"]),
+        percent(row["coverage_after"]),
+    )
+
+
+def pile(result: Plain) -> Section | None:
+    """A picture per condition that has profiles, held-out ones first; None where none has."""
+    pictures = sorted(result["piles"], key=lambda row: row["role"] != "holdout")
+    if not pictures:
+        return None
+    text = (
+        "Mean height over the distance from the pile's own middle, mirrored; a band is one standard deviation between "
+        "pours. Heights and radii have one scale."
+    )
+    if not added(result):
+        text += " Before and after are the same model here."
+    blocks: list[Block] = [Text(text)]
+    for k, picture in enumerate(pictures, start=1):
+        words = "held out" if picture["role"] == "holdout" else "fitted"
+        blocks.append(Figure(f"pile-{k}", pile_chart(picture), f"Condition {picture['condition']}, {words}."))
+    return Section("The pile", tuple(blocks))
+
+
+def residuals(result: Plain) -> Section:
+    """Where the residual sits, the bar chart with its bands, and the numbers behind it."""
+    features, drawn = len(result["residuals"]), len(drawn_residuals(result))
+    one, every = bands(features)
+    text = (
+        "Measured mean minus model in units of σ, which holds the noise of the measured mean, the errors of the model "
+        f"and of instruments, and what calibration leaves open. A right model leaves one feature within ± {fixed(one)} "
+        f"in 95 % of cases, and all {features} within ± {fixed(every)}. Features are correlated: the probabilities "
+        "count that, single bars do not."
+    )
+    few = f" The {drawn} of {features} features that are farthest off." if drawn < features else ""
+    figure = Figure("residuals", residual_chart(result), f"Dashed: 95 % for one feature; solid: for all of them.{few}")
+    return Section(
+        "Which numbers it rests on",
+        (
+            Text(f"{text} After: {final_model(result)}."),
+            _places(result),
+            figure,
+            Folded("The numbers", (_residual_table(result),)),
+        ),
+    )
+
+
+def _places(result: Plain) -> Table:
+    rows = tuple(
+        (row["condition"], percent(row["share"]), feature_label(row["feature"]), f"{signed(row['z'])} σ")
+        for row in result["where"]
+    )
+    header = ("condition", "share of the squared residual", "feature farthest off", "measured − model")
+    return Table(header, rows, "Of the calibrated declared model.")
+
+
+def _residual_table(result: Plain) -> Table:
+    rows = []
+    for row in result["residuals"]:
+        name = row["feature"]
+        values = (feature_value(result, name, row[key], 4) for key in ("measured", "before", "after"))
+        rows.append((row["condition"], feature_label(name), *values, signed(row["z_before"]), signed(row["z_after"])))
+    header = ("condition", "feature", "measured", "before", "after", "residual before [σ]", "after [σ]")
+    return Table(header, tuple(rows), "Models by the regression at their best fits.")
+
+
+def effects(result: Plain) -> Section:
+    """What the data say of every effect, and beside it the range, literature and lever of each."""
+    text = (
+        "Log evidence: natural logarithm of the evidence for the effect, over all its amplitudes, signs and "
+        "directions, less that of the declared model. p: chance of data as far off as these if the best fit were true. "
+        "Strength: shift in the features that are compared, in standard errors of these data, less what recalibration "
+        "can undo; of the reference amplitude, at which the effect was poured, and of the best fit. Cosine: likeness "
+        "of the best fit's shift to the residual of the declared model; 1 is the same pattern."
+    )
+    header = (
+        "effect",
+        "probability",
+        "log evidence",
+        "amplitude",
+        "p",
+        "strength of the fit",
+        "cosine",
+        "reference amplitude",
+        "its strength",
+        "pours",
+    )
+    rows = tuple(_effect(row) for row in result["effects"])
+    table = Table(header, rows, "The most probable first; amplitudes are posterior means.")
+    return Section("Effects", (Text(text), table, _bounds(result)))
+
+
+def _effect(row: Plain) -> tuple[str, ...]:
+    alone = bool(row["reference"])
+    return (
+        spelled(row["name"]),
+        chance(row["probability"]),
+        signed(row["log_evidence"], 1),
+        amplitudes_of(row["amplitudes"]),
+        p_value(row["p"]),
+        f"{fixed(row['fitted_strength'], 1)} σ",
+        signed(row["cosine"]),
+        reference_text(row),
+        f"{fixed(row['strength'], 1)} σ" if alone else MISSING,
+        str(row["pours"]) if alone else MISSING,
+    )
+
+
+def _bounds(result: Plain) -> Table:
+    rows = tuple(
+        (
+            code(name),
+            simulated_range(result, name),
+            literature_bound(name),
+            EFFECTS[name].literature,
+            EFFECTS[name].lever,
+        )
+        for name in (row["name"] for row in result["ranges"])
+    )
+    header = ("effect", "range", "strongest supported", "by", "what reveals it")
+    return Table(header, rows, "The range is that in which every condition can be set up.")
+
+
+def parameters(result: Plain) -> Section:
+    """Calibrated parameters without and with what is added, beside their measurement; a sentence for each far off."""
+    rows = []
+    for row in result["parameters"]:
+        name = row["name"]
+        measured = MISSING
+        if row["mean"] is not None:
+            measured = f"{parameter_value(name, row['mean'])} ± {parameter_value(name, row['sd'])}"
+        fits = (
+            f"{parameter_value(name, row[when])} ± {parameter_value(name, row[f'{when}_sd'])}"
+            for when in ("before", "after")
+        )
+        rows.append((parameter_label(name), measured, parameter_range(name, row["low"], row["high"]), *fits))
+    header = ("parameter", "measured", "range", "before", "after")
+    text = (
+        "Every model is compared with the data at all values that the measurement of a parameter allows, weighted by "
+        f"it; these are the values that fit best. After: {final_model(result)}."
+    )
+    table = Table(
+        header, tuple(rows), "± is one standard deviation. Without a measured mean, all of the range is alike."
+    )
+    blocks: list[Block] = [Text(text), table]
+    blocks += [Caution(line) for line in strained(result)]
+    return Section("Parameters", tuple(blocks))
+
+
+def strained(result: Plain) -> list[str]:
+    """A sentence for every parameter that the fit drives to an end of its range or far from its measured mean."""
+    found = []
+    for row in result["parameters"]:
+        for when, model in (("before", BASE), ("after", result["final"])):
+            value = row[when]
+            if when == "after" and not added(result):
+                continue
+            where = ""
+            if value in (row["low"], row["high"]):
+                where = f"at the {'lower' if value == row['low'] else 'upper'} end of its range"
+            elif row["mean"] is not None and abs(value - row["mean"]) > FAR_OFF * row["sd"]:
+                where = f"{fixed(abs(value - row['mean']) / row['sd'], 1)} standard deviations from its measurement"
+            if where:
+                found.append(
+                    f"To fit, {model_words(model)} needs {parameter_label(row['name'])} ({code(row['name'])}) {where}, "
+                    f"{parameter_value(row['name'], value)}. If the measurement is right, that is evidence against "
+                    "this model."
+                )
+    return found

@@ -1,0 +1,214 @@
+"""How the answer was reached: what the data offered, the method in six lines, text for a paper, how to repeat."""
+
+from __future__ import annotations
+
+import shlex
+
+from doe.diagnose.confirm import CONTRADICTED
+from doe.diagnose.levels import STRONG
+from doe.diagnose.posterior import NOTHING as PRIOR_NOTHING
+from doe.diagnose.posterior import OUTSIDE as PRIOR_OUTSIDE
+from doe.diagnose.posterior import PAIRS as PRIOR_PAIRS
+from doe.diagnose.verdict import CREDIBLE, FITS, NOTHING_FROM
+from explorer.report.content import Block, Bullets, Code, Section, Table, Text
+from explorer.report.diagnosis.charts import likely
+from explorer.report.diagnosis.findings import (
+    OVERALL,
+    added,
+    amplitudes_of,
+    answers,
+    chance,
+    effect_row,
+    feature_label,
+    feature_value,
+    kind_of,
+    model_words,
+    overall,
+    probability,
+    spelled,
+)
+from explorer.report.findings import Plain
+from explorer.report.units_for_people import (
+    duration,
+    enumeration,
+    fixed,
+    number,
+    p_value,
+    parameter_label,
+    percent,
+)
+
+OFFERS = {"scalars": "scalars", "profile": "scalars and height profiles", "scan": "scalars and scans of the surface"}
+
+
+def data(result: Plain) -> Section:
+    """Conditions, what each offers and what a scan would add, what is not used, and the scatter."""
+    offered = {row["condition"]: row for row in result["offered"]}
+    rows = []
+    for row in result["measured"]:
+        fitted = offered.get(row["condition"])
+        more = 0 if fitted is None else fitted["scan_would_add"]
+        rows.append(
+            (
+                row["condition"],
+                "fitted" if row["role"] == "fit" else "held out",
+                row["rig"].replace("_", " "),
+                str(row["replicates"]),
+                "summaries" if fitted is None else OFFERS[fitted["offer"]],
+                str(len(row["summaries"]) if fitted is None else fitted["features"]),
+                f"{more} features" if more else "nothing more",
+                enumeration([feature_label(name) for name in row["summaries"]]),
+            )
+        )
+    header = ("condition", "role", "rig", "pours", "offers", "compared", "a scan would add", "summaries")
+    caption = (
+        "Features are chosen by name before any value is looked at, and read the same way from data and runs. Of a "
+        "profile or a scan: ten rings of equal width about the funnel's axis; the core is the inner half; heights of "
+        "classes are in thicknesses of a body. Held-out conditions are compared by their summaries alone."
+    )
+    blocks: list[Block] = [Table(header, tuple(rows), caption)]
+    for words, items in (
+        ("Not used:", result["data"]["ignored"]),
+        ("Changed in reading:", result["data"]["notes"]),
+        ("Offered, but left out because no pour varies or gives it:", list(map(_left_out, result["left_out"]))),
+    ):
+        if items:
+            blocks += [Text(words), Bullets(tuple(items))]
+    scatter = result["scatter"]
+    words = (
+        "no more than simulated ones"
+        if scatter <= 1.0
+        else f"with {fixed(scatter)} times the variance of simulated ones, and the noise of the data is widened by that"
+    )
+    blocks.append(Text(f"Measured pours of a condition scatter {words}."))
+    return Section("Data", tuple(blocks))
+
+
+def _left_out(label: str) -> str:
+    condition, _, feature = label.rpartition(": ")
+    return f"{feature_label(feature)} ({condition})"
+
+
+def for_a_paper(result: Plain) -> Section:
+    """Methods and result as two paragraphs of plain English."""
+    return Section("For a paper", (Text(_methods(result)), Text(_result(result))))
+
+
+def _methods(result: Plain) -> str:
+    conditions = enumeration(
+        [
+            f"{row['condition']} ({row['features']} features, {_pours(result, row['condition'])})"
+            for row in result["offered"]
+        ]
+    )
+    moved = enumeration([parameter_label(row["name"]) for row in result["parameters"]])
+    return (
+        f"The measured pours of {conditions} were compared with discrete-element simulations of the declared model, "
+        f"alone and with each of {len(result['ranges'])} candidate effects. Features of the pile were whitened by the "
+        f"covariance of one simulated pour. A Bayesian linear regression on {result['pours']['settings']} simulated "
+        "settings predicted them for every effect at any amplitude; the calibrated parameters "
+        f"({moved}) were integrated out over their independent measurements. Prior probabilities were "
+        f"{number(PRIOR_NOTHING)} that nothing is missing, {number(PRIOR_OUTSIDE)} for something outside the library "
+        f"and {number(PRIOR_PAIRS)} for two effects at once, the rest shared alike by the single effects; evidence was "
+        f"raised to the power {number(result['temperature'])}. An effect was named from a posterior probability of "
+        f"{number(result['threshold'])} on."
+    )
+
+
+def _result(result: Plain) -> str:
+    if kind_of(result) == "unexplained" and not result["taken_back"]:
+        left = [answer for answer, _ in likely(result)]
+    else:
+        left = answers(result["taken_back"] or result["verdict"])
+    odds = enumeration([f"{spelled(one)} {chance(probability(result, one))}" for one in left])
+    sentence = f"The posterior probabilities were: {odds}."
+    if len(left) == 1:
+        sentence = f"The posterior probability of {spelled(left[0])} was {chance(probability(result, left[0]))}."
+    row = effect_row(result, result["final"])
+    if row is not None:
+        sentence += (
+            f" The amplitude of {spelled(row['name'])} was {amplitudes_of(row['amplitudes'])}; data as far off the "
+            f"best fit as these have p = {p_value(row['p'])}."
+        )
+    if kind_of(result) == "unexplained" and not result["taken_back"]:
+        best = effect_row(result, left[0])
+        rejected = "" if best is None else f" {spelled(left[0])} does not fit the data (p = {p_value(best['p'])})."
+        sentence += f"{rejected} No effect of the library was accepted as an explanation."
+    total = overall(result, "holdout")
+    if total is not None:
+        after = f", of the final model {feature_value(result, OVERALL, total['after'])}" if added(result) else ""
+        sentence += (
+            " On held-out conditions the root-mean-square error of the calibrated declared model, in standard "
+            f"deviations of a measured pour, was {feature_value(result, OVERALL, total['before'])}{after}, with a "
+            f"noise floor of {feature_value(result, OVERALL, total['noise_floor'])}."
+        )
+    if result["taken_back"]:
+        told = result["held_out"]
+        sentence += (
+            f" The held-out data contradicted that answer ({feature_label(told['summary'])} in {told['condition']}, "
+            f"p = {p_value(told['p'])}), and it was withdrawn."
+        )
+    return sentence
+
+
+def _pours(result: Plain, condition: str) -> str:
+    (pours,) = (row["replicates"] for row in result["measured"] if row["condition"] == condition)
+    return f"{pours} pours"
+
+
+def how_reached(result: Plain) -> Section:
+    """The method in six lines, with the numbers of its rules."""
+    features = sum(row["features"] for row in result["offered"])
+    lines = (
+        f"The same {features} features are read from measured and simulated piles. Their far tails are drawn in, and "
+        "they are whitened by the covariance of one simulated pour.",
+        f"{result['pours']['settings']} settings are poured: the declared model with its parameters moved, every "
+        f"effect at an amplitude that shifts the data by about {number(STRONG)} standard errors (or at the end of its "
+        "range), and more of whatever stays in question.",
+        "One regression over all pours gives every model at every amplitude, with its uncertainty. Parameters are "
+        "integrated out over their measurements, so what recalibration can do counts for no effect.",
+        f"Probabilities follow from Student's t densities of the data, averaged over amplitudes, signs and directions, "
+        f"and from the priors: {number(PRIOR_NOTHING)} for nothing missing, {number(PRIOR_OUTSIDE)} for something "
+        f"outside the library, {number(PRIOR_PAIRS)} for pairs, the rest for single effects. The temperature is "
+        f"{number(result['temperature'])}; below 1 the answer is less sure than the evidence says.",
+        f"What reaches {percent(result['threshold'])} is named if the data are likely under it (p ≥ {number(FITS)}). "
+        f"Else nothing is missing if that has {percent(NOTHING_FROM)} or more, unexplained if something outside is the "
+        f"most probable, and ambiguous otherwise: the smallest set of answers that holds {percent(CREDIBLE)}.",
+        "Fresh pours of the declared and the final model give the errors. Held-out data never choose; they take an "
+        f"answer back where a summary contradicts it at p < {number(CONTRADICTED)}, corrected for their number.",
+    )
+    blocks: list[Block] = [Bullets(lines)]
+    told = result["held_out"]
+    if told is not None:
+        blocks.append(
+            Text(
+                f"Held-out data: farthest from fresh pours of {model_words(told['label'])} is "
+                f"{feature_label(told['summary'])} of {told['condition']}, by {fixed(told['farthest'], 1)} "
+                f"standard errors, p = {p_value(told['p'])}."
+            )
+        )
+    return Section("How the answer was reached", tuple(blocks))
+
+
+def repeat(result: Plain) -> Section:
+    """The command that gives the same answer; pours that are in the store are not run again."""
+    pours = result["pours"]
+    text = (
+        f"{pours['settings']} settings of the declared model and its effects, each poured in every fitted condition; "
+        f"{pours['run']} pours were run in {duration(result['timing']['total_s'])}, the others were in the store. "
+        "Pours have seeds of their own, so that the same order gives the same answer. `diagnosis.json` holds every "
+        "number of this report."
+    )
+    versions = tuple((name, version or "not installed") for name, version in result["versions"].items())
+    return Section("How to repeat", (Text(text), Code(command(result)), Table(("program", "version"), versions)))
+
+
+def command(result: Plain) -> str:
+    """The order as a command line."""
+    order = result["order"]
+    parts = ["explorer", "diagnose", result["data"]["folder"], "--out", order["out"]]
+    if order["effects"]:
+        parts += ["--effects", ",".join(order["effects"])]
+    if order["budget"] is not None:
+        parts += ["--budget", str(order["budget"])]
+    return shlex.join(parts)

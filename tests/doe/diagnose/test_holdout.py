@@ -1,0 +1,70 @@
+"""Holdout errors by hand, and the skill of models that are right, half right and wrong."""
+
+import json
+
+import numpy as np
+import pytest
+
+from doe.diagnose.holdout import OVERALL, HoldoutCondition, holdout_errors
+from doe.errors import StatisticsError
+
+
+def condition(bias_before, bias_after, seed=0, n=8, m=20, names=("angle", "height"), scale=(1.0, 0.01)):
+    generator = np.random.default_rng(seed)
+
+    def pours(count, bias):
+        return (10 + np.asarray(bias) + generator.standard_normal((count, len(names)))) * np.asarray(scale)
+
+    return HoldoutCondition("c", names, pours(n, 0.0), pours(m, bias_before), pours(m, bias_after))
+
+
+def test_errors_by_hand():
+    """Means 2 and 5: before off by 3. s^2/n: 2/2 and 2/2, so the floor is sqrt(2); after is exact."""
+    two, five = np.array([[1.0], [3.0]]), np.array([[4.0], [6.0]])
+    rows = holdout_errors([HoldoutCondition("c", ("x",), two, five, two)])
+    assert [row.observable for row in rows] == ["x", OVERALL]
+    assert (rows[0].before, rows[0].after) == (pytest.approx(3.0), pytest.approx(0.0))
+    assert rows[0].noise_floor == pytest.approx(np.sqrt(2))
+    assert rows[0].skill == pytest.approx(1 - (0 - 2) / (9 - 2))
+    # Overall: in measured standard deviations of sqrt(2).
+    assert rows[1].before == pytest.approx(3 / np.sqrt(2))
+
+
+def test_observables_join_over_conditions():
+    rows = holdout_errors([condition(3.0, 0.0, seed=1), condition(4.0, 0.0, seed=2, names=("angle",), scale=(1.0,))])
+    assert [row.observable for row in rows] == ["angle", "height", OVERALL]
+    assert rows[0].before == pytest.approx(np.sqrt((9 + 16) / 2), abs=0.8)
+    json.dumps([row.to_dict() for row in rows], allow_nan=False)
+
+
+@pytest.mark.parametrize(("bias", "skill"), [(0.0, 1.0), (1.5, 0.75), (3.0, 0.0)])
+def test_skill_of_a_model_that_is_right_half_right_and_unchanged(bias, skill):
+    """Bias 3 before; after it: 1 - bias^2/9. The mean of 60 holdouts, free of noise on both sides."""
+    found = [holdout_errors([condition(3.0, bias, seed)], samples=200, seed=seed)[-1] for seed in range(60)]
+    assert np.mean([row.skill for row in found]) == pytest.approx(skill, abs=0.06)
+    # Two observables with eight pours each: a percentile interval of 95 % covers somewhat less.
+    assert np.mean([row.skill_low <= skill <= row.skill_high for row in found]) > 0.75
+
+
+def test_a_right_model_is_at_the_noise_floor_and_covers():
+    found = [holdout_errors([condition(3.0, 0.0, seed)], samples=200, seed=seed)[-1] for seed in range(100)]
+    # Mean of after^2/noise^2 is one; the floor itself is estimated from 7 and 19 df.
+    assert np.mean([row.ratio**2 for row in found]) == pytest.approx(1.0, abs=0.35)
+    # 1600 measured pours, in groups that share their simulated mean.
+    assert np.mean([row.coverage_after for row in found]) == pytest.approx(0.90, abs=0.03)
+    assert np.mean([row.coverage_before for row in found]) < 0.25
+
+
+def test_a_base_model_within_the_noise_has_no_skill_to_gain():
+    data = condition(0.0, 0.0)
+    row = holdout_errors([HoldoutCondition("c", data.summaries, data.measured, data.measured, data.after)])[-1]
+    assert np.isnan(row.skill)
+    assert row.to_dict()["skill_low"] is None
+
+
+def test_single_replicates_are_refused():
+    data = condition(0.0, 0.0)
+    with pytest.raises(StatisticsError, match="at least 2"):
+        holdout_errors([HoldoutCondition("c", data.summaries, data.measured[:1], data.before, data.after)])
+    with pytest.raises(StatisticsError, match="no condition"):
+        holdout_errors([])

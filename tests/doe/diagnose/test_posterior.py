@@ -1,0 +1,364 @@
+"""The posterior: densities against SciPy's, and answers that have to come out; the replay on made-up pours."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from doe.diagnose.emulator import (
+    ANGLES,
+    CURVATURE,
+    SQUASH,
+    Emulator,
+    Lessons,
+    Squash,
+    Way,
+    emulated,
+    planar_weights,
+    regression,
+    signature_prior,
+)
+from doe.diagnose.limit import RISKS, Kind
+from doe.diagnose.posterior import BEYOND, NOTHING, OUTSIDE, PAIRS, SPREADS, Data, multiples, posterior
+from doe.diagnose.replay import NULLS, Teaching, Truth, replay
+from doe.errors import StatisticsError
+from tests.doe.diagnose.test_ruler import D, sample_of, unit
+
+SIZE = 2 * D
+UNSQUASHED = Squash(np.zeros(D), np.full(D, 1e9))
+"""So wide that it does nothing."""
+SURE = 1e5
+"""Deviations of a parameter at which two pours tell its slope for certain."""
+BASE = 24
+
+
+def emulator(shifts, freedom=200, pours=12, sensitivity=None, variance=25.0, ways=None):
+    """Of features of unit noise, with the base model at zero and effects shifting by ``shifts`` at amplitude 1."""
+    m = len(shifts)
+    rows = [np.zeros(2 + 2 * m)] * BASE
+    z = [np.zeros(SIZE)] * BASE
+    slope = np.zeros(SIZE) if sensitivity is None else sensitivity
+    for k, sign in enumerate((-SURE, SURE)):
+        rows[k] = sign * np.eye(2 + 2 * m)[1]
+        z[k] = sign * slope
+    for way, shift in enumerate(shifts.values()):
+        rows += [np.eye(2 + 2 * m)[2 + way]] * pours
+        z += [shift] * pours
+    table = np.array(rows)
+    table[:, 0] = 1.0
+    mean, covariance = regression(table, np.array(z), 1, np.full(SIZE, variance))
+    names = ways or tuple(Way(name, name) for name in shifts)
+    return Emulator(names, 1, mean, covariance, freedom, (UNSQUASHED,) * 2, np.eye(SIZE), (1.0,) * m)
+
+
+def judged(taught, z, replicates=6, pairs=False):
+    return posterior(taught, Data(z, replicates), temperature=1.0, pairs=pairs)
+
+
+def test_without_effects_it_is_the_ratio_of_two_densities():
+    """Nothing against outside, by SciPy's multivariate t with a parameter."""
+    rng = np.random.default_rng(0)
+    slope, z = rng.standard_normal(SIZE), rng.standard_normal(SIZE)
+    found = judged(emulator({}, freedom=30, sensitivity=slope), z)
+
+    def density(more):
+        scale = np.eye(SIZE) * (1.0 / 6.0 + 1.0 / 24.0 + more) + np.outer(slope, slope)
+        return stats.multivariate_t.pdf(z, shape=scale, df=30)
+
+    nothing, outside = NOTHING * density(0.0), OUTSIDE * np.mean([density(s**2) for s in SPREADS])
+    assert found.nothing == pytest.approx(nothing / (nothing + outside), rel=1e-6)
+
+
+def test_an_effect_by_conditioning_a_gaussian():
+    """Prediction by the joint normal of base, taught pours and data, evidence by SciPy's t; no regression in it."""
+    shift, slope, prior, pours = 3.0 * unit(1, 7), 0.5 * unit(3), 4.0, 8
+    z = 1.4 * unit(1, 7)
+    found = judged(emulator({"push": shift}, freedom=50, pours=pours, sensitivity=slope, variance=prior), z)
+
+    def log_t(mean, variance):
+        scale = np.diag(variance) + np.outer(slope, slope)
+        return stats.multivariate_t.pdf(z - mean, shape=scale, df=50)
+
+    def predicted(a):
+        wide = 1e7  # of the base model, which is flat
+        here, there = np.array([a, a**2 - a]), np.array([1.0, 0.0])
+        kernel = np.diag([prior, CURVATURE**2 * prior])
+        seen = np.array([[wide + 1.0 / 24.0, wide], [wide, wide + there @ kernel @ there + 1.0 / pours]])
+        between = np.array([wide, wide + here @ kernel @ there])
+        weights = np.linalg.solve(seen, between)
+        return weights[1] * shift, np.full(SIZE, wide + here @ kernel @ here - weights @ between + 1.0 / 6.0)
+
+    base = 1.0 / 24.0
+    # The base model is known better by the effect's pours, as far as these may be off it.
+    base = 1.0 / (1.0 / base + 1.0 / (prior + 1.0 / pours))
+    offset = base / (prior + 1.0 / pours) * shift
+    weights = {
+        "nothing": NOTHING * log_t(offset, np.full(SIZE, 1.0 / 6.0 + base)),
+        "outside": OUTSIDE * np.mean([log_t(offset, np.full(SIZE, 1.0 / 6.0 + base + s**2)) for s in SPREADS]),
+        "push": (1.0 - NOTHING - OUTSIDE - PAIRS) * np.mean([log_t(*predicted(a)) for a in multiples(BEYOND)]),
+    }
+    total = sum(weights.values())
+    assert found.nothing == pytest.approx(weights["nothing"] / total, rel=1e-5)
+    assert found.effects["push"] == pytest.approx(weights["push"] / total, rel=1e-5)
+
+
+def test_probabilities_add_up_and_go_to_what_is_there():
+    taught = emulator({"push": 4.0 * unit(0, 8), "pull": 4.0 * unit(3)})
+    for z, answer in ((2.0 * unit(0, 8), "push"), (2.0 * unit(3), "pull")):
+        found = judged(taught, z)
+        assert found.best[0] == answer
+        assert found.best[1] > 0.9
+        assert found.nothing + found.outside + sum(found.effects.values()) == pytest.approx(1.0)
+    assert judged(taught, np.zeros(SIZE)).nothing > 0.8
+    assert judged(taught, 5.0 * unit(5, 11) - 3.0 * unit(2)).outside > 0.9
+
+
+def test_the_best_amplitude_is_told():
+    """Where signatures are expected to be of about this size, and so not far from proportional."""
+    taught = emulator({"push": 4.0 * unit(0, 8)}, variance=1.0)
+    for share in (0.3, 0.5, 1.0):
+        found = judged(taught, share * 4.0 * unit(0, 8))
+        (amplitude,) = found.fits["push"].amplitudes
+        (level,) = found.levels
+        assert level.amplitude == pytest.approx(share, rel=0.35)
+        assert amplitude.low < share < amplitude.high
+        assert not amplitude.at_end
+
+
+def test_what_recalibration_can_do_is_nobodys_effect():
+    """A shift along a parameter that may move by as much leaves nothing to explain."""
+    shift = 3.0 * unit(0)
+    free = judged(emulator({"push": 4.0 * unit(0, 1)}, sensitivity=shift), shift)
+    fixed = judged(emulator({"push": 4.0 * unit(0, 1)}), shift)
+    assert free.nothing > 0.8
+    assert fixed.nothing < 1e-3
+
+
+def test_few_degrees_of_freedom_make_the_answer_less_sure():
+    """On average over the noise of the data, which fills all dimensions."""
+    noise = np.sqrt(5.0 / 24.0) * np.random.default_rng(0).standard_normal((50, SIZE))
+
+    def nothing(freedom):
+        taught = emulator({"push": 4.0 * unit(0)}, freedom=freedom)
+        return np.mean([np.log(judged(taught, 1.6 * unit(0) + one).nothing) for one in noise])
+
+    assert nothing(5) > nothing(10_000) + 0.5
+
+
+def test_data_with_more_scatter_say_less():
+    taught = emulator({"push": 4.0 * unit(0)})
+    z = 1.8 * unit(0)
+    calm, wild = (posterior(taught, Data(z, 6, scatter), temperature=1.0) for scatter in (1.0, 3.0))
+    assert wild.nothing > calm.nothing + 0.1
+
+
+def test_what_an_instrument_may_be_off_by_is_nobodys_effect():
+    taught = emulator({"push": 4.0 * unit(0, 1)})
+    z = 3.0 * unit(0)
+    doubted = posterior(taught, Data(z, 6, 1.0, 3.0 * unit(0)[:, None]), temperature=1.0)
+    assert doubted.nothing > 0.8
+    assert judged(taught, z).nothing < 1e-3
+
+
+def planar(shifts):
+    """An effect with a direction: ``shifts`` along +x, +y, −x, −y."""
+    names = ("+x", "+y", "-x", "-y")
+    ways = tuple(
+        Way("tilt", f"tilt {one}", (2.0, 0.0), math.inf, angle) for one, angle in zip(names, ANGLES, strict=True)
+    )
+    return emulator(dict(zip(names, shifts, strict=True)), variance=1.0, ways=ways)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 90.0, 45.0, 200.0, 300.0])
+def test_an_effect_in_the_plane_is_found_in_every_direction(degrees):
+    """What answers as cos φ, sin φ and 1 is interpolated exactly: a leaning pile that is also flatter."""
+    x, y, even = 3.0 * unit(0), 3.0 * unit(7), 1.0 * unit(3)
+    taught = planar([even + x, even + y, even - x, even - y])
+    towards = math.radians(degrees)
+    z = 0.7 * (even + math.cos(towards) * x + math.sin(towards) * y)
+    found = judged(taught, z)
+    assert found.effects["tilt"] > 0.95
+    along_x, along_y = (one.value for one in found.fits["tilt"].amplitudes)
+    assert math.hypot(along_x, along_y) == pytest.approx(1.4, rel=0.35)
+    off = math.degrees(math.atan2(along_y, along_x)) - degrees
+    assert abs((off + 180.0) % 360.0 - 180.0) < 12.0
+
+
+def test_weights_in_the_plane_interpolate():
+    for angle in ANGLES:
+        weights = planar_weights(angle)
+        assert [weights[one] for one in ANGLES] == pytest.approx([float(one == angle) for one in ANGLES], abs=1e-12)
+    assert sum(planar_weights(0.3).values()) == pytest.approx(1.0)
+
+
+def test_two_effects_at_once_are_told_where_none_alone_explains():
+    taught = emulator({"push": 4.0 * unit(0, 8), "pull": 4.0 * unit(3), "turn": 4.0 * unit(5)}, variance=1.0)
+    found = judged(taught, 3.0 * unit(0, 8) + 3.0 * unit(3), pairs=True)
+    assert found.best[0] == "push+pull"
+    assert found.best[1] > 0.9
+    assert [one.effect for one in found.fits["push+pull"].amplitudes] == ["push", "pull"]
+    # Where one is enough, no pair is weighed.
+    alone = judged(taught, 3.0 * unit(0, 8), pairs=True)
+    assert set(alone.effects) == {"push", "pull", "turn"}
+
+
+def test_an_amplitude_ends_where_the_literature_does():
+    free = emulator({"push": 2.0 * unit(0)}, variance=1.0)
+    held = emulator({"push": 2.0 * unit(0)}, variance=1.0, ways=(Way("push", "push", (0.1,), 1.0),))
+    z = 3.0 * unit(0)
+    (far,), (near,) = (judged(one, z).fits["push"].amplitudes for one in (free, held))
+    assert far.value > 1.0
+    assert near.high <= 0.1
+    assert near.at_end
+
+
+def test_a_lower_temperature_is_less_sure():
+    taught = emulator({"push": 4.0 * unit(0)})
+    z = 2.0 * unit(0)
+    sure, tempered = (posterior(taught, Data(z, 6), temperature=one).effects["push"] for one in (1.0, 0.5))
+    assert 0.5 < tempered < sure
+
+
+def test_data_far_off_every_model_are_unlikely_under_all():
+    taught = emulator({"push": 4.0 * unit(0)}, variance=0.1)
+    assert judged(taught, 5.0 * unit(4)).fits["push"].p < 1e-3
+    assert judged(taught, 2.0 * unit(0)).fits["push"].p > 0.05
+
+
+def base_of(taught):
+    return taught.at(taught.row()[None])
+
+
+def test_the_base_model_is_known_better_by_pours_of_effects_that_hardly_move_it():
+    still = emulator({"a": np.zeros(SIZE), "b": np.zeros(SIZE)}, variance=1e-3)
+    moving = emulator({"a": np.zeros(SIZE), "b": np.zeros(SIZE)}, variance=1e6)
+    assert base_of(moving)[1] == pytest.approx(1.0 / 24.0, rel=1e-3)
+    assert base_of(still)[1] == pytest.approx(1.0 / 48.0, rel=0.05)
+
+
+def lessons_of(sample, ways):
+    """Pours of ``sample`` as lessons; ``ways``: number and amplitude of a kind."""
+    parts = []
+    for kind, blocks in sample.pours.items():
+        n = len(blocks[0])
+        theta = {"friction -": -1.5, "friction +": 1.5}.get(kind, 0.0)
+        way, amplitude = ways.get(kind, (-1, 0.0))
+        parts.append(Lessons(np.full((n, 1), theta), np.full(n, way), np.full(n, amplitude), np.ones(n, bool), blocks))
+    found = parts[0]
+    for part in parts[1:]:
+        found = found.joined(part)
+    return found
+
+
+def test_the_emulator_is_taught_by_pours():
+    sample = sample_of(np.random.default_rng(0), {"push": 4.0 * unit(2), "half": 2.0 * unit(2)}, sensitivity=unit(5))
+    found = emulated(lessons_of(sample, {"push": (0, 1.0), "half": (0, 0.5)}), [Way("push", "push")])
+    # Three groups, for pours with a parameter moved are the base model's, and one parameter.
+    assert found.freedom == 2 * 96 + 4 * 96 - 3 - 1
+    z = {kind: found.seen(sample.pours[kind]) for kind in ("base", "push", "half")}
+    for kind, amplitude in (("push", 1.0), ("half", 0.5)):
+        mean, variance = found.at(found.row({0: amplitude})[None])
+        assert mean[0] == pytest.approx(z[kind], abs=0.4)
+        assert (variance > 0.0).all()
+    # Lengths do not depend on the axes; four deviations are drawn in a little, and so is what they are measured by.
+    assert np.linalg.norm(z["push"] - z["base"]) == pytest.approx(4.0, rel=0.2)
+    assert np.linalg.norm(found.slopes) == pytest.approx(1.0, rel=0.25)
+    assert found.reached == (1.0,)
+    # What z stands for is what was poured.
+    for kind in ("base", "push"):
+        assert found.features(z[kind]) == pytest.approx(
+            np.concatenate([block.mean(axis=0) for block in sample.pours[kind]]), abs=0.15
+        )
+
+
+def test_parameters_that_move_in_every_pour_cost_no_pours_of_their_own():
+    """Half of the pours of every kind with the parameter up, half down: slope and signature come out apart."""
+    rng = np.random.default_rng(1)
+    theta = np.tile([[1.0], [-1.0]], (60, 1))
+    way = np.repeat([-1, 0], 60)
+    features = theta * unit(5) + np.where(way == 0, 1.0, 0.0)[:, None] * 4.0 * unit(2)
+    features = features + rng.standard_normal((120, SIZE))
+    blocks = tuple(np.split(features, 2, axis=1))
+    taught = emulated(Lessons(theta, way, (way == 0).astype(float), np.ones(120, bool), blocks), [Way("push", "push")])
+    assert np.linalg.norm(taught.slopes) == pytest.approx(1.0, rel=0.35)
+    shift = taught.at(taught.row({0: 1.0})[None])[0] - base_of(taught)[0]
+    assert np.linalg.norm(shift) == pytest.approx(4.0, rel=0.2)
+
+
+def test_a_pour_looked_at_otherwise_tells_nothing_of_the_scatter():
+    sample = sample_of(np.random.default_rng(0), {"push": 4.0 * unit(2)})
+    lessons = lessons_of(sample, {"push": (0, 1.0)})
+    copies = lessons.where(lessons.way == 0)
+    again = lessons.joined(
+        Lessons(copies.theta, copies.way, copies.amplitude, np.zeros(len(copies), bool), copies.blocks)
+    )
+    one, other = (emulated(some, [Way("push", "push")]) for some in (lessons, again))
+    assert one.freedom == other.freedom
+
+
+def test_what_cannot_teach_is_refused():
+    sample = sample_of(np.random.default_rng(0), {"push": unit(0)}, pours=1)
+    with pytest.raises(StatisticsError, match="push: 1 pours"):
+        emulated(lessons_of(sample, {"push": (0, 1.0)}), [Way("push", "push")])
+    with pytest.raises(StatisticsError, match="pull: 0 pours"):
+        emulated(lessons_of(sample, {}), [Way("pull", "pull")])
+
+
+def test_signatures_of_noise_alone_are_not_believed():
+    rng = np.random.default_rng(0)
+    noise = np.full(18, 0.2)
+    nothing, _ = signature_prior(np.sqrt(0.2) * rng.standard_normal((18, 90)), noise)
+    assert nothing.max() < 0.1 * 0.2
+    along = rng.standard_normal((18, 1)) * 5.0 * np.eye(90)[:1]
+    values, axes = signature_prior(along + np.sqrt(0.2) * rng.standard_normal((18, 90)), noise)
+    assert values.max() == pytest.approx((along**2).sum() / 18, rel=0.3)
+    assert abs(axes[0, values.argmax()]) > 0.95
+    assert np.sort(values)[-2] < 0.1 * 0.2
+
+
+def test_a_rare_large_count_is_drawn_in():
+    squash = Squash(np.zeros(1), np.ones(1))
+    small, large = squash(np.array([[0.1]])), squash(np.array([[100.0]]))
+    assert small[0, 0] == pytest.approx(0.1, rel=1e-3)
+    assert large[0, 0] == pytest.approx(SQUASH * np.arcsinh(100.0 / SQUASH))
+
+
+def truths(kinds):
+    return [Truth(kind, "weak", 4.9) for kind in kinds]
+
+
+@pytest.mark.parametrize("teaching", [Teaching(8, 0), Teaching(4, 12)])
+def test_a_replay_names_what_is_far_apart_and_nothing_where_nothing_is(teaching):
+    """Two effects of 4 pours' deviations at right angles; data have half of it, 2 √6 = 4.9 σ."""
+    shifts = {"a strong": 4.0 * unit(0), "a weak": 2.0 * unit(0), "b strong": 4.0 * unit(7), "b weak": 2.0 * unit(7)}
+    sample = sample_of(np.random.default_rng(1), shifts)
+    kinds = [Kind(name, name, False) for name in "ab"]
+    found = replay("scan", sample, kinds, truths(kinds), teaching, 10, np.random.default_rng(0))
+    assert (found.sets, found.nulls) == (20, 10 * NULLS)
+    assert found.right == 1.0
+    assert found.named == (1.0,) * len(RISKS)
+    assert set(found.by_effect) == {"a", "b"}
+    assert (found.pours > 0.0) == (teaching.more > 0)
+    assert max(found.false) <= 2
+
+
+def test_a_replay_of_effects_that_are_alike_is_a_guess():
+    shifts = {f"{name} {size}": length * unit(0) for name in "ab" for size, length in (("strong", 4.0), ("weak", 2.0))}
+    sample = sample_of(np.random.default_rng(1), shifts)
+    kinds = [Kind(name, name, False) for name in "ab"]
+    found = replay("scan", sample, kinds, truths(kinds), Teaching(8, 0), 40, np.random.default_rng(0))
+    assert 0.2 < found.right < 0.8
+    assert found.named[RISKS.index(0.01)] < 0.2
+
+
+def test_a_feature_that_hardly_ever_varies_does_not_spoil_the_answer():
+    """Constant in the pours that teach, unlike in some that are data: it is left out, and every answer is a number."""
+    shifts = {"a strong": 4.0 * unit(0), "a weak": 2.0 * unit(0)}
+    sample = sample_of(np.random.default_rng(1), shifts)
+    for blocks in sample.pours.values():
+        blocks[0][:, 3] = 0.0
+    sample.pours["base"][0][::40, 3] = 1.0
+    kinds = [Kind("a", "a", False)]
+    found = replay("scan", sample, kinds, truths(kinds), Teaching(8, 0), 20, np.random.default_rng(0))
+    assert found.named == (1.0,) * len(RISKS)

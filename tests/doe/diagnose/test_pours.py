@@ -1,0 +1,120 @@
+"""Which pours are the same: model, number and condition, not the number alone."""
+
+import dataclasses
+import math
+from contextlib import closing
+
+import numpy as np
+import pytest
+
+from doe.diagnose import pours as module
+from doe.diagnose.confirm import Model, confirm
+from doe.diagnose.declared import Condition, Declared
+from doe.diagnose.levels import whitened_shift
+from doe.diagnose.points import Point
+from doe.diagnose.pours import ModelPours, Pour
+from doe.measurement import summary_names
+from doe.measurement.features import feature_set
+from doe.store import Store
+from doe.validation.laboratory import OBSERVABLES, declared_model
+from solver import Outcome, value
+from tests.solver.observables.made_up import empty_pile, record_of
+
+FRICTION = "pair.grain.grain.static_friction"
+
+
+@pytest.fixture
+def poured(monkeypatch, tmp_path):
+    """A model of one parameter whose every summary is that parameter, and the jobs that were run."""
+    condition = declared_model().fit[0]
+    jobs = []
+
+    def run(queue, room):
+        while queue:
+            job = queue.popleft()
+            jobs.append(job)
+            friction = float(value(job.scene, FRICTION))
+            # What is read is read off the raw pour, which knows no friction: the mass stands for it.
+            record = record_of(empty_pile(), np.zeros(1), np.zeros(1), poured_mass=friction)
+            yield job, dataclasses.replace(record, scene=job.scene, outcome=Outcome.MEASURED)
+
+    def features(asked, record):
+        return np.full(len(feature_set(asked).names), record.poured_mass)
+
+    monkeypatch.setattr(module, "features_of_record", features)
+    with closing(Store(tmp_path / "runs.sqlite")) as store:
+        yield ModelPours([condition], [FRICTION], store, run), jobs
+
+
+def test_two_models_are_confirmed_by_pours_of_their_own(poured):
+    pours, jobs = poured
+    width = len(OBSERVABLES) - 1
+    for asked in ((0.5,), (0.6, 0.5)):
+        found = confirm([Model((friction,)) for friction in asked], pours, 3, [width])
+        assert [one.blocks[0].tolist() for one in found] == [[[friction] * width] * 3 for friction in asked]
+    # The last asks for what the first has poured.
+    assert len(jobs) == 6
+
+
+def at(friction, number=0):
+    return Point("search", number, (friction,))
+
+
+def test_searches_are_answered_side_by_side_and_what_follows_a_pour_goes_first(poured):
+    """A search of three steps beside two of one: each gets its own pours, and the long one does not come last."""
+    pours, jobs = poured
+
+    def climbing(friction):
+        for _ in range(2):
+            (row,) = yield [at(friction)]
+            friction = row[0].summaries[0] + 0.01
+        rows = yield [at(friction), at(friction, 1)]
+        return [row[0].summaries[0] for row in rows]
+
+    def single(friction):
+        ((pour,),) = yield [at(friction)]
+        return pour.summaries[0]
+
+    found = pours.answered("search", [climbing(0.5), single(0.6), single(0.7)])
+    assert found == [pytest.approx([0.52, 0.52]), 0.6, 0.7]
+    run = [float(value(job.scene, FRICTION)) for job in jobs]
+    assert run == pytest.approx([0.5, 0.51, 0.52, 0.52, 0.6, 0.7])
+    # All of it is known now: the searches end without a pour.
+    assert pours.answered("search", [climbing(0.5), single(0.7)]) == [pytest.approx([0.52, 0.52]), 0.7]
+    assert (len(jobs), pours.run_now) == (6, 6)
+
+
+def test_a_point_that_is_asked_for_twice_is_poured_once(poured):
+    pours, jobs = poured
+    first, second = pours.run("twice", [at(0.5), at(0.5)])
+    assert first == second
+    assert len(jobs) == 1
+
+
+def test_an_effect_under_which_no_pour_ends_is_infinitely_far():
+    declared = Declared((), (), (Condition("one", ("a", "b")),))
+    centre = [(Pour(tuple(row), "measured"),) for row in np.random.default_rng(0).normal(size=(8, 2))]
+    for moved in (Pour((math.nan, 1.0), "measured"), Pour((1.0, 1.0), "jammed")):
+        assert whitened_shift(declared, centre, [(moved,)]) == math.inf
+
+
+def test_a_new_summary_is_read_off_all_stored_pours_without_pouring(poured):
+    """A data set of the same set-up that offers more: the pours of the first serve it as they are."""
+    pours, jobs = poured
+    points = [at(0.5), at(0.6), at(0.7, 1)]
+    pours.run("first", points)
+    (condition,) = pours._conditions
+    # Fewer numbers were measured first, then more: in the order of a laboratory that looks again.
+    for observations in (condition.observations[:3], condition.observations[:5]):
+        smaller = dataclasses.replace(condition, observations=observations)
+        other = ModelPours([smaller], [FRICTION], pours._store, pours._pours)
+        found = other.run("second", points)
+        width = len(summary_names(smaller))
+        assert [row[0].summaries for row in found] == [(f,) * width for f in (0.5, 0.6, 0.7)]
+        assert other.run_now == 0
+    taller = dataclasses.replace(condition.observations[0], observable="centre_height_m")
+    more = dataclasses.replace(condition, observations=(*condition.observations, taller))
+    assert "centre_height_m" in summary_names(more)
+    other = ModelPours([more], [FRICTION], pours._store, pours._pours)
+    assert other.run("third", points)[0][0].summaries == (0.5,) * len(summary_names(more))
+    assert (other.run_now, len(jobs)) == (0, 3)
