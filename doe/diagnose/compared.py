@@ -8,7 +8,7 @@ matter of names (``doe/measurement/features.py``), so nothing here looks at a va
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -16,14 +16,18 @@ import numpy.typing as npt
 from doe.diagnose.emulator import Emulator, Lessons, Way, emulated
 from doe.diagnose.posterior import Data, Posterior, posterior
 from doe.errors import StatisticsError
-from doe.measurement.features import feature_set, features_of_data, offer_of
+from doe.measurement.features import SCAN, feature_set, features_of_data, offer_of, sight_of
 from doe.measurement.measurement import Condition
+from doe.measurement.sight import PERFECT, Sight
 from doe.measurement.summaries import summary_uncertainties
 
 FloatArray = npt.NDArray[np.float64]
 
 READABLE = 0.8
 """Share of the base model's pours in which a feature has to be there."""
+BIAS_ERROR = 0.3
+"""Standard deviation of a sight's bias, as a share of it: it is that of the base model's piles, and cameras are not
+what is assumed of them."""
 CONSTANT = 1e-9
 """Scatter within groups of pours, as a share of the feature's size, below which it says nothing."""
 
@@ -32,7 +36,8 @@ CONSTANT = 1e-9
 class Measured:
     """Features that a condition's data offer: names, replicates (r, d) and the stated error of each, (d,).
 
-    ``scalars``: how many of them are not read off a surface. ``axis_error``: of the scans' axis [m].
+    ``scalars``: how many of them are not read off a surface. ``sight``: what the scans were seen through;
+    ``axis_error``: of their axis [m].
     """
 
     condition: str
@@ -43,6 +48,7 @@ class Measured:
     mean_of: int = 1
     scalars: int = 0
     axis_error: float = 0.0
+    sight: Sight = PERFECT
 
     def pours(self, columns: npt.NDArray[np.int64]) -> FloatArray:
         """The replicates in which all of ``columns`` could be read."""
@@ -66,6 +72,7 @@ def measured(condition: Condition, offer: str | None = None) -> Measured:
         mean_of=condition.mean_of,
         scalars=len(names.scalars),
         axis_error=max((one.axis_error for one in condition.surfaces.values()), default=0.0),
+        sight=sight_of(condition) if found == SCAN else PERFECT,
     )
 
 
@@ -94,15 +101,26 @@ class Compared:
     posterior: Posterior
 
 
-def weighed(
-    lessons: Lessons, ways: Sequence[Way], conditions: Sequence[Measured], displaced: Sequence[FloatArray] = ()
-) -> Compared:
-    """Weigh all models by the data of the fitted ``conditions``.
+@dataclass(frozen=True)
+class Instrument:
+    """What the scanner of a condition does to all features of the base model's pours, by the same pours seen both ways.
 
-    ``displaced``: by condition, what the axis' error along x and along y does to all features of the pours, (2, …).
+    ``bias``: its sight, (d,). ``axis``: its axis being off by one standard deviation along x and along y, (2, d).
+    """
+
+    bias: FloatArray
+    axis: FloatArray
+
+
+def weighed(
+    lessons: Lessons, ways: Sequence[Way], conditions: Sequence[Measured], instruments: Sequence[Instrument] = ()
+) -> Compared:
+    """Weigh all models by the data of the fitted ``conditions``, freed from the bias of their ``instruments``.
 
     Raises StatisticsError where a condition has nothing that can be compared.
     """
+    if instruments:
+        conditions = [_freed(one, instrument) for one, instrument in zip(conditions, instruments, strict=True)]
     columns = [_readable(lessons, c, condition) for c, condition in enumerate(conditions)]
     taught = _complete(lessons.only(columns))
     columns = [chosen[_varies(taught, c)] for c, chosen in enumerate(columns)]
@@ -123,7 +141,7 @@ def weighed(
         emulator.seen(blocks),
         float(numbers.mean()),
         _scatter(emulator, blocks, weights, conditions),
-        _instrument(emulator, blocks, conditions, columns, displaced),
+        _loadings(emulator, blocks, conditions, columns, instruments),
     )
     names = tuple(tuple(one.names[k] for k in chosen) for one, chosen in zip(conditions, columns, strict=True))
     labels = tuple(one.condition for one in conditions)
@@ -178,16 +196,21 @@ def _scatter(
     return max(1.0, square / expected) if expected > 0.0 else 1.0
 
 
-def _instrument(
+def _freed(condition: Measured, instrument: Instrument) -> Measured:
+    return replace(condition, values=condition.values - instrument.bias[: condition.values.shape[1]])
+
+
+def _loadings(
     emulator: Emulator,
     blocks: Sequence[FloatArray],
     conditions: Sequence[Measured],
     columns: Sequence[npt.NDArray[np.int64]],
-    displaced: Sequence[FloatArray],
+    instruments: Sequence[Instrument],
 ) -> FloatArray:
     """I: what the errors of instruments, which no averaging reduces, do to z, (D, q).
 
-    Stated errors of numbers are independent; that of a scan's axis moves all that is read off the surface together.
+    Stated errors of numbers are independent. What a scan's axis is off, and what is not known of the bias of its sight,
+    move all that is read off the surface together.
     """
     size, first, found = len(emulator.whitening), 0, []
     for c, (squash, block, one, chosen) in enumerate(zip(emulator.squashes, blocks, conditions, columns, strict=True)):
@@ -197,9 +220,10 @@ def _instrument(
         stated = one.instrument[chosen] * slope
         for k in np.flatnonzero(stated > 0.0):
             found.append(stated[k] * np.eye(size)[places[k]])
-        if one.axis_error > 0.0 and displaced:
-            for change in displaced[c][:, chosen]:
+        if instruments:
+            changes = [*instruments[c].axis, BIAS_ERROR * instruments[c].bias]
+            for change in (change[chosen] for change in changes if change.any()):
                 moved = np.zeros(size)
-                moved[places] = np.where(chosen >= one.scalars, change, 0.0) * slope
+                moved[places] = change * slope
                 found.append(moved)
     return np.asarray(emulator.whitening @ np.array(found).T, dtype=np.float64) if found else np.zeros((size, 0))

@@ -17,7 +17,7 @@ from doe.diagnose.menu import Menu, Suggestion, next_experiment
 from doe.diagnose.posterior import Posterior
 from doe.diagnose.pours import ModelPours, OnPour
 from doe.diagnose.teaching import Budget, Say, Teacher
-from doe.diagnose.verdict import NO_EFFECT, Verdict, taken_back, verdict_of
+from doe.diagnose.verdict import NO_EFFECT, THRESHOLD, Verdict, taken_back, verdict_of
 from doe.measurement.features import SCAN, feature_set
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.summaries import summaries_of_data, summary_names
@@ -116,8 +116,8 @@ def run_diagnosis(
 def pursued(teacher: Teacher, conditions: Sequence[Condition], budget: Budget, say: Say) -> Compared:
     """Models and data once what is in question has been looked at more closely."""
     data = [measured(condition) for condition in conditions]
-    displaced = teacher.displaced(data)
-    compared = weighed(teacher.lessons(), teacher.ways, data, displaced)
+    instruments = teacher.instruments(data)
+    compared = weighed(teacher.lessons(), teacher.ways, data, instruments)
     say(f"after screening: {odds(compared.posterior)}")
     looked: set[str] = set()
     for _ in range(budget.looks):
@@ -130,8 +130,13 @@ def pursued(teacher: Teacher, conditions: Sequence[Condition], budget: Budget, s
         if not poured:
             break
         looked |= set(poured)
-        compared = weighed(teacher.lessons(), teacher.ways, data, displaced)
+        compared = weighed(teacher.lessons(), teacher.ways, data, instruments)
         say(f"after a closer look at {', '.join(poured)}: {odds(compared.posterior)}")
+    label, p = compared.posterior.best if compared.posterior.effects else ("", 0.0)
+    if p >= THRESHOLD:
+        teacher.refine(compared.posterior, label)
+        compared = weighed(teacher.lessons(), teacher.ways, data, instruments)
+        say(f"with pours on both sides of its best fit: {odds(compared.posterior)}")
     return compared
 
 

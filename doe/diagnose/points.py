@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from doe.diagnose.declared import Declared, Effect, Parameter
+from doe.measurement.sight import PERFECT, Sight
 from doe.record import Record
 from solver import Record as PourRecord
 
@@ -26,16 +27,20 @@ from solver import Record as PourRecord
 @dataclass(frozen=True)
 class View:
     """How a pour is looked at: its pile after ``turns`` quarter turns about the rig's axis, then displaced by
-    ``shift`` (x, y) [m].
+    ``shift`` (x, y) [m], its surface seen through ``sight``.
     """
 
     turns: int = 0
     shift: tuple[float, float] = (0.0, 0.0)
+    sight: Sight = PERFECT
 
     @property
     def label(self) -> str:
         """What the name of a number that is read so ends with."""
-        return "" if self == AS_IT_IS else f"|{self.turns} {self.shift[0]:.6g} {self.shift[1]:.6g}"
+        if self == AS_IT_IS:
+            return ""
+        through = "" if self.sight == PERFECT else f" {self.sight.label}"
+        return f"|{self.turns} {self.shift[0]:.6g} {self.shift[1]:.6g}{through}"
 
     def of(self, record: PourRecord) -> PourRecord:
         """``record`` with its pile so."""

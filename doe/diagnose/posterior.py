@@ -45,8 +45,11 @@ DIRECTIONS = 24
 """Directions in the plane over which an effect with two amplitudes is summed."""
 SPREADS = np.geomspace(0.3, 6.0, 6)
 """Shifts by something outside [standard deviations of one pour in every feature]."""
+FITS = 0.002
+"""Probability of data as far off as these, below which a model does not fit: one right model in 500 is lost."""
 PAIRED_FROM = 0.3
-"""Probability of something outside from which on pairs of effects are weighed too; they cost seconds."""
+"""Probability of something outside from which on pairs of effects are weighed too, for they cost seconds; they are as
+well where the best single effect does not fit."""
 COARSE = 3
 """Every so many amplitudes and directions of a member of a pair are summed."""
 AT_ONCE = 20_000

@@ -246,7 +246,7 @@ def reader(condition: Condition, view: View = AS_IT_IS) -> Reader:
 
     def read(record: Record) -> dict[str, float]:
         record = view.of(record)
-        heights, numbers = profile_of_record(condition, record), features_of_record(condition, record)
+        heights, numbers = profile_of_record(condition, record), features_of_record(condition, record, view.sight)
         names = [name + view.label for name in (*profile_names(condition), *feature_set(condition).names)]
         return dict(zip(names, (*heights, *numbers.tolist()), strict=True))
 

@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
-from doe.diagnose.compared import Measured
+from doe.diagnose.compared import Instrument, Measured
 from doe.diagnose.declared import Declared, declare
 from doe.diagnose.emulator import Lessons, Way
 from doe.diagnose.levels import Level, Trials, level_of
@@ -23,6 +23,7 @@ from doe.diagnose.posterior import Posterior
 from doe.diagnose.pours import ModelPours, Pour
 from doe.errors import StatisticsError
 from doe.measurement.measurement import Condition, Measurement
+from doe.measurement.sight import PERFECT
 from solver import Scene, pour_rig
 
 FloatArray = npt.NDArray[np.float64]
@@ -143,6 +144,19 @@ class Teacher:
         self._pour("closer look", wanted)
         return tuple(dict.fromkeys(self.ways[way].effect for way, _, _ in wanted))
 
+    def refine(self, found: Posterior, label: str) -> None:
+        """Pour the effects of ``label`` on both sides of their best fits, so that these are no extrapolation."""
+        wanted = []
+        for name in label.split("+"):
+            level = max(
+                (one for one in found.levels if self.ways[one.way].effect == name), key=lambda one: one.log_density
+            )
+            power = math.log2(level.amplitude)
+            for one in (math.floor(power), math.ceil(power)):
+                multiple = min(2.0**one, self.ways[level.way].most)
+                wanted.append((level.way, multiple, max(self._taught(level.way, multiple), self._budget.more)))
+        self._pour("refinement", wanted)
+
     def lessons(self) -> Lessons:
         """All pours, NaN where one broke off or a feature could not be read."""
         points = list(self._rows)
@@ -161,22 +175,23 @@ class Teacher:
             tuple(blocks),
         )
 
-    def displaced(self, conditions: Sequence[Measured]) -> list[FloatArray]:
-        """By condition, what its scans' axis being off by its error along x and along y does to all features, (2, d).
-
-        Of the same pours, so without noise. Empty where no scan has an axis that could be off.
-        """
-        if not any(one.axis_error > 0.0 for one in conditions):
+    def instruments(self, conditions: Sequence[Measured]) -> list[Instrument]:
+        """By condition what its scanner does to the base model's pours; empty where every sight and axis is perfect."""
+        if all(one.sight == PERFECT and one.axis_error == 0.0 for one in conditions):
             return []
         found = []
         for c, one in enumerate(conditions):
             points = base_points(self._declared, SHIFTED)
-            views = [View(), View(shift=(one.axis_error, 0.0)), View(shift=(0.0, one.axis_error))]
-            seen = self._pours.run("axis of the scans", [p.seen(v) for v in views for p in points], [c])
-            rows = np.array([(*row.summaries, *row.surface) for (row,) in seen]).reshape(3, len(points), -1)
+            shifts = ((one.axis_error, 0.0), (0.0, one.axis_error))
+            views = [AS_IT_IS, View(sight=one.sight), *(View(shift=shift) for shift in shifts)]
+            seen = self._pours.run("scanner", [p.seen(v) for v in views for p in points], [c])
+            rows = np.array([(*row.summaries, *row.surface) for (row,) in seen]).reshape(len(views), len(points), -1)
             change = rows[1:] - rows[0]
-            ended = np.isfinite(change).any(axis=(0, 2))
-            found.append(np.nan_to_num(change[:, ended].mean(axis=1)))
+            # Numbers of the table come from other instruments.
+            change[:, :, : one.scalars] = 0.0
+            ended = np.isfinite(change).all(axis=(0, 2))
+            bias, *axis = change[:, ended].mean(axis=1)
+            found.append(Instrument(bias, np.array(axis)))
         return found
 
     def _found_levels(self) -> list[Level]:
@@ -227,7 +242,7 @@ class Teacher:
         return sum(one == (way, multiple) for one in self._acting.values())
 
     def _in_question(self, found: Posterior) -> list[tuple[int, float]]:
-        """Ways, with the multiples that are poured next to their best fit."""
+        """Ways, with the multiple that is poured nearest to their best fit."""
         probability: dict[str, float] = {}
         for label, p in found.effects.items():
             for name in label.split("+"):
@@ -236,17 +251,11 @@ class Teacher:
         for level in found.levels:
             effect = self.ways[level.way].effect
             best[effect] = max(best.get(effect, -math.inf), level.log_density)
-        leading = max(probability, key=lambda name: probability[name], default="")
         asked: list[tuple[int, float]] = []
         for level in found.levels:
             way = self.ways[level.way]
             if probability[way.effect] > IN_QUESTION and level.log_density > best[way.effect] - BEHIND:
-                power = math.log2(level.amplitude)
-                powers = {round(power)}
-                if way.effect == leading and level.log_density == best[way.effect]:
-                    # On both sides of the best fit, so that it is no extrapolation.
-                    powers = {math.floor(power), math.ceil(power)}
-                asked += [(level.way, min(2.0**one, way.most)) for one in sorted(powers)]
+                asked.append((level.way, min(2.0 ** round(math.log2(level.amplitude)), way.most)))
         return asked
 
     def at_end(self, found: Posterior) -> list[tuple[int, float]]:

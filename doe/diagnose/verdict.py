@@ -20,7 +20,7 @@ import numpy.typing as npt
 from doe.diagnose.compared import Compared
 from doe.diagnose.declared import Declared, Parameter
 from doe.diagnose.levels import Level
-from doe.diagnose.posterior import TEMPERATURE, Amplitude, Fit, Posterior
+from doe.diagnose.posterior import FITS, TEMPERATURE, Amplitude, Fit, Posterior
 from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
@@ -30,10 +30,10 @@ THRESHOLD = 0.9
 NOTHING_FROM = 0.5
 """Probability that nothing is missing from which on that is the answer: the prior's, so that data that favour no effect
 accuse none."""
-FITS = 0.002
-"""Probability of data as far off as these, below which a model does not fit: one right model in 500 is lost."""
 CREDIBLE = 0.95
 """Probability of the set of an ambiguous answer."""
+MOST_PAIRS = 5
+"""Pairs in the table."""
 NO_EFFECT, UNEXPLAINED = "no_missing_effect", "unexplained"
 
 
@@ -209,13 +209,15 @@ def verdict_of(compared: Compared, declared: Declared, levels: Sequence[Level], 
     before, after = found.fits["base"], found.fits[final]
     white = _Recalibrated(compared)
     rows = sorted(found.effects, key=lambda one: -found.effects[one])
+    likely = [label for label in rows if "+" in label][:MOST_PAIRS]
+    rows = [label for label in rows if "+" not in label or label in likely]
     return Verdict(
         kind=kind,
         names=names,
         statement=statement,
         nothing=found.nothing,
         outside=found.outside,
-        effects=tuple(_effect_row(compared, white, label, pours) for label in rows[: len(levels) + 5]),
+        effects=tuple(_effect_row(compared, white, label, pours) for label in rows),
         parameters=tuple(_parameter_row(p, j, before, after) for j, p in enumerate(declared.parameters)),
         residuals=_residuals(compared, before, after),
         where=_places(compared, white),

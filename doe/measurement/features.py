@@ -23,6 +23,7 @@ import numpy.typing as npt
 from doe.measurement.measurement import Condition
 from doe.measurement.piles import PileSurface
 from doe.measurement.scans import UpperSurface
+from doe.measurement.sight import PERFECT, Sight, found_sight, seen_through
 from doe.measurement.summaries import summaries_of_data, summaries_of_record, summary_names
 from solver import (
     ASYMMETRY_NAMES,
@@ -106,8 +107,10 @@ def feature_set(condition: Condition) -> FeatureSet:
     )
 
 
-def features_of_record(condition: Condition, record: Record) -> Array:
+def features_of_record(condition: Condition, record: Record, sight: Sight = PERFECT) -> Array:
     """Values of ``feature_set(condition).names`` of a run of the condition's set-up, NaN where one cannot be read.
+
+    ``sight``: what its surface is seen through.
 
     Scales are those of the declared scene, whatever acted in the run.
     """
@@ -115,7 +118,7 @@ def features_of_record(condition: Condition, record: Record) -> Array:
     if not names.profile:
         return scalars
     frame = frame_of_scene(condition.scene)
-    seen = dict(surface_features(_seen(PileSurface(record.pile.spheres), condition), frame))
+    seen = dict(surface_features(_seen(PileSurface(record.pile.spheres), condition, sight), frame))
     places = _listed_places(condition)
     if places is not None and not condition.surfaces:
         heights = np.asarray(observe_named(record, {LISTED: places})[LISTED])
@@ -143,6 +146,14 @@ def features_of_data(condition: Condition) -> Array:
                 seen = profile_features(ring_heights(observation.x, heights, frame), frame)
         rows.append(_chosen(missing | dict(seen), names))
     return np.concatenate([scalars, np.array(rows)], axis=1)[:, : names.offered(offer)]
+
+
+def sight_of(condition: Condition) -> Sight:
+    """What the scans of ``condition`` were seen through: the camera that their shadows tell of, and their noise."""
+    half_width, (cell, _) = frame_of_scene(condition.scene).half_width, cells_of(condition)
+    maps = [surface.height_map(half_width, cell) for surface in condition.surfaces.values()]
+    noise = max((surface.noise for surface in condition.surfaces.values()), default=0.0)
+    return found_sight(maps, noise)
 
 
 def seen_surface(condition: Condition, replicate: int) -> HeightMap:
@@ -192,11 +203,11 @@ def ring_heights(places: Array, heights: Array, frame: Frame) -> Array:
     return np.asarray((found * radius).sum(axis=1) / radius.sum(axis=1), dtype=np.float64)
 
 
-def _seen(surface: UpperSurface, condition: Condition) -> HeightMap:
+def _seen(surface: UpperSurface, condition: Condition, sight: Sight = PERFECT) -> HeightMap:
     cell, times = cells_of(condition)
     pixel = times * cell
     half_width = pixel * np.ceil(frame_of_scene(condition.scene).half_width / pixel)
-    return without_holes(coarsened(surface.height_map(half_width, cell), times))
+    return coarsened(without_holes(seen_through(surface.height_map(half_width, cell), sight)), times)
 
 
 def _listed_places(condition: Condition) -> Array | None:

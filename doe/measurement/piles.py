@@ -38,6 +38,7 @@ class PileSurface:
     grid: float = 0.0
     on_axis: bool = True
     axis_error: float = 0.0
+    noise: float = 0.0
 
     def height_map(self, half_width: float, pixel: float) -> HeightMap:
         """Heights of the highest spheres within ``half_width`` [m] of the axis."""

@@ -85,6 +85,10 @@ class UpperSurface(Protocol):
     def axis_error(self) -> float:
         """Standard deviation of each coordinate of the axis [m]."""
 
+    @property
+    def noise(self) -> float:
+        """Standard deviation of a height [m]; 0 where none is stated."""
+
     def height_map(self, half_width: float, pixel: float) -> HeightMap:
         """Heights within ``half_width`` [m] of the axis in pixels of ``pixel`` [m]; NaN where nothing was seen."""
 
@@ -101,6 +105,8 @@ class Scan:
     """Whether the axis is known; else x and y are about the centre of the volume."""
     axis_error: float = AXIS_ERROR
     """Standard deviation of each coordinate of the axis [m]."""
+    noise: float = 0.0
+    """Of a height [m]."""
 
     def height_map(self, half_width: float, pixel: float) -> HeightMap:
         """The upper surface within ``half_width`` [m] in pixels of ``pixel`` [m]; NaN where nothing was seen."""
@@ -197,7 +203,7 @@ def read_scan(path: Path, settings: ScanSettings) -> Scan:
         raise MeasurementError(f"{path}: {error}") from None
     except (OSError, ParameterError) as error:
         raise MeasurementError(f"{path}: cannot be read ({' '.join(str(error).split())[:120]})") from None
-    return Scan(points, grid, settings.axis is not None, settings.axis_error)
+    return Scan(points, grid, settings.axis is not None, settings.axis_error, settings.noise or 0.0)
 
 
 def found_plate(points: Array) -> tuple[float, float, float]:

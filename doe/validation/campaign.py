@@ -22,7 +22,7 @@ from doe.measurement.features import SCALARS, feature_set
 from doe.store import Store, default_store
 from doe.validation.answers import Answers
 from doe.validation.laboratory import MODEL, declared_model
-from doe.validation.outside import AMPLITUDE
+from doe.validation.outside import AMPLITUDE, DEVELOPMENT
 from doe.validation.schedule import Case, cases
 from doe.validation.sets import Row, append_rows, read_rows
 from doe.validation.truth import Strengths, strengths_of
@@ -62,7 +62,9 @@ class CampaignOrder:
     @cached_property
     def asked(self) -> tuple[Case, ...]:
         """The data sets."""
-        found = self.cases or tuple(cases(self.root, self.number, tuple(AMPLITUDE), self.wide))
+        found = self.cases or tuple(
+            cases(self.root, self.number, DEVELOPMENT if self.wide else tuple(AMPLITUDE), self.wide)
+        )
         return found[self.shard - 1 :: self.of]
 
 

@@ -5,8 +5,14 @@
     misread_scale      every length that is read off the pile is too large by one factor
     breaking_bodies    a share of the mass is single lobes instead of trefoils
     sticky_funnel      a share of the mass stays in the funnel for good, whatever the rest does
+    turning_plate      the plate turns about the funnel's axis
+    draught            air moves sideways above the plate and drags what falls through it
+    short_charge       less was weighed in than was written down
+    raised_funnel      the funnel stands higher than was written down
+    stray_spheres      a share of the mass is spheres of the bodies' own mass and solid volume
 
-Each pour is driven by hand in a process of its own (``work_place``), and gives an ordinary record.
+The first five are for development; a test (``schedule.py``) has all ten. Each pour is driven by hand in a process of
+its own (``work_place``), and gives an ordinary record.
 """
 
 import dataclasses
@@ -14,7 +20,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from solver import Batch, Members, Pour, Record, Scene, capacity_for, poured_mass, with_values
+from solver import Batch, Members, Pour, Record, Scene, capacity_for, poured_mass, value, with_values
 
 AMPLITUDE = {
     "vibrating_plate": 0.05,
@@ -22,8 +28,16 @@ AMPLITUDE = {
     "misread_scale": 0.10,
     "breaking_bodies": 0.18,
     "sticky_funnel": 0.07,
+    "turning_plate": 2.5,
+    "draught": 3.0,
+    "short_charge": 0.2,
+    "raised_funnel": 0.5,
+    "stray_spheres": 0.3,
 }
-"""Speed [m/s], q, factor − 1, shares: chosen once so that each moves the summaries by more than 10 standard errors."""
+"""Speed [m/s], q, factor − 1, shares, rate [rad/s], acceleration [m/s²], share left out, factor − 1, share: chosen
+once, before any diagnosis was asked, so that each moves the summaries by more than 10 standard errors."""
+DEVELOPMENT = ("vibrating_plate", "plate_attraction", "misread_scale", "breaking_bodies", "sticky_funnel")
+"""The kinds that a development campaign asks for."""
 OUTSIDE = 1
 """Version of this file: raise it with every change to what one of its pours does."""
 PLATE = 0
@@ -48,7 +62,19 @@ def outside_pour(name: str, scene: Scene, seed: int, amount: float) -> Record:
     if name == "sticky_funnel":
         stuck = amount * poured_mass(scene)
         return with_stuck(driven(with_values(scene, {"rig.mass": poured_mass(scene) - stuck}), seed), stuck)
-    act, every = {"vibrating_plate": (vibrate, HALF_PERIOD), "plate_attraction": (attract, KICK)}[name]
+    if name == "short_charge":
+        return driven(with_values(scene, {"rig.mass": (1.0 - amount) * poured_mass(scene)}), seed)
+    if name == "raised_funnel":
+        height = float(value(scene, "rig.outlet_height"))
+        return driven(with_values(scene, {"rig.outlet_height": (1.0 + amount) * height}), seed)
+    if name == "stray_spheres":
+        return driven(with_spheres(scene, amount), seed)
+    act, every = {
+        "vibrating_plate": (vibrate, HALF_PERIOD),
+        "plate_attraction": (attract, KICK),
+        "turning_plate": (turn, HALF_PERIOD),
+        "draught": (blow, KICK),
+    }[name]
     return driven(scene, seed, lambda batch, pour: act(batch, pour, amount), every)
 
 
@@ -77,6 +103,36 @@ def attract(batch: Batch, pour: Pour, strength: float) -> None:
         velocity = state[b, 7:10].copy()
         velocity[2] -= strength * 9.81 * np.exp(-state[b, 2] / REACH) * KICK
         batch.enter(0, int(b), state[b, 0:3], state[b, 3:7], velocity, state[b, 10:13])
+
+
+def turn(batch: Batch, pour: Pour, rate: float) -> None:
+    """Let the plate turn about the vertical."""
+    batch.set_motion(0, PLATE, (0.0, 0.0, 0.0), (0.0, 0.0, rate))
+
+
+def blow(batch: Batch, pour: Pour, acceleration: float) -> None:
+    """The draught's impulse over ``KICK`` on every body that is falling, above the pile and below the outlet."""
+    state = batch.bodies(0, pour.entered)
+    outlet = float(value(pour.scene, "rig.outlet_height"))
+    for b in np.flatnonzero((state[:, 2] > REACH) & (state[:, 2] < outlet) & (state[:, 13] > 0.5)):
+        velocity = state[b, 7:10].copy()
+        velocity[0] += acceleration * KICK
+        batch.enter(0, int(b), state[b, 0:3], state[b, 3:7], velocity, state[b, 10:13])
+
+
+def with_spheres(scene: Scene, share: float) -> Scene:
+    """``scene`` with ``share`` of its mass in spheres of the first body's mass, of the volume of its member spheres."""
+    whole = scene.bodies[0]
+    assert isinstance(whole.shape, Members)
+    radii, mass = np.array(whole.shape.radii), whole.shape.mass
+    # Of bodies whose members hardly overlap.
+    radius = float((radii**3).sum() ** (1.0 / 3.0))
+    sphere = Members(((0.0, 0.0, 0.0),), (radius,), mass, (0.4 * mass * radius**2,) * 3)
+    bodies = (
+        dataclasses.replace(whole, mass_fraction=1.0 - share),
+        dataclasses.replace(whole, name="sphere", shape=sphere, mass_fraction=share),
+    )
+    return dataclasses.replace(scene, bodies=bodies)
 
 
 def broken(scene: Scene, share: float) -> Scene:

@@ -125,16 +125,26 @@ def surface_features(surface: HeightMap, frame: Frame) -> dict[str, float]:
 
 
 def without_holes(surface: HeightMap) -> HeightMap:
-    """``surface`` with NaN replaced by the mean of what is known at the same distance from the axis (2 pixels wide)."""
+    """``surface`` with NaN replaced by the lowest of the nearest known heights along ±x and ±y; 0 where there is none.
+
+    What a scanner does not see lies mostly in the shadow of something higher, and on what stands lowest around it.
+    """
     height = surface.height
     missing = np.isnan(height)
     if not missing.any():
         return surface
-    ring = (surface.radius / (2.0 * surface.pixel)).astype(np.int64)
-    number = np.bincount(ring[~missing], minlength=int(ring.max()) + 1)
-    total = np.bincount(ring[~missing], weights=height[~missing], minlength=number.size)
-    mean = total / np.maximum(number, 1)
-    return HeightMap(np.where(missing, mean[ring], height), surface.radius, surface.pixel)
+    around = np.stack([np.rot90(_last_known(np.rot90(height, turns)), -turns) for turns in range(4)])
+    lowest = around.min(axis=0)
+    filled = np.where(np.isfinite(lowest), lowest, 0.0)
+    return HeightMap(np.where(missing, filled, height), surface.radius, surface.pixel)
+
+
+def _last_known(height: Array) -> Array:
+    """Of every pixel the last height along the first axis, up to it, that is not NaN; infinite where there is none."""
+    rows = np.arange(height.shape[0])[:, None]
+    last = np.maximum.accumulate(np.where(np.isnan(height), -1, rows), axis=0)
+    known = np.take_along_axis(height, np.maximum(last, 0), axis=0)
+    return np.where(last >= 0, known, np.inf)
 
 
 def _laplacian(height: Array, pixel: float) -> Array:
