@@ -46,7 +46,6 @@ PARTS = {
     "page speed": Part((sys.executable, "-m", "tests.browser.page_speed")),
     "README, whole": Part((*SLOW, "tests/test_readme.py")),
     "trefoils": Part((*SLOW, "tests/explorer/test_trefoils.py"), nightly=False),
-    "rates of the verdict": Part((*SLOW, "tests/doe/diagnose/test_rates.py"), nightly=False),
     "other engines, 18 pours each": Part((*SLOW, "-s", "tests/peers/test_same_pile.py"), nightly=False),
     "benchmark": Part(
         (sys.executable, "-m", "explorer", "bench", "--table", "docs/benchmark.md", "--json", "docs/benchmark.json"),

@@ -38,7 +38,7 @@ def poured(monkeypatch, tmp_path):
             record = record_of(empty_pile(), np.zeros(1), np.zeros(1), poured_mass=friction)
             yield job, dataclasses.replace(record, scene=job.scene, outcome=Outcome.MEASURED)
 
-    def features(asked, record):
+    def features(asked, record, sight):
         return np.full(len(feature_set(asked).names), record.poured_mass)
 
     monkeypatch.setattr(module, "features_of_record", features)

@@ -3,7 +3,9 @@
 import shutil
 
 import numpy as np
-from doe.diagnose.declare import complete_rows, declare, observe
+from doe.diagnose.compared import measured
+from doe.diagnose.declared import declare
+from doe.diagnose.diagnosis import complete_rows
 
 from doe.measurement import load_measurement
 from doe.validation.laboratory import MODEL, OBSERVABLES, write_folder
@@ -15,13 +17,13 @@ from tests.doe.validation.disguise import disguise
 def asked(folder):
     """All that the decision is told of a data set."""
     measurement = load_measurement(folder)
-    observed = observe(measurement.fit)
+    fitted = [measured(condition) for condition in measurement.fit]
     return (
         declare(measurement, tuple(EFFECTS)),
         [condition.scene for condition in measurement.conditions],
-        [np.sort(block, axis=0) for block in observed.blocks],
-        observed.instrument,
-        observed.mean_of,
+        [np.sort(one.values, axis=0) for one in fitted],
+        [one.instrument for one in fitted],
+        [one.mean_of for one in fitted],
         [np.sort(complete_rows(condition), axis=0) for condition in measurement.holdout],
     )
 
