@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.diagnose.emulator import Emulator, Lessons, Way, emulated
-from doe.diagnose.posterior import Data, Posterior, posterior
+from doe.diagnose.posterior import Data, Posterior, fitted, posterior
 from doe.errors import StatisticsError
 from doe.measurement.features import SCAN, feature_set, features_of_data, offer_of, sight_of
 from doe.measurement.measurement import Condition
@@ -90,6 +90,9 @@ class Compared:
         What is weighed, by what, and what came out.
     blocks
         Measured replicates, by condition (r, d_c).
+    plain
+        The emulator without what the signatures have in common, in the same coordinates: for the amplitude of what is
+        named.
     """
 
     conditions: tuple[str, ...]
@@ -99,6 +102,15 @@ class Compared:
     data: Data
     emulator: Emulator
     posterior: Posterior
+    plain: Emulator
+
+    def refitted(self, labels: Sequence[str]) -> Compared:
+        """The same with the fits of ``labels`` by the plain emulator, their evidence as it was."""
+        fits = dict(self.posterior.fits)
+        for label in labels:
+            found = fitted(self.plain, self.data, label)
+            fits[label] = replace(found, log_evidence=fits[label].log_evidence, p=fits[label].p)
+        return replace(self, posterior=replace(self.posterior, fits=fits))
 
 
 @dataclass(frozen=True)
@@ -113,9 +125,15 @@ class Instrument:
 
 
 def weighed(
-    lessons: Lessons, ways: Sequence[Way], conditions: Sequence[Measured], instruments: Sequence[Instrument] = ()
+    lessons: Lessons,
+    ways: Sequence[Way],
+    conditions: Sequence[Measured],
+    instruments: Sequence[Instrument] = (),
+    library: int = 0,
 ) -> Compared:
     """Weigh all models by the data of the fitted ``conditions``, freed from the bias of their ``instruments``.
+
+    ``library``: effects that share the prior, where only some of them are weighed.
 
     Raises StatisticsError where a condition has nothing that can be compared.
     """
@@ -136,7 +154,7 @@ def weighed(
     blocks = tuple(condition.pours(chosen) for condition, chosen in zip(conditions, columns, strict=True))
     numbers = np.array([len(b) * one.mean_of for b, one in zip(blocks, conditions, strict=True)], dtype=np.float64)
     weights = numbers / numbers.mean()
-    emulator = emulated(taught, ways, weights.tolist())
+    emulator, plain = (emulated(taught, ways, weights.tolist(), shrunk) for shrunk in (True, False))
     data = Data(
         emulator.seen(blocks),
         float(numbers.mean()),
@@ -145,7 +163,9 @@ def weighed(
     )
     names = tuple(tuple(one.names[k] for k in chosen) for one, chosen in zip(conditions, columns, strict=True))
     labels = tuple(one.condition for one in conditions)
-    return Compared(labels, names, tuple(left_out), blocks, data, emulator, posterior(emulator, data))
+    return Compared(
+        labels, names, tuple(left_out), blocks, data, emulator, posterior(emulator, data, library=library), plain
+    )
 
 
 def _readable(lessons: Lessons, c: int, condition: Measured) -> npt.NDArray[np.int64]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -15,9 +15,10 @@ from doe.diagnose.holdout import HoldoutCondition, HoldoutError, holdout_errors
 from doe.diagnose.levels import Level
 from doe.diagnose.menu import Menu, Suggestion, next_experiment
 from doe.diagnose.posterior import Posterior
-from doe.diagnose.pours import ModelPours, OnPour
+from doe.diagnose.pours import ROOT, ModelPours, OnPour
 from doe.diagnose.teaching import Budget, Say, Teacher
 from doe.diagnose.verdict import NO_EFFECT, THRESHOLD, Verdict, taken_back, verdict_of
+from doe.errors import MeasurementError
 from doe.measurement.features import SCAN, feature_set
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.summaries import summaries_of_data, summary_names
@@ -31,6 +32,8 @@ FRESH = 8
 """Pours per model and condition in the confirmation, or as many as there are replicates if that is more."""
 SETTLED, QUIET = 0.99, 0.9
 """Probability of an effect that has had a closer look, and of nothing, from which on no further look is taken."""
+FIRST_OTHER_ROOT = 100
+"""Roots of other seeds begin here: below it are those of laboratories and of reference pours."""
 MOST_RIVALS = 4
 """That the next experiment is chosen for."""
 
@@ -50,6 +53,8 @@ class Diagnosis:
     """What came out. ``fit_error`` and ``holdout_error`` are by fresh pours; the latter is empty without a holdout."""
 
     declared: Declared
+    conditions: tuple[Condition, ...]
+    """Of the data and of a follow-up, in the order of the blocks below."""
     levels: tuple[Level, ...]
     offered: tuple[Offered, ...]
     verdict: Verdict
@@ -64,6 +69,14 @@ class Diagnosis:
     pours: int
     """Pours that were really run; the others were found in the store."""
     settings: int
+
+
+@dataclass(frozen=True)
+class FollowUp:
+    """What was measured next, and the labels that it was to tell apart ("base" for nothing missing)."""
+
+    measurement: Measurement
+    rivals: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -83,22 +96,37 @@ def run_diagnosis(
     budget: Budget,
     say: Say,
     on_pour: OnPour | None = None,
+    seed: int = 0,
+    follow_up: FollowUp | None = None,
 ) -> Diagnosis:
-    """Diagnose ``measurement`` against its declared model, with ``effects`` as candidates."""
+    """Diagnose ``measurement`` against its declared model, with ``effects`` as candidates.
+
+    Data sets of one model share their pours; those of another ``seed`` are others. With a ``follow_up`` its conditions
+    are fitted as well, and only what it was asked for is weighed.
+    """
+    library = len(effects)
     declared, paths = declare(measurement, effects), [p.path for p in measurement.parameters]
-    model = ModelPours(measurement.fit, paths, store, pours, on_pour)
-    everywhere = ModelPours(measurement.conditions, paths, store, pours, on_pour)
+    if follow_up is not None:
+        declared, measurement = joined(declared, measurement, follow_up)
+    root = ROOT if seed == 0 else FIRST_OTHER_ROOT + seed
+    model = ModelPours(measurement.fit, paths, store, pours, on_pour, root)
+    everywhere = ModelPours(measurement.conditions, paths, store, pours, on_pour, root)
     teacher = Teacher(declared, measurement.fit, model, budget, say)
-    compared = pursued(teacher, measurement.fit, budget, say)
+    compared = pursued(teacher, measurement.fit, budget, say, library)
     taught = teacher.lessons().way
     verdict = verdict_of(
         compared, declared, teacher.levels, [int((taught == w).sum()) for w in range(len(teacher.ways))]
     )
     say(f"verdict: {verdict.kind}")
     confirmed, verdict = concluded(verdict, compared, declared, measurement.conditions, everywhere, say)
-    menu = suggested(verdict, compared.posterior, declared, measurement.fit[0], paths, store, pours, on_pour)
+    menu = (
+        Menu((), 0)
+        if follow_up
+        else suggested(verdict, compared.posterior, declared, measurement.fit[0], paths, store, pours, on_pour)
+    )
     return Diagnosis(
         declared=declared,
+        conditions=measurement.conditions,
         levels=teacher.levels,
         offered=tuple(offered(condition, c, compared) for c, condition in enumerate(measurement.fit)),
         verdict=verdict,
@@ -113,11 +141,34 @@ def run_diagnosis(
     )
 
 
-def pursued(teacher: Teacher, conditions: Sequence[Condition], budget: Budget, say: Say) -> Compared:
-    """Models and data once what is in question has been looked at more closely."""
+def joined(declared: Declared, measurement: Measurement, follow_up: FollowUp) -> tuple[Declared, Measurement]:
+    """The declared model with the effects that are still possible, and the data with those of the follow-up.
+
+    Raises MeasurementError where the follow-up has other parameters, or a condition of a name that is there already.
+    """
+    if follow_up.measurement.parameters != measurement.parameters:
+        raise MeasurementError(f"{follow_up.measurement.folder}: parameters are not those of {measurement.folder}")
+    known = {condition.name for condition in measurement.conditions}
+    new = follow_up.measurement.fit
+    for condition in new:
+        if condition.name in known:
+            raise MeasurementError(
+                f"{follow_up.measurement.folder}: condition {condition.name!r} is one of {measurement.folder} already"
+            )
+    wanted = {name for label in follow_up.rivals for name in label.split("+")}
+    effects = tuple(effect for effect in declared.effects if effect.name in wanted)
+    fitted = (*measurement.fit, *new, *measurement.holdout)
+    return replace(declared, effects=effects), replace(measurement, conditions=fitted)
+
+
+def pursued(teacher: Teacher, conditions: Sequence[Condition], budget: Budget, say: Say, library: int = 0) -> Compared:
+    """Models and data once what is in question has been looked at more closely.
+
+    ``library``: effects that share the prior, where only some of them are weighed.
+    """
     data = [measured(condition) for condition in conditions]
     instruments = teacher.instruments(data)
-    compared = weighed(teacher.lessons(), teacher.ways, data, instruments)
+    compared = weighed(teacher.lessons(), teacher.ways, data, instruments, library)
     say(f"after screening: {odds(compared.posterior)}")
     looked: set[str] = set()
     for _ in range(budget.looks):
@@ -130,13 +181,15 @@ def pursued(teacher: Teacher, conditions: Sequence[Condition], budget: Budget, s
         if not poured:
             break
         looked |= set(poured)
-        compared = weighed(teacher.lessons(), teacher.ways, data, instruments)
+        compared = weighed(teacher.lessons(), teacher.ways, data, instruments, library)
         say(f"after a closer look at {', '.join(poured)}: {odds(compared.posterior)}")
     label, p = compared.posterior.best if compared.posterior.effects else ("", 0.0)
     if p >= THRESHOLD:
         teacher.refine(compared.posterior, label)
-        compared = weighed(teacher.lessons(), teacher.ways, data, instruments)
+        compared = weighed(teacher.lessons(), teacher.ways, data, instruments, library)
         say(f"with pours on both sides of its best fit: {odds(compared.posterior)}")
+        label = compared.posterior.best[0]
+        return compared.refitted(("base", label))
     return compared
 
 

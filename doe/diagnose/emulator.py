@@ -234,7 +234,9 @@ def planar_weights(angle: float) -> dict[float, float]:
     )
 
 
-def emulated(lessons: Lessons, ways: Sequence[Way], weights: Sequence[float] | None = None) -> Emulator:
+def emulated(
+    lessons: Lessons, ways: Sequence[Way], weights: Sequence[float] | None = None, shrunk: bool = True
+) -> Emulator:
     """The emulator taught by pours.
 
     Parameters
@@ -246,6 +248,9 @@ def emulated(lessons: Lessons, ways: Sequence[Way], weights: Sequence[float] | N
     weights
         By condition, pours of the data there over their mean over the conditions; 1 where they are as many everywhere.
         A condition with more pours of data counts for more.
+    shrunk
+        Whether v is learned axis by axis. That tells effects apart best, and underrates what each does; without it v is
+        the whole variance of the signatures along every axis, as becomes an effect that many pours have taught.
 
     Returns
     -------
@@ -273,6 +278,8 @@ def emulated(lessons: Lessons, ways: Sequence[Way], weights: Sequence[float] | N
     signatures = np.stack([lessons.amplitude[lessons.way == w] @ shift[lessons.way == w] for w in range(m)] or [z[0]])
     noise = 1.0 / square + 1.0 / base.sum() if m else np.ones(1)
     variances, axes = signature_prior(signatures / square[:, None] if m else 0.0 * signatures, noise)
+    if not shrunk:
+        variances = np.full_like(variances, variances.sum())
     rows = np.zeros((len(lessons), 1 + k + 2 * m))
     rows[:, 0], rows[:, 1 : 1 + k] = 1.0, lessons.theta
     acting = np.flatnonzero(~base)

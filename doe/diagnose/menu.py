@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,30 +18,66 @@ from doe.runner import Pours
 from doe.store import Store
 from solver import EFFECTS, ParameterError, Scene, parameters, value, with_values
 
-POURS = 6
+POURS = 4
 """Per model and set-up of the menu."""
 PLANNED = 6
+"""Pours that are asked of the laboratory."""
 
-CHANGES: dict[str, dict[str, float]] = {
-    "as it is, poured again": {},
-    "half the mass": {"rig.mass": 0.5},
-    "outlet at twice the height": {"rig.outlet_height": 2.0},
-    "outlet 1.3 times as wide": {"rig.outlet_diameter": 1.3},
-    "fed four times as fast": {"insertion.rate": 4.0},
-    "dropped four times as fast": {"insertion.drop_speed": 4.0},
-}
-"""Set-ups by the factors on the parameters of the first fitted condition.
 
-More mass would tell what less of it tells, at four times the cost.
-"""
+@dataclass(frozen=True)
+class Change(Record):
+    """A change of the first fitted condition that a laboratory can make in minutes.
+
+    ``factors`` multiply its parameters, ``choices`` replace settings.
+    """
+
+    name: str
+    factors: Mapping[str, float] = field(default_factory=dict)
+    choices: Mapping[str, str] = field(default_factory=dict)
+
+
+CHANGES = (
+    Change("as it is, poured again"),
+    Change("half the mass", {"rig.mass": 0.5}),
+    Change("half as much mass again", {"rig.mass": 1.5}),
+    Change("outlet at 0.6 times the height", {"rig.outlet_height": 0.6}),
+    Change("outlet at 1.5 times the height", {"rig.outlet_height": 1.5}),
+    Change("outlet at twice the height", {"rig.outlet_height": 2.0}),
+    Change("outlet 1.3 times as wide", {"rig.outlet_diameter": 1.3}),
+    Change("fed four times as fast", {"insertion.rate": 4.0}),
+    Change("fed at 0.4 times the rate", {"insertion.rate": 0.4}),
+    Change("dropped four times as fast", {"insertion.drop_speed": 4.0}),
+    Change("filled with the outlet closed, then opened", choices={"insertion.protocol": "fill_then_open"}),
+    Change("outlet 1.3 times as wide at twice the height", {"rig.outlet_diameter": 1.3, "rig.outlet_height": 2.0}),
+)
 
 
 @dataclass(frozen=True)
 class Suggestion(Record):
-    """An experiment, and the levers of the effects that it is to tell apart."""
+    """An experiment.
+
+    Attributes
+    ----------
+    experiment
+        What it tells, and with which chance.
+    values
+        Parameter path → value [SI] of what is set otherwise than in the condition ``condition``.
+    condition
+        Name of the fitted condition that it changes.
+    rivals
+        Labels of what it is to tell apart, "base" for nothing missing.
+    levers
+        By their nature: what reveals each of the rivals' effects.
+    pours
+        That it asks for.
+    """
 
     experiment: RankedExperiment
+    values: Mapping[str, float | str]
+    condition: str
+    rivals: tuple[str, ...]
     levers: tuple[str, ...]
+    pours: int = PLANNED
 
 
 @dataclass(frozen=True)
@@ -66,7 +103,10 @@ def next_experiment(
     """
     if len(rivals) < 2:
         return Menu((), 0)
-    set_ups = [replace(condition, name=name, scene=scene) for name, scene in feasible(condition.scene).items()]
+    set_ups = [
+        replace(condition, name=change.name, scene=with_values(condition.scene, dict(values)))
+        for change, values in feasible(condition.scene)
+    ]
     # All set-ups at once, so that no core waits for the last pour of one of them.
     model, widths = ModelPours(set_ups, paths, store, pours, on_pour), [len(summary_names(one)) for one in set_ups]
     poured = confirm(tuple(rivals.values()), model, POURS, widths)
@@ -91,18 +131,25 @@ def next_experiment(
         return Menu((), model.run_now)
     asked = dict.fromkeys(name for rival in rivals.values() for name, _ in rival.effects)
     levers = tuple(f"{name}: {EFFECTS[name].lever}" for name in asked)
-    return Menu(tuple(Suggestion(one, levers) for one in rank_experiments(items, weights, PLANNED)), model.run_now)
+    changed = {change.name: values for change, values in feasible(condition.scene)}
+    ranked = rank_experiments(items, weights, PLANNED)
+    names = tuple(rivals)
+    suggestions = [Suggestion(one, changed[one.name], condition.name, names, levers) for one in ranked]
+    return Menu(tuple(suggestions), model.run_now)
 
 
-def feasible(scene: Scene) -> dict[str, Scene]:
-    """Set-ups of ``CHANGES`` that the rig can do."""
-    found = {}
+def feasible(scene: Scene) -> list[tuple[Change, dict[str, float | str]]]:
+    """The changes that the rig of ``scene`` can do, with the values [SI] that they come to."""
+    found = []
     known = parameters(scene)
-    for name, factors in CHANGES.items():
-        if not set(factors) <= set(known):
+    for change in CHANGES:
+        if not (set(change.factors) | set(change.choices)) <= set(known):
             continue
-        try:
-            found[name] = with_values(scene, {path: f * float(value(scene, path)) for path, f in factors.items()})
-        except ParameterError:
-            continue  # beyond what the rig allows
+        values: dict[str, float | str] = {path: f * float(value(scene, path)) for path, f in change.factors.items()}
+        values |= change.choices
+        if values and all(value(scene, path) == new for path, new in values.items()):
+            continue  # as it is already
+        with suppress(ParameterError):  # beyond what the rig allows
+            with_values(scene, dict(values))
+            found.append((change, values))
     return found

@@ -29,6 +29,8 @@ OUTSIDE_WIDTH = 3.0
 """Standard deviation of the outside rival's prediction in those of one pour, beside the spread of the models."""
 
 MAX_REPLICATES = 100
+SURE, DRAWS = 0.9, 400
+"""Probability that is an answer, and made-up data sets of each model."""
 
 
 @dataclass(frozen=True)
@@ -51,19 +53,23 @@ class MenuItem:
 @dataclass(frozen=True)
 class RankedExperiment(Record):
     """score as above; replicates for the asked odds between every two models, None where MAX_REPLICATES do not give
-    them; separation: least distance between two models in sigma of one pour and their own uncertainty.
+    them; separation: least distance between two models in sigma of one pour and their own uncertainty; chance: of
+    ending with the right model at `SURE` after the planned pours.
     """
 
     name: str
     score: float
     replicates: int | None
     separation: float
+    chance: float
 
 
 def rank_experiments(
     menu: Sequence[MenuItem], weights: Mapping[str, float], replicates: int, odds: float = 20.0
 ) -> tuple[RankedExperiment, ...]:
-    """Return the menu, most discriminating first. weights: of the surviving models; replicates: planned pours, for V.
+    """Return the menu, the best chance of an answer first (in steps of a tenth), then the best score.
+
+    weights: of the surviving models; replicates: planned pours, for V.
 
     Raises StatisticsError with fewer than two models, an empty menu, or a set-up that some model does not predict.
     """
@@ -79,10 +85,33 @@ def rank_experiments(
             discrimination(item, weights, replicates),
             replicates_for_odds(item, tuple(weights), odds),
             _least_separation(item, tuple(weights)),
+            chance_of_an_answer(item, weights, replicates),
         )
         for item in menu
     ]
-    return tuple(sorted(rows, key=lambda row: -row.score))
+    return tuple(sorted(rows, key=lambda row: (-math.floor(10.0 * row.chance), -row.score)))
+
+
+def chance_of_an_answer(item: MenuItem, weights: Mapping[str, float], replicates: int, seed: int = 0) -> float:
+    """Return how often the true model ends with a probability of `SURE`, by `DRAWS` made-up means of each model's data.
+
+    The truth is drawn by ``weights``; means are Gaussian about its prediction, of covariance V + W_i.
+    """
+    names, rng = tuple(weights), np.random.default_rng(seed)
+    share = np.array([weights[name] for name in names]) / sum(weights.values())
+    noise = item.pour / replicates
+    factors = [np.linalg.cholesky(noise + item.predictions[name].covariance) for name in names]
+    right = 0.0
+    for k, name in enumerate(names):
+        drawn = item.predictions[name].mean + rng.standard_normal((DRAWS, len(item.pour))) @ factors[k].T
+        logs = []
+        for j, other in enumerate(names):
+            white = np.linalg.solve(factors[j], (drawn - item.predictions[other].mean).T)
+            logs.append(np.log(share[j]) - np.log(np.diag(factors[j])).sum() - 0.5 * (white**2).sum(axis=0))
+        stacked = np.stack(logs)
+        posterior = np.exp(stacked - stacked.max(axis=0))
+        right += share[k] * float((posterior[k] / posterior.sum(axis=0) >= SURE).mean())
+    return right
 
 
 def discrimination(item: MenuItem, weights: Mapping[str, float], replicates: int) -> float:

@@ -181,7 +181,9 @@ class _Nodes:
         return _Nodes(self.rows[some], self.natural[some], self.ends[some], self.way[some], self.multiple[some])
 
 
-def posterior(emulator: Emulator, data: Data, temperature: float = TEMPERATURE, pairs: bool = True) -> Posterior:
+def posterior(
+    emulator: Emulator, data: Data, temperature: float = TEMPERATURE, pairs: bool = True, library: int = 0
+) -> Posterior:
     """The posterior of a data set.
 
     Parameters
@@ -194,6 +196,8 @@ def posterior(emulator: Emulator, data: Data, temperature: float = TEMPERATURE, 
         T.
     pairs
         Whether pairs of effects are weighed where something outside is likely.
+    library
+        Effects that share the prior, at least those of the emulator: some may have been put behind before.
 
     Returns
     -------
@@ -210,7 +214,8 @@ def posterior(emulator: Emulator, data: Data, temperature: float = TEMPERATURE, 
         name: weigher.fit(name, (name,), nodes.rows, nodes.natural, nodes.ends, logs[name])
         for name, nodes in singles.items()
     }
-    share = (1.0 - NOTHING - OUTSIDE - PAIRS) / max(1, len(singles))
+    number = max(1, library, len(singles))
+    share = (1.0 - NOTHING - OUTSIDE - PAIRS) / number
     weighed = {name: _weight(share, fits[name].log_evidence, temperature) for name in singles}
     nothing = _weight(NOTHING, fits["base"].log_evidence, temperature)
     log_outside = float(logsumexp(spread)) - math.log(len(SPREADS))
@@ -222,7 +227,7 @@ def posterior(emulator: Emulator, data: Data, temperature: float = TEMPERATURE, 
     ):
         found = _pairs(weigher, singles)
         fits |= found
-        each = PAIRS / (0.5 * len(singles) * (len(singles) - 1))
+        each = PAIRS / (0.5 * number * (number - 1))
         weighed |= {label: _weight(each, fit.log_evidence, temperature) for label, fit in found.items()}
     total = logsumexp([nothing, outside, *weighed.values()])
     levels = []
@@ -239,6 +244,20 @@ def posterior(emulator: Emulator, data: Data, temperature: float = TEMPERATURE, 
         tuple(levels),
         log_outside,
     )
+
+
+def fitted(emulator: Emulator, data: Data, label: str) -> Fit:
+    """The best fit of one model: "base", an effect, or "a+b"."""
+    weigher = _Weigher(emulator, data)
+    if label == "base":
+        row = weigher.row[None]
+        return weigher.fit(label, (), row, np.zeros((1, 0)), np.zeros(1, bool), weigher.densities(row))
+    names = label.split("+")
+    singles = {name: _nodes_of(emulator, name) for name in names}
+    if len(names) == 2:
+        return _pairs(weigher, singles)[label]
+    nodes = singles[label]
+    return weigher.fit(label, names, nodes.rows, nodes.natural, nodes.ends, weigher.densities(nodes.rows))
 
 
 def _weight(prior: float, log_evidence: float, temperature: float) -> float:

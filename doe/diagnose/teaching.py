@@ -30,7 +30,9 @@ FloatArray = npt.NDArray[np.float64]
 Say = Callable[[str], None]
 
 TRIALS = Trials(pours=2, most=5, enough=7.0, too_much=18.0)
-"""Two pours tell a shift of 12 to ± 2; all that are tried teach as well."""
+"""Two pours tell a shift of 12 to ± 2."""
+NEAR = (0.2, 2.5)
+"""Multiples of a level at which the pours of its search teach: a parabola follows no answer farther."""
 SHIFTED = 12
 """Pours of the base model that are looked at from elsewhere, for a displaced funnel."""
 IN_QUESTION = 0.03
@@ -89,6 +91,9 @@ def scaled_budget(runs: int, measurement: Measurement, effects: Sequence[str]) -
 class Teacher:
     """Pours what teaches the models of a declared scene in the set-ups of ``conditions``.
 
+    ``declared`` holds the first of these, or all: amplitudes are found by what they do in them, so that a condition
+    that comes later changes nothing of what was poured in the others.
+
     Raises StatisticsError where the base model comes to no valid end.
     """
 
@@ -100,6 +105,7 @@ class Teacher:
         self._acting: dict[Point, tuple[int, float]] = {}
         """Way and multiple of every point that was poured."""
         self._rows: dict[Point, list[Pour]] = {}
+        self._tried: list[tuple[Direction, float, list[Point]]] = []
         self._directions = [one for effect in declared.effects for one in directions_of(effect)]
         self._turned = all(_turns(condition.scene) for condition in conditions)
         self._heaps = all(pour_rig(condition.scene).leaves_heap for condition in conditions)
@@ -120,6 +126,7 @@ class Teacher:
             for one, level in zip(self._directions, self._levels, strict=True)
         )
         self._pour("screening", [(way, 1.0, budget.screening) for way in range(len(self.ways))])
+        self._keep_trials()
         say(f"screening: {len(self._rows)} settings of {len(declared.effects)} effects")
 
     @property
@@ -197,9 +204,16 @@ class Teacher:
     def _found_levels(self) -> list[Level]:
         """The level of every direction; one for all directions in the plane."""
         asked = [one for one in self._directions if not one.angle]
-        searches = [level_of(self._declared, one, self._base, partial(self._points, one), TRIALS) for one in asked]
+
+        def tried(direction: Direction, share: float, number: int) -> list[Point]:
+            points = self._points(direction, share, number)
+            self._tried.append((direction, share, points))
+            return points
+
+        searches = [level_of(self._declared, one, self._base, partial(tried, one), TRIALS) for one in asked]
         widest = [point for one in asked for point in self._points(one, 1.0, 1)]
-        found = self._pours.answered("amplitudes", searches, widest=widest)
+        first = range(len(self._declared.conditions))
+        found = self._pours.answered("amplitudes", searches, first, widest)
         levels, last = [], iter(found)
         for one in self._directions:
             if not one.angle:
@@ -208,6 +222,14 @@ class Teacher:
                 self._say(f"{one.name}: {reach}")
             levels.append(replace(level, direction=one))
         return levels
+
+    def _keep_trials(self) -> None:
+        """Pours by which a level was found teach as well, where they are not too far from it."""
+        for direction, share, points in self._tried:
+            way = self._directions.index(direction)
+            multiple = share / self._levels[way].share
+            if direction.angle is None and multiple != 1.0 and NEAR[0] <= multiple <= NEAR[1]:
+                self._keep(points, self._pours.run("amplitudes", points), way, multiple)
 
     def _points(self, direction: Direction, share: float, number: int) -> list[Point]:
         """Pours of ``direction`` at ``share`` of its range, by whatever stands in for them."""

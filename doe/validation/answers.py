@@ -8,7 +8,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from doe.diagnose.diagnosis import concluded, errors_of, pursued
+from doe.diagnose.diagnosis import FollowUp, concluded, errors_of, joined, pursued, suggested
+from doe.diagnose.menu import Suggestion
 from doe.diagnose.points import Point
 from doe.diagnose.pours import ModelPours, room_of
 from doe.diagnose.teaching import Budget, Teacher
@@ -21,6 +22,7 @@ from doe.validation.schedule import Case
 from doe.validation.sets import NONE, OUT_OF_REACH, Row
 from doe.validation.truth import REPLICATES, ROOT, Strengths, Truth, truth_of
 from doe.validation.work_place import Order, WorkPlace, complete
+from solver import with_values
 
 TRIES = 3
 """Times that a laboratory pours ``REPLICATES`` more to replace pours that jammed."""
@@ -30,6 +32,14 @@ NAN = float("nan")
 
 Data = dict[str, list[Sample]]
 """Pours per condition."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """The row of a data set, and what to measure next where the answer is ambiguous."""
+
+    row: Row
+    suggestion: Suggestion | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,31 +68,55 @@ class Answers:
         return rows
 
     def judged(self, truth: Truth, data: Data, offer: str) -> Row:
-        """The row of a data set that is written to a folder and read like any other."""
+        """The row of a data set that is written to a folder and read like any other, with a follow-up if one is due."""
         seed = (ROOT, *truth.case.seed)
         scanner = Scanner.drawn(np.random.default_rng([*seed, 1])) if offer == SCAN else None
         with TemporaryDirectory() as folder:
             hand_out(Path(folder), self.model, data, scanner, seed)
-            return self.judged_folder(Path(folder), truth, offer)
+            measurement = load_measurement(Path(folder))
+            first = self.judged_data(measurement, truth, offer)
+            if first.suggestion is None:
+                return first.row
+            found = self.followed_up(truth, first.suggestion, scanner)
+            if found is None:
+                return first.row
+            last = self.judged_data(measurement, truth, offer, found)
+        return replace(
+            last.row,
+            first=first.row.verdict,
+            follow_up=first.suggestion.experiment.name,
+            pours=first.row.pours + last.row.pours,
+        )
 
-    def judged_folder(self, folder: Path, truth: Truth, offer: str) -> Row:
-        """The row of the data set in ``folder``; of ``truth`` only the label gets into it."""
-        measurement = load_measurement(folder)
-        declared, say = self.strengths.declared, _silent
+    def judged_data(
+        self, measurement: Measurement, truth: Truth, offer: str, follow_up: FollowUp | None = None
+    ) -> Judged:
+        """The row of a data set, and what to measure next; of ``truth`` only the label gets into it."""
+        declared, say, library = self.strengths.declared, _silent, len(self.strengths.declared.effects)
+        if follow_up is not None:
+            declared, measurement = joined(declared, measurement, follow_up)
         fitted, held = self.model_pours(measurement.fit), self.model_pours(measurement.holdout)
         teacher = Teacher(declared, measurement.fit, fitted, self.budget, say)
-        compared = pursued(teacher, measurement.fit, self.budget, say)
+        compared = pursued(teacher, measurement.fit, self.budget, say, library)
         taught = teacher.lessons().way
         pours = [int((taught == way).sum()) for way in range(len(teacher.ways))]
         verdict = verdict_of(compared, declared, teacher.levels, pours)
         conclusion, verdict = concluded(verdict, compared, declared, measurement.holdout, held, say)
         found = compared.posterior
+        suggestion = None
+        if follow_up is None:
+            paths = [parameter.path for parameter in measurement.parameters]
+            clock, place = self.place.look_at_the_clock, self.place
+            menu = suggested(verdict, found, declared, measurement.fit[0], paths, place.store, place.pours, clock)
+            suggestion = next(iter(menu.suggestions), None)
         best, best_p = found.best
         label = label_of(truth)
-        errors = errors_of(measurement.holdout, "holdout", conclusion) if verdict.names == (label,) else ()
+        named = {frozenset(name.split("+")) for name in verdict.names}
+        right = verdict.kind.startswith("effect") and named == {frozenset(label.split("+"))}
+        errors = errors_of(measurement.holdout, "holdout", conclusion) if right else ()
         before, after = (errors[-1].before / errors[-1].noise_floor, errors[-1].ratio) if errors else (NAN, NAN)
         told = conclusion.held_out
-        return Row(
+        row = Row(
             root=truth.case.root,
             number=truth.case.number,
             kind=truth.case.kind,
@@ -91,6 +125,8 @@ class Answers:
             amplitude=amplitude_text(truth),
             offer=offer,
             verdict=verdict.kind,
+            first="",
+            follow_up="",
             nothing=found.nothing,
             outside=found.outside,
             best=best,
@@ -105,29 +141,48 @@ class Answers:
             pours=fitted.run_now + held.run_now,
             seconds=0.0,
         )
+        return Judged(row, suggestion)
 
-    def measured(self, truth: Truth, conditions: Sequence[Condition]) -> Data | None:
-        """A laboratory's pours; None where there is no such truth, or pours keep breaking off."""
+    def followed_up(self, truth: Truth, asked: Suggestion, scanner: Scanner | None) -> FollowUp | None:
+        """What the laboratory measures in the set-up that it is asked for; None where its pours keep breaking off."""
+        place = next(c for c, one in enumerate(self.measurement.conditions) if one.name == asked.condition)
+        condition = self.measurement.conditions[place]
+        changed = replace(condition, scene=with_values(condition.scene, dict(asked.values)))
+        data = self.measured(truth, [changed], f" next {asked.experiment.name}")
+        if data is None:
+            return None
+        with TemporaryDirectory() as folder:
+            # The table of a changed condition reads like that of the condition itself; only its set-up is another one.
+            hand_out(Path(folder), self.model, data, scanner, (ROOT, *truth.case.seed, 2))
+            measurement = load_measurement(Path(folder))
+        (read,) = measurement.fit
+        new = replace(read, name=asked.experiment.name, scene=with_values(read.scene, dict(asked.values)))
+        return FollowUp(replace(measurement, conditions=(new,)), asked.rivals)
+
+    def measured(self, truth: Truth, conditions: Sequence[Condition], occasion: str = "") -> Data | None:
+        """A laboratory's pours; None where there is no such truth, or pours keep breaking off.
+
+        ``occasion``: another one has other seeds.
+        """
         if truth.missing:
             return None
         for attempt in range(TRIES):
             numbers = range(REPLICATES * (attempt + 1))
-            orders = [order for c in conditions for order in self.orders(truth, c, numbers)]
+            orders = [order for c in conditions for order in self.orders(truth, c, numbers, occasion)]
             samples = iter(self.place.pour(orders, room_of(conditions)))
             data = {c.name: complete(next(samples) for _ in numbers)[:REPLICATES] for c in conditions}
             if all(len(one) == REPLICATES for one in data.values()):
                 return data
         return None
 
-    def orders(self, truth: Truth, condition: Condition, numbers: Sequence[int]) -> list[Order]:
+    def orders(self, truth: Truth, condition: Condition, numbers: Sequence[int], occasion: str = "") -> list[Order]:
         """Pours ``numbers`` of a laboratory in a condition; their seeds follow from root and number of the set."""
         paths = [parameter.path for parameter in self.measurement.parameters]
-        laboratory = ModelPours(self.measurement.conditions, paths, self.place.store, self.place.pours, root=ROOT)
-        c = self.measurement.conditions.index(condition)
-        name = f"set {truth.case.root}.{truth.case.number}"
+        laboratory = ModelPours([condition], paths, self.place.store, self.place.pours, root=ROOT)
+        name = f"set {truth.case.root}.{truth.case.number} {condition.name}{occasion}"
         points = [Point(name, k, truth.theta, truth.effects) for k in numbers]
         outside = truth.case.label if truth.case.kind == "outside" else ""
-        return [Order(laboratory.scene(p, c), laboratory.seed(p, c), condition, outside) for p in points]
+        return [Order(laboratory.scene(p, 0), laboratory.seed(p, 0), condition, outside) for p in points]
 
     def model_pours(self, conditions: Sequence[Condition]) -> ModelPours:
         """Pours of the declared model, as a diagnosis makes them."""
@@ -152,7 +207,7 @@ def out_of_reach(truth: Truth, offer: str) -> Row:
     verdict = OUT_OF_REACH + (truth.missing or "pours break off")
     case = truth.case
     return Row(case.root, case.number, case.kind, label_of(truth), case.strength, amplitude_text(truth), offer, verdict,
-               NAN, NAN, "", NAN, NAN, {}, {}, NAN, NAN, NAN, 0, 0.0)  # fmt: skip
+               "", "", NAN, NAN, "", NAN, NAN, {}, {}, NAN, NAN, NAN, 0, 0.0)  # fmt: skip
 
 
 def _silent(line: str) -> None:

@@ -41,7 +41,9 @@ class Row(Record):
     offer
         "scalars" or "scan".
     verdict
-        The answer.
+        The answer, after the follow-up where one was asked for.
+    first, follow_up
+        The answer before, and the change of the set-up that was asked for; "" without one.
     nothing, outside, best, best_p, truth_p
         Probabilities; ``best``: the most probable effect, ``truth_p``: of the truth, NaN where it is no library effect.
     evidence
@@ -65,6 +67,8 @@ class Row(Record):
     amplitude: str
     offer: str
     verdict: str
+    first: str
+    follow_up: str
     nothing: float
     outside: float
     best: str
@@ -82,6 +86,11 @@ class Row(Record):
     def answer(self) -> Answer:
         """What the verdict is worth."""
         return answer_to(self.verdict, self.label)
+
+    @property
+    def first_answer(self) -> Answer:
+        """What the answer before the follow-up was worth."""
+        return answer_to(self.first or self.verdict, self.label)
 
     @property
     def named(self) -> bool:

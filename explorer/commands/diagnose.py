@@ -18,6 +18,10 @@ def diagnose(
     resume: bool = typer.Option(False, "--resume", help="Go on in a folder that is not empty."),
     store: Path | None = typer.Option(None, help="SQLite file that keeps every pour."),
     threads: int | None = typer.Option(None, min=1, help="Worker processes; one per core if not given."),
+    seed: int = typer.Option(0, min=0, help="Of the pours; another one asks for others."),
+    follow_up: Path | None = typer.Option(
+        None, "--follow-up", metavar="DIR", help="The folder OUT/next of an ambiguous answer, filled in."
+    ),
     apply: bool = typer.Option(False, "--apply", help="Also write the corrected material as OUT/corrected.toml."),
 ) -> None:
     """Calibrate the declared model, test what is left, name the missing effect, confirm it by fresh pours."""
@@ -27,6 +31,16 @@ def diagnose(
     # The page cancels with SIGTERM; that has to end like Ctrl-C, with the store closed and finished pours kept.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     names = tuple(name.strip() for name in effects.split(",") if name.strip())
-    run_diagnose(
-        DiagnoseOrder(measurement_folder(folder), out, names, budget, resume, store, threads, apply), typer.echo
+    order = DiagnoseOrder(
+        folder=measurement_folder(folder),
+        out=out,
+        effects=names,
+        budget=budget,
+        resume=resume,
+        store=store,
+        threads=threads,
+        apply=apply,
+        seed=seed,
+        follow_up=follow_up,
     )
+    run_diagnose(order, typer.echo)

@@ -14,16 +14,17 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.diagnose.confirm import Confirmed
-from doe.diagnose.diagnosis import Diagnosis, run_diagnosis
+from doe.diagnose.diagnosis import Diagnosis, FollowUp, run_diagnosis
 from doe.diagnose.holdout import HoldoutError
 from doe.diagnose.pours import measured_profile
 from doe.diagnose.teaching import Budget, scaled_budget
 from doe.measurement.load import load_measurement
-from doe.measurement.measurement import Measurement
+from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.summaries import summaries
 from doe.record import plain
 from doe.store import Store, default_store
 from explorer.diagnosis.corrected_material import corrected_toml
+from explorer.diagnosis.next_folder import read_next, write_next
 from explorer.diagnosis.progress import PourProgress
 from explorer.errors import CommandError
 from explorer.files.run_result import versions
@@ -46,6 +47,8 @@ class DiagnoseOrder:
     store: Path | None = None
     threads: int | None = None
     apply: bool = False
+    seed: int = 0
+    follow_up: Path | None = None
 
 
 def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> Diagnosis:
@@ -57,6 +60,8 @@ def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> Diagnosis:
     if order.out.is_file() or (order.out.is_dir() and any(order.out.iterdir()) and not order.resume):
         raise CommandError(f"--out {order.out}: is not empty; name a new folder, or add --resume to go on there")
     names = order.effects or tuple(EFFECTS)
+    asked = read_next(order.follow_up) if order.follow_up else None
+    follow_up = FollowUp(asked.measurement, asked.rivals) if asked else None
     path = order.store or default_store()
     budget = Budget()
     if order.budget is not None:
@@ -72,11 +77,16 @@ def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> Diagnosis:
         store = Store(path)
         stack.callback(store.close)
         crew = stack.enter_context(Crew(order.threads))
-        found = run_diagnosis(measurement, store, crew.run_queue, names, budget, progress.stage, progress.pour)
+        found = run_diagnosis(
+            measurement, store, crew.run_queue, names, budget, progress.stage, progress.pour, order.seed, follow_up
+        )
     result = result_of(measurement, order, found, progress.elapsed)
     write_whole(order.out / "diagnosis.json", json.dumps(result, ensure_ascii=False, allow_nan=False, indent=1) + "\n")
     write_diagnosis_report(result, order.out)
     say(f"{order.out}/report.html, report.md, diagnosis.json")
+    if found.suggestions:
+        write_next(order.out / "next", order.folder, measurement, found.suggestions[0])
+        say(f"{order.out}/next: what to measure next, to be filled in; then --follow-up {order.out}/next")
     if order.apply:
         write_whole(order.out / "corrected.toml", corrected_toml(measurement, found))
         say(f"{order.out}/corrected.toml: the corrected model, for every command that takes a material")
@@ -88,7 +98,7 @@ def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> Diagnosis:
 def result_of(measurement: Measurement, order: DiagnoseOrder, found: Diagnosis, total_s: float) -> dict[str, Any]:
     """The content of ``diagnosis.json``."""
     verdict = found.verdict
-    units = {s.name: s.unit for condition in measurement.conditions for s in summaries(condition)}
+    units = {s.name: s.unit for condition in found.conditions for s in summaries(condition)}
     return plain(
         {
             "schema": SCHEMA,
@@ -117,8 +127,8 @@ def result_of(measurement: Measurement, order: DiagnoseOrder, found: Diagnosis, 
             "held_out": found.held_out,
             "next_experiment": found.suggestions,
             "confirmation": {
-                "before": _confirmed(measurement, found.before),
-                "after": _confirmed(measurement, found.after),
+                "before": _confirmed(found.conditions, found.before),
+                "after": _confirmed(found.conditions, found.after),
             },
             "measured": [
                 {
@@ -128,16 +138,17 @@ def result_of(measurement: Measurement, order: DiagnoseOrder, found: Diagnosis, 
                     "replicates": condition.replicates * condition.mean_of,
                     "summaries": [s.name for s in summaries(condition)],
                 }
-                for condition in measurement.conditions
+                for condition in found.conditions
             ],
-            "piles": [picture for c in range(len(measurement.conditions)) for picture in _piles(measurement, found, c)],
+            "piles": [picture for c in range(len(found.conditions)) for picture in _piles(found, c)],
             "data": {
                 "folder": str(order.folder),
                 "title": measurement.title,
                 "ignored": measurement.ignored,
                 "notes": measurement.notes,
             },
-            "order": {"out": str(order.out), "effects": order.effects, "budget": order.budget},
+            "order": {"out": str(order.out), "effects": order.effects, "budget": order.budget, "seed": order.seed}
+            | {"follow_up": str(order.follow_up) if order.follow_up else None},
             "units": units,
             "pours": {"run": found.pours, "settings": found.settings},
             "timing": {"total_s": total_s},
@@ -162,9 +173,9 @@ def _error(row: HoldoutError, units: dict[str, str]) -> dict[str, Any]:
     return {**row.to_dict(), "unit": units.get(row.observable, "σ")}
 
 
-def _piles(measurement: Measurement, found: Diagnosis, number: int) -> Iterator[dict[str, Any]]:
+def _piles(found: Diagnosis, number: int) -> Iterator[dict[str, Any]]:
     """Height profiles [m] of condition ``number``, measured and by both models; none where the data have none."""
-    condition = measurement.conditions[number]
+    condition = found.conditions[number]
     profile = measured_profile(condition)
     blocks = [profile.values, *(one.profiles[number] for one in (found.before, found.after))] if profile else []
     if profile is not None and min(map(len, blocks)) > 1:
@@ -180,13 +191,13 @@ def _mean_and_sd(block: npt.NDArray[np.float64]) -> dict[str, Any]:
     return {"mean": block.mean(axis=0), "sd": block.std(axis=0, ddof=1)}
 
 
-def _confirmed(measurement: Measurement, found: Confirmed) -> dict[str, Any]:
+def _confirmed(conditions: Sequence[Condition], found: Confirmed) -> dict[str, Any]:
     return {
         "theta": found.model.theta,
         "effects": found.model.effects,
         "broken": found.broken,
         "conditions": [
             {"condition": condition.name, "pours": len(block), **_mean_and_sd(block)}
-            for condition, block in zip(measurement.conditions, found.blocks, strict=True)
+            for condition, block in zip(conditions, found.blocks, strict=True)
         ],
     }

@@ -219,6 +219,7 @@ def diagnosed(
     found, verdict = concluded(verdict, compared, declared, conditions, fresh, lambda line: None)
     return measurement, Diagnosis(
         declared=declared,
+        conditions=measurement.conditions,
         levels=levels,
         offered=tuple(
             Offered(name, offer, len(names), more)

@@ -17,6 +17,7 @@ def test_sets_that_are_there_are_only_counted(tmp_path):
     # Of root 1 the first two sets; what they are does not matter to the count.
     row = {
         "root": 1, "kind": "null", "label": "none", "strength": None, "amplitude": "", "verdict": "no_missing_effect",
+        "first": "", "follow_up": "",
         "nothing": 0.9, "outside": 0.02, "best": "air_drag", "best_p": 0.03, "truth_p": None, "evidence": {"base": 0.0},
         "fits": {"base": 0.4}, "held_out_p": 0.5, "before": None, "after": None, "pours": 12, "seconds": 3.5,
     }  # fmt: skip

@@ -6,10 +6,11 @@ import shlex
 
 from doe.diagnose.confirm import CONTRADICTED
 from doe.diagnose.levels import STRONG
+from doe.diagnose.posterior import FITS
 from doe.diagnose.posterior import NOTHING as PRIOR_NOTHING
 from doe.diagnose.posterior import OUTSIDE as PRIOR_OUTSIDE
 from doe.diagnose.posterior import PAIRS as PRIOR_PAIRS
-from doe.diagnose.verdict import CREDIBLE, FITS, NOTHING_FROM
+from doe.diagnose.verdict import CREDIBLE, NOTHING_FROM
 from explorer.report.content import Block, Bullets, Code, Section, Table, Text
 from explorer.report.diagnosis.charts import likely
 from explorer.report.diagnosis.findings import (
@@ -211,4 +212,8 @@ def command(result: Plain) -> str:
         parts += ["--effects", ",".join(order["effects"])]
     if order["budget"] is not None:
         parts += ["--budget", str(order["budget"])]
+    if order["seed"]:
+        parts += ["--seed", str(order["seed"])]
+    if order["follow_up"]:
+        parts += ["--follow-up", order["follow_up"]]
     return shlex.join(parts)

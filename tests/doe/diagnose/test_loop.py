@@ -128,7 +128,7 @@ def run(measurement, monkeypatch, effects, seed=1, formula=expected, held_out=No
 
 
 def test_a_planted_effect_is_named_with_its_amplitude(measurement, monkeypatch):
-    planted = 0.4 * EFFECTS["rolling_resistance"].strongest
+    planted = 0.7 * EFFECTS["rolling_resistance"].strongest
     found, said = run(measurement, monkeypatch, (("rolling_resistance", (planted,)),))
     assert found.verdict.kind == "effect:rolling_resistance", said
     row = found.verdict.effects[0]

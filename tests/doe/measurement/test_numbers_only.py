@@ -3,10 +3,10 @@
 import shutil
 
 import numpy as np
+
 from doe.diagnose.compared import measured
 from doe.diagnose.declared import declare
 from doe.diagnose.diagnosis import complete_rows
-
 from doe.measurement import load_measurement
 from doe.validation.laboratory import MODEL, OBSERVABLES, write_folder
 from solver import EFFECTS

@@ -14,6 +14,7 @@ from doe.diagnose.declared import Declared, declare
 from doe.diagnose.limit import Kind, Reached
 from doe.diagnose.ruler import Strength
 from doe.diagnose.teaching import Budget
+from doe.measurement import load_measurement
 from doe.store import Store
 from doe.validation.answers import Answers
 from doe.validation.campaign import CampaignOrder, run_campaign
@@ -126,6 +127,6 @@ def test_the_verdict_depends_on_numbers_only(order, rows, tmp_path):
             folder.mkdir()
             write_folder(folder, order.model, readings)
         disguise(second, np.random.default_rng(0))
-        one, other = (answers.judged_folder(folder, truth, "scalars") for folder in (first, second))
+        one, other = (answers.judged_data(load_measurement(folder), truth, "scalars").row for folder in (first, second))
     assert one.verdict == "effect:rolling_resistance"
     assert numbers([one]) == numbers([other])
