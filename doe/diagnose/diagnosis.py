@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from doe.diagnose.budget import Budget
 from doe.diagnose.compared import Compared, measured, weighed
 from doe.diagnose.confirm import Confirmed, HeldOut, HeldOutData, Model, confirm, held_out, model_of
 from doe.diagnose.declared import Declared, declare
@@ -16,7 +17,7 @@ from doe.diagnose.levels import Level
 from doe.diagnose.menu import Menu, Suggestion, next_experiment
 from doe.diagnose.posterior import Posterior
 from doe.diagnose.pours import ROOT, ModelPours, OnPour
-from doe.diagnose.teaching import Budget, Say, Teacher
+from doe.diagnose.teaching import Say, Teacher
 from doe.diagnose.verdict import NO_EFFECT, THRESHOLD, Verdict, taken_back, verdict_of
 from doe.errors import MeasurementError
 from doe.measurement.features import SCAN, feature_set

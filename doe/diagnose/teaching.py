@@ -8,21 +8,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
+from doe.diagnose.budget import Budget
 from doe.diagnose.compared import Instrument, Measured
-from doe.diagnose.declared import Declared, declare
+from doe.diagnose.declared import Declared
 from doe.diagnose.emulator import Lessons, Way
 from doe.diagnose.levels import Level, Trials, level_of
 from doe.diagnose.points import AS_IT_IS, Direction, Point, View, base_points, directions_of, effect_points
 from doe.diagnose.posterior import Posterior
 from doe.diagnose.pours import ModelPours, Pour
 from doe.errors import StatisticsError
-from doe.measurement.measurement import Condition, Measurement
+from doe.measurement.measurement import Condition
 from doe.measurement.sight import PERFECT
 from solver import Scene, pour_rig
 
@@ -42,50 +43,6 @@ FURTHER, FOLLOWED = 5.0, 3
 was poured, and how many of these at once: what is strong looks like nothing that was poured."""
 BEHIND = 4.0
 """Log evidence by which a direction may be behind the best one of its effect and be in question with it."""
-
-
-@dataclass(frozen=True)
-class Budget:
-    """How many pours a diagnosis takes for its models, in each condition."""
-
-    base: int = 24
-    screening: int = 4
-    """Of each direction of an effect."""
-    more: int = 12
-    """At each look, of what stays in question."""
-    looks: int = 3
-
-    def planned(self, directions: int, conditions: int) -> int:
-        """Pours before the first look, amplitudes found at once."""
-        return conditions * (self.base + directions * self.screening)
-
-    def scaled(self, runs: int, directions: int, conditions: int) -> Budget:
-        """The same shares in at most ``runs`` pours. Raises StatisticsError for fewer than ``LEAST`` takes."""
-        least = LEAST.planned(directions, conditions)
-        if runs < least:
-            raise StatisticsError(
-                f"budget: {runs} pours; {directions} directions of effects in {conditions} fitted conditions take at "
-                f"least {least}"
-            )
-        share = runs / self.planned(directions, conditions)
-        # What is held at its least is taken from the rest.
-        while (found := self._shares(share)).planned(directions, conditions) > runs:
-            share *= 0.99
-        return found
-
-    def _shares(self, share: float) -> Budget:
-        own = {name: getattr(self, name) for name in ("base", "screening", "more")}
-        return replace(self, **{key: max(getattr(LEAST, key), round(share * value)) for key, value in own.items()})
-
-
-LEAST = Budget(base=12, screening=2, more=4)
-"""Below that there is no covariance."""
-
-
-def scaled_budget(runs: int, measurement: Measurement, effects: Sequence[str]) -> Budget:
-    """The budget of about ``runs`` pours before the first closer look. Raises StatisticsError for too few."""
-    directions = sum(len(directions_of(effect)) for effect in declare(measurement, effects).effects)
-    return Budget().scaled(runs, directions, len(measurement.fit))
 
 
 class Teacher:

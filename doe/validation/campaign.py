@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from doe.diagnose.budget import Budget
 from doe.diagnose.declared import Declared, declare
 from doe.diagnose.limit import limit_study
 from doe.diagnose.reference import load
-from doe.diagnose.teaching import Budget
 from doe.errors import StatisticsError
 from doe.measurement.features import SCALARS, feature_set
 from doe.store import Store, default_store

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
-from doe.diagnose.teaching import scaled_budget
+from doe.diagnose.budget import scaled_budget
 from doe.measurement.load import load_measurement
 from explorer.background.command_process import PROGRAM, BackgroundError, CommandProcess, CommandStatus
 from explorer.background.output_folders import finished, new_folder, newest_unfinished

@@ -13,11 +13,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from doe.diagnose.confirm import Confirmed
+from doe.diagnose.budget import Budget, scaled_budget
+from doe.diagnose.confirm import CONTRADICTED, Confirmed
 from doe.diagnose.diagnosis import Diagnosis, FollowUp, run_diagnosis
 from doe.diagnose.holdout import HoldoutError
+from doe.diagnose.levels import STRONG
+from doe.diagnose.posterior import FITS, NOTHING, OUTSIDE, PAIRS
 from doe.diagnose.pours import measured_profile
-from doe.diagnose.teaching import Budget, scaled_budget
+from doe.diagnose.verdict import CREDIBLE, NOTHING_FROM
 from doe.measurement.load import load_measurement
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.summaries import summaries
@@ -33,6 +36,17 @@ from explorer.report.diagnosis import write_diagnosis_report
 from solver import EFFECTS, Crew
 
 SCHEMA = 2
+RULE = {
+    "prior_nothing": NOTHING,
+    "prior_outside": OUTSIDE,
+    "prior_pairs": PAIRS,
+    "fits": FITS,
+    "nothing_from": NOTHING_FROM,
+    "credible": CREDIBLE,
+    "contradicted": CONTRADICTED,
+    "strong": STRONG,
+}
+"""Constants of the rule that the report tells."""
 
 
 @dataclass(frozen=True)
@@ -107,6 +121,7 @@ def result_of(measurement: Measurement, order: DiagnoseOrder, found: Diagnosis, 
             "names": verdict.names,
             "probabilities": {"nothing": verdict.nothing, "outside": verdict.outside},
             "threshold": verdict.threshold,
+            "rule": RULE,
             "temperature": verdict.temperature,
             "taken_back": verdict.taken_back,
             "final": verdict.final,

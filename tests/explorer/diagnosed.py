@@ -253,7 +253,8 @@ def suggestions(verdict):
     ]
     ranked = rank_experiments(menu, dict.fromkeys(rivals, 1.0), 6)
     levers = tuple(f"{name}: {EFFECTS[name].lever}" for name in verdict.names if name in EFFECTS)
-    return tuple(Suggestion(one, levers) for one in ranked)
+    changes = {"rig.outlet_height": 0.12}
+    return tuple(Suggestion(one, changes, "fit", tuple(rivals), levers) for one in ranked)
 
 
 CASES = {

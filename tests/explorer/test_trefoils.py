@@ -5,8 +5,8 @@ When it last ran stands in ``docs/nightly.md``; whole runs with all fifteen effe
 
 import pytest
 
+from doe.diagnose.budget import Budget
 from doe.diagnose.diagnosis import run_diagnosis
-from doe.diagnose.teaching import Budget
 from doe.measurement.load import load_measurement
 from doe.store import Store
 from solver import Crew

@@ -10,7 +10,6 @@ import math
 from itertools import pairwise
 from typing import Literal
 
-from doe.diagnose.verdict import NO_EFFECT, UNEXPLAINED
 from explorer.errors import CommandError
 from explorer.report.findings import Plain
 from explorer.report.units_for_people import (
@@ -34,7 +33,7 @@ Confirmation = Literal["no holdout", "within noise", "confirmed", "not certain",
 
 SCHEMA = 2
 """Of the ``diagnosis.json`` that is read here."""
-NOTHING, OUTSIDE, BASE = NO_EFFECT, UNEXPLAINED, "base"
+NOTHING, OUTSIDE, BASE = "no_missing_effect", "unexplained", "base"
 OVERALL = "overall"
 ROUNDING = 1e-9
 """Share of the strongest amplitude below which one is zero."""

@@ -4,13 +4,6 @@ from __future__ import annotations
 
 import shlex
 
-from doe.diagnose.confirm import CONTRADICTED
-from doe.diagnose.levels import STRONG
-from doe.diagnose.posterior import FITS
-from doe.diagnose.posterior import NOTHING as PRIOR_NOTHING
-from doe.diagnose.posterior import OUTSIDE as PRIOR_OUTSIDE
-from doe.diagnose.posterior import PAIRS as PRIOR_PAIRS
-from doe.diagnose.verdict import CREDIBLE, NOTHING_FROM
 from explorer.report.content import Block, Bullets, Code, Section, Table, Text
 from explorer.report.diagnosis.charts import likely
 from explorer.report.diagnosis.findings import (
@@ -96,6 +89,7 @@ def for_a_paper(result: Plain) -> Section:
 
 
 def _methods(result: Plain) -> str:
+    rule = {name: number(value) for name, value in result["rule"].items()}
     conditions = enumeration(
         [
             f"{row['condition']} ({row['features']} features, {_pours(result, row['condition'])})"
@@ -109,8 +103,8 @@ def _methods(result: Plain) -> str:
         f"covariance of one simulated pour. A Bayesian linear regression on {result['pours']['settings']} simulated "
         "settings predicted them for every effect at any amplitude; the calibrated parameters "
         f"({moved}) were integrated out over their independent measurements. Prior probabilities were "
-        f"{number(PRIOR_NOTHING)} that nothing is missing, {number(PRIOR_OUTSIDE)} for something outside the library "
-        f"and {number(PRIOR_PAIRS)} for two effects at once, the rest shared alike by the single effects; evidence was "
+        f"{rule['prior_nothing']} that nothing is missing, {rule['prior_outside']} for something outside the library "
+        f"and {rule['prior_pairs']} for two effects at once, the rest shared alike by the single effects; evidence was "
         f"raised to the power {number(result['temperature'])}. An effect was named from a posterior probability of "
         f"{number(result['threshold'])} on."
     )
@@ -159,24 +153,26 @@ def _pours(result: Plain, condition: str) -> str:
 
 def how_reached(result: Plain) -> Section:
     """The method in six lines, with the numbers of its rules."""
+    rule = {name: number(value) for name, value in result["rule"].items()}
     features = sum(row["features"] for row in result["offered"])
     lines = (
         f"The same {features} features are read from measured and simulated piles. Their far tails are drawn in, and "
         "they are whitened by the covariance of one simulated pour.",
         f"{result['pours']['settings']} settings are poured: the declared model with its parameters moved, every "
-        f"effect at an amplitude that shifts the data by about {number(STRONG)} standard errors (or at the end of its "
+        f"effect at an amplitude that shifts the data by about {rule['strong']} standard errors (or at the end of its "
         "range), and more of whatever stays in question.",
         "One regression over all pours gives every model at every amplitude, with its uncertainty. Parameters are "
         "integrated out over their measurements, so what recalibration can do counts for no effect.",
         f"Probabilities follow from Student's t densities of the data, averaged over amplitudes, signs and directions, "
-        f"and from the priors: {number(PRIOR_NOTHING)} for nothing missing, {number(PRIOR_OUTSIDE)} for something "
-        f"outside the library, {number(PRIOR_PAIRS)} for pairs, the rest for single effects. The temperature is "
+        f"and from the priors: {rule['prior_nothing']} for nothing missing, {rule['prior_outside']} for something "
+        f"outside the library, {rule['prior_pairs']} for pairs, the rest for single effects. The temperature is "
         f"{number(result['temperature'])}; below 1 the answer is less sure than the evidence says.",
-        f"What reaches {percent(result['threshold'])} is named if the data are likely under it (p ≥ {number(FITS)}). "
-        f"Else nothing is missing if that has {percent(NOTHING_FROM)} or more, unexplained if something outside is the "
-        f"most probable, and ambiguous otherwise: the smallest set of answers that holds {percent(CREDIBLE)}.",
+        f"What reaches {percent(result['threshold'])} is named if the data are likely under it (p ≥ {rule['fits']}). "
+        f"Else nothing is missing if that has {percent(result['rule']['nothing_from'])} or more, unexplained if "
+        "something outside is the most probable, and ambiguous otherwise: the smallest set of answers that holds "
+        f"{percent(result['rule']['credible'])}.",
         "Fresh pours of the declared and the final model give the errors. Held-out data never choose; they take an "
-        f"answer back where a summary contradicts it at p < {number(CONTRADICTED)}, corrected for their number.",
+        f"answer back where a summary contradicts it at p < {rule['contradicted']}, corrected for their number.",
     )
     blocks: list[Block] = [Bullets(lines)]
     told = result["held_out"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import viser
 
-from doe.diagnose.teaching import Budget
+from doe.diagnose.budget import Budget
 from explorer.screen_units import checked
 from solver import EFFECTS
 

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from doe.diagnose import diagnosis, menu
+from doe.diagnose.budget import LEAST, Budget, scaled_budget
 from doe.diagnose.compared import Measured
 from doe.diagnose.declared import declare
 from doe.diagnose.levels import REPLICATES, whitened_shift
 from doe.diagnose.pours import Pour
-from doe.diagnose.teaching import LEAST, Budget, Teacher, scaled_budget
+from doe.diagnose.teaching import Teacher
 from doe.errors import StatisticsError
 from doe.measurement import load_measurement, summary_names
 from solver import EFFECTS

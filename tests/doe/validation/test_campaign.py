@@ -10,10 +10,10 @@ from contextlib import closing
 import numpy as np
 import pytest
 
+from doe.diagnose.budget import Budget
 from doe.diagnose.declared import Declared, declare
 from doe.diagnose.limit import Kind, Reached
 from doe.diagnose.ruler import Strength
-from doe.diagnose.teaching import Budget
 from doe.measurement import load_measurement
 from doe.store import Store
 from doe.validation.answers import Answers

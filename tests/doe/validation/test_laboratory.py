@@ -7,7 +7,7 @@ from contextlib import closing
 
 import numpy as np
 
-from doe.diagnose.teaching import Budget
+from doe.diagnose.budget import Budget
 from doe.measurement import load_measurement
 from doe.measurement.features import SCALARS, SCAN, features_of_data, offer_of
 from doe.store import Store

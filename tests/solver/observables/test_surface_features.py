@@ -102,8 +102,8 @@ def test_holes_take_the_lowest_of_what_is_around_them():
     holed[np.random.default_rng(0).random(holed.shape) < 0.1] = np.nan
     filled = without_holes(HeightMap(holed, surface.radius, PIXEL))
     assert np.isfinite(filled.height).all()
-    # Of one hole in ten the nearest known pixel is three away at most.
-    assert np.abs(filled.height - surface.height).max() < SLOPE * 3.0 * PIXEL
+    # Of holes in one pixel of ten, runs of five in a row are the longest in 160 000 pixels.
+    assert np.abs(filled.height - surface.height).max() < SLOPE * 6.0 * PIXEL
     assert without_holes(surface) is surface
 
 

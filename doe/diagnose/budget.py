@@ -1,0 +1,55 @@
+"""How many pours a diagnosis takes for its models. Loads nothing that compiles, for the page asks it too."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from doe.diagnose.declared import declare
+from doe.diagnose.points import directions_of
+from doe.errors import StatisticsError
+from doe.measurement.measurement import Measurement
+
+
+@dataclass(frozen=True)
+class Budget:
+    """How many pours a diagnosis takes for its models, in each condition."""
+
+    base: int = 24
+    screening: int = 4
+    """Of each direction of an effect."""
+    more: int = 12
+    """At each look, of what stays in question."""
+    looks: int = 3
+
+    def planned(self, directions: int, conditions: int) -> int:
+        """Pours before the first look, amplitudes found at once."""
+        return conditions * (self.base + directions * self.screening)
+
+    def scaled(self, runs: int, directions: int, conditions: int) -> Budget:
+        """The same shares in at most ``runs`` pours. Raises StatisticsError for fewer than ``LEAST`` takes."""
+        least = LEAST.planned(directions, conditions)
+        if runs < least:
+            raise StatisticsError(
+                f"budget: {runs} pours; {directions} directions of effects in {conditions} fitted conditions take at "
+                f"least {least}"
+            )
+        share = runs / self.planned(directions, conditions)
+        # What is held at its least is taken from the rest.
+        while (found := self._shares(share)).planned(directions, conditions) > runs:
+            share *= 0.99
+        return found
+
+    def _shares(self, share: float) -> Budget:
+        own = {name: getattr(self, name) for name in ("base", "screening", "more")}
+        return replace(self, **{key: max(getattr(LEAST, key), round(share * value)) for key, value in own.items()})
+
+
+LEAST = Budget(base=12, screening=2, more=4)
+"""Below that there is no covariance."""
+
+
+def scaled_budget(runs: int, measurement: Measurement, effects: Sequence[str]) -> Budget:
+    """The budget of about ``runs`` pours before the first closer look. Raises StatisticsError for too few."""
+    directions = sum(len(directions_of(effect)) for effect in declare(measurement, effects).effects)
+    return Budget().scaled(runs, directions, len(measurement.fit))

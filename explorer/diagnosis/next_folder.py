@@ -1,0 +1,438 @@
+"""What to measure next, as a folder that a laboratory fills in: ``OUT/next`` of an ambiguous diagnosis, and back.
+
+measurement.toml, <name>.csv, scans/    a measured data set (`doe.measurement`) of one condition, without its values
+README.md, setup.svg                    what to set otherwise, in words and to scale
+follow_up.json                          which answers the pours are to tell apart
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import shlex
+import shutil
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import escape
+
+from doe.csv_table import csv_table
+from doe.diagnose.menu import Suggestion
+from doe.diagnose.next_experiment import SURE
+from doe.errors import MeasurementError
+from doe.measurement.condition_table import AS_THEY_ARE, FEED_SLACK
+from doe.measurement.load import FILE, load_measurement
+from doe.measurement.long_form import COLUMNS, MOST_BYTES
+from doe.measurement.measurement import Condition, Measurement
+from doe.measurement.parameter_table import read_parameters
+from doe.record import plain
+from doe.study_table import Table, entries, section
+from doe.text_file import read_text
+from explorer.errors import CommandError
+from explorer.files.whole_file import write_whole
+from explorer.report.diagnosis.findings import BASE, spelled
+from explorer.report.units_for_people import code, enumeration, number, parameter_label, parameter_value, percent
+from explorer.scene.text import toml_key, toml_value
+from solver import EFFECTS, Scene, named, parameters, parse_quantity, pour_rig, read_toml, value, with_values
+from solver.rigs.surface import Pose, Revolved
+
+ORDER, SCHEMA = "follow_up.json", 1
+DROPPED = ("images", "mean_of")
+"""Keys of a condition that are about pours that were made."""
+PROTOCOLS = {
+    "pour_through": "the outlet open from the start",
+    "fill_then_open": "filled with the outlet closed, left to settle, then opened",
+}
+DRAWN, EDGE, LEFT = 420.0, 40.0, 200.0
+"""Height of the drawn rig, and what is free around it and to its left [px]."""
+INK, CHANGED = "#222222", "#c2410c"
+THIN, DASHED = 'stroke-width="1"', 'stroke-width="1" stroke-dasharray="6 4"'
+DIMENSIONS = {
+    "outlet_height": "upright",
+    "cylinder_height": "upright",
+    "outlet_diameter": "outlet",
+    "inlet_diameter": "top",
+    "diameter": "top",
+}
+"""Dimensions of rigs that are drawn, and where: from the plate on, below the outlet, above the feed."""
+
+
+@dataclass(frozen=True, eq=False)
+class NextFolder:
+    """A follow-up that was measured: the labels that it is to tell apart, the name of the change, and its data."""
+
+    rivals: tuple[str, ...]
+    change: str
+    measurement: Measurement
+
+
+def write_next(folder: Path, source: Path, measurement: Measurement, suggestion: Suggestion) -> None:
+    """Write ``suggestion``, a change of a condition of ``measurement`` as read from ``source``, to the new ``folder``.
+
+    Raises CommandError in one line for a folder that is not empty, and for a change that no condition can state.
+    """
+    if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
+        raise CommandError(f"{folder}: is not empty; allowed: a folder that is new or empty")
+    table = read_toml(source / FILE)
+    condition = next(one for one in measurement.conditions if one.name == suggestion.condition)
+    given = next(one for one in entries(table, "condition") if one["name"] == condition.name)
+    name, change = _free_name(suggestion, measurement), suggestion.experiment.name
+    changed = with_values(condition.scene, dict(suggestion.values))
+    entry = _changed_entry(given, name, measurement, suggestion, changed)
+    title = f"{measurement.title or source.name}: follow-up, {change}"
+    folder.mkdir(parents=True, exist_ok=True)
+    top = {"format": 1, "title": title, "material": _copied_material(str(table["material"]), source, folder)}
+    tables = {"parameters": _parameters(table, measurement), "uncertainty": _uncertainty(table, condition)}
+    write_whole(folder / FILE, _measurement_toml(top, tables, entry))
+    write_whole(folder / f"{name}.csv", _empty_table(condition, suggestion.pours))
+    if any(one.surfaces for one in measurement.conditions):
+        (folder / "scans").mkdir()
+        files = f"{name}_1.ply … {name}_{suggestion.pours}.ply"
+        unit = f"in metres, or with unit under [condition.scan] in {FILE}"
+        write_whole(folder / "scans/README.txt", f"A scan of each pile: {files} (or .stl, .xyz, .npz, .tif), {unit}.\n")
+    drawing = setup_svg(changed, suggestion.values)
+    if drawing:
+        write_whole(folder / "setup.svg", drawing)
+    write_whole(folder / "README.md", _readme(folder, source, measurement, suggestion, name))
+    order = {"schema": SCHEMA, "rivals": suggestion.rivals, "change": change, "values": suggestion.values}
+    order |= {"condition": condition.name, "source": str(source.absolute())}
+    write_whole(folder / ORDER, json.dumps(plain(order), ensure_ascii=False, indent=1) + "\n")
+
+
+def read_next(folder: Path) -> NextFolder:
+    """The follow-up in ``folder``, filled in.
+
+    Raises CommandError for what is not such a folder or holds no value yet, MeasurementError for data that cannot be
+    read; each one line naming file and key.
+    """
+    path = folder / ORDER
+    try:
+        order = json.loads(read_text(path, MOST_BYTES, CommandError))
+    except json.JSONDecodeError as error:
+        raise CommandError(f"{path}: no JSON ({error})") from None
+    if not isinstance(order, dict) or order.get("schema") != SCHEMA:
+        found = order.get("schema") if isinstance(order, dict) else order
+        raise CommandError(f"{path}: schema: {found!r:.60}; allowed: {SCHEMA}")
+    rivals, change = order.get("rivals"), order.get("change")
+    if not isinstance(rivals, list) or len(rivals) < 2 or not all(_is_label(label) for label in rivals):
+        raise CommandError(
+            f"{path}: rivals: {rivals!r:.60}; allowed: a list of {BASE}, effects or pairs a+b, two or more"
+        )
+    if not isinstance(change, str):
+        raise CommandError(f"{path}: change: {change!r:.60}; allowed: the name of a change")
+    try:
+        return NextFolder(tuple(rivals), change, load_measurement(folder))
+    except MeasurementError:
+        for table in sorted(folder.glob("*.csv")):
+            if not _holds_value(table):
+                raise CommandError(
+                    f"{table}: value: none is filled in yet; take the # off a row and write what was measured"
+                ) from None
+        raise
+
+
+def _is_label(label: Any) -> bool:
+    return isinstance(label, str) and (label == BASE or all(name in EFFECTS for name in label.split("+")))
+
+
+def _holds_value(table: Path) -> bool:
+    text = read_text(table, MOST_BYTES, MeasurementError)
+    found = csv_table(text, lambda line, what: MeasurementError(f"{table}:{line}: {what}"), trailing_comments=True)
+    at = COLUMNS.index("value")
+    return any(len(cells) > at and cells[at] for _, cells in found.rows[1:])
+
+
+# The data set
+
+
+def _free_name(suggestion: Suggestion, measurement: Measurement) -> str:
+    """The change as a file's name, and no condition's: a diagnosis takes the new data beside the old ones."""
+    slug = re.sub(r"[^a-z0-9]+", "_", suggestion.experiment.name.lower()).strip("_") or "follow_up"
+    taken = {condition.name for condition in measurement.conditions}
+    return next(one for k in range(1, len(taken) + 2) if (one := slug if k == 1 else f"{slug}_{k}") not in taken)
+
+
+def _changed_entry(
+    given: Table, name: str, measurement: Measurement, suggestion: Suggestion, changed: Scene
+) -> dict[str, Any]:
+    entry = {key: item for key, item in given.items() if key not in DROPPED}
+    entry |= {"name": name, "role": "fit", "data": f"{name}.csv"}
+    rig, insertion = dict(section(given, "rig_parameters")), dict(section(given, "insertion"))
+    calibrated = {parameter.path for parameter in measurement.parameters}
+    for path, new in suggestion.values.items():
+        kind, _, key = path.partition(".")
+        if path in calibrated:
+            raise CommandError(
+                f"{path}: is calibrated, and {suggestion.experiment.name!r} sets it; allowed: one of both"
+            )
+        if kind == "rig":
+            rig[key] = new
+        elif path == "insertion.drop_speed":
+            insertion["velocity"] = [0.0, 0.0, -float(new)]
+        elif kind == "insertion" and key in AS_THEY_ARE:
+            insertion[key] = new
+        else:
+            raise CommandError(f"{path}: no condition states it; allowed: rig.…, insertion.drop_speed, {AS_THEY_ARE}")
+    if "mesh" in rig:  # a relative path would start in the working directory of whoever reads it
+        rig["mesh"] = value(changed, "rig.mesh")
+    if "region_z" in insertion:
+        insertion["region_z"] = _moved(insertion["region_z"], pour_rig(changed).feed().floor)
+    return entry | {key: found for key, found in (("rig_parameters", rig), ("insertion", insertion)) if found}
+
+
+def _moved(region: list[float], floor: float) -> list[float]:
+    """``region`` from the opening on, as it is where it begins there, else as high as before to the last bit if it can
+    be: another height would make other pours."""
+    if abs(region[0] - floor) <= FEED_SLACK:
+        return region
+    height = region[1] - region[0]
+    # The difference of two rounded heights: the next numbers on either side give the bits that these do not.
+    near = [(low, high) for low in _neighbours(floor) for high in _neighbours(floor + height)]
+    return list(min(near, key=lambda ends: abs(ends[1] - ends[0] - height)))
+
+
+def _neighbours(x: float) -> tuple[float, float, float]:
+    return x, math.nextafter(x, -math.inf), math.nextafter(x, math.inf)
+
+
+def _parameters(table: Table, measurement: Measurement) -> dict[str, Any]:
+    """As stated, but for a range that another condition's rig has narrowed: read alone it would stay wide, and a
+    diagnosis takes no follow-up of other parameters."""
+    stated = section(table, "parameters")
+    read, _ = read_parameters(stated, [condition.scene for condition in measurement.conditions])
+    rows = zip(stated.items(), read, measurement.parameters, strict=True)
+    return {
+        path: entry if before == after else {**entry, "low": after.low, "high": after.high}
+        for (path, entry), before, after in rows
+    }
+
+
+def _uncertainty(table: Table, condition: Condition) -> dict[str, Any]:
+    """As stated; that of a mean of n pours becomes that of one pour, √n times as much."""
+    stated = section(table, "uncertainty")
+    if condition.mean_of == 1:
+        return stated
+    known = {name: found for name in stated if (found := named(name))}
+    return {
+        name: math.sqrt(condition.mean_of) * parse_quantity(stated[name], found.unit, name)
+        for name, found in known.items()
+    }
+
+
+def _copied_material(name: str, source: Path, folder: Path) -> str:
+    """What the new file calls the material: its copy in ``folder``, or the name of a shipped one."""
+    own = source / Path(name).expanduser()
+    if not own.is_file():
+        return name
+    _copy_toml(own, folder / own.name)
+    return own.name
+
+
+def _copy_toml(path: Path, to: Path) -> None:
+    """Copy a material or body file with the files that it names; those outside its folder are named in full instead."""
+    text = path.read_text(encoding="utf-8")
+    for name, is_body in _named_files(read_toml(path)):
+        if Path(name).is_absolute() or not (path.parent / name).is_file():
+            continue  # valid from anywhere: a full path, or a shipped mesh
+        if ".." in Path(name).parts:
+            full = toml_value(str((path.parent / name).resolve()))
+            text = text.replace(f'"{name}"', full).replace(f"'{name}'", full)
+            continue
+        (to.parent / name).parent.mkdir(parents=True, exist_ok=True)
+        (_copy_toml if is_body else shutil.copyfile)(path.parent / name, to.parent / name)
+    write_whole(to, text)
+
+
+def _named_files(table: Table) -> Iterator[tuple[str, bool]]:
+    """Files that a material or body file names, and whether each is a body file."""
+    for body in entries(table, "body"):
+        shape = body.get("shape")
+        for holder, key in ((body, "file"), (body, "mesh"), (shape, "mesh")):
+            if isinstance(holder, dict) and key in holder:
+                yield str(holder[key]), key == "file"
+    if "mesh" in section(table, "rig"):
+        yield str(table["rig"]["mesh"]), False
+
+
+def _measurement_toml(top: Mapping[str, Any], tables: Mapping[str, Any], entry: Mapping[str, Any]) -> str:
+    parts = {"": top} | {f"[{name}]\n": table for name, table in tables.items() if table}
+    parts["[[condition]]\n"] = {key: item for key, item in entry.items() if not isinstance(item, dict)}
+    parts |= {f"[condition.{toml_key(key)}]\n": item for key, item in entry.items() if isinstance(item, dict)}
+    text = "\n".join(
+        head + "".join(f"{toml_key(key)} = {toml_value(item)}\n" for key, item in table.items())
+        for head, table in parts.items()
+    )
+    return text.replace("\x7f", "\\u007F")  # JSON, whose strings these are, lets it stand; TOML does not
+
+
+def _empty_table(condition: Condition, pours: int) -> str:
+    """A row per pour, observable and place. Slopes that follow from a listed profile are not asked for.
+
+    A reader refuses a row without a value, so that each is a comment until it has one.
+    """
+    asked = [one for one in condition.observations if one.origin != "profile"]
+    units = ", ".join(f"{one.observable} [{one.unit}]" for one in asked)
+    lines = [
+        '# Not measured yet. Of each row that you measured, take off the "# " in front and write the value at its end.',
+        "# What was not measured stays as it is. Places x of a curve may be others.",
+        f"# Units: {units}",
+        ",".join(COLUMNS),
+    ]
+    for replicate in range(1, pours + 1):
+        for one in sorted(asked, key=lambda one: one.x is not None):
+            places = [""] if one.x is None else [repr(float(x)) for x in one.x]
+            lines += [f"# {replicate},{one.observable},{x}," for x in places]
+    return "\n".join(lines) + "\n"
+
+
+# For people
+
+
+def _readme(folder: Path, source: Path, measurement: Measurement, suggestion: Suggestion, name: str) -> str:
+    experiment, pours = suggestion.experiment, suggestion.pours
+    condition = next(one for one in measurement.conditions if one.name == suggestion.condition)
+    title = code(" ".join((measurement.title or source.name).split()))
+    answers = enumeration([spelled(label) for label in suggestion.rivals])
+    settings = [f"- {_setting(condition.scene, path, new)}" for path, new in suggestion.values.items()]
+    until = condition.scene.numerics.duration
+    reading = f" Read each pile {number(until)} s after the first body entered, at rest or not." if until > 0.0 else ""
+    drawing = " `setup.svg` shows it to scale, what changes in colour." if (folder / "setup.svg").is_file() else ""
+    more = f", and a scan of each pile as `scans/{name}_1.ply` and so on" if (folder / "scans").is_dir() else ""
+    if any(one.origin == "photographs" for one in condition.observations):
+        more += f', or name photographs under `[[condition]]` in `{FILE}`: `images = ["…"]`'
+    command = ["explorer", "diagnose", str(source.absolute()), "--follow-up", str(folder.absolute())]
+    # The folder of the first diagnosis is not empty any more.
+    command += ["--out", f"{folder.absolute().parent}_with_follow_up"]
+    return f"""# To be measured next: {experiment.name}
+
+The data of {title} leave {len(suggestion.rivals)} answers: {answers}. These pours are to tell them apart.
+
+## What to set otherwise than in condition {code(condition.name)}
+
+{_lines(settings) or "- nothing: the same set-up once more"}
+
+All else stays as it was, and bodies enter right above the feed opening, wherever that is now.{drawing}
+
+Pour **{pours} times**, each time onto the bare plate.{reading}
+
+## What it will decide
+
+If one of these answers is right, {pours} pours single it out (probability of {percent(SURE)} or more) with a chance of
+**{percent(experiment.chance)}**, by simulated pours of each answer.
+
+## Why this one
+
+Of the changes that this rig allows, none has a better chance. By their nature, the effects in question are told by
+
+{_lines([f"- {lever}" for lever in suggestion.levers])}
+
+## What to fill in
+
+`{name}.csv`: take the `# ` off each row that you measured and write the value behind its last comma{more}.
+The table needs two pours or more. If a setting came out otherwise than asked, correct it in `{FILE}`.
+
+## The command that takes it
+
+    {shlex.join(command)}
+"""
+
+
+def _lines(items: list[str]) -> str:
+    return "\n".join(items)
+
+
+def _setting(scene: Scene, path: str, new: float | str) -> str:
+    old, label = value(scene, path), parameter_label(path)
+    if path == "insertion.protocol":
+        return f"{label}: **{PROTOCOLS[str(new)]}** (so far {PROTOCOLS[str(old)]})"
+    # A laboratory sets this speed by the height that bodies fall from.
+    fall = f", as after a free fall of {_mm(float(new) ** 2 / (2.0 * 9.81))}" if path == "insertion.drop_speed" else ""
+    return f"{label}: **{parameter_value(path, new)}**{fall} (so far {parameter_value(path, old)})"
+
+
+def _mm(length: float) -> str:
+    return f"{number(1e3 * length, 4)} mm"
+
+
+# The drawing
+
+
+def setup_svg(scene: Scene, changed: Mapping[str, float | str]) -> str:
+    """Cross-section of the rig of ``scene`` to scale, the parameters ``changed`` in another colour.
+
+    Empty for a rig without upright walls turned about its axis.
+    """
+    rig, fed, known = pour_rig(scene), scene.insertion, parameters(scene)
+    shells: dict[bool, list[Revolved]] = {False: [], True: []}
+    for name, one in zip(rig.surface_names, rig.surfaces(), strict=True):
+        if isinstance(one, Revolved) and one.pose == Pose():
+            shells[name == "gate"].append(one)
+    if not shells[False]:
+        return ""
+    size = {name: float(value(scene, f"rig.{name}")) for name in DIMENSIONS if f"rig.{name}" in known}
+    reach = max(fed.region_radius, *(max(wall.r0, wall.r1) for wall in shells[False]))
+    floor, ceiling = rig.feed().floor, rig.feed().floor + fed.region_height
+    scale = DRAWN / ceiling
+    middle, ground, side = LEFT + reach * scale, 2.0 * EDGE + DRAWN, reach + EDGE / scale
+    width, height = 2.0 * middle, ground + 3.0 * EDGE
+
+    def line(r0: float, z0: float, r1: float, z1: float, paint: str = INK, more: str = 'stroke-width="2"') -> str:
+        x0, y0, x1, y1 = middle + r0 * scale, ground - z0 * scale, middle + r1 * scale, ground - z1 * scale
+        return f'<line x1="{x0:.1f}" y1="{y0:.1f}" x2="{x1:.1f}" y2="{y1:.1f}" stroke="{paint}" {more}/>'
+
+    def text(r: float, z: float, down: float, words: str, path: str = "", anchor: str = "middle") -> str:
+        """At radius and height [m], and so many pixels further down."""
+        x, y = middle + r * scale, ground - z * scale + down
+        return f'<text x="{x:.1f}" y="{y:.1f}" fill="{paint(path)}" text-anchor="{anchor}">{escape(words)}</text>'
+
+    def paint(path: str) -> str:
+        return CHANGED if path in changed else INK
+
+    def measure(name: str, r0: float, z0: float, r1: float, z1: float) -> str:
+        """A dimension line with a tick at both ends."""
+        colour, tick = paint(f"rig.{name}"), 5.0 / scale
+        ends = [line(r - tick, z - tick, r + tick, z + tick, colour, THIN) for r, z in ((r0, z0), (r1, z1))]
+        return line(r0, z0, r1, z1, colour, THIN) + "".join(ends)
+
+    drawn = [line(-side, 0.0, side, 0.0), text(side + 10.0 / scale, 0.0, 4.0, "plate", anchor="start")]
+    drawn += [line(s * wall.r0, wall.z0, s * wall.r1, wall.z1) for wall in shells[False] for s in (-1.0, 1.0)]
+    if fed.protocol == "fill_then_open":
+        closed = paint("insertion.protocol")
+        drawn += [line(s * one.r0, one.z0, s * one.r1, one.z1, closed) for one in shells[True] for s in (-1.0, 1.0)]
+    r = fed.region_radius
+    corners = [(-r, floor), (-r, ceiling), (r, ceiling), (r, floor), (-r, floor)]
+    drawn += [line(*a, *b, more=DASHED) for a, b in pairwise(corners)]
+    for down, path in ((-6.0, "insertion.rate"), (12.0, "insertion.drop_speed")):
+        words = parameter_value(path, float(value(scene, path)))
+        drawn.append(text(0.0, (floor + ceiling) / 2.0, down, f"feed {words}" if down < 0.0 else f"at {words}", path))
+    for name, length in size.items():
+        path, half = f"rig.{name}", length / 2.0
+        words, colour = f"{parameter_label(path)} {_mm(length)}", paint(path)
+        match DIMENSIONS[name]:
+            case "upright":
+                drawn += [measure(name, -side, 0.0, -side, length), line(-side, length, 0.0, length, colour, DASHED)]
+                drawn += [text(-side - 10.0 / scale, half, 4.0, words, path, "end")]
+            case "outlet":
+                low = size["outlet_height"] - 14.0 / scale
+                drawn += [
+                    measure(name, -half, low, half, low),
+                    text(half + 10.0 / scale, low, 4.0, words, path, "start"),
+                ]
+            case "top":
+                high = ceiling + 14.0 / scale
+                drawn += [measure(name, -half, high, half, high), text(0.0, high, -8.0, words, path)]
+                drawn += [line(r, floor, r, high, colour, DASHED) for r in (-half, half)]
+    if "rig.mass" in known:
+        mass = parameter_value("rig.mass", float(value(scene, "rig.mass")))
+        drawn.append(text(0.0, 0.0, EDGE, f"poured: {mass}", "rig.mass"))
+    drawn.append(text(0.0, 0.0, 1.6 * EDGE, PROTOCOLS[fed.protocol], "insertion.protocol"))
+    if changed:
+        drawn.append(text(0.0, 0.0, 2.3 * EDGE, "in this colour: what is set otherwise", next(iter(changed))))
+    head = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}" height="{height:.0f}" '
+        f'viewBox="0 0 {width:.0f} {height:.0f}" font-family="sans-serif" font-size="13">'
+    )
+    return _lines([head, '<rect width="100%" height="100%" fill="#ffffff"/>', *drawn, "</svg>"]) + "\n"
