@@ -28,7 +28,7 @@ from explorer.files.whole_file import write_whole
 from explorer.tables.text_table import text_table
 from solver import EFFECTS, PHYSICS, Crew
 
-TEACHINGS, SPLITS = (Teaching(4, 0), Teaching(8, 0), Teaching(8, 12)), 20
+TEACHINGS, SPLITS = (Teaching(4, 0), Teaching(4, 12), Teaching(8, 12)), 20
 """What teaches the rule, and splits of the reference into pours that teach and data."""
 BANDS = ((3.5, 5.5), (5.5, 9.0))
 """Strengths [σ] on the ruler of the effects in the data of a row."""

@@ -191,7 +191,8 @@ def _moved(region: list[float], floor: float) -> list[float]:
     height = region[1] - region[0]
     # The difference of two rounded heights: the next numbers on either side give the bits that these do not.
     near = [(low, high) for low in _neighbours(floor) for high in _neighbours(floor + height)]
-    return list(min(near, key=lambda ends: abs(ends[1] - ends[0] - height)))
+    low, high = min(near, key=lambda ends: abs(ends[1] - ends[0] - height))
+    return [low, high]
 
 
 def _neighbours(x: float) -> tuple[float, float, float]:
@@ -402,7 +403,7 @@ def setup_svg(scene: Scene, changed: Mapping[str, float | str]) -> str:
     if fed.protocol == "fill_then_open":
         closed = paint("insertion.protocol")
         drawn += [line(s * one.r0, one.z0, s * one.r1, one.z1, closed) for one in shells[True] for s in (-1.0, 1.0)]
-    r = fed.region_radius
+    r, rim = fed.region_radius, shells[False][0].r0
     corners = [(-r, floor), (-r, ceiling), (r, ceiling), (r, floor), (-r, floor)]
     drawn += [line(*a, *b, more=DASHED) for a, b in pairwise(corners)]
     for down, path in ((-6.0, "insertion.rate"), (12.0, "insertion.drop_speed")):
@@ -413,7 +414,7 @@ def setup_svg(scene: Scene, changed: Mapping[str, float | str]) -> str:
         words, colour = f"{parameter_label(path)} {_mm(length)}", paint(path)
         match DIMENSIONS[name]:
             case "upright":
-                drawn += [measure(name, -side, 0.0, -side, length), line(-side, length, 0.0, length, colour, DASHED)]
+                drawn += [measure(name, -side, 0.0, -side, length), line(-side, length, -rim, length, colour, DASHED)]
                 drawn += [text(-side - 10.0 / scale, half, 4.0, words, path, "end")]
             case "outlet":
                 low = size["outlet_height"] - 14.0 / scale

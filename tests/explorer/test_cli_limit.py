@@ -5,7 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from doe.diagnose.reference import Direction, Level, Reference, Sample, save
+from doe.diagnose.levels import Level
+from doe.diagnose.points import Direction
+from doe.diagnose.reference import Reference, Sample, save
 from doe.measurement.features import feature_set
 from doe.store import READINGS
 from doe.validation.laboratory import declared_model
@@ -37,7 +39,7 @@ def made_up(model, physics=PHYSICS):
 
     pours = {kind: tuple(block(*what, len(one)) for one in names) for kind, what in kinds.items()}
     levels = tuple(
-        Level(Direction(name, name, (0.3,), True), 0.5, 12.0) for name in ("rolling_resistance", "size_dispersion")
+        Level(Direction(name, name, (0.3,)), 0.5, 12.0) for name in ("rolling_resistance", "size_dispersion")
     )
     sample = Sample(pours, tuple(p.path for p in model.parameters))
     return Reference(model.title, physics, READINGS, tuple(names), levels, ROUNDS, sample)
