@@ -45,6 +45,10 @@ class Teaching(Record):
     all: int
     more: int
 
+    def most(self, level: str) -> int:
+        """Pours of ``level`` that may teach."""
+        return self.more + (self.all if level == "strong" else 0)
+
 
 @dataclass(frozen=True)
 class Truth(Record):
@@ -105,11 +109,11 @@ def replay(
     data: str,
     sample: Sample,
     kinds: Sequence[Kind],
-    truths: Sequence[Truth],
+    bands: Sequence[Sequence[Truth]],
     teaching: Teaching,
     splits: int,
     rng: np.random.Generator,
-) -> Replayed:
+) -> list[Replayed]:
     """Play the rule on ``splits`` splits of ``sample``.
 
     Parameters
@@ -120,8 +124,8 @@ def replay(
         Reference pours; of "base" at least ``BASE_POURS`` + 6 x ``NULLS``, of what is data enough for both.
     kinds
         The directions that teach.
-    truths
-        What is data.
+    bands
+        What is data, by range of strengths; data without an effect are the same for all.
     teaching
         Pours that teach.
     splits, rng
@@ -129,10 +133,11 @@ def replay(
 
     Returns
     -------
-    What came out.
+    What came out, band by band.
     """
     ways = tuple(Way(kind.effect, kind.name) for kind in kinds)
-    answers: list[_Answer] = []
+    answers: list[list[_Answer]] = [[] for _ in bands]
+    nothing: list[_Answer] = []
     for _ in range(splits):
         mixed = {
             kind: tuple(block[rng.permutation(len(block))] for block in blocks) for kind, blocks in sample.pours.items()
@@ -140,12 +145,16 @@ def replay(
         # What never varies in the pours that teach cannot be weighed.
         keep = Sample({"base": _first(mixed["base"], BASE_POURS)}, ()).vary()
         split = _Split(Sample(mixed, sample.parameters).only(keep), ways, teaching)
-        answers += [_Answer(one.kind.effect, *split.judged(split.data_of(one))) for one in truths]
+        for own, truths in zip(answers, bands, strict=True):
+            own += [_Answer(one.kind.effect, *split.judged(split.data_of(one))) for one in truths]
         for number in range(NULLS):
             first = BASE_POURS + number * REPLICATES
-            nothing = tuple(block[first : first + REPLICATES] for block in split.pours["base"])
-            answers.append(_Answer("", *split.judged(nothing)))
-    return _replayed(data, teaching, float(np.mean([one.strength for one in truths])), answers)
+            pours = tuple(block[first : first + REPLICATES] for block in split.pours["base"])
+            nothing.append(_Answer("", *split.judged(pours)))
+    return [
+        _replayed(data, teaching, float(np.mean([one.strength for one in truths])), own, nothing)
+        for own, truths in zip(answers, bands, strict=True)
+    ]
 
 
 class _Split:
@@ -163,7 +172,7 @@ class _Split:
 
     def data_of(self, truth: Truth) -> Blocks:
         """A data set that no model has been taught by."""
-        first = self._most(truth.level)
+        first = self._teaching.most(truth.level)
         return tuple(block[first : first + REPLICATES] for block in self.pours[f"{truth.kind.name} {truth.level}"])
 
     def judged(self, data: Blocks) -> tuple[Posterior, int]:
@@ -172,7 +181,7 @@ class _Split:
         emulator, asked = self._first, 0
         found = posterior(emulator, Data(emulator.seen(data), REPLICATES), pairs=False)
         for _ in range(LOOKS if self._teaching.more else 0):
-            wanted = {place: self._most(place[1]) for place in self._in_question(found)}
+            wanted = {place: self._teaching.most(place[1]) for place in self._in_question(found)}
             new = {place: number for place, number in wanted.items() if counts.get(place, 0) < number}
             if not new:
                 break
@@ -196,10 +205,6 @@ class _Split:
                 places.append((level.way, min(levels, key=lambda name: abs(LEVELS[name] - level.amplitude))))
         return places
 
-    def _most(self, level: str) -> int:
-        """Pours of ``level`` that may teach."""
-        return self._teaching.more + (self._teaching.all if level == "strong" else 0)
-
     def _taught(self, counts: Mapping[tuple[int, str], int]) -> Emulator:
         lessons = self._base[0]
         for more in self._base[1:]:
@@ -222,9 +227,10 @@ def _first(blocks: Blocks, number: int) -> Blocks:
     return tuple(block[:number] for block in blocks)
 
 
-def _replayed(data: str, teaching: Teaching, strength: float, answers: Sequence[_Answer]) -> Replayed:
-    sets = [one for one in answers if one.truth]
-    nulls = np.array([one.found.best[1] for one in answers if not one.truth])
+def _replayed(
+    data: str, teaching: Teaching, strength: float, sets: Sequence[_Answer], nothing: Sequence[_Answer]
+) -> Replayed:
+    nulls = np.array([one.found.best[1] for one in nothing])
     p = np.array([one.found.best[1] for one in sets])
     correct = np.array([one.found.best[0] == one.truth for one in sets])
     order = np.argsort(-p)

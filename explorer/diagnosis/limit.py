@@ -75,20 +75,18 @@ def replays(found: Reference, study: LimitStudy, offered: Mapping[str, Sequence[
     for data, numbers in offered.items():
         sample = found.sample.first(numbers).varying()
         for teaching in TEACHINGS:
-            needed = {"strong": teaching.all + teaching.more + REPLICATES, "weak": teaching.more + REPLICATES}
             if min(map(len, pours["base"])) < BASE_POURS + NULLS * REPLICATES or any(
                 min(map(len, pours[f"{kind.name} strong"])) < teaching.all for kind in kinds
             ):
                 continue
-            for low, high in BANDS:
-                truths = [
-                    one
-                    for one in truths_of(study)
-                    if low <= one.strength < high
-                    and min(map(len, pours[f"{one.kind.name} {one.level}"])) >= needed[one.level]
-                ]
-                if truths:
-                    rows.append(replay(data, sample, kinds, truths, teaching, SPLITS, np.random.default_rng(0)))
+            enough = [
+                one
+                for one in truths_of(study)
+                if min(map(len, pours[f"{one.kind.name} {one.level}"])) >= teaching.most(one.level) + REPLICATES
+            ]
+            bands = [[one for one in enough if low <= one.strength < high] for low, high in BANDS]
+            some = [truths for truths in bands if truths]
+            rows += replay(data, sample, kinds, some, teaching, SPLITS, np.random.default_rng(0))
     return tuple(rows)
 
 

@@ -334,7 +334,7 @@ def test_a_replay_names_what_is_far_apart_and_nothing_where_nothing_is(teaching)
     shifts = {"a strong": 4.0 * unit(0), "a weak": 2.0 * unit(0), "b strong": 4.0 * unit(7), "b weak": 2.0 * unit(7)}
     sample = sample_of(np.random.default_rng(1), shifts)
     kinds = [Kind(name, name, False) for name in "ab"]
-    found = replay("scan", sample, kinds, truths(kinds), teaching, 10, np.random.default_rng(0))
+    (found,) = replay("scan", sample, kinds, [truths(kinds)], teaching, 10, np.random.default_rng(0))
     assert (found.sets, found.nulls) == (20, 10 * NULLS)
     assert found.right == 1.0
     assert found.named == (1.0,) * len(RISKS)
@@ -347,7 +347,7 @@ def test_a_replay_of_effects_that_are_alike_is_a_guess():
     shifts = {f"{name} {size}": length * unit(0) for name in "ab" for size, length in (("strong", 4.0), ("weak", 2.0))}
     sample = sample_of(np.random.default_rng(1), shifts)
     kinds = [Kind(name, name, False) for name in "ab"]
-    found = replay("scan", sample, kinds, truths(kinds), Teaching(8, 0), 40, np.random.default_rng(0))
+    (found,) = replay("scan", sample, kinds, [truths(kinds)], Teaching(8, 0), 40, np.random.default_rng(0))
     assert 0.2 < found.right < 0.8
     assert found.named[RISKS.index(0.01)] < 0.2
 
@@ -360,5 +360,5 @@ def test_a_feature_that_hardly_ever_varies_does_not_spoil_the_answer():
         blocks[0][:, 3] = 0.0
     sample.pours["base"][0][::40, 3] = 1.0
     kinds = [Kind("a", "a", False)]
-    found = replay("scan", sample, kinds, truths(kinds), Teaching(8, 0), 20, np.random.default_rng(0))
+    (found,) = replay("scan", sample, kinds, [truths(kinds)], Teaching(8, 0), 20, np.random.default_rng(0))
     assert found.named == (1.0,) * len(RISKS)
