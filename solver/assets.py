@@ -14,6 +14,7 @@ AssetKind = Literal[
     "designs",
     "runs",
     "photographs",
+    "validation",
 ]
 
 _SUFFIX: dict[AssetKind, str] = {
@@ -27,6 +28,7 @@ _SUFFIX: dict[AssetKind, str] = {
     "designs": ".toml",
     "runs": ".csv",
     "photographs": ".jpg",
+    "validation": ".npz",
 }
 
 
@@ -41,6 +43,7 @@ _SINGULAR: dict[AssetKind, str] = {
     "designs": "factors file",
     "runs": "sheet of runs",
     "photographs": "photograph",
+    "validation": "file of reference pours",
 }
 
 _FOLDER = {"runs": "designs"}
@@ -99,11 +102,6 @@ def measurement_folder(name: str) -> Path:
 def shipped_fits() -> Path:
     """Folder of the member spheres of shipped bodies (`solver.clump_cache`)."""
     return _folder("clumps")
-
-
-def shipped_reference() -> Path:
-    """File of reference pours of the made-up laboratories' model."""
-    return _folder("validation") / "reference_blind.npz"
 
 
 def shipped_measurements() -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from doe.diagnose.menu import Menu, Suggestion, next_experiment
 from doe.diagnose.posterior import Posterior
 from doe.diagnose.pours import ROOT, ModelPours, OnPour
 from doe.diagnose.teaching import Say, Teacher
-from doe.diagnose.verdict import NO_EFFECT, THRESHOLD, Verdict, taken_back, verdict_of
+from doe.diagnose.verdict import NO_EFFECT, NOTHING_FROM, THRESHOLD, Verdict, taken_back, verdict_of
 from doe.errors import MeasurementError
 from doe.measurement.features import SCAN, feature_set
 from doe.measurement.measurement import Condition, Measurement
@@ -32,7 +32,8 @@ FloatArray = npt.NDArray[np.float64]
 FRESH = 8
 """Pours per model and condition in the confirmation, or as many as there are replicates if that is more."""
 SETTLED, QUIET = 0.99, 0.9
-"""Probability of an effect that has had a closer look, and of nothing, from which on no further look is taken."""
+"""Probability of an effect that has had a closer look, and of nothing, from which on no further look is taken; where
+the most probable effect has had one, ``NOTHING_FROM`` of nothing will do, for more pours add nothing to the data."""
 FIRST_OTHER_ROOT = 100
 """Roots of other seeds begin here: below it are those of laboratories and of reference pours."""
 MOST_RIVALS = 4
@@ -175,7 +176,8 @@ def pursued(teacher: Teacher, conditions: Sequence[Condition], budget: Budget, s
     for _ in range(budget.looks):
         found = compared.posterior
         name, p = found.best if found.effects else ("", 0.0)
-        settled = found.nothing >= QUIET or (p >= SETTLED and name in looked)
+        quiet = NOTHING_FROM if name in looked else QUIET
+        settled = found.nothing >= quiet or (p >= SETTLED and name in looked)
         if settled and not any(teacher.ways[way].effect == name for way, _ in teacher.at_end(found)):
             break
         poured = teacher.look(found)

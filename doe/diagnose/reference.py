@@ -13,7 +13,7 @@ from __future__ import annotations
 import io
 import json
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -27,12 +27,16 @@ from doe.diagnose.levels import Level, Trials, level_of
 from doe.diagnose.points import Direction, Point, directions_of, middle
 from doe.diagnose.pours import ModelPours
 from doe.errors import StatisticsError
+from doe.measurement.features import feature_set
+from doe.measurement.measurement import Measurement
 from doe.record import plain
+from doe.store import READINGS
 
 FloatArray = npt.NDArray[np.float64]
 
 Blocks = tuple[FloatArray, ...]
 """Per fitted condition the features of the pours, (n_c, d_c)."""
+Say = Callable[[str], None]
 
 CONSTANT = 1e-9
 """Standard deviation, as a share of the feature's size, below which it says nothing."""
@@ -173,6 +177,36 @@ def extended(found: Reference, declared: Declared, pours: ModelPours) -> Referen
         sample[kind] = tuple(block.reshape(len(block), -1) for block in blocks)
     parameters = tuple(parameter.name for parameter in declared.parameters)
     return replace(found, rounds=found.rounds + 1, sample=Sample(sample, parameters))
+
+
+def kept(path: Path, measurement: Measurement, physics: int) -> Reference:
+    """The reference of the fitted conditions of ``measurement`` in ``path``; without a pour where there is no file.
+
+    Raises StatisticsError where it is of another model, physics, or readings.
+    """
+    features = tuple(feature_set(condition).names for condition in measurement.fit)
+    now = Reference(measurement.title, physics, READINGS, features, ())
+    if not path.exists():
+        return now
+    found = load(path)
+    for name in ("title", "physics", "readings", "features"):
+        if getattr(found, name) != getattr(now, name):
+            there = repr(getattr(found, name)) if name != "features" else "of its pours"
+            raise StatisticsError(f"{path}: {name} {there} is not that of today; name another file")
+    return found
+
+
+def extended_to(
+    found: Reference, rounds: int, declared: Declared, pours: ModelPours, path: Path, say: Say
+) -> Reference:
+    """``found`` with ``rounds`` rounds, written to ``path`` after each that was missing."""
+    if not found.levels and rounds:
+        found = replace(found, levels=tuple(find_levels(declared, pours)))
+    while found.rounds < rounds:
+        found = extended(found, declared, pours)
+        save(found, path)
+        say(f"{path}: {found.rounds} of {rounds} rounds")
+    return found
 
 
 def save(found: Reference, path: Path) -> None:

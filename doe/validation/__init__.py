@@ -1,12 +1,12 @@
 """Made-up laboratories: data with a truth that the diagnosis cannot read, and how often it finds it.
 
-    model/             the declared model, its material and its conditions
+    laboratories/      files of laboratories: bodies, rig, conditions, what is handed out
     schedule.py        which truths are asked for, by root and number of the data set
     truth.py           parameters and amplitudes of a truth of a given strength
     outside.py         effects that no library holds
     work_place.py      pours in worker processes, and the clock
     scanner.py         a made-up scanner
-    laboratory.py      pours → a folder of measured data, with scans or without
+    laboratory.py      reads such a file; pours → a folder of measured data, with scans or without
     answers.py         truths → folders → verdicts → rows
     sets.py rates.py   rows in sets.jsonl, what an answer is worth, rates and targets
     campaign.py        all of it, for ``explorer validate-diagnosis``

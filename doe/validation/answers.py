@@ -17,7 +17,7 @@ from doe.diagnose.teaching import Teacher
 from doe.diagnose.verdict import verdict_of
 from doe.measurement import Condition, Measurement, load_measurement
 from doe.measurement.features import SCALARS, SCAN
-from doe.validation.laboratory import Sample, hand_out
+from doe.validation.laboratory import Laboratory, Sample
 from doe.validation.scanner import Scanner
 from doe.validation.schedule import Case
 from doe.validation.sets import NONE, OUT_OF_REACH, Row
@@ -45,13 +45,17 @@ class Judged:
 
 @dataclass(frozen=True, eq=False)
 class Answers:
-    """The declared model, what its truths are made of, and where the work is done."""
+    """The laboratory, what its truths are made of, and where the work is done."""
 
-    model: Path
-    measurement: Measurement
+    laboratory: Laboratory
     strengths: Strengths
     place: WorkPlace
     budget: Budget
+
+    @property
+    def measurement(self) -> Measurement:
+        """The declared model."""
+        return self.laboratory.declared
 
     def rows(self, case: Case) -> list[Row]:
         """Rows of ``case``, one for each kind of data."""
@@ -59,7 +63,7 @@ class Answers:
         truth = truth_of(case, self.strengths)
         data = self.measured(truth, self.measurement.conditions)
         if data is None:
-            return [out_of_reach(truth, offer) for offer in OFFERS]
+            return [self.out_of_reach(truth, offer) for offer in OFFERS]
         poured = (time.monotonic() - began) / len(OFFERS)
         rows = []
         for offer in OFFERS:
@@ -71,9 +75,10 @@ class Answers:
     def judged(self, truth: Truth, data: Data, offer: str) -> Row:
         """The row of a data set that is written to a folder and read like any other, with a follow-up if one is due."""
         seed = (ROOT, *truth.case.seed)
-        scanner = Scanner.drawn(np.random.default_rng([*seed, 1])) if offer == SCAN else None
+        rng = np.random.default_rng([*seed, 1])
+        scanner = Scanner.drawn(rng, self.laboratory.scanner) if offer == SCAN else None
         with TemporaryDirectory() as folder:
-            hand_out(Path(folder), self.model, data, scanner, seed)
+            self.laboratory.hand_out(Path(folder), data, scanner, seed)
             measurement = load_measurement(Path(folder))
             first = self.judged_data(measurement, truth, offer)
             if first.suggestion is None:
@@ -118,6 +123,7 @@ class Answers:
         before, after = (errors[-1].before / errors[-1].noise_floor, errors[-1].ratio) if errors else (NAN, NAN)
         told = conclusion.held_out
         row = Row(
+            laboratory=self.measurement.title,
             root=truth.case.root,
             number=truth.case.number,
             kind=truth.case.kind,
@@ -154,7 +160,7 @@ class Answers:
             return None
         with TemporaryDirectory() as folder:
             # The table of a changed condition reads like that of the condition itself; only its set-up is another one.
-            hand_out(Path(folder), self.model, data, scanner, (ROOT, *truth.case.seed, 2))
+            self.laboratory.hand_out(Path(folder), data, scanner, (ROOT, *truth.case.seed, 2))
             measurement = load_measurement(Path(folder))
         (read,) = measurement.fit
         new = replace(read, name=asked.experiment.name, scene=with_values(read.scene, dict(asked.values)))
@@ -185,6 +191,13 @@ class Answers:
         outside = truth.case.label if truth.case.kind == "outside" else ""
         return [Order(laboratory.scene(p, 0), laboratory.seed(p, 0), condition, outside) for p in points]
 
+    def out_of_reach(self, truth: Truth, offer: str) -> Row:
+        """The row of a truth that cannot be, or whose pours keep breaking off."""
+        verdict = OUT_OF_REACH + (truth.missing or "pours break off")
+        case, title = truth.case, self.measurement.title
+        return Row(title, case.root, case.number, case.kind, label_of(truth), case.strength, amplitude_text(truth),
+                   offer, verdict, "", "", NAN, NAN, "", NAN, NAN, {}, {}, NAN, NAN, NAN, 0, 0.0)  # fmt: skip
+
     def model_pours(self, conditions: Sequence[Condition]) -> ModelPours:
         """Pours of the declared model, as a diagnosis makes them."""
         paths = [parameter.path for parameter in self.measurement.parameters]
@@ -201,14 +214,6 @@ def label_of(truth: Truth) -> str:
 def amplitude_text(truth: Truth) -> str:
     """Amplitudes of the truth's effects, natural units."""
     return " ".join(f"{name}={'/'.join(f'{x:.4g}' for x in a)}" for name, a in truth.effects)
-
-
-def out_of_reach(truth: Truth, offer: str) -> Row:
-    """The row of a truth that cannot be, or whose pours keep breaking off."""
-    verdict = OUT_OF_REACH + (truth.missing or "pours break off")
-    case = truth.case
-    return Row(case.root, case.number, case.kind, label_of(truth), case.strength, amplitude_text(truth), offer, verdict,
-               "", "", NAN, NAN, "", NAN, NAN, {}, {}, NAN, NAN, NAN, 0, 0.0)  # fmt: skip
 
 
 def _silent(line: str) -> None:

@@ -10,26 +10,28 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
 from doe.diagnose.budget import Budget
-from doe.diagnose.declared import Declared, declare
+from doe.diagnose.declared import declare
 from doe.diagnose.limit import limit_study
-from doe.diagnose.reference import load
-from doe.errors import StatisticsError
+from doe.diagnose.pours import ModelPours
+from doe.diagnose.reference import ROOT as REFERENCE_ROOT
+from doe.diagnose.reference import extended_to, kept
 from doe.measurement.features import SCALARS, feature_set
 from doe.store import Store, default_store
 from doe.validation.answers import Answers
-from doe.validation.laboratory import MODEL, declared_model
-from doe.validation.outside import AMPLITUDE, DEVELOPMENT
+from doe.validation.laboratory import TREFOILS, Laboratory, read_laboratory
+from doe.validation.outside import AMPLITUDE, DEVELOPMENT, possible
 from doe.validation.schedule import Case, cases
 from doe.validation.sets import Row, append_rows, read_rows
 from doe.validation.truth import Strengths, strengths_of
 from doe.validation.work_place import OutOfTimeError, WorkPlace
-from solver import EFFECTS
+from solver import EFFECTS, PHYSICS
 
 SETS = "sets.jsonl"
+ROUNDS = 4
+"""Rounds of reference pours for a laboratory that has none: 48 pours of each effect, strengths to some 8 %."""
 
 Say = Callable[[str], None]
 
@@ -52,39 +54,36 @@ class CampaignOrder:
     shard: int = 1
     of: int = 1
     wide: bool = False
-    model: Path = MODEL
+    laboratory: Path = TREFOILS
     effects: tuple[str, ...] = tuple(EFFECTS)
     budget: Budget = Budget()
     cases: tuple[Case, ...] = ()
     strengths: Strengths | None = None
-    reference: Path | None = None
 
-    @cached_property
-    def asked(self) -> tuple[Case, ...]:
+    def asked(self, laboratory: Laboratory) -> tuple[Case, ...]:
         """The data sets."""
-        found = self.cases or tuple(
-            cases(self.root, self.number, DEVELOPMENT if self.wide else tuple(AMPLITUDE), self.wide)
-        )
+        kinds = possible(laboratory.declared.scene, DEVELOPMENT if self.wide else tuple(AMPLITUDE))
+        found = self.cases or tuple(cases(self.root, self.number, kinds, self.wide))
         return found[self.shard - 1 :: self.of]
 
 
 def run_campaign(order: CampaignOrder, say: Say) -> list[Row]:
     """Answer the data sets that ``sets.jsonl`` does not hold yet, until all are there or the time is over."""
     order.out.mkdir(parents=True, exist_ok=True)
-    path = order.out / SETS
-    known = {(row.root, row.number) for row in read_rows(path)}
-    todo = [case for case in order.asked if case.seed not in known]
-    say(f"{path}: {len(order.asked) - len(todo)} of {len(order.asked)} data sets are there")
+    path, laboratory = order.out / SETS, read_laboratory(order.laboratory)
+    title, asked = laboratory.declared.title, order.asked(laboratory)
+    known = {(row.root, row.number) for row in read_rows(path) if row.laboratory == title}
+    todo = [case for case in asked if case.seed not in known]
+    say(f"{path}: {len(asked) - len(todo)} of {len(asked)} data sets are there")
     deadline = time.monotonic() + 60.0 * order.minutes
     if todo and order.minutes > 0.0:
         with ExitStack() as stack:
             store = Store(order.store or default_store())
             stack.callback(store.close)
             place = stack.enter_context(WorkPlace(store, order.workers or os.cpu_count() or 1, deadline))
-            measurement = declared_model(order.model)
-            strengths = order.strengths or reference_strengths(order, declare(measurement, order.effects))
-            answers = Answers(order.model, measurement, strengths, place, order.budget)
             try:
+                strengths = order.strengths or measured_strengths(order, laboratory, place, say)
+                answers = Answers(laboratory, strengths, place, order.budget)
                 for case in todo:
                     rows = answers.rows(case)
                     append_rows(path, rows)
@@ -93,16 +92,21 @@ def run_campaign(order: CampaignOrder, say: Say) -> list[Row]:
                         say(f"{row.number}: {what}: {row.verdict} ({row.answer}), {row.seconds:.0f} s")
             except OutOfTimeError:
                 say(f"{order.minutes:g} min are over; all pours are kept, and the same command goes on")
-    asked = {case.seed for case in order.asked}
-    return [row for row in read_rows(path) if (row.root, row.number) in asked]
+    wanted = {case.seed for case in asked}
+    return [row for row in read_rows(path) if row.laboratory == title and (row.root, row.number) in wanted]
 
 
-def reference_strengths(order: CampaignOrder, declared: Declared) -> Strengths:
-    """Amplitudes of given strengths by the reference pours of the order's model."""
-    if order.reference is None:
-        raise StatisticsError("reference: not given; allowed: a file of reference pours of the laboratories' model")
-    found = load(order.reference)
-    numbers = [feature_set(condition).offered(SCALARS) for condition in declared_model(order.model).fit]
+def measured_strengths(order: CampaignOrder, laboratory: Laboratory, place: WorkPlace, say: Say) -> Strengths:
+    """Amplitudes of given strengths by the laboratory's reference pours, which are made where it has none."""
+    measurement = laboratory.declared
+    declared = declare(measurement, order.effects)
+    path = laboratory.reference or order.out / f"reference_{measurement.title}.npz"
+    found = kept(path, measurement, PHYSICS)
+    if laboratory.reference is None:
+        paths = [parameter.path for parameter in measurement.parameters]
+        pours = ModelPours(measurement.fit, paths, place.store, place.pours, place.look_at_the_clock, REFERENCE_ROOT)
+        found = extended_to(found, ROUNDS, declared, pours, path, say)
+    numbers = [feature_set(condition).offered(SCALARS) for condition in measurement.fit]
     study = limit_study(found.sample, found.levels, {SCALARS: numbers})
     effects = {one.kind.name: one.kind.effect for one in study.reached}
     cosines: dict[frozenset[str], float] = {}

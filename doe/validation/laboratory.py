@@ -1,42 +1,42 @@
 """A made-up laboratory: what it declares, and the folder of data that it hands out.
 
-The model's folder holds ``head.toml`` (parameters), ``material.toml`` and one file per condition; a data set's
-``measurement.toml`` is the head and the conditions that were measured. Beside the table of numbers it hands out scans
-of its piles, made by a scanner of its own (``scanner.py``).
+Its file is written as ``measurement.toml`` (``doe/measurement/load.py``), without data, and with one table more:
+
+    [laboratory]
+    readings = ["angle_of_repose_deg", …]   numbers that it reads off every pour
+    reference = "reference.npz"             pours that tell how strong an effect is, as `explorer limit` writes them:
+                                            beside the file, or shipped; without it the campaign makes them first
+    [laboratory.scanner]                    ranges that a set's scanner is drawn from (`scanner.py`), each optional
+    grid = ["0.5mm", "1mm"]
+    noise = ["0.05mm", "0.3mm"]
+    axis_off = ["1mm", "2mm"]
+
+Beside the table of numbers it hands out scans of its piles, made by a scanner of its own.
 """
 
 import math
-import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import tomli_w
 
+from doe.errors import MeasurementError
 from doe.measurement import Measurement, load_measurement
-from doe.validation.scanner import Scanner, write_scan
+from doe.study_table import Table, entries, names, only, section
+from doe.validation.scanner import Scanner, ScannerRanges, write_scan
+from solver import ParameterError, all_names, asset_path, parse_quantity, read_toml
 
 Array = npt.NDArray[np.float64]
 
-MODEL = Path(__file__).parent / "model"
-OBSERVABLES = (
-    "angle_of_repose_deg",
-    "angle_of_repose_left_deg",
-    "angle_of_repose_right_deg",
-    "apex_height_m",
-    "centre_height_m",
-    "footprint_r50_m",
-    "footprint_r90_m",
-    "stray_fraction",
-    "centroid_x_m",
-    "centroid_y_m",
-    "discharge_t10_s",
-    "discharge_t90_s",
-    "residual_mass_kg",
-)
-"""What every laboratory reads off its pours: scalars, all of them summaries or parts of one."""
+TREFOILS = Path(__file__).parent / "laboratories/trefoils/laboratory.toml"
+"""The shipped one."""
+KEYS = ("readings", "reference", "scanner")
 
 Reading = Mapping[str, float]
 """Observable → value of one pour; NaN where it cannot be read."""
@@ -51,44 +51,133 @@ class Sample:
     radius: Array
 
 
-def declared_model(model: Path = MODEL) -> Measurement:
-    """The declared model with all its conditions; the values in them are placeholders, which nothing may read."""
-    conditions = sorted(path.stem for path in model.glob("*.toml") if path.stem not in ("head", "material"))
-    placeholders = [dict.fromkeys(OBSERVABLES, 0.0), dict.fromkeys(OBSERVABLES, 1.0)]
-    with TemporaryDirectory() as folder:
-        write_folder(Path(folder), model, dict.fromkeys(conditions, placeholders))
-        return load_measurement(Path(folder))
+@dataclass(frozen=True)
+class Laboratory:
+    """What a laboratory's file says.
 
-
-def write_folder(folder: Path, model: Path, measured: Mapping[str, Sequence[Reading]], scan_settings: str = "") -> None:
-    """Write a data set of ``model`` into an existing ``folder``.
-
-    ``measured``: condition → readings of its pours. ``scan_settings``: what stands in every condition of its scans.
+    Attributes
+    ----------
+    path
+        The file.
+    table
+        Of it all but ``[laboratory]``.
+    readings
+        Observables that it reads off every pour.
+    scanner
+        What its scanners may be.
+    reference
+        File of reference pours, or None.
     """
-    shutil.copy(model / "material.toml", folder)
-    parts = [(model / "head.toml").read_text(encoding="utf-8")]
-    for condition in measured:
-        parts += [(model / f"{condition}.toml").read_text(encoding="utf-8"), scan_settings]
-    (folder / "measurement.toml").write_text("\n".join(parts), encoding="utf-8")
-    for condition, readings in measured.items():
-        lines = ["replicate,observable,x,value"]
-        for replicate, reading in enumerate(readings, start=1):
-            lines += [f"{replicate},{name},,{x!r}" for name, x in reading.items() if math.isfinite(x)]
-        (folder / f"{condition}.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+    path: Path
+    table: Table
+    readings: tuple[str, ...]
+    scanner: ScannerRanges
+    reference: Path | None
+
+    @cached_property
+    def declared(self) -> Measurement:
+        """The declared model with all its conditions; the values in them are placeholders, which nothing may read."""
+        placeholders = [dict.fromkeys(self.readings, 0.0), dict.fromkeys(self.readings, 1.0)]
+        with TemporaryDirectory() as folder:
+            try:
+                self.write(
+                    Path(folder), {str(one.get("name")): placeholders for one in entries(self.table, "condition")}
+                )
+                return load_measurement(Path(folder))
+            except MeasurementError as error:
+                # What is wrong stands in the laboratory's file, whatever copy of it was read.
+                text = str(error).replace(str(Path(folder) / "measurement.toml"), str(self.path))
+                raise MeasurementError(text) from None
+
+    def write(self, folder: Path, measured: Mapping[str, Sequence[Reading]], scan: Table | None = None) -> None:
+        """Write a data set into an existing ``folder``.
+
+        ``measured``: condition → readings of its pours. ``scan``: what stands in every condition of its scans.
+        """
+        conditions: list[dict[str, Any]] = []
+        for entry in entries(self.table, "condition"):
+            if (name := str(entry.get("name"))) in measured:
+                conditions.append({**entry, "data": f"{name}.csv"} | ({"scan": scan} if scan else {}))
+        table = {**self.table, "material": str(self._material()), "condition": conditions}
+        (folder / "measurement.toml").write_text(tomli_w.dumps(table), encoding="utf-8")
+        for name, readings in measured.items():
+            lines = ["replicate,observable,x,value"]
+            for replicate, reading in enumerate(readings, start=1):
+                lines += [f"{replicate},{key},,{x!r}" for key, x in reading.items() if math.isfinite(x)]
+            (folder / f"{name}.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+    def hand_out(
+        self, folder: Path, measured: Mapping[str, Sequence[Sample]], scanner: Scanner | None, seed: Sequence[int]
+    ) -> None:
+        """Write a data set of pours into an existing ``folder``, with scans where there is a ``scanner``."""
+        readings = {name: [sample.reading for sample in samples] for name, samples in measured.items()}
+        self.write(folder, readings, scanner.table() if scanner else None)
+        if scanner is None:
+            return
+        (folder / "scans").mkdir()
+        for c, (name, samples) in enumerate(measured.items()):
+            for replicate, sample in enumerate(samples, start=1):
+                rng = np.random.default_rng([*seed, c, replicate])
+                write_scan(
+                    folder / "scans" / f"{name}_{replicate}.npz", scanner.scan(sample.centre, sample.radius, rng)
+                )
+
+    def _material(self) -> Path:
+        return asset_path("materials", str(self.table.get("material")), relative_to=self.path.parent).resolve()
 
 
-def hand_out(
-    folder: Path, model: Path, measured: Mapping[str, Sequence[Sample]], scanner: Scanner | None, seed: Sequence[int]
-) -> None:
-    """Write a data set of pours into an existing ``folder``, with scans where there is a ``scanner``."""
-    readings = {condition: [sample.reading for sample in samples] for condition, samples in measured.items()}
-    write_folder(folder, model, readings, scanner.toml() if scanner else "")
-    if scanner is None:
-        return
-    (folder / "scans").mkdir()
-    for c, (condition, samples) in enumerate(measured.items()):
-        for replicate, sample in enumerate(samples, start=1):
-            rng = np.random.default_rng([*seed, c, replicate])
-            write_scan(
-                folder / "scans" / f"{condition}_{replicate}.npz", scanner.scan(sample.centre, sample.radius, rng)
-            )
+def read_laboratory(path: Path) -> Laboratory:
+    """The laboratory that the file ``path`` describes.
+
+    Raises
+    ------
+    MeasurementError
+        One line naming file, key, value and what is allowed.
+    """
+    if not path.is_file():
+        raise MeasurementError(f"{path}: no such file")
+    try:
+        table = read_toml(path)
+        own = section(table, "laboratory")
+        only(own, KEYS, "laboratory")
+        if "readings" not in own:
+            raise MeasurementError(f"laboratory.readings: missing; allowed: some of {', '.join(all_names())}")
+        readings = names(own["readings"], "laboratory.readings", all_names())
+        for entry in entries(table, "condition"):
+            if "data" in entry:
+                raise MeasurementError(
+                    f"condition.data: {entry['data']!r}; a laboratory has no data before it is asked for some"
+                )
+        scanner = _ranges(section(own, "scanner"))
+        reference = _reference(own.get("reference"), path.parent)
+    except (MeasurementError, ParameterError, ValueError) as error:
+        text = str(error)
+        raise MeasurementError(text if text.startswith(str(path)) else f"{path}: {text}") from None
+    return Laboratory(
+        path, {key: value for key, value in table.items() if key != "laboratory"}, readings, scanner, reference
+    )
+
+
+def _reference(name: object, folder: Path) -> Path | None:
+    return None if name is None else asset_path("validation", str(name), relative_to=folder)
+
+
+def _ranges(table: Table) -> ScannerRanges:
+    only(table, ("grid", "noise", "axis_off"), "laboratory.scanner")
+    usual = ScannerRanges()
+    found: dict[str, tuple[float, ...]] = {}
+    for key in ("grid", "noise", "axis_off"):
+        given = table.get(key)
+        if given is None:
+            found[key] = getattr(usual, key)
+            continue
+        where = f"laboratory.scanner.{key}"
+        if not isinstance(given, list) or not given or (key != "grid" and len(given) != 2):
+            allowed = "a list of resolutions" if key == "grid" else "[least, most]"
+            raise MeasurementError(f"{where}: {given!r}; allowed: {allowed}")
+        values = tuple(parse_quantity(one, "m", where) for one in given)
+        if min(values) < 0.0 or (key == "grid" and min(values) == 0.0) or list(values) != sorted(values):
+            raise MeasurementError(f"{where}: {given!r}; allowed: lengths from the smallest to the largest")
+        found[key] = values
+    return ScannerRanges(found["grid"], *(((one[0], one[1])) for one in (found["noise"], found["axis_off"])))

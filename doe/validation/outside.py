@@ -16,11 +16,11 @@ its own (``work_place``), and gives an ordinary record.
 """
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from solver import Batch, Members, Pour, Record, Scene, capacity_for, poured_mass, value, with_values
+from solver import Batch, Members, Pour, Record, Scene, capacity_for, parameters, poured_mass, value, with_values
 
 AMPLITUDE = {
     "vibrating_plate": 0.05,
@@ -49,7 +49,18 @@ REACH = 0.02
 KICK = 1e-3
 """Interval [s] at which the attraction acts."""
 
+POURED = ("sticky_funnel", "draught", "raised_funnel")
+"""Those that need an outlet."""
+CLUMPS = ("breaking_bodies", "stray_spheres")
+"""Those that need bodies of member spheres."""
+
 Act = Callable[[Batch, Pour, float], None]
+
+
+def possible(scene: Scene, kinds: Sequence[str]) -> tuple[str, ...]:
+    """Those of ``kinds`` that there can be in ``scene``."""
+    outlet, clump = "rig.outlet_height" in parameters(scene), isinstance(scene.bodies[0].shape, Members)
+    return tuple(kind for kind in kinds if (outlet or kind not in POURED) and (clump or kind not in CLUMPS))
 
 
 def outside_pour(name: str, scene: Scene, seed: int, amount: float) -> Record:

@@ -11,18 +11,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
-GRIDS = (0.5e-3, 0.75e-3, 1.0e-3, 1.5e-3, 2.0e-3)
-"""Resolutions that one may buy [m]."""
-NOISE = (0.05e-3, 0.3e-3)
-"""Standard deviation of a height [m]."""
-AXIS_OFF = (1.0e-3, 2.0e-3)
-"""By how much the axis is off [m], in any direction."""
 ELEVATION = (math.radians(50.0), math.radians(80.0))
 """Of the camera above the plate."""
 PATCHES, PATCH_RADIUS = 6, 3.0e-3
@@ -31,6 +26,25 @@ PLATE_MARGIN = 0.03
 """Bare plate [m] that is scanned around the pile."""
 FARTHEST = 0.15
 """Bodies farther than this from the axis [m] are off the scanner's table."""
+
+
+@dataclass(frozen=True)
+class ScannerRanges:
+    """What scanners may be [m].
+
+    Attributes
+    ----------
+    grid
+        Resolutions that one may buy.
+    noise
+        Range of the standard deviation of a height.
+    axis_off
+        Range of what the axis is off, in any direction.
+    """
+
+    grid: tuple[float, ...] = (0.5e-3, 0.75e-3, 1.0e-3, 1.5e-3, 2.0e-3)
+    noise: tuple[float, float] = (0.05e-3, 0.3e-3)
+    axis_off: tuple[float, float] = (1.0e-3, 2.0e-3)
 
 
 @dataclass(frozen=True)
@@ -45,12 +59,12 @@ class Scanner:
     azimuth: float
 
     @staticmethod
-    def drawn(rng: np.random.Generator) -> Scanner:
+    def drawn(rng: np.random.Generator, ranges: ScannerRanges = ScannerRanges()) -> Scanner:
         """A scanner that somebody may have."""
-        off, towards = rng.uniform(*AXIS_OFF), rng.uniform(0.0, 2.0 * math.pi)
+        off, towards = rng.uniform(*ranges.axis_off), rng.uniform(0.0, 2.0 * math.pi)
         return Scanner(
-            grid=float(rng.choice(GRIDS)),
-            noise=float(rng.uniform(*NOISE)),
+            grid=float(rng.choice(ranges.grid)),
+            noise=float(rng.uniform(*ranges.noise)),
             axis_x=off * math.cos(towards),
             axis_y=off * math.sin(towards),
             elevation=float(rng.uniform(*ELEVATION)),
@@ -90,12 +104,14 @@ class Scanner:
             blocked |= moved > height + step * rise
         return blocked
 
-    def toml(self) -> str:
+    def table(self) -> dict[str, Any]:
         """The ``[condition.scan]`` that the laboratory writes: its axis is the origin, which it takes for right."""
-        return (
-            f'[condition.scan]\naxis = [0.0, 0.0]\nplate = [0.0, 0.0, 0.0]\ngrid = "{1e3 * self.grid:g}mm"\n'
-            f'noise = "{1e3 * self.noise:.3g}mm"\n'
-        )
+        return {
+            "axis": [0.0, 0.0],
+            "plate": [0.0, 0.0, 0.0],
+            "grid": f"{1e3 * self.grid:g}mm",
+            "noise": f"{1e3 * self.noise:.3g}mm",
+        }
 
 
 def tops(centre: Array, radius: Array, x: Array, y: Array) -> Array:

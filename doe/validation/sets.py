@@ -30,6 +30,8 @@ class Row(Record):
 
     Attributes
     ----------
+    laboratory
+        Title of its file.
     root, number
         They give the truth and the pours.
     kind, label
@@ -59,6 +61,7 @@ class Row(Record):
         Pours that were run for it, and wall time.
     """
 
+    laboratory: str
     root: int
     number: int
     kind: str
@@ -123,7 +126,7 @@ def read_rows(path: Path) -> list[Row]:
     if not path.is_file():
         return []
     rows = [_row(json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
-    return sorted(rows, key=lambda row: (row.root, row.number, row.offer))
+    return sorted(rows, key=lambda row: (row.laboratory, row.root, row.number, row.offer))
 
 
 def append_rows(path: Path, rows: Sequence[Row]) -> None:

@@ -9,11 +9,11 @@ import typer
 
 
 def limit(
-    folder: str = typer.Argument(
+    source: str = typer.Argument(
         "",
-        metavar="[DIR]",
-        help="Folder with measurement.toml, or a shipped data set's name; only what it declares "
-        "is used. The made-up laboratory's model if not given.",
+        metavar="[DIR|FILE]",
+        help="Folder with measurement.toml, or a shipped data set's name; only what it declares is used. Or a made-up "
+        "laboratory's file; the shipped one if not given.",
     ),
     rounds: int = typer.Option(8, min=1, help="Rounds of reference pours; 8 give 96 of each effect."),
     out: Path = typer.Option(Path("limit.json"), help="File for the strengths, the pairs that look alike, the limits."),
@@ -24,9 +24,11 @@ def limit(
     threads: int | None = typer.Option(None, min=1, help="Worker processes; one per core if not given."),
 ) -> None:
     """Pour every effect many times and print the Bayes limit: what scalars, profiles and scans can tell at best."""
+    from doe.validation.laboratory import TREFOILS
     from explorer.diagnosis.limit import LimitOrder, limit_text, run_limit
     from solver.assets import measurement_folder
 
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    order = LimitOrder(measurement_folder(folder) if folder else None, rounds, out, reference, store, threads)
+    path = Path(source) if source else TREFOILS
+    order = LimitOrder(path if path.is_file() else measurement_folder(source), rounds, out, reference, store, threads)
     typer.echo(limit_text(*run_limit(order, typer.echo)))

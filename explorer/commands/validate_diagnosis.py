@@ -10,6 +10,11 @@ import typer
 def validate_diagnosis(
     n: int = typer.Option(370, "--n", min=1, help="Data sets; 370 are a whole test."),
     root: int = typer.Option(1, "--root", min=1, help="Root of all random numbers: another root, other data sets."),
+    laboratory: Path | None = typer.Option(
+        None,
+        metavar="FILE",
+        help="What it declares and hands out (doe/validation/laboratory.py); the shipped one if not given.",
+    ),
     out: Path = typer.Option(Path("validation"), help="Folder for sets.jsonl, two lines per data set."),
     minutes: float | None = typer.Option(
         None, min=0.0, help="Stop after so long; the same command goes on. 0: only the table of what is there."
@@ -23,9 +28,9 @@ def validate_diagnosis(
     import math
 
     from doe.validation.campaign import CampaignOrder, run_campaign
+    from doe.validation.laboratory import TREFOILS
     from explorer.errors import CommandError
     from explorer.tables.validation import campaign_text
-    from solver.assets import shipped_reference
 
     number, _, of = shard.partition("/")
     if not (number.isdecimal() and of.isdecimal() and 1 <= int(number) <= int(of)):
@@ -40,6 +45,6 @@ def validate_diagnosis(
         shard=int(number),
         of=int(of),
         wide=wide,
-        reference=shipped_reference(),
+        laboratory=laboratory or TREFOILS,
     )
     typer.echo(campaign_text(run_campaign(order, typer.echo)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,15 +14,14 @@ from doe.diagnose.declared import Declared, declare
 from doe.diagnose.levels import REPLICATES
 from doe.diagnose.limit import RISK, RISKS, LimitStudy, confused, limit_study
 from doe.diagnose.pours import Ended, ModelPours
-from doe.diagnose.reference import ROOT, Reference, extended, find_levels, load, save
+from doe.diagnose.reference import ROOT, Reference, extended_to, kept
 from doe.diagnose.replay import BASE_POURS, NULLS, Replayed, Teaching, Truth, replay
 from doe.diagnose.ruler import Strength
 from doe.measurement import Measurement, load_measurement
 from doe.measurement.features import OFFERS, feature_set
 from doe.record import plain
-from doe.store import READINGS, Store, default_store
-from doe.validation.laboratory import declared_model
-from explorer.errors import CommandError
+from doe.store import Store, default_store
+from doe.validation.laboratory import read_laboratory
 from explorer.files.run_folder import json_text
 from explorer.files.whole_file import write_whole
 from explorer.tables.text_table import text_table
@@ -40,9 +39,12 @@ SAID_EVERY = 100
 
 @dataclass(frozen=True)
 class LimitOrder:
-    """What a user asked for; ``folder`` None: the made-up laboratory's model. ``reference``: file of earlier rounds."""
+    """What a user asked for.
 
-    folder: Path | None
+    ``source``: folder of a measurement, or file of a made-up laboratory. ``reference``: file of earlier rounds.
+    """
+
+    source: Path
     rounds: int
     out: Path
     reference: Path
@@ -52,12 +54,10 @@ class LimitOrder:
 
 def run_limit(order: LimitOrder, say: Callable[[str], None]) -> tuple[LimitStudy, tuple[Replayed, ...]]:
     """Pour the rounds that are missing, and write what follows. Every pour and every round is kept."""
-    measurement = load_measurement(order.folder) if order.folder else declared_model()
+    measurement = _declared(order.source)
     declared = declare(measurement, tuple(EFFECTS))
     sets = [feature_set(condition) for condition in measurement.fit]
-    nothing = Reference(measurement.title, PHYSICS, READINGS, tuple(one.names for one in sets), ())
-    found = load(order.reference) if order.reference.exists() else nothing
-    _require_same(found, nothing, order.reference)
+    found = kept(order.reference, measurement, PHYSICS)
     if found.rounds < order.rounds:
         found = _poured(order, measurement, declared, found, say)
     offered = {offer: [one.offered(offer) for one in sets] for offer in OFFERS}
@@ -96,6 +96,10 @@ def truths_of(study: LimitStudy) -> list[Truth]:
     return strong + [Truth(one.kind, "weak", one.weak.value) for one in study.reached if one.weak is not None]
 
 
+def _declared(source: Path) -> Measurement:
+    return load_measurement(source) if source.is_dir() else read_laboratory(source).declared
+
+
 def _poured(
     order: LimitOrder, measurement: Measurement, declared: Declared, found: Reference, say: Callable[[str], None]
 ) -> Reference:
@@ -112,20 +116,7 @@ def _poured(
         crew = stack.enter_context(Crew(order.threads))
         paths = [parameter.path for parameter in measurement.parameters]
         pours = ModelPours(measurement.fit, paths, store, crew.run_queue, on_pour, ROOT)
-        if not found.levels:
-            found = replace(found, levels=tuple(find_levels(declared, pours)))
-        while found.rounds < order.rounds:
-            found = extended(found, declared, pours)
-            save(found, order.reference)
-            say(f"{order.reference}: {found.rounds} of {order.rounds} rounds")
-    return found
-
-
-def _require_same(found: Reference, now: Reference, path: Path) -> None:
-    for name in ("title", "physics", "readings", "features"):
-        if getattr(found, name) != getattr(now, name):
-            there = getattr(found, name) if name != "features" else "other features"
-            raise CommandError(f"--reference {path}: {name} {there!r} is not that of today; name another file")
+        return extended_to(found, order.rounds, declared, pours, order.reference, say)
 
 
 def limit_text(found: LimitStudy, replayed: Sequence[Replayed]) -> str:

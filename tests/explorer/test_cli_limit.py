@@ -10,7 +10,7 @@ from doe.diagnose.points import Direction
 from doe.diagnose.reference import Reference, Sample, save
 from doe.measurement.features import feature_set
 from doe.store import READINGS
-from doe.validation.laboratory import declared_model
+from doe.validation.laboratory import TREFOILS, read_laboratory
 from solver import PHYSICS
 from tests.explorer.command_line import explorer
 
@@ -19,7 +19,7 @@ ROUNDS, STRONG, WEAK, BASE = 8, 64, 32, 240
 
 @pytest.fixture(scope="module")
 def model():
-    return declared_model()
+    return read_laboratory(TREFOILS).declared
 
 
 def made_up(model, physics=PHYSICS):
@@ -65,5 +65,5 @@ def test_a_reference_of_another_physics_is_refused(model, tmp_path):
     save(made_up(model, physics=PHYSICS - 1), path)
     result = explorer("limit", "--reference", path, "--out", tmp_path / "limit.json")
     assert result.exit_code == 2
-    assert f"--reference {path}: physics {PHYSICS - 1} is not that of today" in " ".join(result.output.split())
+    assert f"{path}: physics {PHYSICS - 1} is not that of today" in " ".join(result.output.split())
     assert not (tmp_path / "limit.json").exists()

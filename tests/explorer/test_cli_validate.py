@@ -16,7 +16,8 @@ ROOT = Path(__file__).parents[2]
 def test_sets_that_are_there_are_only_counted(tmp_path):
     # Of root 1 the first two sets; what they are does not matter to the count.
     row = {
-        "root": 1, "kind": "null", "label": "none", "strength": None, "amplitude": "", "verdict": "no_missing_effect",
+        "laboratory": "blind", "root": 1, "kind": "null",
+        "label": "none", "strength": None, "amplitude": "", "verdict": "no_missing_effect",
         "first": "", "follow_up": "",
         "nothing": 0.9, "outside": 0.02, "best": "air_drag", "best_p": 0.03, "truth_p": None, "evidence": {"base": 0.0},
         "fits": {"base": 0.4}, "held_out_p": 0.5, "before": None, "after": None, "pours": 12, "seconds": 3.5,
@@ -48,7 +49,10 @@ def test_an_installed_program_can_run_it(tmp_path):
     result = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
     assert (result.returncode, result.stderr) == (0, "")
     assert "0 of 0 data sets within reach" in result.stdout
-    program = "from doe.validation import laboratory; laboratory.declared_model(); print(laboratory.__file__)"
+    program = (
+        "from doe.validation import laboratory as one; found = one.read_laboratory(one.TREFOILS); "
+        "found.declared; print(found.reference)"
+    )
     result = subprocess.run(
         [sys.executable, "-c", program], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
     )

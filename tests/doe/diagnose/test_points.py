@@ -6,7 +6,7 @@ import pytest
 from doe.diagnose.declared import Condition, Declared, Effect, Parameter
 from doe.diagnose.points import AS_IT_IS, Direction, View, base_points, directions_of, effect_points, middle, moved
 from doe.measurement.features import features_of_record
-from doe.validation.laboratory import declared_model
+from doe.validation.laboratory import TREFOILS, read_laboratory
 from solver import run_pour, with_values
 
 PARAMETERS = (
@@ -66,7 +66,7 @@ def test_a_parameter_stays_within_its_range():
 
 @pytest.fixture(scope="module")
 def condition():
-    found = declared_model().fit[0]
+    found = read_laboratory(TREFOILS).declared.fit[0]
     scene = with_values(found.scene, {"rig.mass": 2.0e-3, "numerics.duration": 0.5})
     return type(found)(found.name, found.role, scene, found.replicates, found.observations)
 

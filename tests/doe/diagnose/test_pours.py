@@ -16,7 +16,7 @@ from doe.diagnose.pours import ModelPours, Pour
 from doe.measurement import summary_names
 from doe.measurement.features import feature_set
 from doe.store import Store
-from doe.validation.laboratory import OBSERVABLES, declared_model
+from doe.validation.laboratory import TREFOILS, read_laboratory
 from solver import Outcome, value
 from tests.solver.observables.made_up import empty_pile, record_of
 
@@ -26,7 +26,7 @@ FRICTION = "pair.grain.grain.static_friction"
 @pytest.fixture
 def poured(monkeypatch, tmp_path):
     """A model of one parameter whose every summary is that parameter, and the jobs that were run."""
-    condition = declared_model().fit[0]
+    condition = read_laboratory(TREFOILS).declared.fit[0]
     jobs = []
 
     def run(queue, room):
@@ -48,7 +48,7 @@ def poured(monkeypatch, tmp_path):
 
 def test_two_models_are_confirmed_by_pours_of_their_own(poured):
     pours, jobs = poured
-    width = len(OBSERVABLES) - 1
+    width = len(read_laboratory(TREFOILS).readings) - 1
     for asked in ((0.5,), (0.6, 0.5)):
         found = confirm([Model((friction,)) for friction in asked], pours, 3, [width])
         assert [one.blocks[0].tolist() for one in found] == [[[friction] * width] * 3 for friction in asked]

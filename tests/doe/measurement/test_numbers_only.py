@@ -8,7 +8,7 @@ from doe.diagnose.compared import measured
 from doe.diagnose.declared import declare
 from doe.diagnose.diagnosis import complete_rows
 from doe.measurement import load_measurement
-from doe.validation.laboratory import MODEL, OBSERVABLES, write_folder
+from doe.validation.laboratory import TREFOILS, read_laboratory
 from solver import EFFECTS
 from solver.assets import measurement_folder
 from tests.doe.validation.disguise import disguise
@@ -41,15 +41,16 @@ def assert_same(one, other):
 
 def test_a_folder_s_name_its_texts_comments_and_order_say_nothing(tmp_path):
     rng = np.random.default_rng(1)
-    conditions = sorted(path.stem for path in MODEL.glob("*.toml") if path.stem not in ("head", "material"))
+    laboratory = read_laboratory(TREFOILS)
+    names = laboratory.readings
     data = {
-        c: [dict(zip(OBSERVABLES, rng.normal(size=len(OBSERVABLES)).tolist(), strict=True)) for _ in range(6)]
-        for c in conditions
+        c.name: [dict(zip(names, rng.normal(size=len(names)).tolist(), strict=True)) for _ in range(6)]
+        for c in laboratory.declared.conditions
     }
     folders = [tmp_path / name for name in ("rolling_resistance", "no_missing_effect")]
     for folder in folders:
         folder.mkdir()
-        write_folder(folder, MODEL, data)
+        laboratory.write(folder, data)
     disguise(folders[1], rng)
     assert_same(*map(asked, folders))
 

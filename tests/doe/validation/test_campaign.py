@@ -18,12 +18,12 @@ from doe.measurement import load_measurement
 from doe.store import Store
 from doe.validation.answers import Answers
 from doe.validation.campaign import CampaignOrder, run_campaign
-from doe.validation.laboratory import declared_model, write_folder
+from doe.validation.laboratory import read_laboratory
 from doe.validation.schedule import Case
 from doe.validation.truth import strengths_of, truth_of
 from doe.validation.work_place import WorkPlace
 from tests.doe.validation.disguise import disguise
-from tests.doe.validation.small_model import small_model
+from tests.doe.validation.small_model import small_laboratory
 
 pytestmark = pytest.mark.slow
 
@@ -44,17 +44,17 @@ def strengths(declared: Declared):
 @pytest.fixture(scope="module")
 def order(tmp_path_factory):
     folder = tmp_path_factory.mktemp("campaign")
-    model = small_model(folder / "model")
+    laboratory = small_laboratory(folder / "laboratory")
     return CampaignOrder(
         out=folder / "out",
         number=len(CASES),
         store=folder / "runs.sqlite",
         workers=2,
-        model=model,
+        laboratory=laboratory,
         effects=EFFECTS,
         budget=Budget(base=16, screening=4, more=6, looks=2),
         cases=CASES,
-        strengths=strengths(declare(declared_model(model), EFFECTS)),
+        strengths=strengths(declare(read_laboratory(laboratory).declared, EFFECTS)),
     )
 
 
@@ -117,15 +117,15 @@ def test_the_verdict_depends_on_numbers_only(order, rows, tmp_path):
     """Another name of the folder, other free text, other comments, rows in another order: the same verdict."""
     first, second = tmp_path / "rolling_resistance", tmp_path / "plate_tilt"
     with closing(Store(order.store)) as store, WorkPlace(store, 1) as place:
-        measurement = declared_model(order.model)
-        answers = Answers(order.model, measurement, order.strengths, place, order.budget)
+        laboratory = read_laboratory(order.laboratory)
+        answers = Answers(laboratory, order.strengths, place, order.budget)
         truth = truth_of(CASES[1], order.strengths)
-        data = answers.measured(truth, measurement.conditions)
+        data = answers.measured(truth, laboratory.declared.conditions)
         assert place.poured == 0
         readings = {name: [sample.reading for sample in samples] for name, samples in data.items()}
         for folder in (first, second):
             folder.mkdir()
-            write_folder(folder, order.model, readings)
+            laboratory.write(folder, readings)
         disguise(second, np.random.default_rng(0))
         one, other = (answers.judged_data(load_measurement(folder), truth, "scalars").row for folder in (first, second))
     assert one.verdict == "effect:rolling_resistance"

@@ -6,36 +6,41 @@ The whole of it in the small, answers included, is slow (`test_campaign.py`).
 from contextlib import closing
 
 import numpy as np
+import pytest
 
 from doe.diagnose.budget import Budget
+from doe.errors import MeasurementError
 from doe.measurement import load_measurement
+from doe.measurement.condition_table import in_rig
 from doe.measurement.features import SCALARS, SCAN, features_of_data, offer_of
 from doe.store import Store
 from doe.validation.answers import Answers
-from doe.validation.laboratory import OBSERVABLES, declared_model, hand_out
+from doe.validation.laboratory import TREFOILS, read_laboratory
+from doe.validation.outside import AMPLITUDE, possible
 from doe.validation.scanner import Scanner
 from doe.validation.schedule import Case
 from doe.validation.truth import REPLICATES, Truth
 from doe.validation.work_place import WorkPlace
-from tests.doe.validation.small_model import small_model
+from solver import AssetNotFoundError
+from tests.doe.validation.small_model import small_laboratory
 
 
 def test_laboratories_pour_with_and_without_an_effect_and_nothing_twice(tmp_path):
-    model = small_model(tmp_path / "model")
-    measurement = declared_model(model)
+    laboratory = read_laboratory(small_laboratory(tmp_path / "laboratory"))
+    measurement = laboratory.declared
     (condition, *_) = measurement.fit
     theta = tuple(0.5 * (parameter.low + parameter.high) for parameter in measurement.parameters)
     rolling = (("rolling_resistance", (0.3,)),)
     null, effect = Truth(Case(9, 0, "null"), theta), Truth(Case(9, 1, "effect"), theta, rolling)
     with closing(Store(tmp_path / "runs.sqlite")) as store, WorkPlace(store, 2) as place:
-        answers = Answers(model, measurement, None, place, Budget())  # nothing is judged
+        answers = Answers(laboratory, None, place, Budget())  # nothing is judged
         assert answers.measured(Truth(Case(9, 2, "effect"), theta, missing="bounds"), [condition]) is None
         plain, acting = (answers.measured(truth, [condition]) for truth in (null, effect))
         poured = place.poured
         assert poured >= 2 * REPLICATES
         for data in (plain, acting):
             assert len(data[condition.name]) == REPLICATES
-            assert all(set(sample.reading) == set(OBSERVABLES) for sample in data[condition.name])
+            assert all(set(sample.reading) == set(laboratory.readings) for sample in data[condition.name])
         assert [one.reading for one in plain[condition.name]] != [one.reading for one in acting[condition.name]]
         again = answers.measured(null, [condition])
         assert [one.reading for one in again[condition.name]] == [one.reading for one in plain[condition.name]]
@@ -43,7 +48,53 @@ def test_laboratories_pour_with_and_without_an_effect_and_nothing_twice(tmp_path
     for scanner, offer in ((None, SCALARS), (Scanner.drawn(np.random.default_rng(0)), SCAN)):
         folder = tmp_path / offer
         folder.mkdir()
-        hand_out(folder, model, plain, scanner, (9, 0))
+        laboratory.hand_out(folder, plain, scanner, (9, 0))
         (read,) = load_measurement(folder).fit
         assert offer_of(read) == offer
         assert np.isfinite(features_of_data(read)).all()
+
+
+def edited(folder, old, new):
+    """The file of a laboratory in which ``old`` is ``new``."""
+    path = small_laboratory(folder)
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    return path
+
+
+WRONG = (
+    ('reference = "reference_blind.npz"', 'reference = "nobody.npz"', "nobody"),
+    ("readings = [", 'wishes = 1\nreadings = ["steepness",', "laboratory.wishes"),
+    ("readings = [", 'readings = ["steepness",', "laboratory.readings: 'steepness'"),
+    ('role = "holdout"', 'role = "holdout"\ndata = "a.csv"', "condition.data: 'a.csv'"),
+    ('rig = "funnel"', 'rig = "hopper"', "hopper"),
+    ("[parameters]", '[laboratory.scanner]\nnoise = ["1mm"]\n[parameters]', "laboratory.scanner.noise: ['1mm']"),
+    ("[parameters]", '[laboratory.scanner]\ngrid = ["0mm"]\n[parameters]', "laboratory.scanner.grid: ['0mm']"),
+)
+
+
+@pytest.mark.parametrize(("old", "new", "named"), WRONG)
+def test_a_file_that_is_wrong_is_named_in_one_line(tmp_path, old, new, named):
+    path = edited(tmp_path / "laboratory", old, new)
+    with pytest.raises((MeasurementError, AssetNotFoundError)) as caught:
+        assert read_laboratory(path).declared
+    (line,) = str(caught.value).splitlines()
+    assert line.startswith(str(path))
+    assert named in line
+
+
+def test_scanners_are_drawn_from_the_file_s_ranges(tmp_path):
+    ranges = '[laboratory.scanner]\ngrid = ["3mm"]\nnoise = ["0.4mm", "0.5mm"]\n\n[parameters]'
+    laboratory = read_laboratory(edited(tmp_path / "laboratory", "[parameters]", ranges))
+    drawn = [Scanner.drawn(np.random.default_rng(seed), laboratory.scanner) for seed in range(20)]
+    assert {one.grid for one in drawn} == {3e-3}
+    assert all(0.4e-3 <= one.noise <= 0.5e-3 for one in drawn)
+    assert all(1e-3 <= np.hypot(one.axis_x, one.axis_y) <= 2e-3 for one in drawn)
+
+
+def test_outside_effects_are_those_that_there_can_be():
+    scene = read_laboratory(TREFOILS).declared.scene
+    assert possible(scene, tuple(AMPLITUDE)) == tuple(AMPLITUDE)
+    cylinder = in_rig(scene, "lifting_cylinder")
+    assert set(AMPLITUDE) - set(possible(cylinder, tuple(AMPLITUDE))) == {"sticky_funnel", "draught", "raised_funnel"}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from doe.validation import outside
-from doe.validation.laboratory import declared_model
+from doe.validation.laboratory import TREFOILS, read_laboratory
 from solver import body_counts, observe, with_values
 
 SEED = 3
@@ -12,7 +12,7 @@ SEED = 3
 
 @pytest.fixture(scope="module")
 def scene():
-    low = declared_model().fit[-1].scene
+    low = read_laboratory(TREFOILS).declared.fit[-1].scene
     return with_values(low, {"rig.mass": 0.0014, "numerics.duration": 0.3})
 
 

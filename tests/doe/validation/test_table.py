@@ -16,7 +16,7 @@ NAN = math.nan
 
 def row(number, kind, label, verdict, strength=NAN, after=NAN, offer="scan"):
     return Row(
-        5, number, kind, label, strength, "", offer, verdict, "", "", 0.1, 0.1, "a", 0.8, NAN,
+        "blind", 5, number, kind, label, strength, "", offer, verdict, "", "", 0.1, 0.1, "a", 0.8, NAN,
         {"base": 0.0}, {"base": 0.5}, NAN, 2.0 * after, after, 12, 1.5,
     )  # fmt: skip
 
