@@ -51,6 +51,8 @@ class Answers:
     strengths: Strengths
     place: WorkPlace
     budget: Budget
+    follow_up: bool = True
+    """Whether an ambiguous answer is followed up."""
 
     @property
     def measurement(self) -> Measurement:
@@ -110,7 +112,7 @@ class Answers:
         conclusion, verdict = concluded(verdict, compared, declared, measurement.holdout, held, say)
         found = compared.posterior
         suggestion = None
-        if follow_up is None:
+        if self.follow_up and follow_up is None:
             paths = [parameter.path for parameter in measurement.parameters]
             clock, place = self.place.look_at_the_clock, self.place
             menu = suggested(verdict, found, declared, measurement.fit[0], paths, place.store, place.pours, clock)

@@ -41,8 +41,8 @@ class CampaignOrder:
     """What is asked for.
 
     minutes: stop after so long, infinite by default; 0: judge nothing. shard: every ``of``-th set from the ``shard``-th
-    on. wide: sets of all strengths, for development. cases: instead of the schedule's. strengths: instead of those of
-    the reference pours in the file ``reference``.
+    on. wide: sets of all strengths, for development. follow_up: whether ambiguous answers are followed up, which takes
+    most of the time. cases: instead of the schedule's. strengths: instead of those by the laboratory's reference pours.
     """
 
     out: Path
@@ -54,6 +54,7 @@ class CampaignOrder:
     shard: int = 1
     of: int = 1
     wide: bool = False
+    follow_up: bool = True
     laboratory: Path = TREFOILS
     effects: tuple[str, ...] = tuple(EFFECTS)
     budget: Budget = Budget()
@@ -83,7 +84,7 @@ def run_campaign(order: CampaignOrder, say: Say) -> list[Row]:
             place = stack.enter_context(WorkPlace(store, order.workers or os.cpu_count() or 1, deadline))
             try:
                 strengths = order.strengths or measured_strengths(order, laboratory, place, say)
-                answers = Answers(laboratory, strengths, place, order.budget)
+                answers = Answers(laboratory, strengths, place, order.budget, order.follow_up)
                 for case in todo:
                     rows = answers.rows(case)
                     append_rows(path, rows)

@@ -21,6 +21,9 @@ def validate_diagnosis(
     ),
     shard: str = typer.Option("1/1", metavar="K/N", help="Only every N-th set; N processes may share OUT and a store."),
     wide: bool = typer.Option(False, "--wide", help="Effects of 4 to 40 σ, for development."),
+    follow_up: bool = typer.Option(
+        True, "--follow-up/--no-follow-up", help="Carry out the experiment that an ambiguous answer asks for."
+    ),
     store: Path | None = typer.Option(None, help="SQLite file that keeps every pour."),
     threads: int | None = typer.Option(None, min=1, help="Worker processes; one per core if not given."),
 ) -> None:
@@ -45,6 +48,7 @@ def validate_diagnosis(
         shard=int(number),
         of=int(of),
         wide=wide,
+        follow_up=follow_up,
         laboratory=laboratory or TREFOILS,
     )
     typer.echo(campaign_text(run_campaign(order, typer.echo)))
