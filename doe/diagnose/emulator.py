@@ -4,10 +4,11 @@ Features are whitened, z = W y with W Σ Wᵀ = I for the covariance Σ of one p
 the signatures. There a pour with parameters θ [standard deviations of their measurements] and effect e at a times its
 reference amplitude gives, feature by feature,
 
-    z = b + J θ + β_e a + γ_e (a² − a) + ε,    ε ~ N(0, 1)
+    z = b + J θ + β_e a + γ_e (a² − a) + ε,    ε ~ N(0, 1 + x_e a)
     b, J flat,    β_e ~ N(0, v),    γ_e ~ N(0, CURVATURE² v)
 
-b is the base model, J what parameters do, β_e a signature, γ_e how far the answer is from proportional. All pours are
+b is the base model, J what parameters do, β_e a signature, γ_e how far the answer is from proportional, x_e by how much
+an effect makes pours scatter more (one number for all features; bodies that stick come down in lumps). All pours are
 in one regression: parameters are moved in every one of them, the base model is known better by what the effects do not
 move, and the errors that two models share are in both. What a signature may be is learned from all of them (v, one
 variance along each principal axis): effects of a granular pour move its features along few directions, and what a
@@ -46,6 +47,10 @@ FLOOR = 0.3
 """Share of the signatures' variance off the leading axes, where noise hides it, that is believed there."""
 LEAST_VARIANCE = 1e-3
 """Of a signature along an axis, where its estimate comes out at nothing."""
+FEW_POURS = 2.0
+"""Pours at the reference amplitude for which the belief counts that an effect leaves the scatter of a pour as it is."""
+SCATTERS = (0.5, 4.0)
+"""Range of the variance of a pour under an effect over that of the base model's."""
 FLAT = 1e-9
 """Prior precision of what nothing is assumed of."""
 ANGLES = (0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi)
@@ -165,6 +170,8 @@ class Emulator:
         From the features of pours to z: by condition, and W (D, D) with its turn.
     reached
         Largest multiple of its reference amplitude at which each way was poured.
+    excess
+        x, by how much the variance of a pour grows per reference amplitude of each way, (m,).
     """
 
     ways: tuple[Way, ...]
@@ -175,6 +182,7 @@ class Emulator:
     squashes: tuple[Squash, ...]
     whitening: FloatArray
     reached: tuple[float, ...]
+    excess: FloatArray
 
     def seen(self, pours: Sequence[FloatArray]) -> FloatArray:
         """Mean of ``pours``, z (D,)."""
@@ -220,6 +228,10 @@ class Emulator:
         some, covariance = rows[:, used], self.covariance[:, used][:, :, used]
         variance = np.einsum("ni,dij,nj->nd", some, covariance, some, optimize=True)
         return some @ self.mean[:, used].T, np.asarray(variance, dtype=np.float64)
+
+    def noise(self, rows: FloatArray) -> FloatArray:
+        """Variance of a pour, (n,), for ``rows`` of the regression; 1 of the base model."""
+        return noise_of(rows[:, 1 + self.parameters : 1 + self.parameters + len(self.ways)], self.excess)
 
 
 def planar_weights(angle: float) -> dict[float, float]:
@@ -286,9 +298,30 @@ def emulated(
     a = lessons.amplitude[acting]
     rows[acting, 1 + k + lessons.way[acting]] = a
     rows[acting, 1 + k + m + lessons.way[acting]] = a**2 - a
-    mean, covariance = regression(rows, z @ axes, k, variances)
+    excess = _excess(z, lessons, m)
+    spread = np.sqrt(noise_of(rows[:, 1 + k : 1 + k + m], excess))[:, None]
+    mean, covariance = regression(rows / spread, z @ axes / spread, k, variances)
     reached = tuple(float(lessons.amplitude[lessons.way == w].max()) for w in range(m))
-    return Emulator(tuple(ways), k, mean, covariance, freedom, squashes, axes.T @ whitening, reached)
+    return Emulator(tuple(ways), k, mean, covariance, freedom, squashes, axes.T @ whitening, reached, excess)
+
+
+def noise_of(amplitudes: FloatArray, excess: FloatArray) -> FloatArray:
+    """Variance of pours, (n,), in which the ways act at ``amplitudes`` (n, m)."""
+    return np.asarray(np.clip(1.0 + amplitudes @ excess, *SCATTERS), dtype=np.float64)
+
+
+def _excess(z: FloatArray, lessons: Lessons, ways: int) -> FloatArray:
+    """x (m,) by least squares of the pours' squared deviations within their groups, drawn towards 0."""
+    group = lessons.groups()
+    several = (np.bincount(group) > 1)[group]
+    square = (_residuals(z, group, lessons.theta) ** 2).mean(axis=1)
+    way, amplitude = lessons.way[several], lessons.amplitude[several]
+    more = square / square[way == -1].mean() - 1.0
+    found = np.zeros(ways)
+    for number in range(ways):
+        a = amplitude[way == number]
+        found[number] = float(a @ more[way == number]) / (float(a @ a) + FEW_POURS)
+    return found
 
 
 def signature_prior(signatures: FloatArray, noise: FloatArray) -> tuple[FloatArray, FloatArray]:

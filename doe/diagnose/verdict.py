@@ -305,9 +305,9 @@ def _residuals(compared: Compared, before: Fit, after: Fit) -> tuple[Residual, .
     columns = []
     for fit in (before, after):
         noise = (
-            np.diag(fit.variance + data.scatter / data.replicates) + data.instrument @ data.instrument.T
+            np.diag(fit.variance) + data.instrument @ data.instrument.T
             if data.instrument.size
-            else np.diag(fit.variance + data.scatter / data.replicates)
+            else np.diag(fit.variance)
         )
         spread = noise + emulator.slopes @ fit.theta_covariance @ emulator.slopes.T
         sigma = np.sqrt(np.einsum("ij,jk,ik->i", inverse, spread, inverse, optimize=True))

@@ -1,6 +1,7 @@
 """The posterior: densities against SciPy's, and answers that have to come out; the replay on made-up pours."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -49,7 +50,7 @@ def emulator(shifts, freedom=200, pours=12, sensitivity=None, variance=25.0, way
     table[:, 0] = 1.0
     mean, covariance = regression(table, np.array(z), 1, np.full(SIZE, variance))
     names = ways or tuple(Way(name, name) for name in shifts)
-    return Emulator(names, 1, mean, covariance, freedom, (UNSQUASHED,) * 2, np.eye(SIZE), (1.0,) * m)
+    return Emulator(names, 1, mean, covariance, freedom, (UNSQUASHED,) * 2, np.eye(SIZE), (1.0,) * m, np.zeros(m))
 
 
 def judged(taught, z, replicates=6, pairs=False):
@@ -70,11 +71,13 @@ def test_without_effects_it_is_the_ratio_of_two_densities():
     assert found.nothing == pytest.approx(nothing / (nothing + outside), rel=1e-6)
 
 
-def test_an_effect_by_conditioning_a_gaussian():
+@pytest.mark.parametrize("excess", [0.0, 2.0])
+def test_an_effect_by_conditioning_a_gaussian(excess):
     """Prediction by the joint normal of base, taught pours and data, evidence by SciPy's t; no regression in it."""
     shift, slope, prior, pours = 3.0 * unit(1, 7), 0.5 * unit(3), 4.0, 8
     z = 1.4 * unit(1, 7)
-    found = judged(emulator({"push": shift}, freedom=50, pours=pours, sensitivity=slope, variance=prior), z)
+    taught = emulator({"push": shift}, freedom=50, pours=pours, sensitivity=slope, variance=prior)
+    found = judged(replace(taught, excess=np.array([excess])), z)
 
     def log_t(mean, variance):
         scale = np.diag(variance) + np.outer(slope, slope)
@@ -87,7 +90,9 @@ def test_an_effect_by_conditioning_a_gaussian():
         seen = np.array([[wide + 1.0 / 24.0, wide], [wide, wide + there @ kernel @ there + 1.0 / pours]])
         between = np.array([wide, wide + here @ kernel @ there])
         weights = np.linalg.solve(seen, between)
-        return weights[1] * shift, np.full(SIZE, wide + here @ kernel @ here - weights @ between + 1.0 / 6.0)
+        return weights[1] * shift, np.full(
+            SIZE, wide + here @ kernel @ here - weights @ between + min(4.0, 1.0 + excess * a) / 6.0
+        )
 
     base = 1.0 / 24.0
     # The base model is known better by the effect's pours, as far as these may be off it.
@@ -284,6 +289,27 @@ def test_parameters_that_move_in_every_pour_cost_no_pours_of_their_own():
     assert np.linalg.norm(taught.slopes) == pytest.approx(1.0, rel=0.35)
     shift = taught.at(taught.row({0: 1.0})[None])[0] - base_of(taught)[0]
     assert np.linalg.norm(shift) == pytest.approx(4.0, rel=0.2)
+
+
+def test_pours_that_scatter_more_under_an_effect_are_known_to():
+    """Three times the variance at the reference amplitude, twice at half of it: x = 2, less for the tails drawn in."""
+    rng = np.random.default_rng(2)
+    way, amplitude = np.repeat([-1, 0, 0, 1], 60), np.repeat([0.0, 1.0, 0.5, 1.0], 60)
+    deviation = np.sqrt(np.where(way == 0, 1.0 + 2.0 * amplitude, 1.0))
+    features = amplitude[:, None] * unit(2) + deviation[:, None] * rng.standard_normal((240, SIZE))
+    blocks = tuple(np.split(features, 2, axis=1))
+    lessons = Lessons(np.zeros((240, 1)), way, amplitude, np.ones(240, bool), blocks)
+    taught = emulated(lessons, [Way("push", "push"), Way("pull", "pull")])
+    # Of a normal feature of variance v, in units of the mean variance over all groups.
+    g = np.linspace(-8.0, 8.0, 4001)
+    still, half, whole = (
+        float((SQUASH * np.arcsinh(math.sqrt(v / 1.75) * g / SQUASH)) ** 2 @ stats.norm.pdf(g)) for v in (1.0, 2.0, 3.0)
+    )
+    expected = ((whole / still - 1.0) + 0.5 * (half / still - 1.0)) / 1.25
+    # 60 pours of 12 features in each group: some 5 % of a variance.
+    assert taught.excess == pytest.approx([expected, 0.0], abs=0.2)
+    noise = taught.noise(np.stack([taught.row(), taught.row({0: 0.5}), taught.row({0: 9.0})]))
+    assert noise == pytest.approx([1.0, 1.0 + 0.5 * taught.excess[0], 4.0])
 
 
 def test_a_pour_looked_at_otherwise_tells_nothing_of_the_scatter():
