@@ -265,10 +265,10 @@ CASES = {
     "no holdout": {"effects": (("adhesion_sjkr", (0.6,)),), "holdout": False},
     "pair": {"effects": (("adhesion_sjkr", (0.8,)), ("density_error", (0.8,)))},
     "ambiguous": {"effects": (("rolling_resistance", (0.6,)),)},
-    "faint": {"effects": (("adhesion_sjkr", (0.3,)),), "seed": 2},
+    "faint": {"effects": (("adhesion_sjkr", (0.35,)),), "seed": 2},
     "unexplained": {"outside": 0.8, "elsewhere": 0.8},
     "wrong elsewhere": {"elsewhere": 1.5},
-    "does not fit": {"effects": (("adhesion_sjkr", (1.0,)), ("density_error", (1.0,)))},
+    "does not fit": {"effects": (("adhesion_sjkr", (1.0,)), ("density_error", (1.0,))), "seed": 1},
     "at the edge": {"theta": (0.0, 1.8)},
     "hostile": {"effects": (("adhesion_sjkr", (0.6,)),), "title": HOSTILE},
 }
