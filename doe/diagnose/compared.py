@@ -139,10 +139,7 @@ def weighed(
     """
     if instruments:
         conditions = [_freed(one, instrument) for one, instrument in zip(conditions, instruments, strict=True)]
-    columns = [_readable(lessons, c, condition) for c, condition in enumerate(conditions)]
-    taught = _complete(lessons.only(columns))
-    columns = [chosen[_varies(taught, c)] for c, chosen in enumerate(columns)]
-    taught = _complete(lessons.only(columns))
+    taught, columns = usable(lessons, [_there(condition) for condition in conditions])
     left_out = [
         f"{condition.condition}: {condition.names[k]}"
         for condition, chosen in zip(conditions, columns, strict=True)
@@ -168,13 +165,26 @@ def weighed(
     )
 
 
-def _readable(lessons: Lessons, c: int, condition: Measured) -> npt.NDArray[np.int64]:
-    """Features of a condition that data and pours give."""
-    there = np.isfinite(condition.values).sum(axis=0) >= max(min(2, len(condition.values)), len(condition.values) / 2)
-    base = lessons.blocks[c][lessons.way == -1, : len(condition.names)]
+def usable(lessons: Lessons, offered: Sequence[npt.NDArray[np.int64]]) -> tuple[Lessons, list[npt.NDArray[np.int64]]]:
+    """The complete pours with those of the ``offered`` features that they give and that vary, and which these are."""
+    columns = [some[_readable(lessons, c)[some]] for c, some in enumerate(offered)]
+    taught = _complete(lessons.only(columns))
+    columns = [chosen[_varies(taught, c)] for c, chosen in enumerate(columns)]
+    return _complete(lessons.only(columns)), columns
+
+
+def _there(condition: Measured) -> npt.NDArray[np.int64]:
+    """Features that the data of a condition give."""
+    number = len(condition.values)
+    return np.flatnonzero(np.isfinite(condition.values).sum(axis=0) >= max(min(2, number), number / 2))
+
+
+def _readable(lessons: Lessons, c: int) -> npt.NDArray[np.bool_]:
+    """Which features the base model's pours give."""
+    base = lessons.blocks[c][lessons.way == -1]
     # A pour that broke off says nothing of a feature.
     ended = np.isfinite(base).any(axis=1)
-    return np.flatnonzero(there & (np.isfinite(base[ended]).mean(axis=0) >= READABLE))
+    return np.asarray(np.isfinite(base[ended]).mean(axis=0) >= READABLE)
 
 
 def _complete(lessons: Lessons) -> Lessons:

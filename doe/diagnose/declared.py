@@ -140,10 +140,11 @@ def widest(name: str, scenes: Sequence[Scene]) -> Effect:
     return Effect(name, low, high)
 
 
-def effect_values(effect: str, amplitude: Sequence[float]) -> dict[str, float]:
-    """Parameter path → value of an effect's amplitudes."""
-    names = EFFECTS[effect].amplitudes
-    return {f"effect.{effect}.{name}": one for name, one in zip(names, amplitude, strict=True)}
+def effect_values(effect: str, amplitude: Sequence[float], turned: bool = False) -> dict[str, float]:
+    """Parameter path → value of an effect's amplitudes; ``turned``: in a rig that is turned by 180° on its bench."""
+    kind = EFFECTS[effect]
+    sign = -1.0 if turned and kind.on_bench else 1.0
+    return {f"effect.{effect}.{name}": sign * one for name, one in zip(kind.amplitudes, amplitude, strict=True)}
 
 
 def _possible(scene: Scene, name: str, amplitude: tuple[float, ...]) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from doe.diagnose.budget import Budget
 from doe.diagnose.compared import Compared, measured, weighed
-from doe.diagnose.confirm import Confirmed, HeldOut, HeldOutData, Model, confirm, held_out, model_of
+from doe.diagnose.confirm import Confirmed, HeldOut, HeldOutData, confirm, held_out, model_of
 from doe.diagnose.declared import Declared, declare
 from doe.diagnose.holdout import HoldoutCondition, HoldoutError, holdout_errors
 from doe.diagnose.levels import Level
@@ -28,6 +28,8 @@ from doe.runner import Pours
 from doe.store import Store
 
 FloatArray = npt.NDArray[np.float64]
+PoursAt = Callable[[Sequence[Condition], int | None], ModelPours]
+"""Pours of the declared model in conditions, of a place in the data where they may be added to it."""
 
 FRESH = 8
 """Pours per model and condition in the confirmation, or as many as there are replicates if that is more."""
@@ -111,8 +113,11 @@ def run_diagnosis(
     if follow_up is not None:
         declared, measurement = joined(declared, measurement, follow_up)
     root = ROOT if seed == 0 else FIRST_OTHER_ROOT + seed
-    model = ModelPours(measurement.fit, paths, store, pours, on_pour, root)
-    everywhere = ModelPours(measurement.conditions, paths, store, pours, on_pour, root)
+
+    def pours_in(conditions: Sequence[Condition], place: int | None = None) -> ModelPours:
+        return ModelPours(conditions, paths, store, pours, on_pour, root, place)
+
+    model, everywhere = pours_in(measurement.fit), pours_in(measurement.conditions)
     teacher = Teacher(declared, measurement.fit, model, budget, say)
     compared = pursued(teacher, measurement.fit, budget, say, library)
     taught = teacher.lessons().way
@@ -121,11 +126,9 @@ def run_diagnosis(
     )
     say(f"verdict: {verdict.kind}")
     confirmed, verdict = concluded(verdict, compared, declared, measurement.conditions, everywhere, say)
-    menu = (
-        Menu((), 0)
-        if follow_up
-        else suggested(verdict, compared.posterior, declared, measurement.fit[0], paths, store, pours, on_pour)
-    )
+    menu = Menu((), 0)
+    if follow_up is None:
+        menu = suggested(verdict, compared.posterior, teacher, measurement.fit, pours_in)
     return Diagnosis(
         declared=declared,
         conditions=measurement.conditions,
@@ -226,23 +229,18 @@ def odds(found: Posterior) -> str:
 
 
 def suggested(
-    verdict: Verdict,
-    found: Posterior,
-    declared: Declared,
-    condition: Condition,
-    paths: Sequence[str],
-    store: Store,
-    pours: Pours,
-    on_pour: OnPour | None,
+    verdict: Verdict, found: Posterior, teacher: Teacher, conditions: Sequence[Condition], pours_in: PoursAt
 ) -> Menu:
-    """What to measure next; empty unless the verdict is ambiguous."""
+    """What to measure next: the first of the fitted ``conditions`` changed; nothing unless the verdict is ambiguous."""
     if not verdict.kind.startswith("ambiguous"):
         return Menu((), 0)
     weights = {label: found.effects[label] for label in verdict.names[:MOST_RIVALS]}
     if NO_EFFECT in verdict.kind or len(weights) < 2:
         weights["base"] = found.nothing
-    rivals: dict[str, Model] = {label: model_of(found.fits[label], declared) for label in weights}
-    return next_experiment(rivals, weights, condition, paths, store, pours, on_pour)
+    menu = next_experiment(teacher, found, weights, conditions[0], lambda set_ups: pours_in(set_ups, len(conditions)))
+    # It is chosen for the likeliest answers; all that are left are weighed by what it gives.
+    left = (*verdict.names, *(label for label in weights if label == "base"))
+    return Menu(tuple(replace(one, rivals=left) for one in menu.suggestions), menu.run_now)
 
 
 def offered(condition: Condition, c: int, compared: Compared) -> Offered:

@@ -1,43 +1,65 @@
-"""What to measure next: the feasible changes of the rig, each poured with every model that is still in the race."""
+"""What to measure next: the feasible changes of the rig, each poured with every answer that is left.
+
+The pours are those that teach the models (``teaching.py``), made in the changed rig, so that data sets of one declared
+model share them, and those of the chosen set-up serve again when its data are weighed. In each set-up a regression of
+its own says what every answer predicts at its best fit, in all features that the data offer; what fit, regression and
+the axis of a scan leave open is in the covariance.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import numpy.typing as npt
 
-from doe.diagnose.confirm import Model, confirm
+from doe.diagnose.compared import usable
+from doe.diagnose.emulator import Emulator, Lessons, emulated, planar_weights
 from doe.diagnose.next_experiment import MenuItem, Prediction, RankedExperiment, rank_experiments
-from doe.diagnose.pours import ModelPours, OnPour
+from doe.diagnose.points import AS_IT_IS
+from doe.diagnose.posterior import Posterior
+from doe.diagnose.pours import ModelPours
+from doe.diagnose.teaching import Teacher, acting
+from doe.errors import StatisticsError
+from doe.measurement.condition_table import turned
+from doe.measurement.features import feature_set, offer_of
 from doe.measurement.measurement import Condition
-from doe.measurement.summaries import summary_names
 from doe.record import Record
-from doe.runner import Pours
-from doe.store import Store
 from solver import EFFECTS, ParameterError, Scene, parameters, value, with_values
 
-POURS = 4
-"""Per model and set-up of the menu."""
-PLANNED = 6
-"""Pours that are asked of the laboratory."""
+FloatArray = npt.NDArray[np.float64]
+PoursIn = Callable[[Sequence[Condition]], ModelPours]
+
+BASE_POURS, POURS = 12, 4
+"""Pours of the base model, and of every direction of an effect that is left, in each set-up of the menu."""
+PLANNED = (6, 12)
+"""Pours that may be asked of the laboratory."""
+LIKELY = 0.8
+"""Chance of an answer from which on the fewer pours will do."""
+INTERVAL = 2.0 * 1.96
+"""Standard deviations in a 95 % interval."""
 
 
 @dataclass(frozen=True)
 class Change(Record):
     """A change of the first fitted condition that a laboratory can make in minutes.
 
-    ``factors`` multiply its parameters, ``choices`` replace settings.
+    ``factors`` multiply its parameters, ``choices`` replace settings. What a turned rig tells needs a direction.
     """
 
     name: str
     factors: Mapping[str, float] = field(default_factory=dict)
     choices: Mapping[str, str] = field(default_factory=dict)
+    turned: bool = False
+    """Whether the rig is turned by 180° on its bench."""
 
 
 CHANGES = (
     Change("as it is, poured again"),
+    Change("rig turned by 180° on its bench", turned=True),
     Change("half the mass", {"rig.mass": 0.5}),
     Change("half as much mass again", {"rig.mass": 1.5}),
     Change("outlet at 0.6 times the height", {"rig.outlet_height": 0.6}),
@@ -70,6 +92,8 @@ class Suggestion(Record):
         By their nature: what reveals each of the rivals' effects.
     pours
         That it asks for.
+    turned
+        Whether the rig is turned by 180° on its bench.
     """
 
     experiment: RankedExperiment
@@ -77,7 +101,12 @@ class Suggestion(Record):
     condition: str
     rivals: tuple[str, ...]
     levers: tuple[str, ...]
-    pours: int = PLANNED
+    pours: int
+    turned: bool = False
+
+    def set_up(self, condition: Condition) -> Condition:
+        """``condition`` with the change, under its name."""
+        return changed(condition, Change(self.experiment.name, turned=self.turned), self.values)
 
 
 @dataclass(frozen=True)
@@ -89,53 +118,131 @@ class Menu:
 
 
 def next_experiment(
-    rivals: Mapping[str, Model],
-    weights: Mapping[str, float],
-    condition: Condition,
-    paths: Sequence[str],
-    store: Store,
-    pours: Pours,
-    on_pour: OnPour | None,
+    teacher: Teacher, found: Posterior, weights: Mapping[str, float], condition: Condition, pours_in: PoursIn
 ) -> Menu:
-    """The menu for telling ``rivals`` of probabilities ``weights`` apart, the most discriminating first.
+    """The menu for telling answers apart, the most discriminating set-up first.
 
-    Empty with fewer than two of them.
+    Parameters
+    ----------
+    teacher, found
+        What taught the models, and the posterior that leaves them.
+    weights
+        Probability of every answer that is left, "base" for nothing missing; empty menu with fewer than two.
+    condition
+        The fitted condition that is changed.
+    pours_in
+        The pours of the declared model in set-ups.
     """
-    if len(rivals) < 2:
+    if len(weights) < 2:
         return Menu((), 0)
-    set_ups = [
-        replace(condition, name=change.name, scene=with_values(condition.scene, dict(values)))
-        for change, values in feasible(condition.scene)
-    ]
-    # All set-ups at once, so that no core waits for the last pour of one of them.
-    model, widths = ModelPours(set_ups, paths, store, pours, on_pour), [len(summary_names(one)) for one in set_ups]
-    poured = confirm(tuple(rivals.values()), model, POURS, widths)
-    blocks = {label: one.blocks for label, one in zip(rivals, poured, strict=True)}
+    changes = {change.name: (change, values) for change, values in feasible(condition.scene)}
+    set_ups = [changed(condition, change, values) for change, values in changes.values()]
+    model = pours_in(set_ups)
+    probes = teacher.base(BASE_POURS) + teacher.probes(found, tuple(weights), POURS)
+    # All set-ups at once, so that no core waits for the last pour of one of them; what is only looked at after that.
+    plain = dict.fromkeys(probe.point.seen(AS_IT_IS) for probe in probes)
+    model.run("what to measure next", list(plain))
+    rows = model.run("what to measure next", [probe.point for probe in probes])
     items = []
-    for k, set_up in enumerate(set_ups):
-        found = {label: block[k] for label, block in blocks.items()}
-        if min(len(block) for block in found.values()) < POURS // 2:
-            continue  # a set-up that jams tells nothing
-        spread = np.mean([np.atleast_2d(np.cov(block, rowvar=False)) for block in found.values()], axis=0)
-        varies = np.diag(spread) > 0.0
-        # Few pours: half of the way to the diagonal.
-        pour = 0.5 * (spread + np.diag(np.diag(spread)))[np.ix_(varies, varies)]
-        items.append(
-            MenuItem(
-                set_up.name,
-                {label: Prediction(b.mean(axis=0)[varies], pour / len(b)) for label, b in found.items()},
-                pour,
-            )
-        )
+    for c, set_up in enumerate(set_ups):
+        lessons = teacher.told(probes, [[row[c]] for row in rows])
+        with suppress(StatisticsError):  # a set-up that jams tells nothing
+            items.append(_item(teacher, found, tuple(weights), lessons, model, c, set_up))
     if not items:
         return Menu((), model.run_now)
-    asked = dict.fromkeys(name for rival in rivals.values() for name, _ in rival.effects)
+    asked = dict.fromkeys(name for label in weights if label != "base" for name in label.split("+"))
     levers = tuple(f"{name}: {EFFECTS[name].lever}" for name in asked)
-    changed = {change.name: values for change, values in feasible(condition.scene)}
-    ranked = rank_experiments(items, weights, PLANNED)
-    names = tuple(rivals)
-    suggestions = [Suggestion(one, changed[one.name], condition.name, names, levers) for one in ranked]
+    for planned in PLANNED:
+        ranked = rank_experiments(items, weights, planned)
+        if ranked[0].chance >= LIKELY:
+            break
+    suggestions = [
+        Suggestion(one, values, condition.name, tuple(weights), levers, planned, change.turned)
+        for one in ranked
+        for change, values in (changes[one.name],)
+    ]
     return Menu(tuple(suggestions), model.run_now)
+
+
+def _item(
+    teacher: Teacher,
+    found: Posterior,
+    labels: Sequence[str],
+    lessons: Lessons,
+    pours: ModelPours,
+    c: int,
+    set_up: Condition,
+) -> MenuItem:
+    """What every answer predicts in a set-up, whitened by a regression of its own.
+
+    Raises StatisticsError where an answer has too few pours that ended.
+    """
+    offered = feature_set(set_up).offered(offer_of(set_up))
+    taught, (columns,) = usable(lessons, [np.arange(offered)])
+    used = sorted(set(taught.way[taught.way >= 0].tolist()))
+    if missing := set(lessons.way.tolist()) - {-1, *used}:
+        raise StatisticsError(f"{teacher.ways[missing.pop()].name}: no pour of it ended")
+    taught = replace(taught, way=np.array([used.index(way) if way >= 0 else -1 for way in taught.way]))
+    emulator = emulated(taught, [teacher.ways[way] for way in used])
+    # The axis of a scan is off in the new pours as well.
+    shared = np.zeros((len(columns), 0))
+    axis_error = max((one.axis_error for one in set_up.surfaces.values()), default=0.0)
+    if axis_error > 0.0:
+        axis = teacher.axis_in(pours, c, len(feature_set(set_up).scalars), axis_error)[:, columns]
+        slope = emulator.squashes[0].slope(emulator.squashes[0].centre)
+        shared = emulator.whitening @ (axis * slope).T
+    predictions = {}
+    for label in labels:
+        rows = _rows(emulator, teacher, found, label)
+        fit = found.fits[label]
+        (mean, *beside), variance = emulator.at(rows)
+        loose = np.array([one - mean for one in beside]).reshape(-1, len(mean))
+        slopes = emulator.slopes
+        covariance = np.diag(variance[0] + emulator.slope_variance) + slopes @ fit.theta_covariance @ slopes.T
+        covariance += loose.T @ loose + shared @ shared.T
+        predictions[label] = Prediction(mean + slopes @ fit.theta, covariance)
+    return MenuItem(set_up.name, predictions, np.eye(len(columns)))
+
+
+def _rows(emulator: Emulator, teacher: Teacher, found: Posterior, label: str) -> FloatArray:
+    """Rows of the regression: at the best fit of ``label``, and with each amplitude a standard deviation beside it."""
+    base, here = emulator.row(), emulator.row()
+    beside = []
+    number = {way.name: k for k, way in enumerate(emulator.ways)}
+    for way, amplitude in acting(found, label, teacher.ways):
+        effect = teacher.ways[way].effect
+        size = math.hypot(*teacher.ways[way].unit)
+        own = [one for one in found.fits[label].amplitudes if one.effect == effect]
+        spread = [(one.high - one.low) / INTERVAL / size for one in own]
+        if len(own) == 1:
+            acts = {number[teacher.ways[way].name]: 1.0}
+            first, *others = (
+                emulator.weighted_row([(acts, a)]) - base for a in (amplitude, amplitude + min(spread[0], amplitude))
+            )
+        else:
+            planar = {one.angle: k for k, one in enumerate(emulator.ways) if one.effect == effect}
+            x, y = (one.value / size for one in own)
+            first, *others = (
+                emulator.weighted_row(
+                    [({planar[a]: w for a, w in planar_weights(math.atan2(q, p)).items()}, math.hypot(p, q))]
+                )
+                - base
+                for p, q in ((x, y), (x + spread[0], y), (x, y + spread[1]))
+            )
+        here = here + first
+        beside += [one - first for one in others]
+    return np.array([here, *(here + one for one in beside)])
+
+
+def changed(condition: Condition, change: Change, values: Mapping[str, float | str]) -> Condition:
+    """``condition`` with ``change``, under its name, where that sets ``values``."""
+    scene = turned(condition.scene) if change.turned else condition.scene
+    return replace(
+        condition,
+        name=change.name,
+        scene=with_values(scene, dict(values)),
+        turned=condition.turned != change.turned,
+    )
 
 
 def feasible(scene: Scene) -> list[tuple[Change, dict[str, float | str]]]:

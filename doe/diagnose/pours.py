@@ -115,8 +115,13 @@ class ModelPours:
         pours: Pours,
         on_pour: OnPour | None = None,
         root: int = ROOT,
+        place: int | None = None,
     ) -> None:
+        """``place``: of all ``conditions`` in the data that they are possible additions to, for their seeds; else each
+        has its own.
+        """
         self._conditions, self._paths, self._store = tuple(conditions), tuple(paths), store
+        self._places = [c if place is None else place for c in range(len(conditions))]
         self._pours, self._on_pour, self._root = pours, on_pour, root
         self._known: dict[Place, Pour] = {}
         self._keys: dict[Place, str] = {}
@@ -185,12 +190,12 @@ class ModelPours:
         """The scene of ``point`` in a condition."""
         values: dict[str, float | str] = dict(zip(self._paths, point.theta, strict=True))
         for effect, amplitude in point.effects:
-            values |= effect_values(effect, amplitude)
+            values |= effect_values(effect, amplitude, self._conditions[condition].turned)
         return with_values(self._conditions[condition].scene, values)
 
     def seed(self, point: Point, condition: int) -> int:
         """Seed of the pour of ``point`` in a condition."""
-        return seed_of(self._root, point.sequence, point.number, condition, 0)
+        return seed_of(self._root, point.sequence, point.number, self._places[condition], 0)
 
     def _possible(self, points: Sequence[Point], where: Sequence[int]) -> list[Scene]:
         """Scenes of ``points``, less those that there cannot be."""

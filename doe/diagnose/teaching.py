@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -20,11 +20,11 @@ from doe.diagnose.declared import Declared
 from doe.diagnose.emulator import Lessons, Way
 from doe.diagnose.levels import Level, Trials, level_of
 from doe.diagnose.points import AS_IT_IS, Direction, Point, View, base_points, directions_of, effect_points
-from doe.diagnose.posterior import Posterior
+from doe.diagnose.posterior import LEAST, Posterior
 from doe.diagnose.pours import ModelPours, Pour
 from doe.errors import StatisticsError
 from doe.measurement.measurement import Condition
-from doe.measurement.sight import PERFECT
+from doe.measurement.sight import PERFECT, Sight
 from solver import Scene, pour_rig
 
 FloatArray = npt.NDArray[np.float64]
@@ -43,6 +43,15 @@ FURTHER, FOLLOWED = 5.0, 3
 was poured, and how many of these at once: what is strong looks like nothing that was poured."""
 BEHIND = 4.0
 """Log evidence by which a direction may be behind the best one of its effect and be in question with it."""
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A pour that teaches: of way ``way`` at a multiple of its level, or of the base model (−1, 0)."""
+
+    point: Point
+    way: int
+    multiple: float
 
 
 class Teacher:
@@ -123,40 +132,55 @@ class Teacher:
 
     def lessons(self) -> Lessons:
         """All pours, NaN where one broke off or a feature could not be read."""
-        points = list(self._rows)
-        blocks = []
-        for c in range(len(self._conditions)):
-            rows = [self._rows[point][c] for point in points]
-            block = np.array([(*row.summaries, *row.surface) for row in rows], dtype=np.float64)
-            block[[not row.valid for row in rows]] = np.nan
-            blocks.append(block)
-        way, amplitude = zip(*(self._acting[point] for point in points), strict=True)
-        return Lessons(
-            np.array([self._declared.theta(point.theta) for point in points]).reshape(len(points), -1),
-            np.array(way, dtype=np.int64),
-            np.array(amplitude, dtype=np.float64),
-            np.array([point.view == AS_IT_IS for point in points]),
-            tuple(blocks),
-        )
+        probes = [Probe(point, *self._acting[point]) for point in self._rows]
+        return self.told(probes, list(self._rows.values()))
 
     def instruments(self, conditions: Sequence[Measured]) -> list[Instrument]:
         """By condition what its scanner does to the base model's pours; empty where every sight and axis is perfect."""
         if all(one.sight == PERFECT and one.axis_error == 0.0 for one in conditions):
             return []
-        found = []
-        for c, one in enumerate(conditions):
-            points = base_points(self._declared, SHIFTED)
-            shifts = ((one.axis_error, 0.0), (0.0, one.axis_error))
-            views = [AS_IT_IS, View(sight=one.sight), *(View(shift=shift) for shift in shifts)]
-            seen = self._pours.run("scanner", [p.seen(v) for v in views for p in points], [c])
-            rows = np.array([(*row.summaries, *row.surface) for (row,) in seen]).reshape(len(views), len(points), -1)
-            change = rows[1:] - rows[0]
-            # Numbers of the table come from other instruments.
-            change[:, :, : one.scalars] = 0.0
-            ended = np.isfinite(change).all(axis=(0, 2))
-            bias, *axis = change[:, ended].mean(axis=1)
-            found.append(Instrument(bias, np.array(axis)))
-        return found
+        return [
+            _instrument(self._declared, self._pours, c, one.scalars, one.axis_error, one.sight)
+            for c, one in enumerate(conditions)
+        ]
+
+    def axis_in(self, pours: ModelPours, c: int, scalars: int, error: float) -> FloatArray:
+        """What a scan's axis that is ``error`` [m] off along x and y does in condition ``c`` of ``pours``, (2, d)."""
+        return _instrument(self._declared, pours, c, scalars, error).axis
+
+    def probes(self, found: Posterior, labels: Sequence[str], number: int) -> list[Probe]:
+        """``number`` pours of each effect of ``labels``, as they teach it, near its best fit in ``found``."""
+        wanted: dict[tuple[int, float], None] = {}
+        for label in labels:
+            for way, multiple in acting(found, label, self.ways):
+                nearest = min(2.0 ** round(math.log2(multiple)), self.ways[way].most)
+                # One that is poured in all directions of the plane needs them all.
+                same = self._all_of(way) if self.ways[way].angle is not None else [way]
+                wanted |= {(one, nearest): None for one in same}
+        return [
+            Probe(point, way, multiple)
+            for way, multiple in wanted
+            for point in self._points(self._directions[way], min(1.0, multiple * self._levels[way].share), number)
+        ]
+
+    def base(self, number: int) -> list[Probe]:
+        """``number`` pours of the base model, as they teach it."""
+        return [Probe(point, -1, 0.0) for point in base_points(self._declared, number)]
+
+    def told(self, probes: Sequence[Probe], rows: Sequence[Sequence[Pour]]) -> Lessons:
+        """What pours of ``probes``, one per condition each, teach; NaN where one broke off or could not be read."""
+        blocks = []
+        for pours in zip(*rows, strict=True):
+            block = np.array([(*pour.summaries, *pour.surface) for pour in pours], dtype=np.float64)
+            block[[not pour.valid for pour in pours]] = np.nan
+            blocks.append(block)
+        return Lessons(
+            np.array([self._declared.theta(probe.point.theta) for probe in probes]).reshape(len(probes), -1),
+            np.array([probe.way for probe in probes], dtype=np.int64),
+            np.array([probe.multiple for probe in probes], dtype=np.float64),
+            np.array([probe.point.view == AS_IT_IS for probe in probes]),
+            tuple(blocks),
+        )
 
     def _found_levels(self) -> list[Level]:
         """The level of every direction; one for all directions in the plane."""
@@ -204,14 +228,17 @@ class Teacher:
         asked: list[tuple[int, float, list[Point]]] = []
         for way, multiple, number in wanted:
             angle = self.ways[way].angle
-            same = [w for w, one in enumerate(self.ways) if one.effect == self.ways[way].effect]
-            for w in [way] if angle is None else same:
+            for w in [way] if angle is None else self._all_of(way):
                 share = min(1.0, multiple * self._levels[w].share)
                 asked.append((w, share / self._levels[w].share, self._points(self._directions[w], share, number)))
         plain = dict.fromkeys(point.seen(AS_IT_IS) for _, _, points in asked for point in points)
         self._pours.run(what, list(plain))
         for way, multiple, points in asked:
             self._keep(points, self._pours.run(what, points), way, multiple)
+
+    def _all_of(self, way: int) -> list[int]:
+        """Ways of the effect of ``way``."""
+        return [number for number, one in enumerate(self.ways) if one.effect == self.ways[way].effect]
 
     def _keep(self, points: Sequence[Point], rows: Sequence[list[Pour]], way: int, multiple: float) -> None:
         for point, row in zip(points, rows, strict=True):
@@ -250,6 +277,43 @@ class Teacher:
 
     def _reached(self, way: int) -> float:
         return max(multiple for one, multiple in self._acting.values() if one == way)
+
+
+def acting(found: Posterior, label: str, ways: Sequence[Way]) -> list[tuple[int, float]]:
+    """Ways and multiples of their reference amplitudes at which the effects of ``label`` fit best; of an effect with a
+    direction in the plane its first way, whatever its direction. None of "base".
+    """
+    places = []
+    for name in label.split("+"):
+        own = [level for level in found.levels if ways[level.way].effect == name]
+        if not own:
+            continue
+        best = max(own, key=lambda one: one.log_density)
+        way, amplitude = best.way, best.amplitude
+        if "+" in label:
+            # Beside another effect it may be of another size and sign.
+            values = [one.value for one in found.fits[label].amplitudes if one.effect == name]
+            way = next((one.way for one in own if ways[one.way].unit[0] * values[0] > 0.0), way)
+            amplitude = max(LEAST, math.hypot(*values) / math.hypot(*ways[way].unit))
+        places.append((way, amplitude))
+    return places
+
+
+def _instrument(
+    declared: Declared, pours: ModelPours, c: int, scalars: int, axis_error: float, sight: Sight = PERFECT
+) -> Instrument:
+    """What a scanner does to the base model's pours in condition ``c`` of ``pours``; not to the ``scalars``."""
+    points = base_points(declared, SHIFTED)
+    shifts = ((axis_error, 0.0), (0.0, axis_error))
+    views = [AS_IT_IS, View(sight=sight), *(View(shift=shift) for shift in shifts)]
+    seen = pours.run("scanner", [p.seen(v) for v in views for p in points], [c])
+    rows = np.array([(*row.summaries, *row.surface) for (row,) in seen]).reshape(len(views), len(points), -1)
+    change = rows[1:] - rows[0]
+    # Numbers of the table come from other instruments.
+    change[:, :, :scalars] = 0.0
+    ended = np.isfinite(change).all(axis=(0, 2))
+    bias, *axis = change[:, ended].mean(axis=1)
+    return Instrument(bias, np.array(axis))
 
 
 def _turns(scene: Scene) -> bool:

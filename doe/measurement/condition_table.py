@@ -3,6 +3,7 @@
 name, role, rig, data              role: fit (calibrated against) or holdout (only predicted)
 images                             photographs of its piles (`photographs`)
 mean_of                            every value of the table is the mean of so many pours (1 where it is not stated)
+turned                             true: the rig stood turned by 180° on its bench, and so did all that is read off it
 [condition.rig_parameters]         last parts of the rig's parameter paths
 [condition.insertion]              protocol, rate, region_radius, region_z, velocity, batch_interval, duration;
                                    region = "cylinder", orientation = "random": the only ones there are
@@ -23,9 +24,33 @@ from typing import Any
 from doe.errors import MeasurementError
 from doe.measurement.measurement import MeasuredParameter
 from doe.study_table import Table, number, one_of, only, section
-from solver import Scene, canonical, parameters, parse_quantity, pour_rig, value, with_rig, with_settings
+from solver import (
+    EFFECTS,
+    Scene,
+    canonical,
+    parameters,
+    parse_quantity,
+    pour_rig,
+    value,
+    with_rig,
+    with_settings,
+    with_values,
+)
 
-KEYS = ("name", "role", "rig", "data", "rig_parameters", "insertion", "domain", "duration", "images", "mean_of", "scan")
+KEYS = (
+    "name",
+    "role",
+    "rig",
+    "data",
+    "rig_parameters",
+    "insertion",
+    "domain",
+    "duration",
+    "images",
+    "mean_of",
+    "scan",
+    "turned",
+)
 INSERTION = (
     "protocol",
     "rate",
@@ -69,7 +94,22 @@ def condition_scene(base: Scene, entry: Table, measured: Sequence[MeasuredParame
     insertion = section(entry, "insertion")
     scene = with_settings(bare, settings | _insertion(insertion) | _duration(entry, insertion, bare))
     _check_feed(scene, insertion)
-    return scene
+    return turned(scene) if is_turned(entry) else scene
+
+
+def is_turned(entry: Table) -> bool:
+    """Whether the rig of a condition stood turned by 180° on its bench."""
+    given = entry.get("turned", False)
+    if not isinstance(given, bool):
+        raise MeasurementError(f"turned: {given!r}; allowed: true or false")
+    return given
+
+
+def turned(scene: Scene) -> Scene:
+    """``scene`` with its rig turned by 180° on the bench: what stays with the bench acts the other way in its frame."""
+    paths = [f"effect.{name}.{one}" for name, kind in EFFECTS.items() if kind.on_bench for one in kind.amplitudes]
+    found = {path: float(value(scene, path)) for path in paths}
+    return with_values(scene, {path: -amplitude for path, amplitude in found.items() if amplitude != 0.0})
 
 
 def _start(parameter: MeasuredParameter, declared: float) -> float:

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from doe.errors import MeasurementError, StudyFileError
 from doe.measurement.condition_table import KEYS as CONDITION_KEYS
-from doe.measurement.condition_table import condition_scene, in_rig
+from doe.measurement.condition_table import condition_scene, in_rig, is_turned
 from doe.measurement.feasible import narrowed
 from doe.measurement.measurement import Condition, CrossCheck, MeasuredParameter, Measurement, Role
 from doe.measurement.observations import read_observations
@@ -82,7 +82,9 @@ def _read(folder: Path, table: Table) -> Measurement:
             raise MeasurementError(
                 f"{scans[name][last]}: replicate {last}; allowed: 1 to {replicates}, as in the table"
             )
-        conditions.append(Condition(name, entry["role"], scene, replicates, observations, mean_of, surfaces))
+        conditions.append(
+            Condition(name, entry["role"], scene, replicates, observations, mean_of, surfaces, is_turned(entry))
+        )
         checks += checked
         ignored += unused
         ignored += [f"condition {name}: images: {line}" for line in unread]

@@ -59,6 +59,8 @@ class Condition:
     """Pours behind each listed value: more than one where only their mean was published."""
     surfaces: Mapping[int, UpperSurface] = field(default_factory=dict)
     """Upper surfaces of the piles by replicate, from 1 on."""
+    turned: bool = False
+    """Whether the rig stood turned by 180° on its bench. Positions are those in the rig's own frame."""
 
     @property
     def offered(self) -> dict[str, Observation]:

@@ -23,7 +23,6 @@ from doe.validation.schedule import Case
 from doe.validation.sets import NONE, OUT_OF_REACH, Row
 from doe.validation.truth import REPLICATES, ROOT, Strengths, Truth, truth_of
 from doe.validation.work_place import Order, WorkPlace, complete
-from solver import with_values
 
 TRIES = 3
 """Times that a laboratory pours ``REPLICATES`` more to replace pours that jammed."""
@@ -113,9 +112,7 @@ class Answers:
         found = compared.posterior
         suggestion = None
         if self.follow_up and follow_up is None:
-            paths = [parameter.path for parameter in measurement.parameters]
-            clock, place = self.place.look_at_the_clock, self.place
-            menu = suggested(verdict, found, declared, measurement.fit[0], paths, place.store, place.pours, clock)
+            menu = suggested(verdict, found, teacher, measurement.fit, self.model_pours)
             suggestion = next(iter(menu.suggestions), None)
         best, best_p = found.best
         label = label_of(truth)
@@ -156,8 +153,8 @@ class Answers:
         """What the laboratory measures in the set-up that it is asked for; None where its pours keep breaking off."""
         place = next(c for c, one in enumerate(self.measurement.conditions) if one.name == asked.condition)
         condition = self.measurement.conditions[place]
-        changed = replace(condition, scene=with_values(condition.scene, dict(asked.values)))
-        data = self.measured(truth, [changed], f" next {asked.experiment.name}")
+        changed = replace(asked.set_up(condition), name=condition.name)
+        data = self.measured(truth, [changed], f" next {asked.experiment.name}", asked.pours)
         if data is None:
             return None
         with TemporaryDirectory() as folder:
@@ -165,22 +162,23 @@ class Answers:
             self.laboratory.hand_out(Path(folder), data, scanner, (ROOT, *truth.case.seed, 2))
             measurement = load_measurement(Path(folder))
         (read,) = measurement.fit
-        new = replace(read, name=asked.experiment.name, scene=with_values(read.scene, dict(asked.values)))
-        return FollowUp(replace(measurement, conditions=(new,)), asked.rivals)
+        return FollowUp(replace(measurement, conditions=(asked.set_up(read),)), asked.rivals)
 
-    def measured(self, truth: Truth, conditions: Sequence[Condition], occasion: str = "") -> Data | None:
-        """A laboratory's pours; None where there is no such truth, or pours keep breaking off.
+    def measured(
+        self, truth: Truth, conditions: Sequence[Condition], occasion: str = "", pours: int = REPLICATES
+    ) -> Data | None:
+        """A laboratory's ``pours`` in each condition; None where there is no such truth, or they keep breaking off.
 
         ``occasion``: another one has other seeds.
         """
         if truth.missing:
             return None
         for attempt in range(TRIES):
-            numbers = range(REPLICATES * (attempt + 1))
+            numbers = range(pours * (attempt + 1))
             orders = [order for c in conditions for order in self.orders(truth, c, numbers, occasion)]
             samples = iter(self.place.pour(orders, room_of(conditions)))
-            data = {c.name: complete(next(samples) for _ in numbers)[:REPLICATES] for c in conditions}
-            if all(len(one) == REPLICATES for one in data.values()):
+            data = {c.name: complete(next(samples) for _ in numbers)[:pours] for c in conditions}
+            if all(len(one) == pours for one in data.values()):
                 return data
         return None
 
@@ -200,11 +198,11 @@ class Answers:
         return Row(title, case.root, case.number, case.kind, label_of(truth), case.strength, amplitude_text(truth),
                    offer, verdict, "", "", NAN, NAN, "", NAN, NAN, {}, {}, NAN, NAN, NAN, 0, 0.0)  # fmt: skip
 
-    def model_pours(self, conditions: Sequence[Condition]) -> ModelPours:
+    def model_pours(self, conditions: Sequence[Condition], place: int | None = None) -> ModelPours:
         """Pours of the declared model, as a diagnosis makes them."""
         paths = [parameter.path for parameter in self.measurement.parameters]
         clock = self.place.look_at_the_clock
-        return ModelPours(conditions, paths, self.place.store, self.place.pours, clock)
+        return ModelPours(conditions, paths, self.place.store, self.place.pours, clock, place=place)
 
 
 def label_of(truth: Truth) -> str:

@@ -49,6 +49,8 @@ REACH = 0.02
 KICK = 1e-3
 """Interval [s] at which the attraction acts."""
 
+ON_BENCH = ("draught",)
+"""Those that act the other way in the frame of a rig that is turned by 180° on its bench."""
 POURED = ("sticky_funnel", "draught", "raised_funnel")
 """Those that need an outlet."""
 CLUMPS = ("breaking_bodies", "stray_spheres")

@@ -17,7 +17,7 @@ from doe.measurement import Condition, readings_of_record
 from doe.runner import stored_run
 from doe.store import Store
 from doe.validation.laboratory import Sample
-from doe.validation.outside import AMPLITUDE, OUTSIDE, magnified, outside_pour
+from doe.validation.outside import AMPLITUDE, ON_BENCH, OUTSIDE, magnified, outside_pour
 from solver import Crew, Job, Outcome, Record, Scene, begin_worker, pour_key, unpacked
 
 
@@ -35,9 +35,15 @@ class Order:
     outside: str = ""
 
     @property
+    def amount(self) -> float:
+        """By how much the outside effect acts."""
+        sign = -1.0 if self.condition.turned and self.outside in ON_BENCH else 1.0
+        return sign * AMPLITUDE[self.outside]
+
+    @property
     def variant(self) -> str:
         """What its pour has that its scene does not say."""
-        return f"{self.outside} {AMPLITUDE[self.outside]!r}, outside {OUTSIDE}" if self.outside else ""
+        return f"{self.outside} {self.amount!r}, outside {OUTSIDE}" if self.outside else ""
 
     @property
     def key(self) -> str:
@@ -95,7 +101,7 @@ class WorkPlace:
         for job, record in self.crew.run_queue(queue, scenes) if queue else ():
             self._keep(plain[job.tag], record)
         strange = [order for order in wanted if order.outside]
-        tasks = [(order.outside, order.scene, order.seed, AMPLITUDE[order.outside]) for order in strange]
+        tasks = [(order.outside, order.scene, order.seed, order.amount) for order in strange]
         for order, record in zip(strange, self.map(_outside, tasks), strict=True):
             self._keep(order, record)
         return [self._sample(order) for order in orders]

@@ -36,7 +36,7 @@ from explorer.files.whole_file import write_whole
 from explorer.report.diagnosis.findings import BASE, spelled
 from explorer.report.units_for_people import code, enumeration, number, parameter_label, parameter_value, percent
 from explorer.scene.text import toml_key, toml_value
-from solver import EFFECTS, Scene, named, parameters, parse_quantity, pour_rig, read_toml, value, with_values
+from solver import EFFECTS, Scene, named, parameters, parse_quantity, pour_rig, read_toml, value
 from solver.rigs.surface import Pose, Revolved
 
 ORDER, SCHEMA = "follow_up.json", 1
@@ -46,6 +46,7 @@ PROTOCOLS = {
     "pour_through": "the outlet open from the start",
     "fill_then_open": "filled with the outlet closed, left to settle, then opened",
 }
+TURNED_FRAME = "x and y of what is read off the pile, and the axes of scans, stay those of the plate and turn with it"
 DRAWN, EDGE, LEFT = 420.0, 40.0, 200.0
 """Height of the drawn rig, and what is free around it and to its left [px]."""
 INK, CHANGED = "#222222", "#c2410c"
@@ -80,7 +81,7 @@ def write_next(folder: Path, source: Path, measurement: Measurement, suggestion:
     condition = next(one for one in measurement.conditions if one.name == suggestion.condition)
     given = next(one for one in entries(table, "condition") if one["name"] == condition.name)
     name, change = _free_name(suggestion, measurement), suggestion.experiment.name
-    changed = with_values(condition.scene, dict(suggestion.values))
+    changed = suggestion.set_up(condition).scene
     entry = _changed_entry(given, name, measurement, suggestion, changed)
     title = f"{measurement.title or source.name}: follow-up, {change}"
     folder.mkdir(parents=True, exist_ok=True)
@@ -98,7 +99,7 @@ def write_next(folder: Path, source: Path, measurement: Measurement, suggestion:
         write_whole(folder / "setup.svg", drawing)
     write_whole(folder / "README.md", _readme(folder, source, measurement, suggestion, name))
     order = {"schema": SCHEMA, "rivals": suggestion.rivals, "change": change, "values": suggestion.values}
-    order |= {"condition": condition.name, "source": str(source.absolute())}
+    order |= {"turned": suggestion.turned, "condition": condition.name, "source": str(source.absolute())}
     write_whole(folder / ORDER, json.dumps(plain(order), ensure_ascii=False, indent=1) + "\n")
 
 
@@ -160,6 +161,8 @@ def _changed_entry(
 ) -> dict[str, Any]:
     entry = {key: item for key, item in given.items() if key not in DROPPED}
     entry |= {"name": name, "role": "fit", "data": f"{name}.csv"}
+    if suggestion.turned:
+        entry["turned"] = not entry.get("turned", False)
     rig, insertion = dict(section(given, "rig_parameters")), dict(section(given, "insertion"))
     calibrated = {parameter.path for parameter in measurement.parameters}
     for path, new in suggestion.values.items():
@@ -298,6 +301,8 @@ def _readme(folder: Path, source: Path, measurement: Measurement, suggestion: Su
     title = code(" ".join((measurement.title or source.name).split()))
     answers = enumeration([spelled(label) for label in suggestion.rivals])
     settings = [f"- {_setting(condition.scene, path, new)}" for path, new in suggestion.values.items()]
+    if suggestion.turned:
+        settings.append(f"- the whole rig, plate and funnel: **turned by 180° on its bench**; {TURNED_FRAME}")
     until = condition.scene.numerics.duration
     reading = f" Read each pile {number(until)} s after the first body entered, at rest or not." if until > 0.0 else ""
     drawing = " `setup.svg` shows it to scale, what changes in colour." if (folder / "setup.svg").is_file() else ""

@@ -62,6 +62,8 @@ class Effect:
     """The experiment that reveals it."""
     telltales: ClassVar[tuple[Telltale, ...]]
     """Observables that can reveal it; it stays hidden in data that hold none of them."""
+    on_bench: ClassVar[bool] = False
+    """Whether it stays with the bench where the rig is turned by 180° on it: its amplitudes change their sign then."""
 
     @property
     def on(self) -> bool:

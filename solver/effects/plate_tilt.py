@@ -25,7 +25,8 @@ class PlateTilt(SetUpEffect):
     amplitudes = ("tilt_x", "tilt_y")
     strongest = 5.0
     literature = "a bench that nobody levelled is off by 1–3°; 5° is seen by eye"
-    lever = "turn the plate by 180°; a spirit level"
+    lever = "turn the rig by 180° on its bench; a spirit level"
+    on_bench = True
     telltales = (Telltale.ASYMMETRY,)
 
     def applied(self, scene: Any) -> Any:

@@ -254,7 +254,7 @@ def suggestions(verdict):
     ranked = rank_experiments(menu, dict.fromkeys(rivals, 1.0), 6)
     levers = tuple(f"{name}: {EFFECTS[name].lever}" for name in verdict.names if name in EFFECTS)
     changes = {"rig.outlet_height": 0.12}
-    return tuple(Suggestion(one, changes, "fit", tuple(rivals), levers) for one in ranked)
+    return tuple(Suggestion(one, changes, "fit", tuple(rivals), levers, 6) for one in ranked)
 
 
 CASES = {

@@ -32,7 +32,8 @@ def measured():
 
 def suggestion(name, values, condition="fit", pours=3):
     experiment = RankedExperiment(name, 2.0, 4, 1.5, 0.83)
-    return Suggestion(experiment, values, condition, RIVALS, ("twisting: spin a single body",), pours)
+    turned = any(change.turned for change in CHANGES if change.name == name)
+    return Suggestion(experiment, values, condition, RIVALS, ("twisting: spin a single body",), pours, turned)
 
 
 def values_of(measurement, name):
@@ -64,6 +65,7 @@ def test_a_filled_folder_is_the_changed_set_up(tmp_path, measured, change):
     (condition,) = found.measurement.conditions
     assert replace(condition.scene, title="") == replace(with_values(fit.scene, dict(values)), title="")
     assert (condition.role, condition.replicates, condition.mean_of) == ("fit", 3, 1)
+    assert condition.turned == change.turned
     assert set(condition.offered) == set(fit.offered)
     assert all((condition.offered[name].x == o.x).all() for name, o in fit.offered.items() if o.x is not None)
     assert found.measurement.parameters == measured.parameters
@@ -102,6 +104,13 @@ def test_the_readme_says_how_to_set_a_speed_and_a_gate(tmp_path, measured):
     assert "filled with the outlet closed, left to settle, then opened" in (shut / "README.md").read_text()
 
 
+def test_the_readme_says_how_a_rig_is_turned(tmp_path, measured):
+    folder = written(tmp_path / "next", SOURCE, measured, "rig turned by 180° on its bench")
+    text = (folder / "README.md").read_text()
+    assert "the whole rig, plate and funnel: **turned by 180° on its bench**" in text
+    assert "turned = true" in (folder / "measurement.toml").read_text()
+
+
 def test_the_order_says_what_was_asked(tmp_path, measured):
     folder = written(tmp_path / "next", SOURCE, measured)
     assert json.loads((folder / "follow_up.json").read_text()) == {
@@ -109,6 +118,7 @@ def test_the_order_says_what_was_asked(tmp_path, measured):
         "rivals": list(RIVALS),
         "change": TWICE,
         "values": {"rig.outlet_height": 0.12},
+        "turned": False,
         "condition": "fit",
         "source": str(SOURCE.absolute()),
     }

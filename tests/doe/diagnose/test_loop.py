@@ -6,19 +6,22 @@ amplitudes shift six pours by 22 standard errors in each condition.
 
 import hashlib
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from doe.diagnose import diagnosis, menu
+from doe.diagnose import diagnosis
 from doe.diagnose.budget import LEAST, Budget, scaled_budget
 from doe.diagnose.compared import Measured
+from doe.diagnose.confirm import Model
 from doe.diagnose.declared import declare
 from doe.diagnose.levels import REPLICATES, whitened_shift
 from doe.diagnose.pours import Pour
 from doe.diagnose.teaching import Teacher
 from doe.errors import StatisticsError
 from doe.measurement import load_measurement, summary_names
+from doe.measurement.features import SCAN, feature_set
 from solver import EFFECTS
 from solver.assets import measurement_folder
 
@@ -66,7 +69,7 @@ class FormulaPours:
     formula = staticmethod(expected)
     declared = None
 
-    def __init__(self, conditions, paths, store, pours, on_pour=None, root=0):
+    def __init__(self, conditions, paths, store, pours, on_pour=None, root=0, place=None):
         self.conditions, self.paths, self.run_now = conditions, paths, 0
 
     def answered(self, what, searches, where=None, widest=()):
@@ -91,13 +94,14 @@ class FormulaPours:
         text = f"{point.sequence} {point.number} {numbers} {condition.name}"
         theta = self.declared.theta(point.theta)
         mean = self.formula(theta, acting(point), condition.name, width)
-        return Pour(tuple(mean + noise(text, width)), "measured")
+        # No surface can be read off a formula.
+        surface = (math.nan,) * (feature_set(condition).offered(SCAN) - width)
+        return Pour(tuple(mean + noise(text, width)), "measured", (), surface)
 
 
 @pytest.fixture
 def measurement(monkeypatch):
-    for module in (diagnosis, menu):
-        monkeypatch.setattr(module, "ModelPours", FormulaPours)
+    monkeypatch.setattr(diagnosis, "ModelPours", FormulaPours)
     found = load_measurement(measurement_folder("trefoil_1"))
     monkeypatch.setattr(FormulaPours, "declared", declare(found, NAMES))
     return found
@@ -289,7 +293,7 @@ def test_an_effect_whose_pours_mostly_break_off_is_weighed_by_the_others(measure
         def pour(self, point, condition):
             found = super().pour(point, condition)
             broken = point.effects and point.effects[0][0] == "air_drag" and point.number % 2
-            return Pour(found.summaries, "jammed") if broken else found
+            return replace(found, outcome="jammed") if broken else found
 
     monkeypatch.setattr(diagnosis, "ModelPours", Half)
     found, said = run(measurement, monkeypatch, (("rolling_resistance", (0.15,)),))
@@ -345,7 +349,7 @@ def test_the_box_is_three_deviations_about_a_measured_mean(measurement):
 
 def test_data_without_a_readable_replicate_have_no_error_row(measurement):
     widths = [len(summary_names(condition)) for condition in measurement.conditions]
-    model = diagnosis.Model((0.5,) * 3)
+    model = Model((0.5,) * 3)
     confirmed = diagnosis.Confirmed(model, tuple(np.zeros((0, width)) for width in widths), 12)
     conclusion = diagnosis.Conclusion(confirmed, confirmed, None)
     assert diagnosis.errors_of(measurement.conditions, "holdout", conclusion) == ()
