@@ -33,7 +33,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from doe.diagnose.ruler import shrunk_covariance
 from doe.errors import StatisticsError
 
 FloatArray = npt.NDArray[np.float64]
@@ -381,6 +380,20 @@ def _whitening(drawn_in: Sequence[FloatArray], own: Lessons, weights: Sequence[f
     several = np.bincount(group) > 1
     pours = int(several[group].sum())
     return white, max(1, pours - int(several.sum()) - own.theta.shape[1])
+
+
+def shrunk_covariance(residuals: FloatArray) -> FloatArray:
+    """Covariance of the rows (n, d), correlations shrunk to zero by λ* = Σ Var(r_ij) / Σ r_ij² over i ≠ j."""
+    n = len(residuals)
+    deviation = np.sqrt((residuals**2).mean(axis=0))
+    z = residuals / deviation
+    correlation = z.T @ z / n
+    scatter = ((z**2).T @ (z**2) / n - correlation**2) / (n - 1)
+    off = ~np.eye(z.shape[1], dtype=bool)
+    denominator = float((correlation[off] ** 2).sum())
+    share = min(1.0, float(scatter[off].sum()) / denominator) if denominator > 0.0 else 1.0
+    shrunk = np.where(off, (1.0 - share) * correlation, 1.0)
+    return np.asarray(shrunk * np.outer(deviation, deviation), dtype=np.float64)
 
 
 def _pooled_slopes(values: FloatArray, group: npt.NDArray[np.int64], theta: FloatArray) -> FloatArray:

@@ -9,6 +9,9 @@
     laboratory.py      reads such a file; pours → a folder of measured data, with scans or without
     answers.py         truths → folders → verdicts → rows
     sets.py rates.py   rows in sets.jsonl, what an answer is worth, rates and targets
+    reference.py       pours of every effect, many of each, that tell how strong it is
+    ruler.py limit.py  its strength in σ, and how often any method could name it
+    replay.py          the rule of the diagnosis on reference pours
     campaign.py        all of it, for ``explorer validate-diagnosis``
 
 The diagnosis is given the folder and nothing else: no truth, no label, no number.

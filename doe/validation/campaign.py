@@ -14,15 +14,15 @@ from pathlib import Path
 
 from doe.diagnose.budget import Budget
 from doe.diagnose.declared import declare
-from doe.diagnose.limit import limit_study
 from doe.diagnose.pours import ModelPours
-from doe.diagnose.reference import ROOT as REFERENCE_ROOT
-from doe.diagnose.reference import extended_to, kept
 from doe.measurement.features import SCALARS, feature_set
 from doe.store import Store, default_store
 from doe.validation.answers import Answers
 from doe.validation.laboratory import TREFOILS, Laboratory, read_laboratory
+from doe.validation.limit import limit_study
 from doe.validation.outside import AMPLITUDE, DEVELOPMENT, possible
+from doe.validation.reference import ROOT as REFERENCE_ROOT
+from doe.validation.reference import extended_to, kept
 from doe.validation.schedule import Case, cases
 from doe.validation.sets import Row, append_rows, read_rows
 from doe.validation.truth import Strengths, strengths_of

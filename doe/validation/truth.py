@@ -1,7 +1,7 @@
 """What is true of one made-up laboratory, drawn by its root and number: parameters within their measured uncertainty,
 and what acts that the declared model lacks.
 
-A truth's strength is that of the ruler (``doe/diagnose/ruler.py``), measured once by many reference pours of the model
+A truth's strength is that of the ruler (``ruler.py``), measured once by many reference pours of the model
 at an amplitude and at half of it: between and beyond them s = s₁ (a/a₁)^p, with p from the two.
 """
 
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from doe.diagnose.declared import Declared
-from doe.diagnose.limit import Reached
+from doe.validation.limit import Reached
 from doe.validation.schedule import Case
 
 REPLICATES = 6

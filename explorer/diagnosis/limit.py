@@ -12,16 +12,16 @@ import numpy as np
 
 from doe.diagnose.declared import Declared, declare
 from doe.diagnose.levels import REPLICATES
-from doe.diagnose.limit import RISK, RISKS, LimitStudy, confused, limit_study
 from doe.diagnose.pours import Ended, ModelPours
-from doe.diagnose.reference import ROOT, Reference, extended_to, kept
-from doe.diagnose.replay import BASE_POURS, NULLS, Replayed, Teaching, Truth, replay
-from doe.diagnose.ruler import Strength
 from doe.measurement import Measurement, load_measurement
 from doe.measurement.features import OFFERS, feature_set
 from doe.record import plain
 from doe.store import Store, default_store
 from doe.validation.laboratory import read_laboratory
+from doe.validation.limit import RISK, RISKS, LimitStudy, confused, limit_study
+from doe.validation.reference import ROOT, Reference, extended_to, kept
+from doe.validation.replay import BASE_POURS, NULLS, Replayed, Teaching, Truth, replay
+from doe.validation.ruler import Strength
 from explorer.files.run_folder import json_text
 from explorer.files.whole_file import write_whole
 from explorer.tables.text_table import text_table

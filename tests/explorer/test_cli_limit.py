@@ -7,10 +7,10 @@ import pytest
 
 from doe.diagnose.levels import Level
 from doe.diagnose.points import Direction
-from doe.diagnose.reference import Reference, Sample, save
 from doe.measurement.features import feature_set
 from doe.store import READINGS
 from doe.validation.laboratory import TREFOILS, read_laboratory
+from doe.validation.reference import Reference, Sample, save
 from solver import PHYSICS
 from tests.explorer.command_line import explorer
 

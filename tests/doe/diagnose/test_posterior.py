@@ -20,11 +20,11 @@ from doe.diagnose.emulator import (
     regression,
     signature_prior,
 )
-from doe.diagnose.limit import RISKS, Kind
 from doe.diagnose.posterior import BEYOND, NOTHING, OUTSIDE, PAIRS, SPREADS, Data, multiples, posterior
-from doe.diagnose.replay import NULLS, Teaching, Truth, replay
 from doe.errors import StatisticsError
-from tests.doe.diagnose.test_ruler import D, sample_of, unit
+from doe.validation.limit import RISKS, Kind
+from doe.validation.replay import NULLS, Teaching, Truth, replay
+from tests.doe.validation.test_ruler import D, sample_of, unit
 
 SIZE = 2 * D
 UNSQUASHED = Squash(np.zeros(D), np.full(D, 1e9))

@@ -12,13 +12,13 @@ import pytest
 
 from doe.diagnose.budget import Budget
 from doe.diagnose.declared import Declared, declare
-from doe.diagnose.limit import Kind, Reached
-from doe.diagnose.ruler import Strength
 from doe.measurement import load_measurement
 from doe.store import Store
 from doe.validation.answers import Answers
 from doe.validation.campaign import CampaignOrder, run_campaign
 from doe.validation.laboratory import read_laboratory
+from doe.validation.limit import Kind, Reached
+from doe.validation.ruler import Strength
 from doe.validation.schedule import Case
 from doe.validation.truth import strengths_of, truth_of
 from doe.validation.work_place import WorkPlace

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from doe.diagnose.declared import Condition, Declared, Effect, Parameter
-from doe.diagnose.limit import Kind, Reached
-from doe.diagnose.ruler import Strength
+from doe.validation.limit import Kind, Reached
+from doe.validation.ruler import Strength
 from doe.validation.schedule import Case
 from doe.validation.truth import strengths_of, truth_of
 

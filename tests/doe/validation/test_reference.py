@@ -9,7 +9,8 @@ from doe.diagnose.declared import Condition, Declared, Effect, Parameter
 from doe.diagnose.levels import Level
 from doe.diagnose.points import Direction
 from doe.diagnose.pours import Pour
-from doe.diagnose.reference import (
+from doe.errors import StatisticsError
+from doe.validation.reference import (
     PER_ROUND,
     Reference,
     extended,
@@ -18,7 +19,6 @@ from doe.diagnose.reference import (
     reference_directions,
     save,
 )
-from doe.errors import StatisticsError
 
 DECLARED = Declared(
     (Parameter("friction", 0.1, 0.9, 0.5, 0.05), Parameter("restitution", 0.2, 0.8)),

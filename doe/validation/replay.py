@@ -17,10 +17,10 @@ import numpy.typing as npt
 
 from doe.diagnose.emulator import Emulator, Lessons, Way, emulated
 from doe.diagnose.levels import REPLICATES
-from doe.diagnose.limit import RISKS, Kind
 from doe.diagnose.posterior import Data, Posterior, posterior
-from doe.diagnose.reference import SIDE, Blocks, Sample
 from doe.record import Record
+from doe.validation.limit import RISKS, Kind
+from doe.validation.reference import SIDE, Blocks, Sample
 
 FloatArray = npt.NDArray[np.float64]
 

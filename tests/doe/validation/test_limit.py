@@ -8,7 +8,9 @@ from scipy.stats import norm
 
 from doe.diagnose.declared import Condition, Declared, Effect, Parameter
 from doe.diagnose.levels import STRONG, Level, Trials, level_of
-from doe.diagnose.limit import (
+from doe.diagnose.points import Direction, base_points, effect_points
+from doe.diagnose.pours import Pour
+from doe.validation.limit import (
     RISK,
     RISKS,
     Kind,
@@ -19,10 +21,8 @@ from doe.diagnose.limit import (
     limit_study,
     nearest_correlation,
 )
-from doe.diagnose.points import Direction, base_points, effect_points
-from doe.diagnose.pours import Pour
-from doe.diagnose.ruler import Strength
-from tests.doe.diagnose.test_ruler import sample_of, unit
+from doe.validation.ruler import Strength
+from tests.doe.validation.test_ruler import sample_of, unit
 
 SETS = 20_000
 

@@ -24,10 +24,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from doe.diagnose.emulator import shrunk_covariance
 from doe.diagnose.levels import REPLICATES
-from doe.diagnose.reference import SIDE, Sample
 from doe.errors import StatisticsError
 from doe.record import Record
+from doe.validation.reference import SIDE, Sample
 
 FloatArray = npt.NDArray[np.float64]
 FOLDS = 8
@@ -127,20 +128,6 @@ def strength_of(sample: Sample, name: str, metric: Metric) -> Strength:
     # Of the square; that of its root by the delta method, and of a root near zero by the root of that.
     error = spread / (2.0 * value) if square > spread else float(np.sqrt(spread))
     return Strength(value, float(np.hypot(error, value / np.sqrt(2.0 * metric.freedom))))
-
-
-def shrunk_covariance(residuals: FloatArray) -> FloatArray:
-    """Covariance of the rows (n, d), correlations shrunk to zero by λ* = Σ Var(r_ij) / Σ r_ij² over i ≠ j."""
-    n = len(residuals)
-    deviation = np.sqrt((residuals**2).mean(axis=0))
-    z = residuals / deviation
-    correlation = z.T @ z / n
-    scatter = ((z**2).T @ (z**2) / n - correlation**2) / (n - 1)
-    off = ~np.eye(z.shape[1], dtype=bool)
-    denominator = float((correlation[off] ** 2).sum())
-    share = min(1.0, float(scatter[off].sum()) / denominator) if denominator > 0.0 else 1.0
-    shrunk = np.where(off, (1.0 - share) * correlation, 1.0)
-    return np.asarray(shrunk * np.outer(deviation, deviation), dtype=np.float64)
 
 
 def _residuals(sample: Sample, condition: int) -> tuple[FloatArray, int]:

@@ -22,9 +22,9 @@ from scipy.special import logsumexp
 from scipy.stats import norm
 
 from doe.diagnose.levels import REPLICATES, Level
-from doe.diagnose.reference import Sample
-from doe.diagnose.ruler import Strength, fold_shifts, metric_of, product, strength_of
 from doe.record import Record
+from doe.validation.reference import Sample
+from doe.validation.ruler import Strength, fold_shifts, metric_of, product, strength_of
 
 FloatArray = npt.NDArray[np.float64]
 

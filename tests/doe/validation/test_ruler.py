@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from doe.diagnose.reference import SIDE, Sample
-from doe.diagnose.ruler import fold_shifts, metric_of, product, shrunk_covariance, strength_of
+from doe.diagnose.emulator import shrunk_covariance
 from doe.errors import StatisticsError
+from doe.validation.reference import SIDE, Sample
+from doe.validation.ruler import fold_shifts, metric_of, product, strength_of
 
 D, POURS = 6, 96
 
