@@ -12,7 +12,10 @@ from doe.study_table import Table, number, one_of, only, positive, required, who
 
 @dataclass(frozen=True)
 class Target(Record):
-    """A measured observable: mean and standard deviation of ``n`` measurements, and the margin of equivalence."""
+    """A measured observable: mean and standard deviation of ``n`` measurements, and the margin of equivalence.
+
+    ``before_…``: mean and standard deviation of n pours of the model that this study improves on; None without one.
+    """
 
     observable: str
     mean: float
@@ -21,6 +24,9 @@ class Target(Record):
     weight: float = 1.0
     margin: float = 2.0
     sd_source: str = "measured"
+    before_mean: float | None = None
+    before_sd: float | None = None
+    before_n: int | None = None
 
     @property
     def standard_error(self) -> float:
@@ -40,6 +46,9 @@ def target_from(entry: Table, observables: Collection[str]) -> Target:
         weight=positive(entry.get("weight", 1.0), "target.weight"),
         margin=positive(entry.get("margin", 2.0), "target.margin"),
         sd_source=str(entry.get("sd_source", "measured")),
+        before_mean=number(entry["before_mean"], "target.before_mean") if "before_mean" in entry else None,
+        before_sd=number(entry["before_sd"], "target.before_sd", least=0.0) if "before_sd" in entry else None,
+        before_n=whole(entry["before_n"], "target.before_n", least=2) if "before_n" in entry else None,
     )
 
 

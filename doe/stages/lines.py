@@ -71,7 +71,14 @@ def optimum_line(result: OptimumResult) -> str:
 def verification_line(result: VerificationResult) -> str:
     """One line of what the verification found."""
     test = result.tests[0]
-    return f"{test.statement} Relative error {test.relative_error_percent:.2f} %."
+    line = f"{test.statement} Relative error {test.relative_error_percent:.2f} %."
+    for target, found in zip(result.targets, result.tests, strict=True):
+        if target.before_mean is not None:
+            name = target.observable
+            errors = [abs(mean - target.mean) for mean in (target.before_mean, found.simulated.mean)]
+            before, after = (_observed(name, error) for error in errors)
+            line += f" {name} off by {before} before and {after} after."
+    return line
 
 
 LINES: Mapping[str, Callable[[Any], str]] = {

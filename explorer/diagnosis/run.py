@@ -26,7 +26,7 @@ from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.summaries import summaries
 from doe.record import plain
 from doe.store import Store, default_store
-from explorer.diagnosis.corrected_material import corrected_toml
+from explorer.diagnosis.corrected import corrected_toml, study_toml
 from explorer.diagnosis.next_folder import read_next, write_next
 from explorer.diagnosis.progress import PourProgress
 from explorer.errors import CommandError
@@ -104,6 +104,11 @@ def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> Diagnosis:
     if order.apply:
         write_whole(order.out / "corrected.toml", corrected_toml(measurement, found))
         say(f"{order.out}/corrected.toml: the corrected model, for every command that takes a material")
+        text = study_toml(measurement, found, "corrected.toml")
+        if text:
+            path = order.out / "corrected_study.toml"
+            write_whole(path, text)
+            say(f"{path}: its calibration, the effect among the factors: explorer calibrate --headless --study {path}")
     for line in error_lines(result):
         say(line)
     return found

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 import trimesh
 
-from explorer.diagnosis.corrected_material import corrected_scene, corrected_toml
+from explorer.diagnosis.corrected import corrected_scene, corrected_toml
 from explorer.scene.file import load_scene
 from explorer.scene.text import material_toml
 from solver import load_material, value, with_rig, with_settings, with_values

@@ -68,7 +68,10 @@ def verdict(target: Plain, test: Plain) -> str:
 def _samples(target: Plain, test: Plain) -> Table:
     name = target["observable"]
     rows = []
-    for words, sample in (("simulated", test["simulated"]), ("measured", test["target"])):
+    samples = [("simulated", test["simulated"]), ("measured", test["target"])]
+    if target.get("before_mean") is not None:
+        samples.append(("the model before", {key: target[f"before_{key}"] for key in ("mean", "sd", "n")}))
+    for words, sample in samples:
         sd = observed(name, sample["sd"])
         if words == "measured" and sample["sd"] is not None and target["sd_source"] != "measured":
             sd += f" ({target['sd_source']})"

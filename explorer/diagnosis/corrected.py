@@ -1,0 +1,129 @@
+"""The corrected model as a material file that every command takes, and as a study that calibrates it with its effect.
+
+The study's factors are the declared parameters within their measured ranges and the amplitudes of what is named within
+their 95 % intervals; its targets are numbers of the first fitted condition, each with what the declared model gave.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from doe.diagnose.diagnosis import Diagnosis, complete_rows
+from doe.measurement.measurement import Condition, Measurement
+from doe.measurement.summaries import summary_names
+from doe.study import CALIBRATED
+from explorer.scene.text import material_toml
+from solver import EFFECTS, Scene, observable_names, parameters, value, with_values
+
+SHORT = {"pilot_runs": 6, "change_runs": 3, "ascent_replicates": 1, "verification_runs": 6} | {
+    f"{part}_replicates": 1 for part in ("screening", "assumption", "scan", "surface")
+}
+"""Runs of the profile ``quick``."""
+TARGETS = 2
+"""Targets of the study at most: each takes part in every stage."""
+
+
+def corrected_toml(measurement: Measurement, diagnosis: Diagnosis) -> str:
+    """The final model of ``diagnosis`` in the set-up of the first fitted condition.
+
+    Parameters are those of its fit; the effect that the verdict names (both of a pair) stands in ``[effect.<name>]``.
+    Of an ambiguous verdict it is the most probable effect, and the heading says that it is not established. Where
+    nothing is named, or held-out data took it back, it is the calibrated declared model.
+    """
+    condition, verdict = measurement.fit[0].name, diagnosis.verdict
+    one_of = ""
+    if verdict.names and verdict.kind.startswith("ambiguous"):
+        one_of = f"\nNOT ESTABLISHED: this is {verdict.names[0]}, one of several answers."
+    heading = (
+        f"{measurement.title or measurement.folder.name}: {verdict.kind}\n"
+        f"{verdict.statement}{one_of}\n"
+        f"Set-up of condition {condition}; parameters of the final fit. SI."
+    )
+    return material_toml(corrected_scene(measurement, diagnosis), heading)
+
+
+def study_toml(measurement: Measurement, diagnosis: Diagnosis, material: str) -> str:
+    """The study that calibrates the corrected model in the file ``material``; "" where nothing is named.
+
+    Empty too where fewer than three parameters and amplitudes can be varied, or no number of the first fitted condition
+    can be a target.
+    """
+    verdict, scene, condition = diagnosis.verdict, corrected_scene(measurement, diagnosis), measurement.fit[0]
+    factors, targets = _factors(measurement, diagnosis, scene), _targets(condition, diagnosis, scene)
+    if not verdict.kind.startswith("effect") or len(factors) < CALIBRATED or not targets:
+        return ""
+    profile = {"mass": float(value(scene, "rig.mass"))} if "rig.mass" in parameters(scene) else {}
+    named = " with ".join(verdict.names[0].split("+"))
+    table = {
+        "format": 1,
+        "title": f"{measurement.title or measurement.folder.name}, with {named}",
+        "material": material,
+        # The amplitudes last: what the diagnosis added is always calibrated.
+        "fallback": [factor["name"] for factor in factors[-CALIBRATED:]],
+        "target": targets,
+        "factor": factors,
+        "profile": {"quick": profile | SHORT, "standard": profile},
+    }
+    return (
+        f"# {named} beside the declared parameters, calibrated against condition {condition.name}. SI.\n"
+        "# before_mean: what the declared model gave, calibrated without it, by fresh pours.\n" + tomli_w.dumps(table)
+    )
+
+
+def _factors(measurement: Measurement, diagnosis: Diagnosis, scene: Scene) -> list[dict[str, Any]]:
+    ranges = {
+        one.path: (box.low, box.high)
+        for one, box in zip(measurement.parameters, diagnosis.declared.parameters, strict=True)
+    }
+    for row in diagnosis.verdict.effects[:1]:
+        for one in row.amplitudes:
+            path = f"effect.{one.effect}.{EFFECTS[one.effect].amplitudes[one.index]}"
+            ranges[path] = (one.low, one.high)
+    found: list[dict[str, Any]] = []
+    for path, (low, high) in ranges.items():
+        known, reference = parameters(scene)[path], float(value(scene, path))
+        low, high = max(low, known.low), min(high, known.high)
+        if low < high:
+            reference = min(high, max(low, reference))
+            name = f"X{len(found) + 1}"
+            found.append({"name": name, "path": path, "low": low, "high": high, "reference": reference})
+    return found
+
+
+def _targets(condition: Condition, diagnosis: Diagnosis, scene: Scene) -> list[dict[str, Any]]:
+    """The angle of repose, or else the number that the declared model missed most, and that one beside the angle."""
+    rows, names = complete_rows(condition), summary_names(condition)
+    before = diagnosis.before.blocks[[one.name for one in diagnosis.conditions].index(condition.name)]
+    if min(len(rows), len(before)) < 2:
+        return []
+    sd = rows.std(axis=0, ddof=1)
+    missed = np.abs(before.mean(axis=0) - rows.mean(axis=0)) / np.where(sd > 0.0, sd, np.inf)
+    allowed = [k for k, name in enumerate(names) if name in observable_names(scene) and sd[k] > 0.0]
+    order = sorted(allowed, key=lambda k: (names[k] != "angle_of_repose_deg", -missed[k]))
+    return [
+        {
+            "observable": names[k],
+            "mean": float(rows[:, k].mean()),
+            "n": len(rows),
+            "sd": float(sd[k]),
+            "sd_source": "measured",
+            "margin": float(sd[k]),
+            "before_mean": float(before[:, k].mean()),
+            "before_sd": float(before[:, k].std(ddof=1)),
+            "before_n": len(before),
+        }
+        for k in order[:TARGETS]
+    ]
+
+
+def corrected_scene(measurement: Measurement, diagnosis: Diagnosis) -> Scene:
+    """The scene that :func:`corrected_toml` writes."""
+    model = (diagnosis.after if diagnosis.verdict.names else diagnosis.before).model
+    values: dict[str, float | str] = dict(zip((p.path for p in measurement.parameters), model.theta, strict=True))
+    for effect, amplitudes in model.effects:
+        names = EFFECTS[effect].amplitudes
+        values |= {f"effect.{effect}.{name}": value for name, value in zip(names, amplitudes, strict=True)}
+    return with_values(measurement.fit[0].scene, dict(values))
