@@ -120,6 +120,9 @@ class Answers:
         right = verdict.kind.startswith("effect") and named == {frozenset(label.split("+"))}
         errors = errors_of(measurement.holdout, "holdout", conclusion) if right else ()
         before, after = (errors[-1].before / errors[-1].noise_floor, errors[-1].ratio) if errors else (NAN, NAN)
+        theta = declared.theta(truth.theta)
+        off = [found.fits[one].theta - theta for one in ("base", verdict.final)] if right else []
+        bias_before, bias_after = (float(np.sqrt((d**2).mean())) for d in off) if off else (NAN, NAN)
         told = conclusion.held_out
         row = Row(
             laboratory=self.measurement.title,
@@ -144,6 +147,8 @@ class Answers:
             held_out_p=told.p if told else NAN,
             before=before,
             after=after,
+            bias_before=bias_before,
+            bias_after=bias_after,
             pours=fitted.run_now + held.run_now,
             seconds=0.0,
         )
@@ -196,7 +201,7 @@ class Answers:
         verdict = OUT_OF_REACH + (truth.missing or "pours break off")
         case, title = truth.case, self.measurement.title
         return Row(title, case.root, case.number, case.kind, label_of(truth), case.strength, amplitude_text(truth),
-                   offer, verdict, "", "", NAN, NAN, "", NAN, NAN, {}, {}, NAN, NAN, NAN, 0, 0.0)  # fmt: skip
+                   offer, verdict, "", "", NAN, NAN, "", NAN, NAN, {}, {}, NAN, NAN, NAN, NAN, NAN, 0, 0.0)  # fmt: skip
 
     def model_pours(self, conditions: Sequence[Condition], place: int | None = None) -> ModelPours:
         """Pours of the declared model, as a diagnosis makes them."""

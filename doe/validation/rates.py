@@ -6,6 +6,7 @@ Wilson 1927, J. Am. Stat. Assoc. 22:209: (p + z²/2n ± z √(p (1 − p)/n + z�
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy import stats
@@ -61,6 +62,93 @@ def wilson(hits: int, sets: int, level: float = LEVEL) -> tuple[float, float]:
     middle = share + z * z / (2 * sets)
     half = z * math.sqrt(share * (1 - share) / sets + z * z / (4 * sets * sets))
     return max(0.0, (middle - half) / (1 + z * z / sets)), min(1.0, (middle + half) / (1 + z * z / sets))
+
+
+RISKS = (0.0, 0.01, 0.025)
+"""Shares of sets with a library effect that get a wrong name at most, of the risk–coverage curve; 0.025 is 4 of 160."""
+BINS = (0.0, 0.5, 0.7, 0.9, 0.99, 1.0)
+"""Ends of the probabilities of the reliability diagram."""
+LEAST_P = 1e-6
+"""Of the truth, as the logarithmic loss counts it."""
+
+
+@dataclass(frozen=True)
+class Bin:
+    """Sets whose most probable answer has a probability in [low, high): mean of it, and how often it is the truth."""
+
+    low: float
+    high: float
+    mean: float
+    right: Rate
+
+
+@dataclass(frozen=True)
+class Scores:
+    """How good the probabilities are, of sets judged by one kind of data.
+
+    Attributes
+    ----------
+    log_loss
+        Mean of −ln of the probability of what is true.
+    coverage
+        Sets with library effects whose most probable effect is right and would be named, at each of ``RISKS``.
+    reliability
+        Sets by the probability of their most probable answer.
+    f1
+        2 TP/(2 TP + FP + FN) of effects that are named and that act, over all sets.
+    bias_before, bias_after
+        Medians of the parameters' errors [standard deviations of their measurements] without and with the effect, of
+        sets with a right name.
+    """
+
+    log_loss: float
+    coverage: tuple[Rate, ...]
+    reliability: tuple[Bin, ...]
+    f1: float
+    bias_before: float
+    bias_after: float
+
+
+def scores(rows: Sequence[Row]) -> Scores:
+    """Scores of judged sets of one kind of data."""
+    library = [row for row in rows if row.kind in ("effect", "pair")]
+    tops = [_top(row) for row in rows]
+    bins = []
+    for low, high in pairwise(BINS):
+        some = [(p, right) for p, right in tops if low <= p < high or p == high == BINS[-1]]
+        mean = float(np.mean([p for p, _ in some])) if some else math.nan
+        bins.append(Bin(low, high, mean, Rate(sum(right for _, right in some), len(some))))
+    found = sum(len(row.names & row.truth) for row in rows)
+    off = sum(len(row.names ^ row.truth) for row in rows)
+    biases = [[b for row in rows if math.isfinite(b := getattr(row, name))] for name in ("bias_before", "bias_after")]
+    before, after = (float(np.median(one)) if one else math.nan for one in biases)
+    return Scores(
+        float(np.mean([-math.log(max(LEAST_P, row.true_p)) for row in rows])) if rows else math.nan,
+        tuple(Rate(_covered(library, risk), len(library)) for risk in RISKS),
+        tuple(bins),
+        2.0 * found / (2.0 * found + off) if found + off else math.nan,
+        before,
+        after,
+    )
+
+
+def _top(row: Row) -> tuple[float, bool]:
+    """Probability of the most probable answer, and whether it is true."""
+    answers = {"nothing": row.nothing, "outside": row.outside, row.best: row.best_p}
+    best = max(answers, key=lambda name: answers[name])
+    true = {"null": "nothing", "outside": "outside"}.get(row.kind, row.label)
+    return answers[best], best == true
+
+
+def _covered(rows: Sequence[Row], risk: float) -> int:
+    """Right names at the lowest threshold at which at most a share ``risk`` of ``rows`` get a wrong one."""
+    most, right, wrong, covered = risk * len(rows), 0, 0, 0
+    for row in sorted(rows, key=lambda row: -row.best_p):
+        right, wrong = (right + 1, wrong) if row.best == row.label else (right, wrong + 1)
+        if wrong > most:
+            break
+        covered = right
+    return covered
 
 
 def targets(rows: Sequence[Row], offer: str) -> list[Target]:

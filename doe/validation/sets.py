@@ -57,6 +57,9 @@ class Row(Record):
     before, after
         Error ÷ noise floor on the held-out condition, of the calibrated base model and the named one; NaN unless the
         name is right.
+    bias_before, bias_after
+        Root mean square of the parameters' errors, without and with the named effect [standard deviations of their
+        measurements]; NaN unless the name is right.
     pours, seconds
         Pours that were run for it, and wall time.
     """
@@ -82,6 +85,8 @@ class Row(Record):
     held_out_p: float
     before: float
     after: float
+    bias_before: float
+    bias_after: float
     pours: int
     seconds: float
 
@@ -102,6 +107,23 @@ class Row(Record):
         if kind in ("effect", "effects"):
             return True
         return kind == "ambiguous" and not {"no_missing_effect", "unexplained"} & set(rest.split(","))
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Effects that the verdict names."""
+        kind, _, rest = self.verdict.partition(":")
+        return frozenset(rest.split("+")) if kind in ("effect", "effects") else frozenset()
+
+    @property
+    def truth(self) -> frozenset[str]:
+        """Library effects that act."""
+        return frozenset(self.label.split("+")) if self.kind in ("effect", "pair") else frozenset()
+
+    @property
+    def true_p(self) -> float:
+        """Probability that was given to what is true; 0 where it was not weighed."""
+        p = {"null": self.nothing, "outside": self.outside}.get(self.kind, self.truth_p)
+        return p if math.isfinite(p) else 0.0
 
 
 def answer_to(verdict: str, label: str) -> Answer:

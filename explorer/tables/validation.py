@@ -4,7 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
-from doe.validation.rates import targets
+from doe.validation.rates import RISKS, Rate, Scores, scores, targets
 from doe.validation.sets import Answer, Row
 from explorer.tables.text_table import text_table
 
@@ -20,7 +20,7 @@ def campaign_text(rows: Sequence[Row]) -> str:
     for offer in offers:
         own = [row for row in judged if row.offer == offer]
         parts += [f"with {offer}" if offer == "scalars" else f"with a {offer}", matrix_text(own), effects_text(own)]
-        parts += ["\n".join(_wrong(own)) or "no wrong name"]
+        parts += [followed_text(own), scores_text(scores(own)), "\n".join(_wrong(own)) or "no wrong name"]
         parts += [
             "\n".join(
                 f"{'met' if t.met else 'no set yet' if t.met is None else 'MISSED':10}  {t.name}: {t.aim}; "
@@ -57,6 +57,41 @@ def effects_text(rows: Sequence[Row]) -> str:
     if not body:
         return "no set with a library effect"
     return text_table(["right name", *(f"{strength:g} σ" for strength in strengths)], body)
+
+
+def followed_text(rows: Sequence[Row]) -> str:
+    """Right names before and after the follow-up, and which changes were asked for."""
+    asked = Counter(row.follow_up for row in rows if row.follow_up)
+    library = [row for row in rows if row.kind in ("effect", "pair")]
+    before, after = (
+        Rate(sum(getattr(row, which) == "right" for row in library), len(library))
+        for which in ("first_answer", "answer")
+    )
+    lines = [f"right names of library effects: {before} before the follow-up, {after} after it"]
+    lines += [f"followed up: {sum(asked.values())} of {len(rows)} sets"] if asked else []
+    return "\n".join([*lines, *(f"  {number:4}  {change}" for change, number in asked.most_common())])
+
+
+def scores_text(found: Scores) -> str:
+    """Log loss, risk–coverage curve, reliability diagram, F1 and bias of the parameters."""
+    curve = [[f"{100.0 * risk:g} %", str(rate)] for risk, rate in zip(RISKS, found.coverage, strict=True)]
+    body = [
+        [
+            f"{one.low:g} … {one.high:g}",
+            str(one.right.sets),
+            f"{one.mean:.3f}" if one.right.sets else "-",
+            str(one.right),
+        ]
+        for one in found.reliability
+    ]
+    return "\n\n".join(
+        (
+            f"log loss {found.log_loss:.3f}; F1 of named effects {found.f1:.2f}; parameters off by "
+            f"{found.bias_before:.2f} σ without the named effect, {found.bias_after:.2f} σ with it",
+            text_table(["wrong names at most", "right names by the most probable effect"], curve),
+            text_table(["probability of the answer", "sets", "mean", "is right"], body),
+        )
+    )
 
 
 def group_of(row: Row) -> str:
