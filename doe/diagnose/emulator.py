@@ -46,6 +46,8 @@ FLOOR = 0.3
 """Share of the signatures' variance off the leading axes, where noise hides it, that is believed there."""
 LEAST_VARIANCE = 1e-3
 """Of a signature along an axis, where its estimate comes out at nothing."""
+SCALES = np.geomspace(0.003, 3.0, 31)
+"""Sizes of a signature's variance beside that of all of them that are tried."""
 FEW_POURS = 2.0
 """Pours at the reference amplitude for which the belief counts that an effect leaves the scatter of a pour as it is."""
 SCATTERS = (0.5, 4.0)
@@ -288,9 +290,11 @@ def emulated(
     square = np.array([(lessons.amplitude[lessons.way == w] ** 2).sum() for w in range(m)])
     signatures = np.stack([lessons.amplitude[lessons.way == w] @ shift[lessons.way == w] for w in range(m)] or [z[0]])
     noise = 1.0 / square + 1.0 / base.sum() if m else np.ones(1)
-    variances, axes = signature_prior(signatures / square[:, None] if m else 0.0 * signatures, noise)
+    signatures = signatures / square[:, None] if m else 0.0 * signatures
+    variances, axes = signature_prior(signatures, noise)
+    scales = signature_scales(signatures @ axes, noise, variances) if m else np.zeros(0)
     if not shrunk:
-        variances = np.full_like(variances, variances.sum())
+        variances, scales = np.full_like(variances, variances.sum()), np.ones(m)
     rows = np.zeros((len(lessons), 1 + k + 2 * m))
     rows[:, 0], rows[:, 1 : 1 + k] = 1.0, lessons.theta
     acting = np.flatnonzero(~base)
@@ -299,7 +303,7 @@ def emulated(
     rows[acting, 1 + k + m + lessons.way[acting]] = a**2 - a
     excess = _excess(z, lessons, m)
     spread = np.sqrt(noise_of(rows[:, 1 + k : 1 + k + m], excess))[:, None]
-    mean, covariance = regression(rows / spread, z @ axes / spread, k, variances)
+    mean, covariance = regression(rows / spread, z @ axes / spread, k, variances, scales)
     reached = tuple(float(lessons.amplitude[lessons.way == w].max()) for w in range(m))
     return Emulator(tuple(ways), k, mean, covariance, freedom, squashes, axes.T @ whitening, reached, excess)
 
@@ -336,8 +340,21 @@ def signature_prior(signatures: FloatArray, noise: FloatArray) -> tuple[FloatArr
     return leading + FLOOR * rest, axes
 
 
+def signature_scales(signatures: FloatArray, noise: FloatArray, variances: FloatArray) -> FloatArray:
+    """s (m,): how large each of ``signatures`` (m, D), along the axes of ``variances`` (D,), is beside the others.
+
+    That of the largest likelihood of β̂ ~ N(0, s v + noise). What hardly does anything at the end of its range, as
+    twisting friction under a pile of small bodies, would else keep the freedom of what does much, and agree with data
+    of the base model better than the base model by the noise of its own pours.
+    """
+    square = signatures[:, None] ** 2
+    total = SCALES[None, :, None] * variances + noise[:, None, None]
+    likelihood = -0.5 * (np.log(total) + square / total).sum(axis=2)
+    return np.asarray(SCALES[likelihood.argmax(axis=1)], dtype=np.float64)
+
+
 def regression(
-    rows: FloatArray, z: FloatArray, parameters: int, variances: FloatArray
+    rows: FloatArray, z: FloatArray, parameters: int, variances: FloatArray, scales: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Mean (D, c) and covariance (D, c, c) of the c = 1 + k + 2m coefficients of every feature.
 
@@ -347,14 +364,14 @@ def regression(
         Of each pour, (n, c) and (n, D).
     parameters
         k.
-    variances
-        v, (D,).
+    variances, scales
+        v (D,) and s (m,).
     """
-    columns = rows.shape[1]
-    m = (columns - 1 - parameters) // 2
+    columns, m = rows.shape[1], len(scales)
     precision = np.full((len(variances), columns), FLAT)
-    precision[:, 1 + parameters : 1 + parameters + m] = 1.0 / variances[:, None]
-    precision[:, 1 + parameters + m :] = 1.0 / (CURVATURE**2 * variances[:, None])
+    own = 1.0 / (variances[:, None] * scales)
+    precision[:, 1 + parameters : 1 + parameters + m] = own
+    precision[:, 1 + parameters + m :] = own / CURVATURE**2
     covariance = np.linalg.inv(rows.T @ rows + precision[:, :, None] * np.eye(columns))
     mean = np.einsum("dij,jd->di", covariance, rows.T @ z, optimize=True)
     return np.asarray(mean, dtype=np.float64), np.asarray(covariance, dtype=np.float64)

@@ -106,7 +106,11 @@ class Teacher:
         return tuple(self._levels)
 
     def look(self, found: Posterior) -> tuple[str, ...]:
-        """Pour more of what ``found`` leaves in question, near its best fits; the effects that were poured."""
+        """Pour more of what ``found`` leaves in question, near its best fits; the effects that were poured.
+
+        And of the base model: all models begin with it, and where it is less well known than they are, data without an
+        effect agree with them better by the noise of its pours.
+        """
         further = self.at_end(found)
         wanted = [(way, multiple, self._budget.screening) for way, multiple in further]
         wanted += [
@@ -114,6 +118,9 @@ class Teacher:
             for way, multiple in self._in_question(found)
             if way not in dict(further)
         ]
+        if wanted:
+            base = base_points(self._declared, self._taught(-1, 0.0) + self._budget.more)
+            self._keep(base, self._pours.run("closer look", base), -1, 0.0)
         self._pour("closer look", wanted)
         return tuple(dict.fromkeys(self.ways[way].effect for way, _, _ in wanted))
 

@@ -17,6 +17,7 @@ from doe.diagnose.compared import Measured
 from doe.diagnose.confirm import Model
 from doe.diagnose.declared import declare
 from doe.diagnose.levels import REPLICATES, whitened_shift
+from doe.diagnose.points import AS_IT_IS
 from doe.diagnose.pours import Pour
 from doe.diagnose.teaching import Teacher
 from doe.errors import StatisticsError
@@ -257,6 +258,21 @@ def test_the_same_model_asks_for_the_same_pours(measurement, monkeypatch):
         asked.append([])
         run(measurement, monkeypatch, effects)
     assert asked[0] == asked[1]
+
+
+def test_a_closer_look_pours_the_base_model_too(measurement, monkeypatch):
+    """All models begin with it: where it is known least, data without an effect fit it least."""
+    asked = set()
+
+    class Recording(FormulaPours):
+        def run(self, what, points, where=None):
+            if what == "closer look":
+                asked.update(point for point in points if point.sequence == "base" and point.view == AS_IT_IS)
+            return super().run(what, points, where)
+
+    monkeypatch.setattr(diagnosis, "ModelPours", Recording)
+    run(measurement, monkeypatch, (("air_drag", (1.0,)),), formula=twins, held_out=())
+    assert {point.number for point in asked} >= set(range(BUDGET.base, BUDGET.base + BUDGET.more))
 
 
 def test_symmetries_cost_no_pours(measurement, monkeypatch):

@@ -19,6 +19,7 @@ from doe.diagnose.emulator import (
     planar_weights,
     regression,
     signature_prior,
+    signature_scales,
 )
 from doe.diagnose.posterior import BEYOND, NOTHING, OUTSIDE, PAIRS, SPREADS, Data, multiples, posterior
 from doe.errors import StatisticsError
@@ -48,7 +49,7 @@ def emulator(shifts, freedom=200, pours=12, sensitivity=None, variance=25.0, way
         z += [shift] * pours
     table = np.array(rows)
     table[:, 0] = 1.0
-    mean, covariance = regression(table, np.array(z), 1, np.full(SIZE, variance))
+    mean, covariance = regression(table, np.array(z), 1, np.full(SIZE, variance), np.ones((table.shape[1] - 2) // 2))
     names = ways or tuple(Way(name, name) for name in shifts)
     return Emulator(names, 1, mean, covariance, freedom, (UNSQUASHED,) * 2, np.eye(SIZE), (1.0,) * m, np.zeros(m))
 
@@ -388,3 +389,14 @@ def test_a_feature_that_hardly_ever_varies_does_not_spoil_the_answer():
     kinds = [Kind("a", "a", False)]
     (found,) = replay("scan", sample, kinds, [truths(kinds)], Teaching(8, 0), 20, np.random.default_rng(0))
     assert found.named == (1.0,) * len(RISKS)
+
+
+def test_a_signature_that_is_only_noise_is_believed_to_be_small():
+    rng = np.random.default_rng(4)
+    variances, noise = np.geomspace(10.0, 0.1, 40), np.full(12, 0.1)
+    signatures = rng.normal(size=(12, 40)) * np.sqrt(variances + 0.1)
+    signatures[0] = rng.normal(size=40) * np.sqrt(0.1)
+    scales = signature_scales(signatures, noise, variances)
+    assert scales[0] <= 0.03
+    # The scale of 40 normal numbers has a standard error of √(2/40) = 0.22.
+    assert np.all((scales[1:] > 0.4) & (scales[1:] < 2.0))

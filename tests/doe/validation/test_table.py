@@ -3,11 +3,12 @@
 import json
 import math
 import re
+from dataclasses import replace
 
 import pytest
 from statsmodels.stats.proportion import proportion_confint
 
-from doe.validation.rates import targets, wilson
+from doe.validation.rates import LEAST_P, scores, targets, wilson
 from doe.validation.sets import Row, answer_to, append_rows, read_rows
 from explorer.tables.validation import campaign_text
 
@@ -17,7 +18,7 @@ NAN = math.nan
 def row(number, kind, label, verdict, strength=NAN, after=NAN, offer="scan"):
     return Row(
         "blind", 5, number, kind, label, strength, "", offer, verdict, "", "", 0.1, 0.1, "a", 0.8, NAN,
-        {"base": 0.0}, {"base": 0.5}, NAN, 2.0 * after, after, 12, 1.5,
+        {"base": 0.0}, {"base": 0.5}, NAN, 2.0 * after, after, NAN, NAN, 12, 1.5,
     )  # fmt: skip
 
 
@@ -72,6 +73,31 @@ def test_rows_come_back_as_they_were_written(tmp_path):
     assert [str(one) for one in read_rows(tmp_path / "sets.jsonl")] == [str(one) for one in reversed(rows)]
     for line in (tmp_path / "sets.jsonl").read_text().splitlines():
         assert json.loads(line)["root"] == 5
+
+
+def judged(number, kind, label, verdict, best, best_p, nothing=0.0, outside=0.0, truth_p=NAN):
+    one = row(number, kind, label, verdict, 6.0)
+    return replace(one, best=best, best_p=best_p, nothing=nothing, outside=outside, truth_p=truth_p)
+
+
+def test_scores_by_hand():
+    rows = [
+        judged(0, "null", "none", "no_missing_effect", "a", 0.1, nothing=0.8),
+        judged(1, "effect", "a", "effect:a", "a", 0.95, truth_p=0.95),
+        judged(2, "effect", "b", "ambiguous:a,b", "a", 0.6, truth_p=0.4),
+        judged(3, "effect", "b", "effect:b", "b", 1.0, truth_p=1.0),
+        judged(4, "pair", "a+b", "effect:a", "a", 0.92),
+        judged(5, "outside", "draught", "unexplained", "a", 0.2, outside=0.7),
+    ]
+    found = scores(rows)
+    # The pair was not weighed: its probability counts as the least.
+    p = [0.8, 0.95, 0.4, 1.0, LEAST_P, 0.7]
+    assert found.log_loss == pytest.approx(-sum(map(math.log, p)) / 6)
+    # By probability: b right at 1, a right at 0.95, then the pair's wrong name.
+    assert [(rate.hits, rate.sets) for rate in found.coverage] == [(2, 4)] * 3
+    assert [(one.right.hits, one.right.sets) for one in found.reliability] == [(0, 0), (0, 1), (2, 2), (1, 2), (1, 1)]
+    # a and b named rightly, and one of the pair: 3 of the 5 that act.
+    assert found.f1 == pytest.approx(2 * 3 / (2 * 3 + 2))
 
 
 def test_targets_by_hand():
