@@ -191,14 +191,14 @@ def _item(
         axis = teacher.axis_in(pours, c, len(feature_set(set_up).scalars), axis_error)[:, columns]
         slope = emulator.squashes[0].slope(emulator.squashes[0].centre)
         shared = emulator.whitening @ (axis * slope).T
-    predictions = {}
-    for label in labels:
-        rows = _rows(emulator, teacher, found, label)
+    expected = {label: emulator.at(_rows(emulator, teacher, found, label)) for label in labels}
+    # How well a regression of few pours knows an answer is no property of it that would give it away.
+    noise = np.mean([variance[0] for _, variance in expected.values()], axis=0) + emulator.slope_variance
+    predictions, slopes = {}, emulator.slopes
+    for label, ((mean, *beside), _) in expected.items():
         fit = found.fits[label]
-        (mean, *beside), variance = emulator.at(rows)
         loose = np.array([one - mean for one in beside]).reshape(-1, len(mean))
-        slopes = emulator.slopes
-        covariance = np.diag(variance[0] + emulator.slope_variance) + slopes @ fit.theta_covariance @ slopes.T
+        covariance = np.diag(noise) + slopes @ fit.theta_covariance @ slopes.T
         covariance += loose.T @ loose + shared @ shared.T
         predictions[label] = Prediction(mean + slopes @ fit.theta, covariance)
     return MenuItem(set_up.name, predictions, np.eye(len(columns)))

@@ -31,7 +31,7 @@ def measured():
 
 
 def suggestion(name, values, condition="fit", pours=3):
-    experiment = RankedExperiment(name, 2.0, 4, 1.5, 0.83)
+    experiment = RankedExperiment(name, 0.83, 1.5)
     turned = any(change.turned for change in CHANGES if change.name == name)
     return Suggestion(experiment, values, condition, RIVALS, ("twisting: spin a single body",), pours, turned)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from doe.diagnose.next_experiment import SURE
 from explorer.report.content import Block, Bullets, Caution, Facts, Figure, Section, Table, Text
 from explorer.report.diagnosis.charts import likely, probability_chart
 from explorer.report.diagnosis.evidence import strained
@@ -45,6 +46,8 @@ VISIBLE = 4.0
 """Shift [standard errors of the data] at which an effect stands out."""
 ALIKE = 0.7
 """|cosine| of two shifts from which on they are called alike: half of one's square is in the other."""
+FAIR = 0.5
+"""Chance of an answer below which a set-up is not likely to give one."""
 MOST_LEVERS = 6
 
 
@@ -254,11 +257,10 @@ def _of_bounds(row: Plain) -> list[str]:
 def _asked_for(result: Plain) -> str:
     if not result["next_experiment"]:
         return "No change of the rig that was tried would tell them apart."
-    best = result["next_experiment"][0]["experiment"]
-    if best["replicates"] is None:
-        return f"Most telling would be {code(best['name'])}, though no hundred pours of it settle the question."
-    pours = best["replicates"]
-    return f"{pours} pour{'s' * (pours > 1)} of {code(best['name'])} would tell them apart at odds of 20 : 1."
+    first = result["next_experiment"][0]
+    best, pours = first["experiment"], first["pours"]
+    chance = percent(best["chance"])
+    return f"{pours} pours of {code(best['name'])} would single out the right one with a chance of {chance}."
 
 
 def _facts(result: Plain) -> list[tuple[str, str]]:
@@ -408,9 +410,8 @@ def _ranked(result: Plain) -> list[Block]:
     rows = tuple(
         (
             code(row["experiment"]["name"]),
-            fixed(row["experiment"]["score"]),
+            f"{row['pours']} pours: {percent(row['experiment']['chance'])}",
             f"{fixed(row['experiment']['separation'])} σ",
-            "more than 100" if row["experiment"]["replicates"] is None else str(row["experiment"]["replicates"]),
         )
         for row in result["next_experiment"]
     )
@@ -419,14 +420,14 @@ def _ranked(result: Plain) -> list[Block]:
     blocks: list[Block] = [
         Text("Set-ups of the first fitted condition, poured with every answer that is left; the most telling first:"),
         Table(
-            ("set-up", "score", "least separation of one pour", "pours for odds of 20 : 1"),
+            ("set-up", "chance of an answer", "least separation of one pour"),
             rows,
-            "Score: expected information of six pours, 0 where nothing is learnt. Separation: distance of the two "
-            "models that are closest, in σ of one pour and of the prediction.",
+            f"Chance: how often the right answer ends with a probability of {percent(SURE)}, by made-up data. "
+            "Separation: distance of the two answers that are closest, in σ of one pour and of the prediction.",
         ),
     ]
-    if all(row["experiment"]["score"] <= 0.0 for row in result["next_experiment"]):
-        blocks.append(Caution("No score is above zero: none of these set-ups is expected to tell the answers apart."))
+    if all(row["experiment"]["chance"] < FAIR for row in result["next_experiment"]):
+        blocks.append(Caution("None of these set-ups is likely to tell the answers apart."))
     return blocks
 
 
