@@ -129,11 +129,8 @@ def weighed(
     ways: Sequence[Way],
     conditions: Sequence[Measured],
     instruments: Sequence[Instrument] = (),
-    library: int = 0,
 ) -> Compared:
     """Weigh all models by the data of the fitted ``conditions``, freed from the bias of their ``instruments``.
-
-    ``library``: effects that share the prior, where only some of them are weighed.
 
     Raises StatisticsError where a condition has nothing that can be compared.
     """
@@ -160,9 +157,7 @@ def weighed(
     )
     names = tuple(tuple(one.names[k] for k in chosen) for one, chosen in zip(conditions, columns, strict=True))
     labels = tuple(one.condition for one in conditions)
-    return Compared(
-        labels, names, tuple(left_out), blocks, data, emulator, posterior(emulator, data, library=library), plain
-    )
+    return Compared(labels, names, tuple(left_out), blocks, data, emulator, posterior(emulator, data), plain)
 
 
 def usable(lessons: Lessons, offered: Sequence[npt.NDArray[np.int64]]) -> tuple[Lessons, list[npt.NDArray[np.int64]]]:

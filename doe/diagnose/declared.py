@@ -135,7 +135,7 @@ def widest(name: str, scenes: Sequence[Scene]) -> Effect:
     ends = [known[f"effect.{name}.{field}"] for field in kind.amplitudes]
     low = tuple(max(end.low, -kind.strongest) for end in ends)
     high = tuple(min(end.high, kind.strongest) for end in ends)
-    while not all(_possible(scene, name, bounds) for scene in scenes for bounds in (low, high)):
+    while not all(possible(scene, name, bounds) for scene in scenes for bounds in (low, high)):
         low, high = tuple(DRAWN_IN * x for x in low), tuple(DRAWN_IN * x for x in high)
     return Effect(name, low, high)
 
@@ -147,7 +147,8 @@ def effect_values(effect: str, amplitude: Sequence[float], turned: bool = False)
     return {f"effect.{effect}.{name}": sign * one for name, one in zip(kind.amplitudes, amplitude, strict=True)}
 
 
-def _possible(scene: Scene, name: str, amplitude: tuple[float, ...]) -> bool:
+def possible(scene: Scene, name: str, amplitude: tuple[float, ...]) -> bool:
+    """Whether ``scene`` can be set up with an effect of ``amplitude``."""
     try:
         with_values(scene, effect_values(name, amplitude))
     except ParameterError:

@@ -76,14 +76,6 @@ class Diagnosis:
 
 
 @dataclass(frozen=True)
-class FollowUp:
-    """What was measured next, and the labels that it was to tell apart ("base" for nothing missing)."""
-
-    measurement: Measurement
-    rivals: tuple[str, ...]
-
-
-@dataclass(frozen=True)
 class Conclusion:
     """Fresh pours of the calibrated base model and the final one, and what held-out data say of the latter."""
 
@@ -101,17 +93,16 @@ def run_diagnosis(
     say: Say,
     on_pour: OnPour | None = None,
     seed: int = 0,
-    follow_up: FollowUp | None = None,
+    follow_up: Measurement | None = None,
 ) -> Diagnosis:
     """Diagnose ``measurement`` against its declared model, with ``effects`` as candidates.
 
-    Data sets of one model share their pours; those of another ``seed`` are others. With a ``follow_up`` its conditions
-    are fitted as well, and only what it was asked for is weighed.
+    Data sets of one model share their pours; those of another ``seed`` are others. The conditions of
+    a ``follow_up`` are fitted as well.
     """
-    library = len(effects)
     declared, paths = declare(measurement, effects), [p.path for p in measurement.parameters]
     if follow_up is not None:
-        declared, measurement = joined(declared, measurement, follow_up)
+        measurement = joined(measurement, follow_up)
     root = ROOT if seed == 0 else FIRST_OTHER_ROOT + seed
 
     def pours_in(conditions: Sequence[Condition], place: int | None = None) -> ModelPours:
@@ -119,7 +110,7 @@ def run_diagnosis(
 
     model, everywhere = pours_in(measurement.fit), pours_in(measurement.conditions)
     teacher = Teacher(declared, measurement.fit, model, budget, say)
-    compared = pursued(teacher, measurement.fit, budget, say, library)
+    compared = pursued(teacher, measurement.fit, budget, say)
     taught = teacher.lessons().way
     verdict = verdict_of(
         compared, declared, teacher.levels, [int((taught == w).sum()) for w in range(len(teacher.ways))]
@@ -146,34 +137,27 @@ def run_diagnosis(
     )
 
 
-def joined(declared: Declared, measurement: Measurement, follow_up: FollowUp) -> tuple[Declared, Measurement]:
-    """The declared model with the effects that are still possible, and the data with those of the follow-up.
+def joined(measurement: Measurement, follow_up: Measurement) -> Measurement:
+    """The data with the fitted conditions of a follow-up.
 
     Raises MeasurementError where the follow-up has other parameters, or a condition of a name that is there already.
     """
-    if follow_up.measurement.parameters != measurement.parameters:
-        raise MeasurementError(f"{follow_up.measurement.folder}: parameters are not those of {measurement.folder}")
+    if follow_up.parameters != measurement.parameters:
+        raise MeasurementError(f"{follow_up.folder}: parameters are not those of {measurement.folder}")
     known = {condition.name for condition in measurement.conditions}
-    new = follow_up.measurement.fit
-    for condition in new:
+    for condition in follow_up.fit:
         if condition.name in known:
             raise MeasurementError(
-                f"{follow_up.measurement.folder}: condition {condition.name!r} is one of {measurement.folder} already"
+                f"{follow_up.folder}: condition {condition.name!r} is one of {measurement.folder} already"
             )
-    wanted = {name for label in follow_up.rivals for name in label.split("+")}
-    effects = tuple(effect for effect in declared.effects if effect.name in wanted)
-    fitted = (*measurement.fit, *new, *measurement.holdout)
-    return replace(declared, effects=effects), replace(measurement, conditions=fitted)
+    return replace(measurement, conditions=(*measurement.fit, *follow_up.fit, *measurement.holdout))
 
 
-def pursued(teacher: Teacher, conditions: Sequence[Condition], budget: Budget, say: Say, library: int = 0) -> Compared:
-    """Models and data once what is in question has been looked at more closely.
-
-    ``library``: effects that share the prior, where only some of them are weighed.
-    """
+def pursued(teacher: Teacher, conditions: Sequence[Condition], budget: Budget, say: Say) -> Compared:
+    """Models and data once what is in question has been looked at more closely."""
     data = [measured(condition) for condition in conditions]
     instruments = teacher.instruments(data)
-    compared = weighed(teacher.lessons(), teacher.ways, data, instruments, library)
+    compared = weighed(teacher.lessons(), teacher.ways, data, instruments)
     say(f"after screening: {odds(compared.posterior)}")
     looked: set[str] = set()
     for _ in range(budget.looks):
@@ -187,12 +171,12 @@ def pursued(teacher: Teacher, conditions: Sequence[Condition], budget: Budget, s
         if not poured:
             break
         looked |= set(poured)
-        compared = weighed(teacher.lessons(), teacher.ways, data, instruments, library)
+        compared = weighed(teacher.lessons(), teacher.ways, data, instruments)
         say(f"after a closer look at {', '.join(poured)}: {odds(compared.posterior)}")
     label, p = compared.posterior.best if compared.posterior.effects else ("", 0.0)
     if p >= THRESHOLD:
         teacher.refine(compared.posterior, label)
-        compared = weighed(teacher.lessons(), teacher.ways, data, instruments, library)
+        compared = weighed(teacher.lessons(), teacher.ways, data, instruments)
         say(f"with pours on both sides of its best fit: {odds(compared.posterior)}")
         label = compared.posterior.best[0]
         return compared.refitted(("base", label))
@@ -238,7 +222,7 @@ def suggested(
     if NO_EFFECT in verdict.kind or len(weights) < 2:
         weights["base"] = found.nothing
     menu = next_experiment(teacher, found, weights, conditions[0], lambda set_ups: pours_in(set_ups, len(conditions)))
-    # It is chosen for the likeliest answers; all that are left are weighed by what it gives.
+    # It is chosen for the likeliest answers, and told of all that are left.
     left = (*verdict.names, *(label for label in weights if label == "base"))
     return Menu(tuple(replace(one, rivals=left) for one in menu.suggestions), menu.run_now)
 

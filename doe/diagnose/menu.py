@@ -137,6 +137,8 @@ def next_experiment(
         return Menu((), 0)
     changes = {change.name: (change, values) for change, values in feasible(condition.scene)}
     set_ups = [changed(condition, change, values) for change, values in changes.values()]
+    # What is measured there is weighed by all effects.
+    set_ups = [one for one in set_ups if teacher.possible_in(one.scene)]
     model = pours_in(set_ups)
     probes = teacher.base(BASE_POURS) + teacher.probes(found, tuple(weights), POURS)
     # All set-ups at once, so that no core waits for the last pour of one of them; what is only looked at after that.
@@ -250,6 +252,8 @@ def feasible(scene: Scene) -> list[tuple[Change, dict[str, float | str]]]:
     found = []
     known = parameters(scene)
     for change in CHANGES:
+        if "insertion.protocol" in change.choices and scene.numerics.duration > 0.0:
+            continue  # filled first, it would be read before it has run out
         if not (set(change.factors) | set(change.choices)) <= set(known):
             continue
         values: dict[str, float | str] = {path: f * float(value(scene, path)) for path, f in change.factors.items()}

@@ -185,9 +185,7 @@ class _Nodes:
         return _Nodes(self.rows[some], self.natural[some], self.ends[some], self.way[some], self.multiple[some])
 
 
-def posterior(
-    emulator: Emulator, data: Data, temperature: float = TEMPERATURE, pairs: bool = True, library: int = 0
-) -> Posterior:
+def posterior(emulator: Emulator, data: Data, temperature: float = TEMPERATURE, pairs: bool = True) -> Posterior:
     """The posterior of a data set.
 
     Parameters
@@ -200,8 +198,6 @@ def posterior(
         T.
     pairs
         Whether pairs of effects are weighed where something outside is likely.
-    library
-        Effects that share the prior, at least those of the emulator: some may have been put behind before.
 
     Returns
     -------
@@ -218,7 +214,7 @@ def posterior(
         name: weigher.fit(name, (name,), nodes.rows, nodes.natural, nodes.ends, logs[name])
         for name, nodes in singles.items()
     }
-    number = max(1, library, len(singles))
+    number = max(1, len(singles))
     share = (1.0 - NOTHING - OUTSIDE - PAIRS) / number
     weighed = {name: _weight(share, fits[name].log_evidence, temperature) for name in singles}
     nothing = _weight(NOTHING, fits["base"].log_evidence, temperature)

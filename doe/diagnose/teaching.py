@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from doe.diagnose.budget import Budget
 from doe.diagnose.compared import Instrument, Measured
-from doe.diagnose.declared import Declared
+from doe.diagnose.declared import Declared, possible
 from doe.diagnose.emulator import Lessons, Way
 from doe.diagnose.levels import Level, Trials, level_of
 from doe.diagnose.points import AS_IT_IS, Direction, Point, View, base_points, directions_of, effect_points
@@ -169,6 +169,12 @@ class Teacher:
             for way, multiple in wanted
             for point in self._points(self._directions[way], min(1.0, multiple * self._levels[way].share), number)
         ]
+
+    def possible_in(self, scene: Scene) -> bool:
+        """Whether ``scene`` can be set up with every effect at both ends of its range."""
+        return all(
+            possible(scene, effect.name, end) for effect in self._declared.effects for end in (effect.low, effect.high)
+        )
 
     def base(self, number: int) -> list[Probe]:
         """``number`` pours of the base model, as they teach it."""

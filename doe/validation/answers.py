@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from doe.diagnose.budget import Budget
-from doe.diagnose.diagnosis import FollowUp, concluded, errors_of, joined, pursued, suggested
+from doe.diagnose.diagnosis import concluded, errors_of, joined, pursued, suggested
 from doe.diagnose.menu import Suggestion
 from doe.diagnose.points import Point
 from doe.diagnose.pours import ModelPours, room_of
@@ -96,15 +96,15 @@ class Answers:
         )
 
     def judged_data(
-        self, measurement: Measurement, truth: Truth, offer: str, follow_up: FollowUp | None = None
+        self, measurement: Measurement, truth: Truth, offer: str, follow_up: Measurement | None = None
     ) -> Judged:
         """The row of a data set, and what to measure next; of ``truth`` only the label gets into it."""
-        declared, say, library = self.strengths.declared, _silent, len(self.strengths.declared.effects)
+        declared, say = self.strengths.declared, _silent
         if follow_up is not None:
-            declared, measurement = joined(declared, measurement, follow_up)
+            measurement = joined(measurement, follow_up)
         fitted, held = self.model_pours(measurement.fit), self.model_pours(measurement.holdout)
         teacher = Teacher(declared, measurement.fit, fitted, self.budget, say)
-        compared = pursued(teacher, measurement.fit, self.budget, say, library)
+        compared = pursued(teacher, measurement.fit, self.budget, say)
         taught = teacher.lessons().way
         pours = [int((taught == way).sum()) for way in range(len(teacher.ways))]
         verdict = verdict_of(compared, declared, teacher.levels, pours)
@@ -154,7 +154,7 @@ class Answers:
         )
         return Judged(row, suggestion)
 
-    def followed_up(self, truth: Truth, asked: Suggestion, scanner: Scanner | None) -> FollowUp | None:
+    def followed_up(self, truth: Truth, asked: Suggestion, scanner: Scanner | None) -> Measurement | None:
         """What the laboratory measures in the set-up that it is asked for; None where its pours keep breaking off."""
         place = next(c for c, one in enumerate(self.measurement.conditions) if one.name == asked.condition)
         condition = self.measurement.conditions[place]
@@ -167,7 +167,7 @@ class Answers:
             self.laboratory.hand_out(Path(folder), data, scanner, (ROOT, *truth.case.seed, 2))
             measurement = load_measurement(Path(folder))
         (read,) = measurement.fit
-        return FollowUp(replace(measurement, conditions=(asked.set_up(read),)), asked.rivals)
+        return replace(measurement, conditions=(asked.set_up(read),))
 
     def measured(
         self, truth: Truth, conditions: Sequence[Condition], occasion: str = "", pours: int = REPLICATES

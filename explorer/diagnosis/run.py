@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from doe.diagnose.budget import Budget, scaled_budget
 from doe.diagnose.confirm import CONTRADICTED, Confirmed
-from doe.diagnose.diagnosis import Diagnosis, FollowUp, run_diagnosis
+from doe.diagnose.diagnosis import Diagnosis, run_diagnosis
 from doe.diagnose.holdout import HoldoutError
 from doe.diagnose.levels import STRONG
 from doe.diagnose.posterior import FITS, NOTHING, OUTSIDE, PAIRS
@@ -75,7 +75,7 @@ def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> Diagnosis:
         raise CommandError(f"--out {order.out}: is not empty; name a new folder, or add --resume to go on there")
     names = order.effects or tuple(EFFECTS)
     asked = read_next(order.follow_up) if order.follow_up else None
-    follow_up = FollowUp(asked.measurement, asked.rivals) if asked else None
+    follow_up = asked.measurement if asked else None
     path = order.store or default_store()
     budget = Budget()
     if order.budget is not None:
