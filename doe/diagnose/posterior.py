@@ -220,11 +220,9 @@ def posterior(emulator: Emulator, data: Data, temperature: float = TEMPERATURE, 
     nothing = _weight(NOTHING, fits["base"].log_evidence, temperature)
     log_outside = float(logsumexp(spread)) - math.log(len(SPREADS))
     outside = _weight(OUTSIDE, log_outside, temperature)
-    if (
-        pairs
-        and len(singles) > 1
-        and math.exp(outside - logsumexp([nothing, outside, *weighed.values()])) > PAIRED_FROM
-    ):
+    elsewhere = math.exp(outside - logsumexp([nothing, outside, *weighed.values()]))
+    best = max(weighed, key=lambda name: weighed[name], default="base")
+    if pairs and len(singles) > 1 and (elsewhere > PAIRED_FROM or fits[best].p < FITS):
         found = _pairs(weigher, singles)
         fits |= found
         each = PAIRS / (0.5 * number * (number - 1))

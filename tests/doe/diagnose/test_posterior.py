@@ -21,7 +21,7 @@ from doe.diagnose.emulator import (
     signature_prior,
     signature_scales,
 )
-from doe.diagnose.posterior import BEYOND, NOTHING, OUTSIDE, PAIRS, SPREADS, Data, multiples, posterior
+from doe.diagnose.posterior import BEYOND, FITS, NOTHING, OUTSIDE, PAIRS, SPREADS, Data, multiples, posterior
 from doe.errors import StatisticsError
 from doe.validation.limit import RISKS, Kind
 from doe.validation.replay import NULLS, Teaching, Truth, replay
@@ -207,6 +207,16 @@ def test_two_effects_at_once_are_told_where_none_alone_explains():
     # Where one is enough, no pair is weighed.
     alone = judged(taught, 3.0 * unit(0, 8), pairs=True)
     assert set(alone.effects) == {"push", "pull", "turn"}
+
+
+def test_two_effects_are_weighed_where_the_best_one_does_not_fit():
+    """Although it is far more probable than something outside."""
+    taught = emulator({"push": 8.0 * unit(0), "pull": 4.0 * unit(3), "turn": 4.0 * unit(5)}, variance=1.0, freedom=2000)
+    z = 8.0 * unit(0) + 3.0 * unit(3)
+    alone = judged(taught, z)
+    assert alone.outside < 0.01
+    assert alone.fits["push"].p < FITS
+    assert judged(taught, z, pairs=True).best[0] == "push+pull"
 
 
 def test_an_amplitude_ends_where_the_literature_does():
