@@ -118,3 +118,23 @@ def test_a_new_summary_is_read_off_all_stored_pours_without_pouring(poured):
     other = ModelPours([more], [FRICTION], pours._store, pours._pours)
     assert other.run("third", points)[0][0].summaries == (0.5,) * len(summary_names(more))
     assert (other.run_now, len(jobs)) == (0, 3)
+
+
+def test_a_turned_rig_sees_a_tilt_the_other_way_and_a_displaced_funnel_as_before(poured):
+    pours, _ = poured
+    condition = read_laboratory(TREFOILS).declared.fit[0]
+    turned = ModelPours([dataclasses.replace(condition, turned=True)], [FRICTION], None, None)
+    effects = (("plate_tilt", (1.0, -2.0)), ("funnel_offset", (0.003, 0.001)))
+    point = Point("search", 0, (0.5,), effects)
+    paths = [f"effect.{name}" for name in ("plate_tilt.tilt_x", "plate_tilt.tilt_y", "funnel_offset.dx")]
+    assert [value(pours.scene(point, 0), path) for path in paths] == [1.0, -2.0, 0.003]
+    assert [value(turned.scene(point, 0), path) for path in paths] == [-1.0, 2.0, 0.003]
+
+
+def test_a_possible_addition_has_the_seeds_of_its_place_in_the_data():
+    """Wherever it stands in the menu, its pours are found again once it is measured."""
+    first, second = read_laboratory(TREFOILS).declared.fit
+    point = Point("base", 3, (0.5,))
+    menu = ModelPours([first, second], [FRICTION], None, None, place=2)
+    data = ModelPours([first, first, second], [FRICTION], None, None)
+    assert menu.seed(point, 0) == menu.seed(point, 1) == data.seed(point, 2)

@@ -8,11 +8,11 @@ import pytest
 from doe.errors import MeasurementError
 from doe.measurement import load_measurement, reach_of, summaries_of_data, summary_names
 from doe.record import plain
-from solver import with_values
+from solver import value, with_values
 from solver.assets import AssetNotFoundError, asset_path, measurement_folder
 from solver.insertion import Insertion
 from solver.rigs import Funnel
-from tests.doe.measurement.folders import MEASUREMENT, TABLE, changed, write, write_pile
+from tests.doe.measurement.folders import MATERIAL, MEASUREMENT, TABLE, changed, write, write_pile
 
 FACTORS = "table4_plackett_burman_factors"
 SHIPPED = ("granudrum_mcc", "trefoil_1", "trefoil_2")
@@ -27,6 +27,19 @@ def test_a_condition_is_a_scene_to_simulate(tmp_path):
     assert (slow.scene.numerics.duration, slow.scene.numerics.sample_interval) == (2.6, 0.02)
     assert (fast.scene.numerics.duration, fast.scene.rig) == (0.0, Funnel(wall="steel"))
     assert (slow.role, fast.role, slow.replicates) == ("fit", "holdout", 2)
+
+
+def test_what_stays_with_the_bench_acts_the_other_way_in_a_turned_rig(tmp_path):
+    tilted = MATERIAL + "[effect.plate_tilt]\ntilt_x = 2.0\n[effect.funnel_offset]\ndx = 0.004\n"
+    files = {
+        "measurement.toml": MEASUREMENT.replace('role = "fit"', 'role = "fit"\nturned = true', 1),
+        "material.toml": tilted,
+    }
+    slow, fast = load_measurement(write(tmp_path, files)).conditions
+    assert (slow.turned, fast.turned) == (True, False)
+    paths = ("effect.plate_tilt.tilt_x", "effect.funnel_offset.dx")
+    assert [value(slow.scene, path) for path in paths] == [-2.0, 0.004]
+    assert [value(fast.scene, path) for path in paths] == [2.0, 0.004]
 
 
 def test_roles_are_kept_apart(tmp_path):

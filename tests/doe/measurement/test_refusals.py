@@ -29,6 +29,7 @@ def refusal(folder):
         ('name = "fast"', 'name = "slow"', ["condition.name: 'slow' stands twice"]),
         ('rig = "funnel"', 'rig = "bucket"', ["condition 'slow'", "'bucket' is not one of funnel"]),
         ('rig = "funnel"', 'rig = "inclined_plane"', ["condition 'slow'", "bench test"]),
+        ('role = "fit"', 'role = "fit"\nturned = 180', ["condition 'slow'", "turned: 180", "true or false"]),
         ('data = "slow.csv"', 'data = "none.csv"', ["none.csv: no such file"]),
         ('data = "slow.csv"\n', "", ["condition.data: missing in slow"]),
         ("mass = 0.014", "mass = 500", ["rig.mass", "1e-05 … 10 kg"]),
