@@ -21,7 +21,7 @@ from doe.diagnose.emulator import (
     signature_prior,
     signature_scales,
 )
-from doe.diagnose.posterior import BEYOND, FITS, NOTHING, OUTSIDE, PAIRS, SPREADS, Data, multiples, posterior
+from doe.diagnose.posterior import BEYOND, FITS, NOTHING, OUTSIDE, PAIRS, SPREADS, Data, log_t, multiples, posterior
 from doe.errors import StatisticsError
 from doe.validation.limit import RISKS, Kind
 from doe.validation.replay import NULLS, Teaching, Truth, replay
@@ -58,6 +58,24 @@ def judged(taught, z, replicates=6, pairs=False):
     return posterior(taught, Data(z, replicates), temperature=1.0, pairs=pairs)
 
 
+def t_of(d, scale, freedom):
+    """SciPy's density where the covariance was ``scale`` by ``freedom`` degrees of freedom."""
+    left = freedom - len(d) + 1
+    return stats.multivariate_t.pdf(d, shape=scale * freedom / left, df=left)
+
+
+def test_the_density_is_a_gaussian_integrated_over_the_covariance():
+    """Over an inverse Wishart distribution, by 200 000 draws: what ν degrees of freedom leave of Σ = I."""
+    freedom, draws = 9, 200_000
+    covariances = stats.invwishart.rvs(freedom, freedom * np.eye(2), size=draws, random_state=1)
+    places = np.array([[0.0, 0.0], [1.5, 0.5], [3.0, -1.0]])
+    inverse, factor = np.linalg.inv(covariances), 1.0 / np.sqrt(np.linalg.det(covariances))
+    each = factor[:, None] * np.exp(-0.5 * np.einsum("ki,nij,kj->nk", places, inverse, places))
+    found = np.exp(log_t(places, np.ones((3, 2)), np.zeros((2, 0)), freedom))
+    # Three standard errors of the mean over the draws.
+    assert found / found[0] == pytest.approx(each.mean(axis=0) / each[:, 0].mean(), rel=0.02)
+
+
 def test_without_effects_it_is_the_ratio_of_two_densities():
     """Nothing against outside, by SciPy's multivariate t with a parameter."""
     rng = np.random.default_rng(0)
@@ -66,7 +84,7 @@ def test_without_effects_it_is_the_ratio_of_two_densities():
 
     def density(more):
         scale = np.eye(SIZE) * (1.0 / 6.0 + 1.0 / 24.0 + more) + np.outer(slope, slope)
-        return stats.multivariate_t.pdf(z, shape=scale, df=30)
+        return t_of(z, scale, 30)
 
     nothing, outside = NOTHING * density(0.0), OUTSIDE * np.mean([density(s**2) for s in SPREADS])
     assert found.nothing == pytest.approx(nothing / (nothing + outside), rel=1e-6)
@@ -82,7 +100,7 @@ def test_an_effect_by_conditioning_a_gaussian(excess):
 
     def log_t(mean, variance):
         scale = np.diag(variance) + np.outer(slope, slope)
-        return stats.multivariate_t.pdf(z - mean, shape=scale, df=50)
+        return t_of(z - mean, scale, 50)
 
     def predicted(a):
         wide = 1e7  # of the base model, which is flat
@@ -111,7 +129,7 @@ def test_an_effect_by_conditioning_a_gaussian(excess):
 
 def test_probabilities_add_up_and_go_to_what_is_there():
     taught = emulator({"push": 4.0 * unit(0, 8), "pull": 4.0 * unit(3)})
-    for z, answer in ((2.0 * unit(0, 8), "push"), (2.0 * unit(3), "pull")):
+    for z, answer in ((2.5 * unit(0, 8), "push"), (2.5 * unit(3), "pull")):
         found = judged(taught, z)
         assert found.best[0] == answer
         assert found.best[1] > 0.9
@@ -204,9 +222,10 @@ def test_two_effects_at_once_are_told_where_none_alone_explains():
     assert found.best[0] == "push+pull"
     assert found.best[1] > 0.9
     assert [one.effect for one in found.fits["push+pull"].amplitudes] == ["push", "pull"]
-    # Where one is enough, no pair is weighed.
+    # Where one is enough, another one that could be seen is not there.
     alone = judged(taught, 3.0 * unit(0, 8), pairs=True)
-    assert set(alone.effects) == {"push", "pull", "turn"}
+    assert alone.best[0] == "push"
+    assert alone.best[1] > 0.9
 
 
 def test_two_effects_are_weighed_where_the_best_one_does_not_fit():
