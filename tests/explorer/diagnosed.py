@@ -268,7 +268,7 @@ CASES = {
     "faint": {"effects": (("adhesion_sjkr", (0.35,)),), "seed": 2},
     "unexplained": {"outside": 0.8, "elsewhere": 0.8},
     "wrong elsewhere": {"elsewhere": 1.5},
-    "does not fit": {"effects": (("adhesion_sjkr", (1.0,)), ("density_error", (1.0,))), "seed": 1},
+    "does not fit": {"effects": (("adhesion_sjkr", (2.0,)),), "outside": 0.7},
     "at the edge": {"theta": (0.0, 1.8)},
     "hostile": {"effects": (("adhesion_sjkr", (0.6,)),), "title": HOSTILE},
 }
@@ -280,7 +280,7 @@ EXPECTED = {
     "no holdout": "effect:adhesion_sjkr",
     "pair": "effects:adhesion_sjkr+density_error",
     "ambiguous": "ambiguous:rolling_resistance,twisting",
-    "faint": "ambiguous:adhesion_sjkr,no_missing_effect,unexplained",
+    "faint": "ambiguous:adhesion_sjkr,no_missing_effect,unexplained,air_drag",
     "unexplained": "unexplained",
     "wrong elsewhere": "unexplained",
     "does not fit": "unexplained",

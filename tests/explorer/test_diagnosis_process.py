@@ -292,7 +292,9 @@ def test_the_answer_holds_probabilities_and_errors_before_after_and_by_noise_alo
         odds, _, errors = answer_markdown(result).partition("| Error on")
         shown = [line.strip("| ").split(" | ") for line in odds.splitlines() if line.startswith("| ")]
         assert shown[0] == ["Answer", "Probability"]
-        assert shown[1] == [r"adhesion\_sjkr", r"\>99.9 %"]
+        first = result["effects"][0]
+        assert (first["name"], result["verdict"]) == ("adhesion_sjkr", "effect:adhesion_sjkr")
+        assert shown[1] == [r"adhesion\_sjkr", f"{100.0 * first['probability']:.1f} %"]
         assert 4 <= len(shown) <= 6
         rows = [line.split(" | ") for line in f"| Error on{errors}".splitlines() if line.startswith("| ")]
         assert rows[0] == [

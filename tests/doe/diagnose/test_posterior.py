@@ -84,7 +84,7 @@ def test_without_effects_it_is_the_ratio_of_two_densities():
 
     def density(more):
         scale = np.eye(SIZE) * (1.0 / 6.0 + 1.0 / 24.0 + more) + np.outer(slope, slope)
-        return t_of(z, scale, 30)
+        return t_of(z, scale, 2 * 30)
 
     nothing, outside = NOTHING * density(0.0), OUTSIDE * np.mean([density(s**2) for s in SPREADS])
     assert found.nothing == pytest.approx(nothing / (nothing + outside), rel=1e-6)
@@ -100,7 +100,7 @@ def test_an_effect_by_conditioning_a_gaussian(excess):
 
     def log_t(mean, variance):
         scale = np.diag(variance) + np.outer(slope, slope)
-        return t_of(z - mean, scale, 50)
+        return t_of(z - mean, scale, 2 * 50)
 
     def predicted(a):
         wide = 1e7  # of the base model, which is flat
