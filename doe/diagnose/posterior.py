@@ -36,9 +36,10 @@ from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
 
-NOTHING, OUTSIDE, PAIRS = 0.5, 0.1, 0.05
+NOTHING, OUTSIDE, PAIRS = 0.5, 0.1, 0.01
 """Prior probabilities that nothing is missing, for most models are not wrong, of what no library holds, and of two
-effects at once; single effects share the rest alike, and pairs theirs."""
+effects at once, rare beside one, or all pairs with it would take their share of its probability; single effects share
+the rest alike, and pairs theirs."""
 TEMPERATURE = 0.5
 """One of the two numbers that are tuned on development sets; the other is ``verdict.THRESHOLD``. By the evidence of the
 first 18 sets of root 1 with one effect or none, after their follow-up, the log loss is least at 0.8 to 1 for scalars

@@ -174,7 +174,7 @@ def test_an_effect_far_beyond_the_first_level_is_followed(measurement, monkeypat
 
 
 def test_two_effects_at_once_are_named_together(measurement, monkeypatch):
-    planted = (("rolling_resistance", (0.45 * EFFECTS["rolling_resistance"].strongest,)), ("density_error", (0.14,)))
+    planted = (("rolling_resistance", (0.6 * EFFECTS["rolling_resistance"].strongest,)), ("density_error", (0.2,)))
     found, said = run(measurement, monkeypatch, planted)
     assert found.verdict.kind == "effects:rolling_resistance+density_error", said
     assert {name for name, _ in found.after.model.effects} == {"rolling_resistance", "density_error"}
