@@ -166,7 +166,7 @@ def _rounded(value: Any) -> Any:
 
 def _row(cells: dict[str, Any]) -> Row:
     floats = {field.name for field in fields(Row) if field.type is float}
-    values: dict[str, Any] = {
-        key: math.nan if value is None and key in floats else value for key, value in cells.items()
-    }
+    # A number that an older file does not have was not taken.
+    values: dict[str, Any] = dict.fromkeys(floats, math.nan)
+    values |= {key: math.nan if value is None and key in floats else value for key, value in cells.items()}
     return Row(**values)
