@@ -106,7 +106,7 @@ class Suggestion(Record):
 
     def set_up(self, condition: Condition) -> Condition:
         """``condition`` with the change, under its name."""
-        return changed(condition, Change(self.experiment.name, turned=self.turned), self.values)
+        return changed(condition, self.experiment.name, self.values, self.turned)
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ def next_experiment(
     if len(weights) < 2:
         return Menu((), 0)
     changes = {change.name: (change, values) for change, values in feasible(condition.scene)}
-    set_ups = [changed(condition, change, values) for change, values in changes.values()]
+    set_ups = [changed(condition, name, values, change.turned) for name, (change, values) in changes.items()]
     # What is measured there is weighed by all effects.
     set_ups = [one for one in set_ups if teacher.possible_in(one.scene)]
     model = pours_in(set_ups)
@@ -236,15 +236,10 @@ def _rows(emulator: Emulator, teacher: Teacher, found: Posterior, label: str) ->
     return np.array([here, *(here + one for one in beside)])
 
 
-def changed(condition: Condition, change: Change, values: Mapping[str, float | str]) -> Condition:
-    """``condition`` with ``change``, under its name, where that sets ``values``."""
-    scene = turned(condition.scene) if change.turned else condition.scene
-    return replace(
-        condition,
-        name=change.name,
-        scene=with_values(scene, dict(values)),
-        turned=condition.turned != change.turned,
-    )
+def changed(condition: Condition, name: str, values: Mapping[str, float | str], about: bool) -> Condition:
+    """``condition`` under another name, with ``values`` set and the rig turned ``about`` on its bench."""
+    scene = turned(condition.scene) if about else condition.scene
+    return replace(condition, name=name, scene=with_values(scene, dict(values)), turned=condition.turned != about)
 
 
 def feasible(scene: Scene) -> list[tuple[Change, dict[str, float | str]]]:

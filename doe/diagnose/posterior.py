@@ -206,7 +206,7 @@ def posterior(emulator: Emulator, data: Data, temperature: float = TEMPERATURE, 
     temperature
         T.
     pairs
-        Whether pairs of effects are weighed where something outside is likely.
+        Whether pairs of effects are weighed where something is missing.
 
     Returns
     -------

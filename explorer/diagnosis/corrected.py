@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from doe.diagnose.declared import effect_values
 from doe.diagnose.diagnosis import Diagnosis, complete_rows
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.summaries import summary_names
@@ -124,6 +125,5 @@ def corrected_scene(measurement: Measurement, diagnosis: Diagnosis) -> Scene:
     model = (diagnosis.after if diagnosis.verdict.names else diagnosis.before).model
     values: dict[str, float | str] = dict(zip((p.path for p in measurement.parameters), model.theta, strict=True))
     for effect, amplitudes in model.effects:
-        names = EFFECTS[effect].amplitudes
-        values |= {f"effect.{effect}.{name}": value for name, value in zip(names, amplitudes, strict=True)}
+        values |= effect_values(effect, amplitudes)
     return with_values(measurement.fit[0].scene, dict(values))
