@@ -1,7 +1,9 @@
 """At which amplitude an effect is poured: where it shifts the summaries of a data set by about 12 standard errors.
 
 From the end of the range inward; back out, halfway on a logarithmic scale, where a step inward went too far. Less only
-where all that the literature supports does less.
+where all that the literature supports does less. Two pours of a trial and the covariance of the base model's alone tell
+the order of a shift: once all effects have been poured, ``taught_shifts`` tells it by the covariance of all of them,
+and what does too little is poured again farther out.
 """
 
 from __future__ import annotations
@@ -13,7 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from doe.diagnose.compared import usable
 from doe.diagnose.declared import Declared
+from doe.diagnose.emulator import Lessons, Way, emulated
 from doe.diagnose.points import Direction, Point
 from doe.diagnose.pours import Rows, Search
 from doe.record import Record
@@ -45,7 +49,7 @@ class Level(Record):
     direction: Direction
     share: float
     shift: float
-    """[standard errors], by the few pours of the search."""
+    """[standard errors], by the pours that teach, or by the few of the search."""
 
 
 def level_of(
@@ -94,6 +98,24 @@ def whitened_shift(declared: Declared, base: Rows, moved: Rows) -> float:
         noise = REPLICATES * (1.0 / len(there) + 1.0 / len(still))
         square += REPLICATES * float(step @ np.linalg.solve(covariance, step)) - noise * len(step)
     return math.sqrt(max(0.0, square))
+
+
+def taught_shifts(lessons: Lessons, ways: Sequence[Way]) -> FloatArray:
+    """Shift of the features of ``lessons`` by every way at its reference amplitude, (m,) [standard errors].
+
+    By the pours there, in the covariance of all pours and with what parameters do taken out; less what noise adds.
+    """
+    taught, _ = usable(lessons, [np.arange(block.shape[1]) for block in lessons.blocks])
+    emulator = emulated(taught, ways)
+    base = emulator.at(emulator.row()[None])[0][0]
+    still, shifts = int((taught.way == -1).sum()), np.zeros(len(ways))
+    for way in range(len(ways)):
+        there = taught.where((taught.way == way) & (taught.amplitude == 1.0))
+        if len(there) > 0:
+            step = emulator.seen(there.blocks) - base - emulator.slopes @ there.theta.mean(axis=0)
+            noise = len(step) * (1.0 / len(there) + 1.0 / still)
+            shifts[way] = math.sqrt(REPLICATES * max(0.0, float(step @ step) - noise))
+    return shifts
 
 
 def _valid(pours: Rows, condition: int) -> FloatArray:

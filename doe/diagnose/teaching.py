@@ -18,20 +18,27 @@ from doe.diagnose.budget import Budget
 from doe.diagnose.compared import Instrument, Measured
 from doe.diagnose.declared import Declared, possible
 from doe.diagnose.emulator import Lessons, Way
-from doe.diagnose.levels import Level, Trials, level_of
+from doe.diagnose.levels import STRONG, Level, Trials, level_of, taught_shifts
 from doe.diagnose.points import AS_IT_IS, Direction, Point, View, base_points, directions_of, effect_points
 from doe.diagnose.posterior import LEAST, Posterior
 from doe.diagnose.pours import ModelPours, Pour
 from doe.errors import StatisticsError
 from doe.measurement.measurement import Condition
 from doe.measurement.sight import PERFECT, Sight
+from doe.measurement.summaries import summary_names
 from solver import Scene, pour_rig
 
 FloatArray = npt.NDArray[np.float64]
 Say = Callable[[str], None]
 
 TRIALS = Trials(pours=2, most=5, enough=7.0, too_much=18.0)
-"""Two pours tell a shift of 12 to ± 2."""
+"""Two pours tell the order of a shift."""
+RAISES = 3
+"""Times at most that an effect is poured farther out, whose pours together shift by less than is enough."""
+TOLD = 4.0
+"""Shift that four pours tell from none: farther out by no more than that has to grow to ``STRONG``."""
+ENDED = 0.75
+"""Share of pours that have to come to a valid end where an effect is poured farther out."""
 NEAR = (0.2, 2.5)
 """Multiples of a level at which the pours of its search teach: a parabola follows no answer farther."""
 SHIFTED = 12
@@ -87,13 +94,25 @@ class Teacher:
             )
         say(f"base model: {len(base)} settings")
         self._levels = self._found_levels()
-        self.ways = tuple(
+        self._pour("screening", [(way, 1.0, budget.screening) for way in range(len(self.ways))])
+        refused: dict[int, float] = {}
+        for _ in range(RAISES):
+            if not self._raise_levels(refused):
+                break
+        self._keep_trials()
+        for direction, level in zip(self._directions, self._levels, strict=True):
+            if not direction.angle:
+                reach = f"up to {_words(direction, level.share)}, which shifts by {level.shift:.1f} standard errors"
+                say(f"{direction.name}: {reach}")
+        say(f"screening: {len(self._rows)} settings of {len(declared.effects)} effects")
+
+    @property
+    def ways(self) -> tuple[Way, ...]:
+        """Directions of effects at their levels."""
+        return tuple(
             Way(one.effect, one.name, one.at(level.share), 1.0 / level.share, one.angle)
             for one, level in zip(self._directions, self._levels, strict=True)
         )
-        self._pour("screening", [(way, 1.0, budget.screening) for way in range(len(self.ways))])
-        self._keep_trials()
-        say(f"screening: {len(self._rows)} settings of {len(declared.effects)} effects")
 
     @property
     def settings(self) -> int:
@@ -212,10 +231,39 @@ class Teacher:
         for one in self._directions:
             if not one.angle:
                 level = next(last)
-                reach = f"up to {_words(one, level.share)}, which shifts by {level.shift:.1f} standard errors"
-                self._say(f"{one.name}: {reach}")
             levels.append(replace(level, direction=one))
         return levels
+
+    def _raise_levels(self, refused: dict[int, float]) -> bool:
+        """Pour farther out what shifts the scalars too little, by all pours so far; whether any could be.
+
+        ``refused``: by way the least share at which pours broke off.
+        """
+        first = len(self._declared.conditions)
+        scalars = [np.arange(len(summary_names(condition))) for condition in self._conditions[:first]]
+        lessons = self.lessons()
+        shifts = taught_shifts(replace(lessons, blocks=lessons.blocks[:first]).only(scalars), self.ways)
+        self._levels = [replace(one, shift=float(shift)) for one, shift in zip(self._levels, shifts, strict=True)]
+        asked: dict[int, tuple[float, list[Point]]] = {}
+        for way, (direction, level) in enumerate(zip(self._directions, self._levels, strict=True)):
+            if direction.angle or level.shift >= TRIALS.enough or level.share == 1.0:
+                continue
+            share = min(1.0, level.share * STRONG / max(level.shift, TOLD))
+            if way in refused:
+                share = min(share, math.sqrt(level.share * refused[way]))
+            for one in self._all_of(way) if direction.angle is not None else [way]:
+                asked[one] = share, self._points(self._directions[one], share, self._budget.screening)
+        self._pours.run("screening", list({p.seen(AS_IT_IS): None for _, points in asked.values() for p in points}))
+        for way, (share, points) in asked.items():
+            rows = self._pours.run("screening", points)
+            if np.mean([all(pour.valid for pour in row[:first]) for row in rows]) < ENDED:
+                refused[way] = share
+                continue
+            outward = share / self._levels[way].share
+            self._acting |= {p: (w, a / outward) for p, (w, a) in self._acting.items() if w == way}
+            self._levels[way] = replace(self._levels[way], share=share)
+            self._keep(points, rows, way, 1.0)
+        return bool(asked)
 
     def _keep_trials(self) -> None:
         """Pours by which a level was found teach as well, where they are not too far from it."""

@@ -5,7 +5,7 @@ all that is still possible, which may be ``no_missing_effect`` and ``unexplained
 
     something is named     if its probability is ``THRESHOLD`` at least and the data are likely under it (``FITS``)
     no_missing_effect      if that is the most probable by far, or nothing else can be told from it (``NOTHING_FROM``)
-    unexplained            if something outside the library is the most probable, or the best model does not fit
+    unexplained            if something outside the library is the most probable, or no model that is left fits
     ambiguous              else: the smallest set that holds ``CREDIBLE``
 """
 
@@ -192,6 +192,11 @@ def answer(found: Posterior, threshold: float = THRESHOLD) -> tuple[str, tuple[s
     last = int(np.searchsorted(np.cumsum([everything[one] for one in order]), CREDIBLE)) + 1
     rivals = order[:last]
     names = tuple(one for one in rivals if one in found.effects)
+    if names and all(found.fits["base" if one == NO_EFFECT else one].p < FITS for one in rivals if one != UNEXPLAINED):
+        text = (
+            f"Data as far off {listed([_spoken(one) for one in names])} as these come up in less than 1 of 500 cases."
+        )
+        return UNEXPLAINED, (), text
     odds = ", ".join(f"{_spoken(one)} {_percent(everything[one])}" for one in rivals)
     return f"ambiguous:{','.join(rivals)}", names, f"The data leave several answers: {odds}."
 

@@ -11,12 +11,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from doe.diagnose import diagnosis
+from doe.diagnose import diagnosis, teaching
 from doe.diagnose.budget import LEAST, Budget, scaled_budget
 from doe.diagnose.compared import Measured
 from doe.diagnose.confirm import Model
 from doe.diagnose.declared import declare
-from doe.diagnose.levels import REPLICATES, whitened_shift
+from doe.diagnose.levels import REPLICATES, Level, whitened_shift
 from doe.diagnose.points import AS_IT_IS
 from doe.diagnose.pours import Pour
 from doe.diagnose.teaching import Teacher
@@ -349,6 +349,51 @@ def test_the_teacher_says_what_every_effect_was_poured_at(measurement):
     lessons = teacher.lessons()
     assert lessons.theta.shape[1] == 3
     assert set(lessons.way.tolist()) == set(range(-1, len(teacher.ways)))
+
+
+def too_small(declared, direction, base, points, trials):
+    """A search that noise ended at a twentieth of the range."""
+    yield points(0.05, trials.pours)
+    return Level(direction, 0.05, 12.0)
+
+
+def test_what_all_pours_show_to_be_too_little_is_poured_farther_out(measurement, monkeypatch):
+    monkeypatch.setattr(teaching, "level_of", too_small)
+    declared = declare(measurement, NAMES)
+    teacher = Teacher(declared, measurement.fit, FormulaPours(measurement.fit, [], None, None), BUDGET, str)
+    for level in teacher.levels:
+        # Full amplitudes shift by 22 standard errors in each condition.
+        full = 22.0 * math.sqrt(len(measurement.fit))
+        assert level.share > 0.2
+        # By four pours a shift is known to √(6/4 + 6/24) = 1.3 along itself.
+        assert level.shift == pytest.approx(full * level.share, abs=4.0)
+    # What had been poured before teaches at its own multiple of the new level.
+    lessons = teacher.lessons()
+    for number, (way, level) in enumerate(zip(teacher.ways, teacher.levels, strict=True)):
+        assert way.unit == level.direction.at(level.share)
+        multiples = set(lessons.amplitude[lessons.way == number])
+        assert 1.0 in multiples
+        if way.name == "rolling_resistance":
+            assert min(multiples) == pytest.approx(0.05 / level.share)
+
+
+def test_pours_that_break_off_farther_out_keep_a_level_below(measurement, monkeypatch):
+    monkeypatch.setattr(teaching, "level_of", too_small)
+    whole = FormulaPours.pour
+
+    def broken(self, point, condition):
+        pour = whole(self, point, condition)
+        far = any(
+            name == "rolling_resistance" and a > 0.12 * EFFECTS[name].strongest for name, (a, *_) in point.effects
+        )
+        return replace(pour, outcome="jammed") if far else pour
+
+    monkeypatch.setattr(FormulaPours, "pour", broken)
+    declared = declare(measurement, NAMES)
+    teacher = Teacher(declared, measurement.fit, FormulaPours(measurement.fit, [], None, None), BUDGET, str)
+    level = next(one for one in teacher.levels if one.direction.effect == "rolling_resistance")
+    assert 0.05 <= level.share <= 0.12
+    assert max(one.share for one in teacher.levels) > 0.1
 
 
 def test_ranges_fit_the_set_up(measurement):
