@@ -35,7 +35,7 @@ PoursIn = Callable[[Sequence[Condition]], ModelPours]
 
 BASE_POURS, POURS = 12, 4
 """Pours of the base model, and of every direction of an effect that is left, in each set-up of the menu."""
-PLANNED = (6, 12)
+PLANNED = (6, 12, 24)
 """Pours that may be asked of the laboratory."""
 LIKELY = 0.8
 """Chance of an answer from which on the fewer pours will do."""

@@ -4,9 +4,10 @@ The chance of a set-up is how often the right answer ends with a probability of 
 truth is drawn by the probabilities that the answers have now, the mean of its n pours by what it predicts, and the
 answers are weighed by Bayes's theorem,
 
-    data of i ~ N(m_i, V/n + W_i),    p_j ∝ w_j N(data; m_j, V/n + W_j)
+    data of i ~ N(m_i, V/n + W_i),    p_j ∝ w_j N(data; m_j, V/n + W_j)ᵀ
 
-with V the covariance of one pour and W_i that of what i predicts. This is the expected posterior of Box and Hill 1967
+with V the covariance of one pour, W_i that of what i predicts and T the temperature at which all data are weighed
+(``posterior.py``). This is the expected posterior of Box and Hill 1967
 (doi 10.1080/00401706.1967.10490441) counted as a laboratory would: an answer, or none.
 """
 
@@ -20,6 +21,7 @@ from itertools import combinations
 import numpy as np
 import numpy.typing as npt
 
+from doe.diagnose.posterior import TEMPERATURE
 from doe.errors import StatisticsError
 from doe.record import Record
 
@@ -90,7 +92,8 @@ def chance_of_an_answer(item: MenuItem, weights: Mapping[str, float], replicates
         logs = []
         for j, other in enumerate(names):
             white = np.linalg.solve(factors[j], (drawn - item.predictions[other].mean).T)
-            logs.append(np.log(share[j]) - np.log(np.diag(factors[j])).sum() - 0.5 * (white**2).sum(axis=0))
+            log_likelihood = -np.log(np.diag(factors[j])).sum() - 0.5 * (white**2).sum(axis=0)
+            logs.append(np.log(share[j]) + TEMPERATURE * log_likelihood)
         stacked = np.stack(logs)
         posterior = np.exp(stacked - stacked.max(axis=0))
         right += float(share[k]) * float((posterior[k] / posterior.sum(axis=0) >= SURE).mean())

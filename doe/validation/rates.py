@@ -10,7 +10,10 @@ from itertools import pairwise
 
 import numpy as np
 from scipy import stats
+from scipy.special import logsumexp
 
+from doe.diagnose.posterior import NOTHING, OUTSIDE, PAIRS
+from doe.diagnose.verdict import THRESHOLD
 from doe.measurement.features import SCAN
 from doe.validation.sets import Row
 
@@ -70,6 +73,8 @@ BINS = (0.0, 0.5, 0.7, 0.9, 0.99, 1.0)
 """Ends of the probabilities of the reliability diagram."""
 LEAST_P = 1e-6
 """Of the truth, as the logarithmic loss counts it."""
+TEMPERATURES = (0.4, 0.55, 0.7, 0.85, 1.0, 1.3)
+"""By which the evidence of kept rows is weighed again."""
 
 
 @dataclass(frozen=True)
@@ -130,6 +135,58 @@ def scores(rows: Sequence[Row]) -> Scores:
         before,
         after,
     )
+
+
+@dataclass(frozen=True)
+class Tempered:
+    """What another temperature would have made of the last evidence of sets with one effect at most.
+
+    ``log_loss``: as in ``Scores``. ``right``, ``wrong``: names of sets with an effect; ``false``: of sets without
+    one.
+    """
+
+    temperature: float
+    log_loss: float
+    right: Rate
+    wrong: Rate
+    false: Rate
+
+
+def by_temperature(rows: Sequence[Row]) -> tuple[Tempered, ...]:
+    """Judged sets of one kind of data at each of ``TEMPERATURES``, pairs of effects left out of truths and answers."""
+    some = [row for row in rows if "outside" in row.evidence and row.kind != "pair"]
+    found = []
+    for temperature in TEMPERATURES:
+        answers = [_probabilities(row, temperature) for row in some]
+        loss = [-math.log(max(LEAST_P, p[_truth(row)])) for row, p in zip(some, answers, strict=True)]
+        named = [max(p, key=lambda one: p[one]) if max(p.values()) >= THRESHOLD else "" for p in answers]
+        accused = [("" if one in ("base", "outside") else one, row) for one, row in zip(named, some, strict=True)]
+        effects = [(one, row) for one, row in accused if row.kind == "effect"]
+        null = [one for one, row in accused if row.kind == "null"]
+        found.append(
+            Tempered(
+                temperature,
+                float(np.mean(loss)) if loss else math.nan,
+                Rate(sum(one == row.label for one, row in effects), len(effects)),
+                Rate(sum(one not in ("", row.label) for one, row in effects), len(effects)),
+                Rate(sum(map(bool, null)), len(null)),
+            )
+        )
+    return tuple(found)
+
+
+def _probabilities(row: Row, temperature: float) -> dict[str, float]:
+    """Of "base", "outside" and every single effect."""
+    singles = [name for name in row.evidence if name not in ("base", "outside") and "+" not in name]
+    priors = {"base": NOTHING, "outside": OUTSIDE} | dict.fromkeys(
+        singles, (1 - NOTHING - OUTSIDE - PAIRS) / len(singles)
+    )
+    logs = np.array([math.log(prior) + temperature * row.evidence[name] for name, prior in priors.items()])
+    return dict(zip(priors, np.exp(logs - logsumexp(logs)).tolist(), strict=True))
+
+
+def _truth(row: Row) -> str:
+    return {"null": "base", "outside": "outside"}.get(row.kind, row.label)
 
 
 def _top(row: Row) -> tuple[float, bool]:

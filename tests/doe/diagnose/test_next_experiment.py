@@ -7,6 +7,7 @@ import pytest
 from scipy import stats
 
 from doe.diagnose.next_experiment import DRAWS, SURE, MenuItem, Prediction, chance_of_an_answer, rank_experiments
+from doe.diagnose.posterior import TEMPERATURE
 from doe.errors import StatisticsError
 
 WEIGHTS = {"a": 0.5, "b": 0.5}
@@ -19,9 +20,9 @@ def item(gap, own=0.0, name="x", d=1):
 
 @pytest.mark.parametrize(("gap", "pours", "own"), [(0.5, 6, 0.0), (1.0, 6, 0.0), (1.0, 12, 0.0), (1.0, 6, 0.1)])
 def test_the_chance_is_that_of_the_likelihood_ratio(gap, pours, own):
-    """With s = gap/√(1/n + own) the log odds of the truth are N(s²/2, s²): P(log odds ≥ ln 9) = Φ(s/2 − ln 9/s)."""
+    """With s = gap/√(1/n + own) the log odds of the truth are T N(s²/2, s²): ≥ ln 9 with Φ(s/2 − ln 9/(T s))."""
     s = gap / math.sqrt(1.0 / pours + own)
-    expected = stats.norm.cdf(0.5 * s - math.log(SURE / (1.0 - SURE)) / s)
+    expected = stats.norm.cdf(0.5 * s - math.log(SURE / (1.0 - SURE)) / (TEMPERATURE * s))
     found = chance_of_an_answer(item(gap, own), WEIGHTS, pours)
     # Three standard errors of a share of 2 x DRAWS made-up data sets.
     assert found == pytest.approx(expected, abs=3.0 * math.sqrt(expected * (1.0 - expected) / (2 * DRAWS)))

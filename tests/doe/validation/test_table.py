@@ -8,7 +8,9 @@ from dataclasses import replace
 import pytest
 from statsmodels.stats.proportion import proportion_confint
 
-from doe.validation.rates import LEAST_P, scores, targets, wilson
+from doe.diagnose.posterior import NOTHING, OUTSIDE, PAIRS
+from doe.diagnose.verdict import THRESHOLD
+from doe.validation.rates import LEAST_P, TEMPERATURES, by_temperature, scores, targets, wilson
 from doe.validation.sets import Row, answer_to, append_rows, read_rows
 from explorer.tables.validation import campaign_text
 
@@ -98,6 +100,34 @@ def test_scores_by_hand():
     assert [(one.right.hits, one.right.sets) for one in found.reliability] == [(0, 0), (0, 1), (2, 2), (1, 2), (1, 1)]
     # a and b named rightly, and one of the pair: 3 of the 5 that act.
     assert found.f1 == pytest.approx(2 * 3 / (2 * 3 + 2))
+
+
+def weighed(number, kind, label, **evidence):
+    return replace(row(number, kind, label, "unexplained", 6.0), evidence={"base": 0.0, "outside": -50.0} | evidence)
+
+
+def test_other_temperatures_by_hand():
+    rows = [
+        weighed(0, "effect", "a", a=8.0, b=2.0),
+        weighed(1, "effect", "a", a=2.0, b=8.0),
+        weighed(2, "null", "none", a=6.0, b=0.0),
+        weighed(3, "pair", "a+b", a=9.0, b=0.0),
+    ]
+    found = {one.temperature: one for one in by_temperature(rows)}
+    share = (1 - NOTHING - OUTSIDE - PAIRS) / 2
+    for temperature in TEMPERATURES:
+        one, total = found[temperature], NOTHING + share * (math.exp(8 * temperature) + math.exp(2 * temperature))
+        logs = [math.log(total / share) - x * temperature for x in (8, 2)]
+        logs += [math.log(1 + share * (1 + math.exp(6 * temperature)) / NOTHING)]
+        assert one.log_loss == pytest.approx(sum(logs) / 3, rel=1e-6)
+        sure = share * math.exp(8 * temperature) / total >= THRESHOLD
+        assert (one.right.hits, one.wrong.hits, one.right.sets) == (sure, sure, 2)
+        accused = share * math.exp(6 * temperature) / (NOTHING + share * (1 + math.exp(6 * temperature))) >= THRESHOLD
+        assert (one.false.hits, one.false.sets) == (accused, 1)
+    # Colder is surer.
+    assert not found[0.4].right.hits
+    assert found[1.0].right.hits
+    assert found[1.0].false.hits
 
 
 def test_targets_by_hand():
