@@ -309,7 +309,7 @@ class Teacher:
         return sum(one == (way, multiple) for one in self._acting.values())
 
     def _in_question(self, found: Posterior) -> list[tuple[int, float]]:
-        """Ways, with the multiple that is poured nearest to their best fit."""
+        """Ways, with a multiple at which they are poured beside their best fit."""
         probability: dict[str, float] = {}
         for label, p in found.effects.items():
             for name in label.split("+"):
@@ -322,8 +322,17 @@ class Teacher:
         for level in found.levels:
             way = self.ways[level.way]
             if probability[way.effect] > IN_QUESTION and level.log_density > best[way.effect] - BEHIND:
-                asked.append((level.way, min(2.0 ** round(math.log2(level.amplitude)), way.most)))
+                asked.append((level.way, self._beside(level.way, level.amplitude)))
         return asked
+
+    def _beside(self, way: int, amplitude: float) -> float:
+        """The power of two of a level that is nearest to ``amplitude``, or the one on its other side once that has been
+        poured: known well on one side only, a model pays for what it does not know on the other.
+        """
+        power = math.log2(amplitude)
+        sides = sorted((math.floor(power), math.ceil(power)), key=lambda one: abs(one - power))
+        multiples = [min(2.0**one, self.ways[way].most) for one in sides]
+        return next((one for one in multiples if self._taught(way, one) < self._budget.more), multiples[0])
 
     def at_end(self, found: Posterior) -> list[tuple[int, float]]:
         """Ways whose best fit is the largest amplitude that the models reach, with a larger one that there can be."""
