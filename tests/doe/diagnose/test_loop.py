@@ -7,6 +7,7 @@ amplitudes shift six pours by 22 standard errors in each condition.
 import hashlib
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from doe.diagnose.confirm import Model
 from doe.diagnose.declared import declare
 from doe.diagnose.levels import REPLICATES, Level, whitened_shift
 from doe.diagnose.points import AS_IT_IS
+from doe.diagnose.posterior import Level as Best
 from doe.diagnose.pours import Pour
 from doe.diagnose.teaching import Teacher
 from doe.errors import StatisticsError
@@ -273,6 +275,28 @@ def test_a_closer_look_pours_the_base_model_too(measurement, monkeypatch):
     monkeypatch.setattr(diagnosis, "ModelPours", Recording)
     run(measurement, monkeypatch, (("air_drag", (1.0,)),), formula=twins, held_out=())
     assert {point.number for point in asked} >= set(range(BUDGET.base, BUDGET.base + BUDGET.more))
+
+
+def test_closer_looks_pour_both_sides_of_a_best_fit(measurement):
+    declared = declare(measurement, NAMES)
+    teacher = Teacher(declared, measurement.fit, FormulaPours(measurement.fit, [], None, None), BUDGET, str)
+    way = next(k for k, one in enumerate(teacher.ways) if one.name == "rolling_resistance")
+    base = SimpleNamespace(log_evidence=0.0)
+    # At 0.8 of its level: nearer to all of it than to half.
+    found = SimpleNamespace(
+        effects={"rolling_resistance": 0.5}, levels=[Best(way, 0.8, 3.0)], fits={"base": base}, nothing=0.5
+    )
+
+    def poured():
+        lessons = teacher.lessons()
+        amplitudes = lessons.amplitude[lessons.way == way]
+        return int((amplitudes == 1.0).sum()), int((amplitudes == 0.5).sum())
+
+    screened = poured()
+    assert teacher.look(found) == ("rolling_resistance",)
+    assert poured() == (screened[0] + BUDGET.more, screened[1])
+    teacher.look(found)
+    assert poured() == (screened[0] + BUDGET.more, screened[1] + BUDGET.more)
 
 
 def test_symmetries_cost_no_pours(measurement, monkeypatch):
