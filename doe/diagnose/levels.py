@@ -1,7 +1,7 @@
 """At which amplitude an effect is poured: where it shifts the summaries of a data set by about 12 standard errors.
 
 From the end of the range inward; back out, halfway on a logarithmic scale, where a step inward went too far. Less only
-where all that the literature supports does less. Two pours of a trial and the covariance of the base model's alone tell
+where all that the literature supports does less. The pour of a trial and the covariance of the base model's alone tell
 the order of a shift: once all effects have been poured, ``taught_shifts`` tells it by the covariance of all of them,
 and what does too little is poured again farther out.
 """
