@@ -8,6 +8,9 @@ an answer back. The farthest summary of the final model over all held-out condit
 with r measured and m fresh pours, s the deviation of a pour pooled over both and f degrees of freedom; Bonferroni's
 p = (number of summaries) P(|t_f| ≥ |t|) below ``CONTRADICTED`` contradicts it. That is strict because the error of the
 fit is not in s, and summary by summary because what is missing shows in what it acts on, not evenly over all.
+
+Of scanned piles the same pours show where the residual sits: measured minus poured height over the plate, before and
+after. Nothing is decided by that.
 """
 
 from __future__ import annotations
@@ -23,6 +26,9 @@ from doe.diagnose.declared import Declared
 from doe.diagnose.points import Point
 from doe.diagnose.posterior import Fit
 from doe.diagnose.pours import ModelPours, Pour
+from doe.measurement.features import coarse_map
+from doe.measurement.measurement import Condition
+from doe.measurement.piles import PileSurface
 from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
@@ -30,6 +36,8 @@ FloatArray = npt.NDArray[np.float64]
 CONTRADICTED = 0.001
 CONSTANT_FLOOR = 1e-3
 """Least standard deviation of a summary, as a share of its size."""
+LEAST_ERROR = 1e-4
+"""Standard error [m] below which no height is known: the plate far from the pile is bare in every pour."""
 
 
 @dataclass(frozen=True)
@@ -83,10 +91,15 @@ def confirm(
 
     Pours of another ``sequence`` have other seeds.
     """
-    points = [Point(f"{sequence} {number}", k, model.theta, model.effects) for model in models for k in range(number)]
+    points = [point for model in models for point in confirming(model, number, sequence)]
     # All of them at once, so that no worker waits for the last pour of a model.
     rows = iter(pours.run(f"{sequence}: {', '.join(model.name for model in models)}", points, where))
     return tuple(_confirmed(model, [next(rows) for _ in range(number)], widths) for model in models)
+
+
+def confirming(model: Model, number: int, sequence: str = "confirm") -> list[Point]:
+    """The points of the ``number`` pours that confirm a model."""
+    return [Point(f"{sequence} {number}", k, model.theta, model.effects) for k in range(number)]
 
 
 def _confirmed(model: Model, rows: Sequence[Sequence[Pour]], widths: Sequence[int]) -> Confirmed:
@@ -147,3 +160,70 @@ def held_out(label: str, data: Sequence[HeldOutData], poured: Sequence[FloatArra
     t_most, freedom, condition, summary = worst
     p = min(1.0, asked * 2.0 * float(stats.t.sf(t_most, freedom)))
     return HeldOut(label, condition, summary, t_most, p)
+
+
+@dataclass(frozen=True)
+class Difference(Record):
+    """Measured minus poured mean height (n, n) [m], rows along x, and the same in standard errors of the two means."""
+
+    height: FloatArray
+    z: FloatArray
+
+
+@dataclass(frozen=True)
+class HeightDifferences(Record):
+    """The differences of one scanned condition.
+
+    Attributes
+    ----------
+    condition, role
+        Its name, and "fit" or "holdout".
+    pixel
+        Width of a pixel [m]; the axis is in the middle of the map.
+    measured
+        Mean measured height (n, n) [m].
+    before, after
+        To the calibrated base model, and to the final one.
+    """
+
+    condition: str
+    role: str
+    pixel: float
+    measured: FloatArray
+    before: Difference
+    after: Difference
+
+
+def height_differences(
+    conditions: Sequence[Condition], before: Confirmed, after: Confirmed, pours: ModelPours, number: int
+) -> tuple[HeightDifferences, ...]:
+    """Of those of ``conditions``, those of ``pours``, that have scans of two piles at least.
+
+    ``number``: pours of each model that were asked for.
+    """
+    found = []
+    for c, condition in enumerate(conditions):
+        if len(condition.surfaces) < 2:
+            continue
+        scans = [coarse_map(surface, condition) for surface in condition.surfaces.values()]
+        measured = np.array([scan.height for scan in scans])
+        differences = []
+        for model in (before.model, after.model):
+            records = pours.records(confirming(model, number), c)
+            poured = [coarse_map(PileSurface(record.pile.spheres), condition).height for record in records]
+            differences.append(difference(measured, np.array(poured)) if len(poured) > 1 else None)
+        first, last = differences
+        if first is not None and last is not None:
+            found.append(
+                HeightDifferences(condition.name, condition.role, scans[0].pixel, measured.mean(axis=0), first, last)
+            )
+    return tuple(found)
+
+
+def difference(measured: FloatArray, poured: FloatArray) -> Difference:
+    """Of measured (r, n, n) and poured (m, n, n) heights, with one standard deviation of a pour for both."""
+    r, m = len(measured), len(poured)
+    step = measured.mean(axis=0) - poured.mean(axis=0)
+    square = (r - 1) * measured.var(axis=0, ddof=1) + (m - 1) * poured.var(axis=0, ddof=1)
+    error = np.sqrt(square / (r + m - 2) * (1.0 / r + 1.0 / m))
+    return Difference(step, step / np.maximum(error, LEAST_ERROR))

@@ -10,7 +10,16 @@ import numpy.typing as npt
 
 from doe.diagnose.budget import Budget
 from doe.diagnose.compared import Compared, measured, weighed
-from doe.diagnose.confirm import Confirmed, HeldOut, HeldOutData, confirm, held_out, model_of
+from doe.diagnose.confirm import (
+    Confirmed,
+    HeightDifferences,
+    HeldOut,
+    HeldOutData,
+    confirm,
+    height_differences,
+    held_out,
+    model_of,
+)
 from doe.diagnose.declared import Declared, declare
 from doe.diagnose.holdout import HoldoutCondition, HoldoutError, holdout_errors
 from doe.diagnose.levels import Level
@@ -69,6 +78,8 @@ class Diagnosis:
     holdout_error: tuple[HoldoutError, ...]
     held_out: HeldOut | None
     """What the held-out data say of the final model; None without such data."""
+    maps: tuple[HeightDifferences, ...]
+    """Where in the scanned piles the residual sits, before and after."""
     suggestions: tuple[Suggestion, ...]
     pours: int
     """Pours that were really run; the others were found in the store."""
@@ -131,6 +142,9 @@ def run_diagnosis(
         fit_error=errors_of(measurement.conditions, "fit", confirmed),
         holdout_error=errors_of(measurement.conditions, "holdout", confirmed),
         held_out=confirmed.held_out,
+        maps=height_differences(
+            measurement.conditions, confirmed.before, confirmed.after, everywhere, fresh_pours(measurement.conditions)
+        ),
         suggestions=menu.suggestions,
         pours=model.run_now + everywhere.run_now + menu.run_now,
         settings=teacher.settings,
@@ -194,8 +208,9 @@ def concluded(
     """The final model beside the base model in ``conditions``, those of ``pours``, and the verdict that it leaves."""
     fits = compared.posterior.fits
     asked = [model_of(fits[label], declared) for label in dict.fromkeys(("base", verdict.final))]
-    number = max(FRESH, *(condition.replicates for condition in conditions))
-    confirmed = confirm(asked, pours, number, [len(summary_names(condition)) for condition in conditions])
+    confirmed = confirm(
+        asked, pours, fresh_pours(conditions), [len(summary_names(condition)) for condition in conditions]
+    )
     before, after = confirmed[0], confirmed[-1]
     told = held_out_of(conditions, verdict.final, after)
     if told is not None and told.contradicted and (verdict.names or verdict.kind == NO_EFFECT):
@@ -203,6 +218,11 @@ def concluded(
         verdict = taken_back(verdict, why)
         say(f"with held-out data: {verdict.kind}")
     return Conclusion(before, after, told), verdict
+
+
+def fresh_pours(conditions: Sequence[Condition]) -> int:
+    """Pours per model and condition in the confirmation."""
+    return max(FRESH, *(condition.replicates for condition in conditions))
 
 
 def odds(found: Posterior) -> str:

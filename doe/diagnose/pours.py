@@ -26,6 +26,7 @@ from solver import (
     Scene,
     observe_named,
     pour_key,
+    unpacked,
     with_values,
 )
 
@@ -185,6 +186,11 @@ class ModelPours:
                 label = f"{point.sequence} {point.number}, {self._conditions[c].name}"
                 self._on_pour(what, left, Ended(label, job.seed, record.outcome, record.message))
         return [found[k] for k in range(len(searches))]
+
+    def records(self, points: Sequence[Point], condition: int) -> list[Record]:
+        """What is kept of the pours of ``points`` that came to a valid end, which have been asked for before."""
+        stored = [self._store.find(self._keys[point, condition]) for point in points]
+        return [unpacked(one.raw) for one in stored if one is not None and Outcome(one.outcome).valid]
 
     def scene(self, point: Point, condition: int) -> Scene:
         """The scene of ``point`` in a condition."""

@@ -210,6 +210,15 @@ def _seen(surface: UpperSurface, condition: Condition, sight: Sight = PERFECT) -
     return coarsened(without_holes(seen_through(surface.height_map(half_width, cell), sight)), times)
 
 
+def coarse_map(surface: UpperSurface, condition: Condition) -> HeightMap:
+    """The surface of a pile of ``condition`` in pixels a body's thickness wide, to be looked at."""
+    seen, times = _seen(surface, condition), int(PIXELS)
+    edge = len(seen.height) % (2 * times) // 2
+    inner = slice(edge, len(seen.height) - edge)
+    cropped = HeightMap(seen.height[inner, inner], seen.radius[inner, inner], seen.pixel)
+    return coarsened(cropped, times)
+
+
 def _listed_places(condition: Condition) -> Array | None:
     observation = condition.offered.get(LISTED)
     return None if observation is None else observation.x

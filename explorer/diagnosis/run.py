@@ -35,7 +35,7 @@ from explorer.files.whole_file import write_whole
 from explorer.report.diagnosis import write_diagnosis_report
 from solver import EFFECTS, Crew
 
-SCHEMA = 2
+SCHEMA = 3
 RULE = {
     "prior_nothing": NOTHING,
     "prior_outside": OUTSIDE,
@@ -161,6 +161,7 @@ def result_of(measurement: Measurement, order: DiagnoseOrder, found: Diagnosis, 
                 for condition in found.conditions
             ],
             "piles": [picture for c in range(len(found.conditions)) for picture in _piles(found, c)],
+            "maps": found.maps,
             "data": {
                 "folder": str(order.folder),
                 "title": measurement.title,

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from doe.diagnose.compared import Measured, weighed
+from doe.diagnose.confirm import HeightDifferences, difference
 from doe.diagnose.declared import declare
 from doe.diagnose.diagnosis import Diagnosis, Offered, concluded, errors_of
 from doe.diagnose.emulator import Lessons, Way
@@ -59,6 +60,7 @@ MIDDLE, SIZE = (np.array([row[k] for row in FEATURES.values()]) for k in (0, 1))
 D, WIDTH = len(SUMMARIES), len(FEATURES)
 REPLICATES, BASE, TAUGHT = 6, 48, 12
 RADIUS = (np.arange(18) + 0.5) * 5e-3
+PIXEL = 7e-3
 PARAMETERS = (
     MeasuredParameter("pair.grain.grain.static_friction", 0.47, 0.72, 0.57, 0.05),
     MeasuredParameter("pair.grain.steel.static_friction", 0.4, 1.0, None, None),
@@ -126,6 +128,19 @@ def measured_condition(name, role, scene, block):
 def profiles(block):
     """Cones of the apex height and the radius r90 of each pour."""
     return block[:, [1]] * np.maximum(0.0, 1.0 - RADIUS / block[:, [4]])
+
+
+def cones(block):
+    """Heights over the plate of the same cones, (pours, 24, 24)."""
+    at = PIXEL * (np.arange(24) - 11.5)
+    shares = np.hypot(at[:, None], at[None, :]) / block[:, 4, None, None]
+    return block[:, 1, None, None] * np.maximum(0.0, 1.0 - shares)
+
+
+def maps_of(measured, before, after):
+    """Of the condition that has a scan."""
+    poured = (difference(cones(measured), cones(one.blocks[0])) for one in (before, after))
+    return (HeightDifferences("fit", "fit", PIXEL, cones(measured).mean(axis=0), *poured),)
 
 
 def levels_of(declared):
@@ -231,6 +246,7 @@ def diagnosed(
         fit_error=errors_of(conditions, "fit", found),
         holdout_error=errors_of(conditions, "holdout", found),
         held_out=found.held_out,
+        maps=maps_of(blocks[0], found.before, found.after),
         suggestions=suggestions(verdict),
         pours=321,
         settings=240,

@@ -260,6 +260,22 @@ def test_the_pile_is_drawn_as_measured_before_and_after(result):
         assert trace["x"] == [-x for x in trace["x"]][::-1]
 
 
+def test_the_map_shows_measured_minus_poured(result):
+    (picture,) = result["maps"]
+    spec = figures_of(result)["map-1"]
+    heat = {trace["name"]: trace for trace in spec["data"] if trace["type"] == "heatmap"}
+    assert heat.keys() == {"before", "after"}
+    for name, trace in heat.items():
+        height, z = picture[name]["height"], picture[name]["z"]
+        for x, y in ((3, 17), (11, 12), (20, 6)):
+            assert trace["z"][y][x] == pytest.approx(1e3 * height[x][y], abs=1e-3)
+            assert trace["customdata"][y][x] == pytest.approx(z[x][y], abs=0.05)
+    assert heat["before"]["x"] == heat["before"]["y"] == [-x for x in heat["before"]["x"]][::-1]
+    ((row,),) = tables(result, "condition", "root mean square before")
+    worst = max(abs(one) for line in picture["before"]["z"] for one in line)
+    assert abs(float(row[4].removesuffix(" σ").replace("−", "-"))) == pytest.approx(worst, abs=0.006)
+
+
 # One property of one variant
 
 
@@ -506,7 +522,7 @@ def test_an_effect_that_fell_out_of_the_table_is_a_dash(results):
 
 
 @pytest.mark.parametrize(
-    ("schema", "maker"), [(1, "an older version"), (3, "another version"), (None, "another version")]
+    ("schema", "maker"), [(1, "an older version"), (SCHEMA + 1, "another version"), (None, "another version")]
 )
 def test_a_result_of_another_version_is_refused_in_one_line(results, tmp_path, schema, maker):
     other = results["effect"] | {"schema": schema}

@@ -9,7 +9,7 @@ from typing import Any
 from explorer.files.whole_file import write_whole
 from explorer.report.content import Section
 from explorer.report.diagnosis.answer import could_have_seen, in_short, rivals
-from explorer.report.diagnosis.evidence import effects, error, parameters, pile, residuals
+from explorer.report.diagnosis.evidence import effects, error, over_the_plate, parameters, pile, residuals
 from explorer.report.diagnosis.findings import checked
 from explorer.report.diagnosis.method import data, for_a_paper, how_reached, repeat
 from explorer.report.findings import Plain
@@ -24,6 +24,7 @@ SECTIONS: tuple[Callable[[Plain], Section | None], ...] = (
     could_have_seen,
     error,
     pile,
+    over_the_plate,
     residuals,
     effects,
     parameters,

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import numpy as np
 from scipy import stats
 
 from explorer.report.content import Spec
 from explorer.report.diagnosis.findings import NOTHING, OUTSIDE, feature_label, probabilities, spelled
 from explorer.report.figures.style import (
     ASSUMPTION,
+    BELOW_TO_ABOVE,
     DUMMY,
     FACTOR,
+    INK,
     TARGET,
     Json,
     axis,
@@ -17,6 +20,8 @@ from explorer.report.figures.style import (
     label,
     line,
     points,
+    side_by_side,
+    suffix,
     vertical_line,
 )
 from explorer.report.findings import Plain
@@ -155,6 +160,44 @@ def pile_chart(picture: Plain) -> Spec:
         "yaxis": axis("mean height [mm]", scaleanchor="x", rangemode="tozero"),
     }
     return chart(traces, layout, 320)
+
+
+def map_chart(picture: Plain) -> Spec:
+    """Measured minus poured height over the plate [mm], before and after, with lines of the measured height."""
+    measured = MM * np.array(picture["measured"])
+    n = len(measured)
+    at = (MM * picture["pixel"] * (np.arange(n) + 0.5 - n / 2)).round(3).tolist()
+    steps = {key: MM * np.array(picture[key]["height"]) for key in ("before", "after")}
+    reach = max(float(np.abs(step).max()) for step in steps.values()) or 1.0
+    colours: Json = {"colorscale": BELOW_TO_ABOVE, "cmin": -reach, "cmax": reach}
+    layout: Json = {
+        "coloraxis": colours | {"colorbar": {"title": {"text": "measured − model [mm]"}}},
+        "showlegend": False,
+    }
+    traces: list[Json] = []
+    for panel, (key, step) in enumerate(steps.items()):
+        axes = {"xaxis": f"x{suffix(panel)}", "yaxis": f"y{suffix(panel)}"}
+        # Rows of a map go along x, rows of a heat map along y.
+        traces.append(
+            {
+                "type": "heatmap",
+                "name": key,
+                "x": at,
+                "y": at,
+                "z": step.T.round(3).tolist(),
+                "customdata": np.array(picture[key]["z"]).T.round(1).tolist(),
+                "coloraxis": "coloraxis",
+                "hovertemplate": "x %{x:.0f} mm, y %{y:.0f} mm<br>%{z:+.2f} mm, %{customdata:+.1f} σ<extra></extra>",
+            }
+            | axes
+        )
+        heights: Json = {"type": "contour", "x": at, "y": at, "z": measured.T.round(2).tolist(), "ncontours": 6}
+        lines: Json = {"contours": {"coloring": "none"}, "line": {"width": 0.8, "color": INK}, "hoverinfo": "skip"}
+        traces.append(heights | lines | {"showscale": False} | axes)
+        title = f"x [mm], {key}"
+        layout[f"xaxis{suffix(panel)}"] = axis(title, domain=side_by_side(2, 0.1)[panel], anchor=f"y{suffix(panel)}")
+        layout[f"yaxis{suffix(panel)}"] = axis("y [mm]", scaleanchor=f"x{suffix(panel)}", anchor=f"x{suffix(panel)}")
+    return chart(traces, layout, 380)
 
 
 def _mirrored(values: list[float | None]) -> list[float | None]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from explorer.report.content import Block, Caution, Figure, Folded, Section, Table, Text
-from explorer.report.diagnosis.charts import bands, drawn_residuals, error_chart, pile_chart, residual_chart
+from explorer.report.diagnosis.charts import bands, drawn_residuals, error_chart, map_chart, pile_chart, residual_chart
 from explorer.report.diagnosis.findings import (
     BASE,
     OVERALL,
@@ -113,9 +115,43 @@ def pile(result: Plain) -> Section | None:
         text += " Before and after are the same model here."
     blocks: list[Block] = [Text(text)]
     for k, picture in enumerate(pictures, start=1):
-        words = "held out" if picture["role"] == "holdout" else "fitted"
-        blocks.append(Figure(f"pile-{k}", pile_chart(picture), f"Condition {picture['condition']}, {words}."))
+        blocks.append(Figure(f"pile-{k}", pile_chart(picture), f"Condition {picture['condition']}, {_role(picture)}."))
     return Section("The pile", tuple(blocks))
+
+
+def over_the_plate(result: Plain) -> Section | None:
+    """Where in the scanned piles the residual sits; None without scans."""
+    if not result["maps"]:
+        return None
+    text = (
+        "Mean measured height minus that of fresh pours, in pixels as wide as a body is thick; lines are the measured "
+        "height. σ is the standard error of the difference by the scatter of measured and poured piles. A right model "
+        "leaves about 1 σ everywhere."
+    )
+    if not added(result):
+        text += " Before and after are the same model here."
+    header = ("condition", "root mean square before", "after", "farthest off before, at x, y", "there before", "after")
+    rows = tuple(_map_row(picture) for picture in result["maps"])
+    figures = [
+        Figure(f"map-{k}", map_chart(picture), f"Condition {picture['condition']}, {_role(picture)}.")
+        for k, picture in enumerate(result["maps"], start=1)
+    ]
+    return Section("Where in the pile it sits", (Text(text), *figures, Table(header, rows)))
+
+
+def _map_row(picture: Plain) -> tuple[str, ...]:
+    """Over the pixels in which a pile was measured or poured."""
+    before, after = (np.array(picture[key]["z"]) for key in ("before", "after"))
+    covered = (before != 0.0) | (after != 0.0)
+    place = np.unravel_index(np.abs(before).argmax(), before.shape)
+    x, y = (1e3 * picture["pixel"] * (k + 0.5 - len(before) / 2) for k in place)
+    means = (f"{fixed(float(np.sqrt((z[covered] ** 2).mean())) if covered.any() else 0.0)} σ" for z in (before, after))
+    there = (f"{signed(float(z[place]))} σ" for z in (before, after))
+    return (picture["condition"], *means, f"{x:.0f}, {y:.0f} mm", *there)
+
+
+def _role(picture: Plain) -> str:
+    return "held out" if picture["role"] == "holdout" else "fitted"
 
 
 def residuals(result: Plain) -> Section:

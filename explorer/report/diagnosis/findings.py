@@ -31,7 +31,7 @@ from solver.observables.surface_features import EDGES, RINGS
 Kind = Literal["no_missing_effect", "effect", "effects", "ambiguous", "unexplained"]
 Confirmation = Literal["no holdout", "within noise", "confirmed", "not certain", "not confirmed"]
 
-SCHEMA = 2
+SCHEMA = 3
 """Of the ``diagnosis.json`` that is read here."""
 NOTHING, OUTSIDE, BASE = "no_missing_effect", "unexplained", "base"
 OVERALL = "overall"

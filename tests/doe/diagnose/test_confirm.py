@@ -1,0 +1,81 @@
+"""Where in the pile the residual sits: differences by hand, and of piles that are known."""
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from doe.diagnose.confirm import LEAST_ERROR, Confirmed, Model, confirming, difference, height_differences
+from doe.measurement import load_measurement
+from doe.measurement.piles import PileSurface
+from solver import Spheres
+from solver.assets import measurement_folder
+
+
+def test_a_difference_in_standard_errors_by_hand():
+    measured, poured = np.zeros((2, 1, 2)), np.zeros((3, 1, 2))
+    measured[:, 0, 0], poured[:, 0, 0] = (3.0, 5.0), (1.0, 2.0, 3.0)
+    found = difference(measured, poured)
+    # Squares (2 + 2) over 3 degrees of freedom, of means of 2 and 3.
+    assert found.height[0] == pytest.approx([2.0, 0.0])
+    assert found.z[0] == pytest.approx([2.0 / np.sqrt(4.0 / 3.0 * (1.0 / 2.0 + 1.0 / 3.0)), 0.0])
+
+
+def test_a_bare_plate_differs_by_nothing():
+    assert np.all(difference(np.zeros((2, 3, 3)), np.zeros((4, 3, 3))).z == 0.0)
+    step = difference(np.full((2, 1, 1), 2.0 * LEAST_ERROR), np.zeros((2, 1, 1)))
+    assert step.z[0, 0] == pytest.approx(2.0)
+
+
+def heap(x):
+    """A pile of one big sphere at ``x`` [m] along x."""
+    one = np.array([[x, 0.0, 0.02]])
+    return Spheres(one, np.array([0.02]), np.zeros(1, dtype=np.int64))
+
+
+def test_a_pile_that_stands_elsewhere_shows_where():
+    condition = load_measurement(Path(measurement_folder("trefoil_1"))).fit[0]
+    scans = {k: PileSurface(heap(0.03 + 1e-4 * k)) for k in (1, 2)}
+    scanned = replace(condition, surfaces=scans)
+    places = {(): -0.03, (("plate_tilt", (1.0, 0.0)),): 0.03}
+    asked = []
+
+    def records(points, c):
+        asked.append((c, [point.number for point in points]))
+        return [
+            SimpleNamespace(pile=SimpleNamespace(spheres=heap(places[one.effects] + 1e-4 * one.number)))
+            for one in points
+        ]
+
+    before, after = (Confirmed(Model((), effects), (), 0) for effects in places)
+    (found,) = height_differences(
+        [condition, scanned] if not condition.surfaces else [scanned],
+        before,
+        after,
+        SimpleNamespace(records=records),
+        3,
+    )
+    assert {numbers for _, one in asked for numbers in [tuple(one)]} == {(0, 1, 2)}
+    n = len(found.measured)
+    x = found.pixel * (np.arange(n) + 0.5 - n / 2)
+    highest = np.unravel_index(found.before.height.argmax(), (n, n))
+    lowest = np.unravel_index(found.before.height.argmin(), (n, n))
+    assert x[highest[0]] == pytest.approx(0.03, abs=found.pixel)
+    assert x[lowest[0]] == pytest.approx(-0.03, abs=found.pixel)
+    assert x[highest[1]] == pytest.approx(0.0, abs=found.pixel)
+    assert np.abs(found.after.height).max() < 0.1 * found.before.height.max()
+
+
+def test_without_scans_there_is_no_map():
+    condition = replace(load_measurement(Path(measurement_folder("trefoil_1"))).fit[0], surfaces={})
+    model = Confirmed(Model(()), (), 0)
+    assert height_differences([condition], model, model, SimpleNamespace(records=None), 3) == ()
+
+
+def test_the_points_that_confirm_are_those_that_were_poured():
+    points = confirming(Model((1.0,), (("air_drag", (0.5,)),)), 2)
+    assert [(one.sequence, one.number, one.theta, one.effects) for one in points] == [
+        ("confirm 2", k, (1.0,), (("air_drag", (0.5,)),)) for k in range(2)
+    ]
