@@ -136,13 +136,14 @@ def over_the_plate(result: Plain) -> Section | None:
         Figure(f"map-{k}", map_chart(picture), f"Condition {picture['condition']}, {_role(picture)}.")
         for k, picture in enumerate(result["maps"], start=1)
     ]
-    return Section("Where in the pile it sits", (Text(text), *figures, Table(header, rows)))
+    caption = "Root mean squares where the measured pile is half a body high at least."
+    return Section("Where in the pile it sits", (Text(text), *figures, Table(header, rows, caption)))
 
 
 def _map_row(picture: Plain) -> tuple[str, ...]:
-    """Over the pixels in which a pile was measured or poured."""
+    """Root mean squares where the pile is half a body high at least: the plate around it says nothing."""
     before, after = (np.array(picture[key]["z"]) for key in ("before", "after"))
-    covered = (before != 0.0) | (after != 0.0)
+    covered = np.array(picture["measured"]) >= 0.5 * picture["pixel"]
     place = np.unravel_index(np.abs(before).argmax(), before.shape)
     x, y = (1e3 * picture["pixel"] * (k + 0.5 - len(before) / 2) for k in place)
     means = (f"{fixed(float(np.sqrt((z[covered] ** 2).mean())) if covered.any() else 0.0)} σ" for z in (before, after))

@@ -91,6 +91,10 @@ class FormulaPours:
         self.run_now += len(points) * len(asked)
         return [[self.pour(point, condition) for condition in asked] for point in points]
 
+    def records(self, points, condition):
+        """No pile stands behind a formula."""
+        return []
+
     def pour(self, point, condition):
         width = len(summary_names(condition))
         numbers = " ".join(f"{x:.8g}" for x in (*point.theta, *(a for _, pair in point.effects for a in pair)))
