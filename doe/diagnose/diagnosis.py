@@ -42,7 +42,7 @@ PoursAt = Callable[[Sequence[Condition], int | None], ModelPours]
 
 FRESH = 8
 """Pours per model and condition in the confirmation, or as many as there are replicates if that is more."""
-SETTLED, QUIET = 0.95, 0.9
+SETTLED, QUIET = 0.95, 0.8
 """Probability of an effect that has had a closer look, and of nothing, from which on no further look is taken; where
 the most probable effect has had one, ``NOTHING_FROM`` of nothing will do, for more pours add nothing to the data."""
 FIRST_OTHER_ROOT = 100
