@@ -31,7 +31,7 @@ from solver import Scene, pour_rig
 FloatArray = npt.NDArray[np.float64]
 Say = Callable[[str], None]
 
-TRIALS = Trials(pours=1, most=5, enough=6.0, too_much=20.0)
+TRIALS = Trials(pours=1, most=5, enough=6.0, too_much=18.0)
 """One pour tells the order of a shift, and all pours of an effect whether it is enough."""
 RAISES = 3
 """Times at most that an effect is poured farther out, whose pours together shift by less than is enough."""
