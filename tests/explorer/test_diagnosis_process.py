@@ -11,6 +11,7 @@ from explorer.background.command_process import BackgroundError, CommandStatus
 from explorer.background.stage_progress import StageProgress
 from explorer.diagnosis.process import DiagnoseProcess, Question
 from explorer.priority import BACKGROUND
+from explorer.report.diagnosis.findings import SCHEMA
 from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.study.diagnosis_panel import OWN, DiagnosisPanel, answer_markdown
@@ -267,7 +268,7 @@ def test_effects_budget_and_queue_are_asked_for_on_the_page(server, tmp_path):
 def test_a_file_that_is_no_diagnosis_is_one_line(server, tmp_path):
     process, actions = FakeDiagnosis(), Actions()
     panel = DiagnosisPanel(server, process, shipped_measurements(), tmp_path / "uploads", actions.post)
-    (tmp_path / "diagnosis.json").write_text('{"schema": 2, "verdict": "<script>"}')
+    (tmp_path / "diagnosis.json").write_text(json.dumps({"schema": SCHEMA, "verdict": "<script>"}))
     process.out = tmp_path
     panel.show("")
     assert "cannot be shown" in panel._answer.content
