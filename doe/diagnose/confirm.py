@@ -145,9 +145,8 @@ def held_out(label: str, data: Sequence[HeldOutData], poured: Sequence[FloatArra
         if min(len(one.measured), len(block)) < 2:
             continue
         freedom = len(one.measured) + len(block) - 2
-        both = [one.measured - one.measured.mean(axis=0), block - block.mean(axis=0)]
         floor = CONSTANT_FLOOR * np.abs(np.concatenate([one.measured, block])).max(axis=0)
-        spread = np.maximum(np.sqrt((np.concatenate(both) ** 2).sum(axis=0) / freedom), floor)
+        spread = np.maximum(_pooled_deviation(one.measured, block), floor)
         off = np.abs(one.measured.mean(axis=0) - block.mean(axis=0))
         varies = spread > 0.0
         asked += int(varies.sum())
@@ -207,15 +206,16 @@ def height_differences(
             continue
         scans = [coarse_map(surface, condition) for surface in condition.surfaces.values()]
         measured = np.array([scan.height for scan in scans])
-        differences = []
-        for model in (before.model, after.model):
+        differences = {}
+        for model in dict.fromkeys((before.model, after.model)):
             records = pours.records(confirming(model, number), c)
             poured = [coarse_map(PileSurface(record.pile.spheres), condition).height for record in records]
-            differences.append(difference(measured, np.array(poured)) if len(poured) > 1 else None)
-        first, last = differences
-        if first is not None and last is not None:
+            if len(poured) > 1:
+                differences[model] = difference(measured, np.array(poured))
+        if {before.model, after.model} <= differences.keys():
+            both = (differences[one.model] for one in (before, after))
             found.append(
-                HeightDifferences(condition.name, condition.role, scans[0].pixel, measured.mean(axis=0), first, last)
+                HeightDifferences(condition.name, condition.role, scans[0].pixel, measured.mean(axis=0), *both)
             )
     return tuple(found)
 
@@ -224,6 +224,11 @@ def difference(measured: FloatArray, poured: FloatArray) -> Difference:
     """Of measured (r, n, n) and poured (m, n, n) heights, with one standard deviation of a pour for both."""
     r, m = len(measured), len(poured)
     step = measured.mean(axis=0) - poured.mean(axis=0)
-    square = (r - 1) * measured.var(axis=0, ddof=1) + (m - 1) * poured.var(axis=0, ddof=1)
-    error = np.sqrt(square / (r + m - 2) * (1.0 / r + 1.0 / m))
+    error = _pooled_deviation(measured, poured) * np.sqrt(1.0 / r + 1.0 / m)
     return Difference(step, step / np.maximum(error, LEAST_ERROR))
+
+
+def _pooled_deviation(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Standard deviation within two samples (n, …), one for both."""
+    both = np.concatenate([one - one.mean(axis=0), other - other.mean(axis=0)])
+    return np.asarray(np.sqrt((both**2).sum(axis=0) / (len(both) - 2)), dtype=np.float64)

@@ -224,12 +224,11 @@ def posterior(emulator: Emulator, data: Data, temperature: float = TEMPERATURE, 
         name: weigher.fit(name, (name,), nodes.rows, nodes.natural, nodes.ends, logs[name])
         for name, nodes in singles.items()
     }
-    number = max(1, len(singles))
-    share = (1.0 - NOTHING - OUTSIDE - PAIRS) / number
-    weighed = {name: _weight(share, fits[name].log_evidence, temperature) for name in singles}
-    nothing = _weight(NOTHING, fits["base"].log_evidence, temperature)
+    number, priors = len(singles), priors_of(tuple(singles))
+    weighed = {name: _weight(priors[name], fits[name].log_evidence, temperature) for name in singles}
+    nothing = _weight(priors["base"], fits["base"].log_evidence, temperature)
     log_outside = float(logsumexp(spread)) - math.log(len(SPREADS))
-    outside = _weight(OUTSIDE, log_outside, temperature)
+    outside = _weight(priors["outside"], log_outside, temperature)
     if (
         pairs
         and len(singles) > 1
@@ -268,6 +267,12 @@ def fitted(emulator: Emulator, data: Data, label: str) -> Fit:
         return _pairs(weigher, singles, least=0.0)[label]
     nodes = singles[label]
     return weigher.fit(label, names, nodes.rows, nodes.natural, nodes.ends, weigher.densities(nodes.rows))
+
+
+def priors_of(effects: Sequence[str]) -> dict[str, float]:
+    """Prior probability of "base", of "outside" and of each of ``effects`` alone."""
+    rest = 1.0 - NOTHING - OUTSIDE - PAIRS
+    return {"base": NOTHING, "outside": OUTSIDE} | {name: rest / len(effects) for name in effects}
 
 
 def _weight(prior: float, log_evidence: float, temperature: float) -> float:

@@ -95,10 +95,12 @@ class Teacher:
         say(f"base model: {len(base)} settings")
         self._levels = self._found_levels()
         self._pour("screening", [(way, 1.0, budget.screening) for way in range(len(self.ways))])
+        self._tell_shifts()
         refused: dict[int, float] = {}
         for _ in range(RAISES):
             if not self._raise_levels(refused):
                 break
+            self._tell_shifts()
         self._keep_trials()
         for direction, level in zip(self._directions, self._levels, strict=True):
             if not direction.angle:
@@ -234,16 +236,20 @@ class Teacher:
             levels.append(replace(level, direction=one))
         return levels
 
-    def _raise_levels(self, refused: dict[int, float]) -> bool:
-        """Pour farther out what shifts the scalars too little, by all pours so far; whether any could be.
-
-        ``refused``: by way the least share at which pours broke off.
-        """
+    def _tell_shifts(self) -> None:
+        """The shifts of the levels in the scalars, by all pours so far."""
         first = len(self._declared.conditions)
         scalars = [np.arange(len(summary_names(condition))) for condition in self._conditions[:first]]
         lessons = self.lessons()
         shifts = taught_shifts(replace(lessons, blocks=lessons.blocks[:first]).only(scalars), self.ways)
         self._levels = [replace(one, shift=float(shift)) for one, shift in zip(self._levels, shifts, strict=True)]
+
+    def _raise_levels(self, refused: dict[int, float]) -> bool:
+        """Pour farther out what shifts the scalars too little; whether there was any.
+
+        ``refused``: by way the least share at which pours broke off.
+        """
+        first = len(self._declared.conditions)
         asked: dict[int, tuple[float, list[Point]]] = {}
         for way, (direction, level) in enumerate(zip(self._directions, self._levels, strict=True)):
             if direction.angle or level.shift >= TRIALS.enough or level.share == 1.0:
@@ -299,7 +305,8 @@ class Teacher:
 
     def _all_of(self, way: int) -> list[int]:
         """Ways of the effect of ``way``."""
-        return [number for number, one in enumerate(self.ways) if one.effect == self.ways[way].effect]
+        effect = self._directions[way].effect
+        return [number for number, one in enumerate(self._directions) if one.effect == effect]
 
     def _keep(self, points: Sequence[Point], rows: Sequence[list[Pour]], way: int, multiple: float) -> None:
         for point, row in zip(points, rows, strict=True):

@@ -12,7 +12,7 @@ import numpy as np
 from scipy import stats
 from scipy.special import logsumexp
 
-from doe.diagnose.posterior import NOTHING, OUTSIDE, PAIRS
+from doe.diagnose.posterior import priors_of
 from doe.diagnose.verdict import THRESHOLD
 from doe.measurement.features import SCAN
 from doe.validation.sets import Row
@@ -178,9 +178,7 @@ def by_temperature(rows: Sequence[Row]) -> tuple[Tempered, ...]:
 def _probabilities(row: Row, temperature: float) -> dict[str, float]:
     """Of "base", "outside" and every single effect."""
     singles = [name for name in row.evidence if name not in ("base", "outside") and "+" not in name]
-    priors = {"base": NOTHING, "outside": OUTSIDE} | dict.fromkeys(
-        singles, (1 - NOTHING - OUTSIDE - PAIRS) / len(singles)
-    )
+    priors = priors_of(singles)
     logs = np.array([math.log(prior) + temperature * row.evidence[name] for name, prior in priors.items()])
     return dict(zip(priors, np.exp(logs - logsumexp(logs)).tolist(), strict=True))
 
@@ -191,10 +189,9 @@ def _truth(row: Row) -> str:
 
 def _top(row: Row) -> tuple[float, bool]:
     """Probability of the most probable answer, and whether it is true."""
-    answers = {"nothing": row.nothing, "outside": row.outside, row.best: row.best_p}
+    answers = {"base": row.nothing, "outside": row.outside, row.best: row.best_p}
     best = max(answers, key=lambda name: answers[name])
-    true = {"null": "nothing", "outside": "outside"}.get(row.kind, row.label)
-    return answers[best], best == true
+    return answers[best], best == _truth(row)
 
 
 def _covered(rows: Sequence[Row], risk: float) -> int:
