@@ -18,9 +18,9 @@ class Budget:
     base: int = 24
     screening: int = 4
     """Of each direction of an effect."""
-    more: int = 12
+    more: int = 8
     """At each look, of what stays in question."""
-    looks: int = 3
+    looks: int = 4
 
     def planned(self, directions: int, conditions: int) -> int:
         """Pours before the first look, amplitudes found at once."""

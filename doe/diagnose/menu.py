@@ -24,7 +24,7 @@ from doe.diagnose.posterior import Posterior
 from doe.diagnose.pours import ModelPours
 from doe.diagnose.teaching import Teacher, acting
 from doe.errors import StatisticsError
-from doe.measurement.condition_table import turned
+from doe.measurement.condition_table import turned as turned_scene
 from doe.measurement.features import feature_set, offer_of
 from doe.measurement.measurement import Condition
 from doe.record import Record
@@ -47,19 +47,25 @@ INTERVAL = 2.0 * 1.96
 class Change(Record):
     """A change of the first fitted condition that a laboratory can make in minutes.
 
-    ``factors`` multiply its parameters, ``choices`` replace settings. What a turned rig tells needs a direction.
+    ``factors`` multiply its parameters, ``choices`` replace settings.
     """
 
     name: str
     factors: Mapping[str, float] = field(default_factory=dict)
     choices: Mapping[str, str] = field(default_factory=dict)
-    turned: bool = False
-    """Whether the rig is turned by 180° on its bench."""
+
+    def named(self, turned: bool) -> str:
+        """Its name, with the rig ``turned`` by 180° on its bench or not."""
+        if not turned:
+            return self.name
+        return f"{self.name}, {TURNED}" if self.factors or self.choices else TURNED
 
 
+TURNED = "rig turned by 180° on its bench"
+"""What any change is made with where an effect with a direction is left: it costs no pours, for all else is the same in
+a turned rig, and tells what stays with the bench from what turns with the rig."""
 CHANGES = (
     Change("as it is, poured again"),
-    Change("rig turned by 180° on its bench", turned=True),
     Change("half the mass", {"rig.mass": 0.5}),
     Change("half as much mass again", {"rig.mass": 1.5}),
     Change("outlet at 0.6 times the height", {"rig.outlet_height": 0.6}),
@@ -135,8 +141,10 @@ def next_experiment(
     """
     if len(weights) < 2:
         return Menu((), 0)
-    changes = {change.name: (change, values) for change, values in feasible(condition.scene)}
-    set_ups = [changed(condition, name, values, change.turned) for name, (change, values) in changes.items()]
+    directed = {way.effect for way in teacher.ways if way.angle is not None}
+    turned = any(name in directed for label in weights for name in label.split("+"))
+    changes = {change.named(turned): values for change, values in feasible(condition.scene)}
+    set_ups = [changed(condition, name, values, turned) for name, values in changes.items()]
     # What is measured there is weighed by all effects.
     set_ups = [one for one in set_ups if teacher.possible_in(one.scene)]
     model = pours_in(set_ups)
@@ -159,9 +167,7 @@ def next_experiment(
         if ranked[0].chance >= LIKELY:
             break
     suggestions = [
-        Suggestion(one, values, condition.name, tuple(weights), levers, planned, change.turned)
-        for one in ranked
-        for change, values in (changes[one.name],)
+        Suggestion(one, changes[one.name], condition.name, tuple(weights), levers, planned, turned) for one in ranked
     ]
     return Menu(tuple(suggestions), model.run_now)
 
@@ -238,7 +244,7 @@ def _rows(emulator: Emulator, teacher: Teacher, found: Posterior, label: str) ->
 
 def changed(condition: Condition, name: str, values: Mapping[str, float | str], about: bool) -> Condition:
     """``condition`` under another name, with ``values`` set and the rig turned ``about`` on its bench."""
-    scene = turned(condition.scene) if about else condition.scene
+    scene = turned_scene(condition.scene) if about else condition.scene
     return replace(condition, name=name, scene=with_values(scene, dict(values)), turned=condition.turned != about)
 
 

@@ -330,7 +330,11 @@ class Teacher:
             way = self.ways[level.way]
             if probability[way.effect] > IN_QUESTION and level.log_density > best[way.effect] - BEHIND:
                 asked.append((level.way, self._beside(level.way, level.amplitude)))
-        return asked
+        # Beside another effect it may fit best elsewhere than alone.
+        pairs = [label for label, p in found.effects.items() if "+" in label and p > IN_QUESTION]
+        paired = [one for label in pairs for one in acting(found, label, self.ways)]
+        asked += [(way, self._beside(way, amplitude)) for way, amplitude in paired]
+        return list(dict.fromkeys(asked))
 
     def _beside(self, way: int, amplitude: float) -> float:
         """The power of two of a level that is nearest to ``amplitude``, or the one on its other side once that has been

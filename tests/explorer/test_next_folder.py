@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 import pytest
 import trimesh
 
-from doe.diagnose.menu import CHANGES, Suggestion, feasible
+from doe.diagnose.menu import CHANGES, TURNED, Suggestion, feasible
 from doe.diagnose.next_experiment import RankedExperiment
 from doe.errors import MeasurementError
 from doe.measurement.load import load_measurement
@@ -35,12 +35,13 @@ def measured():
 
 def suggestion(name, values, condition="fit", pours=3):
     experiment = RankedExperiment(name, 0.83, 1.5)
-    turned = any(change.turned for change in CHANGES if change.name == name)
-    return Suggestion(experiment, values, condition, RIVALS, ("twisting: spin a single body",), pours, turned)
+    levers = ("twisting: spin a single body",)
+    return Suggestion(experiment, values, condition, RIVALS, levers, pours, name.endswith(TURNED))
 
 
 def values_of(measurement, name):
-    return {change.name: values for change, values in feasible(measurement.fit[0].scene)}[name]
+    changes = feasible(measurement.fit[0].scene)
+    return {change.named(turned): values for change, values in changes for turned in (False, True)}[name]
 
 
 def written(folder, source, measurement, name=TWICE):
@@ -68,7 +69,7 @@ def test_a_filled_folder_is_the_changed_set_up(tmp_path, measured, change):
     (condition,) = found.measurement.conditions
     assert replace(condition.scene, title="") == replace(with_values(fit.scene, dict(values)), title="")
     assert (condition.role, condition.replicates, condition.mean_of) == ("fit", 3, 1)
-    assert condition.turned == change.turned
+    assert not condition.turned
     assert set(condition.offered) == set(fit.offered)
     assert all((condition.offered[name].x == o.x).all() for name, o in fit.offered.items() if o.x is not None)
     assert found.measurement.parameters == measured.parameters
@@ -116,7 +117,7 @@ def test_what_is_read_after_a_stated_time_is_not_filled_first(measured):
 
 
 def test_the_readme_says_how_a_rig_is_turned(tmp_path, measured):
-    folder = written(tmp_path / "next", SOURCE, measured, "rig turned by 180° on its bench")
+    folder = written(tmp_path / "next", SOURCE, measured, TURNED)
     text = (folder / "README.md").read_text()
     assert "the whole rig, plate and funnel: **turned by 180° on its bench**" in text
     assert "turned = true" in (folder / "measurement.toml").read_text()
