@@ -32,18 +32,13 @@ DOE_PARTS_THAT_MAY_USE_THE_SOLVER = {
     "doe/study.py": "reads a study file: its material, rig and insertion make a scene",
     "doe/measurement/": "a condition is a scene, and data and runs are read by the same functions",
     "doe/validation/": "laboratories that pour what the diagnosis is then asked about",
-    "doe/diagnose/declared.py": "turns declared parameters and effects into those of the decision",
-    "doe/diagnose/points.py": "looks at a pour's pile from another side",
-    "doe/diagnose/pours.py": "turns a point of a plan into a simulated world",
+    "doe/declared/": "turns what is declared, and a point of a plan, into simulated worlds",
     "doe/diagnose/teaching.py": "asks a rig for its symmetries",
     "doe/diagnose/menu.py": "set-ups that a rig can do",
 }
 
 # In the order of the data: each file of the diagnosis may import from those before it.
 DIAGNOSIS_FILES = (
-    "declared",
-    "points",
-    "pours",
     "emulator",
     "posterior",
     "compared",
@@ -52,7 +47,6 @@ DIAGNOSIS_FILES = (
     "teaching",
     "verdict",
     "confirm",
-    "holdout",
     "next_experiment",
     "menu",
     "diagnosis",
@@ -230,7 +224,7 @@ def a_laboratory_shares_no_code_with_the_diagnosis(source: Source) -> list[str]:
 
 
 def no_truth_within_reach_of_the_diagnosis(source: Source) -> list[str]:
-    if not source.path.startswith("doe/diagnose/"):
+    if not source.path.startswith(("doe/diagnose/", "doe/declared/")):
         return []
     used = {one.module for one in imports(source) if one.module.startswith("doe.validation")}
     return [f"{source.path}: the diagnosis may not import {module}, which knows the truths" for module in sorted(used)]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from doe.diagnose.declared import declare
-from doe.diagnose.points import directions_of
+from doe.declared.model import declare
+from doe.declared.points import directions_of
 from doe.errors import StatisticsError
 from doe.measurement.measurement import Measurement
 

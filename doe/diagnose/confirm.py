@@ -22,10 +22,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from doe.diagnose.declared import Declared
-from doe.diagnose.points import Point
+from doe.declared.model import Declared
+from doe.declared.points import Point
+from doe.declared.pours import ModelPours, Pour
 from doe.diagnose.posterior import Fit
-from doe.diagnose.pours import ModelPours, Pour
 from doe.measurement.features import coarse_map
 from doe.measurement.measurement import Condition
 from doe.measurement.piles import PileSurface

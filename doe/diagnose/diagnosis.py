@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from doe.declared.model import Declared, declare
+from doe.declared.pours import ROOT, ModelPours, OnPour
 from doe.diagnose.budget import Budget
 from doe.diagnose.compared import Compared, measured, weighed
 from doe.diagnose.confirm import (
@@ -20,15 +22,13 @@ from doe.diagnose.confirm import (
     held_out,
     model_of,
 )
-from doe.diagnose.declared import Declared, declare
-from doe.diagnose.holdout import HoldoutCondition, HoldoutError, holdout_errors
 from doe.diagnose.levels import Level
 from doe.diagnose.menu import Menu, Suggestion, next_experiment
 from doe.diagnose.posterior import Posterior
-from doe.diagnose.pours import ROOT, ModelPours, OnPour
 from doe.diagnose.teaching import Say, Teacher
 from doe.diagnose.verdict import NO_EFFECT, NOTHING_FROM, THRESHOLD, Verdict, taken_back, verdict_of
 from doe.errors import MeasurementError
+from doe.holdout import HoldoutCondition, HoldoutError, holdout_errors
 from doe.measurement.features import SCAN, feature_set
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.summaries import summaries_of_data, summary_names

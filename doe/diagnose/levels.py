@@ -15,11 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from doe.declared.model import Declared
+from doe.declared.points import Direction, Point
+from doe.declared.pours import Rows, Search
 from doe.diagnose.compared import usable
-from doe.diagnose.declared import Declared
 from doe.diagnose.emulator import Lessons, Way, emulated
-from doe.diagnose.points import Direction, Point
-from doe.diagnose.pours import Rows, Search
 from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]

@@ -16,12 +16,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
+from doe.declared.points import AS_IT_IS
+from doe.declared.pours import ModelPours
 from doe.diagnose.compared import usable
 from doe.diagnose.emulator import Emulator, Lessons, emulated, planar_weights
 from doe.diagnose.next_experiment import MenuItem, Prediction, RankedExperiment, rank_experiments
-from doe.diagnose.points import AS_IT_IS
 from doe.diagnose.posterior import Posterior
-from doe.diagnose.pours import ModelPours
 from doe.diagnose.teaching import Teacher, acting
 from doe.errors import StatisticsError
 from doe.measurement.condition_table import turned as turned_scene

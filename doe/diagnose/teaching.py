@@ -14,14 +14,14 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
+from doe.declared.model import Declared, possible
+from doe.declared.points import AS_IT_IS, Direction, Point, View, base_points, directions_of, effect_points
+from doe.declared.pours import ModelPours, Pour
 from doe.diagnose.budget import Budget
 from doe.diagnose.compared import Instrument, Measured
-from doe.diagnose.declared import Declared, possible
 from doe.diagnose.emulator import Lessons, Way
 from doe.diagnose.levels import STRONG, Level, Trials, level_of, taught_shifts
-from doe.diagnose.points import AS_IT_IS, Direction, Point, View, base_points, directions_of, effect_points
 from doe.diagnose.posterior import LEAST, Posterior
-from doe.diagnose.pours import ModelPours, Pour
 from doe.errors import StatisticsError
 from doe.measurement.measurement import Condition
 from doe.measurement.sight import PERFECT, Sight

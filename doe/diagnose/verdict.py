@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from doe.declared.model import Declared, Parameter
 from doe.diagnose.compared import Compared
-from doe.diagnose.declared import Declared, Parameter
 from doe.diagnose.levels import Level
 from doe.diagnose.posterior import FITS, TEMPERATURE, Amplitude, Fit, Posterior
 from doe.record import Record

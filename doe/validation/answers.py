@@ -8,11 +8,11 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from doe.declared.points import Point
+from doe.declared.pours import ModelPours, room_of
 from doe.diagnose.budget import Budget
 from doe.diagnose.diagnosis import concluded, errors_of, joined, pursued, suggested
 from doe.diagnose.menu import Suggestion
-from doe.diagnose.points import Point
-from doe.diagnose.pours import ModelPours, room_of
 from doe.diagnose.teaching import Teacher
 from doe.diagnose.verdict import verdict_of
 from doe.measurement import Condition, Measurement, load_measurement

@@ -12,9 +12,9 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
+from doe.declared.model import declare
+from doe.declared.pours import ModelPours
 from doe.diagnose.budget import Budget
-from doe.diagnose.declared import declare
-from doe.diagnose.pours import ModelPours
 from doe.measurement.features import SCALARS, feature_set
 from doe.store import Store, default_store
 from doe.validation.answers import Answers

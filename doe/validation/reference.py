@@ -22,10 +22,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from doe.diagnose.declared import Declared, Effect
+from doe.declared.model import Declared, Effect
+from doe.declared.points import Direction, Point, directions_of, middle
+from doe.declared.pours import ModelPours
 from doe.diagnose.levels import Level, Trials, level_of
-from doe.diagnose.points import Direction, Point, directions_of, middle
-from doe.diagnose.pours import ModelPours
 from doe.errors import StatisticsError
 from doe.measurement.features import feature_set
 from doe.measurement.measurement import Measurement

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from doe.diagnose.declared import Declared
+from doe.declared.model import Declared
 from doe.validation.limit import Reached
 from doe.validation.schedule import Case
 

@@ -57,7 +57,7 @@ def _rooms_of(sources: list[str]) -> dict[str, list[Scene]]:
 
 
 def _shipped_rooms() -> dict[str, list[Scene]]:
-    from doe.diagnose.pours import room_of
+    from doe.declared.pours import room_of
     from doe.measurement.load import load_measurement
     from explorer.scene.file import DEFAULT_STUDY, load_scene
     from solver import RIGS, body_counts

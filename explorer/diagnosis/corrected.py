@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import tomli_w
 
-from doe.diagnose.declared import effect_values
+from doe.declared.model import effect_values
 from doe.diagnose.diagnosis import Diagnosis, complete_rows
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.summaries import summary_names

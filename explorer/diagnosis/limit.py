@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from doe.diagnose.declared import Declared, declare
+from doe.declared.model import Declared, declare
+from doe.declared.pours import Ended, ModelPours
 from doe.diagnose.levels import REPLICATES
-from doe.diagnose.pours import Ended, ModelPours
 from doe.measurement import Measurement, load_measurement
 from doe.measurement.features import OFFERS, feature_set
 from doe.record import plain

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from doe.diagnose.pours import Ended
+from doe.declared.pours import Ended
 from explorer.study.progress import told_run
 
 EVERY = 20.0

@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from doe.declared.pours import measured_profile
 from doe.diagnose.budget import Budget, scaled_budget
 from doe.diagnose.confirm import CONTRADICTED, Confirmed
 from doe.diagnose.diagnosis import Diagnosis, run_diagnosis
-from doe.diagnose.holdout import HoldoutError
 from doe.diagnose.levels import STRONG
 from doe.diagnose.posterior import FITS, NOTHING, OUTSIDE, PAIRS
-from doe.diagnose.pours import measured_profile
 from doe.diagnose.verdict import CREDIBLE, NOTHING_FROM
+from doe.holdout import HoldoutError
 from doe.measurement.load import load_measurement
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.summaries import summaries

@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from doe.diagnose.pours import Ended
+from doe.declared.pours import Ended
 from doe.runner import Run
 
 EVERY = 2.0

@@ -10,7 +10,7 @@ import math
 import sys
 from pathlib import Path
 
-from doe.diagnose.pours import reader
+from doe.declared.pours import reader
 from doe.measurement.load import load_measurement
 from doe.store import READINGS, observables_of, read_off
 from solver import Scene, load_material, packed, run_pour, unpacked, with_values

@@ -2,7 +2,7 @@
 
 import json
 
-from doe.diagnose.pours import Ended
+from doe.declared.pours import Ended
 from explorer.background.command_process import CommandStatus
 from explorer.background.stage_progress import failures, with_event, with_run
 from explorer.diagnosis.progress import PourProgress

@@ -1,9 +1,9 @@
-"""Data sets poured by LIGGGHTS with something added there that no file states, judged like any other (``make foreign``).
+"""Data sets poured by LIGGGHTS with something added there that no file states, judged like any other: ``make foreign``.
 
 The made-up laboratory of ``doe/validation/laboratories/trefoils`` with another engine: every pour is exported as
 ``explorer export`` writes it, the addition is made in LIGGGHTS's own input, and only where bodies come to rest is read.
-The laboratory has no balance: it hands out no discharge times and no mass that stays in the funnel. A follow-up is poured by
-LIGGGHTS too. Rows are those of ``explorer validate-diagnosis`` and are kept in ``assets/validation/foreign/sets.jsonl``.
+The laboratory has no balance: it hands out no discharge times and no mass that stays in the funnel. A follow-up is
+poured by LIGGGHTS too. Rows are those of ``explorer validate-diagnosis``, in ``assets/validation/foreign/sets.jsonl``.
 """
 
 import dataclasses
@@ -156,7 +156,8 @@ class ForeignAnswers(Answers):
 
 def main(store, numbers):
     """Judge the sets ``numbers`` that are not there yet."""
-    OUT.mkdir(parents=True, exist_ok=True)
+    for folder in (OUT, Path(store).parent):
+        folder.mkdir(parents=True, exist_ok=True)
     path, laboratory = OUT / "sets.jsonl", read_laboratory(TREFOILS)
     known = {row.number for row in read_rows(path)}
     with WorkPlace(Store(Path(store)), 1) as place:

@@ -138,7 +138,7 @@ def overall(result: Plain, role: str) -> Plain | None:
 
 
 def confirmation(result: Plain) -> Confirmation:
-    """What the held-out conditions say of the final model, by its skill (`doe.diagnose.holdout`)."""
+    """What the held-out conditions say of the final model, by its skill (`doe.holdout`)."""
     row = overall(result, "holdout")
     if row is None:
         return "no holdout"

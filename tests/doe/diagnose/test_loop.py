@@ -12,15 +12,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from doe.declared.model import declare
+from doe.declared.points import AS_IT_IS
+from doe.declared.pours import Pour
 from doe.diagnose import diagnosis, teaching
 from doe.diagnose.budget import LEAST, Budget, scaled_budget
 from doe.diagnose.compared import Measured
 from doe.diagnose.confirm import Model
-from doe.diagnose.declared import declare
 from doe.diagnose.levels import REPLICATES, Level, whitened_shift
-from doe.diagnose.points import AS_IT_IS
 from doe.diagnose.posterior import Level as Best
-from doe.diagnose.pours import Pour
 from doe.diagnose.teaching import Teacher
 from doe.errors import StatisticsError
 from doe.measurement import load_measurement, summary_names

@@ -4,8 +4,8 @@ import shutil
 
 import numpy as np
 
+from doe.declared.model import declare
 from doe.diagnose.compared import measured
-from doe.diagnose.declared import declare
 from doe.diagnose.diagnosis import complete_rows
 from doe.measurement import load_measurement
 from doe.validation.laboratory import TREFOILS, read_laboratory

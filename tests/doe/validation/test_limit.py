@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from doe.diagnose.declared import Condition, Declared, Effect, Parameter
+from doe.declared.model import Condition, Declared, Effect, Parameter
+from doe.declared.points import Direction, base_points, effect_points
+from doe.declared.pours import Pour
 from doe.diagnose.levels import STRONG, Level, Trials, level_of
-from doe.diagnose.points import Direction, base_points, effect_points
-from doe.diagnose.pours import Pour
 from doe.validation.limit import (
     RISK,
     RISKS,

@@ -5,10 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from doe.diagnose.declared import Condition, Declared, Effect, Parameter
+from doe.declared.model import Condition, Declared, Effect, Parameter
+from doe.declared.points import Direction
+from doe.declared.pours import Pour
 from doe.diagnose.levels import Level
-from doe.diagnose.points import Direction
-from doe.diagnose.pours import Pour
 from doe.errors import StatisticsError
 from doe.validation.reference import (
     PER_ROUND,

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from doe.diagnose.declared import Condition, Declared, Effect, Parameter
+from doe.declared.model import Condition, Declared, Effect, Parameter
 from doe.validation.limit import Kind, Reached
 from doe.validation.ruler import Strength
 from doe.validation.schedule import Case

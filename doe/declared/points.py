@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from doe.diagnose.declared import Declared, Effect, Parameter
+from doe.declared.model import Declared, Effect, Parameter
 from doe.measurement.sight import PERFECT, Sight
 from doe.record import Record
 from solver import Record as PourRecord

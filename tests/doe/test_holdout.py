@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from doe.diagnose.holdout import OVERALL, HoldoutCondition, holdout_errors
 from doe.errors import StatisticsError
+from doe.holdout import OVERALL, HoldoutCondition, holdout_errors
 
 
 def condition(bias_before, bias_after, seed=0, n=8, m=20, names=("angle", "height"), scale=(1.0, 0.01)):

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from doe.diagnose.declared import Condition, Declared, Effect, Parameter
-from doe.diagnose.points import AS_IT_IS, Direction, View, base_points, directions_of, effect_points, middle, moved
+from doe.declared.model import Condition, Declared, Effect, Parameter
+from doe.declared.points import AS_IT_IS, Direction, View, base_points, directions_of, effect_points, middle, moved
 from doe.measurement.features import features_of_record
 from doe.validation.laboratory import TREFOILS, read_laboratory
 from solver import run_pour, with_values

@@ -7,12 +7,12 @@ from contextlib import closing
 import numpy as np
 import pytest
 
-from doe.diagnose import pours as module
+from doe.declared import pours as module
+from doe.declared.model import Condition, Declared
+from doe.declared.points import Point
+from doe.declared.pours import ModelPours, Pour
 from doe.diagnose.confirm import Model, confirm
-from doe.diagnose.declared import Condition, Declared
 from doe.diagnose.levels import whitened_shift
-from doe.diagnose.points import Point
-from doe.diagnose.pours import ModelPours, Pour
 from doe.measurement import summary_names
 from doe.measurement.features import feature_set
 from doe.store import Store

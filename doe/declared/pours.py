@@ -11,8 +11,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from doe.diagnose.declared import effect_values
-from doe.diagnose.points import AS_IT_IS, Point, View
+from doe.declared.model import effect_values
+from doe.declared.points import AS_IT_IS, Point, View
 from doe.measurement.features import feature_set, features_of_record
 from doe.measurement.measurement import Condition, Observation
 from doe.runner import Pours, seed_of, stored_run
