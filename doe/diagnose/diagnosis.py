@@ -122,10 +122,7 @@ def run_diagnosis(
     model, everywhere = pours_in(measurement.fit), pours_in(measurement.conditions)
     teacher = Teacher(declared, measurement.fit, model, budget, say)
     compared = pursued(teacher, measurement.fit, budget, say)
-    taught = teacher.lessons().way
-    verdict = verdict_of(
-        compared, declared, teacher.levels, [int((taught == w).sum()) for w in range(len(teacher.ways))]
-    )
+    verdict = verdict_of(compared, declared, teacher.levels, teacher.pours, follow_up is not None)
     say(f"verdict: {verdict.kind}")
     confirmed, verdict = concluded(verdict, compared, declared, measurement.conditions, everywhere, say)
     menu = Menu((), 0)

@@ -53,8 +53,9 @@ DIRECTIONS = 24
 """Directions in the plane over which an effect with two amplitudes is summed."""
 SPREADS = np.geomspace(0.3, 6.0, 6)
 """Shifts by something outside [standard deviations of one pour in every feature]."""
-FITS = 0.002
-"""Probability of data as far off as these, below which a model does not fit: one right model in 500 is lost."""
+FITS = 0.01
+"""Probability of data as far off as these, below which a model does not fit: one right model in 100 is lost. With 0.002
+the stronger one of two effects was named at 0.004 (root 1); right ones lie evenly between 0 and 1."""
 PAIRED_BELOW = 0.1
 """Probability of nothing missing below which pairs of effects are weighed too, for they cost seconds: where something
 is missing, the most probable single effect may be the stronger one of two."""

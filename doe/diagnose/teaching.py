@@ -126,6 +126,12 @@ class Teacher:
         """Reference amplitudes, way by way."""
         return tuple(self._levels)
 
+    @property
+    def pours(self) -> tuple[int, ...]:
+        """Pours that taught each way."""
+        ways = [way for way, _ in self._acting.values()]
+        return tuple(ways.count(way) for way in range(len(self._levels)))
+
     def look(self, found: Posterior) -> tuple[str, ...]:
         """Pour more of what ``found`` leaves in question, near its best fits; the effects that were poured.
 

@@ -105,9 +105,7 @@ class Answers:
         fitted, held = self.model_pours(measurement.fit), self.model_pours(measurement.holdout)
         teacher = Teacher(declared, measurement.fit, fitted, self.budget, say)
         compared = pursued(teacher, measurement.fit, self.budget, say)
-        taught = teacher.lessons().way
-        pours = [int((taught == way).sum()) for way in range(len(teacher.ways))]
-        verdict = verdict_of(compared, declared, teacher.levels, pours)
+        verdict = verdict_of(compared, declared, teacher.levels, teacher.pours, follow_up is not None)
         conclusion, verdict = concluded(verdict, compared, declared, measurement.holdout, held, say)
         found = compared.posterior
         suggestion = None

@@ -19,7 +19,7 @@ from doe.diagnose.confirm import CONTRADICTED, Confirmed
 from doe.diagnose.diagnosis import Diagnosis, run_diagnosis
 from doe.diagnose.levels import STRONG
 from doe.diagnose.posterior import FITS, NOTHING, OUTSIDE, PAIRS
-from doe.diagnose.verdict import CREDIBLE, NOTHING_FROM
+from doe.diagnose.verdict import CREDIBLE, NOTHING_AT_ONCE, NOTHING_FROM
 from doe.holdout import HoldoutError
 from doe.measurement.load import load_measurement
 from doe.measurement.measurement import Condition, Measurement
@@ -41,6 +41,7 @@ RULE = {
     "prior_outside": OUTSIDE,
     "prior_pairs": PAIRS,
     "fits": FITS,
+    "nothing_at_once": NOTHING_AT_ONCE,
     "nothing_from": NOTHING_FROM,
     "credible": CREDIBLE,
     "contradicted": CONTRADICTED,

@@ -168,8 +168,9 @@ def how_reached(result: Plain) -> Section:
         f"outside the library, {rule['prior_pairs']} for pairs, the rest for single effects. The temperature is "
         f"{number(result['temperature'])}; below 1 the answer is less sure than the evidence says.",
         f"What reaches {percent(result['threshold'])} is named if the data are likely under it (p ≥ {rule['fits']}). "
-        f"Else nothing is missing if that has {percent(result['rule']['nothing_from'])} or more, unexplained if "
-        "something outside is the most probable, and ambiguous otherwise: the smallest set of answers that holds "
+        f"Else nothing is missing if that has {percent(result['rule']['nothing_at_once'])} or more "
+        f"({percent(result['rule']['nothing_from'])} after a follow-up), unexplained if something outside is the most "
+        "probable, and ambiguous otherwise: the smallest set of answers that holds "
         f"{percent(result['rule']['credible'])}.",
         "Fresh pours of the declared and the final model give the errors. Held-out data never choose; they take an "
         f"answer back where a summary contradicts it at p < {rule['contradicted']}, corrected for their number.",

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from doe.diagnose.posterior import FITS, Fit, Posterior
-from doe.diagnose.verdict import NO_EFFECT, UNEXPLAINED, answer
+from doe.diagnose.verdict import NO_EFFECT, NOTHING_AT_ONCE, NOTHING_FROM, UNEXPLAINED, answer
 
 
 def posterior(nothing, outside, effects, badly=()):
@@ -46,6 +46,13 @@ def test_the_rules(found, kind):
 )
 def test_a_model_that_does_not_fit_is_no_answer(found, kind):
     assert answer(found)[0] == kind
+
+
+@pytest.mark.parametrize(("nothing", "kind"), [(0.65, f"ambiguous:{NO_EFFECT},a,{UNEXPLAINED}"), (0.7, NO_EFFECT)])
+def test_what_is_half_sure_that_nothing_is_missing_asks_for_more(nothing, kind):
+    found = posterior(nothing, 0.1, {"a": 0.9 - nothing})
+    assert answer(found, NOTHING_AT_ONCE)[0] == kind
+    assert answer(found, NOTHING_FROM)[0] == NO_EFFECT
 
 
 def test_the_reason_is_told():
