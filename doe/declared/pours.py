@@ -143,8 +143,9 @@ class ModelPours:
     ) -> list[Result]:
         """What each of ``searches`` ends with. Each is answered as soon as its own pours are there.
 
-        What is asked for in answer to pours goes first, so that a search of many steps does not come last. It has to
-        fit into the room that its first points and the points ``widest`` need.
+        A point that is asked for in answer to pours goes first, so that a search of many steps does not come last;
+        several at once go last, as no further step waits for them. They have to fit into the room that the first
+        points and the points ``widest`` need.
         """
         asked = range(len(self._conditions)) if where is None else where
         found: dict[int, Result] = {}
@@ -180,7 +181,10 @@ class ModelPours:
             self.run_now += 1
             open_places[k].discard((point, c))
             more = [] if open_places[k] else resumed(k)
-            queue.extendleft(reversed(more))
+            if len(more) <= len(asked):
+                queue.extendleft(reversed(more))
+            else:
+                queue.extend(more)
             left += len(more) - 1
             if self._on_pour is not None:
                 label = f"{point.sequence} {point.number}, {self._conditions[c].name}"

@@ -30,14 +30,13 @@ from doe.measurement.features import coarse_map
 from doe.measurement.measurement import Condition
 from doe.measurement.piles import PileSurface
 from doe.record import Record
+from doe.residual_map import ResidualMap, height_difference, pooled_deviation
 
 FloatArray = npt.NDArray[np.float64]
 
 CONTRADICTED = 0.001
 CONSTANT_FLOOR = 1e-3
 """Least standard deviation of a summary, as a share of its size."""
-LEAST_ERROR = 1e-4
-"""Standard error [m] below which no height is known: the plate far from the pile is bare in every pour."""
 
 
 @dataclass(frozen=True)
@@ -146,7 +145,7 @@ def held_out(label: str, data: Sequence[HeldOutData], poured: Sequence[FloatArra
             continue
         freedom = len(one.measured) + len(block) - 2
         floor = CONSTANT_FLOOR * np.abs(np.concatenate([one.measured, block])).max(axis=0)
-        spread = np.maximum(_pooled_deviation(one.measured, block), floor)
+        spread = np.maximum(pooled_deviation(one.measured, block), floor)
         off = np.abs(one.measured.mean(axis=0) - block.mean(axis=0))
         varies = spread > 0.0
         asked += int(varies.sum())
@@ -161,41 +160,9 @@ def held_out(label: str, data: Sequence[HeldOutData], poured: Sequence[FloatArra
     return HeldOut(label, condition, summary, t_most, p)
 
 
-@dataclass(frozen=True)
-class Difference(Record):
-    """Measured minus poured mean height (n, n) [m], rows along x, and the same in standard errors of the two means."""
-
-    height: FloatArray
-    z: FloatArray
-
-
-@dataclass(frozen=True)
-class HeightDifferences(Record):
-    """The differences of one scanned condition.
-
-    Attributes
-    ----------
-    condition, role
-        Its name, and "fit" or "holdout".
-    pixel
-        Width of a pixel [m]; the axis is in the middle of the map.
-    measured
-        Mean measured height (n, n) [m].
-    before, after
-        To the calibrated base model, and to the final one.
-    """
-
-    condition: str
-    role: str
-    pixel: float
-    measured: FloatArray
-    before: Difference
-    after: Difference
-
-
-def height_differences(
+def residual_maps(
     conditions: Sequence[Condition], before: Confirmed, after: Confirmed, pours: ModelPours, number: int
-) -> tuple[HeightDifferences, ...]:
+) -> tuple[ResidualMap, ...]:
     """Of those of ``conditions``, those of ``pours``, that have scans of two piles at least.
 
     ``number``: pours of each model that were asked for.
@@ -211,24 +178,8 @@ def height_differences(
             records = pours.records(confirming(model, number), c)
             poured = [coarse_map(PileSurface(record.pile.spheres), condition).height for record in records]
             if len(poured) > 1:
-                differences[model] = difference(measured, np.array(poured))
+                differences[model] = height_difference(measured, np.array(poured))
         if {before.model, after.model} <= differences.keys():
             both = (differences[one.model] for one in (before, after))
-            found.append(
-                HeightDifferences(condition.name, condition.role, scans[0].pixel, measured.mean(axis=0), *both)
-            )
+            found.append(ResidualMap(condition.name, condition.role, scans[0].pixel, measured.mean(axis=0), *both))
     return tuple(found)
-
-
-def difference(measured: FloatArray, poured: FloatArray) -> Difference:
-    """Of measured (r, n, n) and poured (m, n, n) heights, with one standard deviation of a pour for both."""
-    r, m = len(measured), len(poured)
-    step = measured.mean(axis=0) - poured.mean(axis=0)
-    error = _pooled_deviation(measured, poured) * np.sqrt(1.0 / r + 1.0 / m)
-    return Difference(step, step / np.maximum(error, LEAST_ERROR))
-
-
-def _pooled_deviation(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Standard deviation within two samples (n, …), one for both."""
-    both = np.concatenate([one - one.mean(axis=0), other - other.mean(axis=0)])
-    return np.asarray(np.sqrt((both**2).sum(axis=0) / (len(both) - 2)), dtype=np.float64)

@@ -14,13 +14,12 @@ from doe.diagnose.budget import Budget
 from doe.diagnose.compared import Compared, measured, weighed
 from doe.diagnose.confirm import (
     Confirmed,
-    HeightDifferences,
     HeldOut,
     HeldOutData,
     confirm,
-    height_differences,
     held_out,
     model_of,
+    residual_maps,
 )
 from doe.diagnose.levels import Level
 from doe.diagnose.menu import Menu, Suggestion, next_experiment
@@ -33,6 +32,7 @@ from doe.measurement.features import SCAN, feature_set
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.summaries import summaries_of_data, summary_names
 from doe.record import Record
+from doe.residual_map import ResidualMap
 from doe.runner import Pours
 from doe.store import Store
 
@@ -78,7 +78,7 @@ class Diagnosis:
     holdout_error: tuple[HoldoutError, ...]
     held_out: HeldOut | None
     """What the held-out data say of the final model; None without such data."""
-    maps: tuple[HeightDifferences, ...]
+    maps: tuple[ResidualMap, ...]
     """Where in the scanned piles the residual sits, before and after."""
     suggestions: tuple[Suggestion, ...]
     pours: int
@@ -139,7 +139,7 @@ def run_diagnosis(
         fit_error=errors_of(measurement.conditions, "fit", confirmed),
         holdout_error=errors_of(measurement.conditions, "holdout", confirmed),
         held_out=confirmed.held_out,
-        maps=height_differences(
+        maps=residual_maps(
             measurement.conditions, confirmed.before, confirmed.after, everywhere, fresh_pours(measurement.conditions)
         ),
         suggestions=menu.suggestions,

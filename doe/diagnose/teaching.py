@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from doe.declared.model import Declared, possible
 from doe.declared.points import AS_IT_IS, Direction, Point, View, base_points, directions_of, effect_points
-from doe.declared.pours import ModelPours, Pour
+from doe.declared.pours import ModelPours, Pour, Search
 from doe.diagnose.budget import Budget
 from doe.diagnose.compared import Instrument, Measured
 from doe.diagnose.emulator import Lessons, Way
@@ -146,9 +146,7 @@ class Teacher:
             if way not in dict(further)
         ]
         if wanted:
-            base = base_points(self._declared, self._taught(-1, 0.0) + self._budget.more)
-            self._keep(base, self._pours.run("closer look", base), -1, 0.0)
-        self._pour("closer look", wanted)
+            self._pour("closer look", wanted, self._taught(-1, 0.0) + self._budget.more)
         return tuple(dict.fromkeys(self.ways[way].effect for way, _, _ in wanted))
 
     def refine(self, found: Posterior, label: str) -> None:
@@ -231,7 +229,13 @@ class Teacher:
             self._tried.append((direction, share, points))
             return points
 
-        searches = [level_of(self._declared, one, self._base, partial(tried, one), TRIALS) for one in asked]
+        def search(one: Direction) -> Search[Level]:
+            level = yield from level_of(self._declared, one, self._base, partial(tried, one), TRIALS)
+            # What screening will ask for, while others are still searched.
+            yield self._points(one, level.share, self._budget.screening)
+            return level
+
+        searches = [search(one) for one in asked]
         widest = [point for one in asked for point in self._points(one, 1.0, 1)]
         first = range(len(self._declared.conditions))
         found = self._pours.answered("amplitudes", searches, first, widest)
@@ -296,9 +300,12 @@ class Teacher:
             return [one.seen(turns) for one in effect_points(self._declared, first, share, number)]
         return effect_points(self._declared, direction, share, number)
 
-    def _pour(self, what: str, wanted: Iterable[tuple[int, float, int]]) -> None:
-        """Pour ways at multiples of their levels up to so many of each; of a planar effect in all its directions."""
-        asked: list[tuple[int, float, list[Point]]] = []
+    def _pour(self, what: str, wanted: Iterable[tuple[int, float, int]], base: int = 0) -> None:
+        """Pour ways at multiples of their levels up to so many of each, of a planar effect in all its directions.
+
+        And the base model up to ``base`` times: all at once, so that no core waits for the last pour of one of them.
+        """
+        asked = [(-1, 0.0, base_points(self._declared, base))]
         for way, multiple, number in wanted:
             angle = self.ways[way].angle
             for w in [way] if angle is None else self._all_of(way):

@@ -17,7 +17,6 @@ from doe.declared.model import declare
 from doe.declared.points import directions_of, moved
 from doe.declared.pours import Pour
 from doe.diagnose.compared import Measured, weighed
-from doe.diagnose.confirm import HeightDifferences, difference
 from doe.diagnose.diagnosis import Diagnosis, Offered, concluded, errors_of
 from doe.diagnose.emulator import Lessons, Way
 from doe.diagnose.levels import Level
@@ -26,6 +25,7 @@ from doe.diagnose.next_experiment import MenuItem, Prediction, rank_experiments
 from doe.diagnose.verdict import verdict_of
 from doe.measurement.features import SCALARS, SCAN
 from doe.measurement.measurement import Condition, MeasuredParameter, Measurement, Observation
+from doe.residual_map import ResidualMap, height_difference
 from explorer.diagnosis.run import DiagnoseOrder, result_of
 from solver import EFFECTS, load_material, with_values
 
@@ -139,8 +139,8 @@ def cones(block):
 
 def maps_of(measured, before, after):
     """Of the condition that has a scan."""
-    poured = (difference(cones(measured), cones(one.blocks[0])) for one in (before, after))
-    return (HeightDifferences("fit", "fit", PIXEL, cones(measured).mean(axis=0), *poured),)
+    poured = (height_difference(cones(measured), cones(one.blocks[0])) for one in (before, after))
+    return (ResidualMap("fit", "fit", PIXEL, cones(measured).mean(axis=0), *poured),)
 
 
 def levels_of(declared):

@@ -7,9 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from doe.diagnose.confirm import LEAST_ERROR, Confirmed, Model, confirming, difference, height_differences
+from doe.diagnose.confirm import Confirmed, Model, confirming, residual_maps
 from doe.measurement import load_measurement
 from doe.measurement.piles import PileSurface
+from doe.residual_map import LEAST_ERROR, height_difference
 from solver import Spheres
 from solver.assets import measurement_folder
 
@@ -17,15 +18,15 @@ from solver.assets import measurement_folder
 def test_a_difference_in_standard_errors_by_hand():
     measured, poured = np.zeros((2, 1, 2)), np.zeros((3, 1, 2))
     measured[:, 0, 0], poured[:, 0, 0] = (3.0, 5.0), (1.0, 2.0, 3.0)
-    found = difference(measured, poured)
+    found = height_difference(measured, poured)
     # Squares (2 + 2) over 3 degrees of freedom, of means of 2 and 3.
     assert found.height[0] == pytest.approx([2.0, 0.0])
     assert found.z[0] == pytest.approx([2.0 / np.sqrt(4.0 / 3.0 * (1.0 / 2.0 + 1.0 / 3.0)), 0.0])
 
 
 def test_a_bare_plate_differs_by_nothing():
-    assert np.all(difference(np.zeros((2, 3, 3)), np.zeros((4, 3, 3))).z == 0.0)
-    step = difference(np.full((2, 1, 1), 2.0 * LEAST_ERROR), np.zeros((2, 1, 1)))
+    assert np.all(height_difference(np.zeros((2, 3, 3)), np.zeros((4, 3, 3))).z == 0.0)
+    step = height_difference(np.full((2, 1, 1), 2.0 * LEAST_ERROR), np.zeros((2, 1, 1)))
     assert step.z[0, 0] == pytest.approx(2.0)
 
 
@@ -50,7 +51,7 @@ def test_a_pile_that_stands_elsewhere_shows_where():
         ]
 
     before, after = (Confirmed(Model((), effects), (), 0) for effects in places)
-    (found,) = height_differences(
+    (found,) = residual_maps(
         [condition, scanned] if not condition.surfaces else [scanned],
         before,
         after,
@@ -71,7 +72,7 @@ def test_a_pile_that_stands_elsewhere_shows_where():
 def test_without_scans_there_is_no_map():
     condition = replace(load_measurement(Path(measurement_folder("trefoil_1"))).fit[0], surfaces={})
     model = Confirmed(Model(()), (), 0)
-    assert height_differences([condition], model, model, SimpleNamespace(records=None), 3) == ()
+    assert residual_maps([condition], model, model, SimpleNamespace(records=None), 3) == ()
 
 
 def test_the_points_that_confirm_are_those_that_were_poured():
