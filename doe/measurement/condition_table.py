@@ -3,6 +3,7 @@
 name, role, rig, data              role: fit (calibrated against) or holdout (only predicted)
 images                             photographs of its piles (`photographs`)
 mean_of                            every value of the table is the mean of so many pours (1 where it is not stated)
+material                           another declared base model than the data set's, with the same pairs in [parameters]
 turned                             true: the rig stood turned by 180° on its bench, and so did all that is read off it
 [condition.rig_parameters]         last parts of the rig's parameter paths
 [condition.insertion]              protocol, rate, region_radius, region_z, velocity, batch_interval, duration;
@@ -50,6 +51,7 @@ KEYS = (
     "mean_of",
     "scan",
     "turned",
+    "material",
 )
 INSERTION = (
     "protocol",

@@ -5,7 +5,7 @@ title, source                free text, never interpreted
 material = "material.toml"   the declared base model, or a shipped material
 [parameters]                 what calibration may move (`parameter_table`)
 [uncertainty]                observable → standard deviation of one value, where replicates cannot give it
-[[condition]]                set-up and table (`condition_table`, `long_form`)
+[[condition]]                set-up and table (`condition_table`, `long_form`); its `material`: another declared one
 piles/, scans/               scanned piles (`piles`) and scanned surfaces (`scans`) of the replicates
 """
 
@@ -54,10 +54,11 @@ def _read(folder: Path, table: Table) -> Measurement:
         raise MeasurementError(f"material: {table.get('material')!r}; allowed: a material file or a shipped material")
     base = load_material(table["material"], relative_to=folder)
     given = _condition_entries(table)
-    bare = []
+    declared, bare = [], []
     for entry in given:
         with _within(entry):
-            bare.append(in_rig(base, str(entry["rig"])))
+            declared.append(load_material(entry["material"], relative_to=folder) if "material" in entry else base)
+            bare.append(in_rig(declared[-1], str(entry["rig"])))
     measured, notes = read_parameters(section(table, "parameters"), bare)
     uncertainty = _uncertainty(section(table, "uncertainty"))
     names = [str(entry["name"]) for entry in given]
@@ -66,10 +67,10 @@ def _read(folder: Path, table: Table) -> Measurement:
     conditions: list[Condition] = []
     checks: list[CrossCheck] = []
     ignored = [f"{path.parent.name}/{path.name}: of no condition" for path in (*strangers, *unknown)]
-    for entry in given:
+    for entry, material in zip(given, declared, strict=True):
         name = str(entry["name"])
         with _within(entry):
-            scene = condition_scene(base, entry, measured)
+            scene = condition_scene(material, entry, measured)
             mean_of = whole(entry.get("mean_of", 1), "mean_of", 1)
             photographed, unread = photograph_values(folder, photograph_entries(entry.get("images", [])))
             settings = scan_settings(section(entry, "scan"))
@@ -108,6 +109,10 @@ def _condition_entries(table: Table) -> list[Table]:
         required(entry, ("name", "role", "rig", "data"), "condition")
         with _within(entry):
             only(entry, CONDITION_KEYS, "")
+            if not isinstance(entry.get("material", ""), str):
+                raise MeasurementError(
+                    f"material: {entry['material']!r}; allowed: a material file or a shipped material"
+                )
             one_of(entry["role"], "role", ROLES)
         if str(entry["name"]) in names:
             raise MeasurementError(f"condition.name: {entry['name']!r} stands twice; allowed: each name once")
@@ -150,7 +155,7 @@ def _within(entry: Table) -> Iterator[None]:
     """Put the condition in front of an error about it."""
     try:
         yield
-    except (ParameterError, StudyFileError, MeasurementError) as error:
+    except (ParameterError, StudyFileError, MeasurementError, AssetNotFoundError) as error:
         raise MeasurementError(f"condition {entry['name']!r}: {error}") from None
 
 

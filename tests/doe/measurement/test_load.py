@@ -42,6 +42,19 @@ def test_what_stays_with_the_bench_acts_the_other_way_in_a_turned_rig(tmp_path):
     assert [value(fast.scene, path) for path in paths] == [2.0, 0.004]
 
 
+def test_a_condition_may_be_of_another_material(tmp_path):
+    files = {
+        "measurement.toml": MEASUREMENT.replace('role = "holdout"', 'role = "holdout"\nmaterial = "dense.toml"', 1),
+        "dense.toml": MATERIAL.replace("density = 2500.0", "density = 5000.0", 1),
+    }
+    measurement = load_measurement(write(tmp_path, files))
+    slow, fast = (float(value(one.scene, "material.glass.density")) for one in measurement.conditions)
+    assert fast == 2.0 * slow == 2.0 * float(value(measurement.scene, "material.glass.density"))
+    # What was measured is set in both.
+    friction = "pair.glass.glass.static_friction"
+    assert len({float(value(one.scene, friction)) for one in measurement.conditions}) == 1
+
+
 def test_roles_are_kept_apart(tmp_path):
     measurement = load_measurement(write(tmp_path))
     assert [c.name for c in measurement.fit] == ["slow"]

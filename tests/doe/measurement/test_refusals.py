@@ -30,6 +30,8 @@ def refusal(folder):
         ('rig = "funnel"', 'rig = "bucket"', ["condition 'slow'", "'bucket' is not one of funnel"]),
         ('rig = "funnel"', 'rig = "inclined_plane"', ["condition 'slow'", "bench test"]),
         ('role = "fit"', 'role = "fit"\nturned = 180', ["condition 'slow'", "turned: 180", "true or false"]),
+        ('role = "fit"', 'role = "fit"\nmaterial = 3', ["condition 'slow'", "material: 3", "a material file"]),
+        ('role = "fit"', 'role = "fit"\nmaterial = "gold.toml"', ["condition 'slow'", "gold.toml", "neither a file"]),
         ('data = "slow.csv"', 'data = "none.csv"', ["none.csv: no such file"]),
         ('data = "slow.csv"\n', "", ["condition.data: missing in slow"]),
         ("mass = 0.014", "mass = 500", ["rig.mass", "1e-05 … 10 kg"]),
