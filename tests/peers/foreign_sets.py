@@ -34,7 +34,7 @@ from solver import Job, observe_scan, scanned_pile
 OUT = Path("assets/validation/foreign")
 ROOT = 7
 """Of the sets, their parameters and seeds."""
-SJKR = "fix cohesion all property/global cohesionEnergyDensity peratomtypepair 2 {0} 0 0 0\n"
+SJKR = "fix cohesion all property/global cohesionEnergyDensity peratomtypepair 2 {0} {1} {1} 0\n"
 SPEED = "fix speed all property/global characteristicVelocity scalar 1.0\n"
 
 
@@ -60,17 +60,16 @@ def tilted(degrees):
 
 
 def heavier(share):
-    """Bodies of another density, of which as much is weighed out and fed per second: the fewer, the heavier."""
+    """Bodies of another density, of which as much is weighed out: the fewer, the heavier."""
 
     def changed(deck, turned):
         clumps = [
             dataclasses.replace(c, mass=share * c.mass, inertia=share * c.inertia, density=share * c.density)
             for c in deck.clumps
         ]
-        kept = slice(round(deck.bodies / share))
+        # Spread over the whole feed, so that as much mass enters per second.
+        kept = np.round(np.linspace(0, deck.bodies - 1, round(deck.bodies / share))).astype(int)
         entries = {f.name: getattr(deck.entries, f.name)[kept] for f in dataclasses.fields(deck.entries)}
-        entries["time"] = share * entries["time"]
-        entries["step"] = np.round(share * entries["step"]).astype(np.int32)
         return dataclasses.replace(deck, clumps=tuple(clumps), entries=type(deck.entries)(**entries))
 
     return changed
@@ -88,15 +87,15 @@ class Recipe:
     @property
     def kind(self):
         """As ``validate-diagnosis`` counts it."""
-        return {"": "null", "linear_spring": "outside"}.get(self.label, "effect")
+        return {"": "null", "linear_spring": "outside", "bodies_stick": "outside"}.get(self.label, "effect")
 
 
-def cohesive(density):
-    """Simplified JKR cohesion between bodies, J/m³."""
+def cohesive(density, at_walls):
+    """Simplified JKR cohesion between bodies, and at walls, J/m³."""
 
     def changed(text):
         text = text.replace("tangential history", "tangential history cohesion sjkr")
-        return text.replace("fix youngs", SJKR.format(density) + "fix youngs", 1)
+        return text.replace("fix youngs", SJKR.format(density, at_walls) + "fix youngs", 1)
 
     return changed
 
@@ -112,10 +111,12 @@ RECIPES = (
     Recipe("rolling_resistance", "rolling_friction epsd2, 0.12", rolling(0.12)),
     Recipe("rolling_resistance", "rolling_friction epsd2, 0.25", rolling(0.25)),
     # 4e5 J/m3 shifts what is handed out by less than 3 standard errors: discharge times, which show it, are not.
-    Recipe("adhesion_sjkr", "cohesion sjkr, 1e6 J/m3", text=cohesive(1e6)),
+    Recipe("adhesion_sjkr", "cohesion sjkr, 1e6 J/m3", text=cohesive(1e6, 1e6)),
     Recipe("density_error", "bodies heavier by a quarter", heavier(1.25)),
     Recipe("plate_tilt", "gravity turned by 4 degrees", tilted(4.0)),
     Recipe("linear_spring", "model hooke", text=linear),
+    # The library's acts at walls as well.
+    Recipe("bodies_stick", "cohesion sjkr between bodies alone, 1e6 J/m3", text=cohesive(1e6, 0)),
 )
 
 
