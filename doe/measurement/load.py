@@ -50,14 +50,12 @@ def _read(folder: Path, table: Table) -> Measurement:
     only(table, KEYS, "")
     if table.get("format") != 1:
         raise MeasurementError(f"format: {table.get('format')!r}; allowed: 1")
-    if not isinstance(table.get("material"), str):
-        raise MeasurementError(f"material: {table.get('material')!r}; allowed: a material file or a shipped material")
-    base = load_material(table["material"], relative_to=folder)
+    base = _material(table, folder)
     given = _condition_entries(table)
     declared, bare = [], []
     for entry in given:
         with _within(entry):
-            declared.append(load_material(entry["material"], relative_to=folder) if "material" in entry else base)
+            declared.append(_material(entry, folder) if "material" in entry else base)
             bare.append(in_rig(declared[-1], str(entry["rig"])))
     measured, notes = read_parameters(section(table, "parameters"), bare)
     uncertainty = _uncertainty(section(table, "uncertainty"))
@@ -102,6 +100,14 @@ def _read(folder: Path, table: Table) -> Measurement:
     )
 
 
+def _material(table: Table, folder: Path) -> Scene:
+    """The declared model that ``table`` names."""
+    name = table.get("material")
+    if not isinstance(name, str):
+        raise MeasurementError(f"material: {name!r}; allowed: a material file or a shipped material")
+    return load_material(name, relative_to=folder)
+
+
 def _condition_entries(table: Table) -> list[Table]:
     given = entries(table, "condition")
     names = set()
@@ -109,10 +115,6 @@ def _condition_entries(table: Table) -> list[Table]:
         required(entry, ("name", "role", "rig", "data"), "condition")
         with _within(entry):
             only(entry, CONDITION_KEYS, "")
-            if not isinstance(entry.get("material", ""), str):
-                raise MeasurementError(
-                    f"material: {entry['material']!r}; allowed: a material file or a shipped material"
-                )
             one_of(entry["role"], "role", ROLES)
         if str(entry["name"]) in names:
             raise MeasurementError(f"condition.name: {entry['name']!r} stands twice; allowed: each name once")

@@ -40,8 +40,8 @@ from solver import EFFECTS, Scene, named, parameters, parse_quantity, pour_rig, 
 from solver.rigs.surface import Pose, Revolved
 
 ORDER, SCHEMA = "follow_up.json", 1
-DROPPED = ("images", "mean_of")
-"""Keys of a condition that are about pours that were made."""
+DROPPED = ("images", "mean_of", "material")
+"""Keys of a condition that are about pours that were made; its own material is that of the whole follow-up."""
 PROTOCOLS = {
     "pour_through": "the outlet open from the start",
     "fill_then_open": "filled with the outlet closed, left to settle, then opened",
@@ -85,7 +85,8 @@ def write_next(folder: Path, source: Path, measurement: Measurement, suggestion:
     entry = _changed_entry(given, name, measurement, suggestion, changed)
     title = f"{measurement.title or source.name}: follow-up, {change}"
     folder.mkdir(parents=True, exist_ok=True)
-    top = {"format": 1, "title": title, "material": _copied_material(str(table["material"]), source, folder)}
+    material = _copied_material(str(given.get("material", table["material"])), source, folder)
+    top = {"format": 1, "title": title, "material": material}
     tables = {"parameters": _parameters(table, measurement), "uncertainty": _uncertainty(table, condition)}
     write_whole(folder / FILE, _measurement_toml(top, tables, entry))
     write_whole(folder / f"{name}.csv", _empty_table(condition, suggestion.pours))

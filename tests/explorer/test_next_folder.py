@@ -244,6 +244,18 @@ def test_what_a_material_names_is_copied(tmp_path):
     assert again.scene.pairs == measured.scene.pairs
 
 
+def test_a_condition_of_another_material_is_followed_up_with_that(tmp_path):
+    source = tmp_path / "data"
+    text = folders.changed(folders.MEASUREMENT, 'role = "fit"', 'role = "fit"\nmaterial = "dense.toml"')
+    dense = folders.changed(folders.MATERIAL, "density = 2500.0", "density = 5000.0")
+    folders.write(source, {"measurement.toml": text, "dense.toml": dense})
+    measured = load_measurement(source)
+    folder = fill(written(tmp_path / "next", source, measured))
+    shutil.rmtree(source)
+    (again,) = read_next(folder).measurement.conditions
+    assert again.scene.materials == measured.fit[0].scene.materials != measured.scene.materials
+
+
 def test_a_published_mean_is_followed_up_by_single_pours(tmp_path):
     source = measurement_folder("sunflower_extract")
     folder = written(tmp_path / "next", source, load_measurement(source))

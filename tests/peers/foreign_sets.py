@@ -29,7 +29,7 @@ from doe.validation.work_place import WorkPlace
 from explorer.export.deck_of_scene import deck_of
 from explorer.export.liggghts import INPUT, write_liggghts
 from explorer.export.run import run_liggghts
-from solver import Job, observe_scan, scanned_pile
+from solver import EFFECTS, Job, observe_scan, scanned_pile
 
 OUT = Path("assets/validation/foreign")
 ROOT = 7
@@ -87,7 +87,7 @@ class Recipe:
     @property
     def kind(self):
         """As ``validate-diagnosis`` counts it."""
-        return {"": "null", "linear_spring": "outside", "bodies_stick": "outside"}.get(self.label, "effect")
+        return "effect" if self.label in EFFECTS else "outside" if self.label else "null"
 
 
 def cohesive(density, at_walls):
