@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from typing import Any
 
 from doe.errors import StatisticsError
 from doe.runner import Run, Runner, Setting
+from doe.study_result import StageResult
 
-Analysis = Callable[[Runner], Any]
+Analysis = Callable[[Runner], StageResult | None]
 """A stage as a function of who makes its runs."""
-OnPartial = Callable[[str, Any], None]
+OnPartial = Callable[[str, StageResult], None]
 """Called with (stage, its result so far)."""
 
 LEAST_INTERVAL = 3.0

@@ -18,6 +18,7 @@ from scipy import stats
 from doe.errors import StatisticsError
 from doe.power import smallest_difference, smallest_main_effect
 from doe.record import Record
+from doe.t_tests import Sample
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -34,6 +35,11 @@ class Noise(Record):
     low: float
     high: float
     runs: int
+
+    @property
+    def half_width(self) -> float:
+        """Return half the 95 % interval of the mean."""
+        return Sample(self.mean, self.sigma, self.runs).half_width
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ import numpy.typing as npt
 from doe.record import Record
 from doe.store import READINGS, RIG, Reader, Store, StoredRun, StoreError, observables_of, read_off
 from doe.study import TRIES
+from doe.t_tests import Sample
 from solver import (
     PHYSICS,
     Job,
@@ -32,7 +34,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Setting:
+class Setting(Record):
     """One row of a design: what is changed against the study's scene, and how often it is run."""
 
     label: str
@@ -102,6 +104,18 @@ def responses(rows: Sequence[Sequence[Run]], observable: str) -> FloatArray:
             if run.valid and found is not None:
                 table[k, run.replicate] = found
     return table
+
+
+def sample_of(runs: Iterable[Run], observable: str) -> Sample:
+    """Summary of an observable over the valid runs in which it could be measured; NaN where there are none."""
+    values = valid_values(runs, observable)
+    return Sample.of(values) if values else Sample(math.nan, math.nan, 0)
+
+
+def valid_values(runs: Iterable[Run], observable: str) -> list[float]:
+    """An observable over the valid runs in which it could be measured."""
+    found = (run.observables.get(observable) for run in runs if run.valid)
+    return [value for value in found if value is not None]
 
 
 def no_pile_shares(rows: Sequence[Sequence[Run]]) -> FloatArray:

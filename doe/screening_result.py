@@ -10,6 +10,7 @@ from doe.multiple_tests import Lenth
 from doe.record import Record
 
 Adjustment = Literal["none", "holm"]
+ErrorSource = Literal["replicates", "dummies"]
 
 SIGNIFICANT = "significant"
 FALLBACK = "fallback: not significant"
@@ -43,6 +44,10 @@ class Effect(Record):
     by_dummies: EffectTest | None
     by_replicates: EffectTest | None
 
+    def test_by(self, source: ErrorSource) -> EffectTest | None:
+        """Return the test against an error; None where there is none."""
+        return self.by_replicates if source == "replicates" else self.by_dummies
+
 
 @dataclass(frozen=True)
 class ErrorEstimate(Record):
@@ -54,7 +59,7 @@ class ErrorEstimate(Record):
     error; `standard_error` is then the median.
     """
 
-    source: Literal["dummies", "replicates"]
+    source: ErrorSource
     sigma: float
     df: int
     standard_error: float
@@ -86,11 +91,28 @@ class Screening(Record):
     notes: tuple[str, ...]
 
     @property
-    def error_source(self) -> Literal["replicates", "dummies", "none"]:
-        """Return which error decides: the replicates where there are any, else the dummies."""
-        if self.pure_error is not None:
-            return "replicates"
-        return "dummies" if self.dummy_error is not None else "none"
+    def error_source(self) -> ErrorSource | None:
+        """Return which error decides: the replicates where there are any, else the dummies, None without either."""
+        return None if self.deciding_error is None else self.deciding_error.source
+
+    @property
+    def deciding_error(self) -> ErrorEstimate | None:
+        """Return the error that decides; None without replicates and dummies."""
+        return self.pure_error or self.dummy_error
+
+    def error(self, source: ErrorSource) -> ErrorEstimate | None:
+        """Return the estimate of an error; None where the design gives none."""
+        return self.pure_error if source == "replicates" else self.dummy_error
+
+    def half_width(self, effect: Effect) -> float:
+        """Return half the 95 % interval of `effect`: t limit × its standard error, NaN where it was not tested."""
+        error, test = self.deciding_error, self.deciding_test(effect)
+        return math.nan if error is None or test is None else error.t_limit * test.standard_error
+
+    def factor_effects(self) -> tuple[Effect, ...]:
+        """Return the effects of the factors that could be estimated, by falling size."""
+        known = [effect for effect in self.effects if not effect.is_dummy and math.isfinite(effect.effect)]
+        return tuple(sorted(known, key=lambda effect: -abs(effect.effect)))
 
     def deciding_test(self, effect: Effect) -> EffectTest | None:
         """Return the test of `effect` against the error that decides."""
@@ -106,15 +128,17 @@ class Screening(Record):
 
         return tuple(sorted((e for e in self.effects if not e.is_dummy), key=size, reverse=True))
 
-    def significant(self, alpha: float = 0.05, adjust: Adjustment = "holm") -> tuple[str, ...]:
-        """Return the factors with p < alpha by falling |t|.
+    def significant(
+        self, alpha: float = 0.05, adjust: Adjustment = "holm", error: ErrorSource | None = None
+    ) -> tuple[str, ...]:
+        """Return the factors with p < alpha by falling |t|, against the error that decides unless one is named.
 
         The default corrects for the number of factors (Holm 1979), so that `alpha` is the chance of any false
         find; "none" is the paper's way, with one false find expected per 1/alpha factors.
         """
         found = []
         for effect in self.ranked():
-            test = self.deciding_test(effect)
+            test = self.deciding_test(effect) if error is None else effect.test_by(error)
             if test is not None and (test.p_holm if adjust == "holm" else test.p) < alpha:
                 found.append(effect.name)
         return tuple(found)

@@ -37,6 +37,16 @@ class Sample(Record):
         sd = float(array.std(ddof=1)) if array.size > 1 else math.nan
         return Sample(float(array.mean()), sd, int(array.size))
 
+    @property
+    def standard_error(self) -> float:
+        """Return the standard error sd/√n of the mean; NaN for fewer than two values."""
+        return self.sd / math.sqrt(self.n) if self.n else math.nan
+
+    @property
+    def half_width(self) -> float:
+        """Return half the 95 % interval of the mean, t(0.975, n − 1) sd/√n; NaN for fewer than two values."""
+        return float(stats.t.ppf(0.975, self.n - 1)) * self.standard_error if self.n > 1 else math.nan
+
 
 @dataclass(frozen=True)
 class DifferenceTest(Record):

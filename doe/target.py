@@ -52,6 +52,11 @@ def target_from(entry: Table, observables: Collection[str]) -> Target:
     )
 
 
+def observed_text(observable: str, value: float) -> str:
+    """A value of an observable for a line of progress; only degrees have a unit that goes without saying."""
+    return f"{value:.1f}°" if is_angle(observable) else f"{value:.3g}"
+
+
 def is_angle(observable: str) -> bool:
     """True for an observable in degrees, a single view (``…_deg@90``) included."""
     return observable.partition("@")[0].endswith("_deg")

@@ -45,6 +45,11 @@ class Verification(Record):
     verdict: Verdict
     statement: str
 
+    @property
+    def deciding(self) -> DifferenceTest | None:
+        """Return the test of the difference: Welch's, or that of one sample where the target has no spread."""
+        return self.welch or self.one_sample
+
 
 def relative_error_percent(simulated: float, target: float) -> float:
     """Return 100 |simulated - target|/|target|; NaN for a target of zero."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from solver.assets import AssetNotFoundError, asset_path
 from solver.body import Body, Members
+from solver.clump_fit import ClumpFit
 from solver.effects import EFFECTS, SetUpEffect, Telltale
 from solver.material_file import is_material, load_material
 from solver.observables import Value, observable_names, observe
@@ -95,6 +96,7 @@ __all__ = [
     "Batch",
     "Bodies",
     "Body",
+    "ClumpFit",
     "Crew",
     "Entries",
     "Frame",

@@ -18,7 +18,7 @@ from doe.stages.screening import ScreeningResult
 from doe.study import Factor, Study
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class AscentResult(Record):
     """The path, what it gave in the target's observable, and the region of the next design.
 
@@ -32,12 +32,18 @@ class AscentResult(Record):
     sd: FloatArray
     standard_error: FloatArray
     relative_error_percent: FloatArray
+    settings: tuple[Setting, ...] = ()
     runs: tuple[tuple[Run, ...], ...]
     bracket: Bracket
     region: Region
     smallest_difference: float
     """Difference between two steps that would have been seen with power 0.8."""
     notes: tuple[str, ...]
+
+    @property
+    def line(self) -> str:
+        """One line of what the ascent found."""
+        return f"{', '.join(f'{mean:.1f}' for mean in self.means)}. {self.bracket.statement}"
 
 
 def ascent(study: Study, profile: Profile, runner: Runner, screened: ScreeningResult, noise: Noise) -> AscentResult:
@@ -76,6 +82,7 @@ def ascent(study: Study, profile: Profile, runner: Runner, screened: ScreeningRe
         sd=sd,
         standard_error=error,
         relative_error_percent=100 * np.abs(means - target.mean) / abs(target.mean),
+        settings=tuple(settings),
         runs=tuple(tuple(runs) for runs in rows),
         bracket=found,
         region=region_around(path, found),

@@ -19,7 +19,7 @@ Bias = dict[str, tuple[tuple[float, float], ...]]
 """Estimator → its error [°] on piles of known angle, (mean, standard error) for each way to fill a cone with bodies."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class PilotResult(Record):
     """Noise per estimator, the choice among them, and the sizes of the stages that follow.
 
@@ -27,6 +27,7 @@ class PilotResult(Record):
     reference setting and under the declared changes (None where that cannot be tested).
     """
 
+    settings: tuple[Setting, ...] = ()
     runs: tuple[tuple[Run, ...], ...]
     noise: dict[str, Noise]
     equal_variance: EqualVariance | None
@@ -37,6 +38,15 @@ class PilotResult(Record):
     sizes: tuple[StageSize, ...]
     resolutions: tuple[Resolution, ...]
     notes: tuple[str, ...]
+
+    @property
+    def line(self) -> str:
+        """One line of what the pilot found."""
+        target, noise = next(iter(self.noise.items()))
+        return (
+            f"{target} {noise.mean:.1f} ± {noise.sigma:.1f} over {noise.runs} seeds "
+            f"(σ 95 % {noise.low:.1f} … {noise.high:.1f}); estimator for screening: {self.estimator}"
+        )
 
 
 def pilot(study: Study, profile: Profile, runner: Runner, bias: Bias) -> PilotResult:
@@ -57,6 +67,7 @@ def pilot(study: Study, profile: Profile, runner: Runner, bias: Bias) -> PilotRe
     after, sizes = sized(study, profile, noise[estimator].sigma, noise[target].sigma)
     notes += [size.statement for size in sizes if size.taken < size.needed]
     return PilotResult(
+        settings=tuple(settings),
         runs=tuple(tuple(runs) for runs in rows),
         noise=noise,
         equal_variance=spread,

@@ -13,9 +13,10 @@ from doe.profile import Profile
 from doe.record import Record
 from doe.runner import FloatArray, Run, Runner, Setting, no_pile_shares, responses
 from doe.study import Study
+from doe.target import observed_text
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ScanResult(Record):
     """Mean and spread of the target's observable at each value of ``path`` (SI); ``noise`` is None below two runs."""
 
@@ -25,9 +26,17 @@ class ScanResult(Record):
     means: FloatArray
     noise: tuple[Noise | None, ...]
     no_pile_share: FloatArray
+    settings: tuple[Setting, ...] = ()
     runs: tuple[tuple[Run, ...], ...]
     smallest_difference: float
     """Difference between two values of ``path`` that would have been seen with power 0.8."""
+
+    @property
+    def line(self) -> str:
+        """One line of what the scan found."""
+        pairs = ", ".join(f"{value:g} → {mean:.1f}" for value, mean in zip(self.values, self.means, strict=True))
+        seen = observed_text(self.observable, self.smallest_difference)
+        return f"{self.path}: {pairs}; smallest difference seen {seen}"
 
 
 def scan(study: Study, profile: Profile, runner: Runner, noise: Noise) -> ScanResult | None:
@@ -35,9 +44,8 @@ def scan(study: Study, profile: Profile, runner: Runner, noise: Noise) -> ScanRe
     if study.scan_path is None or not study.scan_values:
         return None
     path = study.scan_path
-    rows = runner.run(
-        "scan", [Setting(f"{path} = {v:g}", {path: v}, profile.scan_replicates) for v in study.scan_values]
-    )
+    settings = [Setting(f"{path} = {v:g}", {path: v}, profile.scan_replicates) for v in study.scan_values]
+    rows = runner.run("scan", settings)
     observable = study.targets[0].observable
     table = responses(rows, observable)
     valid = [row[~np.isnan(row)] for row in table]
@@ -48,6 +56,7 @@ def scan(study: Study, profile: Profile, runner: Runner, noise: Noise) -> ScanRe
         means=np.array([row.mean() if len(row) else math.nan for row in valid]),
         noise=tuple(replicate_noise(row) if len(row) > 1 else None for row in valid),
         no_pile_share=no_pile_shares(rows),
+        settings=tuple(settings),
         runs=tuple(tuple(runs) for runs in rows),
         smallest_difference=smallest_effect(noise.sigma * math.sqrt(2.0 / profile.scan_replicates), noise.runs - 1),
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,6 +19,7 @@ from doe.runner import FloatArray, Run, Runner, Setting, no_pile_shares, respons
 from doe.screening import Screening, Selected, analyse_screening, select_factors
 from doe.stages.sizing import ASSUMPTION_ROWS, SCREENING_ROWS
 from doe.study import CALIBRATED, COLUMNS, Factor, Study
+from doe.target import observed_text
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,7 @@ class NotTestable(Record):
     statement: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ScreeningResult(Record):
     """Runs and analysis of a two-level design.
 
@@ -42,6 +44,7 @@ class ScreeningResult(Record):
     columns: tuple[str, ...]
     factors: tuple[Factor, ...]
     design: FloatArray
+    settings: tuple[Setting, ...] = ()
     runs: tuple[tuple[Run, ...], ...]
     analysis: Screening
     target_analysis: Screening
@@ -49,6 +52,25 @@ class ScreeningResult(Record):
     no_pile_analysis: Screening | None
     not_testable: tuple[NotTestable, ...]
     selected: tuple[Selected, ...]
+
+    @property
+    def line(self) -> str:
+        """One line of what a screening found."""
+        found = self.analysis.significant()
+        text = f"significant: {', '.join(found) if found else 'none'}"
+        error = self.analysis.deciding_error
+        # The factors are judged all at once (Holm); so is the effect that could have been seen.
+        if error is not None and math.isfinite(error.smallest_detectable_effect_bonferroni):
+            size = observed_text(self.response, error.smallest_detectable_effect_bonferroni)
+            text += f"; smallest effect seen, all factors at once, {size}"
+        lost = self.no_pile_analysis.significant() if self.no_pile_analysis is not None else ()
+        if lost:
+            text += f"; the share of valid pours depends on {', '.join(lost)}"
+        if self.not_testable:
+            text += f"; not testable: {', '.join(entry.factor for entry in self.not_testable)}"
+        if self.selected:
+            text += "; going on: " + ", ".join(f"{s.name} ({s.reason})" for s in self.selected)
+        return text
 
 
 def screening(study: Study, profile: Profile, runner: Runner, response: str) -> ScreeningResult:
@@ -117,6 +139,7 @@ def two_level_study(
         columns=tuple(names),
         factors=tuple(factors),
         design=design.astype(float),
+        settings=tuple(settings),
         runs=tuple(tuple(runs) for runs in rows),
         analysis=analysed(design, names, responses(rows, response), dummies, spare),
         target_analysis=analysed(design, names, responses(rows, study.targets[0].observable), dummies, spare),

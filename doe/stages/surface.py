@@ -21,7 +21,7 @@ from doe.surface import Surface, fit_surface
 from doe.surface_anova import SurfaceAnova, analyse_surface
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SurfaceResult(Record):
     """Runs of the Box–Behnken design and, per target in the study's order, model, ANOVA and canonical analysis."""
 
@@ -29,6 +29,7 @@ class SurfaceResult(Record):
     region: Region
     design: FloatArray
     natural: FloatArray
+    settings: tuple[Setting, ...] = ()
     runs: tuple[tuple[Run, ...], ...]
     no_pile_share: FloatArray
     observables: tuple[str, ...]
@@ -37,6 +38,12 @@ class SurfaceResult(Record):
     canonical: tuple[Canonical, ...]
     smallest_main_effect: tuple[float, ...]
     """Per target: the change from low to high of one factor that would have been seen with power 0.8."""
+
+    @property
+    def line(self) -> str:
+        """One line of what the surface found."""
+        a = self.anova[0]
+        return f"R² {a.r_squared:.2f}, adjusted {a.r_squared_adjusted:.2f}, predicted {a.r_squared_predicted:.2f}"
 
 
 @dataclass(frozen=True)
@@ -47,6 +54,12 @@ class OptimumResult(Record):
     factors: tuple[Factor, ...]
     single: Optimum
     compromise: Compromise | None
+
+    @property
+    def line(self) -> str:
+        """One line of what the optimum is."""
+        values = ", ".join(f"{path} = {value:.4g}" for path, value in self.values.items())
+        return f"{'chosen by rule: ' if self.single.unidentified else ''}{values}. {self.single.statement}"
 
 
 def surface(
@@ -71,6 +84,7 @@ def surface(
         region=region,
         design=design,
         natural=natural,
+        settings=tuple(settings),
         runs=tuple(tuple(runs) for runs in rows),
         no_pile_share=no_pile_shares(rows),
         observables=observables,

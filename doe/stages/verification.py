@@ -10,15 +10,16 @@ from doe.profile import Profile
 from doe.record import Record
 from doe.runner import Run, Runner, Setting, no_pile_shares, responses
 from doe.study import Study
-from doe.target import Target
+from doe.target import Target, observed_text
 from doe.verification import Verification, verify
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class VerificationResult(Record):
     """Fresh runs at ``values`` [SI] and, per target, the tests."""
 
     values: dict[str, float]
+    settings: tuple[Setting, ...] = ()
     runs: tuple[Run, ...]
     no_pile_share: float
     targets: tuple[Target, ...]
@@ -26,13 +27,28 @@ class VerificationResult(Record):
     smallest_difference: tuple[float, ...]
     """Per target: the difference from the measured mean that would have been seen with power 0.8 (Welch)."""
 
+    @property
+    def line(self) -> str:
+        """One line of what the verification found."""
+        test = self.tests[0]
+        line = f"{test.statement} Relative error {test.relative_error_percent:.2f} %."
+        for target, found in zip(self.targets, self.tests, strict=True):
+            if target.before_mean is not None:
+                name = target.observable
+                errors = [abs(mean - target.mean) for mean in (target.before_mean, found.simulated.mean)]
+                before, after = (observed_text(name, error) for error in errors)
+                line += f" {name} off by {before} before and {after} after."
+        return line
+
 
 def verification(study: Study, profile: Profile, runner: Runner, values: dict[str, float]) -> VerificationResult:
     """Run the optimum with seeds that no other stage used and compare with the measurement."""
-    rows = runner.run("verification", [Setting("optimum", dict(values), profile.verification_runs)])
+    settings = (Setting("optimum", dict(values), profile.verification_runs),)
+    rows = runner.run("verification", settings)
     tests = tuple(verify(responses(rows, t.observable)[0], t.mean, t.sd, t.n, margin=t.margin) for t in study.targets)
     return VerificationResult(
         values=values,
+        settings=settings,
         runs=tuple(rows[0]),
         no_pile_share=float(no_pile_shares(rows)[0]),
         targets=study.targets,

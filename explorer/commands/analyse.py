@@ -44,7 +44,7 @@ def analyse(
         out=out,
     )
     result = run_analyse(order)
-    typer.echo(json_text(result) if json else analysis_text(result))
+    typer.echo(json_text(result.to_dict()) if json else analysis_text(result))
     if out is not None and not json:
         typer.echo(f"\nwrote {out / 'report.html'}, report.md, result.json")
 

@@ -9,22 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from doe.analysis.analyse import DesignAnalysis, Target, analyse_design
+from doe.analysis.analyse import Target, analyse_design
 from doe.analysis.models import ORDERS, Order
 from doe.designs.factorial import factor_letters
 from doe.errors import StatisticsError
-from doe.record import plain
 from explorer.design.factors_file import read_factors, region_of
 from explorer.design.filled_sheet import read_sheet
 from explorer.design.kinds import ModelOrder
+from explorer.design.result import DesignResult, Response, RunCount, SheetFactor
 from explorer.design.runs import Runs, runs_of
 from explorer.errors import CommandError
 from explorer.files.run_folder import appearing, json_text
 from explorer.files.run_result import versions
 from explorer.report.units_for_people import own_path
 from solver.assets import asset_path
-
-SCHEMA = 1
 
 
 @dataclass(frozen=True)
@@ -42,7 +40,7 @@ class AnalyseOrder:
     out: Path | None = field(default=None)
 
 
-def run_analyse(order: AnalyseOrder) -> dict[str, Any]:
+def run_analyse(order: AnalyseOrder) -> DesignResult:
     """Read, analyse and, with ``out``, write result.json, report.html and report.md. Returns the result."""
     from explorer.report.design import write_design_report
 
@@ -53,16 +51,13 @@ def run_analyse(order: AnalyseOrder) -> dict[str, Any]:
     result = analyse_runs(runs, order)
     if order.out is not None:
         with appearing(order.out) as folder:
-            (folder / "result.json").write_text(json_text(result) + "\n", encoding="utf-8")
+            (folder / "result.json").write_text(json_text(result.to_dict()) + "\n", encoding="utf-8")
             write_design_report(result, folder)
     return result
 
 
-def analyse_runs(runs: Runs, order: AnalyseOrder) -> dict[str, Any]:
-    """The analysis of one response as JSON types, in the shape that the charts of a study read.
-
-    surface, optimum: as in a study's result, with one target; None where there is no model, or no solution asked for.
-    """
+def analyse_runs(runs: Runs, order: AnalyseOrder) -> DesignResult:
+    """The analysis of one response."""
     region = region_of(runs.factors)
     reference = np.array([factor.reference for factor in runs.factors])
     target = None if order.target is None else Target(order.target, order.target_error, reference)
@@ -72,30 +67,19 @@ def analyse_runs(runs: Runs, order: AnalyseOrder) -> dict[str, Any]:
         )
     except StatisticsError as error:
         raise CommandError(f"{order.sheet}, column {runs.response}: {error}") from None
-    factors = _factors(runs)
-    response = _response_path(runs)
-    return {
-        "schema": SCHEMA,
-        "kind": "design analysis",
-        "sheet": order.sheet,
-        "design": runs.design,
-        "response": {"name": runs.response, "path": response, "unit": runs.unit},
-        "runs": {"rows": len(runs.coded), "valid": int((~np.isnan(runs.responses)).sum()), "missing": runs.missing},
-        "labels": _labels(runs),
-        "factors": factors,
-        "study": {
-            "targets": [{"observable": response, "mean": order.target, "margin": 0.0}],
-            "reference_name": "reference",
-        },
-        "fits": plain(found.fits),
-        "effects": _effects(found, factors, response),
-        "surface": _surface(found, runs, factors, response),
-        "model": _model(found),
-        "optimum": _optimum(found, factors),
-        "notes": list(found.notes),
-        "command": _command(order),
-        "versions": versions(),
-    }
+    return DesignResult(
+        sheet=order.sheet,
+        design=runs.design,
+        response=Response(runs.response, _response_path(runs), runs.unit),
+        runs=RunCount(len(runs.coded), int((~np.isnan(runs.responses)).sum()), runs.missing),
+        labels=_labels(runs),
+        factors=_factors(runs),
+        coded=runs.coded,
+        target=order.target,
+        analysis=found,
+        command=_command(order),
+        versions=versions(),
+    )
 
 
 def _order(runs: Runs, order: AnalyseOrder) -> Order | None:
@@ -130,20 +114,19 @@ def _symbols(runs: Runs, terms: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _factors(runs: Runs) -> list[dict[str, Any]]:
-    """name: the letter that equations use; path: name and unit; values in that unit."""
-    return [
-        {
-            "name": letter,
-            "factor": factor.name,
-            "path": own_path(factor.name, factor.unit),
-            "unit": factor.unit,
-            "low": factor.low,
-            "high": factor.high,
-            "reference": factor.reference,
-        }
+def _factors(runs: Runs) -> tuple[SheetFactor, ...]:
+    return tuple(
+        SheetFactor(
+            name=letter,
+            path=own_path(factor.name, factor.unit),
+            low=factor.low,
+            high=factor.high,
+            reference=factor.reference,
+            factor=factor.name,
+            unit=factor.unit,
+        )
         for letter, factor in zip(factor_letters(len(runs.factors)), runs.factors, strict=True)
-    ]
+    )
 
 
 def _response_path(runs: Runs) -> str:
@@ -153,58 +136,10 @@ def _response_path(runs: Runs) -> str:
     return own_path(runs.response, {"1": "", "deg": "°"}.get(runs.unit, runs.unit))
 
 
-def _labels(runs: Runs) -> list[str]:
+def _labels(runs: Runs) -> tuple[str, ...]:
     """What the valid runs are called, in the order of the surface's runs."""
     row, replicate = np.nonzero(~np.isnan(runs.responses))
-    return [runs.labels[i][j] for i, j in zip(row, replicate, strict=True)]
-
-
-def _effects(found: DesignAnalysis, factors: list[dict[str, Any]], response: str) -> dict[str, Any] | None:
-    if found.effects is None:
-        return None
-    contrasts = found.effects.contrasts
-    return {
-        "analysis": plain(found.effects.screening),
-        "columns": list(contrasts.names),
-        "aliases": plain(contrasts.aliases),
-        "curvature": plain(found.effects.curvature),
-        "factors": factors,
-        "response": response,
-    }
-
-
-def _surface(found: DesignAnalysis, runs: Runs, factors: list[dict[str, Any]], response: str) -> dict[str, Any] | None:
-    if found.model is None:
-        return None
-    region = region_of(runs.factors)
-    return {
-        "design": runs.coded.tolist(),
-        "natural": region.natural(runs.coded).tolist(),
-        "factors": factors,
-        "region": plain(region),
-        "observables": [response],
-        "models": [plain(found.model.surface)],
-        "anova": [plain(found.model.anova)],
-        "canonical": [plain(found.model.canonical)],
-    }
-
-
-def _model(found: DesignAnalysis) -> dict[str, Any] | None:
-    if found.model is None:
-        return None
-    return {
-        "diagnostics": plain(found.model.diagnostics),
-        "box_cox": plain(found.model.box_cox),
-        "highest": plain(found.model.highest),
-        "lowest": plain(found.model.lowest),
-    }
-
-
-def _optimum(found: DesignAnalysis, factors: list[dict[str, Any]]) -> dict[str, Any] | None:
-    if found.optimum is None:
-        return None
-    values = {factor["path"]: value for factor, value in zip(factors, found.optimum.point.tolist(), strict=True)}
-    return {"single": plain(found.optimum), "factors": factors, "values": values, "compromise": None}
+    return tuple(runs.labels[i][j] for i, j in zip(row, replicate, strict=True))
 
 
 def _only_response(path: Path, responses: list[str]) -> str:
@@ -215,7 +150,7 @@ def _only_response(path: Path, responses: list[str]) -> str:
     )
 
 
-def _command(order: AnalyseOrder) -> list[str]:
+def _command(order: AnalyseOrder) -> tuple[str, ...]:
     """The order as words of a command line, without where it was written to."""
     words = ["explorer", "analyse", order.sheet]
     options: list[tuple[str, Any, Callable[[Any], str]]] = [
@@ -230,4 +165,4 @@ def _command(order: AnalyseOrder) -> list[str]:
     for option, value, write in options:
         if value is not None and value not in ("", ()):
             words += [option, write(value)]
-    return words
+    return tuple(words)

@@ -132,7 +132,7 @@ def analysis_answer(order: AnalyseOrder) -> Answer:
     """`explorer analyse`: what a filled sheet says."""
     result = run_analyse(order)
     files = {"report.html": design_html(result).encode()}
-    return Answer(analysis_text(result), shlex.join(result["command"]), design_plots(result), files)
+    return Answer(analysis_text(result), shlex.join(result.command), design_plots(result), files)
 
 
 def audit_answer(folder: Path | None) -> Answer:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
+from doe.study_result import StudyResult
 from explorer.files.whole_file import write_whole
 from explorer.report.html import page
 from explorer.report.markdown import document
@@ -13,27 +13,23 @@ from explorer.report.sections import sections_of
 __all__ = ["report_html", "report_markdown", "write_report"]
 
 
-def write_report(result: dict[str, Any], folder: Path) -> None:
-    """Write ``report.html`` and ``report.md`` into ``folder``; each appears complete or not at all.
-
-    ``result`` is the content of ``result.json`` (see `explorer.study.run.result_of`).
-    """
+def write_report(result: StudyResult, folder: Path) -> None:
+    """Write ``report.html`` and ``report.md`` into ``folder``; each appears complete or not at all."""
     texts = {"report.html": report_html(result), "report.md": report_markdown(result)}
     for name, text in texts.items():
         write_whole(folder / name, text)
 
 
-def report_html(result: dict[str, Any]) -> str:
+def report_html(result: StudyResult) -> str:
     """The page: self-contained, with charts."""
     return page(*_headings(result), sections_of(result))
 
 
-def report_markdown(result: dict[str, Any]) -> str:
+def report_markdown(result: StudyResult) -> str:
     """The same facts without charts."""
     return document(*_headings(result), sections_of(result))
 
 
-def _headings(result: dict[str, Any]) -> tuple[str, str]:
-    study = result["study"]
-    subtitle = f"Calibration report of the study {study['name']}, profile {study['profile']['name']}"
-    return study["title"] or study["name"], subtitle
+def _headings(result: StudyResult) -> tuple[str, str]:
+    study = result.study
+    return study.title or study.name, f"Calibration report of the study {study.name}, profile {study.profile.name}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from explorer.report.diagnosis.charts import error_chart, pile_chart, probability_chart, residual_chart
-from explorer.report.findings import Plain
+from explorer.report.diagnosis.findings import Plain
 from explorer.report.plot import Plot, Plots
 
 ROLES = (("holdout", "held-out"), ("fit", "fitted"))

@@ -6,9 +6,11 @@ scatters from refit to refit; it tells what is known of a factor only where the 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
-from explorer.report.findings import Plain
+from doe.optimum import Optimum
+from doe.stages.surface import OptimumResult
 from explorer.report.units_for_people import (
     MISSING,
     enumeration,
@@ -61,35 +63,35 @@ class Setting:
         return self.value if self.feasible == MISSING else f"{self.feasible} ({BY_RULE}: {self.chosen})"
 
 
-def settings(optimum: Plain) -> tuple[Setting, ...]:
+def settings(optimum: OptimumResult) -> tuple[Setting, ...]:
     """Every factor of an optimum, in its order."""
-    return tuple(_setting(optimum, k) for k in range(len(optimum["factors"])))
+    return tuple(_setting(optimum, k) for k in range(len(optimum.factors)))
 
 
-def is_identified(single: Plain, k: int) -> bool:
+def is_identified(single: Optimum, k: int) -> bool:
     """Whether the target identifies factor ``k``; one that is out of reach identifies none."""
-    return single["reached"] and single["names"][k] not in single["unidentified"]
+    return single.reached and single.names[k] not in single.unidentified
 
 
-def all_identified(optimum: Plain) -> bool:
+def all_identified(optimum: OptimumResult) -> bool:
     """Whether the target identifies every factor, so that the point is more than a choice."""
-    return all(is_identified(optimum["single"], k) for k in range(len(optimum["factors"])))
+    return all(is_identified(optimum.single, k) for k in range(len(optimum.factors)))
 
 
-def rule(optimum: Plain, reference: str) -> str:
+def rule(optimum: OptimumResult, reference: str) -> str:
     """How the point was chosen, as a sentence for below a table; empty where every factor is identified."""
     if all_identified(optimum):
         return ""
-    if optimum["compromise"] is not None:
+    if optimum.compromise is not None:
         how = "the setting of least weighted misfit over all targets"
-    elif optimum["single"]["reached"]:
+    elif optimum.single.reached:
         how = f"nearest the {reference} among the settings that give the target"
     else:
         how = "where the model comes nearest the target"
     return f"{BY_RULE.capitalize()}: {how}; not an estimate, so it has no 95 % set."
 
 
-def cloud_caution(optimum: Plain) -> str:
+def cloud_caution(optimum: OptimumResult) -> str:
     """What the scatter of the refits does not tell, as a sentence; empty where every factor is identified."""
     open_ = [s.name for s in settings(optimum) if not s.identified]
     if not open_:
@@ -97,18 +99,18 @@ def cloud_caution(optimum: Plain) -> str:
     return f"The target does not identify {enumeration(open_)}: there the scatter is that of the rule's choice."
 
 
-def _setting(optimum: Plain, k: int) -> Setting:
-    single, factor = optimum["single"], optimum["factors"][k]
-    path, identified = factor["path"], is_identified(single, k)
-    low, high = single["solution_low"][k], single["solution_high"][k]
+def _setting(optimum: OptimumResult, k: int) -> Setting:
+    single, factor = optimum.single, optimum.factors[k]
+    path, identified = factor.path, is_identified(single, k)
+    low, high = float(single.solution_low[k]), float(single.solution_high[k])
     return Setting(
-        name=factor["name"],
+        name=factor.name,
         label=parameter_label(path),
         identified=identified,
-        chosen=parameter_value(path, optimum["values"][path]),
-        confidence_set=parameter_range(path, single["point_low"][k], single["point_high"][k])
+        chosen=parameter_value(path, optimum.values[path]),
+        confidence_set=parameter_range(path, float(single.point_low[k]), float(single.point_high[k]))
         if identified
         else MISSING,
         feasible=parameter_range(path, low, high),
-        feasible_share=MISSING if low is None else percent(single["solution_share"][k]),
+        feasible_share=MISSING if math.isnan(low) else percent(float(single.solution_share[k])),
     )

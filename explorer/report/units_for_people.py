@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -82,10 +83,10 @@ def parameter_value(path: str, value: float | str | None) -> str:
 
 def parameter_range(path: str, low: float | str | None, high: float | str | None) -> str:
     """Two values with one unit, e.g. "40.1 … 70.5 MPa"."""
-    if low is None or high is None:
-        return MISSING
     if isinstance(low, str) or isinstance(high, str):
         return f"{low} … {high}"
+    if low is None or high is None or not (math.isfinite(low) and math.isfinite(high)):
+        return MISSING
     unit = unit_of_parameter(path)
     return unit.attach(f"{number(unit.of(low), 4)} … {number(unit.of(high), 4)}")
 
@@ -171,12 +172,12 @@ def p_value(p: float | None) -> str:
 
 def percent(share: float | None, decimals: int = 0) -> str:
     """A share as a percentage."""
-    return MISSING if share is None else f"{fixed(100 * share, decimals)} %"
+    return MISSING if share is None or not math.isfinite(share) else f"{fixed(100 * share, decimals)} %"
 
 
 def duration(seconds: float | None) -> str:
     """A duration in s below two minutes, else in min."""
-    if seconds is None:
+    if seconds is None or not math.isfinite(seconds):
         return MISSING
     return f"{number(seconds)} s" if seconds < 120 else f"{fixed(seconds / 60, 1)} min"
 
@@ -186,7 +187,7 @@ def code(text: str) -> str:
     return "`" + text.replace("`", "'") + "`"
 
 
-def enumeration(items: list[str]) -> str:
+def enumeration(items: Sequence[str]) -> str:
     """ "a", "a and b", "a, b and c"; "none" for an empty list."""
     if not items:
         return "none"

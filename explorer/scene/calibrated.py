@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 from doe.study import load_study, with_profile
+from doe.study_result import StudyResult
 from explorer.errors import CommandError
 from explorer.report.identified import settings
 from solver import ParameterError, Scene, with_values
@@ -30,19 +30,17 @@ def calibrated_scene(source: str) -> tuple[Scene, str]:
     """
     path = Path(source).expanduser() / RESULT
     try:
-        result: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        study, profile = result["study"], str(result["study"]["profile"]["name"])
-        name = str(study["file"]) if Path(study["file"]).is_file() else str(study["name"])
-        values = {str(key): float(value) for key, value in result["optimum"]["values"].items()}
-        trusted = bool(result["optimum"]["single"]["better_than_noise"])
-        open_factors = [setting for setting in settings(result["optimum"]) if not setting.identified]
-    except (json.JSONDecodeError, UnicodeDecodeError, KeyError, TypeError, AttributeError, ValueError, OSError):
+        result = StudyResult.from_dict(json.loads(path.read_text(encoding="utf-8")))
+    except (ValueError, OSError):
         raise CommandError(f"{path}: is not the result of `explorer calibrate`") from None
+    study, optimum = result.study, result.optimum
+    name = study.file if Path(study.file).is_file() else study.name
+    open_factors = [setting for setting in settings(optimum) if not setting.identified]
     try:
-        scene = with_values(with_profile(load_study(name), profile)[0].scene, dict(values))
+        scene = with_values(with_profile(load_study(name), study.profile.name)[0].scene, dict(optimum.values))
     except ParameterError as error:
         raise ParameterError(f"{path}: {error}") from None
-    if not trusted:
+    if not optimum.single.better_than_noise:
         return scene, f"{path}: its response surface is not better than noise, so this is not a calibration"
     if not open_factors:
         return scene, ""

@@ -1,4 +1,4 @@
-"""``partial.json``: what a study that still runs has found so far, in the form of ``result.json``.
+"""``partial.json``: what a study that still runs has found so far (`doe.study_result.PartialStudy`).
 
 Stages that have ended are there as in ``result.json``; ``partial`` names the stage that runs, whose own key, if there,
 holds its analysis of the runs so far, and ``line`` says it in words. The file is gone once ``result.json`` is written.
@@ -8,38 +8,40 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from doe.record import plain
-from doe.stages.lines import LINES
+from doe.study_result import PartialStudy, StageResult, StudyDescription
 from explorer.files.whole_file import write_whole
 from explorer.study.process import PARTIAL
 
 
 class PartialResult:
-    """The file in the output folder of one study; ``study`` is the key of that name."""
+    """The file in the output folder of one study."""
 
-    def __init__(self, folder: Path, study: Mapping[str, Any]) -> None:
-        self._file, self._found = folder / PARTIAL, {"study": plain(study)}
+    def __init__(self, folder: Path, study: StudyDescription) -> None:
+        self._file, self._found = folder / PARTIAL, PartialStudy(study=study)
         self.remove()
 
-    def show(self, stage: str, result: Any) -> None:
+    def show(self, stage: str, result: StageResult) -> None:
         """``result`` is what ``stage`` found so far."""
-        line = LINES[stage](result)
         # A mean that no run has given yet is no finding.
-        line = "" if re.search(r"\bnan\b", line) else line
-        self._write(self._found | {stage: plain(result), "partial": stage, "line": line})
+        line = "" if re.search(r"\bnan\b", result.line) else result.line
+        self._write(replace(self._found, **_of(stage, result), partial=stage, line=line))
 
-    def keep(self, stage: str, result: Any) -> None:
+    def keep(self, stage: str, result: StageResult | None) -> None:
         """``stage`` has ended with ``result``, None where the study has no such stage."""
-        self._found[stage] = plain(result)
-        self._write(self._found | {"partial": None, "line": ""})
+        self._found = replace(self._found, **_of(stage, result))
+        self._write(self._found)
 
     def remove(self) -> None:
         """Take the file away."""
         self._file.unlink(missing_ok=True)
 
-    def _write(self, content: dict[str, Any]) -> None:
-        write_whole(self._file, json.dumps(content, ensure_ascii=False, allow_nan=False) + "\n")
+    def _write(self, content: PartialStudy) -> None:
+        write_whole(self._file, json.dumps(content.to_dict(), ensure_ascii=False, allow_nan=False) + "\n")
+
+
+def _of(stage: str, result: StageResult | None) -> dict[str, Any]:
+    return {stage: result}

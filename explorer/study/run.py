@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from doe.campaign import SCHEMA, STAGES, CampaignResult, run_campaign, summary_of_runs
+from doe.campaign import Campaign, run_campaign
 from doe.partial import PartialStages
 from doe.profile import Profile
-from doe.record import plain
 from doe.runner import PourRunner, Run
 from doe.stages.sizing import planned_runs
 from doe.store import Store, default_store
 from doe.study import TRIES, Study, load_study, with_profile
+from doe.study_result import STAGES, PouredBody, RunCounts, StudyDescription, StudyResult, Timing
 from explorer.errors import CommandError
 from explorer.files.run_result import versions
 from explorer.files.whole_file import write_whole
@@ -63,7 +62,7 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> float:
     say(f"{study.name}, profile {profile.name}: {sum(planned.values())} runs of {1e3 * profile.mass:g} g; store {path}")
     progress = Progress(order.out / "progress.jsonl", planned, say, terminal=sys.stdout.isatty())
     progress.compiling()
-    partial = PartialResult(order.out, described(study, profile, order.tries))
+    partial = PartialResult(order.out, StudyDescription.of(study, profile, order.tries))
     follower = PartialStages(partial.show)
 
     def ended(stage: str, run: Run, remaining: int) -> None:
@@ -90,11 +89,12 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> float:
         bias = estimator_bias(study.estimators)
         found = run_campaign(study, profile, runner, bias, progress.stage, follower.begin, partial.keep)
     result = result_of(study, profile, found, progress.elapsed, order.tries)
-    write_whole(order.out / "result.json", json.dumps(result, ensure_ascii=False, allow_nan=False, indent=1) + "\n")
+    text = json.dumps(result.to_dict(), ensure_ascii=False, allow_nan=False, indent=1)
+    write_whole(order.out / "result.json", text + "\n")
     write_report(result, order.out)
     partial.remove()
     say(f"{order.out}/report.html, report.md, result.json")
-    return found.verification.tests[0].relative_error_percent
+    return result.verification.tests[0].relative_error_percent
 
 
 def holds_more_than(folder: Path, study_file: Path) -> bool:
@@ -102,47 +102,21 @@ def holds_more_than(folder: Path, study_file: Path) -> bool:
     return folder.is_dir() and any(entry.resolve() != study_file.resolve() for entry in folder.iterdir())
 
 
-def described(study: Study, profile: Profile, tries: int = TRIES) -> dict[str, Any]:
-    """What was asked: the key ``study`` of ``result.json``."""
-    return {
-        "name": study.name,
-        "title": study.scene.title,
-        "file": str(study.file),
-        "profile": profile.to_dict(),
-        "targets": study.targets,
-        "factors": study.factors,
-        "assumptions": study.assumptions,
-        "assumed": study.scene.assumed,
-        "contact": dataclasses.asdict(study.scene.contact),
-        "changes": study.changes,
-        "seed": study.seed,
-        "tries": tries,
-    }
-
-
-def result_of(
-    study: Study, profile: Profile, found: CampaignResult, total_s: float, tries: int = TRIES
-) -> dict[str, Any]:
-    """The content of ``result.json``: study, one key per stage, runs, timing, versions, shapes."""
-    runs = summary_of_runs(found)
-    return plain(
-        {
-            "schema": SCHEMA,
-            "study": described(study, profile, tries),
-            **found.to_dict(),
-            "runs": runs,
-            "timing": {
-                "total_s": total_s,
-                "stage_s": found.stage_seconds,
-                "runs_per_minute": 60.0 * runs["total"] / max(total_s, 1e-9),
-                "reused_runs": sum(run.reused for _, run in found.all_runs()),
-            },
-            "versions": versions(),
-            "shapes": [
-                {"body": body.name, "mass": body.mass, "spheres": body.spheres, "fit": asdict(body.clump.fit)}
-                for body in study.scene.bodies
-            ],
-        }
+def result_of(study: Study, profile: Profile, found: Campaign, total_s: float, tries: int = TRIES) -> StudyResult:
+    """The content of ``result.json``."""
+    runs = list(found.stages.all_runs())
+    return StudyResult(
+        study=StudyDescription.of(study, profile, tries),
+        **{stage: found.stages.result_of(stage) for stage in STAGES},  # type: ignore[arg-type]
+        runs=RunCounts.of(found.stages),
+        timing=Timing(
+            total_s=total_s,
+            stage_s=found.seconds,
+            runs_per_minute=60.0 * len(runs) / max(total_s, 1e-9),
+            reused_runs=sum(run.reused for _, run in runs),
+        ),
+        versions=versions(),
+        shapes=tuple(PouredBody(body.name, body.mass, body.spheres, body.clump.fit) for body in study.scene.bodies),
     )
 
 

@@ -6,14 +6,14 @@ import json
 import numpy as np
 import pytest
 
-from doe.campaign import STAGES, run_campaign, summary_of_runs
+from doe.campaign import run_campaign
 from doe.errors import StudyStopped
 from doe.power import smallest_effect, smallest_main_effect
 from doe.profile import Profile
-from doe.stages.lines import screening_line
 from doe.stages.pilot import pilot
 from doe.stages.sizing import planned_runs
 from doe.study import load_study
+from doe.study_result import STAGES, RunCounts
 from doe.target import Target
 from tests.doe.formula_runner import FormulaRunner
 
@@ -42,7 +42,7 @@ def study():
 def campaign(study):
     lines = []
     runner = FormulaRunner(planted, sigma=0.8, jam=0.05)
-    result = run_campaign(study, PROFILE, runner, BIAS, on_stage=lambda stage, line: lines.append((stage, line)))
+    result = run_campaign(study, PROFILE, runner, BIAS, on_stage=lambda stage, line: lines.append((stage, line))).stages
     return result, lines, runner
 
 
@@ -54,8 +54,8 @@ def test_stages_come_in_order_and_make_the_planned_runs(study, campaign):
     for stage, run in result.all_runs():
         valid[stage] += run.valid
     assert valid == planned
-    assert sum(runner.calls.values()) == summary_of_runs(result)["total"] > sum(planned.values())
-    assert summary_of_runs(result)["by_outcome"]["jammed"] > 0
+    assert sum(runner.calls.values()) == RunCounts.of(result).total > sum(planned.values())
+    assert RunCounts.of(result).by_outcome["jammed"] > 0
 
 
 def test_the_plan_counts_the_points_of_the_surface_that_is_run(study, monkeypatch):
@@ -111,7 +111,7 @@ def test_result_is_plain_json(campaign):
 
 
 def test_without_an_effect_the_study_falls_back_and_says_so(study):
-    result = run_campaign(study, PROFILE, FormulaRunner(lambda values: 20.0, sigma=2.0), BIAS)
+    result = run_campaign(study, PROFILE, FormulaRunner(lambda values: 20.0, sigma=2.0), BIAS).stages
     assert result.screening.analysis.significant() == ()
     assert [s.name for s in result.screening.selected] == ["X4", "X7", "X16"]
     assert {s.reason for s in result.screening.selected} == {"fallback: not significant"}
@@ -124,7 +124,7 @@ def test_target_out_of_reach_gives_the_nearest_value(study):
     def low(values):
         return planted(values) - 40.0
 
-    result = run_campaign(study, PROFILE, FormulaRunner(low, sigma=0.5), BIAS)
+    result = run_campaign(study, PROFILE, FormulaRunner(low, sigma=0.5), BIAS).stages
     assert not result.optimum.single.reached
     assert result.optimum.single.predicted == pytest.approx(result.optimum.single.reachable_high, abs=0.2)
     # Nearest means the high end of every factor that raises the angle.
@@ -140,7 +140,7 @@ def test_rows_without_a_pile_are_missing_and_the_rest_is_analysed(study, outcome
             stuck = stage == "screening" and row in (3, 8, 11, 20)
             return dataclasses.replace(run, outcome=outcome) if stuck else run
 
-    result = run_campaign(study, PROFILE, Jamming(planted, sigma=0.8), BIAS)
+    result = run_campaign(study, PROFILE, Jamming(planted, sigma=0.8), BIAS).stages
     assert result.screening.analysis.missing_rows == (3, 8, 11, 20)
     assert "given up" in result.screening.analysis.notes[-1]
     assert {"X4", "X7", "X16"} <= set(result.screening.analysis.significant())
@@ -154,7 +154,7 @@ def test_a_study_of_flat_layers_ends_with_a_line_that_says_so(study):
 
 def test_full_profile_is_sized_by_the_pilot(study):
     profile = Profile("full", pilot_runs=20, change_runs=4, resolution_deg=2.0, verification_runs=10, max_replicates=8)
-    result = run_campaign(study, profile, FormulaRunner(planted, sigma=2.0), BIAS)
+    result = run_campaign(study, profile, FormulaRunner(planted, sigma=2.0), BIAS).stages
     taken = {size.stage: size.taken for size in result.pilot.sizes}
     for stage in ("screening", "assumptions", "scan", "ascent", "surface"):
         assert len({run.replicate for run in getattr(result, stage).runs[0]}) == taken[stage]
@@ -172,7 +172,7 @@ def test_the_ascent_follows_the_effects_on_the_target_and_not_those_on_the_estim
         modulus = (float(values.get(MODULUS, 56.3e6)) - 55.3e6) / 15.2e6
         return planted(values) + 16.0 * friction - 8.0 * modulus
 
-    result = run_campaign(study, PROFILE, FormulaRunner(planted, sigma=0.3, others={cone: seen_by_cone}), BIAS)
+    result = run_campaign(study, PROFILE, FormulaRunner(planted, sigma=0.3, others={cone: seen_by_cone}), BIAS).stages
     assert result.screening.response == cone
     assert [s.name for s in result.screening.selected] == ["X7", "X4", "X16"]
     path = result.ascent.path
@@ -186,15 +186,15 @@ def test_screening_line_tells_what_all_factors_at_once_could_show(campaign):
     screened = campaign[0].screening
     error = screened.analysis.pure_error
     assert error.smallest_detectable_effect_bonferroni > 1.2 * error.smallest_detectable_effect
-    assert f"all factors at once, {error.smallest_detectable_effect_bonferroni:.1f}°;" in screening_line(screened)
-    assert "°" not in screening_line(dataclasses.replace(screened, response="bulk_density_kg_m3"))
+    assert f"all factors at once, {error.smallest_detectable_effect_bonferroni:.1f}°;" in screened.line
+    assert "°" not in dataclasses.replace(screened, response="bulk_density_kg_m3").line
 
 
 def test_a_factor_or_assumption_on_few_bodies_is_named_in_the_line(campaign):
     result = campaign[0]
     assert [entry.factor for entry in result.assumptions.not_testable] == ["plate_thickness"]
-    assert "not testable: plate_thickness" in screening_line(result.assumptions)
-    assert "not testable: X2, X5" in screening_line(result.screening)
+    assert "not testable: plate_thickness" in result.assumptions.line
+    assert "not testable: X2, X5" in result.screening.line
 
 
 def test_the_scan_states_the_smallest_difference_it_could_see(campaign):
@@ -232,21 +232,21 @@ def test_a_spread_that_differs_between_settings_is_found_and_noted(study):
             self.sigma = 6.0 if setting.label == "outlet 15 mm higher" else 0.5
             return super()._once(stage, row, setting, replicate, attempt)
 
-    unequal = run_campaign(study, PROFILE, Unequal(planted), BIAS).pilot
+    unequal = run_campaign(study, PROFILE, Unequal(planted), BIAS).stages.pilot
     assert unequal.equal_variance.p < 0.05
     assert {name for name, _ in unequal.equal_variance.sigmas} == {"reference", *study.changes}
     assert any("Brown–Forsythe" in note for note in unequal.notes)
 
 
 def test_the_share_without_a_pile_counts_every_failure(study):
-    result = run_campaign(study, PROFILE, NoPile("scan"), BIAS)
+    result = run_campaign(study, PROFILE, NoPile("scan"), BIAS).stages
     assert result.scan.no_pile_share.tolist() == [1.0] * len(study.scan_values)
 
 
 def test_two_targets_are_weighed_against_each_other(study):
     density = Target("bulk_density_kg_m3", mean=150.0 + 5.0 * 24.68, sd=2.0, n=10)
     both = dataclasses.replace(study, targets=(*study.targets, density))
-    result = run_campaign(both, PROFILE, FormulaRunner(planted, sigma=0.5), BIAS)
+    result = run_campaign(both, PROFILE, FormulaRunner(planted, sigma=0.5), BIAS).stages
     compromise = result.optimum.compromise
     assert np.abs(compromise.standardised).max() < 1.0  # the two targets agree in the planted truth
     assert len(result.verification.tests) == 2

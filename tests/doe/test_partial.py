@@ -46,7 +46,7 @@ def followed(request):
     patch = pytest.MonkeyPatch()
     patch.setattr("doe.partial.SHARE", 1.0)
     follower = PartialStages(lambda stage, result: seen.append((stage, result)), clock=Clock())
-    result = run_campaign(STUDY, PROFILE, Followed(follower, sigma=2.0, jam=0.05), BIAS, on_begin=follower.begin)
+    result = run_campaign(STUDY, PROFILE, Followed(follower, sigma=2.0, jam=0.05), BIAS, on_begin=follower.begin).stages
     patch.undo()
     return seen, result
 

@@ -142,7 +142,7 @@ def test_three_missing_rows_leave_no_error_between_rows():
     values[[0, 1, 2]] = np.nan
     screening = screen(values, DUMMIES)
     assert screening.dummy_error is None
-    assert screening.error_source == "none"
+    assert screening.error_source is None
     assert screening.significant() == ()
 
 

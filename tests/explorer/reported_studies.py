@@ -10,6 +10,7 @@ import re
 from doe.campaign import run_campaign
 from doe.profile import Profile
 from doe.study import load_study
+from doe.study_result import study_from
 from explorer.report import report_markdown
 from explorer.study.run import result_of
 from tests.doe.formula_runner import FormulaRunner
@@ -59,10 +60,15 @@ CASES = {
 
 
 def result_of_case(name):
-    """What the report gets: the content of result.json, read back as a reader of the file would."""
+    """The content of result.json, as a reader of the file finds it."""
     study, profile, runner = CASES[name]
     result = result_of(study, profile, run_campaign(study, profile, runner, BIAS), 912.5)
-    return json.loads(json.dumps(result, allow_nan=False))
+    return json.loads(json.dumps(result.to_dict(), allow_nan=False))
+
+
+def typed(result):
+    """The result as the report gets it."""
+    return study_from(result)
 
 
 def visible(page):
@@ -82,4 +88,5 @@ def tables_in(markdown):
 
 
 def table(result, *start):
-    return next(rows for header, rows in tables_in(report_markdown(result)).items() if header[: len(start)] == start)
+    tables = tables_in(report_markdown(typed(result)))
+    return next(rows for header, rows in tables.items() if header[: len(start)] == start)

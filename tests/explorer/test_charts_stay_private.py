@@ -43,7 +43,7 @@ def lab_page(folder):
 
 
 PAGES = {
-    "study": lambda _: report_html(reported_studies.result_of_case("two targets")),
+    "study": lambda _: report_html(reported_studies.typed(reported_studies.result_of_case("two targets"))),
     "design": lambda _: design_html(run_analyse(AnalyseOrder("sunflower_extract", target=24.68))),
     "diagnosis": lambda _: diagnosis_html(diagnosed.result_of_case("ambiguous")),
     "audit": lambda _: audit_html(audit_study(read_study(shipped_study()))),
@@ -77,7 +77,7 @@ def test_the_charts_of_a_page_are_drawn_with_the_upload_off(page):
 
 
 def test_the_charts_of_the_live_page_are_drawn_with_the_upload_off():
-    plots = study_plots(reported_studies.result_of_case("two targets"))
+    plots = study_plots(reported_studies.typed(reported_studies.result_of_case("two targets")))
     for title, plot in plots.items():
         sent = json.loads(Drawn(plot.make(), True, title).to_json())
         assert sent["config"] == CONFIG

@@ -65,7 +65,7 @@ def analysed(*options):
 def test_table_8_gives_table_9_the_papers_equation_and_a_solution(tmp_path):
     """Processes 2022, 10, 185: Table 9 (sums of squares, p), R² 0.983, adjusted 0.9612, CV 1.59 %; equation 8."""
     result = analysed("sunflower_extract", "--target", 24.68)
-    anova = result["surface"]["anova"][0]
+    anova = result["analysis"]["model"]["anova"]
     rows = {row["source"]: row for row in anova["rows"]}
     table = np.genfromtxt(asset_path("source_tables", "table9_box_behnken_anova"), delimiter=",", dtype=str)[1:]
     ours = ("model", "A", "B", "C", "A*B", "A*C", "B*C", "A^2", "B^2", "C^2", "residual", "lack_of_fit", "pure_error")
@@ -79,15 +79,15 @@ def test_table_8_gives_table_9_the_papers_equation_and_a_solution(tmp_path):
     # As the README quotes it; its check by leaving out one run at a time is in tests/doe/test_surface.py.
     assert anova["r_squared_predicted"] == pytest.approx(0.832, abs=5e-4)
     printed = [18.31, 0.14, 149.7, -219.08, 3.01, 1.85, 22.22, -0.026, -249, 113.81]
-    natural = result["surface"]["models"][0]["coefficients_natural"]
+    natural = result["analysis"]["model"]["surface"]["coefficients_natural"]
     assert natural == pytest.approx(printed, rel=0.03)  # 0.14 and -0.026 are printed with two digits
-    single = result["optimum"]["single"]
+    single = result["analysis"]["optimum"]
     assert single["reached"]
     assert single["predicted"] == pytest.approx(24.68, abs=1e-5)
     assert single["unidentified"] == ["A", "B", "C"]
     assert single["reachable_high"] == pytest.approx(28.34, abs=5e-3)
     assert single["solution_share"] == pytest.approx([0.77, 0.76, 1.0], abs=5e-3)
-    (canonical,) = result["surface"]["canonical"]
+    canonical = result["analysis"]["model"]["canonical"]
     assert (canonical["kind"], canonical["inside"]) == ("saddle", False)
 
 
@@ -114,7 +114,7 @@ def test_report_is_written_complete_and_holds_the_same_numbers(tmp_path):
     ):
         assert f'<figure id="{name}">' in page
     stored = json.loads((out / "result.json").read_text(encoding="utf-8"))
-    assert stored["optimum"]["single"]["statement"] in result.stdout
+    assert stored["analysis"]["optimum"]["statement"] in result.stdout
     assert "explorer analyse sunflower_extract --target 24.68" in markdown
     assert "is not empty" in refused(explorer("analyse", "sunflower_extract", "--target", 24.68, "--out", out))
 
@@ -125,16 +125,13 @@ def test_factorial_from_factors_to_the_textbooks_effects(tmp_path):
     path, said = made(tmp_path, "factorial", "--factors", factors, "--standard-order")
     assert "2^4: 16 rows × 1 = 16 runs" in said
     result = analysed(fill(path, FILTRATION_RATE), "--terms", "f1,f3,f4,f1*f3,A*D")
-    effects = {effect["name"]: effect["effect"] for effect in result["effects"]["analysis"]["effects"]}
+    effects = {effect["name"]: effect["effect"] for effect in result["analysis"]["effects"]["screening"]["effects"]}
     assert effects["A"] == pytest.approx(21.625)
     assert effects["A*C"] == pytest.approx(-18.125)
-    included = [
-        term
-        for term, is_in in zip(*(result["surface"]["models"][0][key] for key in ("terms", "included")), strict=True)
-        if is_in
-    ]
+    surface = result["analysis"]["model"]["surface"]
+    included = [term for term, is_in in zip(surface["terms"], surface["included"], strict=True) if is_in]
     assert included == ["intercept", "A", "C", "D", "A*C", "A*D"]
-    assert result["surface"]["anova"][0]["r_squared"] == pytest.approx(0.966, abs=5e-4)
+    assert result["analysis"]["model"]["anova"]["r_squared"] == pytest.approx(0.966, abs=5e-4)
     text = explorer("analyse", path, "--terms", "f1,f3,f4,f1*f3,A*D").stdout
     equation = next(line for line in text.splitlines() if line.startswith("Equation, coded: "))
     assert re.sub("[0-9.]+", "n", equation) == "Equation, coded: n + n A + n C + n D − n A·C + n A·D"
@@ -151,11 +148,11 @@ def test_central_composite_finds_a_planted_maximum(tmp_path, process):
     x1, x2 = np.array([[(float(row[4]) - 85) / 5, (float(row[5]) - 175) / 5] for row in rows]).T
     noise = 1e-3 * np.random.default_rng(3).standard_normal(len(rows))
     result = analysed(fill(path, 80 - 1.4 * (x1 - 0.4) ** 2 - (x2 - 0.3) ** 2 + noise))
-    canonical = result["surface"]["canonical"][0]
+    canonical = result["analysis"]["model"]["canonical"]
     assert canonical["kind"] == "maximum"
     assert canonical["inside"]
     assert canonical["stationary_natural"] == pytest.approx([87.0, 176.5], abs=0.02)
-    assert result["optimum"] is None
+    assert result["analysis"]["optimum"] is None
 
 
 def test_screening_with_a_fold_over_says_what_it_confuses(tmp_path):
@@ -169,8 +166,8 @@ def test_screening_with_a_fold_over_says_what_it_confuses(tmp_path):
     assert "aliases" not in folded.stdout
     assert "those share columns with each other, up to 1/3 of one" in folded.stdout
     result = analysed(fill(path, np.random.default_rng(1).standard_normal(12)))
-    assert result["surface"] is None
-    assert len(result["effects"]["analysis"]["effects"]) == 11
+    assert result["analysis"]["model"] is None
+    assert len(result["analysis"]["effects"]["screening"]["effects"]) == 11
 
 
 def test_fraction_prints_its_defining_relation_and_alias_chains(tmp_path):
@@ -192,7 +189,7 @@ def test_only_some_factors_leave_the_others_to_the_scatter(tmp_path):
     path, _ = made(tmp_path, "factorial", "--factors", many_factors(tmp_path, 4), "--standard-order")
     result = analysed(fill(path, FILTRATION_RATE), "--only", "f1,f3,f4", "--model", "interactions")
     assert [factor["factor"] for factor in result["factors"]] == ["f1", "f3", "f4"]
-    rows = {row["source"]: row for row in result["surface"]["anova"][0]["rows"]}
+    rows = {row["source"]: row for row in result["analysis"]["model"]["anova"]["rows"]}
     assert rows["pure_error"]["df"] == 8
 
 

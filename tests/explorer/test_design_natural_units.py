@@ -24,10 +24,10 @@ def test_coefficients_their_errors_and_adequate_precision_of_the_shipped_sheet()
     fit, room = fitted_in_natural_units(quadratic(NAMES), NAMES, natural, y)
     # what the condition of natural levels leaves of a double, about 1e-8
     assert room < 1e-7
-    found = run_analyse(AnalyseOrder("sunflower_extract"))["surface"]
-    assert found["models"][0]["coefficients_natural"] == pytest.approx(fit.params.to_numpy(), rel=10 * room)
+    found = run_analyse(AnalyseOrder("sunflower_extract"))
+    assert found.analysis.model.surface.coefficients_natural == pytest.approx(fit.params.to_numpy(), rel=10 * room)
     precision = np.ptp(fit.fittedvalues) / math.sqrt((fit.get_prediction().se_mean ** 2).mean())
-    assert found["anova"][0]["adequate_precision"] == pytest.approx(precision, rel=10 * room)
+    assert found.analysis.model.anova.adequate_precision == pytest.approx(precision, rel=10 * room)
     middle, half = (natural.max(axis=0) + natural.min(axis=0)) / 2, np.ptp(natural, axis=0) / 2
-    surface = fit_surface(np.array(found["design"]), y, Region(tuple(NAMES), middle, half, ()))
+    surface = fit_surface(found.coded, y, Region(tuple(NAMES), middle, half, ()))
     assert natural_errors(surface) == pytest.approx(fit.bse.to_numpy(), rel=10 * room)

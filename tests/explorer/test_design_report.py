@@ -1,5 +1,6 @@
 """The report of a design: every chart is one that plotly reads, for designs of every kind and for poor results."""
 
+import json
 import math
 
 import numpy as np
@@ -10,6 +11,7 @@ from doe.designs import box_behnken, central_composite, factorial, latin_hypercu
 from explorer.design.analysis import AnalyseOrder, analyse_runs
 from explorer.design.analysis_text import analysis_text
 from explorer.design.factors_file import Factor
+from explorer.design.result import DesignResult
 from explorer.design.runs import Runs
 from explorer.report.content import Figure, Folded, Table
 from explorer.report.design import design_html, design_markdown
@@ -117,9 +119,14 @@ def test_what_acts_and_where_the_target_lies_are_in_short(result):
     first = sections_of(result)[0]
     assert first.title == "In short"
     facts = dict(next(block for block in first.blocks if hasattr(block, "pairs")).pairs)
-    assert ("Target" in facts) == (result["optimum"] is not None)
-    assert ("Equation, coded" in facts) == (result["surface"] is not None)
-    assert ("Factors that act" in facts) == (result["effects"] is not None)
+    assert ("Target" in facts) == (result.optimum is not None)
+    assert ("Equation, coded" in facts) == (result.fitted is not None)
+    assert ("Factors that act" in facts) == (result.effects is not None)
+
+
+def test_the_result_survives_json(result):
+    kept = json.loads(json.dumps(result.to_dict(), allow_nan=False))
+    assert DesignResult.from_dict(kept).to_dict() == kept
 
 
 def test_names_from_outside_are_escaped():

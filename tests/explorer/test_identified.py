@@ -2,11 +2,11 @@
 
 import copy
 import re
+from dataclasses import replace
 
 import pytest
 
 from doe.campaign import run_campaign
-from doe.stages.lines import optimum_line
 from explorer.design.analysis import AnalyseOrder, run_analyse
 from explorer.laboratory.answers import analysis_answer
 from explorer.report import report_html, report_markdown
@@ -14,12 +14,14 @@ from explorer.report.comparison import comparison
 from explorer.report.content import Table
 from explorer.report.design import design_markdown
 from explorer.report.design.plots import design_plots
+from explorer.report.figures.model import fitted_targets
 from explorer.report.figures.optimum import ranges
 from explorer.report.html import escaped
 from explorer.report.study_plots import study_plots
 from explorer.report.units_for_people import parameter_range, parameter_value
 from tests.explorer import reported_studies
 from tests.explorer.command_line import explorer
+from tests.explorer.reported_studies import typed
 
 SET_TRACE = "95 % set of the optimum (bootstrap)"
 
@@ -65,7 +67,7 @@ def test_the_terminal_shows_ranges_and_a_choice_where_nothing_is_identified():
     """Processes 2022, 10, 185, Table 8: one angle leaves all three factors open."""
     result = explorer("analyse", "sunflower_extract", "--target", 24.68)
     assert result.exit_code == 0
-    found = run_analyse(AnalyseOrder("sunflower_extract", target=24.68))["optimum"]
+    found = run_analyse(AnalyseOrder("sunflower_extract", target=24.68)).optimum.to_dict()
     rows = {line[0]: re.split(r"\s{2,}", line) for line in result.stdout.splitlines() if " (chosen by rule)" in line}
     assert rows.keys() == {"A", "B", "C"}
     for name, (confidence_set, feasible, chosen) in texts_of(found).items():
@@ -82,7 +84,7 @@ def test_the_page_and_the_report_of_a_design_say_the_same():
     result = run_analyse(order)
     answer, markdown = analysis_answer(order), design_markdown(result)
     page = answer.files["report.html"].decode()
-    for confidence_set, feasible, chosen in texts_of(result["optimum"]).values():
+    for confidence_set, feasible, chosen in texts_of(result.optimum.to_dict()).values():
         for text in (answer.text, markdown, page):
             assert escaped(confidence_set) not in text
             assert confidence_set not in text
@@ -93,11 +95,13 @@ def test_the_page_and_the_report_of_a_design_say_the_same():
     assert SET_TRACE not in shown
     assert "optimum" not in shown
     assert "chosen by rule" in shown
-    assert SET_TRACE in traces(design_plots(identifying(result, "A", "B", "C")))
+    optimum = replace(result.analysis.optimum, unidentified=())
+    known = replace(result, analysis=replace(result.analysis, optimum=optimum))
+    assert SET_TRACE in traces(design_plots(known))
 
 
 def test_a_study_report_without_identified_factors_prints_no_95_percent_set(open_study):
-    html, markdown = report_html(open_study), report_markdown(open_study)
+    html, markdown = report_html(typed(open_study)), report_markdown(typed(open_study))
     for name, (confidence_set, feasible, chosen) in texts_of(open_study["optimum"]).items():
         assert confidence_set not in markdown
         assert confidence_set not in html
@@ -109,14 +113,14 @@ def test_a_study_report_without_identified_factors_prints_no_95_percent_set(open
     assert "Chosen by rule: nearest the measured parameters among the settings that give the target" in markdown
     assert "The 95 % set and this share" not in markdown
     assert SET_TRACE not in html
-    shown = traces(study_plots(open_study))
+    shown = traces(study_plots(typed(open_study)))
     assert "optimum" not in shown
     assert SET_TRACE not in shown
 
 
 def test_a_study_report_with_every_factor_identified_prints_its_95_percent_sets(open_study):
     result = identifying(open_study, "X7", "X4", "X16")
-    html, markdown = report_html(result), report_markdown(result)
+    html, markdown = report_html(typed(result)), report_markdown(typed(result))
     for name, (confidence_set, feasible, chosen) in texts_of(result["optimum"]).items():
         (row,) = re.findall(rf"^\| {name} \| [^|]* \| yes \|.*$", markdown, re.MULTILINE)
         assert f"| {feasible} |" in row
@@ -130,10 +134,10 @@ def test_a_study_report_with_every_factor_identified_prints_its_95_percent_sets(
 
 def test_of_some_identified_factors_only_these_have_a_95_percent_set(open_study):
     result = identifying(open_study, "X7")
-    markdown = report_markdown(result)
+    markdown = report_markdown(typed(result))
     shown = {name: confidence_set in markdown for name, (confidence_set, _, _) in texts_of(result["optimum"]).items()}
     assert shown == {"X7": True, "X4": False, "X16": False}
-    spec = ranges(result)
+    spec = ranges(fitted_targets(typed(result))[0])
     bars = [trace["y"][0] for trace in spec["data"] if trace["name"] == SET_TRACE]
     assert bars == ["X7 · static friction seed–seed"]
     stars = {
@@ -146,7 +150,7 @@ def test_of_some_identified_factors_only_these_have_a_95_percent_set(open_study)
 
 def test_a_target_out_of_reach_identifies_nothing():
     result = reported_studies.result_of_case("out of reach")
-    markdown = report_markdown(result)
+    markdown = report_markdown(typed(result))
     assert not result["optimum"]["single"]["reached"]
     for confidence_set, _, chosen in texts_of(result["optimum"]).values():
         assert f"| no | – | – | {chosen} (chosen by rule) | – |" in markdown
@@ -157,12 +161,12 @@ def test_a_target_out_of_reach_identifies_nothing():
 def test_several_targets_have_a_rule_of_their_own():
     result = reported_studies.result_of_case("two targets")
     assert result["optimum"]["single"]["unidentified"]
-    assert "Chosen by rule: the setting of least weighted misfit over all targets" in report_markdown(result)
+    assert "Chosen by rule: the setting of least weighted misfit over all targets" in report_markdown(typed(result))
 
 
 def test_two_studies_are_compared_by_what_each_identifies(open_study):
     known = identifying(open_study, "X7", "X4", "X16")
-    tables = comparison(open_study, known, ("open", "known"))
+    tables = comparison(typed(open_study), typed(known), ("open", "known"))
     assert all(isinstance(table, Table) for table in tables)
     cells = {row[0]: row[1:] for row in tables[1].rows}
     for factor, (confidence_set, feasible, chosen) in zip(
@@ -174,8 +178,8 @@ def test_two_studies_are_compared_by_what_each_identifies(open_study):
 
 def test_the_progress_of_a_study_calls_the_point_chosen_by_rule():
     study, profile, runner = reported_studies.CASES["planted"]
-    found = run_campaign(study, profile, runner, reported_studies.BIAS).optimum
-    line, single = optimum_line(found), found.single
+    found = run_campaign(study, profile, runner, reported_studies.BIAS).stages.optimum
+    line, single = found.line, found.single
     assert line.startswith("chosen by rule: ")
     for name, low, high in zip(single.names, single.solution_low, single.solution_high, strict=True):
         assert f"{name} in {low:.4g} … {high:.4g}" in line

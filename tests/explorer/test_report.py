@@ -10,15 +10,16 @@ import re
 import plotly.graph_objects as go
 import pytest
 
+from doe.record import RecordError
+from doe.runner import valid_values
 from explorer.report import report_html, report_markdown, write_report
 from explorer.report.content import Figure, Folded, Table
-from explorer.report.findings import values_of
 from explorer.report.html import embedded
 from explorer.report.sections import sections_of
 from explorer.report.sections.surface import equation
 from explorer.report.units_for_people import p_value
 from solver import asset_path
-from tests.explorer.reported_studies import CASES, HOSTILE, result_of_case, table, visible
+from tests.explorer.reported_studies import CASES, HOSTILE, result_of_case, table, typed, visible
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +40,7 @@ def figures_of(result):
             elif isinstance(block, Figure):
                 yield block
 
-    return {figure.name: figure.spec for section in sections_of(result) for figure in walk(section.blocks)}
+    return {figure.name: figure.spec for section in sections_of(typed(result)) for figure in walk(section.blocks)}
 
 
 def charts_in(page):
@@ -61,9 +62,9 @@ def trace(spec, name):
 
 
 def test_every_section_and_chart_is_on_the_page(result):
-    page = report_html(result)
+    page = report_html(typed(result))
     text = visible(page)
-    for section in sections_of(result):
+    for section in sections_of(typed(result)):
         assert section.blocks
         assert section.title in text
     assert charts_in(page).keys() == figures_of(result).keys()
@@ -72,13 +73,13 @@ def test_every_section_and_chart_is_on_the_page(result):
 
 
 def test_no_missing_number_leaks_into_the_text(result):
-    for text in (visible(report_html(result)), report_markdown(result)):
+    for text in (visible(report_html(typed(result))), report_markdown(typed(result))):
         assert not re.search(r"\b(nan|NaN|None|inf|null|undefined|True|False)\b", text)
         assert "{" not in text
 
 
 def test_page_loads_nothing_from_elsewhere(result):
-    page = re.sub(r'<script id="plotly">.*?</script>', "", report_html(result), flags=re.DOTALL)
+    page = re.sub(r'<script id="plotly">.*?</script>', "", report_html(typed(result)), flags=re.DOTALL)
     assert len(page) < 1_500_000
     assert not re.search(r"https?:|//cdn|@import|url\(", page)
     assert not re.search(r"<(script|img|link|iframe)[^>]+(src|href)=", page)
@@ -86,7 +87,7 @@ def test_page_loads_nothing_from_elsewhere(result):
 
 
 def test_page_stays_below_six_megabytes(result):
-    assert len(report_html(result).encode()) < 6e6
+    assert len(report_html(typed(result)).encode()) < 6e6
 
 
 def test_charts_are_valid_for_plotly(result):
@@ -104,7 +105,7 @@ def test_tables_are_rectangular(result):
             elif isinstance(block, Folded):
                 walk(block.blocks)
 
-    for section in sections_of(result):
+    for section in sections_of(typed(result)):
         walk(section.blocks)
 
 
@@ -146,7 +147,7 @@ def test_verification_chart_and_tables_hold_the_pours(result):
     stage = result["verification"]
     for index, target in enumerate(stage["targets"]):
         spec, test = figures_of(result)[f"verification-{index + 1}"], stage["tests"][index]
-        assert trace(spec, "fresh pours")["y"] == values_of(stage["runs"], target["observable"])
+        assert trace(spec, "fresh pours")["y"] == valid_values(typed(result).verification.runs, target["observable"])
         assert trace(spec, "simulated mean, 95 % interval")["y"] == [test["simulated"]["mean"]]
         band = spec["layout"]["shapes"][0]
         assert (band["y0"], band["y1"]) == (target["mean"] - target["margin"], target["mean"] + target["margin"])
@@ -162,7 +163,8 @@ def test_all_pours_are_counted(result):
 
 def test_printed_equation_gives_the_prediction_at_the_optimum(result):
     part, values = result["surface"], result["optimum"]["values"]
-    _, actual = equation(part, 0)
+    found = typed(result).surface
+    _, actual = equation(found.models[0], found.factors, found.observables[0])
     size = {"material.seed.shear_modulus": 1e6}
     at = {factor["name"]: values[factor["path"]] / size.get(factor["path"], 1.0) for factor in part["factors"]}
     total, largest = 0.0, 0.0
@@ -196,7 +198,7 @@ def test_contours_pass_through_the_optimum(result):
 
 def test_pareto_has_both_errors_and_both_limits(results):
     result = results["planted"]
-    spec, analysis = charts_in(report_html(result))["pareto"], result["screening"]["analysis"]
+    spec, analysis = charts_in(report_html(typed(result)))["pareto"], result["screening"]["analysis"]
     for name, key in (("replicates", "pure_error"), ("dummies", "dummy_error")):
         sizes = [abs(e[f"by_{name}"]["t"]) for e in analysis["effects"] if e[f"by_{name}"] is not None]
         assert sorted(t for t in trace(spec, name)["x"] if t is not None) == sorted(sizes)
@@ -208,7 +210,7 @@ def test_pareto_has_both_errors_and_both_limits(results):
 
 def test_ascent_and_scan_charts_hold_means_and_intervals(results):
     result = results["planted"]
-    charts = charts_in(report_html(result))
+    charts = charts_in(report_html(typed(result)))
     walk = trace(charts["ascent"], "mean, 95 % interval")
     assert walk["y"] == result["ascent"]["means"]
     assert walk["error_y"]["array"] == [1.96 * error for error in result["ascent"]["standard_error"]]
@@ -227,14 +229,14 @@ def test_bootstrap_cloud_holds_every_refit(results):
 
 
 def test_stages_that_did_not_run_leave_no_section(results):
-    bare = {section.title for section in sections_of(results["no assumptions, no scan"])}
-    full = {section.title for section in sections_of(results["planted"])}
+    bare = {section.title for section in sections_of(typed(results["no assumptions, no scan"]))}
+    full = {section.title for section in sections_of(typed(results["planted"]))}
     assert full - bare == {"Over the outlet height", "Compared with the paper"}
-    text = visible(report_html(results["no assumptions, no scan"]))
+    text = visible(report_html(typed(results["no assumptions, no scan"])))
     assert "this study declares no assumption" in text
     stripped = copy.deepcopy(results["no assumptions, no scan"])
     stripped["study"]["assumed"] = []
-    assert "What the source does not state" not in {section.title for section in sections_of(stripped)}
+    assert "What the source does not state" not in {section.title for section in sections_of(typed(stripped))}
 
 
 def test_hostile_names_stay_text(results):
@@ -247,11 +249,11 @@ def test_hostile_names_stay_text(results):
     for entry in result["pilot"]["choice"]["separations"]:
         entry["change"] = HOSTILE
     result["pilot"]["choice"]["separations"] = result["pilot"]["choice"]["separations"][:5]
-    page = report_html(result)
+    page = report_html(typed(result))
     assert "<script>alert" not in page
     assert page.count("<script") == len(figures_of(result)) + 2
     assert "&lt;script&gt;alert" in page
-    outside_code = re.sub(r"`[^`]*`", "", report_markdown(result))
+    outside_code = re.sub(r"`[^`]*`", "", report_markdown(typed(result)))
     assert "alert" in outside_code
     assert not re.search(r"(?<!\\)<script", outside_code)
 
@@ -263,18 +265,18 @@ def test_embedded_json_cannot_end_its_element():
 
 
 def test_paper_is_compared_only_for_its_own_study(results):
-    text = report_markdown(results["planted"])
+    text = report_markdown(typed(results["planted"]))
     for printed in ("25.96°, 25.31°, 23.47°", "24.91°", "0.923 %", "0.827", "58.34 MPa", "0.608"):
         assert printed in text
     rows = {row[0]: row for row in table(results["planted"], "factor", "parameter", "paper: sum of squares")}
     with asset_path("source_tables", "table6_plackett_burman_anova").open(encoding="utf-8") as file:
         printed_p = {row["factor"]: row["p_value"] for row in csv.DictReader(io.StringIO(file.read()))}
     assert {name: row[4] for name, row in rows.items()} == {name: printed_p[name] for name in rows}
-    assert "Compared with the paper" not in report_markdown(results["no assumptions, no scan"])
+    assert "Compared with the paper" not in report_markdown(typed(results["no assumptions, no scan"]))
 
 
 def test_cautions_say_what_the_numbers_cannot(results):
-    texts = {name: visible(report_html(result)) for name, result in results.items()}
+    texts = {name: visible(report_html(typed(result))) for name, result in results.items()}
     assert "went on without being significant" in texts["nothing acts"]
     assert "not better than noise" in texts["nothing acts"]
     assert "lies outside what the model reaches" in texts["out of reach"]
@@ -291,7 +293,7 @@ def test_the_noise_table_shows_the_range_of_the_bias(results):
 
 
 def test_the_page_tells_the_spread_by_setting_and_which_assumption_is_not_testable(results):
-    text = report_markdown(results["planted"])
+    text = report_markdown(typed(results["planted"]))
     pilot = results["planted"]["pilot"]
     assert f"Brown–Forsythe: p = {p_value(pilot['equal_variance']['p'])}" in text
     assert re.search(r"plate thickness .*acts on 3 bodies", text)
@@ -309,10 +311,10 @@ def test_the_scan_and_the_sizes_of_a_full_profile_state_what_they_resolve(result
 
 
 def test_the_optimum_says_whether_the_target_is_taken_as_exact(results):
-    assert "the target's own standard error, 0.51°" in report_markdown(results["planted"])
+    assert "the target's own standard error, 0.51°" in report_markdown(typed(results["planted"]))
     exact = copy.deepcopy(results["planted"])
     exact["optimum"]["single"]["target_standard_error"] = 0.0
-    assert "The target is taken as exact" in report_markdown(exact)
+    assert "The target is taken as exact" in report_markdown(typed(exact))
 
 
 def test_relative_error_below_the_standard_error_is_marked(results):
@@ -320,13 +322,13 @@ def test_relative_error_below_the_standard_error_is_marked(results):
     test = result["verification"]["tests"][0]
     spread = 100 * test["simulated"]["sd"] / math.sqrt(test["simulated"]["n"]) / 24.68
     test["relative_error_percent"] = 0.9 * spread
-    assert "is smaller than the standard error" in visible(report_html(result))
+    assert "is smaller than the standard error" in visible(report_html(typed(result)))
     test["relative_error_percent"] = 1.1 * spread
-    assert "is smaller than the standard error" not in visible(report_html(result))
+    assert "is smaller than the standard error" not in visible(report_html(typed(result)))
 
 
 def test_largest_unknown_is_named_beside_the_largest_factor(results):
-    text = report_markdown(results["planted"])
+    text = report_markdown(typed(results["planted"]))
     assumed = max((e for e in results["planted"]["assumptions"]["analysis"]["effects"] if not e["is_dummy"]),
                   key=lambda e: abs(e["effect"]))  # fmt: skip
     assert assumed["name"] == "outlet_height"  # planted: −6° against +8° of X7
@@ -336,23 +338,23 @@ def test_largest_unknown_is_named_beside_the_largest_factor(results):
 
 def test_command_line_repeats_the_study(results):
     command = "explorer calibrate --headless --study sunflower_extract --profile test --out results"
-    assert command in report_markdown(results["planted"])
+    assert command in report_markdown(typed(results["planted"]))
     own = copy.deepcopy(results["planted"])
     own["study"] |= {"name": "mine", "file": "/home/me/my studies/mine.toml"}
-    assert "--study '/home/me/my studies/mine.toml'" in report_markdown(own)
-    assert "--tries" not in report_markdown(own)
+    assert "--study '/home/me/my studies/mine.toml'" in report_markdown(typed(own))
+    assert "--tries" not in report_markdown(typed(own))
     own["study"]["tries"] = 6
-    assert "--tries 6 --out results" in report_markdown(own)
+    assert "--tries 6 --out results" in report_markdown(typed(own))
 
 
 def test_files_appear_complete_or_not_at_all(results, tmp_path):
-    write_report(results["planted"], tmp_path)
+    write_report(typed(results["planted"]), tmp_path)
     assert {path.name for path in tmp_path.iterdir()} == {"report.html", "report.md"}
     before = (tmp_path / "report.md").read_text(encoding="utf-8")
     broken = copy.deepcopy(results["planted"])
     del broken["verification"]["tests"][0]["simulated"]
-    with pytest.raises(KeyError):
-        write_report(broken, tmp_path)
+    with pytest.raises(RecordError, match=r"^result of a study: verification\.tests\[0\]\.simulated: is missing$"):
+        write_report(typed(broken), tmp_path)
     assert (tmp_path / "report.md").read_text(encoding="utf-8") == before
 
 
@@ -360,7 +362,7 @@ def test_files_appear_complete_or_not_at_all(results, tmp_path):
 def test_browser_draws_every_chart_and_asks_for_nothing(results, tmp_path, chromium):
     from playwright.sync_api import sync_playwright
 
-    write_report(results["two targets"], tmp_path)
+    write_report(typed(results["two targets"]), tmp_path)
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         page = browser.new_page()

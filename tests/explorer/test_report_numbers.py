@@ -2,27 +2,47 @@
 
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from explorer.report.findings import half_width, interval_of_mean, mean_and_sd
-from explorer.report.units_for_people import code, number, p_value, parameter_label, parameter_range, parameter_value
+from doe.designs import factorial
+from doe.runner import sample_of
+from doe.screening import analyse_screening
+from doe.t_tests import Sample
+from explorer.report.units_for_people import (
+    code,
+    number,
+    p_value,
+    parameter_label,
+    parameter_range,
+    parameter_value,
+    percent,
+)
 
 
 def test_intervals_agree_with_scipy():
     values = [24.1, 22.8, 27.3, 25.0, 23.2]
-    mean, sd = mean_and_sd(values)
-    low, high = stats.t.interval(0.95, 4, loc=mean, scale=stats.sem(values))
-    assert (mean - interval_of_mean(sd, 5), mean + interval_of_mean(sd, 5)) == pytest.approx((low, high))
-    assert interval_of_mean(None, 1) is None
-    assert mean_and_sd([]) == (None, None)
+    sample = Sample.of(values)
+    low, high = stats.t.interval(0.95, 4, loc=sample.mean, scale=stats.sem(values))
+    assert (sample.mean - sample.half_width, sample.mean + sample.half_width) == pytest.approx((low, high))
+    assert math.isnan(Sample.of(values[:1]).half_width)
+    empty = sample_of([], "angle_of_repose_deg")
+    assert empty.n == 0
+    assert math.isnan(empty.mean)
+    assert math.isnan(empty.standard_error)
 
 
-def test_half_width_is_none_without_an_error():
-    effect = {"by_dummies": None, "by_replicates": None}
-    assert half_width({"pure_error": None, "dummy_error": None}, effect) is None
+def test_half_width_is_nan_without_an_error():
+    levels = factorial(2)
+    full = np.column_stack(
+        [levels, levels.prod(axis=1)]
+    )  # as many columns as the rows allow: nothing is left for error
+    found = analyse_screening(full, ("a", "b", "ab"), np.array([[1.0], [2.0], [3.0], [4.5]]), ())
+    assert found.deciding_error is None
+    assert math.isnan(found.half_width(found.effects[0]))
 
 
 def test_units_are_those_that_people_read():
@@ -43,6 +63,8 @@ def test_number_reads_back_within_its_digits(value):
 def test_missing_number_is_a_dash(value):
     assert number(value) == "–"
     assert p_value(value) == "–"
+    assert percent(value) == "–"
+    assert parameter_range("rig.outlet_height", 0.06, value) == "–"
 
 
 def test_code_span_cannot_be_left():

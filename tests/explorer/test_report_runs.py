@@ -4,7 +4,7 @@ import importlib
 import re
 
 from explorer.report import report_html, report_markdown
-from tests.explorer.reported_studies import PROFILE, result_of_case, table, visible
+from tests.explorer.reported_studies import PROFILE, result_of_case, table, typed, visible
 
 
 def test_a_study_of_runs_that_last_their_time_counts_its_valid_runs():
@@ -23,14 +23,14 @@ def test_a_study_of_runs_that_last_their_time_counts_its_valid_runs():
     assert {int(row[4]) for row in steps} == {PROFILE.ascent_replicates}
     assert {int(row[2]) for row in rows} == {PROFILE.screening_replicates}
     share = f"{100 * (1 - valid / total):.1f} % not valid"
-    for text in (visible(report_html(result)), report_markdown(result)):
+    for text in (visible(report_html(typed(result))), report_markdown(typed(result))):
         assert share in text.replace("\xa0", " ")
         assert not re.search(r"\b(gave|given|without) (a|no) pile|no pile", text)
 
 
 def test_numbers_of_the_method_are_printed_from_where_they_are_decided(monkeypatch):
     result = result_of_case("planted")
-    text = report_markdown(result)
+    text = report_markdown(typed(result))
     assert "at most 3 seeds are tried" in text
     assert "main effects in the 28-run design" in text
     assert "misses by more than 5° under" in text
@@ -41,7 +41,7 @@ def test_numbers_of_the_method_are_printed_from_where_they_are_decided(monkeypat
     sections = "explorer.report.sections"
     monkeypatch.setattr(importlib.import_module(f"{sections}.noise"), "BIAS_LIMIT_DEG", 7.5)
     monkeypatch.setattr(importlib.import_module(f"{sections}.screening"), "MIN_BODIES", 9)
-    text = report_markdown(result)
+    text = report_markdown(typed(result))
     assert "at most 1 seed is tried" in text
     assert "main effects in the 36-run design" in text
     assert "misses by more than 7.5° under" in text

@@ -11,23 +11,22 @@ from scipy import stats
 
 from doe.campaign import run_campaign
 from doe.partial import PartialStages
+from doe.study_result import StudyDescription
 from explorer.report.diagnosis_plots import diagnosis_plots
 from explorer.report.figures.effects import all_effects, errors_at_hand, pareto_against
 from explorer.report.figures.main_effects import main_effects
-from explorer.report.figures.model import chosen_point, model_of
+from explorer.report.figures.model import fitted_targets
 from explorer.report.figures.noise import noise_of_estimators
 from explorer.report.figures.profiler import prediction, profiler
 from explorer.report.figures.style import short_rows, stacked
 from explorer.report.figures.surface import residual_quantiles
 from explorer.report.figures.surface_3d import height_over, solutions
-from explorer.report.findings import factor_effects
 from explorer.report.study_plots import study_plots
 from explorer.study.partial_result import PartialResult
 from explorer.study.process import PARTIAL
-from explorer.study.run import described
 from tests.doe.formula_runner import FormulaRunner
 from tests.explorer import diagnosed, reported_studies
-from tests.explorer.reported_studies import BIAS, PROFILE, STUDY, planted
+from tests.explorer.reported_studies import BIAS, PROFILE, STUDY, planted, typed
 
 TITLES = (
     "Noise of the estimators", "Pareto of effects, by replicates", "Pareto of effects, by dummies", "Half-normal",
@@ -39,13 +38,18 @@ TITLES = (
 
 @pytest.fixture(scope="module")
 def result():
-    return reported_studies.result_of_case("planted")
+    return typed(reported_studies.result_of_case("planted"))
+
+
+@pytest.fixture(scope="module")
+def fitted(result):
+    return fitted_targets(result)[0]
 
 
 @pytest.mark.parametrize("case", sorted(reported_studies.CASES))
 def test_every_plot_of_every_kind_of_study_is_one_that_plotly_takes(case):
     found = reported_studies.result_of_case(case)
-    plots = study_plots(found)
+    plots = study_plots(typed(found))
     for title, plot in plots.items():
         spec = plot.make()
         assert spec is not None, title
@@ -59,7 +63,8 @@ def test_every_plot_of_every_kind_of_study_is_one_that_plotly_takes(case):
 
 
 def test_texts_of_a_study_cannot_bring_markup():
-    specs = [plot.make() for plot in study_plots(reported_studies.result_of_case("no assumptions, no scan")).values()]
+    found = typed(reported_studies.result_of_case("no assumptions, no scan"))
+    specs = [plot.make() for plot in study_plots(found).values()]
     assert "<script>" not in json.dumps(specs)
 
 
@@ -75,18 +80,18 @@ def test_every_plot_of_every_kind_of_diagnosis_is_one_that_plotly_takes(case):
 
 
 def test_the_pareto_of_one_error_has_its_limits(result):
-    part = result["screening"]
-    assert errors_at_hand(part) == ["replicates", "dummies"]
+    part = result.screening
+    assert errors_at_hand(part.analysis) == ["replicates", "dummies"]
     spec = pareto_against(part, ["dummies"])
     drawn = [shape["x0"] for shape in spec["layout"]["shapes"]]
-    error = part["analysis"]["dummy_error"]
-    assert drawn == [error["t_limit"], error["t_limit_bonferroni"]]
+    error = part.analysis.dummy_error
+    assert drawn == [error.t_limit, error.t_limit_bonferroni]
     # Student's t, 95 %, two-sided; Bonferroni over the 24 factors.
-    assert drawn == pytest.approx([stats.t.ppf(0.975, error["df"]), stats.t.ppf(1 - 0.025 / 24, error["df"])])
+    assert drawn == pytest.approx([stats.t.ppf(0.975, error.df), stats.t.ppf(1 - 0.025 / 24, error.df)])
 
 
 def test_panels_in_a_row_become_panels_below_each_other(result):
-    before = noise_of_estimators(result["pilot"])
+    before = noise_of_estimators(result.pilot)
     after = stacked(before)
     panels = [key for key in before["layout"] if key.startswith("xaxis")]
     assert len(panels) == 3  # σ, d′ and bias, which share the axis of the estimators
@@ -101,8 +106,8 @@ def test_panels_in_a_row_become_panels_below_each_other(result):
 
 
 def test_short_names_of_rows_keep_the_long_ones_for_the_hover(result):
-    error = errors_at_hand(result["screening"])[0]
-    long = pareto_against(result["screening"], [error])
+    error = errors_at_hand(result.screening.analysis)[0]
+    long = pareto_against(result.screening, [error])
     axis = short_rows(long)["layout"]["yaxis"]
     names = dict(zip(axis["tickvals"], axis["ticktext"], strict=True))
     assert names["X7 · static friction seed–seed"] == "X7"
@@ -110,49 +115,48 @@ def test_short_names_of_rows_keep_the_long_ones_for_the_hover(result):
 
 
 def test_main_effects_differ_by_the_effect(result):
-    analysis = result["screening"]["analysis"]
-    spec = main_effects(result["screening"])
+    analysis = result.screening.analysis
+    spec = main_effects(result.screening)
     sizes = [trace["y"][1] - trace["y"][0] for trace in spec["data"]]
     assert [abs(size) for size in sizes] == sorted((abs(size) for size in sizes), reverse=True)
-    by_name = {effect["name"]: effect["effect"] for effect in analysis["effects"]}
+    by_name = {effect.name: effect.effect for effect in analysis.effects}
     assert sizes == pytest.approx([by_name[trace["name"]] for trace in spec["data"]])
     # planted(): friction between seeds acts most, 4 per unit of the coded level
     assert spec["data"][0]["name"] == "X7"
-    assert np.mean(spec["data"][0]["y"]) == pytest.approx(analysis["mean"])
+    assert np.mean(spec["data"][0]["y"]) == pytest.approx(analysis.mean)
 
 
 @pytest.mark.parametrize("case", ["planted", "no assumptions, no scan"])
 def test_each_mark_of_the_effects_chart_has_its_own_entry_in_the_legend(case):
-    found = reported_studies.result_of_case(case)
-    traces = all_effects(found)["data"]
+    found = typed(reported_studies.result_of_case(case))
+    traces = all_effects(found.screening, found.assumptions)["data"]
     # plotly gives the legend the symbol of a trace's first point, so a trace has one symbol for all its points.
     symbols = {trace["name"]: trace["marker"]["symbol"] for trace in traces if trace.get("showlegend", True)}
     assert all(isinstance(symbol, str) for symbol in symbols.values())
     assert len(set(symbols.values())) == len(symbols) == len(traces)
     drawn = {x: trace["marker"]["symbol"] for trace in traces for x in trace["x"]}
-    for name, part in (("factors", found["screening"]), ("assumptions about the set-up", found["assumptions"])):
-        untestable = {entry["factor"] for entry in part["not_testable"]} if part else set()
-        for effect in factor_effects(part["analysis"]) if part else []:
-            meaning = f"{name}, not testable" if effect["name"] in untestable else name
-            assert drawn[effect["effect"]] == symbols[meaning]
+    for name, part in (("factors", found.screening), ("assumptions about the set-up", found.assumptions)):
+        untestable = {entry.factor for entry in part.not_testable} if part else set()
+        for effect in part.analysis.factor_effects() if part else []:
+            meaning = f"{name}, not testable" if effect.name in untestable else name
+            assert drawn[effect.effect] == symbols[meaning]
 
 
-def test_the_model_of_a_result_is_the_fitted_one(result):
-    model, fitted = model_of(result, 0), result["surface"]["models"][0]
-    at = np.array(fitted["points"])
-    np.testing.assert_allclose(model.mean(at), fitted["predicted"], rtol=1e-12)
+def test_half_the_interval_of_a_model_follows_from_the_leverage(fitted):
+    model, at = fitted.model, fitted.model.points
+    np.testing.assert_allclose(model.predict(at), model.predicted, rtol=1e-12)
     # leverage h = x'(X'X)⁻¹x, so half the interval is t sqrt(MSE h)
-    expected = stats.t.ppf(0.975, fitted["df_residual"]) * np.sqrt(fitted["mse"] * np.array(fitted["leverage"]))
-    np.testing.assert_allclose(model.half_interval(at), expected, rtol=1e-9)
-    np.testing.assert_allclose(model.coded(model.natural(at)), at, atol=1e-12)
+    expected = stats.t.ppf(0.975, model.df_residual) * np.sqrt(model.mse * model.leverage)
+    np.testing.assert_allclose(fitted.half_interval(at), expected, rtol=1e-9)
+    np.testing.assert_allclose(fitted.coded(fitted.natural(at)), at, atol=1e-12)
 
 
-def test_the_profiler_passes_through_the_point_and_shows_the_optimums_interval(result):
-    point, found = chosen_point(result), result["optimum"]["single"]
-    mean, half = prediction(result, 0, point)
-    assert mean == pytest.approx(found["predicted"], abs=1e-6)
-    assert [mean - half, mean + half] == pytest.approx([found["predicted_low"], found["predicted_high"]], abs=1e-6)
-    spec = profiler(result, 0, point)
+def test_the_profiler_passes_through_the_point_and_shows_the_optimums_interval(fitted):
+    point, found = fitted.chosen, fitted.optimum.single
+    mean, half = prediction(fitted, point)
+    assert mean == pytest.approx(found.predicted, abs=1e-6)
+    assert [mean - half, mean + half] == pytest.approx([found.predicted_low, found.predicted_high], abs=1e-6)
+    spec = profiler(fitted, point)
     traces = [trace for trace in spec["data"] if trace.get("name") == "here"]
     assert [trace["y"] for trace in traces] == [[pytest.approx(mean)]] * 3
     for row, (band, curve) in enumerate(zip(spec["data"][::3], spec["data"][1::3], strict=True)):
@@ -162,20 +166,20 @@ def test_the_profiler_passes_through_the_point_and_shows_the_optimums_interval(r
         assert (np.array(band["y"][n:])[::-1] < curve["y"]).all()
 
 
-def test_moving_one_factor_moves_the_traces_of_the_others_only(result):
-    centre = list(result["surface"]["region"]["centre"])
-    other = [centre[0] + result["surface"]["region"]["half_width"][0], *centre[1:]]
-    before, after = profiler(result, 0, centre), profiler(result, 0, other)
+def test_moving_one_factor_moves_the_traces_of_the_others_only(fitted):
+    centre = fitted.model.region.centre.tolist()
+    other = [fitted.high[0], *centre[1:]]
+    before, after = profiler(fitted, centre), profiler(fitted, other)
     curves = [trace["y"] for trace in before["data"][1::3]], [trace["y"] for trace in after["data"][1::3]]
     assert curves[0][0] == curves[1][0]
     assert curves[0][1] != curves[1][1]
 
 
-def test_the_solution_surface_lies_where_the_model_gives_the_target(result):
-    sheet = solutions(result, 0)["data"][0]
-    assert sheet["isomin"] == sheet["isomax"] == result["study"]["targets"][0]["mean"]
+def test_the_solution_surface_lies_where_the_model_gives_the_target(fitted):
+    sheet = solutions(fitted)["data"][0]
+    assert sheet["isomin"] == sheet["isomax"] == fitted.target
     assert min(sheet["value"]) < sheet["isomin"] < max(sheet["value"])
-    chosen = next(trace for trace in solutions(result, 0)["data"] if trace["name"] == "chosen by rule")
+    chosen = next(trace for trace in solutions(fitted)["data"] if trace["name"] == "chosen by rule")
     place = [trace[0] for trace in (chosen["x"], chosen["y"], chosen["z"])]
     near = np.linalg.norm(
         (np.column_stack([sheet["x"], sheet["y"], sheet["z"]]) - place)
@@ -185,20 +189,20 @@ def test_the_solution_surface_lies_where_the_model_gives_the_target(result):
     assert sheet["value"][int(near.argmin())] == pytest.approx(sheet["isomin"], abs=1.0)
 
 
-def test_the_surface_in_space_passes_through_the_optimum(result):
-    spec = height_over(result, 0, (0, 1))
+def test_the_surface_in_space_passes_through_the_optimum(fitted):
+    spec = height_over(fitted, (0, 1))
     sheet, runs, star = spec["data"]
-    assert len(runs["z"]) == len(result["surface"]["models"][0]["observed"])
-    assert star["z"] == [pytest.approx(result["optimum"]["single"]["predicted"], abs=1e-6)]
+    assert len(runs["z"]) == len(fitted.model.observed)
+    assert star["z"] == [pytest.approx(fitted.optimum.single.predicted, abs=1e-6)]
     column = int(np.abs(np.array(sheet["x"]) - star["x"][0]).argmin())
     row = int(np.abs(np.array(sheet["y"]) - star["y"][0]).argmin())
     # half a grid cell of at most 12 ° per factor over 24 cells, on each side
     assert sheet["z"][row][column] == pytest.approx(star["z"][0], abs=0.6)
 
 
-def test_residual_quantiles_are_those_of_t(result):
-    spec = residual_quantiles(result, 0)
-    shown, df = spec["data"][1], result["surface"]["models"][0]["df_residual"]
+def test_residual_quantiles_are_those_of_t(fitted):
+    spec = residual_quantiles(fitted)
+    shown, df = spec["data"][1], fitted.model.df_residual
     n = len(shown["x"])
     assert shown["y"] == sorted(shown["y"])
     assert shown["x"][n // 4] == pytest.approx(stats.t.ppf((n // 4 + 0.5) / n, df - 1))
@@ -206,7 +210,7 @@ def test_residual_quantiles_are_those_of_t(result):
 
 def test_a_study_that_still_runs_has_plots_of_what_it_has(tmp_path, monkeypatch):
     monkeypatch.setattr("doe.partial.SHARE", 1.0)
-    partial = PartialResult(tmp_path, described(STUDY, PROFILE))
+    partial = PartialResult(tmp_path, StudyDescription.of(STUDY, PROFILE))
     versions = []
 
     class Watched(FormulaRunner):
@@ -226,16 +230,16 @@ def test_a_study_that_still_runs_has_plots_of_what_it_has(tmp_path, monkeypatch)
     run_campaign(STUDY, PROFILE, Watched(planted, sigma=2.0), BIAS, on_begin=follower.begin, on_result=partial.keep)
     assert {version["partial"] for version in versions} >= {"pilot", "screening", "surface", "verification"}
     for version in versions:
-        for title, plot in study_plots(version).items():
+        for title, plot in study_plots(typed(version)).items():
             spec = plot.make()
             assert spec is not None, title
             json.dumps(spec, allow_nan=False)
     assert "over 2 seeds" in next(version["line"] for version in versions)
     assert not any("nan" in version["line"] for version in versions)
     in_surface = next(v for v in versions if v["partial"] == "surface")
-    assert "optimum" not in in_surface
-    assert "Contours" in study_plots(in_surface)
-    assert "Verification" not in study_plots(in_surface)
+    assert in_surface["optimum"] is None
+    assert "Contours" in study_plots(typed(in_surface))
+    assert "Verification" not in study_plots(typed(in_surface))
     whole = json.loads((tmp_path / PARTIAL).read_text())
     assert whole["partial"] is None
     assert math.isfinite(whole["verification"]["tests"][0]["simulated"]["mean"])

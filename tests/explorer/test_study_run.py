@@ -5,8 +5,8 @@ import json
 
 import pytest
 
-from doe.campaign import STAGES
 from doe.runner import TRIES
+from doe.study_result import STAGES
 from explorer.study import run as study_run
 from solver import asset_path
 from tests.doe.formula_runner import FormulaRunner

@@ -7,7 +7,8 @@ import pytest
 from doe.campaign import run_campaign
 from doe.runner import Setting
 from doe.study import load_study, with_profile
-from explorer.study.runs import STAGES, scene_of, settings_of, study_runs
+from doe.study_result import PartialStudy, StudyResult
+from explorer.study.runs import scene_of, settings_of, stages_with_runs
 from solver import pour_key, with_values
 from tests.doe.formula_runner import FormulaRunner
 from tests.explorer import reported_studies
@@ -42,41 +43,51 @@ def keyed():
 
 def test_the_settings_of_every_run_are_those_that_were_asked_for(keyed):
     result, runner = keyed
-    stages = {}
-    for stage in STAGES:
-        for run in study_runs(result, stage):
-            stages[stage] = stages.get(stage, 0) + 1
-            assert settings_of(result, stage, run.label) == pytest.approx(runner.asked[stage, run.label])
-    assert stages == result["runs"]["by_stage"]
+    for stage in stages_with_runs(result):
+        for runs in result.runs_of(stage):
+            for run in runs:
+                assert settings_of(result, stage, run.label) == pytest.approx(runner.asked[stage, run.label])
+    assert set(stages_with_runs(result)) == set(result.runs.by_stage)
+    assert sum(result.runs.by_stage.values()) == result.runs.total == len(list(result.all_runs()))
 
 
 def test_every_scene_is_the_stored_one_to_the_last_bit(keyed):
     result, _ = keyed
-    for stage in STAGES:
-        firsts = [run for run in study_runs(result, stage) if run.replicate == 0]
+    for stage in stages_with_runs(result):
+        firsts = [run for runs in result.runs_of(stage) for run in runs if run.replicate == 0]
         for run in (firsts[0], firsts[-1]):
-            scene, same = scene_of(result, run)
+            scene, same = scene_of(result, stage, run)
             assert same, run
-            assert not scene_of(result, dataclasses.replace(run, seed=run.seed + 1))[1]
+            assert not scene_of(result, stage, dataclasses.replace(run, seed=run.seed + 1))[1]
     assert scene.rig.mass == 0.020  # of the profile "quick"
 
 
 def test_a_study_file_that_is_gone_or_a_label_that_nobody_gave_is_one_line(keyed):
     result, _ = keyed
-    run = study_runs(result, "surface")[0]
-    lost = result | {"study": result["study"] | {"file": "/nowhere/study.toml"}}
+    run = result.surface.runs[0][0]
+    lost = dataclasses.replace(result, study=dataclasses.replace(result.study, file="/nowhere/study.toml"))
     with pytest.raises(ValueError, match=r"/nowhere/study.toml"):
-        scene_of(lost, run)
+        scene_of(lost, "surface", run)
     for stage, label in (("surface", "point 99"), ("surface", "row 1"), ("scan", "x = 1"), ("verification", "best"),
                          ("screening", "row 0"), ("ascent", "step"), ("pilot", "<b>")):  # fmt: skip
         with pytest.raises(ValueError, match="is no setting of the stage"):
             settings_of(result, stage, label)
     with pytest.raises(ValueError, match="no such stage"):
         settings_of(result, "optimum", "optimum")
+    begun = PartialStudy(study=result.study, pilot=result.pilot)
     with pytest.raises(ValueError, match="there are pilot"):
-        settings_of({"pilot": result["pilot"]}, "surface", "point 1")
+        settings_of(begun, "surface", "point 1")
 
 
-def test_a_stage_that_has_not_begun_has_no_runs():
-    assert study_runs({}, "pilot") == ()
-    assert study_runs({"scan": None}, "scan") == ()
+def test_a_result_of_before_settings_were_kept_says_so(keyed):
+    result, _ = keyed
+    content = result.to_dict()
+    del content["ascent"]["settings"]
+    with pytest.raises(ValueError, match=r"^ascent: .* an older version made it$"):
+        settings_of(StudyResult.from_dict(content), "ascent", "step 1")
+
+
+def test_a_stage_that_has_not_begun_has_no_runs(keyed):
+    result, _ = keyed
+    assert stages_with_runs(PartialStudy(study=result.study)) == ()
+    assert PartialStudy(study=result.study).runs_of("scan") == ()

@@ -129,16 +129,16 @@ def test_a_finished_study_is_drawn_and_stays_while_nothing_changes(table, result
     plots = table.panel._plots
     assert plots._choice.options[-1] == PROFILER
     assert drawn(plots)["layout"]["xaxis"]["title"]["text"] == "noise σ of one pour [°]"
-    table.enter(plots._choice, "Ascent path")
+    table.enter(plots._choice, "Scan of an assumption")
     first = drawn(plots)
-    assert first["layout"]["xaxis"]["title"]["text"] == "step"
+    assert first["layout"]["xaxis"]["title"]["text"] == "outlet height [mm]"
     assert plots._caption.content.startswith("Band: the target")
     before = plots._chart.figure
     table.panel.show("")
     assert plots._chart.figure is before
-    (tmp_path / "study-1" / "result.json").write_text(json.dumps(result | {"ascent": None}))
+    (tmp_path / "study-1" / "result.json").write_text(json.dumps(result | {"scan": None}))
     table.panel.show("")
-    assert "Ascent path" not in plots._choice.options
+    assert "Scan of an assumption" not in plots._choice.options
     assert drawn(plots) != first
 
 
@@ -190,7 +190,7 @@ def test_what_a_browser_sends_for_the_list_may_be_anything(server):
 
 
 def test_a_study_that_runs_shows_what_it_has(table, result, tmp_path):
-    partial = {key: result[key] for key in ("study", "pilot", "screening")} | {
+    partial = {key: result[key] for key in ("schema", "study", "pilot", "screening")} | {
         "partial": "screening",
         "line": "X7 *acts*",
     }

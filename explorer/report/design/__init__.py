@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
+from explorer.design.result import DesignResult
 from explorer.files.whole_file import write_whole
 from explorer.report.design.sections import sections_of
 from explorer.report.html import page
@@ -13,27 +13,23 @@ from explorer.report.markdown import document
 __all__ = ["design_html", "design_markdown", "write_design_report"]
 
 
-def write_design_report(result: dict[str, Any], folder: Path) -> None:
-    """Write ``report.html`` and ``report.md`` into ``folder``; each appears complete or not at all.
-
-    ``result`` is the content of ``result.json`` (see `explorer.design.analysis.analyse_runs`).
-    """
+def write_design_report(result: DesignResult, folder: Path) -> None:
+    """Write ``report.html`` and ``report.md`` into ``folder``; each appears complete or not at all."""
     texts = {"report.html": design_html(result), "report.md": design_markdown(result)}
     for name, text in texts.items():
         write_whole(folder / name, text)
 
 
-def design_html(result: dict[str, Any]) -> str:
+def design_html(result: DesignResult) -> str:
     """The page: self-contained, with charts."""
     return page(*_headings(result), sections_of(result))
 
 
-def design_markdown(result: dict[str, Any]) -> str:
+def design_markdown(result: DesignResult) -> str:
     """The same facts without charts."""
     return document(*_headings(result), sections_of(result))
 
 
-def _headings(result: dict[str, Any]) -> tuple[str, str]:
-    kind = f"{result['design']} design" if result["design"] else "Design"
-    sheet = Path(result["sheet"]).name
-    return f"{result['response']['name']}", f"{kind} of {len(result['factors'])} factors, analysed from {sheet}"
+def _headings(result: DesignResult) -> tuple[str, str]:
+    kind = f"{result.design} design" if result.design else "Design"
+    return result.response.name, f"{kind} of {len(result.factors)} factors, analysed from {Path(result.sheet).name}"

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 from scipy import stats
 
+from doe.analysis.analyse import Model
+from doe.analysis.box_cox import BoxCox
+from doe.analysis.diagnostics import Diagnostics
+from explorer.design.result import DesignResult
 from explorer.report.content import Spec
 from explorer.report.figures.style import (
     ASSUMPTION,
@@ -16,6 +23,7 @@ from explorer.report.figures.style import (
     Json,
     axis,
     chart,
+    finite,
     horizontal_band,
     horizontal_line,
     label,
@@ -24,84 +32,80 @@ from explorer.report.figures.style import (
     side_by_side,
     vertical_line,
 )
-from explorer.report.findings import Plain
 from explorer.report.units_for_people import observable_title, parameter_label
 
 COLOURS = (FACTOR, CHOSEN, ASSUMPTION)
 DASHES = ("solid", "dash", "dot")
 
 
-def single_runs(result: Plain) -> Spec:
+def single_runs(found: Diagnostics, names: Sequence[str]) -> Spec:
     """Per run: the studentised residual with the limit for the largest of all, Cook's distance and leverage."""
-    found, labels = result["model"]["diagnostics"], [label(name) for name in result["labels"]]
+    labels = [label(name) for name in names]
     places = list(range(1, len(labels) + 1))
     hover = {"text": labels, "hovertemplate": "run %{text}: %{y:.3g}<extra></extra>"}
     domains = side_by_side(3, 0.08)
     layout: Json = {"showlegend": False, "shapes": []}
     traces = []
-    for panel, (key, title) in enumerate(
-        (("external", "studentised residual"), ("cooks_distance", "Cook's distance"), ("leverage", "leverage"))
+    for panel, (values, title) in enumerate(
+        (
+            (found.external, "studentised residual"),
+            (found.cooks_distance, "Cook's distance"),
+            (found.leverage, "leverage"),
+        )
     ):
         number = "" if panel == 0 else str(panel + 1)
         place = {"xaxis": f"x{number}", "yaxis": f"y{number}"}
-        traces.append(points(places, found[key], title, FACTOR, **place, **hover))
+        traces.append(points(places, finite(values), title, FACTOR, **place, **hover))
         layout[f"xaxis{number}"] = axis("run of the sheet, by row", domain=domains[panel], anchor=f"y{number}")
         layout[f"yaxis{number}"] = axis(title, anchor=f"x{number}")
-    limit = found["outlier_limit"]
-    if limit is not None:
-        layout["shapes"] += [horizontal_line(sign * limit, CHOSEN, 0, "dash") for sign in (-1, 1)]
+    if math.isfinite(found.outlier_limit):
+        layout["shapes"] += [horizontal_line(sign * found.outlier_limit, CHOSEN, 0, "dash") for sign in (-1, 1)]
     layout["shapes"].append(horizontal_line(1.0, CHOSEN, 1, "dash"))
-    if found["leverage_limit"] < 1.0:
-        layout["shapes"].append(horizontal_line(found["leverage_limit"], CHOSEN, 2, "dash"))
+    if found.leverage_limit < 1.0:
+        layout["shapes"].append(horizontal_line(found.leverage_limit, CHOSEN, 2, "dash"))
     return chart(traces, layout, 340)
 
 
-def box_cox_profile(result: Plain) -> Spec | None:
+def box_cox_profile(found: BoxCox) -> Spec | None:
     """ln SS over the power of the response, with its 95 % interval; None where there is no profile."""
-    found = result["model"]["box_cox"]
-    if found["note"]:
+    if found.note:
         return None
-    sums = found["log_sum_of_squares"]
-    traces = [
-        {"type": "scatter", "mode": "lines", "x": found["powers"], "y": sums, "line": line(FACTOR), "name": "ln SS"}
-    ]
-    band = horizontal_band(min(sums), found["limit"], INTERVAL_BAND)
+    powers, sums = found.powers.tolist(), found.log_sum_of_squares.tolist()
+    traces = [{"type": "scatter", "mode": "lines", "x": powers, "y": sums, "line": line(FACTOR), "name": "ln SS"}]
+    band = horizontal_band(min(sums), found.limit, INTERVAL_BAND)
     layout = {
         "showlegend": False,
         "xaxis": axis("power of the response"),
         "yaxis": axis("ln of the residual sum of squares"),
-        "shapes": [band, vertical_line(found["best"], CHOSEN), vertical_line(1.0, DUMMY, 0, "dash")],
+        "shapes": [band, vertical_line(found.best, CHOSEN), vertical_line(1.0, DUMMY, 0, "dash")],
     }
     return chart(traces, layout, 320)
 
 
-def ridge(result: Plain) -> Spec:
+def ridge(result: DesignResult, model: Model) -> Spec:
     """Left: highest and lowest response within a distance of the centre, band 95 %; right: where the highest is."""
-    model, factors = result["model"], result["factors"]
-    df = result["surface"]["models"][0]["df_residual"]
+    df = model.surface.df_residual
     left, right = side_by_side(2, 0.12)
     traces: list[Json] = []
-    for key, name, colour in (("highest", "highest", TARGET), ("lowest", "lowest", DUMMY)):
-        path = model[key]
-        mean = np.array(path["predicted"])
-        half = float(stats.t.ppf(0.975, df)) * np.array(path["standard_error"])
+    for path, name, colour in ((model.highest, "highest", TARGET), (model.lowest, "lowest", DUMMY)):
+        mean, half = path.predicted, float(stats.t.ppf(0.975, df)) * path.standard_error
         band = {"type": "scatter", "mode": "lines", "fill": "toself", "fillcolor": INTERVAL_BAND, "hoverinfo": "skip"}
         edges = np.concatenate([mean + half, (mean - half)[::-1]]).tolist()
-        radius = path["radius"]
+        radius = path.radius.tolist()
         traces.append(band | {"x": radius + radius[::-1], "y": edges, "line": {"width": 0}, "showlegend": False})
         traces.append(
             {"type": "scatter", "mode": "lines", "x": radius, "y": mean.tolist(), "name": name, "line": line(colour)}
         )
-    for k, factor in enumerate(factors):
+    for k, factor in enumerate(result.factors):
         stroke = line(COLOURS[k % len(COLOURS)], DASHES[k // len(COLOURS) % len(DASHES)])
         traces.append(
-            {"type": "scatter", "mode": "lines", "x": model["highest"]["radius"], "xaxis": "x2", "yaxis": "y2"}
-            | {"y": [point[k] for point in model["highest"]["coded"]], "line": stroke}
-            | {"name": label(f"{factor['name']}: {parameter_label(factor['path'])}")}
+            {"type": "scatter", "mode": "lines", "x": model.highest.radius.tolist(), "xaxis": "x2", "yaxis": "y2"}
+            | {"y": model.highest.coded[:, k].tolist(), "line": stroke}
+            | {"name": label(f"{factor.name}: {parameter_label(factor.path)}")}
         )
     layout = {
         "xaxis": axis("distance from the centre [half-widths]", domain=left),
-        "yaxis": axis(observable_title(result["response"]["path"])),
+        "yaxis": axis(observable_title(result.response.path)),
         "xaxis2": axis("distance from the centre [half-widths]", domain=right, anchor="y2"),
         "yaxis2": axis("coded level where it is highest", anchor="x2"),
     }

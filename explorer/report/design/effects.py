@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from doe.analysis.contrasts import Curvature
+from doe.screening_result import Effect
+from explorer.design.result import DesignResult, DrawnEffects
 from explorer.report.content import Block, Bullets, Facts, Figure, Section, Table, Text
 from explorer.report.figures.effects import half_normal, pareto
 from explorer.report.figures.main_effects import main_effects
-from explorer.report.findings import Plain
 from explorer.report.units_for_people import MISSING, fixed, number, observed, p_value, signed
 
 MOST_DRAWN = 40
 """Contrasts in a chart; the table has all."""
 
 
-def effects(result: Plain) -> Section | None:
+def effects(result: DesignResult) -> Section | None:
     """Effects and their tests; None for a design that is not of two levels."""
-    part = result["effects"]
-    if part is None:
+    part, found = result.effects, result.analysis.effects
+    if part is None or found is None:
         return None
-    drawn = part | {"analysis": part["analysis"] | {"effects": largest(part["analysis"]["effects"])}}
+    drawn = _only(part, largest(part.analysis.effects))
     blocks: list[Block] = [
         Text(
             "An effect is the mean at the high level less the mean at the low one. Of an interaction it is half the "
@@ -31,40 +37,39 @@ def effects(result: Plain) -> Section | None:
         blocks.append(Figure("pareto", bars, lines))
     caption = "Noise alone would follow a straight line through the origin; what stands above it acts."
     blocks.append(Figure("half-normal", half_normal(drawn), caption))
-    chart = main_effects(part | {"analysis": part["analysis"] | {"effects": _of_factors(part)}})
+    chart = main_effects(_only(part, _of_factors(part)))
     if chart is not None:
         blocks.append(Figure("main-effects", chart, "The largest ones; whiskers: 95 %; dotted: mean."))
-    blocks.append(effect_table(part))
-    if part["curvature"] is not None:
-        blocks.append(Text(curvature(part)))
-    if part["analysis"]["notes"]:
-        blocks.append(Bullets(tuple(part["analysis"]["notes"])))
+    blocks.append(effect_table(part, found.contrasts.aliases))
+    if found.curvature is not None:
+        blocks.append(Text(curvature(found.curvature, part.response)))
+    if part.analysis.notes:
+        blocks.append(Bullets(part.analysis.notes))
     return Section("Effects", tuple(blocks))
 
 
-def largest(effects: list[Plain]) -> list[Plain]:
+def largest(effects: Sequence[Effect]) -> tuple[Effect, ...]:
     """The effects that a chart has room for, in their order."""
-    kept = sorted(effects, key=lambda effect: -abs(effect["effect"] or 0.0))[:MOST_DRAWN]
-    return [effect for effect in effects if effect in kept]
+    kept = {effect.name for effect in sorted(effects, key=_rank)[:MOST_DRAWN]}
+    return tuple(effect for effect in effects if effect.name in kept)
 
 
-def effect_table(part: Plain) -> Table:
+def effect_table(part: DrawnEffects, aliases: Mapping[str, Sequence[str]]) -> Table:
     """All contrasts by falling size."""
     rows = []
-    for effect in sorted(part["analysis"]["effects"], key=lambda effect: -abs(effect["effect"] or 0.0)):
-        name = effect["name"]
-        by_replicates, by_columns = effect["by_replicates"], effect["by_dummies"]
-        deciding = by_replicates if part["analysis"]["pure_error"] is not None else by_columns
+    for effect in sorted(part.analysis.effects, key=_rank):
+        name, deciding = effect.name, part.analysis.deciding_test(effect)
+        by_replicates, by_columns = effect.by_replicates, effect.by_dummies
         rows.append(
             (
-                name.replace("*", " × ") + (" (error)" if effect["is_dummy"] else ""),
-                ", ".join(part["aliases"].get(name, ())).replace("*", " × ").replace("-", "−") or MISSING,
-                signed(effect["effect"], 4),
-                number(effect["sum_of_squares"], 5),
-                fixed(effect["contribution_percent"], 2),
-                MISSING if by_replicates is None else p_value(by_replicates["p"]),
-                MISSING if by_columns is None else p_value(by_columns["p"]),
-                MISSING if deciding is None else p_value(deciding["p_holm"]),
+                name.replace("*", " × ") + (" (error)" if effect.is_dummy else ""),
+                ", ".join(aliases.get(name, ())).replace("*", " × ").replace("-", "−") or MISSING,
+                signed(effect.effect, 4),
+                number(effect.sum_of_squares, 5),
+                fixed(effect.contribution_percent, 2),
+                MISSING if by_replicates is None else p_value(by_replicates.p),
+                MISSING if by_columns is None else p_value(by_columns.p),
+                MISSING if deciding is None else p_value(deciding.p_holm),
             )
         )
     header = (
@@ -75,39 +80,48 @@ def effect_table(part: Plain) -> Table:
     return Table(header, tuple(rows), caption)
 
 
-def curvature(part: Plain) -> str:
+def curvature(found: Curvature, response: str) -> str:
     """The test of the centre runs, in a sentence."""
-    found = part["curvature"]
     return (
-        f"Curvature: the corners lie {observed(part['response'], found['difference'])} from the centre runs "
-        f"(F = {number(found['f'], 4)} on 1 and {found['df_error']} degrees of freedom, p = {p_value(found['p'])})."
+        f"Curvature: the corners lie {observed(response, found.difference)} from the centre runs "
+        f"(F = {number(found.f, 4)} on 1 and {found.df_error} degrees of freedom, p = {p_value(found.p)})."
     )
 
 
-def _of_factors(part: Plain) -> list[Plain]:
-    names = {factor["name"] for factor in part["factors"]}
-    return [effect for effect in part["analysis"]["effects"] if effect["name"] in names]
+def _rank(effect: Effect) -> float:
+    return -abs(effect.effect) if math.isfinite(effect.effect) else 0.0
 
 
-def _errors(part: Plain) -> list[tuple[str, str]]:
-    analysis, response = part["analysis"], part["response"]
-    lenth = analysis["lenth"]
+def _of_factors(part: DrawnEffects) -> tuple[Effect, ...]:
+    names = {factor.name for factor in part.factors}
+    return tuple(effect for effect in part.analysis.effects if effect.name in names)
+
+
+def _only(part: DrawnEffects, effects: tuple[Effect, ...]) -> DrawnEffects:
+    return replace(part, analysis=replace(part.analysis, effects=effects))
+
+
+def _errors(part: DrawnEffects) -> list[tuple[str, str]]:
+    analysis, response = part.analysis, part.response
+    lenth = analysis.lenth
     found = [
         (
             "Lenth",
-            f"pseudo standard error {number(lenth['pseudo_standard_error'], 4)}, margin {number(lenth['margin'], 4)}, "
-            f"for all effects at once {number(lenth['simultaneous_margin'], 4)}",
+            f"pseudo standard error {number(lenth.pseudo_standard_error, 4)}, margin {number(lenth.margin, 4)}, "
+            f"for all effects at once {number(lenth.simultaneous_margin, 4)}",
         )
     ]
-    for key, title in (("pure_error", "Error by replicates"), ("dummy_error", "Error by columns without a factor")):
-        error = analysis[key]
+    for error, title in (
+        (analysis.pure_error, "Error by replicates"),
+        (analysis.dummy_error, "Error by columns without a factor"),
+    ):
         if error is not None:
             found.append(
                 (
                     title,
-                    f"σ = {observed(response, error['sigma'])}, {error['df']} degrees of freedom; margin of one effect "
-                    f"{observed(response, error['margin'])}, of all {observed(response, error['margin_bonferroni'])}; "
-                    f"seen with chance 0.8: {observed(response, error['smallest_detectable_effect'])}",
+                    f"σ = {observed(response, error.sigma)}, {error.df} degrees of freedom; margin of one effect "
+                    f"{observed(response, error.margin)}, of all {observed(response, error.margin_bonferroni)}; "
+                    f"seen with chance 0.8: {observed(response, error.smallest_detectable_effect)}",
                 )
             )
     return found

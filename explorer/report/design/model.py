@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from doe.analysis.analyse import DesignAnalysis, Model
+from doe.analysis.box_cox import BoxCox
+from doe.analysis.diagnostics import Diagnostics
+from explorer.design.result import DesignResult, SheetFactor
 from explorer.report.content import Block, Bullets, Facts, Figure, Folded, Section, Table, Text
 from explorer.report.design.charts import box_cox_profile, single_runs
+from explorer.report.figures.model import FittedTarget
 from explorer.report.figures.profiler import profiler
 from explorer.report.figures.surface import contours, fit, residual_quantiles
 from explorer.report.figures.surface_3d import height_over
-from explorer.report.findings import Plain
 from explorer.report.sections.surface import anova_table, equation
 from explorer.report.units_for_people import MISSING, enumeration, fixed, number, observed, p_value
 
@@ -15,55 +21,53 @@ MOST_PANELS = 3
 """Factors up to which every pair of them is drawn side by side."""
 
 
-def model(result: Plain) -> Section | None:
+def model(result: DesignResult) -> Section | None:
     """Equations, analysis of variance and charts; None where the runs bear no model."""
-    surface = result["surface"]
-    if surface is None:
+    found, fitted = result.analysis.model, result.fitted
+    if found is None or fitted is None:
         return None
-    anova, response = surface["anova"][0], result["response"]["path"]
-    coded, actual = equation(surface, 0)
-    errors = anova["coefficient_standard_errors"]
-    fitted = surface["models"][0]
+    anova, response = found.anova, result.response.path
+    coded, actual = equation(found.surface, result.factors, response)
     blocks: list[Block] = [
-        fit_summary(result),
+        fit_summary(result.analysis),
         Facts(
             (
                 ("Equation, coded", f"{coded} (each factor from −1 to +1)"),
-                ("Equation, actual", actual + units_of_factors(result)),
-                ("R²", f"{fixed(anova['r_squared'], 4)}; adjusted {fixed(anova['r_squared_adjusted'], 4)}; predicted "
-                       f"{fixed(anova['r_squared_predicted'], 4)} (PRESS {number(anova['press'], 4)}), by whole rows "
-                       f"{fixed(anova['r_squared_predicted_by_row'], 4)}"),
-                ("Scatter", f"σ = {observed(response, anova['sigma'])}, mean {observed(response, anova['mean'])}, "
-                            f"coefficient of variation {fixed(anova['cv_percent'])} %"),
-                ("Adequate precision", f"{fixed(anova['adequate_precision'])} (above 4 is wanted)"),
+                ("Equation, actual", actual + units_of_factors(result.factors)),
+                ("R²", f"{fixed(anova.r_squared, 4)}; adjusted {fixed(anova.r_squared_adjusted, 4)}; predicted "
+                       f"{fixed(anova.r_squared_predicted, 4)} (PRESS {number(anova.press, 4)}), by whole rows "
+                       f"{fixed(anova.r_squared_predicted_by_row, 4)}"),
+                ("Scatter", f"σ = {observed(response, anova.sigma)}, mean {observed(response, anova.mean)}, "
+                            f"coefficient of variation {fixed(anova.cv_percent)} %"),
+                ("Adequate precision", f"{fixed(anova.adequate_precision)} (above 4 is wanted)"),
             )
         ),
         anova_table(anova),
-        coefficient_table(fitted, errors),
+        coefficient_table(found),
     ]  # fmt: skip
-    if anova["notes"]:
-        blocks.append(Bullets(tuple(anova["notes"])))
-    return Section("Model", (*blocks, *_charts(result)))
+    if anova.notes:
+        blocks.append(Bullets(anova.notes))
+    return Section("Model", (*blocks, *_charts(fitted)))
 
 
-def units_of_factors(result: Plain) -> str:
+def units_of_factors(factors: Sequence[SheetFactor]) -> str:
     """Units of an equation's letters, in brackets; empty for plain numbers."""
-    units = [f"{factor['name']} in {factor['unit']}" for factor in result["factors"] if factor["unit"]]
+    units = [f"{factor.name} in {factor.unit}" for factor in factors if factor.unit]
     return f" ({', '.join(units)})" if units else ""
 
 
-def fit_summary(result: Plain) -> Table:
+def fit_summary(analysis: DesignAnalysis) -> Table:
     """The three orders of polynomial side by side."""
     rows = []
-    for one in result["fits"]:
-        if not one["estimable"]:
-            rows.append((one["order"], str(one["terms"]), *([MISSING] * 7)))
+    for one in analysis.fits:
+        if not one.estimable:
+            rows.append((one.order, str(one.terms), *([MISSING] * 7)))
             continue
         rows.append(
             (
-                *(one["order"], str(one["terms"]), str(one["df_residual"]), p_value(one["p"])),
-                *(p_value(one["lack_of_fit_p"]), number(one["sigma"], 4)),
-                *(fixed(one[key], 4) for key in ("r_squared", "r_squared_adjusted", "r_squared_predicted")),
+                *(one.order, str(one.terms), str(one.df_residual), p_value(one.p)),
+                *(p_value(one.lack_of_fit_p), number(one.sigma, 4)),
+                *(fixed(r2, 4) for r2 in (one.r_squared, one.r_squared_adjusted, one.r_squared_predicted)),
             )
         )
     header = (
@@ -73,16 +77,17 @@ def fit_summary(result: Plain) -> Table:
     return Table(header, tuple(rows), "What these runs can bear; – where they cannot separate the terms.")
 
 
-def coefficient_table(fitted: Plain, errors: list[float]) -> Table:
+def coefficient_table(found: Model) -> Table:
     """Coded and actual coefficients of the model's terms."""
+    fitted = found.surface
     rows = tuple(
         (term.replace("*", " × ").replace("^2", "²"), number(coded, 5), f"± {number(error, 3)}", number(actual, 6))
         for term, is_in, coded, error, actual in zip(
-            fitted["terms"],
-            fitted["included"],
-            fitted["coefficients"],
-            errors,
-            fitted["coefficients_natural"],
+            fitted.terms,
+            fitted.included,
+            fitted.coefficients,
+            found.anova.coefficient_standard_errors,
+            fitted.coefficients_natural,
             strict=True,
         )
         if is_in
@@ -90,46 +95,49 @@ def coefficient_table(fitted: Plain, errors: list[float]) -> Table:
     return Table(("term", "coded", "standard error", "actual"), rows)
 
 
-def diagnostics(result: Plain) -> Section | None:
+def diagnostics(result: DesignResult) -> Section | None:
     """Is any run at odds with the model, and would another scale of the response do better?"""
-    if result["model"] is None:
+    model, fitted = result.analysis.model, result.fitted
+    if model is None or fitted is None:
         return None
-    found, labels = result["model"]["diagnostics"], result["labels"]
+    found, labels = model.diagnostics, result.labels
     facts = [
-        ("Outliers", _which(found["outliers"], labels, f"|studentised residual| > {number(found['outlier_limit'])}, "
+        ("Outliers", _which(found.outliers, labels, f"|studentised residual| > {number(found.outlier_limit)}, "
                                                        "p = 0.05 for the largest of all")),
-        ("Influence", _which(found["influential"], labels, "Cook's distance > 1")),
+        ("Influence", _which(found.influential, labels, "Cook's distance > 1")),
         ("Leverage", _leverage(found, labels)),
-        ("Normality of the residuals", f"Shapiro–Wilk p = {p_value(found['shapiro_p'])}"),
-        ("Box–Cox", box_cox_words(result["model"]["box_cox"])),
+        ("Normality of the residuals", f"Shapiro–Wilk p = {p_value(found.shapiro_p)}"),
+        ("Box–Cox", box_cox_words(model.box_cox)),
     ]  # fmt: skip
     blocks: list[Block] = [
         Facts(tuple(facts)),
-        Figure("fit", fit(result, 0), ""),
-        Figure("residual-quantiles", residual_quantiles(result, 0), "A right model's residuals follow the line."),
-        Figure("single-runs", single_runs(result), "Dashed: the limits named above."),
+        Figure("fit", fit(fitted), ""),
+        Figure("residual-quantiles", residual_quantiles(fitted), "A right model's residuals follow the line."),
+        Figure("single-runs", single_runs(found, labels), "Dashed: the limits named above."),
     ]
-    profile = box_cox_profile(result)
+    profile = box_cox_profile(model.box_cox)
     if profile is not None:
         caption = "Band: 95 % interval; red: the best power; dashed: no transformation."
         blocks.append(Figure("box-cox", profile, caption))
-    return Section("Diagnostics", (*blocks, Folded("All runs against the model", (run_table(result),))))
+    return Section("Diagnostics", (*blocks, Folded("All runs against the model", (run_table(result, model),))))
 
 
-def run_table(result: Plain) -> Table:
+def run_table(result: DesignResult, model: Model) -> Table:
     """Every run with its residual and its weight in the fit."""
-    fitted, found, response = result["surface"]["models"][0], result["model"]["diagnostics"], result["response"]["path"]
+    fitted, found, response = model.surface, model.diagnostics, result.response.path
     rows = tuple(
         (
             label,
-            observed(response, fitted["observed"][k]),
-            observed(response, fitted["predicted"][k]),
-            *(
-                number(found[key][k])
-                for key in ("residual", "leverage", "internal", "external", "cooks_distance", "dffits")
-            ),
+            observed(response, fitted.observed[k]),
+            observed(response, fitted.predicted[k]),
+            number(found.residual[k]),
+            number(found.leverage[k]),
+            number(found.internal[k]),
+            number(found.external[k]),
+            number(found.cooks_distance[k]),
+            number(found.dffits[k]),
         )
-        for k, label in enumerate(result["labels"])
+        for k, label in enumerate(result.labels)
     )
     header = (
         *("run", "observed", "predicted", "residual", "leverage", "internally studentised"),
@@ -138,47 +146,41 @@ def run_table(result: Plain) -> Table:
     return Table(header, rows)
 
 
-def box_cox_words(found: Plain) -> str:
+def box_cox_words(found: BoxCox) -> str:
     """The profile in words."""
-    if found["note"]:
-        return f"no profile: {found['note']}"
-    ends = (found["powers"][0], found["powers"][-1])
+    if found.note:
+        return f"no profile: {found.note}"
+    ends = (found.powers[0], found.powers[-1])
     best, low, high = (
-        f"{number(found[key])} or beyond" if found[key] in ends else number(found[key])
-        for key in ("best", "low", "high")
+        f"{number(power)} or beyond" if power in ends else number(power)
+        for power in (found.best, found.low, found.high)
     )
     where = f"best power {best}, 95 % {low} … {high}"
-    if found["suggestion"] == "none":
+    if found.suggestion == "none":
         return f"{where}; it holds 1, so the response stays as it is"
-    return f"{where}; it does not hold 1: {found['suggestion']} would fit better"
+    return f"{where}; it does not hold 1: {found.suggestion} would fit better"
 
 
-def _charts(result: Plain) -> list[Block]:
-    factors = result["factors"]
-    has_optimum = result["optimum"] is not None
-    where = "the chosen setting" if has_optimum else "the middle"
-    at = [result["optimum"]["values"][f["path"]] for f in factors] if has_optimum else result["surface"]["region"][
-        "centre"
-    ]  # fmt: skip
-    blocks: list[Block] = [
-        Figure("profiler", profiler(result, 0, at), f"Along each factor through {where}; band: 95 % of the mean.")
-    ]
-    if 2 <= len(factors) <= MOST_PANELS:
+def _charts(fitted: FittedTarget) -> list[Block]:
+    where = "the middle" if fitted.optimum is None else "the chosen setting"
+    caption = f"Along each factor through {where}; band: 95 % of the mean."
+    blocks: list[Block] = [Figure("profiler", profiler(fitted, fitted.section_point), caption)]
+    if 2 <= len(fitted.factors) <= MOST_PANELS:
         caption = f"Through {where}; the points of the design are projected on each panel."
-        blocks.append(Figure("contours", contours(result, 0), caption))
-        blocks.append(Figure("surface", height_over(result, 0, (0, 1)), f"Over A and B through {where}."))
-    elif len(factors) > MOST_PANELS:
+        blocks.append(Figure("contours", contours(fitted), caption))
+        blocks.append(Figure("surface", height_over(fitted, (0, 1)), f"Over A and B through {where}."))
+    elif len(fitted.factors) > MOST_PANELS:
         blocks.append(Text(f"Contours are drawn for up to {MOST_PANELS} factors; `--only` keeps the ones that act."))
     return blocks
 
 
-def _leverage(found: Plain, labels: list[str]) -> str:
-    limit = found["leverage_limit"]
+def _leverage(found: Diagnostics, labels: Sequence[str]) -> str:
+    limit = found.leverage_limit
     if limit >= 1.0:
         # A leverage is at most one; with so many terms for the runs the rule has nothing to say.
-        return f"at most {number(max(found['leverage']))}; too few runs per term for the rule 2p/n"
-    return _which(found["leveraged"], labels, f"above 2p/n = {number(limit)}")
+        return f"at most {number(found.leverage.max())}; too few runs per term for the rule 2p/n"
+    return _which(found.leveraged, labels, f"above 2p/n = {number(limit)}")
 
 
-def _which(positions: list[int], labels: list[str], rule: str) -> str:
+def _which(positions: Sequence[int], labels: Sequence[str], rule: str) -> str:
     return f"{enumeration([f'run {labels[k]}' for k in positions])} ({rule})"

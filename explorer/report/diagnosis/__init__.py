@@ -10,9 +10,8 @@ from explorer.files.whole_file import write_whole
 from explorer.report.content import Section
 from explorer.report.diagnosis.answer import could_have_seen, in_short, rivals
 from explorer.report.diagnosis.evidence import effects, error, over_the_plate, parameters, pile, residuals
-from explorer.report.diagnosis.findings import checked
+from explorer.report.diagnosis.findings import Plain, checked
 from explorer.report.diagnosis.method import data, for_a_paper, how_reached, repeat
-from explorer.report.findings import Plain
 from explorer.report.html import page
 from explorer.report.markdown import document
 

@@ -12,6 +12,7 @@ from explorer.report.diagnosis.findings import (
     NOTHING,
     OUTSIDE,
     OVERALL,
+    Plain,
     added,
     amplitudes_of,
     answers,
@@ -33,7 +34,6 @@ from explorer.report.diagnosis.findings import (
     size_text,
     spelled,
 )
-from explorer.report.findings import Plain
 from explorer.report.units_for_people import MISSING, code, enumeration, fixed, p_value, percent, signed
 from solver.effects import EFFECTS
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy import stats
 
 from explorer.report.content import Spec
-from explorer.report.diagnosis.findings import NOTHING, OUTSIDE, feature_label, probabilities, spelled
+from explorer.report.diagnosis.findings import NOTHING, OUTSIDE, Plain, feature_label, probabilities, spelled
 from explorer.report.figures.style import (
     ASSUMPTION,
     BELOW_TO_ABOVE,
@@ -24,7 +24,6 @@ from explorer.report.figures.style import (
     suffix,
     vertical_line,
 )
-from explorer.report.findings import Plain
 
 BEFORE, AFTER, MEASURED = ASSUMPTION, FACTOR, TARGET
 ROW_HEIGHT = 30

@@ -9,6 +9,7 @@ from explorer.report.diagnosis.charts import bands, drawn_residuals, error_chart
 from explorer.report.diagnosis.findings import (
     BASE,
     OVERALL,
+    Plain,
     added,
     amplitudes_of,
     chance,
@@ -21,7 +22,6 @@ from explorer.report.diagnosis.findings import (
     simulated_range,
     spelled,
 )
-from explorer.report.findings import Plain
 from explorer.report.units_for_people import (
     MISSING,
     code,

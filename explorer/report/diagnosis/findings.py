@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Literal
+from typing import Any, Literal
 
 from explorer.errors import CommandError
-from explorer.report.findings import Plain
 from explorer.report.units_for_people import (
     MISSING,
     ReadingUnit,
@@ -28,6 +27,7 @@ from solver import HISTOGRAM_NAMES, TEXTURE_NAMES
 from solver.effects import EFFECTS
 from solver.observables.surface_features import EDGES, RINGS
 
+Plain = dict[str, Any]
 Kind = Literal["no_missing_effect", "effect", "effects", "ambiguous", "unexplained"]
 Confirmation = Literal["no holdout", "within noise", "confirmed", "not certain", "not confirmed"]
 

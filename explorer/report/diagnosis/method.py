@@ -8,6 +8,7 @@ from explorer.report.content import Block, Bullets, Code, Section, Table, Text
 from explorer.report.diagnosis.charts import likely
 from explorer.report.diagnosis.findings import (
     OVERALL,
+    Plain,
     added,
     amplitudes_of,
     answers,
@@ -21,7 +22,6 @@ from explorer.report.diagnosis.findings import (
     probability,
     spelled,
 )
-from explorer.report.findings import Plain
 from explorer.report.units_for_people import (
     duration,
     enumeration,

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 from explorer.report.content import Spec
+from explorer.report.figures.effects import EffectsOf
 from explorer.report.figures.style import DUMMY, FACTOR, Json, axis, chart, error_bars, label, line, points, suffix
-from explorer.report.findings import Plain, factor_effects, half_width
 from explorer.report.units_for_people import observable_title, parameter_label, unit_of_observable
 
 MOST = 8
@@ -14,27 +16,27 @@ GAP = 0.03
 ROW_GAP = 0.16
 
 
-def main_effects(screening: Plain) -> Spec | None:
+def main_effects(screening: EffectsOf) -> Spec | None:
     """Small charts with one axis, the largest effects first; None where no effect could be estimated.
 
     The interval of a level's mean follows from that of the effect e = ȳ(high) − ȳ(low) of a balanced design: its half
     width is that of e divided by √2.
     """
-    analysis, unit = screening["analysis"], unit_of_observable(screening["response"])
-    effects = factor_effects(analysis)[:MOST]
-    if not effects or analysis["mean"] is None:
+    analysis, unit = screening.analysis, unit_of_observable(screening.response)
+    effects = analysis.factor_effects()[:MOST]
+    if not effects or math.isnan(analysis.mean):
         return None
-    words = {factor["name"]: parameter_label(factor["path"]) for factor in screening["factors"]}
-    middle = unit.of(analysis["mean"])
+    words = {factor.name: parameter_label(factor.path) for factor in screening.factors}
+    middle = unit.of(analysis.mean)
     traces: list[Json] = []
     layout: Json = {"showlegend": False, "shapes": [], "annotations": []}
     rows = -(-len(effects) // ACROSS)
     for k, effect in enumerate(effects):
-        shift, half = 0.5 * unit.of(effect["effect"]), half_width(analysis, effect)
-        width = None if half is None else unit.of(half) / 2**0.5
+        shift = 0.5 * unit.of(effect.effect)
+        width = unit.of(analysis.half_width(effect)) / 2**0.5
         place = {"xaxis": f"x{suffix(k)}", "yaxis": f"y{suffix(k)}"}
         drawn = {"mode": "lines+markers", "line": line(FACTOR), "error_y": error_bars([width, width], FACTOR)}
-        name = effect["name"]
+        name = effect.name
         # A name that spells its parameter out needs no second wording.
         title = name.replace("_", " ") if "_" in name else f"{name} · {words[name]}"
         hover = {"hovertemplate": label(name) + " %{x}: %{y:.2f}" + unit.symbol + "<extra></extra>"}
@@ -46,7 +48,7 @@ def main_effects(screening: Plain) -> Spec | None:
             {"type": "line", "xref": f"x{suffix(k)} domain", "yref": f"y{suffix(k)}", "x0": 0, "x1": 1}
             | {"y0": middle, "y1": middle, "line": line(DUMMY, "dot")}
         )
-    layout["yaxis"]["title"] = {"text": observable_title(screening["response"])}
+    layout["yaxis"]["title"] = {"text": observable_title(screening.response)}
     return chart(traces, layout, 230 * rows)
 
 

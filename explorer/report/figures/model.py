@@ -1,6 +1,6 @@
-"""The response surface of a result as a function, for charts: mean and 95 % interval anywhere in its region.
+"""The response surface of one target with what the charts mark on it: the runs, the target, the reference, the optimum.
 
-ŷ(x) = x'b,   ŷ ± t(0.975, df) sqrt(MSE x'(X'X)⁻¹x),   x the model terms of the coded point
+A study's surface and that of a design from any laboratory are drawn by the same charts; both come as `FittedTarget`.
 """
 
 from __future__ import annotations
@@ -12,77 +12,86 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from doe.surface import second_order_terms
-from explorer.report.findings import Plain
+from doe.stages.surface import OptimumResult, SurfaceResult
+from doe.study import Factor
+from doe.study_result import AnyStudy
+from doe.surface import Surface
+from doe.surface_anova import SurfaceAnova
+from doe.target import Target
 from explorer.report.identified import BY_RULE, all_identified
 
 Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class FittedModel:
-    """One target's model. Natural values in SI, response in the unit of the store; k factors, p terms."""
+class FittedTarget:
+    """Natural values in SI, the response in the unit of the store; k factors."""
 
-    coefficients: Array
-    """Coded, shape (p,)."""
-    information_inverse: Array
-    """(X'X)⁻¹, shape (p, p)."""
-    mse: float
-    df: int
-    centre: Array
-    half_width: Array
-    """Of the region, shape (k,)."""
+    model: Surface
+    anova: SurfaceAnova
+    factors: tuple[Factor, ...]
+    design: Array
+    """Natural levels of the points of the design, shape (points, k)."""
+    observable: str
+    target: float | None
+    margin: float
+    optimum: OptimumResult | None
+    reference_name: str = "measured parameters"
+    """What the reference values of the factors are called."""
+
+    @property
+    def low(self) -> Array:
+        """Lower end of the region, shape (k,)."""
+        return self.model.region.centre - self.model.region.half_width
+
+    @property
+    def high(self) -> Array:
+        """Upper end of the region, shape (k,)."""
+        return self.model.region.centre + self.model.region.half_width
 
     def coded(self, natural: Sequence[float] | Array) -> Array:
         """Natural → coded values, shape (..., k)."""
-        return (np.asarray(natural, dtype=np.float64) - self.centre) / self.half_width
+        return (np.asarray(natural, dtype=np.float64) - self.model.region.centre) / self.model.region.half_width
 
     def natural(self, coded: Array) -> Array:
         """Coded → natural values, shape (..., k)."""
-        return self.centre + self.half_width * coded
-
-    def mean(self, coded: Array) -> Array:
-        """The model at coded points, shape (..., k) → (...)."""
-        return np.asarray(second_order_terms(coded) @ self.coefficients)
+        return self.model.region.centre + self.model.region.half_width * coded
 
     def half_interval(self, coded: Array) -> Array:
         """Half the 95 % interval of the mean at coded points, shape (..., k) → (...)."""
-        x = second_order_terms(coded)
-        variance = self.mse * np.einsum("...i,ij,...j->...", x, self.information_inverse, x)
-        return np.asarray(stats.t.ppf(0.975, self.df) * np.sqrt(np.maximum(variance, 0.0)))
+        return np.asarray(stats.t.ppf(0.975, self.model.df_residual) * self.model.standard_error(coded))
+
+    @property
+    def chosen(self) -> list[float] | None:
+        """The optimum in the order of the factors (natural); None before there is one."""
+        return None if self.optimum is None else [self.optimum.values[factor.path] for factor in self.factors]
+
+    @property
+    def chosen_name(self) -> str:
+        """What the chosen point is called."""
+        return "optimum" if self.optimum is None or all_identified(self.optimum) else BY_RULE
+
+    @property
+    def section_point(self) -> list[float]:
+        """Where sections through the surface are laid (natural): the optimum, or the middle of the region before it."""
+        return self.chosen or self.model.region.centre.tolist()
 
 
-def model_of(result: Plain, index: int) -> FittedModel:
-    """The model of target ``index``; the result must have got as far as its surface."""
-    surface = result["surface"]
-    model, region = surface["models"][index], surface["region"]
-    return FittedModel(
-        np.array(model["coefficients"], dtype=np.float64),
-        np.array(model["information_inverse"], dtype=np.float64),
-        float(model["mse"]),
-        int(model["df_residual"]),
-        np.array(region["centre"], dtype=np.float64),
-        np.array(region["half_width"], dtype=np.float64),
+def fitted_targets(result: AnyStudy) -> tuple[FittedTarget, ...]:
+    """One per target of a study; none before its surface."""
+    if result.surface is None:
+        return ()
+    return tuple(_fitted(result.surface, k, target, result.optimum) for k, target in enumerate(result.study.targets))
+
+
+def _fitted(surface: SurfaceResult, k: int, target: Target, optimum: OptimumResult | None) -> FittedTarget:
+    return FittedTarget(
+        model=surface.models[k],
+        anova=surface.anova[k],
+        factors=surface.factors,
+        design=surface.natural,
+        observable=target.observable,
+        target=target.mean,
+        margin=target.margin,
+        optimum=optimum,
     )
-
-
-def chosen_point(result: Plain) -> list[float] | None:
-    """The optimum in the order of the surface's factors (natural); None before there is one."""
-    found = result.get("optimum")
-    return None if not found else [found["values"][factor["path"]] for factor in result["surface"]["factors"]]
-
-
-def reference_name(result: Plain) -> str:
-    """What the reference values of the factors are called."""
-    return str(result["study"].get("reference_name", "measured parameters"))
-
-
-def chosen_name(result: Plain) -> str:
-    """What the chosen point of a result that has one is called."""
-    return "optimum" if all_identified(result["optimum"]) else BY_RULE
-
-
-def section_point(result: Plain) -> list[float]:
-    """Where sections through the surface are laid (natural): the optimum, or the middle of the region before it."""
-    chosen = chosen_point(result)
-    return list(result["surface"]["region"]["centre"]) if chosen is None else chosen

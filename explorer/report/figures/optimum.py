@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from itertools import combinations
 
+import numpy as np
+
+from doe.study import Factor
 from explorer.report.content import Spec
-from explorer.report.figures.model import chosen_name, reference_name
+from explorer.report.figures.model import Array, FittedTarget
 from explorer.report.figures.style import (
     CHOSEN,
     CLOUD,
@@ -21,20 +26,19 @@ from explorer.report.figures.style import (
     side_by_side,
     suffix,
 )
-from explorer.report.findings import Plain
 from explorer.report.identified import BY_RULE, GIVES_TARGET, is_identified
 from explorer.report.units_for_people import axis_title, parameter_label, parameter_range, unit_of_parameter
 
 
-def cloud(result: Plain) -> Spec:
+def cloud(fitted: FittedTarget) -> Spec:
     """The chosen point of every bootstrap refit, for each pair of factors, with the optimum and the measured values."""
-    found, factors = result["optimum"]["single"], result["optimum"]["factors"]
+    assert fitted.optimum is not None
+    found, factors = fitted.optimum.single, fitted.factors
     pairs = list(combinations(range(len(factors)), 2))
     domains = side_by_side(len(pairs), 0.1)
-    sizes = [unit_of_parameter(factor["path"]).size for factor in factors]
-    refits = [[value / size for value, size in zip(point, sizes, strict=True)] for point in found["bootstrap_points"]]
-    chosen = [value / size for value, size in zip(found["point"], sizes, strict=True)]
-    measured = [value / size for value, size in zip(found["reference"], sizes, strict=True)]
+    sizes = np.array([unit_of_parameter(factor.path).size for factor in factors])
+    refits = (found.bootstrap_points / sizes).tolist()
+    chosen, measured = (found.point / sizes).tolist(), (found.reference / sizes).tolist()
     traces: list[Json] = []
     layout: Json = {}
     for panel, (i, j) in enumerate(pairs):
@@ -46,39 +50,39 @@ def cloud(result: Plain) -> Spec:
         )
         traces += [
             points([p[i] for p in refits], [p[j] for p in refits], "bootstrap refits", FACTOR, marker=dots, **shown),
-            points([measured[i]], [measured[j]], reference_name(result), DUMMY, marker=cross, **shown),
-            points([chosen[i]], [chosen[j]], chosen_name(result), CHOSEN, marker=star, **shown),
+            points([measured[i]], [measured[j]], fitted.reference_name, DUMMY, marker=cross, **shown),
+            points([chosen[i]], [chosen[j]], fitted.chosen_name, CHOSEN, marker=star, **shown),
         ]
         for direction, k, other in (("x", i, "y"), ("y", j, "x")):
-            title = axis_title(factors[k]["path"], factors[k]["name"])
+            title = axis_title(factors[k].path, factors[k].name)
             place = {"domain": domains[panel]} if direction == "x" else {}
             layout[f"{direction}axis{suffix(panel)}"] = axis(title, anchor=f"{other}{suffix(panel)}", **place)
     return chart(traces, layout, 360)
 
 
-def ranges(result: Plain) -> Spec:
+def ranges(fitted: FittedTarget) -> Spec:
     """Per factor, as a share of its screened range: region, range that gives the target, optimum, measured value.
 
     An identified factor has the 95 % set of its optimum as well; of any other the point is a hollow star.
     """
-    found, factors, region = result["optimum"]["single"], result["optimum"]["factors"], result["surface"]["region"]
-    rows = [label(f"{factor['name']} · {parameter_label(factor['path'])}") for factor in factors]
-    low = [c - h for c, h in zip(region["centre"], region["half_width"], strict=True)]
-    high = [c + h for c, h in zip(region["centre"], region["half_width"], strict=True)]
+    assert fitted.optimum is not None
+    assert fitted.chosen is not None
+    found, factors = fitted.optimum.single, fitted.factors
+    rows = [label(f"{factor.name} · {parameter_label(factor.path)}") for factor in factors]
     known = [is_identified(found, k) for k in range(len(factors))]
-    set_low, set_high = (_where(known, found[end]) for end in ("point_low", "point_high"))
+    set_low, set_high = (_where(known, end) for end in (found.point_low, found.point_high))
     bars = (
-        ("region of the surface", low, high, DUMMY, 22),
-        (GIVES_TARGET, found["solution_low"], found["solution_high"], TARGET, 12),
+        ("region of the surface", fitted.low, fitted.high, DUMMY, 22),
+        (GIVES_TARGET, found.solution_low, found.solution_high, TARGET, 12),
         ("95 % set of the optimum (bootstrap)", set_low, set_high, CHOSEN, 5),
     )
     traces: list[Json] = []
     for name, lows, highs, colour, width in bars:
         for k, (factor, row) in enumerate(zip(factors, rows, strict=True)):
-            least, greatest = lows[k], highs[k]
-            if least is None or greatest is None:
+            least, greatest = float(lows[k]), float(highs[k])
+            if math.isnan(least) or math.isnan(greatest):
                 continue
-            text = parameter_range(factor["path"], least, greatest)
+            text = parameter_range(factor.path, least, greatest)
             traces.append(
                 {
                     "type": "scatter",
@@ -93,13 +97,12 @@ def ranges(result: Plain) -> Spec:
                     "hovertemplate": f"{name}: {text}<extra></extra>",
                 }
             )
-    chosen = [result["optimum"]["values"][factor["path"]] for factor in factors]
     for name, values, colour, symbol in (
-        (reference_name(result), found["reference"], "#ffffff", "diamond"),
-        ("optimum", _where(known, chosen), CHOSEN, "star"),
-        (BY_RULE, _where([not one for one in known], chosen), CHOSEN, "star-open"),
+        (fitted.reference_name, found.reference, "#ffffff", "diamond"),
+        ("optimum", _where(known, fitted.chosen), CHOSEN, "star"),
+        (BY_RULE, _where([not one for one in known], fitted.chosen), CHOSEN, "star-open"),
     ):
-        shares = [None if v is None else _share(factor, v) for factor, v in zip(factors, values, strict=True)]
+        shares = [None if math.isnan(v) else _share(factor, v) for factor, v in zip(factors, values, strict=True)]
         outlined = {"symbol": symbol, "size": 12, "line": {"color": INK, "width": 1.2}}
         if any(share is not None for share in shares):
             traces.append(points(shares, rows, name, colour, marker=outlined))
@@ -110,11 +113,12 @@ def ranges(result: Plain) -> Spec:
     return chart(traces, layout, 190 + 52 * len(rows))
 
 
-def _where(shown: list[bool], values: list[float]) -> list[float | None]:
-    """The values that are shown, None for the others."""
-    return [value if show else None for show, value in zip(shown, values, strict=True)]
+def _where(shown: Sequence[bool], values: Sequence[float] | Array) -> Array:
+    """The values that are shown, NaN for the others."""
+    return np.where(shown, values, math.nan)
 
 
-def _share(factor: Plain, value: float) -> float:
+def _share(factor: Factor, value: float) -> float:
     """Place of a value in the screened range of its factor [%]."""
-    return 100.0 * (value - factor["low"]) / (factor["high"] - factor["low"])
+    low, high = float(factor.low), float(factor.high)
+    return 100.0 * (float(value) - low) / (high - low)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from explorer.report.content import Spec
-from explorer.report.figures.model import model_of
+from explorer.report.figures.model import FittedTarget
 from explorer.report.figures.style import (
     CHOSEN,
     FACTOR,
@@ -21,7 +21,6 @@ from explorer.report.figures.style import (
     points,
     suffix,
 )
-from explorer.report.findings import Plain
 from explorer.report.units_for_people import axis_title, observable_title, unit_of_observable, unit_of_parameter
 
 TRACE_POINTS = 31
@@ -29,27 +28,26 @@ ROW_GAP = 0.13
 """Space between two rows, for the title of the axis [share of the height]."""
 
 
-def profiler(result: Plain, index: int, natural: Sequence[float]) -> Spec:
-    """One row per factor: the mean of target ``index`` over its range, the others at ``natural`` (SI), band 95 %."""
-    model, factors = model_of(result, index), result["surface"]["factors"]
-    target = result["study"]["targets"][index]
-    unit = unit_of_observable(target["observable"])
-    here = model.coded(natural)
+def profiler(fitted: FittedTarget, natural: Sequence[float]) -> Spec:
+    """One row per factor: the mean of the target over its range, the others at ``natural`` (SI), band 95 %."""
+    factors, unit = fitted.factors, unit_of_observable(fitted.observable)
+    here = fitted.coded(natural)
     k, coded = len(factors), np.linspace(-1.0, 1.0, TRACE_POINTS)
     along = np.broadcast_to(here, (k, TRACE_POINTS, k)).copy()
     for row in range(k):
         along[row, :, row] = coded
-    means = model.mean(along) / unit.size
-    widths = model.half_interval(along) / unit.size
-    height = unit.of(float(model.mean(here)))
+    means = fitted.model.predict(along) / unit.size
+    widths = fitted.half_interval(along) / unit.size
+    height = unit.of(float(fitted.model.predict(here)))
     traces: list[Json] = []
     layout: Json = {"showlegend": False, "shapes": []}
-    goal = None if target["mean"] is None else unit.of(target["mean"])
+    goal = None if fitted.target is None else unit.of(fitted.target)
     ends = [float(np.min(means - widths)), float(np.max(means + widths)), *([] if goal is None else [goal])]
     room = 0.05 * (max(ends) - min(ends))
+    region = fitted.model.region
     for row, factor in enumerate(factors):
-        size = unit_of_parameter(factor["path"]).size
-        x = ((model.centre[row] + model.half_width[row] * coded) / size).tolist()
+        size = unit_of_parameter(factor.path).size
+        x = ((region.centre[row] + region.half_width[row] * coded) / size).tolist()
         at = natural[row] / size
         low, high = (means[row] - widths[row]).round(5).tolist(), (means[row] + widths[row]).round(5).tolist()
         place: Json = {"xaxis": f"x{suffix(row)}", "yaxis": f"y{suffix(row)}"}
@@ -61,18 +59,17 @@ def profiler(result: Plain, index: int, natural: Sequence[float]) -> Spec:
             | {"hovertemplate": "%{x:.4g}: %{y:.2f}<extra></extra>"},
             points([at], [height], "here", CHOSEN, marker={"size": 10}, **place),
         ]
-        layout |= _row(row, k, axis_title(factor["path"], factor["name"]), [min(ends) - room, max(ends) + room])
+        layout |= _row(row, k, axis_title(factor.path, factor.name), [min(ends) - room, max(ends) + room])
         if goal is not None:
-            layout["shapes"] += _goal(row, goal, unit.of(target["margin"]))
-    layout["yaxis"]["title"] = {"text": observable_title(target["observable"])}
+            layout["shapes"] += _goal(row, goal, unit.of(fitted.margin))
+    layout["yaxis"]["title"] = {"text": observable_title(fitted.observable)}
     return chart(traces, layout, 170 * k)
 
 
-def prediction(result: Plain, index: int, natural: Sequence[float]) -> tuple[float, float]:
+def prediction(fitted: FittedTarget, natural: Sequence[float]) -> tuple[float, float]:
     """Mean of the model at ``natural`` (SI) and half its 95 % interval, in the unit of the screen."""
-    model, unit = model_of(result, index), unit_of_observable(result["study"]["targets"][index]["observable"])
-    here = model.coded(natural)
-    return unit.of(float(model.mean(here))), unit.of(float(model.half_interval(here)))
+    here, unit = fitted.coded(natural), unit_of_observable(fitted.observable)
+    return unit.of(float(fitted.model.predict(here))), unit.of(float(fitted.half_interval(here)))
 
 
 def _goal(row: int, goal: float, margin: float) -> list[Json]:

@@ -7,6 +7,8 @@ colour blindness (a test holds both).
 from __future__ import annotations
 
 import html
+import math
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from explorer.report.content import Spec
@@ -105,6 +107,11 @@ def short_rows(spec: Spec) -> Spec:
     return {"data": spec["data"], "layout": spec["layout"] | axes}
 
 
+def finite(values: Iterable[float]) -> list[float | None]:
+    """Numbers for a chart: None, which leaves a gap, for one that is not there."""
+    return [float(value) if math.isfinite(value) else None for value in values]
+
+
 def suffix(panel: int) -> str:
     """What plotly puts behind "x" and "y" for a panel: nothing for the first, then "2", "3", …"""
     return "" if panel == 0 else str(panel + 1)
@@ -116,9 +123,9 @@ def points(x: list[Any], y: list[Any], name: str, colour: str, **more: Any) -> J
     return {"type": "scatter", "mode": "markers", "x": x, "y": y, "name": label(name), "marker": marker, **more}
 
 
-def error_bars(half_widths: list[float | None], colour: str) -> Json:
-    """Symmetric intervals; none where the half-width is None."""
-    widths = [0.0 if width is None else width for width in half_widths]
+def error_bars(half_widths: Sequence[float], colour: str) -> Json:
+    """Symmetric intervals; none where the half-width is not known."""
+    widths = [width if math.isfinite(width) else 0.0 for width in half_widths]
     return {"type": "data", "array": widths, "color": colour, "thickness": 1.5, "width": 4}
 
 

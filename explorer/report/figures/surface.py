@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from itertools import combinations
 
 import numpy as np
 from scipy import stats
 
-from doe.surface import second_order_terms
 from explorer.report.content import Spec
-from explorer.report.figures.model import chosen_name, chosen_point, reference_name, section_point
+from explorer.report.figures.model import Array, FittedTarget
 from explorer.report.figures.style import (
     BELOW_TO_ABOVE,
     CHOSEN,
@@ -20,43 +20,36 @@ from explorer.report.figures.style import (
     Json,
     axis,
     chart,
+    finite,
     line,
     points,
     side_by_side,
     suffix,
 )
-from explorer.report.findings import Plain
 from explorer.report.units_for_people import axis_title, observable_title, unit_of_observable, unit_of_parameter
 
 GRID = 41
 
 
-def contours(result: Plain, index: int) -> Spec:
-    """The surface of target ``index`` over each pair of factors, the others at the optimum (before it: the middle).
+def contours(fitted: FittedTarget) -> Spec:
+    """The surface of a target over each pair of factors, the others at the optimum (before it: the middle).
 
     Runs of the design are projected on each panel; the thick line is where the model gives the target, where there is
     one.
     """
-    surface, target = result["surface"], result["study"]["targets"][index]
-    unit = unit_of_observable(target["observable"])
-    model, factors, region = surface["models"][index], surface["factors"], surface["region"]
-    centre, half_width = np.array(region["centre"]), np.array(region["half_width"])
-    chosen = chosen_point(result)
-    optimum = None if chosen is None else np.array(chosen)
-    fixed = (np.array(section_point(result)) - centre) / half_width
+    unit, factors, region = unit_of_observable(fitted.observable), fitted.factors, fitted.model.region
     pairs = list(combinations(range(len(factors)), 2))
-    grids = [_slice(np.array(model["coefficients"]), fixed, i, j) / unit.size for i, j in pairs]
-    has_target = target["mean"] is not None
-    level = unit.of(target["mean"]) if has_target else float(np.mean(grids))
+    grids = [_slice(fitted, i, j) / unit.size for i, j in pairs]
+    level = float(np.mean(grids)) if fitted.target is None else unit.of(fitted.target)
     reach = max(float(np.abs(grid - level).max()) for grid in grids) or 1.0
     domains = side_by_side(len(pairs), 0.1)
     traces: list[Json] = []
-    layout: Json = {"coloraxis": _colours(level, reach, observable_title(target["observable"]))}
+    layout: Json = {"coloraxis": _colours(level, reach, observable_title(fitted.observable))}
     for panel, (i, j) in enumerate(pairs):
         axes = {"xaxis": f"x{suffix(panel)}", "yaxis": f"y{suffix(panel)}"}
-        scale = [unit_of_parameter(factors[k]["path"]).size for k in (i, j)]
+        scale = [unit_of_parameter(factors[k].path).size for k in (i, j)]
         x, y = (
-            ((centre[k] + half_width[k] * np.linspace(-1, 1, GRID)) / size).tolist()
+            ((region.centre[k] + region.half_width[k] * np.linspace(-1, 1, GRID)) / size).tolist()
             for k, size in zip((i, j), scale, strict=True)
         )
         shared: Json = {"type": "contour", "x": x, "y": y, "z": np.round(grids[panel], 6).tolist(), **axes}
@@ -76,24 +69,21 @@ def contours(result: Plain, index: int) -> Spec:
             | {"contours": at_target, "line": {"color": TARGET, "width": 4}, "showscale": False, "hoverinfo": "skip"}
             | {"name": "model = target", "showlegend": panel == 0}
         )
-        traces += [line_at_target] if has_target else []
-        traces += _marks(result, optimum, factors, (i, j), scale, axes, panel == 0)
+        traces += [] if fitted.target is None else [line_at_target]
+        traces += _marks(fitted, (i, j), scale, axes, panel == 0)
         layout[f"xaxis{suffix(panel)}"] = axis(
-            axis_title(factors[i]["path"], factors[i]["name"]), domain=domains[panel], anchor=f"y{suffix(panel)}"
+            axis_title(factors[i].path, factors[i].name), domain=domains[panel], anchor=f"y{suffix(panel)}"
         )
-        layout[f"yaxis{suffix(panel)}"] = axis(
-            axis_title(factors[j]["path"], factors[j]["name"]), anchor=f"x{suffix(panel)}"
-        )
+        layout[f"yaxis{suffix(panel)}"] = axis(axis_title(factors[j].path, factors[j].name), anchor=f"x{suffix(panel)}")
     return chart(traces, layout, 420)
 
 
-def fit(result: Plain, index: int) -> Spec:
+def fit(fitted: FittedTarget) -> Spec:
     """Left: predicted against observed per run; right: externally studentized residuals over the prediction."""
-    surface = result["surface"]
-    model, anova, observable = surface["models"][index], surface["anova"][index], surface["observables"][index]
-    unit = unit_of_observable(observable)
-    observed = [unit.of(value) for value in model["observed"]]
-    predicted = [unit.of(value) for value in model["predicted"]]
+    unit = unit_of_observable(fitted.observable)
+    observed = [unit.of(value) for value in fitted.model.observed.tolist()]
+    predicted = [unit.of(value) for value in fitted.model.predicted.tolist()]
+    studentized = finite(fitted.anova.studentized_residuals)
     ends = [min(observed + predicted), max(observed + predicted)]
     left, right = side_by_side(2, 0.12)
     residuals = {"xaxis": "x2", "yaxis": "y2", "showlegend": False}
@@ -107,9 +97,9 @@ def fit(result: Plain, index: int) -> Spec:
             "line": line(DUMMY, "dash"),
         },
         points(observed, predicted, "runs of the design", FACTOR, marker={"opacity": 0.75}),
-        points(predicted, anova["studentized_residuals"], "residual", FACTOR, marker={"opacity": 0.75}, **residuals),
+        points(predicted, studentized, "residual", FACTOR, marker={"opacity": 0.75}, **residuals),
     ]
-    title = observable_title(observable)
+    title = observable_title(fitted.observable)
     layout = {
         "xaxis": axis(f"observed: {title}", domain=left),
         "yaxis": axis("predicted"),
@@ -119,11 +109,10 @@ def fit(result: Plain, index: int) -> Spec:
     return chart(traces, layout, 380)
 
 
-def residual_quantiles(result: Plain, index: int) -> Spec:
+def residual_quantiles(fitted: FittedTarget) -> Spec:
     """Studentized residuals over the quantiles of t that a right model would give them, and the line y = x."""
-    surface = result["surface"]
-    df = surface["models"][index]["df_residual"]
-    known = sorted(r for r in surface["anova"][index]["studentized_residuals"] if r is not None)
+    df = fitted.model.df_residual
+    known = sorted(r for r in fitted.anova.studentized_residuals.tolist() if math.isfinite(r))
     # Externally studentized residuals follow t with one degree of freedom less than the error.
     wanted = [float(stats.t.ppf((k + 0.5) / len(known), max(1, df - 1))) for k in range(len(known))]
     ends = [min(wanted, default=-1.0), max(wanted, default=1.0)]
@@ -138,29 +127,20 @@ def residual_quantiles(result: Plain, index: int) -> Spec:
     return chart(traces, layout, 380)
 
 
-def _slice(coefficients: np.ndarray, fixed: np.ndarray, i: int, j: int) -> np.ndarray:
-    """The model on a grid over factors i (columns) and j (rows), the others at ``fixed`` (coded)."""
+def _slice(fitted: FittedTarget, i: int, j: int) -> Array:
+    """The model on a grid over factors i (columns) and j (rows), the others at the point of the sections."""
     across, up = np.meshgrid(np.linspace(-1, 1, GRID), np.linspace(-1, 1, GRID))
+    fixed = fitted.coded(fitted.section_point)
     coded = np.broadcast_to(fixed, (GRID, GRID, fixed.size)).copy()
     coded[..., i], coded[..., j] = across, up
-    return np.asarray(second_order_terms(coded) @ coefficients)
+    return fitted.model.predict(coded)
 
 
-def _marks(
-    result: Plain,
-    optimum: np.ndarray | None,
-    factors: list[Plain],
-    pair: tuple[int, int],
-    scale: list[float],
-    axes: Json,
-    in_legend: bool,
-) -> list[Json]:
+def _marks(fitted: FittedTarget, pair: tuple[int, int], scale: list[float], axes: Json, in_legend: bool) -> list[Json]:
     """Runs of the design, the measured parameters where they lie in the region, and the optimum if there is one."""
-    surface, (i, j) = result["surface"], pair
-    natural = np.array(surface["natural"])[:, pair] / scale
-    reference = np.array([factors[i]["reference"], factors[j]["reference"]]) / scale
-    low = (np.array(surface["region"]["centre"]) - surface["region"]["half_width"])[list(pair)] / scale
-    high = (np.array(surface["region"]["centre"]) + surface["region"]["half_width"])[list(pair)] / scale
+    natural = fitted.design[:, pair] / scale
+    reference = np.array([float(fitted.factors[k].reference) for k in pair]) / scale
+    low, high = fitted.low[list(pair)] / scale, fitted.high[list(pair)] / scale
     runs = {"size": 7, "color": "#ffffff", "line": {"color": INK, "width": 1.2}}
     star = {"size": 13, "symbol": "star", "line": {"color": "#ffffff", "width": 1}}
     diamond = {"size": 10, "symbol": "diamond", "color": "#ffffff", "line": {"color": INK, "width": 1.5}}
@@ -168,11 +148,11 @@ def _marks(
     marks = [points(natural[:, 0].tolist(), natural[:, 1].tolist(), "points of the design", INK, marker=runs, **shown)]
     if ((low <= reference) & (reference <= high)).all():
         x, y = (float(value) for value in reference)
-        marks.append(points([x], [y], reference_name(result), INK, marker=diamond, **shown))
-    if optimum is None:
+        marks.append(points([x], [y], fitted.reference_name, INK, marker=diamond, **shown))
+    if fitted.chosen is None:
         return marks
-    at = np.array([optimum[i], optimum[j]]) / scale
-    return [*marks, points([float(at[0])], [float(at[1])], chosen_name(result), CHOSEN, marker=star, **shown)]
+    at = np.array(fitted.chosen)[list(pair)] / scale
+    return [*marks, points([float(at[0])], [float(at[1])], fitted.chosen_name, CHOSEN, marker=star, **shown)]
 
 
 def _colours(level: float, reach: float, title: str) -> Json:

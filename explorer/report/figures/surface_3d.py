@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from explorer.report.content import Spec
-from explorer.report.figures.model import chosen_name, chosen_point, model_of, reference_name, section_point
+from explorer.report.figures.model import FittedTarget
 from explorer.report.figures.style import (
     BELOW_TO_ABOVE,
     CHOSEN,
@@ -20,7 +20,6 @@ from explorer.report.figures.style import (
     chart,
     label,
 )
-from explorer.report.findings import Plain
 from explorer.report.units_for_people import axis_title, observable_title, unit_of_observable, unit_of_parameter
 
 GRID = 25
@@ -28,20 +27,18 @@ CUBE = 17
 """Points along each side of the grids."""
 
 
-def height_over(result: Plain, index: int, pair: tuple[int, int]) -> Spec:
-    """The model of target ``index`` over two factors, the others at the optimum, with the observed runs above it."""
-    surface, target = result["surface"], result["study"]["targets"][index]
-    model, unit, (i, j) = model_of(result, index), unit_of_observable(target["observable"]), pair
+def height_over(fitted: FittedTarget, pair: tuple[int, int]) -> Spec:
+    """The model over two factors, the others at the optimum, with the observed runs above it."""
+    model, region, unit, (i, j) = fitted.model, fitted.model.region, unit_of_observable(fitted.observable), pair
     sides = np.linspace(-1.0, 1.0, GRID)
-    coded = np.broadcast_to(model.coded(section_point(result)), (GRID, GRID, model.centre.size)).copy()
+    coded = np.broadcast_to(fitted.coded(fitted.section_point), (GRID, GRID, region.centre.size)).copy()
     coded[..., i], coded[..., j] = np.meshgrid(sides, sides)
-    heights = model.mean(coded) / unit.size
-    level = float(heights.mean()) if target["mean"] is None else unit.of(target["mean"])
+    heights = model.predict(coded) / unit.size
+    level = float(heights.mean()) if fitted.target is None else unit.of(fitted.target)
     reach = max(float(np.abs(heights - level).max()), 1e-9)
-    sizes = [unit_of_parameter(surface["factors"][k]["path"]).size for k in pair]
-    x, y = (((model.centre[k] + model.half_width[k] * sides) / s).tolist() for k, s in zip(pair, sizes, strict=True))
-    observed = surface["models"][index]
-    at = model.natural(np.array(observed["points"], dtype=np.float64))
+    sizes = [unit_of_parameter(fitted.factors[k].path).size for k in pair]
+    x, y = (((region.centre[k] + region.half_width[k] * sides) / s).tolist() for k, s in zip(pair, sizes, strict=True))
+    at = fitted.natural(model.points)
     traces: list[Json] = [
         {"type": "surface", "x": x, "y": y, "z": heights.round(5).tolist(), "colorscale": BELOW_TO_ABOVE}
         | {"cmin": level - reach, "cmax": level + reach, "showscale": False, "opacity": 0.85, "name": "model"}
@@ -51,53 +48,52 @@ def height_over(result: Plain, index: int, pair: tuple[int, int]) -> Spec:
             [
                 (at[:, i] / sizes[0]).tolist(),
                 (at[:, j] / sizes[1]).tolist(),
-                [unit.of(value) for value in observed["observed"]],
+                [unit.of(value) for value in model.observed.tolist()],
             ],
             "runs",
             {"size": 3.5, "color": FACTOR},
         ),
     ]
-    chosen = chosen_point(result)
+    chosen = fitted.chosen
     if chosen is not None:
-        height = [unit.of(float(model.mean(model.coded(chosen))))]
+        height = [unit.of(float(model.predict(fitted.coded(chosen))))]
         star = {"size": 7, "color": CHOSEN, "symbol": "diamond"}
-        traces.append(_dots([[chosen[i] / sizes[0]], [chosen[j] / sizes[1]], height], chosen_name(result), star))
-    titles = [axis_title(surface["factors"][k]["path"], surface["factors"][k]["name"]) for k in pair]
-    return _in_space(traces, [*titles, observable_title(target["observable"])])
+        traces.append(_dots([[chosen[i] / sizes[0]], [chosen[j] / sizes[1]], height], fitted.chosen_name, star))
+    titles = [axis_title(fitted.factors[k].path, fitted.factors[k].name) for k in pair]
+    return _in_space(traces, [*titles, observable_title(fitted.observable)])
 
 
-def solutions(result: Plain, index: int) -> Spec | None:
-    """All settings of three factors at which the model gives target ``index``, with the chosen one and its refits.
+def solutions(fitted: FittedTarget) -> Spec | None:
+    """All settings of three factors at which the model gives the target, with the chosen one and its refits.
 
     None unless there are three factors and a target.
     """
-    factors = result["surface"]["factors"]
-    target = result["study"]["targets"][index]
-    if len(factors) != 3 or target["mean"] is None:
+    factors, target = fitted.factors, fitted.target
+    if len(factors) != 3 or target is None:
         return None
-    model = model_of(result, index)
     side = np.linspace(-1.0, 1.0, CUBE)
     coded = np.stack(np.meshgrid(side, side, side, indexing="ij"), axis=-1).reshape(-1, 3)
-    sizes = np.array([unit_of_parameter(factor["path"]).size for factor in factors])
-    x, y, z = (model.natural(coded) / sizes).T
-    same = {"isomin": target["mean"], "isomax": target["mean"], "surface": {"count": 1}, "caps": _no_caps()}
+    sizes = np.array([unit_of_parameter(factor.path).size for factor in factors])
+    x, y, z = (fitted.natural(coded) / sizes).T
+    heights = fitted.model.predict(coded).round(6).tolist()
+    same = {"isomin": target, "isomax": target, "surface": {"count": 1}, "caps": _no_caps()}
     colour = [[0.0, TARGET], [1.0, TARGET]]
     traces: list[Json] = [
         {"type": "isosurface", "x": x.tolist(), "y": y.tolist(), "z": z.tolist(), "name": "model = target"}
-        | {"value": model.mean(coded).round(6).tolist(), "colorscale": colour, "showscale": False, "opacity": 0.45}
+        | {"value": heights, "colorscale": colour, "showscale": False, "opacity": 0.45}
         | same
         | {"hoverinfo": "skip", "showlegend": True}
     ]
-    found = result.get("optimum")
-    if found:
-        refits = (np.array(found["single"]["bootstrap_points"], dtype=np.float64) / sizes)[::4]
+    if fitted.optimum is not None:
+        found = fitted.optimum.single
+        refits = (found.bootstrap_points / sizes)[::4]
         traces.append(_dots(refits.T.tolist(), "bootstrap refits", {"size": 2, "color": CLOUD}))
-        measured, chosen = np.array(found["single"]["reference"]) / sizes, np.array(chosen_point(result)) / sizes
+        measured, chosen = found.reference / sizes, np.array(fitted.chosen) / sizes
         open_diamond = {"size": 6, "color": "#ffffff", "symbol": "diamond", "line": {"color": INK, "width": 2}}
-        traces.append(_dots([[float(v)] for v in measured], reference_name(result), open_diamond))
+        traces.append(_dots([[float(v)] for v in measured], fitted.reference_name, open_diamond))
         star = {"size": 7, "color": CHOSEN, "symbol": "diamond"}
-        traces.append(_dots([[float(v)] for v in chosen], chosen_name(result), star))
-    return _in_space(traces, [axis_title(factor["path"], factor["name"]) for factor in factors])
+        traces.append(_dots([[float(v)] for v in chosen], fitted.chosen_name, star))
+    return _in_space(traces, [axis_title(factor.path, factor.name) for factor in factors])
 
 
 def _dots(places: Sequence[Sequence[float]], name: str, marker: Json) -> Json:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
+from doe.study_result import StudyResult
 from explorer.report.content import Section
 from explorer.report.sections.ascent import ascent
 from explorer.report.sections.assumptions import assumptions, scan
@@ -18,7 +18,7 @@ from explorer.report.sections.screening import screening
 from explorer.report.sections.surface import surface
 from explorer.report.sections.verification import verification
 
-SECTIONS: tuple[Callable[[dict[str, Any]], Section | None], ...] = (
+SECTIONS: tuple[Callable[[StudyResult], Section | None], ...] = (
     overview,
     verification,
     effects,
@@ -36,7 +36,7 @@ SECTIONS: tuple[Callable[[dict[str, Any]], Section | None], ...] = (
 """In the order of the page: what was found, then how."""
 
 
-def sections_of(result: dict[str, Any]) -> tuple[Section, ...]:
+def sections_of(result: StudyResult) -> tuple[Section, ...]:
     """Every section that ``result`` has something for."""
     found = (make(result) for make in SECTIONS)
     return tuple(section for section in found if section is not None)

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import csv
 
+from doe.study_result import StudyResult
+from doe.t_tests import Sample
 from explorer.report.content import Section, Table, Text
-from explorer.report.findings import Plain, deciding_error, mean_and_sd, significant
 from explorer.report.identified import GIVES_TARGET, settings
 from explorer.report.units_for_people import (
     MISSING,
@@ -30,25 +31,25 @@ PRINTED_RELATIVE_ERROR_PERCENT = 0.923
 PRINTED_P = 0.827
 
 
-def paper(result: Plain) -> Section | None:
+def paper(result: StudyResult) -> Section | None:
     """Factors, optimum and verification side by side; None for any other study."""
-    if result["study"]["name"] != STUDY:
+    if result.study.name != STUDY:
         return None
-    analysis = result["screening"]["analysis"]
-    ours = significant(analysis, deciding_error(analysis), "p_holm")
+    analysis = result.screening.analysis
+    their_way = analysis.significant(adjust="none", error="dummies")
     text = (
         f"The paper (Processes 2022, 10, 185) found {enumeration(list(PRINTED_SIGNIFICANT))} significant, judged "
-        f"against three dummy columns without correction. Here: {enumeration(significant(analysis, 'dummies', 'p'))} "
-        f"in that way, {enumeration(ours)} after Holm against the {deciding_error(analysis)}."
+        f"against three dummy columns without correction. Here: {enumeration(their_way)} in that way, "
+        f"{enumeration(analysis.significant())} after Holm against the {analysis.error_source}."
     )
     return Section("Compared with the paper", (Text(text), _optimum(result), _verification(result), _factors(result)))
 
 
-def _optimum(result: Plain) -> Table:
-    found = {setting.name: setting for setting in settings(result["optimum"])}
+def _optimum(result: StudyResult) -> Table:
+    found = {setting.name: setting for setting in settings(result.optimum)}
     rows = []
-    for factor in result["study"]["factors"]:
-        name, path = factor["name"], factor["path"]
+    for factor in result.study.factors:
+        name, path = factor.name, factor.path
         if name not in PRINTED_OPTIMUM and name not in found:
             continue
         here = found.get(name)
@@ -58,22 +59,21 @@ def _optimum(result: Plain) -> Table:
     return Table(header, tuple(rows))
 
 
-def _verification(result: Plain) -> Table:
-    name = result["study"]["targets"][0]["observable"]
-    test = result["verification"]["tests"][0]
+def _verification(result: StudyResult) -> Table:
+    name = result.study.targets[0].observable
+    test = result.verification.tests[0]
     pours = [float(row["simulated_angle_of_repose_deg"]) for row in _table("table10_verification")]
-    _, sd = mean_and_sd(pours)
-    p = None if test["pooled"] is None else test["pooled"]["p"]
-    ours = test["simulated"]
+    p = None if test.pooled is None else test.pooled.p
+    ours = test.simulated
     rows = (
-        ("simulated pours", f"{len(pours)}: {', '.join(f'{value:.2f}°' for value in pours)}", f"{ours['n']}"),
-        ("simulated mean", f"{PRINTED_MEAN_DEG:.2f}°", observed(name, ours["mean"])),
-        ("sd of one pour", f"{fixed(sd)}° (from the three pours)", observed(name, ours["sd"])),
-        ("measured mean", "24.68°", observed(name, test["target"]["mean"])),
+        ("simulated pours", f"{len(pours)}: {', '.join(f'{value:.2f}°' for value in pours)}", str(ours.n)),
+        ("simulated mean", f"{PRINTED_MEAN_DEG:.2f}°", observed(name, ours.mean)),
+        ("sd of one pour", f"{fixed(Sample.of(pours).sd)}° (from the three pours)", observed(name, ours.sd)),
+        ("measured mean", "24.68°", observed(name, test.target.mean)),
         (
             "relative error",
             f"{PRINTED_RELATIVE_ERROR_PERCENT} % as printed",
-            f"{fixed(test['relative_error_percent'])} %",
+            f"{fixed(test.relative_error_percent)} %",
         ),
         ("p, two-sample t test", f"{PRINTED_P}", p_value(p)),
     )
@@ -84,25 +84,25 @@ def _verification(result: Plain) -> Table:
     return Table(("", "paper", "here"), rows, caption)
 
 
-def _factors(result: Plain) -> Table:
+def _factors(result: StudyResult) -> Table:
     printed = {row["factor"]: row for row in _table("table6_plackett_burman_anova")}
-    paths = {factor["name"]: factor["path"] for factor in result["study"]["factors"]}
+    paths = {factor.name: factor.path for factor in result.study.factors}
     rows = []
-    for effect in result["screening"]["analysis"]["effects"]:
-        if effect["is_dummy"] or effect["name"] not in printed:
+    for effect in result.screening.analysis.effects:
+        if effect.is_dummy or effect.name not in printed:
             continue
-        row, by_dummies, by_replicates = printed[effect["name"]], effect["by_dummies"], effect["by_replicates"]
+        row, by_dummies, by_replicates = printed[effect.name], effect.by_dummies, effect.by_replicates
         deciding = by_replicates or by_dummies
         rows.append(
             (
-                effect["name"],
-                parameter_label(paths[effect["name"]]),
+                effect.name,
+                parameter_label(paths[effect.name]),
                 row["sum_of_squares"],
-                fixed(effect["sum_of_squares"]),
+                fixed(effect.sum_of_squares),
                 row["p_value"],
-                MISSING if by_dummies is None else p_value(by_dummies["p"]),
-                MISSING if by_replicates is None else p_value(by_replicates["p"]),
-                MISSING if deciding is None else p_value(deciding["p_holm"]),
+                MISSING if by_dummies is None else p_value(by_dummies.p),
+                MISSING if by_replicates is None else p_value(by_replicates.p),
+                MISSING if deciding is None else p_value(deciding.p_holm),
             )
         )
     header = (

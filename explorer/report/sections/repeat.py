@@ -3,54 +3,55 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 
 from doe.study import TRIES
+from doe.study_result import PouredBody, StudyDescription, StudyResult
 from explorer.report.content import Block, Code, Section, Table, Text
-from explorer.report.findings import Plain, outcomes_by_stage, seeds_tried
 from explorer.report.units_for_people import MISSING, duration, enumeration, fixed, number, percent
 from solver.assets import shipped_assets
 
 
-def runs(result: Plain) -> Section:
+def runs(result: StudyResult) -> Section:
     """Outcomes by stage, seeds, and the shapes that were poured."""
-    counted, totals = outcomes_by_stage(result), result["runs"]
+    counted, totals = result.runs.outcomes(), result.runs
     names = sorted({name for outcomes in counted.values() for name in outcomes})
     rows = [
         (stage, *(str(outcomes[name]) for name in names), str(outcomes.total())) for stage, outcomes in counted.items()
     ]
-    rows.append(("all", *(str(totals["by_outcome"].get(name, 0)) for name in names), str(totals["total"])))
-    seeds = [run["seed"] for run in totals["list"]]
+    rows.append(("all", *(str(totals.by_outcome.get(name, 0)) for name in names), str(totals.total)))
+    seeds = {run.seed for run in totals.list}
+    root = MISSING if result.study.seed is None else result.study.seed
     text = (
-        f"{totals['total']} pours with {len(set(seeds))} different seeds, all drawn from the study's seed "
-        f"{result['study'].get('seed', MISSING)} by stage, row, replicate and attempt; `result.json` lists the seed, "
+        f"{totals.total} pours with {len(seeds)} different seeds, all drawn from the study's seed "
+        f"{root} by stage, row, replicate and attempt; `result.json` lists the seed, "
         "outcome and store key of every pour."
     )
     blocks: list[Block] = [
         Text(text),
         Table(("stage", *(name.replace("_", " ") for name in names), "pours"), tuple(rows)),
     ]
-    if contact := result["study"].get("contact"):
+    if contact := result.study.contact:
         named = ", ".join(f"{name.replace('_', ' ')} {choice}" for name, choice in contact.items())
         blocks.append(Text(f"Contact law: Hertz–Mindlin; {named} (`explorer parameters`, contact.*)."))
-    if result["shapes"]:
-        blocks.append(_shapes(result["shapes"]))
+    if result.shapes:
+        blocks.append(_shapes(result.shapes))
     return Section("Runs", tuple(blocks))
 
 
-def repeat(result: Plain) -> Section:
+def repeat(result: StudyResult) -> Section:
     """Command line, time per stage and versions."""
-    study, timing = result["study"], result["timing"]
-    command = f"explorer calibrate --headless --study {_study(study)} --profile {shlex.quote(study['profile']['name'])}"
-    tries = seeds_tried(result)
-    if tries != TRIES:
-        command += f" --tries {tries}"
-    times = [(stage, duration(seconds)) for stage, seconds in timing["stage_s"].items()]
-    times.append(("all", duration(timing["total_s"])))
-    rate = f"{number(timing['runs_per_minute'])} pours per minute."
-    if timing.get("reused_runs"):
-        rate += f" {timing['reused_runs']} pours were found in the store and not run again."
-    versions = tuple((name, version or "not installed") for name, version in result["versions"].items())
+    study, timing = result.study, result.timing
+    command = f"explorer calibrate --headless --study {_study(study)} --profile {shlex.quote(study.profile.name)}"
+    if study.tries != TRIES:
+        command += f" --tries {study.tries}"
+    times = [(stage, duration(seconds)) for stage, seconds in timing.stage_s.items()]
+    times.append(("all", duration(timing.total_s)))
+    rate = f"{number(timing.runs_per_minute)} pours per minute."
+    if timing.reused_runs:
+        rate += f" {timing.reused_runs} pours were found in the store and not run again."
+    versions = tuple((name, version or "not installed") for name, version in result.versions.items())
     return Section(
         "How to repeat",
         (
@@ -61,25 +62,25 @@ def repeat(result: Plain) -> Section:
     )
 
 
-def _study(study: Plain) -> str:
+def _study(study: StudyDescription) -> str:
     """The study as the command line takes it: its name if it is shipped, else its file."""
-    shipped = study["name"] in shipped_assets("studies") and Path(study["file"]).parent.name == "studies"
-    return study["name"] if shipped else shlex.quote(study["file"])
+    shipped = study.name in shipped_assets("studies") and Path(study.file).parent.name == "studies"
+    return study.name if shipped else shlex.quote(study.file)
 
 
-def _shapes(shapes: list[Plain]) -> Table:
+def _shapes(shapes: Sequence[PouredBody]) -> Table:
     rows = []
     for shape in shapes:
-        fit = shape["fit"]
-        extents = enumeration([percent(error, 1) for error in fit["extent_errors"]])
+        fit = shape.fit
+        extents = enumeration([percent(error, 1) for error in fit.extent_errors])
         rows.append(
             (
-                shape["body"],
-                str(fit["n_spheres"]),
-                percent(fit["volume_ratio"], 1),
-                percent(fit["covered_ratio"], 1),
-                f"{fixed(1e3 * fit['surface_rms'])} mm",
-                f"{fixed(1e3 * fit['surface_max'])} mm",
+                shape.body,
+                str(fit.n_spheres),
+                percent(fit.volume_ratio, 1),
+                percent(fit.covered_ratio, 1),
+                f"{fixed(1e3 * fit.surface_rms)} mm",
+                f"{fixed(1e3 * fit.surface_max)} mm",
                 extents,
             )
         )

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from doe.factors import MIN_BODIES
+from doe.runner import sample_of
+from doe.screening_result import Adjustment, ErrorSource
+from doe.stages.screening import ScreeningResult
+from doe.study_result import StudyResult
 from explorer.report.content import Block, Bullets, Facts, Figure, Folded, Section, Table, Text
 from explorer.report.figures.effects import half_normal, pareto
-from explorer.report.findings import (
-    Plain,
-    factor_effects,
-    half_width,
-    mean_and_sd,
-    significant,
-    values_of,
-)
 from explorer.report.units_for_people import (
     MISSING,
     enumeration,
@@ -27,15 +23,17 @@ from explorer.report.units_for_people import (
     signed,
 )
 
+ADJUSTMENTS: tuple[Adjustment, ...] = ("none", "holm")
 
-def screening(result: Plain) -> Section:
+
+def screening(result: StudyResult) -> Section:
     """Pareto, half-normal plot, the verdicts, effects and rows of the Plackett–Burman design."""
-    part = result["screening"]
-    analysis, response = part["analysis"], part["response"]
+    part = result.screening
+    analysis = part.analysis
     blocks: list[Block] = [
         Text(
-            f"{analysis['rows']}-run Plackett–Burman design over {len(part['factors'])} factors, "
-            f"{analysis['runs']} valid pours, response: {observable_label(response)}."
+            f"{analysis.rows}-run Plackett–Burman design over {len(part.factors)} factors, "
+            f"{analysis.runs} valid pours, response: {observable_label(part.response)}."
         ),
         Facts(tuple(_verdicts(part))),
     ]
@@ -48,49 +46,47 @@ def screening(result: Plain) -> Section:
         )
     caption = "Noise alone would follow a straight line through the origin; what stands above it acts."
     blocks += [Figure("half-normal", half_normal(part), caption), effect_table(part)]
-    notes = (*analysis["notes"], *(_no_pile_note(part)))
-    if notes:
-        blocks.append(Bullets(notes))
+    notes = (*analysis.notes, _no_pile_note(part))
+    blocks.append(Bullets(notes))
     blocks += not_testable(part)
     blocks.append(Folded("All rows of the screening", (row_table(part),)))
     return Section("Screening", tuple(blocks))
 
 
-def not_testable(part: Plain) -> list[Block]:
+def not_testable(part: ScreeningResult) -> list[Block]:
     """Which factors act on so few bodies that their effect says nothing; empty if none does."""
-    if not part["not_testable"]:
+    if not part.not_testable:
         return []
     names = tuple(
-        f"{entry['factor'].replace('_', ' ')} ({parameter_label(entry['path'])}): acts on {entry['bodies']:.0f} bodies"
-        for entry in part["not_testable"]
+        f"{entry.factor.replace('_', ' ')} ({parameter_label(entry.path)}): acts on {entry.bodies:.0f} bodies"
+        for entry in part.not_testable
     )
     return [Text(f"Not testable, because they touch fewer than {MIN_BODIES} bodies of the mixture:"), Bullets(names)]
 
 
-def effect_table(part: Plain) -> Table:
+def effect_table(part: ScreeningResult) -> Table:
     """Effects by falling size with their tests; the last column reads the same pours in the target's observable."""
-    analysis, response = part["analysis"], part["response"]
-    factors = {factor["name"]: factor for factor in part["factors"]}
-    in_target = {effect["name"]: effect for effect in part["target_analysis"]["effects"]}
-    untestable = {entry["factor"] for entry in part["not_testable"]}
+    analysis = part.analysis
+    factors = {factor.name: factor for factor in part.factors}
+    in_target = {effect.name: effect for effect in part.target_analysis.effects}
+    untestable = {entry.factor for entry in part.not_testable}
     rows = []
-    for effect in factor_effects(analysis):
-        factor = factors[effect["name"]]
-        by_replicates, by_dummies = effect["by_replicates"], effect["by_dummies"]
-        deciding = by_replicates if analysis["pure_error"] is not None else by_dummies
+    for effect in analysis.factor_effects():
+        factor, deciding = factors[effect.name], analysis.deciding_test(effect)
+        by_replicates, by_dummies = effect.by_replicates, effect.by_dummies
         rows.append(
             (
-                effect["name"].replace("_", " ") + (" †" if effect["name"] in untestable else ""),
-                parameter_label(factor["path"]),
-                parameter_range(factor["path"], factor["low"], factor["high"]),
-                signed(effect["effect"]),
-                f"± {fixed(half_width(analysis, effect))}",
-                MISSING if by_replicates is None else p_value(by_replicates["p"]),
-                MISSING if by_dummies is None else p_value(by_dummies["p"]),
-                MISSING if deciding is None else p_value(deciding["p_holm"]),
-                fixed(effect["sum_of_squares"]),
-                fixed(effect["contribution_percent"], 1),
-                signed(in_target[effect["name"]]["effect"]),
+                effect.name.replace("_", " ") + (" †" if effect.name in untestable else ""),
+                parameter_label(factor.path),
+                parameter_range(factor.path, factor.low, factor.high),
+                signed(effect.effect),
+                f"± {fixed(analysis.half_width(effect))}",
+                MISSING if by_replicates is None else p_value(by_replicates.p),
+                MISSING if by_dummies is None else p_value(by_dummies.p),
+                MISSING if deciding is None else p_value(deciding.p_holm),
+                fixed(effect.sum_of_squares),
+                fixed(effect.contribution_percent, 1),
+                signed(in_target[effect.name].effect),
             )
         )
     header = (
@@ -99,65 +95,65 @@ def effect_table(part: Plain) -> Table:
     )
     caption = "† not testable. " if untestable else ""
     caption += (
-        f"Effects on {observable_title(response)}; sums of squares of row means. p Holm is corrected for all factors, "
-        "against the error that decides (replicates where there are any); the last column reads the same pours in the "
-        "target's own observable."
+        f"Effects on {observable_title(part.response)}; sums of squares of row means. p Holm is corrected for all "
+        "factors, against the error that decides (replicates where there are any); the last column reads the same "
+        "pours in the target's own observable."
     )
     return Table(header, tuple(rows), caption)
 
 
-def row_table(part: Plain) -> Table:
+def row_table(part: ScreeningResult) -> Table:
     """One line per row of the design: levels, pours, mean, spread and failures."""
     rows = []
-    for k, (levels, runs, lost) in enumerate(zip(part["design"], part["runs"], part["no_pile_share"], strict=True)):
-        values = values_of(runs, part["response"])
-        mean, sd = mean_and_sd(values)
+    for k, (levels, runs, lost) in enumerate(zip(part.design, part.runs, part.no_pile_share, strict=True)):
+        sample = sample_of(runs, part.response)
         signs = "".join("+" if level > 0 else "−" for level in levels)
         rows.append(
             (
                 str(k + 1),
                 f"`{signs}`",
-                str(len(values)),
-                observed(part["response"], mean),
-                observed(part["response"], sd),
+                str(sample.n),
+                observed(part.response, sample.mean),
+                observed(part.response, sample.sd),
                 percent(lost),
             )
         )
-    columns = ", ".join(part["columns"])
+    columns = ", ".join(part.columns)
     return Table(("row", "levels", "valid pours", "mean", "sd", "not valid"), tuple(rows), f"Levels of {columns}.")
 
 
-def _verdicts(part: Plain) -> list[tuple[str, str]]:
-    analysis, response = part["analysis"], part["response"]
+def _verdicts(part: ScreeningResult) -> list[tuple[str, str]]:
+    analysis, response = part.analysis, part.response
     found = []
-    for name, key, way in (
-        ("replicates", "pure_error", "By replicates"),
-        ("dummies", "dummy_error", "By dummies, the way of most published studies"),
-    ):
-        error = analysis[key]
+    ways: dict[ErrorSource, str] = {
+        "replicates": "By replicates",
+        "dummies": "By dummies, the way of most published studies",
+    }
+    for name, way in ways.items():
+        error = analysis.error(name)
         if error is None:
             found.append((way, "not available"))
             continue
-        raw, corrected = (enumeration(significant(analysis, name, p)) for p in ("p", "p_holm"))  # type: ignore[arg-type]
-        found.append((way, f"p < 0.05: {raw}; after Holm: {corrected} ({error['df']} degrees of freedom)"))
+        raw, corrected = (enumeration(analysis.significant(adjust=one, error=name)) for one in ADJUSTMENTS)
+        found.append((way, f"p < 0.05: {raw}; after Holm: {corrected} ({error.df} degrees of freedom)"))
         found.append(
             (
                 f"Limits against the {name}",
-                f"{observed(response, error['margin'])} for one factor, "
-                f"{observed(response, error['margin_bonferroni'])} for all (Bonferroni); smallest effect seen with "
-                f"chance 0.8: {observed(response, error['smallest_detectable_effect'])}, for all "
-                f"{observed(response, error['smallest_detectable_effect_bonferroni'])}",
+                f"{observed(response, error.margin)} for one factor, "
+                f"{observed(response, error.margin_bonferroni)} for all (Bonferroni); smallest effect seen with "
+                f"chance 0.8: {observed(response, error.smallest_detectable_effect)}, for all "
+                f"{observed(response, error.smallest_detectable_effect_bonferroni)}",
             )
         )
-    chosen = [f"{entry['name']} ({entry['reason']})" for entry in part["selected"]]
+    chosen = [f"{entry.name} ({entry.reason})" for entry in part.selected]
     return [*found, ("Going on", enumeration(chosen))] if chosen else found
 
 
-def _no_pile_note(part: Plain) -> list[str]:
-    if part["no_pile_analysis"] is None:
-        return ["Every pour is valid, so no factor changes the share of valid pours."]
-    found = significant(part["no_pile_analysis"], "dummies", "p_holm")
-    return [
-        f"Share of pours that are not valid: mean {percent(part['no_pile_analysis']['mean'], 1)} per row; factors that "
-        f"change it (against the dummies, after Holm): {enumeration(found)}."
-    ]
+def _no_pile_note(part: ScreeningResult) -> str:
+    lost = part.no_pile_analysis
+    if lost is None:
+        return "Every pour is valid, so no factor changes the share of valid pours."
+    return (
+        f"Share of pours that are not valid: mean {percent(lost.mean, 1)} per row; factors that change it (against "
+        f"the dummies, after Holm): {enumeration(lost.significant(error='dummies'))}."
+    )

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections.abc import Sequence
 from itertools import combinations
 
+import numpy as np
+
+from doe.canonical import Canonical
+from doe.runner import sample_of
+from doe.stages.surface import SurfaceResult
+from doe.study import Factor
+from doe.study_result import StudyResult
+from doe.surface import Surface
+from doe.surface_anova import SurfaceAnova
 from explorer.report.content import Block, Bullets, Facts, Figure, Folded, Section, Table, Text
+from explorer.report.figures.model import FittedTarget, fitted_targets
 from explorer.report.figures.surface import contours, fit
-from explorer.report.findings import Plain, mean_and_sd, resolved_by_surface, valid_count, values_of
+from explorer.report.sections.overview import resolved_by_surface
 from explorer.report.units_for_people import (
     fixed,
     number,
@@ -23,71 +33,67 @@ from explorer.report.units_for_people import (
 )
 
 
-def surface(result: Plain) -> Section:
+def surface(result: StudyResult) -> Section:
     """Model, ANOVA, equations and charts per target."""
-    part = result["surface"]
+    part = result.surface
     blocks: list[Block] = [
         Text(
-            f"Box–Behnken design of {len(part['design'])} points over {len(part['factors'])} factors, and "
+            f"Box–Behnken design of {len(part.design)} points over {len(part.factors)} factors, and "
             "the full second-order model by least squares on every valid pour. The first model sees a change of "
-            f"{observed(part['observables'][0], resolved_by_surface(result))} from the low to the high end of a factor "
+            f"{observed(part.observables[0], resolved_by_surface(result))} from the low to the high end of a factor "
             "with chance 0.8."
         ),
         Bullets(tuple(_region(part))),
     ]
-    for index, observable in enumerate(part["observables"]):
-        blocks += _of_target(result, index, observable)
+    for place, (fitted, canonical) in enumerate(zip(fitted_targets(result), part.canonical, strict=True), start=1):
+        blocks += _of_target(place, fitted, canonical)
     blocks.append(Folded("All points of the design", (_points(part),)))
     return Section("Response surface", tuple(blocks))
 
 
-def equation(part: Plain, index: int) -> tuple[str, str]:
+def equation(model: Surface, factors: Sequence[Factor], observable: str) -> tuple[str, str]:
     """The model as text, coded (x from −1 to +1) and in the units that people read."""
-    model, letters = part["models"][index], [factor["name"] for factor in part["factors"]]
-    sizes = [unit_of_parameter(factor["path"]).size for factor in part["factors"]]
-    unit = unit_of_observable(part["observables"][index])
-    terms, scales = _terms(letters, sizes)
-    coded = [unit.of(value) for value in model["coefficients"]]
-    actual = [unit.of(value) * scale for value, scale in zip(model["coefficients_natural"], scales, strict=True)]
-    # Results from before models could leave terms out have them all.
-    kept = [k for k, is_in in enumerate(model.get("included", [True] * len(terms))) if is_in]
+    unit = unit_of_observable(observable)
+    terms, scales = _terms([factor.name for factor in factors], [unit_of_parameter(f.path).size for f in factors])
+    coded = [unit.of(value) for value in model.coefficients.tolist()]
+    actual = [unit.of(value) * scale for value, scale in zip(model.coefficients_natural.tolist(), scales, strict=True)]
+    kept = np.flatnonzero(model.included)
     names = [terms[k] for k in kept]
     return _sum([coded[k] for k in kept], names, 4), _sum([actual[k] for k in kept], names, 5)
 
 
-def anova_table(anova: Plain) -> Table:
+def anova_table(anova: SurfaceAnova) -> Table:
     """Analysis of variance as published calibrations print it."""
     rows = tuple(
         (
-            row["source"].replace("_", " ").replace("*", " × ").replace("^2", "²"),
-            number(row["sum_of_squares"], 4),
-            str(row["df"]),
-            number(row["mean_square"], 4),
-            number(row["f"], 4),
-            p_value(row["p"]),
+            row.source.replace("_", " ").replace("*", " × ").replace("^2", "²"),
+            number(row.sum_of_squares, 4),
+            str(row.df),
+            number(row.mean_square, 4),
+            number(row.f, 4),
+            p_value(row.p),
         )
-        for row in anova["rows"]
+        for row in anova.rows
     )
     return Table(("source", "sum of squares", "df", "mean square", "F", "p"), rows, "Partial sums of squares.")
 
 
-def _of_target(result: Plain, index: int, observable: str) -> list[Block]:
-    part = result["surface"]
-    anova, canonical = part["anova"][index], part["canonical"][index]
-    coded, actual = equation(part, index)
-    symbols = {factor["name"]: unit_of_parameter(factor["path"]).symbol for factor in part["factors"]}
+def _of_target(place: int, fitted: FittedTarget, canonical: Canonical) -> list[Block]:
+    anova, observable = fitted.anova, fitted.observable
+    coded, actual = equation(fitted.model, fitted.factors, observable)
+    symbols = {factor.name: unit_of_parameter(factor.path).symbol for factor in fitted.factors}
     units = [f"{name} in {symbol}" for name, symbol in symbols.items() if symbol]
     name = observable_label(observable)
     blocks: list[Block] = [
         Facts(
             (
                 ("Model of", f"{name}; valid pours only"),
-                ("R²", f"{fixed(anova['r_squared'], 3)}; adjusted {fixed(anova['r_squared_adjusted'], 3)}; predicted "
-                       f"{fixed(anova['r_squared_predicted'], 3)}, by whole points "
-                       f"{fixed(anova['r_squared_predicted_by_row'], 3)}"),
-                ("Scatter", f"σ = {observed(observable, anova['sigma'])}, coefficient of variation "
-                            f"{fixed(anova['cv_percent'])} %"),
-                ("Adequate precision", fixed(anova["adequate_precision"])),
+                ("R²", f"{fixed(anova.r_squared, 3)}; adjusted {fixed(anova.r_squared_adjusted, 3)}; predicted "
+                       f"{fixed(anova.r_squared_predicted, 3)}, by whole points "
+                       f"{fixed(anova.r_squared_predicted_by_row, 3)}"),
+                ("Scatter", f"σ = {observed(observable, anova.sigma)}, coefficient of variation "
+                            f"{fixed(anova.cv_percent)} %"),
+                ("Adequate precision", fixed(anova.adequate_precision)),
                 ("Shape", _shape(canonical)),
                 ("Equation, coded", f"{coded} (each factor from −1 to +1 over the region)"),
                 ("Equation, actual", actual + (f" ({', '.join(units)})" if units else "")),
@@ -95,45 +101,43 @@ def _of_target(result: Plain, index: int, observable: str) -> list[Block]:
         )
     ]  # fmt: skip
     caption = "Through the optimum; the points of the design are projected on each panel."
-    blocks.append(Figure(f"contours-{index + 1}", contours(result, index), caption))
-    blocks.append(Figure(f"fit-{index + 1}", fit(result, index), ""))
+    blocks.append(Figure(f"contours-{place}", contours(fitted), caption))
+    blocks.append(Figure(f"fit-{place}", fit(fitted), ""))
     blocks.append(anova_table(anova))
-    if anova["notes"]:
-        blocks.append(Bullets(tuple(anova["notes"])))
+    if anova.notes:
+        blocks.append(Bullets(anova.notes))
     return blocks
 
 
-def _shape(canonical: Plain) -> str:
-    values = ", ".join(number(value) for value in canonical["eigenvalues"])
-    if canonical["kind"] == "ridge":
+def _shape(canonical: Canonical) -> str:
+    values = ", ".join(number(value) for value in canonical.eigenvalues)
+    if canonical.kind == "ridge":
         return f"ridge without a stationary point (eigenvalues {values} in coded units)"
-    place = "inside" if canonical["inside"] else "outside"
-    return f"{canonical['kind']}, its stationary point {place} the region (eigenvalues {values} in coded units)"
+    place = "inside" if canonical.inside else "outside"
+    return f"{canonical.kind}, its stationary point {place} the region (eigenvalues {values} in coded units)"
 
 
-def _region(part: Plain) -> list[str]:
-    centre, half = part["region"]["centre"], part["region"]["half_width"]
+def _region(part: SurfaceResult) -> list[str]:
+    centre, half = part.region.centre.tolist(), part.region.half_width.tolist()
     return [
-        f"{factor['name']} {parameter_label(factor['path'])}: "
-        f"{parameter_range(factor['path'], c - h, c + h)} of the screened "
-        f"{parameter_range(factor['path'], factor['low'], factor['high'])}"
-        for factor, c, h in zip(part["factors"], centre, half, strict=True)
+        f"{factor.name} {parameter_label(factor.path)}: {parameter_range(factor.path, c - h, c + h)} of the screened "
+        f"{parameter_range(factor.path, factor.low, factor.high)}"
+        for factor, c, h in zip(part.factors, centre, half, strict=True)
     ]
 
 
-def _points(part: Plain) -> Table:
+def _points(part: SurfaceResult) -> Table:
     rows = []
-    for k, (natural, runs, lost) in enumerate(zip(part["natural"], part["runs"], part["no_pile_share"], strict=True)):
+    for k, (natural, runs, lost) in enumerate(zip(part.natural.tolist(), part.runs, part.no_pile_share, strict=True)):
         means = []
-        for observable in part["observables"]:
-            values = values_of(runs, observable)
-            mean, sd = mean_and_sd(values)
-            means += [observed(observable, mean), observed(observable, sd)]
-        settings = (parameter_value(f["path"], v) for f, v in zip(part["factors"], natural, strict=True))
-        valid = valid_count(Counter(run["outcome"] for run in runs))
+        for observable in part.observables:
+            sample = sample_of(runs, observable)
+            means += [observed(observable, sample.mean), observed(observable, sample.sd)]
+        settings = (parameter_value(f.path, v) for f, v in zip(part.factors, natural, strict=True))
+        valid = sum(run.valid for run in runs)
         rows.append((str(k + 1), *settings, str(valid), *means, percent(lost)))
-    measured = [word for name in part["observables"] for word in (f"mean {observable_label(name)}", "sd")]
-    header = ("point", *(factor["name"] for factor in part["factors"]), "valid pours", *measured, "not valid")
+    measured = [word for name in part.observables for word in (f"mean {observable_label(name)}", "sd")]
+    header = ("point", *(factor.name for factor in part.factors), "valid pours", *measured, "not valid")
     return Table(header, tuple(rows))
 
 

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
+from doe.stages.verification import VerificationResult
+from doe.study_result import StudyResult
+from doe.t_tests import Sample
+from doe.target import Target
+from doe.verification import Verification
 from explorer.report.content import Block, Figure, Section, Table, Text
 from explorer.report.figures.verification import verification as verification_chart
-from explorer.report.findings import Plain, standard_error
 from explorer.report.units_for_people import (
     MISSING,
     fixed,
@@ -15,107 +21,104 @@ from explorer.report.units_for_people import (
     unit_of_observable,
 )
 
-TESTS = (
-    ("welch", "Welch, two samples"),
-    ("pooled", "Student, two samples, equal variances"),
-    ("one_sample", "one sample against the measured mean"),
-)
 
-
-def verification(result: Plain) -> Section:
+def verification(result: StudyResult) -> Section:
     """Per target: samples, tests, equivalence, relative error beside the noise."""
-    stage = result["verification"]
-    seeds = len({run["seed"] for run in stage["runs"]})
+    stage = result.verification
+    seeds = len({run.seed for run in stage.runs})
     blocks: list[Block] = [
         Text(
-            f"{len(stage['runs'])} pours at the optimum with {seeds} seeds that no other stage used; "
-            f"{percent(stage['no_pile_share'], 1)} are not valid. Means are over valid pours."
+            f"{len(stage.runs)} pours at the optimum with {seeds} seeds that no other stage used; "
+            f"{percent(stage.no_pile_share, 1)} are not valid. Means are over valid pours."
         )
     ]
-    for index, (target, test) in enumerate(zip(stage["targets"], stage["tests"], strict=True)):
-        blocks += _of_target(result, index, target, test)
+    for index, (target, test) in enumerate(zip(stage.targets, stage.tests, strict=True)):
+        blocks += _of_target(stage, index, target, test)
     return Section("Verification", tuple(blocks))
 
 
-def _of_target(result: Plain, index: int, target: Plain, test: Plain) -> list[Block]:
-    name = target["observable"]
+def _of_target(stage: VerificationResult, index: int, target: Target, test: Verification) -> list[Block]:
+    name = target.observable
     words = observable_label(name)
     caption = "Band: target ± equivalence margin, fixed before any run."
     return [
         Text(f"{words[0].upper()}{words[1:]}: {verdict(target, test)}"),
-        Figure(f"verification-{index + 1}", verification_chart(result, index), caption),
+        Figure(f"verification-{index + 1}", verification_chart(stage, index), caption),
         _samples(target, test),
         _tests(target, test),
     ]
 
 
-def verdict(target: Plain, test: Plain) -> str:
+def verdict(target: Target, test: Verification) -> str:
     """The outcome in one sentence, the equivalence test first: no difference found is no proof of agreement."""
-    name = target["observable"]
-    margin = observed(name, target["margin"])
-    deciding = test["welch"] or test["one_sample"]
+    name = target.observable
+    margin = observed(name, target.margin)
+    deciding = test.deciding
     words = {
         "equivalent": f"equivalent to the measurement within ± {margin}.",
         "different": f"different from the measurement, and not shown to lie within ± {margin}.",
         "cannot tell": f"neither different nor shown to lie within ± {margin}; more pours are needed to tell.",
-    }[test["verdict"]]
-    if deciding is None or deciding["low"] is None:
+    }[test.verdict]
+    if deciding is None or math.isnan(deciding.low):
         return words
-    interval = f"{_difference(name, deciding['low'])} … {_difference(name, deciding['high'])}"
-    return f"{words} Difference {_difference(name, deciding['difference'])}, 95 % interval {interval}."
+    interval = f"{_difference(name, deciding.low)} … {_difference(name, deciding.high)}"
+    return f"{words} Difference {_difference(name, deciding.difference)}, 95 % interval {interval}."
 
 
-def _samples(target: Plain, test: Plain) -> Table:
-    name = target["observable"]
+def _samples(target: Target, test: Verification) -> Table:
+    name = target.observable
     rows = []
-    samples = [("simulated", test["simulated"]), ("measured", test["target"])]
-    if target.get("before_mean") is not None:
-        samples.append(("the model before", {key: target[f"before_{key}"] for key in ("mean", "sd", "n")}))
+    samples = [("simulated", test.simulated), ("measured", test.target)]
+    if target.before_mean is not None:
+        sd, n = target.before_sd, target.before_n
+        samples.append(("the model before", Sample(target.before_mean, math.nan if sd is None else sd, n or 0)))
     for words, sample in samples:
-        sd = observed(name, sample["sd"])
-        if words == "measured" and sample["sd"] is not None and target["sd_source"] != "measured":
-            sd += f" ({target['sd_source']})"
-        spread = observed(name, standard_error(sample))
-        rows.append((words, observed(name, sample["mean"]), sd, str(sample["n"] or MISSING), spread))
-    error = standard_error(test["simulated"])
-    share = None if error is None else 100 * error / abs(target["mean"])
+        spread = observed(name, sample.sd)
+        if words == "measured" and math.isfinite(sample.sd) and target.sd_source != "measured":
+            spread += f" ({target.sd_source})"
+        error = observed(name, sample.standard_error)
+        rows.append((words, observed(name, sample.mean), spread, str(sample.n or MISSING), error))
+    share = 100 * test.simulated.standard_error / abs(target.mean)
     caption = (
-        f"Relative error {fixed(test['relative_error_percent'])} %; standard error of the simulated mean "
+        f"Relative error {fixed(test.relative_error_percent)} %; standard error of the simulated mean "
         f"{fixed(share)} % of the target."
     )
     return Table(("", "mean", "sd", "n", "standard error"), tuple(rows), caption)
 
 
-def _tests(target: Plain, test: Plain) -> Table:
-    name = target["observable"]
+def _tests(target: Target, test: Verification) -> Table:
+    name = target.observable
     rows: list[tuple[str, ...]] = []
-    for key, words in TESTS:
-        found = test[key]
+    for found, words in (
+        (test.welch, "Welch, two samples"),
+        (test.pooled, "Student, two samples, equal variances"),
+        (test.one_sample, "one sample against the measured mean"),
+    ):
         if found is None:
             continue
-        interval = f"{_difference(name, found['low'])} … {_difference(name, found['high'])}"
+        interval = f"{_difference(name, found.low)} … {_difference(name, found.high)}"
         rows.append(
             (
                 words,
-                _difference(name, found["difference"]),
-                f"{percent(found['level'])}: {interval}",
-                fixed(found["t"]),
-                fixed(found["df"], 1),
-                p_value(found["p"]),
+                _difference(name, found.difference),
+                f"{percent(found.level)}: {interval}",
+                fixed(found.t),
+                fixed(found.df, 1),
+                p_value(found.p),
             )
         )
-    found = test["equivalence"]
-    if found is not None:
-        interval = f"{_difference(name, found['low'])} … {_difference(name, found['high'])}"
-        margin = observed(name, found["margin"])
+    equivalence = test.equivalence
+    if equivalence is not None:
+        interval = f"{_difference(name, equivalence.low)} … {_difference(name, equivalence.high)}"
+        margin = observed(name, equivalence.margin)
         rows.append(
             (
                 f"equivalence within ± {margin} (TOST)",
                 MISSING,
-                f"{percent(found['level'])}: {interval}",
+                f"{percent(equivalence.level)}: {interval}",
                 MISSING,
                 MISSING,
-                p_value(found["p"]),
+                p_value(equivalence.p),
             )
         )
     if not rows:
@@ -124,8 +127,8 @@ def _tests(target: Plain, test: Plain) -> Table:
     return Table(("test", "difference", "interval", "t", "df", "p"), tuple(rows), caption)
 
 
-def _difference(name: str, value: float | None) -> str:
+def _difference(name: str, value: float) -> str:
     """A difference with its sign and unit."""
     text = observed(name, value)
     unit = unit_of_observable(name)
-    return f"+{text}" if value is not None and unit.of(value) >= 0 else text
+    return f"+{text}" if unit.of(value) >= 0 else text

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import viser
 
+from doe.record import RecordError
+from doe.study_result import AnyStudy, StudyResult
 from explorer.background.result_file import ResultFile
 from explorer.report.comparison import comparison
 from explorer.report.content import Table
-from explorer.report.findings import Plain
 from explorer.viewer.actions import Post
 from explorer.viewer.study.process_view import escaped
 from explorer.viewer.study.result_chooser import ResultChooser, title
@@ -27,7 +29,7 @@ class ComparisonPanel:
         self._file = ResultFile("result.json")
         self._chooser = ResultChooser(server, "Compare with", NONE, "result.json", post, self._draw)
         self._words = server.gui.add_markdown(EMPTY)
-        self._result: Plain | None = None
+        self._result: AnyStudy | None = None
         self._name = ""
         self._version: Hashable = None
 
@@ -35,7 +37,7 @@ class ComparisonPanel:
         """The finished studies that there are now."""
         self._chooser.offer(folders)
 
-    def show(self, result: Plain | None, name: str, version: Hashable) -> None:
+    def show(self, result: AnyStudy | None, name: str, version: Hashable) -> None:
         """Follow the result that the page shows, called ``name``."""
         if (version, name) != self._version:
             self._version, self._result, self._name = (version, name), result, name
@@ -46,7 +48,7 @@ class ComparisonPanel:
         other = self._file.read(folder)
         if other is None or folder is None:
             text = EMPTY
-        elif self._result is None or "runs" not in self._result:
+        elif not isinstance(self._result, StudyResult):
             text = NOT_YET
         else:
             text = comparison_markdown(self._result, other, (self._name, title(folder)))
@@ -54,13 +56,13 @@ class ComparisonPanel:
             self._words.content = text
 
 
-def comparison_markdown(one: Plain, other: Plain, names: tuple[str, str]) -> str:
-    """The tables, or one line where a file is not a whole result."""
+def comparison_markdown(one: StudyResult, other: Mapping[str, Any], names: tuple[str, str]) -> str:
+    """The tables, or one line where the other file is not a whole result."""
     try:
-        tables = comparison(one, other, names)
-    except (KeyError, IndexError, TypeError, ValueError) as error:
+        tables = comparison(one, StudyResult.from_dict(other), names)
+    except RecordError as error:
         # A folder that somebody named may hold any JSON, also that of another version.
-        return f"These two cannot be compared: {escaped(f'{type(error).__name__}: {error}')}"
+        return f"These two cannot be compared: {escaped(str(error))}"
     return "\n\n".join(table_markdown(table) for table in tables)
 
 

@@ -13,6 +13,7 @@ from explorer.files.uploads import kept_measurements
 from explorer.report.diagnosis.answer import verdict_sentence
 from explorer.report.diagnosis.charts import likely
 from explorer.report.diagnosis.findings import (
+    Plain,
     ResultVersionError,
     chance,
     checked,
@@ -21,7 +22,6 @@ from explorer.report.diagnosis.findings import (
     spelled,
 )
 from explorer.report.diagnosis_plots import diagnosis_plots
-from explorer.report.findings import Plain
 from explorer.viewer.actions import Post
 from explorer.viewer.study.candidates import Candidates
 from explorer.viewer.study.plot_view import PlotView

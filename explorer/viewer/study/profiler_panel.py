@@ -8,15 +8,16 @@ from typing import Any
 
 import viser
 
+from doe.study_result import AnyStudy
 from explorer.report.content import Spec
-from explorer.report.figures.model import chosen_point, section_point
+from explorer.report.figures.model import FittedTarget, fitted_targets
 from explorer.report.figures.profiler import prediction, profiler
-from explorer.report.findings import Plain
 from explorer.report.plot import Plot, Plots
 from explorer.report.units_for_people import (
     axis_title,
     fixed,
     observable_label,
+    observed,
     parameter_value,
     unit_of_observable,
     unit_of_parameter,
@@ -49,7 +50,7 @@ class ProfilerPanel:
         apply: Callable[[Mapping[str, float | str]], None],
     ) -> None:
         self._gui, self._post, self._moved, self._apply = server.gui, post, moved, apply
-        self._result: Plain | None = None
+        self._targets: tuple[FittedTarget, ...] = ()
         self._sliders: list[Any] = []
         self._region: object = None
         self._place = server.gui.add_folder(None)
@@ -62,10 +63,10 @@ class ProfilerPanel:
         optimum.on_click(lambda _: post(self._to_optimum))
         pour.on_click(lambda _: post(self._hand_on))
 
-    def show(self, result: Plain | None) -> None:
+    def show(self, result: AnyStudy | None) -> None:
         """Follow the result that the page shows; it may have got no surface yet."""
-        self._result = result if result is not None and result.get("surface") else None
-        region = None if self._result is None else (self._result["surface"]["region"], self._paths())
+        self._targets = () if result is None else fitted_targets(result)
+        region = [(self._paths(), one.low.tolist(), one.high.tolist()) for one in self._targets[:1]]
         if region != self._region:
             self._region = region
             self._build()
@@ -78,95 +79,85 @@ class ProfilerPanel:
 
     def values(self) -> list[float]:
         """Values of the factors [SI] where the sliders are, within the region; raises InputError."""
-        assert self._result is not None
-        surface = self._result["surface"]
-        found = []
-        for k, (factor, slider) in enumerate(zip(surface["factors"], self._sliders, strict=True)):
-            size = unit_of_parameter(factor["path"]).size
-            low, high = self._ends(k)
-            found.append(min(max(checked(slider.value, low / size, high / size, factor["name"]) * size, low), high))
+        first, found = self._targets[0], []
+        for factor, slider, low, high in zip(first.factors, self._sliders, first.low, first.high, strict=True):
+            size = unit_of_parameter(factor.path).size
+            value = checked(slider.value, low / size, high / size, factor.name) * size
+            found.append(min(max(value, float(low)), float(high)))
         return found
 
     def _titles(self) -> list[str]:
-        targets = [] if self._result is None else self._result["study"]["targets"]
-        if len(targets) == 1:
+        if len(self._targets) == 1:
             return [TITLE]
-        return [f"{TITLE}: {observable_label(target['observable'])}" for target in targets]
+        return [f"{TITLE}: {observable_label(target.observable)}" for target in self._targets]
 
     def _draw(self, index: int) -> Spec | None:
-        return None if self._result is None else profiler(self._result, index, self.values())
+        return profiler(self._targets[index], self.values()) if self._targets else None
 
     def _paths(self) -> list[str]:
-        assert self._result is not None
-        return [factor["path"] for factor in self._result["surface"]["factors"]]
-
-    def _ends(self, k: int) -> tuple[float, float]:
-        assert self._result is not None
-        region = self._result["surface"]["region"]
-        return region["centre"][k] - region["half_width"][k], region["centre"][k] + region["half_width"][k]
+        return [factor.path for factor in self._targets[0].factors]
 
     def _build(self) -> None:
         for slider in self._sliders:
             slider.remove()
         self._sliders = []
-        if self._result is None:
+        if not self._targets:
             return
-        start = section_point(self._result)
+        first = self._targets[0]
+        ends = zip(first.factors, first.section_point, first.low, first.high, strict=True)
         with self._place:
-            for k, factor in enumerate(self._result["surface"]["factors"]):
-                size = unit_of_parameter(factor["path"]).size
-                low, high = (float(f"{end / size:.6g}") for end in self._ends(k))
+            for factor, start, *region in ends:
+                size = unit_of_parameter(factor.path).size
+                low, high = (float(f"{end / size:.6g}") for end in region)
                 slider = self._gui.add_slider(
-                    axis_title(factor["path"], factor["name"]),
+                    axis_title(factor.path, factor.name),
                     low,
                     high,
                     (high - low) / STEPS,
-                    min(max(float(f"{start[k] / size:.6g}"), low), high),
+                    min(max(float(f"{start / size:.6g}"), low), high),
                     hint="Within the region of the surface; beyond it the model says nothing.",
                 )
                 slider.on_update(lambda event: self._post(self._follow) if event.client_id is not None else None)
                 self._sliders.append(slider)
 
     def _follow(self) -> None:
-        if self._result is not None:
+        if self._targets:
             self._tell()
             self._moved(self._titles())
 
     def _to_optimum(self) -> None:
-        if self._result is None:
+        if not self._targets:
             return
-        for slider, factor, value in zip(
-            self._sliders, self._result["surface"]["factors"], section_point(self._result), strict=True
-        ):
-            slider.value = float(f"{value / unit_of_parameter(factor['path']).size:.6g}")
+        first = self._targets[0]
+        for slider, factor, value in zip(self._sliders, first.factors, first.section_point, strict=True):
+            slider.value = float(f"{value / unit_of_parameter(factor.path).size:.6g}")
         self._follow()
 
     def _hand_on(self) -> None:
-        if self._result is not None:
+        if self._targets:
             self._apply(dict(zip(self._paths(), self.values(), strict=True)))
 
     def _tell(self) -> None:
-        text = EMPTY if self._result is None else prediction_markdown(self._result, self.values())
+        text = prediction_markdown(self._targets, self.values()) if self._targets else EMPTY
         if self._words.content != text:
             self._words.content = text
 
 
-def prediction_markdown(result: Plain, natural: list[float]) -> str:
+def prediction_markdown(targets: Sequence[FittedTarget], natural: list[float]) -> str:
     """Setting, prediction of every target with its interval, and what it is worth."""
-    surface = result["surface"]
     at = ", ".join(
-        f"{escaped(factor['name'])} = {parameter_value(factor['path'], value)}"
-        for factor, value in zip(surface["factors"], natural, strict=True)
+        f"{escaped(factor.name)} = {parameter_value(factor.path, value)}"
+        for factor, value in zip(targets[0].factors, natural, strict=True)
     )
     lines = [f"At {at}:"]
-    for index, target in enumerate(result["study"]["targets"]):
-        unit = unit_of_observable(target["observable"])
-        mean, half = prediction(result, index, natural)
-        text = f"{escaped(observable_label(target['observable']))} **{unit.attach(fixed(mean))} ± {fixed(half)}**"
-        text += f" (95 % interval of the mean); target {unit.attach(fixed(unit.of(target['mean'])))}."
-        if not surface["anova"][index]["better_than_noise"]:
+    for target in targets:
+        mean, half = prediction(target, natural)
+        unit = unit_of_observable(target.observable)
+        text = f"{escaped(observable_label(target.observable))} **{unit.attach(fixed(mean))} ± {fixed(half)}**"
+        text += f" (95 % interval of the mean); target {observed(target.observable, target.target)}."
+        if not target.anova.better_than_noise:
             text += " The surface is not better than noise: do not take this for a calibration."
         lines.append(text)
-    if chosen_point(result) is None:
+    if targets[0].optimum is None:
         lines.append("From the runs so far; the study goes on.")
     return "\n\n".join(lines)

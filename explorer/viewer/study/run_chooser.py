@@ -6,14 +6,14 @@ from typing import Any
 
 import viser
 
+from doe.runner import Run
+from doe.study_result import AnyStudy
 from explorer.errors import CommandError
-from explorer.report.findings import Plain
 from explorer.report.units_for_people import observable_label, observed, parameter_label, parameter_value
 from explorer.session import Session
-from explorer.study.runs import STAGES, StudyRun, scene_of, settings_of, study_runs
+from explorer.study.runs import scene_of, settings_of, stages_with_runs
 from explorer.viewer.actions import Post
 from explorer.viewer.study.process_view import escaped
-from solver import Outcome
 
 NONE = "(no runs yet)"
 CHANGES_SHOWN = 8
@@ -25,8 +25,8 @@ class RunChooser:
     def __init__(self, server: viser.ViserServer, session: Session, post: Post) -> None:
         gui = server.gui
         self._session = session
-        self._result: Plain | None = None
-        self._runs: dict[str, StudyRun] = {}
+        self._result: AnyStudy | None = None
+        self._runs: dict[str, Run] = {}
         self._stage = gui.add_dropdown("Stage", (NONE,))
         self._run = gui.add_dropdown("Run", (NONE,), hint="Setting, seed, and what was read off the pile.")
         self._words = gui.add_markdown("")
@@ -35,11 +35,11 @@ class RunChooser:
         self._run.on_update(lambda event: post(self._tell) if event.client_id is not None else None)
         button.on_click(lambda _: post(self._pour))
 
-    def show(self, result: Plain | None) -> None:
+    def show(self, result: AnyStudy | None) -> None:
         """Follow the result that the page shows."""
         self._result = result
-        begun = tuple(stage for stage in STAGES if result is not None and study_runs(result, stage)) or (NONE,)
-        _offer(self._stage, begun)
+        begun = () if result is None else stages_with_runs(result)
+        _offer(self._stage, begun or (NONE,))
         self._show_stage()
 
     def _show_stage(self) -> None:
@@ -47,12 +47,12 @@ class RunChooser:
         _offer(self._run, tuple(self._runs) or (NONE,))
         self._tell()
 
-    def _chosen(self) -> StudyRun | None:
+    def _chosen(self) -> Run | None:
         return self._runs.get(str(self._run.value))
 
     def _tell(self) -> None:
         run = self._chosen()
-        text = "" if run is None or self._result is None else run_markdown(self._result, run)
+        text = "" if run is None or self._result is None else run_markdown(self._result, str(self._stage.value), run)
         if self._words.content != text:
             self._words.content = text
 
@@ -60,31 +60,32 @@ class RunChooser:
         run = self._chosen()
         if run is None or self._result is None:
             raise CommandError("no run is chosen; start a study, or choose a finished one above")
-        scene, same = scene_of(self._result, run)
+        scene, same = scene_of(self._result, str(self._stage.value), run)
         self._session.restart(scene, run.seed)
         note = "" if same else (
             "\n\nProgram, study file or material have changed since that run: this pour need not be the same."
         )  # fmt: skip
-        self._words.content = run_markdown(self._result, run) + note
+        self._words.content = run_markdown(self._result, str(self._stage.value), run) + note
 
 
-def listed(result: Plain, stage: str) -> dict[str, StudyRun]:
+def listed(result: AnyStudy, stage: str) -> dict[str, Run]:
     """Runs of a stage under the texts to choose them by."""
-    name = result["study"]["targets"][0]["observable"]
-    return {run_text(run, name): run for run in (study_runs(result, stage) if stage in STAGES else ())}
+    name = result.study.targets[0].observable
+    begun = stages_with_runs(result)  # the list holds a text of its own before a stage has begun
+    return {run_text(run, name): run for runs in (result.runs_of(stage) if stage in begun else ()) for run in runs}
 
 
-def run_text(run: StudyRun, observable: str) -> str:
+def run_text(run: Run, observable: str) -> str:
     """One run in a line, e.g. "row 3 · 24.3° · seed 17"."""
     value = run.observables.get(observable)
-    seen = observed(observable, value) if value is not None and Outcome(run.outcome).valid else ""
+    seen = observed(observable, value) if value is not None and run.valid else ""
     return " · ".join(part for part in (run.label, seen or run.outcome.replace("_", " "), f"seed {run.seed}") if part)
 
 
-def run_markdown(result: Plain, run: StudyRun) -> str:
+def run_markdown(result: AnyStudy, stage: str, run: Run) -> str:
     """What was set in a run and what came out."""
-    name = result["study"]["targets"][0]["observable"]
-    settings = settings_of(result, run.stage, run.label)
+    name = result.study.targets[0].observable
+    settings = settings_of(result, stage, run.label)
     parts = [f"{escaped(parameter_label(path))} {escaped(parameter_value(path, v))}" for path, v in settings.items()]
     more = f" and {len(parts) - CHANGES_SHOWN} more" if len(parts) > CHANGES_SHOWN else ""
     setting = f"{', '.join(parts[:CHANGES_SHOWN])}{more}" if parts else "everything at the reference values"

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import viser
 
+from doe.record import RecordError
 from doe.stages.sizing import planned_runs
 from doe.study import Study, load_study
+from doe.study_result import AnyStudy, study_from
 from explorer.background.result_file import ResultFile
-from explorer.report.findings import Plain
 from explorer.report.study_plots import study_plots
 from explorer.session import Session
 from explorer.study.process import PARTIAL, RESULT, StudyProcess
@@ -116,23 +117,24 @@ class StudyPanel:
         present = folder is None
         file = self._alive if present and self._study.status().alive else self._over
         folder = self._present() if folder is None else folder
-        result = file.read(folder)
+        content = file.read(folder)
         if present:
-            self._so_far = (str((result or {}).get("partial")), str((result or {}).get("line")))
+            self._so_far = (str((content or {}).get("partial")), str((content or {}).get("line")))
         now = (folder, file.version)
         if now == self._shown:
             return
         self._shown, self._trouble = now, ""
         try:
+            result = None if content is None else study_from(content)
             self._show_result(result, "" if folder is None else title(folder), now)
-        except (KeyError, IndexError, TypeError, ValueError) as error:
+        except RecordError as error:
             # A folder that somebody named may hold any JSON, also that of another version.
-            self._trouble = f"{folder}: cannot be shown ({type(error).__name__}: {error})"
+            self._trouble = f"{folder}: cannot be shown ({error})"
             self._show_result(None, "", None)
 
-    def _show_result(self, result: Plain | None, name: str, version: Hashable) -> None:
+    def _show_result(self, result: AnyStudy | None, name: str, version: Hashable) -> None:
         self._profiler.show(result)
-        plots = {} if result is None else {**study_plots(result), **self._profiler.plots()}
+        plots = {} if result is None else study_plots(result) | self._profiler.plots()
         self._plots.offer(plots, version)
         self._runs.show(result)
         self._comparison.show(result, name, version)

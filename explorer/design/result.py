@@ -1,0 +1,113 @@
+"""An analysed sheet with what was asked of it: the content of ``result.json``, and the views of it that charts draw."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.analysis.analyse import DesignAnalysis
+from doe.record import Document, Record
+from doe.screening_result import Screening
+from doe.stages.surface import OptimumResult
+from doe.study import Factor
+from explorer.report.figures.model import FittedTarget
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SheetFactor(Factor):
+    """A factor of a sheet, called by its letter. ``factor``, ``unit``: its name and unit; all values in that unit."""
+
+    factor: str
+    unit: str
+
+
+@dataclass(frozen=True)
+class Response(Record):
+    """The analysed column. ``path``: name and unit as the charts read them (`own_path`)."""
+
+    name: str
+    path: str
+    unit: str
+
+
+@dataclass(frozen=True)
+class RunCount(Record):
+    """Rows of the design, runs with a result, and runs without."""
+
+    rows: int
+    valid: int
+    missing: int
+
+
+@dataclass(frozen=True)
+class DrawnEffects:
+    """The effects of a two-level design as the charts of a screening read them."""
+
+    analysis: Screening
+    columns: tuple[str, ...]
+    factors: tuple[SheetFactor, ...]
+    response: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class DesignResult(Document):
+    """``design``: kind of the design, "" where the sheet does not say. ``coded``: its levels, shape (rows, k).
+
+    ``labels``: what the valid runs are called, in the order of the model's runs. ``target``: value that was asked for.
+    """
+
+    SCHEMA: ClassVar[int] = 2
+    NAME: ClassVar[str] = "result of a design"
+
+    kind: str = "design analysis"
+    sheet: str
+    design: str
+    response: Response
+    runs: RunCount
+    labels: tuple[str, ...]
+    factors: tuple[SheetFactor, ...]
+    coded: Array
+    target: float | None
+    analysis: DesignAnalysis
+    command: tuple[str, ...]
+    versions: dict[str, str | None]
+
+    @property
+    def effects(self) -> DrawnEffects | None:
+        """The effects of a two-level design; None of any other."""
+        found = self.analysis.effects
+        if found is None:
+            return None
+        return DrawnEffects(found.screening, found.contrasts.names, self.factors, self.response.path)
+
+    @property
+    def optimum(self) -> OptimumResult | None:
+        """The setting for the target; None where none was asked for, or there is no model."""
+        found = self.analysis.optimum
+        if found is None:
+            return None
+        values = {factor.path: value for factor, value in zip(self.factors, found.point.tolist(), strict=True)}
+        return OptimumResult(values=values, factors=self.factors, single=found, compromise=None)
+
+    @property
+    def fitted(self) -> FittedTarget | None:
+        """The response surface; None where the runs bear no model."""
+        found = self.analysis.model
+        if found is None:
+            return None
+        return FittedTarget(
+            model=found.surface,
+            anova=found.anova,
+            factors=self.factors,
+            design=found.surface.region.natural(self.coded),
+            observable=self.response.path,
+            target=self.target,
+            margin=0.0,
+            optimum=self.optimum,
+            reference_name="reference",
+        )
