@@ -11,7 +11,7 @@ from typing import TypeVar
 from doe.errors import StatisticsError, StudyStopped
 from doe.partial import Analysis
 from doe.profile import Profile
-from doe.runner import Run, Runner, Setting
+from doe.runs import Run, Runner, Setting
 from doe.stages.ascent import ascent
 from doe.stages.pilot import Bias, pilot
 from doe.stages.scan import scan
@@ -97,7 +97,7 @@ class CountingRunner:
         """Outcome → number of the stage that ran last."""
 
     def run(self, stage: str, settings: Sequence[Setting]) -> list[list[Run]]:
-        """See :class:`doe.runner.Runner`."""
+        """See :class:`doe.runs.Runner`."""
         rows = self._runner.run(stage, settings)
         self.runs += sum(len(runs) for runs in rows)
         self.outcomes = Counter(run.outcome for runs in rows for run in runs)

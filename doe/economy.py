@@ -19,7 +19,7 @@ import numpy.typing as npt
 from scipy import stats
 
 from doe.record import Record
-from doe.runner import Run, Runner, Setting, responses
+from doe.runs import Run, Runner, Setting, responses
 from doe.study import Study
 from doe.t_tests import Sample, equivalence_test, welch_test
 from solver import Scene, observable_names, parameters, value, with_values

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 
 from doe.errors import StatisticsError
-from doe.runner import Run, Runner, Setting
+from doe.runs import Run, Runner, Setting
 from doe.study_result import StageResult
 
 Analysis = Callable[[Runner], StageResult | None]
@@ -27,7 +27,7 @@ class KnownRuns:
         self._runs = sorted(runs, key=lambda run: (run.replicate, run.attempt))
 
     def run(self, stage: str, settings: Sequence[Setting]) -> list[list[Run]]:
-        """See :class:`doe.runner.Runner`; the runs of a setting are those with its label."""
+        """See :class:`doe.runs.Runner`; the runs of a setting are those with its label."""
         return [[run for run in self._runs if run.label == setting.label] for setting in settings]
 
 

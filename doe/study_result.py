@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 from doe.profile import Profile
 from doe.record import Document, Record
-from doe.runner import Run, Setting
+from doe.runs import Run, Setting
 from doe.stages.ascent import AscentResult
 from doe.stages.pilot import PilotResult
 from doe.stages.scan import ScanResult

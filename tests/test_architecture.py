@@ -26,11 +26,12 @@ THIRD_PARTY_HOMES = {
 # The rest of doe is statistics and must stay testable without Taichi.
 DOE_PARTS_THAT_MAY_USE_THE_SOLVER = {
     "doe/store.py": "keeps raw pours, and reads observables off them",
+    "doe/runs.py": "reads what the solver says of a run: whether its outcome is valid",
     "doe/runner.py": "turns a row of a design into a batch of simulated worlds",
     "doe/factors.py": "checks a factor's path and range against the declared parameters",
     "doe/economy.py": "changes the numerical settings of a study's scene",
     "doe/study.py": "reads a study file: its material, rig and insertion make a scene",
-    "doe/study_result.py": "reads what the solver says of a run: whether its outcome is valid, how well a clump fits",
+    "doe/study_result.py": "says which outcomes are valid, and how well the clumps fit",
     "doe/measurement/": "a condition is a scene, and data and runs are read by the same functions",
     "doe/validation/": "laboratories that pour what the diagnosis is then asked about",
     "doe/declared/": "turns what is declared, and a point of a plan, into simulated worlds",

@@ -12,7 +12,7 @@ from doe.pilot import Noise
 from doe.power import smallest_effect
 from doe.profile import Profile
 from doe.record import Record
-from doe.runner import FloatArray, Run, Runner, Setting, responses
+from doe.runs import FloatArray, Run, Runner, Setting, responses
 from doe.screening import SIGNIFICANT
 from doe.stages.screening import ScreeningResult
 from doe.study import Factor, Study

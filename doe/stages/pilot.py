@@ -9,7 +9,7 @@ from doe.errors import StatisticsError
 from doe.pilot import BIAS_LIMIT_DEG, EqualVariance, Noise, Resolution, equal_variance, replicate_noise, resolution
 from doe.profile import Profile
 from doe.record import Record
-from doe.runner import FloatArray, Run, Runner, Setting, responses
+from doe.runs import FloatArray, Run, Runner, Setting, responses
 from doe.separation import EstimatorChoice, choose_estimator
 from doe.stages.sizing import SCREENING_ROWS, StageSize, sized
 from doe.study import Study

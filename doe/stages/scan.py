@@ -11,7 +11,7 @@ from doe.pilot import Noise, replicate_noise
 from doe.power import smallest_effect
 from doe.profile import Profile
 from doe.record import Record
-from doe.runner import FloatArray, Run, Runner, Setting, no_pile_shares, responses
+from doe.runs import FloatArray, Run, Runner, Setting, no_pile_shares, responses
 from doe.study import Study
 from doe.target import observed_text
 

@@ -15,7 +15,7 @@ from doe.errors import StatisticsError
 from doe.factors import MIN_BODIES, bodies_touched
 from doe.profile import Profile
 from doe.record import Record
-from doe.runner import FloatArray, Run, Runner, Setting, no_pile_shares, responses
+from doe.runs import FloatArray, Run, Runner, Setting, no_pile_shares, responses
 from doe.screening import Screening, Selected, analyse_screening, select_factors
 from doe.stages.sizing import ASSUMPTION_ROWS, SCREENING_ROWS
 from doe.study import CALIBRATED, COLUMNS, Factor, Study

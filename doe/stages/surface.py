@@ -14,7 +14,7 @@ from doe.optimum import Optimum, find_optimum
 from doe.power import smallest_effect
 from doe.profile import Profile
 from doe.record import Record
-from doe.runner import FloatArray, Run, Runner, Setting, no_pile_shares, responses
+from doe.runs import FloatArray, Run, Runner, Setting, no_pile_shares, responses
 from doe.stages.sizing import surface_design
 from doe.study import Factor, Study
 from doe.surface import Surface, fit_surface

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from doe.power import smallest_effect
 from doe.profile import Profile
 from doe.record import Record
-from doe.runner import Run, Runner, Setting, no_pile_shares, responses
+from doe.runs import Run, Runner, Setting, no_pile_shares, responses
 from doe.study import Study
 from doe.target import Target, observed_text
 from doe.verification import Verification, verify

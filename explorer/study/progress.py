@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from doe.declared.pours import Ended
-from doe.runner import Run
+from doe.runs import Run
 
 EVERY = 2.0
 """Seconds between two lines of progress where there is no terminal."""

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 from doe.campaign import Campaign, run_campaign
 from doe.partial import PartialStages
 from doe.profile import Profile
-from doe.runner import PourRunner, Run
+from doe.runner import PourRunner
+from doe.runs import Run
 from doe.stages.sizing import planned_runs
 from doe.store import Store, default_store
 from doe.study import TRIES, Study, load_study, with_profile

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from doe.runner import Run
+from doe.runs import Run
 from doe.study import Values, load_study, with_profile
 from doe.study_result import STAGES, AnyStudy
 from explorer.errors import CommandError

@@ -4,7 +4,8 @@ import hashlib
 
 import numpy as np
 
-from doe.runner import TRIES, Run, seed_of
+from doe.runner import TRIES, seed_of
+from doe.runs import Run
 from doe.study import ESTIMATORS
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from doe.economy import ECONOMIES, OBSERVABLES, compare, judged, pours_needed, rows_of, settings_of
-from doe.runner import Run
+from doe.runs import Run
 from doe.study import load_study
 from solver import value, with_values
 from solver.time_step import time_step

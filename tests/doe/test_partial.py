@@ -7,7 +7,7 @@ import pytest
 from doe.campaign import run_campaign
 from doe.errors import StatisticsError
 from doe.partial import LEAST_INTERVAL, KnownRuns, PartialStages
-from doe.runner import Setting
+from doe.runs import Setting
 from tests.doe.formula_runner import FormulaRunner
 from tests.explorer.reported_studies import BIAS, PROFILE, STUDY, planted
 

@@ -6,7 +6,7 @@ import dataclasses
 import pytest
 
 from doe.errors import StudyFileError
-from doe.runner import Run
+from doe.runs import Run
 from doe.study import study_from, with_profile
 from solver import ParameterError, pour_key, value
 from tests.doe.test_study import PATH, TABLE

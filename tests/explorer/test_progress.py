@@ -6,7 +6,7 @@ import signal
 
 import pytest
 
-from doe.runner import Setting
+from doe.runs import Setting
 from explorer.study.progress import Progress, told_of_pauses
 from tests.doe.formula_runner import FormulaRunner
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from doe.designs import factorial
-from doe.runner import sample_of
+from doe.runs import sample_of
 from doe.screening import analyse_screening
 from doe.t_tests import Sample
 from explorer.report.units_for_people import (

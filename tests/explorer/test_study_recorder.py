@@ -3,7 +3,8 @@
 import pytest
 from rerun.chunk import RrdReader
 
-from doe.runner import PourRunner, Setting
+from doe.runner import PourRunner
+from doe.runs import Setting
 from doe.store import Store
 from explorer.logs.study_recorder import StudyRecorder
 from solver import load_material, with_values

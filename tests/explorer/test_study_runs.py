@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 
 from doe.campaign import run_campaign
-from doe.runner import Setting
+from doe.runs import Setting
 from doe.study import load_study, with_profile
 from doe.study_result import PartialStudy, StudyResult
 from explorer.study.runs import scene_of, settings_of, stages_with_runs

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from doe.runner import valid_values
+from doe.runs import valid_values
 from doe.stages.verification import VerificationResult
 from explorer.report.content import Spec
 from explorer.report.figures.style import (

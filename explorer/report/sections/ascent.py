@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from doe.runner import valid_values
+from doe.runs import valid_values
 from doe.stages.ascent import AscentResult
 from doe.study_result import StudyResult
 from explorer.report.content import Block, Bullets, Figure, Section, Table, Text

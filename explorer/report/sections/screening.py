@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from doe.factors import MIN_BODIES
-from doe.runner import sample_of
+from doe.runs import sample_of
 from doe.screening_result import Adjustment, ErrorSource
 from doe.stages.screening import ScreeningResult
 from doe.study_result import StudyResult

@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from doe.canonical import Canonical
-from doe.runner import sample_of
+from doe.runs import sample_of
 from doe.stages.surface import SurfaceResult
 from doe.study import Factor
 from doe.study_result import StudyResult
