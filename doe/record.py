@@ -139,8 +139,7 @@ def _value(kind: Any, value: Any, where: str) -> Any:
     if origin is not None:
         return [_value(arguments[0], item, f"{where}[{k}]") for k, item in enumerate(_listed(value, where))]
     if is_dataclass(kind):
-        reader = getattr(kind, "from_dict", None)
-        return _record(kind, value, where) if reader is None or not issubclass(kind, Document) else reader(value)  # type: ignore[arg-type]
+        return _record(kind, value, where)
     return _scalar(kind, value, where)
 
 

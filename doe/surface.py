@@ -68,9 +68,13 @@ class Surface(Record):
         x = second_order_terms(np.asarray(coded, dtype=np.float64))
         return np.asarray(np.sqrt(self.mse * np.einsum("...i,ij,...j->...", x, self.information_inverse, x)))
 
+    def half_width(self, coded: npt.ArrayLike, level: float = 0.95) -> FloatArray:
+        """Return half the interval for the mean response at coded points, (..., k) -> (...)."""
+        return np.asarray(stats.t.ppf((1 + level) / 2, self.df_residual) * self.standard_error(coded))
+
     def confidence_interval(self, coded: npt.ArrayLike, level: float = 0.95) -> tuple[FloatArray, FloatArray]:
         """Return low and high of the interval for the mean response at coded points."""
-        half = stats.t.ppf((1 + level) / 2, self.df_residual) * self.standard_error(coded)
+        half = self.half_width(coded, level)
         return self.predict(coded) - half, self.predict(coded) + half
 
 

@@ -103,7 +103,7 @@ def one_sample_test(sample: Sample, mean: float, level: float = 0.95) -> Differe
     Raises StatisticsError when the sample has n < 2.
     """
     _require_spread(sample)
-    return _difference(sample.mean - mean, sample.sd / math.sqrt(sample.n), sample.n - 1, level)
+    return _difference(sample.mean - mean, sample.standard_error, sample.n - 1, level)
 
 
 def equivalence_test(difference: DifferenceTest, margin: float, alpha: float = 0.05) -> EquivalenceTest:

@@ -16,10 +16,10 @@ def analysis_text(result: DesignResult) -> str:
     """All tables of the report that fit a terminal, without the charts."""
     parts = [_table(factor_table(result))]
     found, effects = result.analysis, result.effects
-    if effects is not None and found.effects is not None:
-        parts.append(_table(effect_table(effects, found.effects.contrasts.aliases)))
-        if found.effects.curvature is not None:
-            parts.append(curvature(found.effects.curvature, result.response.path))
+    if effects is not None:
+        parts.append(_table(effect_table(effects)))
+        if effects.curvature is not None:
+            parts.append(curvature(effects.curvature, effects.response))
     if found.model is not None:
         parts += [_table(fit_summary(found)), _table(anova_table(found.model.anova))]
     told: set[str] = set()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -9,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.analysis.analyse import DesignAnalysis
+from doe.analysis.contrasts import Curvature
 from doe.record import Document, Record
 from doe.screening_result import Screening
 from doe.stages.surface import OptimumResult
@@ -52,6 +54,9 @@ class DrawnEffects:
     columns: tuple[str, ...]
     factors: tuple[SheetFactor, ...]
     response: str
+    aliases: Mapping[str, tuple[str, ...]]
+    """Column → what else it holds."""
+    curvature: Curvature | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,7 +88,10 @@ class DesignResult(Document):
         found = self.analysis.effects
         if found is None:
             return None
-        return DrawnEffects(found.screening, found.contrasts.names, self.factors, self.response.path)
+        contrasts = found.contrasts
+        return DrawnEffects(
+            found.screening, contrasts.names, self.factors, self.response.path, contrasts.aliases, found.curvature
+        )
 
     @property
     def optimum(self) -> OptimumResult | None:

@@ -108,7 +108,7 @@ def result_of(study: Study, profile: Profile, found: Campaign, total_s: float, t
     runs = list(found.stages.all_runs())
     return StudyResult(
         study=StudyDescription.of(study, profile, tries),
-        **{stage: found.stages.result_of(stage) for stage in STAGES},  # type: ignore[arg-type]
+        **vars(found.stages),
         runs=RunCounts.of(found.stages),
         timing=Timing(
             total_s=total_s,

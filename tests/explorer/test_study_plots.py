@@ -147,8 +147,8 @@ def test_half_the_interval_of_a_model_follows_from_the_leverage(fitted):
     np.testing.assert_allclose(model.predict(at), model.predicted, rtol=1e-12)
     # leverage h = x'(X'X)⁻¹x, so half the interval is t sqrt(MSE h)
     expected = stats.t.ppf(0.975, model.df_residual) * np.sqrt(model.mse * model.leverage)
-    np.testing.assert_allclose(fitted.half_interval(at), expected, rtol=1e-9)
-    np.testing.assert_allclose(fitted.coded(fitted.natural(at)), at, atol=1e-12)
+    np.testing.assert_allclose(model.half_width(at), expected, rtol=1e-9)
+    np.testing.assert_allclose(model.region.coded(model.region.natural(at)), at, atol=1e-12)
 
 
 def test_the_profiler_passes_through_the_point_and_shows_the_optimums_interval(fitted):

@@ -30,6 +30,7 @@ from explorer.report.figures.style import (
     line,
     points,
     side_by_side,
+    suffix,
     vertical_line,
 )
 from explorer.report.units_for_people import observable_title, parameter_label
@@ -53,7 +54,7 @@ def single_runs(found: Diagnostics, names: Sequence[str]) -> Spec:
             (found.leverage, "leverage"),
         )
     ):
-        number = "" if panel == 0 else str(panel + 1)
+        number = suffix(panel)
         place = {"xaxis": f"x{number}", "yaxis": f"y{number}"}
         traces.append(points(places, finite(values), title, FACTOR, **place, **hover))
         layout[f"xaxis{number}"] = axis("run of the sheet, by row", domain=domains[panel], anchor=f"y{number}")

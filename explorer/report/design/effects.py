@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from doe.analysis.contrasts import Curvature
@@ -20,8 +20,8 @@ MOST_DRAWN = 40
 
 def effects(result: DesignResult) -> Section | None:
     """Effects and their tests; None for a design that is not of two levels."""
-    part, found = result.effects, result.analysis.effects
-    if part is None or found is None:
+    part = result.effects
+    if part is None:
         return None
     drawn = _only(part, largest(part.analysis.effects))
     blocks: list[Block] = [
@@ -40,9 +40,9 @@ def effects(result: DesignResult) -> Section | None:
     chart = main_effects(_only(part, _of_factors(part)))
     if chart is not None:
         blocks.append(Figure("main-effects", chart, "The largest ones; whiskers: 95 %; dotted: mean."))
-    blocks.append(effect_table(part, found.contrasts.aliases))
-    if found.curvature is not None:
-        blocks.append(Text(curvature(found.curvature, part.response)))
+    blocks.append(effect_table(part))
+    if part.curvature is not None:
+        blocks.append(Text(curvature(part.curvature, part.response)))
     if part.analysis.notes:
         blocks.append(Bullets(part.analysis.notes))
     return Section("Effects", tuple(blocks))
@@ -54,7 +54,7 @@ def largest(effects: Sequence[Effect]) -> tuple[Effect, ...]:
     return tuple(effect for effect in effects if effect.name in kept)
 
 
-def effect_table(part: DrawnEffects, aliases: Mapping[str, Sequence[str]]) -> Table:
+def effect_table(part: DrawnEffects) -> Table:
     """All contrasts by falling size."""
     rows = []
     for effect in sorted(part.analysis.effects, key=_rank):
@@ -63,7 +63,7 @@ def effect_table(part: DrawnEffects, aliases: Mapping[str, Sequence[str]]) -> Ta
         rows.append(
             (
                 name.replace("*", " × ") + (" (error)" if effect.is_dummy else ""),
-                ", ".join(aliases.get(name, ())).replace("*", " × ").replace("-", "−") or MISSING,
+                ", ".join(part.aliases.get(name, ())).replace("*", " × ").replace("-", "−") or MISSING,
                 signed(effect.effect, 4),
                 number(effect.sum_of_squares, 5),
                 fixed(effect.contribution_percent, 2),

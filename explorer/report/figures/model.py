@@ -5,12 +5,10 @@ A study's surface and that of a design from any laboratory are drawn by the same
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import stats
 
 from doe.stages.surface import OptimumResult, SurfaceResult
 from doe.study import Factor
@@ -48,18 +46,6 @@ class FittedTarget:
     def high(self) -> Array:
         """Upper end of the region, shape (k,)."""
         return self.model.region.centre + self.model.region.half_width
-
-    def coded(self, natural: Sequence[float] | Array) -> Array:
-        """Natural → coded values, shape (..., k)."""
-        return (np.asarray(natural, dtype=np.float64) - self.model.region.centre) / self.model.region.half_width
-
-    def natural(self, coded: Array) -> Array:
-        """Coded → natural values, shape (..., k)."""
-        return self.model.region.centre + self.model.region.half_width * coded
-
-    def half_interval(self, coded: Array) -> Array:
-        """Half the 95 % interval of the mean at coded points, shape (..., k) → (...)."""
-        return np.asarray(stats.t.ppf(0.975, self.model.df_residual) * self.model.standard_error(coded))
 
     @property
     def chosen(self) -> list[float] | None:

@@ -31,13 +31,13 @@ ROW_GAP = 0.13
 def profiler(fitted: FittedTarget, natural: Sequence[float]) -> Spec:
     """One row per factor: the mean of the target over its range, the others at ``natural`` (SI), band 95 %."""
     factors, unit = fitted.factors, unit_of_observable(fitted.observable)
-    here = fitted.coded(natural)
+    here = fitted.model.region.coded(natural)
     k, coded = len(factors), np.linspace(-1.0, 1.0, TRACE_POINTS)
     along = np.broadcast_to(here, (k, TRACE_POINTS, k)).copy()
     for row in range(k):
         along[row, :, row] = coded
     means = fitted.model.predict(along) / unit.size
-    widths = fitted.half_interval(along) / unit.size
+    widths = fitted.model.half_width(along) / unit.size
     height = unit.of(float(fitted.model.predict(here)))
     traces: list[Json] = []
     layout: Json = {"showlegend": False, "shapes": []}
@@ -68,8 +68,8 @@ def profiler(fitted: FittedTarget, natural: Sequence[float]) -> Spec:
 
 def prediction(fitted: FittedTarget, natural: Sequence[float]) -> tuple[float, float]:
     """Mean of the model at ``natural`` (SI) and half its 95 % interval, in the unit of the screen."""
-    here, unit = fitted.coded(natural), unit_of_observable(fitted.observable)
-    return unit.of(float(fitted.model.predict(here))), unit.of(float(fitted.half_interval(here)))
+    here, unit = fitted.model.region.coded(natural), unit_of_observable(fitted.observable)
+    return unit.of(float(fitted.model.predict(here))), unit.of(float(fitted.model.half_width(here)))
 
 
 def _goal(row: int, goal: float, margin: float) -> list[Json]:

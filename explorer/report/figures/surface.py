@@ -130,7 +130,7 @@ def residual_quantiles(fitted: FittedTarget) -> Spec:
 def _slice(fitted: FittedTarget, i: int, j: int) -> Array:
     """The model on a grid over factors i (columns) and j (rows), the others at the point of the sections."""
     across, up = np.meshgrid(np.linspace(-1, 1, GRID), np.linspace(-1, 1, GRID))
-    fixed = fitted.coded(fitted.section_point)
+    fixed = fitted.model.region.coded(fitted.section_point)
     coded = np.broadcast_to(fixed, (GRID, GRID, fixed.size)).copy()
     coded[..., i], coded[..., j] = across, up
     return fitted.model.predict(coded)

@@ -31,14 +31,14 @@ def height_over(fitted: FittedTarget, pair: tuple[int, int]) -> Spec:
     """The model over two factors, the others at the optimum, with the observed runs above it."""
     model, region, unit, (i, j) = fitted.model, fitted.model.region, unit_of_observable(fitted.observable), pair
     sides = np.linspace(-1.0, 1.0, GRID)
-    coded = np.broadcast_to(fitted.coded(fitted.section_point), (GRID, GRID, region.centre.size)).copy()
+    coded = np.broadcast_to(region.coded(fitted.section_point), (GRID, GRID, region.centre.size)).copy()
     coded[..., i], coded[..., j] = np.meshgrid(sides, sides)
     heights = model.predict(coded) / unit.size
     level = float(heights.mean()) if fitted.target is None else unit.of(fitted.target)
     reach = max(float(np.abs(heights - level).max()), 1e-9)
     sizes = [unit_of_parameter(fitted.factors[k].path).size for k in pair]
     x, y = (((region.centre[k] + region.half_width[k] * sides) / s).tolist() for k, s in zip(pair, sizes, strict=True))
-    at = fitted.natural(model.points)
+    at = region.natural(model.points)
     traces: list[Json] = [
         {"type": "surface", "x": x, "y": y, "z": heights.round(5).tolist(), "colorscale": BELOW_TO_ABOVE}
         | {"cmin": level - reach, "cmax": level + reach, "showscale": False, "opacity": 0.85, "name": "model"}
@@ -56,7 +56,7 @@ def height_over(fitted: FittedTarget, pair: tuple[int, int]) -> Spec:
     ]
     chosen = fitted.chosen
     if chosen is not None:
-        height = [unit.of(float(model.predict(fitted.coded(chosen))))]
+        height = [unit.of(float(model.predict(region.coded(chosen))))]
         star = {"size": 7, "color": CHOSEN, "symbol": "diamond"}
         traces.append(_dots([[chosen[i] / sizes[0]], [chosen[j] / sizes[1]], height], fitted.chosen_name, star))
     titles = [axis_title(fitted.factors[k].path, fitted.factors[k].name) for k in pair]
@@ -74,7 +74,7 @@ def solutions(fitted: FittedTarget) -> Spec | None:
     side = np.linspace(-1.0, 1.0, CUBE)
     coded = np.stack(np.meshgrid(side, side, side, indexing="ij"), axis=-1).reshape(-1, 3)
     sizes = np.array([unit_of_parameter(factor.path).size for factor in factors])
-    x, y, z = (fitted.natural(coded) / sizes).T
+    x, y, z = (fitted.model.region.natural(coded) / sizes).T
     heights = fitted.model.predict(coded).round(6).tolist()
     same = {"isomin": target, "isomax": target, "surface": {"count": 1}, "caps": _no_caps()}
     colour = [[0.0, TARGET], [1.0, TARGET]]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from doe.compromise import Compromise
+from doe.stages.surface import OptimumResult
 from doe.study_result import StudyResult
 from explorer.report.content import Block, Figure, Section, Table, Text
 from explorer.report.figures.model import fitted_targets
@@ -23,7 +24,7 @@ from explorer.report.units_for_people import (
 def optimum(result: StudyResult) -> Section:
     """Chosen setting, the 95 % sets of identified parameters and the ranges that give the target."""
     found, single, first = result.optimum, result.optimum.single, fitted_targets(result)[0]
-    blocks: list[Block] = [Text(_statement(result)), _settings(result)]
+    blocks: list[Block] = [Text(_statement(result)), _settings(found, first.reference_name)]
     if found.compromise is not None:
         blocks += _compromise(result, found.compromise)
     blocks += [
@@ -76,8 +77,7 @@ def _statement(result: StudyResult) -> str:
     return text
 
 
-def _settings(result: StudyResult) -> Table:
-    found = result.optimum
+def _settings(found: OptimumResult, reference_name: str) -> Table:
     rows = tuple(
         (
             *setting.cells,
@@ -91,7 +91,7 @@ def _settings(result: StudyResult) -> Table:
         *("measured", "screened"),
     )
     first_alone = "Intervals and ranges of the first target alone." if found.compromise is not None else ""
-    return Table(header, rows, f"{rule(found, fitted_targets(result)[0].reference_name)} {first_alone}".strip())
+    return Table(header, rows, f"{rule(found, reference_name)} {first_alone}".strip())
 
 
 def _compromise(result: StudyResult, compromise: Compromise) -> list[Block]:

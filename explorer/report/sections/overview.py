@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
-from doe.power import smallest_effect
 from doe.screening_result import SIGNIFICANT
 from doe.stages.screening import ScreeningResult
 from doe.study_result import StudyResult, valid_runs
@@ -146,30 +143,13 @@ def assumption_statement(result: StudyResult) -> str:
     return text
 
 
-def resolved_by_surface(result: StudyResult) -> float:
-    """Smallest change from low to high of a linear term that the first surface sees with power 0.8."""
-    return _detectable(
-        2 * float(result.surface.anova[0].coefficient_standard_errors[1]), result.surface.models[0].df_residual
-    )
-
-
-def resolved_by_verification(result: StudyResult) -> float:
-    """Smallest difference from the first target that the verification sees with power 0.8."""
-    test = result.verification.tests[0].deciding
-    return math.nan if test is None else _detectable(test.standard_error, test.df)
-
-
-def _detectable(error: float, df: float) -> float:
-    return smallest_effect(error, df) if math.isfinite(error) and math.isfinite(df) else math.nan
-
-
 def _resolutions(result: StudyResult) -> Table:
     observable, response = result.study.targets[0].observable, result.screening.response
     sizes = {
         "screening": _of_screening(result.screening, response),
         "ascent": f"{observed(observable, result.ascent.smallest_difference)} between two steps",
-        "surface": f"{observed(observable, resolved_by_surface(result))} from low to high of a factor",
-        "verification": f"{observed(observable, resolved_by_verification(result))} from the target",
+        "surface": f"{observed(observable, result.surface.smallest_main_effect[0])} from low to high of a factor",
+        "verification": f"{observed(observable, result.verification.smallest_difference[0])} from the target",
     }
     if result.scan is not None:
         sizes["scan"] = f"{observed(result.scan.observable, result.scan.smallest_difference)} between two values"

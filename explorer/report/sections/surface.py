@@ -17,7 +17,6 @@ from doe.surface_anova import SurfaceAnova
 from explorer.report.content import Block, Bullets, Facts, Figure, Folded, Section, Table, Text
 from explorer.report.figures.model import FittedTarget, fitted_targets
 from explorer.report.figures.surface import contours, fit
-from explorer.report.sections.overview import resolved_by_surface
 from explorer.report.units_for_people import (
     fixed,
     number,
@@ -40,7 +39,7 @@ def surface(result: StudyResult) -> Section:
         Text(
             f"Box–Behnken design of {len(part.design)} points over {len(part.factors)} factors, and "
             "the full second-order model by least squares on every valid pour. The first model sees a change of "
-            f"{observed(part.observables[0], resolved_by_surface(result))} from the low to the high end of a factor "
+            f"{observed(part.observables[0], part.smallest_main_effect[0])} from the low to the high end of a factor "
             "with chance 0.8."
         ),
         Bullets(tuple(_region(part))),

@@ -10,7 +10,7 @@ import viser
 from doe.record import RecordError
 from doe.stages.sizing import planned_runs
 from doe.study import Study, load_study
-from doe.study_result import AnyStudy, study_from
+from doe.study_result import AnyStudy, PartialStudy, study_from
 from explorer.background.result_file import ResultFile
 from explorer.report.study_plots import study_plots
 from explorer.session import Session
@@ -118,14 +118,14 @@ class StudyPanel:
         file = self._alive if present and self._study.status().alive else self._over
         folder = self._present() if folder is None else folder
         content = file.read(folder)
-        if present:
-            self._so_far = (str((content or {}).get("partial")), str((content or {}).get("line")))
         now = (folder, file.version)
         if now == self._shown:
             return
         self._shown, self._trouble = now, ""
         try:
             result = None if content is None else study_from(content)
+            if present:
+                self._so_far = (result.partial or "", result.line) if isinstance(result, PartialStudy) else ("", "")
             self._show_result(result, "" if folder is None else title(folder), now)
         except RecordError as error:
             # A folder that somebody named may hold any JSON, also that of another version.
