@@ -26,10 +26,10 @@ from doe.declared.model import Declared
 from doe.declared.points import Point
 from doe.declared.pours import ModelPours, Pour
 from doe.diagnose.posterior import Fit
+from doe.diagnose.result import HeldOut, Model
 from doe.measurement.features import coarse_map
 from doe.measurement.measurement import Condition
 from doe.measurement.piles import PileSurface
-from doe.record import Record
 from doe.residual_map import ResidualMap, height_difference, pooled_deviation
 
 FloatArray = npt.NDArray[np.float64]
@@ -37,19 +37,6 @@ FloatArray = npt.NDArray[np.float64]
 CONTRADICTED = 0.001
 CONSTANT_FLOOR = 1e-3
 """Least standard deviation of a summary, as a share of its size."""
-
-
-@dataclass(frozen=True)
-class Model(Record):
-    """A calibrated model: parameters in natural units and the amplitudes of the effects that are on."""
-
-    theta: tuple[float, ...]
-    effects: tuple[tuple[str, tuple[float, ...]], ...] = ()
-
-    @property
-    def name(self) -> str:
-        """ "base", or the effects' names."""
-        return "+".join(name for name, _ in self.effects) or "base"
 
 
 def model_of(fit: Fit, declared: Declared) -> Model:
@@ -109,22 +96,6 @@ def _confirmed(model: Model, rows: Sequence[Sequence[Pour]], widths: Sequence[in
         blocks.append(np.array([pour.summaries for pour in valid]).reshape(len(valid), width))
         profiles.append(np.array([pour.profile for pour in valid]).reshape(len(valid), -1 if valid else 0))
     return Confirmed(model, tuple(blocks), broken, tuple(profiles))
-
-
-@dataclass(frozen=True)
-class HeldOut(Record):
-    """What fresh pours of a model say of held-out data: |t| of the farthest summary, which it is, Bonferroni's p."""
-
-    label: str
-    condition: str
-    summary: str
-    farthest: float
-    p: float
-
-    @property
-    def contradicted(self) -> bool:
-        """Whether the data contradict the model."""
-        return self.p < CONTRADICTED
 
 
 @dataclass(frozen=True)

@@ -13,25 +13,24 @@ from doe.declared.pours import ROOT, ModelPours, OnPour
 from doe.diagnose.budget import Budget
 from doe.diagnose.compared import Compared, measured, weighed
 from doe.diagnose.confirm import (
+    CONTRADICTED,
     Confirmed,
-    HeldOut,
     HeldOutData,
     confirm,
     held_out,
     model_of,
     residual_maps,
 )
-from doe.diagnose.levels import Level
-from doe.diagnose.menu import Menu, Suggestion, next_experiment
+from doe.diagnose.menu import Menu, next_experiment
 from doe.diagnose.posterior import Posterior
+from doe.diagnose.result import NO_EFFECT, HeldOut, Level, Offered, Suggestion
 from doe.diagnose.teaching import Say, Teacher
-from doe.diagnose.verdict import NO_EFFECT, NOTHING_FROM, THRESHOLD, Verdict, taken_back, verdict_of
+from doe.diagnose.verdict import NOTHING_FROM, THRESHOLD, Verdict, taken_back, verdict_of
 from doe.errors import MeasurementError
 from doe.holdout import HoldoutCondition, HoldoutError, holdout_errors
 from doe.measurement.features import SCAN, feature_set
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.summaries import summaries_of_data, summary_names
-from doe.record import Record
 from doe.residual_map import ResidualMap
 from doe.runner import Pours
 from doe.store import Store
@@ -49,16 +48,6 @@ FIRST_OTHER_ROOT = 100
 """Roots of other seeds begin here: below it are those of laboratories and of reference pours."""
 MOST_RIVALS = 4
 """That the next experiment is chosen for."""
-
-
-@dataclass(frozen=True)
-class Offered(Record):
-    """What a fitted condition's data offer, how many features are compared, and how many more a scan would add."""
-
-    condition: str
-    offer: str
-    features: int
-    scan_would_add: int
 
 
 @dataclass(frozen=True)
@@ -210,7 +199,7 @@ def concluded(
     )
     before, after = confirmed[0], confirmed[-1]
     told = held_out_of(conditions, verdict.final, after)
-    if told is not None and told.contradicted and (verdict.names or verdict.kind == NO_EFFECT):
+    if told is not None and told.p < CONTRADICTED and (verdict.names or verdict.kind == NO_EFFECT):
         why = f"{told.summary} of {told.condition} is {told.farthest:.1f} standard errors off"
         verdict = taken_back(verdict, why)
         say(f"with held-out data: {verdict.kind}")

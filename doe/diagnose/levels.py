@@ -20,7 +20,7 @@ from doe.declared.points import Direction, Point
 from doe.declared.pours import Rows, Search
 from doe.diagnose.compared import usable
 from doe.diagnose.emulator import Lessons, Way, emulated
-from doe.record import Record
+from doe.diagnose.result import Level
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -40,16 +40,6 @@ class Trials:
     most: int
     enough: float
     too_much: float
-
-
-@dataclass(frozen=True)
-class Level(Record):
-    """A direction with the share of its range at which it was found to shift by about ``STRONG``."""
-
-    direction: Direction
-    share: float
-    shift: float
-    """[standard errors], by the pours that teach, or by the few of the search."""
 
 
 def level_of(

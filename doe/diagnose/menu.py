@@ -20,8 +20,9 @@ from doe.declared.points import AS_IT_IS
 from doe.declared.pours import ModelPours
 from doe.diagnose.compared import usable
 from doe.diagnose.emulator import Emulator, Lessons, emulated, planar_weights
-from doe.diagnose.next_experiment import MenuItem, Prediction, RankedExperiment, rank_experiments
+from doe.diagnose.next_experiment import MenuItem, Prediction, rank_experiments
 from doe.diagnose.posterior import Posterior
+from doe.diagnose.result import Suggestion
 from doe.diagnose.teaching import Teacher, acting
 from doe.errors import StatisticsError
 from doe.measurement.condition_table import turned as turned_scene
@@ -78,41 +79,6 @@ CHANGES = (
     Change("filled with the outlet closed, then opened", choices={"insertion.protocol": "fill_then_open"}),
     Change("outlet 1.3 times as wide at twice the height", {"rig.outlet_diameter": 1.3, "rig.outlet_height": 2.0}),
 )
-
-
-@dataclass(frozen=True)
-class Suggestion(Record):
-    """An experiment.
-
-    Attributes
-    ----------
-    experiment
-        What it tells, and with which chance.
-    values
-        Parameter path → value [SI] of what is set otherwise than in the condition ``condition``.
-    condition
-        Name of the fitted condition that it changes.
-    rivals
-        Labels of what it is to tell apart, "base" for nothing missing.
-    levers
-        By their nature: what reveals each of the rivals' effects.
-    pours
-        That it asks for.
-    turned
-        Whether the rig is turned by 180° on its bench.
-    """
-
-    experiment: RankedExperiment
-    values: Mapping[str, float | str]
-    condition: str
-    rivals: tuple[str, ...]
-    levers: tuple[str, ...]
-    pours: int
-    turned: bool = False
-
-    def set_up(self, condition: Condition) -> Condition:
-        """``condition`` with the change, under its name."""
-        return changed(condition, self.experiment.name, self.values, self.turned)
 
 
 @dataclass(frozen=True)
@@ -246,6 +212,11 @@ def changed(condition: Condition, name: str, values: Mapping[str, float | str], 
     """``condition`` under another name, with ``values`` set and the rig turned ``about`` on its bench."""
     scene = turned_scene(condition.scene) if about else condition.scene
     return replace(condition, name=name, scene=with_values(scene, dict(values)), turned=condition.turned != about)
+
+
+def as_suggested(condition: Condition, asked: Suggestion) -> Condition:
+    """``condition`` with the change of a suggestion, under its name."""
+    return changed(condition, asked.experiment.name, asked.values, asked.turned)
 
 
 def feasible(scene: Scene) -> list[tuple[Change, dict[str, float | str]]]:

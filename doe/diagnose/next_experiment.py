@@ -22,8 +22,8 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.diagnose.posterior import TEMPERATURE
+from doe.diagnose.result import RankedExperiment
 from doe.errors import StatisticsError
-from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -46,15 +46,6 @@ class MenuItem:
     name: str
     predictions: Mapping[str, Prediction]
     pour: FloatArray
-
-
-@dataclass(frozen=True)
-class RankedExperiment(Record):
-    """chance: see above; separation: least distance of two answers in sigma of one pour and their own uncertainty."""
-
-    name: str
-    chance: float
-    separation: float
 
 
 def rank_experiments(

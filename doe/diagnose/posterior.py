@@ -32,7 +32,7 @@ from scipy import stats
 from scipy.special import logsumexp
 
 from doe.diagnose.emulator import ANGLES, Emulator, planar_weights
-from doe.record import Record
+from doe.diagnose.result import Amplitude
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -88,21 +88,6 @@ class Data:
     replicates: float
     scatter: float = 1.0
     instrument: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
-
-
-@dataclass(frozen=True)
-class Amplitude(Record):
-    """One amplitude of one effect, natural units: posterior mean and 95 % interval.
-
-    ``at_end``: the best one is the largest of those that the models reach, or that the literature supports.
-    """
-
-    effect: str
-    index: int
-    value: float
-    low: float
-    high: float
-    at_end: bool
 
 
 @dataclass(frozen=True)

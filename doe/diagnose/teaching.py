@@ -20,8 +20,9 @@ from doe.declared.pours import ModelPours, Pour, Search
 from doe.diagnose.budget import Budget
 from doe.diagnose.compared import Instrument, Measured
 from doe.diagnose.emulator import Lessons, Way
-from doe.diagnose.levels import STRONG, Level, Trials, level_of, taught_shifts
+from doe.diagnose.levels import STRONG, Trials, level_of, taught_shifts
 from doe.diagnose.posterior import LEAST, Posterior
+from doe.diagnose.result import Level
 from doe.errors import StatisticsError
 from doe.measurement.measurement import Condition
 from doe.measurement.sight import PERFECT, Sight

@@ -19,8 +19,8 @@ import numpy.typing as npt
 
 from doe.declared.model import Declared, Parameter
 from doe.diagnose.compared import Compared
-from doe.diagnose.levels import Level
-from doe.diagnose.posterior import FITS, TEMPERATURE, Amplitude, Fit, Posterior
+from doe.diagnose.posterior import FITS, TEMPERATURE, Fit, Posterior
+from doe.diagnose.result import NO_EFFECT, UNEXPLAINED, EffectRow, Level, ParameterRow, Place, Residual
 from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
@@ -35,87 +35,6 @@ CREDIBLE = 0.95
 """Probability of the set of an ambiguous answer."""
 MOST_PAIRS = 5
 """Pairs in the table."""
-NO_EFFECT, UNEXPLAINED = "no_missing_effect", "unexplained"
-
-
-@dataclass(frozen=True)
-class EffectRow(Record):
-    """One effect, or a pair that was weighed.
-
-    Attributes
-    ----------
-    name
-        The effect, or "a+b".
-    probability
-        Posterior.
-    log_evidence
-        ln of its evidence over that of the base model.
-    amplitudes
-        At its best fit.
-    p
-        Probability of data as far off as these, were its best fit true.
-    reference
-        The amplitude that its signature was poured at, "+" and "x" direction first; empty of a pair.
-    strength
-        Shift by that amplitude in the features that are compared, after recalibration [standard errors of the data].
-    fitted_strength
-        The same by its best fit.
-    cosine
-        Of its best fit's shift to the residual, after recalibration.
-    pours
-        That taught it, in every condition.
-    """
-
-    name: str
-    probability: float
-    log_evidence: float
-    amplitudes: tuple[Amplitude, ...]
-    p: float
-    reference: tuple[float, ...]
-    strength: float
-    fitted_strength: float
-    cosine: float
-    pours: int
-
-
-@dataclass(frozen=True)
-class ParameterRow(Record):
-    """A calibrated parameter, natural units: its measurement, and its posterior without and with what is named."""
-
-    name: str
-    low: float
-    high: float
-    mean: float | None
-    sd: float | None
-    before: float
-    before_sd: float
-    after: float
-    after_sd: float
-
-
-@dataclass(frozen=True)
-class Residual(Record):
-    """One feature: measured mean, calibrated base model and final model, natural units, and both residuals over the
-    standard deviation of noise, model and instrument, after recalibration.
-    """
-
-    condition: str
-    feature: str
-    measured: float
-    before: float
-    after: float
-    z_before: float
-    z_after: float
-
-
-@dataclass(frozen=True)
-class Place(Record):
-    """A condition: its share of the squared residuals of the base model, and the feature that is farthest off."""
-
-    condition: str
-    share: float
-    feature: str
-    z: float
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,8 @@ from doe.declared.points import Point
 from doe.declared.pours import ModelPours, room_of
 from doe.diagnose.budget import Budget
 from doe.diagnose.diagnosis import concluded, errors_of, joined, pursued, suggested
-from doe.diagnose.menu import Suggestion
+from doe.diagnose.menu import as_suggested
+from doe.diagnose.result import Suggestion
 from doe.diagnose.teaching import Teacher
 from doe.diagnose.verdict import verdict_of
 from doe.measurement import Condition, Measurement, load_measurement
@@ -156,7 +157,7 @@ class Answers:
         """What the laboratory measures in the set-up that it is asked for; None where its pours keep breaking off."""
         place = next(c for c, one in enumerate(self.measurement.conditions) if one.name == asked.condition)
         condition = self.measurement.conditions[place]
-        changed = replace(asked.set_up(condition), name=condition.name)
+        changed = replace(as_suggested(condition, asked), name=condition.name)
         data = self.measured(truth, [changed], f" next {asked.experiment.name}", asked.pours)
         if data is None:
             return None
@@ -165,7 +166,7 @@ class Answers:
             self.laboratory.hand_out(Path(folder), data, scanner, (ROOT, *truth.case.seed, 2))
             measurement = load_measurement(Path(folder))
         (read,) = measurement.fit
-        return replace(measurement, conditions=(asked.set_up(read),))
+        return replace(measurement, conditions=(as_suggested(read, asked),))
 
     def measured(
         self, truth: Truth, conditions: Sequence[Condition], occasion: str = "", pours: int = REPLICATES

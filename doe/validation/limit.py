@@ -21,7 +21,8 @@ import numpy.typing as npt
 from scipy.special import logsumexp
 from scipy.stats import norm
 
-from doe.diagnose.levels import REPLICATES, Level
+from doe.diagnose.levels import REPLICATES
+from doe.diagnose.result import Level
 from doe.record import Record
 from doe.validation.reference import Sample
 from doe.validation.ruler import Strength, fold_shifts, metric_of, product, strength_of

@@ -25,7 +25,8 @@ import numpy.typing as npt
 from doe.declared.model import Declared, Effect
 from doe.declared.points import Direction, Point, directions_of, middle
 from doe.declared.pours import ModelPours
-from doe.diagnose.levels import Level, Trials, level_of
+from doe.diagnose.levels import Trials, level_of
+from doe.diagnose.result import Level
 from doe.errors import StatisticsError
 from doe.measurement.features import feature_set
 from doe.measurement.measurement import Measurement

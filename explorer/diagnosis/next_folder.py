@@ -20,7 +20,8 @@ from typing import Any
 from xml.sax.saxutils import escape
 
 from doe.csv_table import csv_table
-from doe.diagnose.menu import Suggestion
+from doe.diagnose.menu import as_suggested
+from doe.diagnose.result import BASE, Suggestion
 from doe.diagnose.next_experiment import SURE
 from doe.errors import MeasurementError
 from doe.measurement.condition_table import AS_THEY_ARE, FEED_SLACK
@@ -81,7 +82,7 @@ def write_next(folder: Path, source: Path, measurement: Measurement, suggestion:
     condition = next(one for one in measurement.conditions if one.name == suggestion.condition)
     given = next(one for one in entries(table, "condition") if one["name"] == condition.name)
     name, change = _free_name(suggestion, measurement), suggestion.experiment.name
-    changed = suggestion.set_up(condition).scene
+    changed = as_suggested(condition, suggestion).scene
     entry = _changed_entry(given, name, measurement, suggestion, changed)
     title = f"{measurement.title or source.name}: follow-up, {change}"
     folder.mkdir(parents=True, exist_ok=True)

@@ -17,11 +17,10 @@ from doe.declared.model import declare
 from doe.declared.points import directions_of, moved
 from doe.declared.pours import Pour
 from doe.diagnose.compared import Measured, weighed
-from doe.diagnose.diagnosis import Diagnosis, Offered, concluded, errors_of
+from doe.diagnose.diagnosis import Diagnosis, concluded, errors_of
 from doe.diagnose.emulator import Lessons, Way
-from doe.diagnose.levels import Level
-from doe.diagnose.menu import Suggestion
 from doe.diagnose.next_experiment import MenuItem, Prediction, rank_experiments
+from doe.diagnose.result import Level, Offered, Suggestion
 from doe.diagnose.verdict import verdict_of
 from doe.measurement.features import SCALARS, SCAN
 from doe.measurement.measurement import Condition, MeasuredParameter, Measurement, Observation

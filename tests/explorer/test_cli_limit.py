@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from doe.declared.points import Direction
-from doe.diagnose.levels import Level
+from doe.diagnose.result import Level
 from doe.measurement.features import feature_set
 from doe.store import READINGS
 from doe.validation.laboratory import TREFOILS, read_laboratory

@@ -10,8 +10,9 @@ from xml.etree import ElementTree
 import pytest
 import trimesh
 
-from doe.diagnose.menu import CHANGES, TURNED, Suggestion, feasible
+from doe.diagnose.menu import CHANGES, TURNED, feasible
 from doe.diagnose.next_experiment import RankedExperiment
+from doe.diagnose.result import Suggestion
 from doe.errors import MeasurementError
 from doe.measurement.load import load_measurement
 from explorer.diagnosis.next_folder import CHANGED, read_next, setup_svg, write_next

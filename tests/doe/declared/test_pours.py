@@ -11,8 +11,9 @@ from doe.declared import pours as module
 from doe.declared.model import Condition, Declared
 from doe.declared.points import Point
 from doe.declared.pours import ModelPours, Pour
-from doe.diagnose.confirm import Model, confirm
+from doe.diagnose.confirm import confirm
 from doe.diagnose.levels import whitened_shift
+from doe.diagnose.result import Model
 from doe.measurement import summary_names
 from doe.measurement.features import feature_set
 from doe.store import Store

@@ -7,7 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from doe.diagnose.confirm import Confirmed, Model, confirming, residual_maps
+from doe.diagnose.confirm import Confirmed, confirming, residual_maps
+from doe.diagnose.result import Model
 from doe.measurement import load_measurement
 from doe.measurement.piles import PileSurface
 from doe.residual_map import LEAST_ERROR, height_difference

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from doe.diagnose.posterior import FITS, Fit, Posterior
-from doe.diagnose.verdict import NO_EFFECT, NOTHING_AT_ONCE, NOTHING_FROM, UNEXPLAINED, answer
+from doe.diagnose.result import NO_EFFECT, UNEXPLAINED
+from doe.diagnose.verdict import NOTHING_AT_ONCE, NOTHING_FROM, answer
 
 
 def posterior(nothing, outside, effects, badly=()):

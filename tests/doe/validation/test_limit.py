@@ -9,7 +9,8 @@ from scipy.stats import norm
 from doe.declared.model import Condition, Declared, Effect, Parameter
 from doe.declared.points import Direction, base_points, effect_points
 from doe.declared.pours import Pour
-from doe.diagnose.levels import STRONG, Level, Trials, level_of
+from doe.diagnose.levels import STRONG, Trials, level_of
+from doe.diagnose.result import Level
 from doe.validation.limit import (
     RISK,
     RISKS,

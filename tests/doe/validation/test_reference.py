@@ -8,7 +8,7 @@ import pytest
 from doe.declared.model import Condition, Declared, Effect, Parameter
 from doe.declared.points import Direction
 from doe.declared.pours import Pour
-from doe.diagnose.levels import Level
+from doe.diagnose.result import Level
 from doe.errors import StatisticsError
 from doe.validation.reference import (
     PER_ROUND,
