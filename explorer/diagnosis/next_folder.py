@@ -21,8 +21,8 @@ from xml.sax.saxutils import escape
 
 from doe.csv_table import csv_table
 from doe.diagnose.menu import as_suggested
-from doe.diagnose.result import BASE, Suggestion
 from doe.diagnose.next_experiment import SURE
+from doe.diagnose.result import BASE, Suggestion
 from doe.errors import MeasurementError
 from doe.measurement.condition_table import AS_THEY_ARE, FEED_SLACK
 from doe.measurement.load import FILE, load_measurement
@@ -34,7 +34,7 @@ from doe.study_table import Table, entries, section
 from doe.text_file import read_text
 from explorer.errors import CommandError
 from explorer.files.whole_file import write_whole
-from explorer.report.diagnosis.findings import BASE, spelled
+from explorer.report.diagnosis.wording import spelled
 from explorer.report.units_for_people import code, enumeration, number, parameter_label, parameter_value, percent
 from explorer.scene.text import toml_key, toml_value
 from solver import EFFECTS, Scene, named, parameters, parse_quantity, pour_rig, read_toml, value

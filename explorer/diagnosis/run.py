@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -24,30 +24,44 @@ from doe.holdout import HoldoutError
 from doe.measurement.load import load_measurement
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.summaries import summaries
-from doe.record import plain
 from doe.store import Store, default_store
 from explorer.diagnosis.corrected import corrected_toml, study_toml
 from explorer.diagnosis.next_folder import read_next, write_next
 from explorer.diagnosis.progress import PourProgress
+from explorer.diagnosis.result import (
+    BeforeAndAfter,
+    DataRead,
+    DiagnosisResult,
+    Duration,
+    ErrorRow,
+    Errors,
+    MeanAndDeviation,
+    MeasuredCondition,
+    Order,
+    PileProfiles,
+    PourCounts,
+    PouredCondition,
+    PouredModel,
+    Probabilities,
+    Rule,
+)
 from explorer.errors import CommandError
 from explorer.files.run_result import versions
 from explorer.files.whole_file import write_whole
 from explorer.report.diagnosis import write_diagnosis_report
 from solver import EFFECTS, Crew
 
-SCHEMA = 3
-RULE = {
-    "prior_nothing": NOTHING,
-    "prior_outside": OUTSIDE,
-    "prior_pairs": PAIRS,
-    "fits": FITS,
-    "nothing_at_once": NOTHING_AT_ONCE,
-    "nothing_from": NOTHING_FROM,
-    "credible": CREDIBLE,
-    "contradicted": CONTRADICTED,
-    "strong": STRONG,
-}
-"""Constants of the rule that the report tells."""
+RULE = Rule(
+    prior_nothing=NOTHING,
+    prior_outside=OUTSIDE,
+    prior_pairs=PAIRS,
+    fits=FITS,
+    nothing_at_once=NOTHING_AT_ONCE,
+    nothing_from=NOTHING_FROM,
+    credible=CREDIBLE,
+    contradicted=CONTRADICTED,
+    strong=STRONG,
+)
 
 
 @dataclass(frozen=True)
@@ -96,7 +110,8 @@ def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> Diagnosis:
             measurement, store, crew.run_queue, names, budget, progress.stage, progress.pour, order.seed, follow_up
         )
     result = result_of(measurement, order, found, progress.elapsed)
-    write_whole(order.out / "diagnosis.json", json.dumps(result, ensure_ascii=False, allow_nan=False, indent=1) + "\n")
+    text = json.dumps(result.to_dict(), ensure_ascii=False, allow_nan=False, indent=1)
+    write_whole(order.out / result.NAME, text + "\n")
     write_diagnosis_report(result, order.out)
     say(f"{order.out}/report.html, report.md, diagnosis.json")
     if found.suggestions:
@@ -115,111 +130,99 @@ def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> Diagnosis:
     return found
 
 
-def result_of(measurement: Measurement, order: DiagnoseOrder, found: Diagnosis, total_s: float) -> dict[str, Any]:
+def result_of(measurement: Measurement, order: DiagnoseOrder, found: Diagnosis, total_s: float) -> DiagnosisResult:
     """The content of ``diagnosis.json``."""
     verdict = found.verdict
     units = {s.name: s.unit for condition in found.conditions for s in summaries(condition)}
-    return plain(
-        {
-            "schema": SCHEMA,
-            "verdict": verdict.kind,
-            "statement": verdict.statement,
-            "names": verdict.names,
-            "probabilities": {"nothing": verdict.nothing, "outside": verdict.outside},
-            "threshold": verdict.threshold,
-            "rule": RULE,
-            "temperature": verdict.temperature,
-            "taken_back": verdict.taken_back,
-            "final": verdict.final,
-            "effects": verdict.effects,
-            "levels": found.levels,
-            "ranges": found.declared.effects,
-            "parameters": verdict.parameters,
-            "residuals": verdict.residuals,
-            "where": verdict.where,
-            "similar": verdict.similar,
-            "scatter": verdict.scatter,
-            "left_out": verdict.left_out,
-            "offered": found.offered,
-            "error": {
-                role: [_error(row, units) for row in rows]
-                for role, rows in (("fit", found.fit_error), ("holdout", found.holdout_error))
-            },
-            "held_out": found.held_out,
-            "next_experiment": found.suggestions,
-            "confirmation": {
-                "before": _confirmed(found.conditions, found.before),
-                "after": _confirmed(found.conditions, found.after),
-            },
-            "measured": [
-                {
-                    "condition": condition.name,
-                    "role": condition.role,
-                    "rig": condition.scene.rig.name,
-                    "replicates": condition.replicates * condition.mean_of,
-                    "summaries": [s.name for s in summaries(condition)],
-                }
-                for condition in found.conditions
-            ],
-            "piles": [picture for c in range(len(found.conditions)) for picture in _piles(found, c)],
-            "maps": found.maps,
-            "data": {
-                "folder": str(order.folder),
-                "title": measurement.title,
-                "ignored": measurement.ignored,
-                "notes": measurement.notes,
-            },
-            "order": {"out": str(order.out), "effects": order.effects, "budget": order.budget, "seed": order.seed}
-            | {"follow_up": str(order.follow_up) if order.follow_up else None},
-            "units": units,
-            "pours": {"run": found.pours, "settings": found.settings},
-            "timing": {"total_s": total_s},
-            "versions": versions(),
-        }
+    return DiagnosisResult(
+        verdict=verdict.kind,
+        statement=verdict.statement,
+        names=verdict.names,
+        probabilities=Probabilities(verdict.nothing, verdict.outside),
+        threshold=verdict.threshold,
+        rule=RULE,
+        temperature=verdict.temperature,
+        taken_back=verdict.taken_back,
+        final=verdict.final,
+        effects=verdict.effects,
+        levels=found.levels,
+        ranges=found.declared.effects,
+        parameters=verdict.parameters,
+        residuals=verdict.residuals,
+        where=verdict.where,
+        similar=verdict.similar,
+        scatter=verdict.scatter,
+        left_out=verdict.left_out,
+        offered=found.offered,
+        error=Errors(_errors(found.fit_error, units), _errors(found.holdout_error, units)),
+        held_out=found.held_out,
+        next_experiment=found.suggestions,
+        confirmation=BeforeAndAfter(
+            _poured_model(found.conditions, found.before), _poured_model(found.conditions, found.after)
+        ),
+        measured=tuple(
+            MeasuredCondition(
+                condition.name,
+                condition.role,
+                condition.scene.rig.name,
+                condition.replicates * condition.mean_of,
+                tuple(s.name for s in summaries(condition)),
+            )
+            for condition in found.conditions
+        ),
+        piles=tuple(picture for c in range(len(found.conditions)) for picture in _piles(found, c)),
+        maps=found.maps,
+        data=DataRead(str(order.folder), measurement.title, measurement.ignored, measurement.notes),
+        order=Order(
+            str(order.out),
+            order.effects,
+            order.budget,
+            order.seed,
+            str(order.follow_up) if order.follow_up else None,
+        ),
+        units=units,
+        pours=PourCounts(found.pours, found.settings),
+        timing=Duration(total_s),
+        versions=versions(),
     )
 
 
-def error_lines(result: dict[str, Any]) -> list[str]:
+def error_lines(result: DiagnosisResult) -> list[str]:
     """The table *before | after | noise floor* on held-out data, or on fitted data where there are none."""
-    rows: Sequence[dict[str, Any]] = result["error"]["holdout"] or result["error"]["fit"]
-    role = "held-out" if result["error"]["holdout"] else "fitted"
+    rows, role = (result.error.holdout, "held-out") if result.error.holdout else (result.error.fit, "fitted")
     lines = [f"error on {role} data", f"{'observable':26} {'before':>10} {'after':>10} {'noise floor':>12}"]
     for row in rows:
-        numbers = (row["before"], row["after"], row["noise_floor"])
-        before, after, floor = (f"{x:.3g}" if x is not None else "–" for x in numbers)
-        lines.append(f"{row['observable']:26} {before:>10} {after:>10} {floor:>12}")
+        numbers = (row.before, row.after, row.noise_floor)
+        before, after, floor = (f"{x:.3g}" if math.isfinite(x) else "–" for x in numbers)
+        lines.append(f"{row.observable:26} {before:>10} {after:>10} {floor:>12}")
     return lines
 
 
-def _error(row: HoldoutError, units: dict[str, str]) -> dict[str, Any]:
-    return {**row.to_dict(), "unit": units.get(row.observable, "σ")}
+def _errors(rows: Sequence[HoldoutError], units: dict[str, str]) -> tuple[ErrorRow, ...]:
+    return tuple(ErrorRow(**vars(row), unit=units.get(row.observable, "σ")) for row in rows)
 
 
-def _piles(found: Diagnosis, number: int) -> Iterator[dict[str, Any]]:
+def _piles(found: Diagnosis, number: int) -> Iterator[PileProfiles]:
     """Height profiles [m] of condition ``number``, measured and by both models; none where the data have none."""
     condition = found.conditions[number]
     profile = measured_profile(condition)
     blocks = [profile.values, *(one.profiles[number] for one in (found.before, found.after))] if profile else []
-    if profile is not None and min(map(len, blocks)) > 1:
-        yield {
-            "condition": condition.name,
-            "role": condition.role,
-            "radius": profile.x,
-            **{key: _mean_and_sd(block) for key, block in zip(("measured", "before", "after"), blocks, strict=True)},
-        }
+    if profile is not None and profile.x is not None and min(map(len, blocks)) > 1:
+        measured, before, after = (_mean_and_deviation(block) for block in blocks)
+        yield PileProfiles(condition.name, condition.role, profile.x, measured, before, after)
 
 
-def _mean_and_sd(block: npt.NDArray[np.float64]) -> dict[str, Any]:
-    return {"mean": block.mean(axis=0), "sd": block.std(axis=0, ddof=1)}
+def _mean_and_deviation(block: npt.NDArray[np.float64]) -> MeanAndDeviation:
+    return MeanAndDeviation(block.mean(axis=0), block.std(axis=0, ddof=1))
 
 
-def _confirmed(conditions: Sequence[Condition], found: Confirmed) -> dict[str, Any]:
-    return {
-        "theta": found.model.theta,
-        "effects": found.model.effects,
-        "broken": found.broken,
-        "conditions": [
-            {"condition": condition.name, "pours": len(block), **_mean_and_sd(block)}
+def _poured_model(conditions: Sequence[Condition], found: Confirmed) -> PouredModel:
+    return PouredModel(
+        found.model.theta,
+        found.model.effects,
+        broken=found.broken,
+        conditions=tuple(
+            PouredCondition(condition.name, len(block), **vars(_mean_and_deviation(block)))
             for condition, block in zip(conditions, found.blocks, strict=True)
-        ],
-    }
+        ),
+    )

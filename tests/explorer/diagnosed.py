@@ -25,6 +25,7 @@ from doe.diagnose.verdict import verdict_of
 from doe.measurement.features import SCALARS, SCAN
 from doe.measurement.measurement import Condition, MeasuredParameter, Measurement, Observation
 from doe.residual_map import ResidualMap, height_difference
+from explorer.diagnosis.result import DiagnosisResult
 from explorer.diagnosis.run import DiagnoseOrder, result_of
 from solver import EFFECTS, load_material, with_values
 
@@ -310,4 +311,9 @@ def result_of_case(name):
     measurement, found = diagnosed(**CASES[name])
     order = DiagnoseOrder(measurement.folder, Path("results/made up"), budget=900)
     result = result_of(measurement, order, found, 912.5)
-    return json.loads(json.dumps(result, allow_nan=False))
+    return json.loads(json.dumps(result.to_dict(), allow_nan=False))
+
+
+def typed(content):
+    """The result that a reader of the file gets."""
+    return DiagnosisResult.from_dict(content)

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
+from explorer.diagnosis.result import DiagnosisResult
 from explorer.files.whole_file import write_whole
 from explorer.report.content import Section
 from explorer.report.diagnosis.answer import could_have_seen, in_short, rivals
 from explorer.report.diagnosis.evidence import effects, error, over_the_plate, parameters, pile, residuals
-from explorer.report.diagnosis.findings import Plain, checked
 from explorer.report.diagnosis.method import data, for_a_paper, how_reached, repeat
 from explorer.report.html import page
 from explorer.report.markdown import document
 
 __all__ = ["diagnosis_html", "diagnosis_markdown", "sections_of", "write_diagnosis_report"]
 
-SECTIONS: tuple[Callable[[Plain], Section | None], ...] = (
+SECTIONS: tuple[Callable[[DiagnosisResult], Section | None], ...] = (
     in_short,
     rivals,
     could_have_seen,
@@ -35,33 +34,29 @@ SECTIONS: tuple[Callable[[Plain], Section | None], ...] = (
 """In the order of the page: the answer and what it rests on first, then how it was found."""
 
 
-def write_diagnosis_report(result: dict[str, Any], folder: Path) -> None:
-    """Write ``report.html`` and ``report.md`` into ``folder``; each appears complete or not at all.
-
-    ``result`` is the content of ``diagnosis.json`` (see `explorer.diagnosis.run.result_of`). Raises ResultVersionError
-    for that of another version of the program.
-    """
+def write_diagnosis_report(result: DiagnosisResult, folder: Path) -> None:
+    """Write ``report.html`` and ``report.md`` into ``folder``; each appears complete or not at all."""
     texts = {"report.html": diagnosis_html(result), "report.md": diagnosis_markdown(result)}
     for name, text in texts.items():
         write_whole(folder / name, text)
 
 
-def diagnosis_html(result: dict[str, Any]) -> str:
-    """The page: self-contained, with charts. Raises ResultVersionError for a result of another version."""
+def diagnosis_html(result: DiagnosisResult) -> str:
+    """The page: self-contained, with charts."""
     return page(*_headings(result), sections_of(result))
 
 
-def diagnosis_markdown(result: dict[str, Any]) -> str:
-    """The same facts without charts. Raises ResultVersionError for a result of another version."""
+def diagnosis_markdown(result: DiagnosisResult) -> str:
+    """The same facts without charts."""
     return document(*_headings(result), sections_of(result))
 
 
-def sections_of(result: Plain) -> tuple[Section, ...]:
+def sections_of(result: DiagnosisResult) -> tuple[Section, ...]:
     """Every section that ``result`` has something for."""
     found = (make(result) for make in SECTIONS)
     return tuple(section for section in found if section is not None)
 
 
-def _headings(result: dict[str, Any]) -> tuple[str, str]:
-    found = checked(result)["data"]
-    return found["title"] or Path(found["folder"]).name, f"Diagnosis of the measured data in {found['folder']}"
+def _headings(result: DiagnosisResult) -> tuple[str, str]:
+    found = result.data
+    return found.title or Path(found.folder).name, f"Diagnosis of the measured data in {found.folder}"

@@ -5,31 +5,21 @@ from __future__ import annotations
 import math
 
 from doe.diagnose.next_experiment import SURE
+from doe.diagnose.result import NO_EFFECT, UNEXPLAINED, EffectRow, HeldOut, Place
+from doe.holdout import OVERALL
+from explorer.diagnosis.result import DiagnosisResult, ErrorRow, answers
 from explorer.report.content import Block, Bullets, Caution, Facts, Figure, Section, Table, Text
 from explorer.report.diagnosis.charts import likely, probability_chart
 from explorer.report.diagnosis.evidence import strained
-from explorer.report.diagnosis.findings import (
-    NOTHING,
-    OUTSIDE,
-    OVERALL,
-    Plain,
-    added,
+from explorer.report.diagnosis.wording import (
     amplitudes_of,
-    answers,
     chance,
-    confirmation,
-    effect_row,
     feature_in,
     feature_label,
     feature_value,
-    kind_of,
     literature_bound,
     members,
     model_words,
-    named,
-    overall,
-    probabilities,
-    probability,
     share_of_bound,
     size_text,
     spelled,
@@ -54,7 +44,7 @@ MOST_LEVERS = 6
 # In short
 
 
-def in_short(result: Plain) -> Section:
+def in_short(result: DiagnosisResult) -> Section:
     """The answer for a reader who reads nothing else."""
     blocks: list[Block] = [
         Text(verdict_sentence(result)),
@@ -62,7 +52,7 @@ def in_short(result: Plain) -> Section:
         Figure(
             "probabilities",
             probability_chart(result),
-            f"Probability of each answer; dashed: {percent(result['threshold'])}, from which on an effect is named.",
+            f"Probability of each answer; dashed: {percent(result.threshold)}, from which on an effect is named.",
         ),
         _probability_table(result),
     ]
@@ -71,36 +61,36 @@ def in_short(result: Plain) -> Section:
     return Section("In short", tuple(blocks))
 
 
-def verdict_sentence(result: Plain) -> str:
+def verdict_sentence(result: DiagnosisResult) -> str:
     """The verdict for an engineer, with what held-out data say of it."""
-    if result["taken_back"]:
-        return _taken_back(result)
-    match kind_of(result):
+    if result.taken_back and result.held_out is not None:
+        return _taken_back(result, result.held_out)
+    match result.kind:
         case "no_missing_effect":
-            best = probabilities(result)[1]
+            best = result.ranked()[1]
             return (
                 "Nothing is missing that these data could show: the calibrated declared model explains them, with "
-                f"probability {_sure(probability(result, NOTHING))}. The next answer is {spelled(best[0])}, "
+                f"probability {_sure(result.probability(NO_EFFECT))}. The next answer is {spelled(best[0])}, "
                 f"{chance(best[1])}."
             )
         case "effect":
-            (name,) = named(result)
+            (name,) = result.named
             return (
-                f"The declared model lacks {code(name)}, with probability {_sure(probability(result, name))}. It "
+                f"The declared model lacks {code(name)}, with probability {_sure(result.probability(name))}. It "
                 f"agrees with the fitted data at {_amplitudes(result, name)}. {confirmation_sentence(result)}"
             )
         case "effects":
-            (pair,) = named(result)
+            (pair,) = result.named
             return (
                 f"The declared model lacks two effects at once, {spelled(pair)}, with probability "
-                f"{_sure(probability(result, pair))}; no single effect comes near. They agree with the fitted data at "
+                f"{_sure(result.probability(pair))}; no single effect comes near. They agree with the fitted data at "
                 f"{_amplitudes(result, pair)}. {confirmation_sentence(result)}"
             )
         case "ambiguous":
-            left = [f"{spelled(one)} ({chance(probability(result, one))})" for one in answers(result["verdict"])]
+            left = [f"{spelled(one)} ({chance(result.probability(one))})" for one in answers(result.verdict)]
             opening = (
                 "These data"
-                if NOTHING in answers(result["verdict"])
+                if NO_EFFECT in answers(result.verdict)
                 else "The declared model lacks something; these data"
             )
             return f"{opening} leave {len(left)} answers: {enumeration(left)}. {_asked_for(result)}"
@@ -108,14 +98,14 @@ def verdict_sentence(result: Plain) -> str:
             return f"{_unexplained(result)} {_sits(result)}"
 
 
-def confirmation_sentence(result: Plain) -> str:
+def confirmation_sentence(result: DiagnosisResult) -> str:
     """What conditions that were not fitted say, by fresh simulations."""
-    row = overall(result, "holdout")
+    row = result.overall("holdout")
     if row is None:
         return "No condition was held out, so nothing independent confirms it."
     numbers = (
-        f"from {feature_value(result, OVERALL, row['before'])} to {feature_value(result, OVERALL, row['after'])}, "
-        f"where noise alone gives {feature_value(result, OVERALL, row['noise_floor'])}"
+        f"from {feature_value(result, OVERALL, row.before)} to {feature_value(result, OVERALL, row.after)}, "
+        f"where noise alone gives {feature_value(result, OVERALL, row.noise_floor)}"
     )
     return {
         "no holdout": "",
@@ -123,66 +113,66 @@ def confirmation_sentence(result: Plain) -> str:
         "confirmed": f"On data that were not fitted the error falls {numbers}.",
         "not certain": f"On data that were not fitted the error goes {numbers}; noise may make that gain.",
         "not confirmed": f"The held-out data do not confirm it: there the error goes {numbers}.",
-    }[confirmation(result)]
+    }[result.confirmed()]
 
 
-def cautions(result: Plain) -> list[str]:
+def cautions(result: DiagnosisResult) -> list[str]:
     """What keeps the numbers of this diagnosis from meaning more than they do, one sentence each."""
     found = []
-    state = confirmation(result)
+    state = result.confirmed()
     if state == "no holdout":
         found.append(
             "Without held-out data the error after is counted on the data that chose the model; it is smaller than on "
             "new ones."
         )
-    if state == "not confirmed" and named(result):
+    if state == "not confirmed" and result.named:
         found.append(
             "The correction does not carry over to the held-out conditions. The effect may stand in for another one, "
             "or its amplitude may depend on the set-up; do not use the corrected model beyond the fitted conditions."
         )
-    row = overall(result, "holdout")
-    if row is not None and (row["ratio"] or 0.0) > FAR:
-        model = "even the final model" if added(result) else "the declared model"
+    row = result.overall("holdout")
+    if row is not None and row.ratio > FAR:
+        model = "even the final model" if result.added else "the declared model"
         found.append(
-            f"On held-out data {model} is {fixed(row['ratio'], 1)} times as far off as noise alone "
+            f"On held-out data {model} is {fixed(row.ratio, 1)} times as far off as noise alone "
             "makes it: it does not hold for those conditions as it does for the fitted ones."
         )
     found += strained(result)
-    final = effect_row(result, result["final"])
+    final = result.effect_row(result.final)
     if final is not None:
         found += [
-            f"{code(one['effect'])} fits best at the largest amplitude that was considered; the true one may be "
+            f"{code(one.effect)} fits best at the largest amplitude that was considered; the true one may be "
             "larger, and the interval is cut there."
-            for one in final["amplitudes"]
-            if one["at_end"]
+            for one in final.amplitudes
+            if one.at_end
         ]
-    if result["scatter"] > WIDE:
+    if result.scatter > WIDE:
         found.append(
-            f"Measured pours scatter with {fixed(result['scatter'])} times the variance of simulated ones. The noise "
+            f"Measured pours scatter with {fixed(result.scatter)} times the variance of simulated ones. The noise "
             "of the data is widened by that; something in the model or in the measurement differs in scatter, not only "
             "in the mean."
         )
-    broken = {name: result["confirmation"][name]["broken"] for name in ("before", "after")}
-    if max(broken.values()):
+    before, after = result.confirmation.before.broken, result.confirmation.after.broken
+    if max(before, after):
         found.append(
-            f"Fresh pours that broke off or left nothing to be read: {broken['before']} of the declared model, "
-            f"{broken['after']} of the final one. Means are those of the others."
+            f"Fresh pours that broke off or left nothing to be read: {before} of the declared model, "
+            f"{after} of the final one. Means are those of the others."
         )
     return found
 
 
-def limits(result: Plain) -> list[str]:
+def limits(result: DiagnosisResult) -> list[str]:
     """What the answer leaves open."""
     found = [
-        f"Only {len(result['ranges'])} effects were considered, and pairs of them only where something "
+        f"Only {len(result.ranges)} effects were considered, and pairs of them only where something "
         "outside the library would else be likely; whatever else is missing is found as `unexplained` at best."
     ]
-    kind = kind_of(result)
+    kind = result.kind
     if kind == "no_missing_effect":
         found.append(
             "Not found is not absent: the section on what could have been seen says how weak an effect may hide."
         )
-    if added(result):
+    if result.added:
         found.append(
             "An effect outside the library that changes the same features in the same proportions would look the same."
         )
@@ -198,135 +188,135 @@ def limits(result: Plain) -> list[str]:
     return found
 
 
-def _taken_back(result: Plain) -> str:
-    fitted, told = answers(result["taken_back"]), result["held_out"]
-    first = " or ".join(f"{spelled(one)} ({chance(probability(result, one))})" for one in fitted)
+def _taken_back(result: DiagnosisResult, told: HeldOut) -> str:
+    fitted = answers(result.taken_back)
+    first = " or ".join(f"{spelled(one)} ({chance(result.probability(one))})" for one in fitted)
     return (
         f"The fitted data give {first}, but the held-out data contradict it, so it is taken back: "
-        f"{feature_label(told['summary'])} of condition {told['condition']} is {fixed(told['farthest'], 1)} standard "
-        f"errors from fresh pours of {model_words(told['label'])} (p = {p_value(told['p'])}, corrected for the number "
+        f"{feature_label(told.summary)} of condition {told.condition} is {fixed(told.farthest, 1)} standard "
+        f"errors from fresh pours of {model_words(told.label)} (p = {p_value(told.p)}, corrected for the number "
         "of summaries). The answer is that something is missing or wrong that none of the effects explains in all "
-        f"conditions. {confirmation_sentence(result) if added(result) else ''}".rstrip()
+        f"conditions. {confirmation_sentence(result) if result.added else ''}".rstrip()
     )
 
 
-def _unexplained(result: Plain) -> str:
-    best, p = probabilities(result)[0]
-    row = effect_row(result, best)
+def _unexplained(result: DiagnosisResult) -> str:
+    best, p = result.ranked()[0]
+    row = result.effect_row(best)
     if row is not None:
         return (
             f"The declared model lacks something. {spelled(best)} comes nearest ({chance(p)}), and yet does not "
-            f"fit: data as far off it as these have p = {p_value(row['p'])}."
+            f"fit: data as far off it as these have p = {p_value(row.p)}."
         )
-    if best == OUTSIDE:
+    if best == UNEXPLAINED:
         return (
-            f"The declared model lacks something that none of the {len(result['ranges'])} effects explains, with "
+            f"The declared model lacks something that none of the {len(result.ranges)} effects explains, with "
             f"probability {_sure(p)}."
         )
     return "The calibrated declared model does not fit the data, and no effect comes nearer to them."
 
 
-def _sits(result: Plain) -> str:
+def _sits(result: DiagnosisResult) -> str:
     """Where the residual is, in a sentence."""
-    worst = result["where"][0]
+    worst = result.where[0]
     return (
-        f"{percent(worst['share'])} of the squared residual is in condition {worst['condition']}; farthest off there "
-        f"is {feature_label(worst['feature'])}, by {signed(worst['z'], 1)} σ."
+        f"{percent(worst.share)} of the squared residual is in condition {worst.condition}; farthest off there "
+        f"is {feature_label(worst.feature)}, by {signed(worst.z, 1)} σ."
     )
 
 
-def _amplitudes(result: Plain, label: str) -> str:
-    row = effect_row(result, label)
+def _amplitudes(result: DiagnosisResult, label: str) -> str:
+    row = result.effect_row(label)
     assert row is not None
     found = [
-        f"{amplitudes_of([one for one in row['amplitudes'] if one['effect'] == name])}, {share} of the strongest that "
+        f"{amplitudes_of([one for one in row.amplitudes if one.effect == name])}, {share} of the strongest that "
         "the literature supports"
         for name, share in zip(members(label), _of_bounds(row), strict=True)
     ]
     return "; and ".join(found)
 
 
-def _of_bounds(row: Plain) -> list[str]:
+def _of_bounds(row: EffectRow) -> list[str]:
     """Amplitudes over the strongest that the literature supports, effect by effect."""
-    values = {
-        name: [one["value"] for one in row["amplitudes"] if one["effect"] == name] for name in members(row["name"])
-    }
+    values = {name: [one.value for one in row.amplitudes if one.effect == name] for name in members(row.name)}
     return [percent(share_of_bound(name, own)) for name, own in values.items()]
 
 
-def _asked_for(result: Plain) -> str:
-    if not result["next_experiment"]:
+def _asked_for(result: DiagnosisResult) -> str:
+    if not result.next_experiment:
         return "No change of the rig that was tried would tell them apart."
-    first = result["next_experiment"][0]
-    best, pours = first["experiment"], first["pours"]
-    chance = percent(best["chance"])
-    return f"{pours} pours of {code(best['name'])} would single out the right one with a chance of {chance}."
+    first = result.next_experiment[0]
+    best, pours = first.experiment, first.pours
+    chance = percent(best.chance)
+    return f"{pours} pours of {code(best.name)} would single out the right one with a chance of {chance}."
 
 
-def _facts(result: Plain) -> list[tuple[str, str]]:
-    compared = {row["condition"]: row["features"] for row in result["offered"]}
+def _facts(result: DiagnosisResult) -> list[tuple[str, str]]:
+    compared = {row.condition: row.features for row in result.offered}
     measured = ", ".join(
-        f"{row['condition']} ({'fitted' if row['role'] == 'fit' else 'held out'}, {row['replicates']} pours, "
+        f"{row.condition} ({'fitted' if row.role == 'fit' else 'held out'}, {row.replicates} pours, "
         + (
-            f"{compared[row['condition']]} features compared)"
-            if row["condition"] in compared
-            else f"{len(row['summaries'])} summaries predicted)"
+            f"{compared[row.condition]} features compared)"
+            if row.condition in compared
+            else f"{len(row.summaries)} summaries predicted)"
         )
-        for row in result["measured"]
+        for row in result.measured
     )
-    facts = [("Verdict", code(result["verdict"])), ("Measured", measured)]
-    row = effect_row(result, result["final"])
+    facts = [("Verdict", code(result.verdict)), ("Measured", measured)]
+    row = result.effect_row(result.final)
     if row is not None:
         bounds = "; ".join(
-            f"{code(name)} up to {literature_bound(name)} ({EFFECTS[name].literature})" for name in members(row["name"])
+            f"{code(name)} up to {literature_bound(name)} ({EFFECTS[name].literature})" for name in members(row.name)
         )
-        facts.append((f"Amplitude of {spelled(row['name'])}", _amplitudes(result, row["name"])))
+        facts.append((f"Amplitude of {spelled(row.name)}", _amplitudes(result, row.name)))
         facts.append(("Supported by the literature", bounds))
-    facts += [("Largest residual", f"{feature_in(one)}, {signed(one['z'])} σ") for one in _worst(result)]
-    for role, words in (("holdout", "Error on held-out data"), ("fit", "Error on fitted data")):
-        total = overall(result, role)
+    facts += [("Largest residual", f"{feature_in(one)}, {signed(one.z)} σ") for one in _worst(result)]
+    for words, total in (
+        ("Error on held-out data", result.overall("holdout")),
+        ("Error on fitted data", result.overall("fit")),
+    ):
         if total is not None:
             facts.append((words, _error_words(result, total)))
     facts.append(
         (
             "Rests on",
-            f"{result['pours']['settings']} simulated settings ({result['pours']['run']} pours run now, the others "
+            f"{result.pours.settings} simulated settings ({result.pours.run} pours run now, the others "
             "found in the store); errors by fresh pours, not by the regression",
         )
     )
     return facts
 
 
-def _worst(result: Plain) -> list[Plain]:
-    return sorted(result["where"], key=lambda one: -abs(one["z"]))[:1]
+def _worst(result: DiagnosisResult) -> list[Place]:
+    return sorted(result.where, key=lambda one: -abs(one.z))[:1]
 
 
-def _error_words(result: Plain, row: Plain) -> str:
-    floor = f"noise floor {feature_value(result, OVERALL, row['noise_floor'])}"
-    if not added(result):
-        inside = f"{percent(row['coverage_before'])} of the pours inside the model's 90 % interval"
-        return f"{feature_value(result, OVERALL, row['before'])}, {floor}; {inside}"
-    inside = f"{percent(row['coverage_before'])} → {percent(row['coverage_after'])}"
+def _error_words(result: DiagnosisResult, row: ErrorRow) -> str:
+    floor = f"noise floor {feature_value(result, OVERALL, row.noise_floor)}"
+    if not result.added:
+        inside = f"{percent(row.coverage_before)} of the pours inside the model's 90 % interval"
+        return f"{feature_value(result, OVERALL, row.before)}, {floor}; {inside}"
+    inside = f"{percent(row.coverage_before)} → {percent(row.coverage_after)}"
     return (
-        f"{feature_value(result, OVERALL, row['before'])} before, {feature_value(result, OVERALL, row['after'])} "
+        f"{feature_value(result, OVERALL, row.before)} before, {feature_value(result, OVERALL, row.after)} "
         f"after, {floor}; {inside} of the pours inside the model's 90 % interval"
     )
 
 
-def _probability_table(result: Plain) -> Table:
+def _probability_table(result: DiagnosisResult) -> Table:
     rows = []
     for answer, p in likely(result):
-        row = effect_row(result, answer)
+        row = result.effect_row(answer)
         if row is None:
             rows.append((spelled(answer), chance(p), MISSING, MISSING))
         else:
-            rows.append((spelled(answer), chance(p), amplitudes_of(row["amplitudes"]), ", ".join(_of_bounds(row))))
+            rows.append((spelled(answer), chance(p), amplitudes_of(row.amplitudes), ", ".join(_of_bounds(row))))
     rest = max(0.0, 1.0 - sum(p for _, p in likely(result)))
     rows.append(("all other answers together", chance(rest), MISSING, MISSING))
     return Table(
         ("answer", "probability", "amplitude", "of the literature's bound"),
         tuple(rows),
-        f"An effect is named from {percent(result['threshold'])} on.",
+        f"An effect is named from {percent(result.threshold)} on.",
     )
 
 
@@ -337,12 +327,12 @@ def _sure(p: float) -> str:
 # What else could look the same
 
 
-def rivals(result: Plain) -> Section:
+def rivals(result: DiagnosisResult) -> Section:
     """Effects that shift the data alike, and the experiments that would tell the answers apart."""
     blocks: list[Block] = [Text(_alike_words(result))]
     pairs = _alike(result)
     if pairs:
-        rows = tuple((code(a), code(b), signed(cosine), chance(probability(result, b))) for a, b, cosine in pairs)
+        rows = tuple((code(a), code(b), signed(cosine), chance(result.probability(b))) for a, b, cosine in pairs)
         header = ("effect", "looks like", "cosine", "probability of the latter")
         blocks.append(Table(header, rows, "Of the shifts by their best fits, after recalibration."))
     blocks += _ranked(result)
@@ -350,12 +340,12 @@ def rivals(result: Plain) -> Section:
     if names:
         blocks.append(Text("Experiments that reveal one effect by itself:"))
         blocks.append(Bullets(tuple(f"{code(name)}: {EFFECTS[name].lever}" for name in names)))
-    more = [f"{row['scan_would_add']} in {row['condition']}" for row in result["offered"] if row["scan_would_add"]]
+    more = [f"{row.scan_would_add} in {row.condition}" for row in result.offered if row.scan_would_add]
     if more:
         blocks.append(
             Text(f"Scans of the piles would add features: {enumeration(more)}. More features tell more answers apart.")
         )
-    if kind_of(result) == "unexplained":
+    if result.kind == "unexplained":
         blocks.append(
             Text(
                 "Before looking for new physics: pour the same set-up again, check scale and units of what was "
@@ -366,7 +356,7 @@ def rivals(result: Plain) -> Section:
     return Section("What else could look the same, and what would tell", tuple(blocks))
 
 
-def _alike_words(result: Plain) -> str:
+def _alike_words(result: DiagnosisResult) -> str:
     names = _asked(result)
     if not names:
         return (
@@ -383,37 +373,37 @@ def _alike_words(result: Plain) -> str:
     )
 
 
-def _alike(result: Plain) -> list[tuple[str, str, float]]:
+def _alike(result: DiagnosisResult) -> list[tuple[str, str, float]]:
     """Pairs (effect in the answer, other, cosine); among all effects where the answer names none."""
     names = set(_asked(result))
     found = []
-    for first, second, cosine in result["similar"]:
+    for first, second, cosine in result.similar:
         if abs(cosine) < ALIKE or (names and not names & {first, second}):
             continue
         found.append((first, second, cosine) if not names or first in names else (second, first, cosine))
     return found
 
 
-def _asked(result: Plain) -> list[str]:
+def _asked(result: DiagnosisResult) -> list[str]:
     """Single effects in the answer, also in one that was taken back."""
-    labels = [one for one in answers(result["taken_back"] or result["verdict"]) if one not in (NOTHING, OUTSIDE)]
+    labels = [one for one in answers(result.taken_back or result.verdict) if one not in (NO_EFFECT, UNEXPLAINED)]
     return list(dict.fromkeys(name for label in labels for name in members(label)))
 
 
-def _in_question(result: Plain) -> list[str]:
+def _in_question(result: DiagnosisResult) -> list[str]:
     """Effects in the answer and those that look like them; none where it holds no effect."""
     names = _asked(result)
     return list(dict.fromkeys([*names, *(other for _, other, _ in _alike(result) if names)]))[:MOST_LEVERS]
 
 
-def _ranked(result: Plain) -> list[Block]:
+def _ranked(result: DiagnosisResult) -> list[Block]:
     rows = tuple(
         (
-            code(row["experiment"]["name"]),
-            f"{row['pours']} pours: {percent(row['experiment']['chance'])}",
-            f"{fixed(row['experiment']['separation'])} σ",
+            code(row.experiment.name),
+            f"{row.pours} pours: {percent(row.experiment.chance)}",
+            f"{fixed(row.experiment.separation)} σ",
         )
-        for row in result["next_experiment"]
+        for row in result.next_experiment
     )
     if not rows:
         return []
@@ -426,7 +416,7 @@ def _ranked(result: Plain) -> list[Block]:
             "Separation: distance of the two answers that are closest, in σ of one pour and of the prediction.",
         ),
     ]
-    if all(row["experiment"]["chance"] < FAIR for row in result["next_experiment"]):
+    if all(row.experiment.chance < FAIR for row in result.next_experiment):
         blocks.append(Caution("None of these set-ups is likely to tell the answers apart."))
     return blocks
 
@@ -434,13 +424,13 @@ def _ranked(result: Plain) -> list[Block]:
 # What could have been seen
 
 
-def could_have_seen(result: Plain) -> Section | None:
+def could_have_seen(result: DiagnosisResult) -> Section | None:
     """About which amplitude of every effect would have stood out; None where something was found."""
-    if kind_of(result) != "no_missing_effect":
+    if result.kind != "no_missing_effect":
         return None
     rows = []
-    for name in (one["name"] for one in result["ranges"]):
-        row = effect_row(result, name)
+    for name in (one.name for one in result.ranges):
+        row = result.effect_row(name)
         seen = (MISSING, MISSING)
         if row is not None:
             seen = f"{fixed(strength_at_end(result, row), 1)} σ", visible_from(result, row)
@@ -454,20 +444,20 @@ def could_have_seen(result: Plain) -> Section | None:
     return Section("What could have been seen", (Text(text), Table(header, tuple(rows), caption)))
 
 
-def strength_at_end(result: Plain, row: Plain) -> float:
+def strength_at_end(result: DiagnosisResult, row: EffectRow) -> float:
     """Shift [σ] by the largest amplitude of an effect's range, in proportion to that of its reference amplitude."""
-    return float(row["strength"]) * _end(result, row) / math.hypot(*row["reference"])
+    return float(row.strength) * _end(result, row) / math.hypot(*row.reference)
 
 
-def visible_from(result: Plain, row: Plain) -> str:
+def visible_from(result: DiagnosisResult, row: EffectRow) -> str:
     """The amplitude that shifts by ``VISIBLE``, in words; says so where the range ends before."""
     if strength_at_end(result, row) < VISIBLE:
         return "not for certain, even at its bound"
-    return size_text(row["name"], math.hypot(*row["reference"]) * VISIBLE / row["strength"])
+    return size_text(row.name, math.hypot(*row.reference) * VISIBLE / row.strength)
 
 
-def _end(result: Plain, row: Plain) -> float:
+def _end(result: DiagnosisResult, row: EffectRow) -> float:
     """Size of the end of the range in the direction of the reference amplitude."""
-    (bounds,) = (one for one in result["ranges"] if one["name"] == row["name"])
-    ends = zip(row["reference"], bounds["low"], bounds["high"], strict=True)
+    bounds = result.range_of(row.name)
+    ends = zip(row.reference, bounds.low, bounds.high, strict=True)
     return min(abs(low if one < 0.0 else high) for one, low, high in ends if one != 0.0)

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+import numpy.typing as npt
 from scipy import stats
 
+from doe.diagnose.result import NO_EFFECT, UNEXPLAINED, Residual
+from doe.residual_map import ResidualMap
+from explorer.diagnosis.result import DiagnosisResult, PileProfiles, Role
 from explorer.report.content import Spec
-from explorer.report.diagnosis.findings import NOTHING, OUTSIDE, Plain, feature_label, probabilities, spelled
+from explorer.report.diagnosis.wording import feature_label, spelled
 from explorer.report.figures.style import (
     ASSUMPTION,
     BELOW_TO_ABOVE,
@@ -36,16 +42,16 @@ MOST_RESIDUALS = 40
 """Features that are drawn; the table holds all."""
 
 
-def likely(result: Plain) -> list[tuple[str, float]]:
+def likely(result: DiagnosisResult) -> list[tuple[str, float]]:
     """The answers that are worth a row, the most probable first."""
-    found = probabilities(result)
+    found = result.ranked()
     return [one for k, one in enumerate(found) if k < FEWEST or one[1] >= LEAST]
 
 
-def probability_chart(result: Plain) -> Spec:
+def probability_chart(result: DiagnosisResult) -> Spec:
     """Probability of every answer that is worth a row, with the threshold for a name."""
     rows = likely(result)[::-1]
-    colours = {NOTHING: TARGET, OUTSIDE: DUMMY}
+    colours = {NO_EFFECT: TARGET, UNEXPLAINED: DUMMY}
     trace: Json = {
         "type": "bar",
         "orientation": "h",
@@ -59,18 +65,21 @@ def probability_chart(result: Plain) -> Spec:
         "yaxis": axis("", tickfont={"size": 12}),
         "bargap": 0.35,
         "showlegend": False,
-        "shapes": [vertical_line(100.0 * result["threshold"], DUMMY, dash="dash")],
+        "shapes": [vertical_line(100.0 * result.threshold, DUMMY, dash="dash")],
     }
     return chart([trace], layout, 110 + ROW_HEIGHT * len(rows))
 
 
-def error_chart(result: Plain, role: str) -> Spec:
+def error_chart(result: DiagnosisResult, role: Role) -> Spec:
     """Errors before and after divided by the noise floor, one row per observable."""
-    rows = [row for row in result["error"][role] if row["noise_floor"]][::-1]
-    names = [label(feature_label(row["observable"])) for row in rows]
+    rows = [row for row in result.error.of(role) if row.noise_floor > 0.0][::-1]
+    names = [label(feature_label(row.observable)) for row in rows]
     traces = [
-        points([row[key] / row["noise_floor"] for row in rows], names, words, colour, marker={"size": 10})
-        for key, words, colour in (("before", "before", BEFORE), ("after", "after", AFTER))
+        points(ratios, names, words, colour, marker={"size": 10})
+        for words, colour, ratios in (
+            ("before", BEFORE, [row.before / row.noise_floor for row in rows]),
+            ("after", AFTER, [row.after / row.noise_floor for row in rows]),
+        )
     ]
     layout: Json = {
         "xaxis": axis("error / noise floor", rangemode="tozero"),
@@ -80,31 +89,34 @@ def error_chart(result: Plain, role: str) -> Spec:
     return chart(traces, layout, 120 + ROW_HEIGHT * len(rows))
 
 
-def drawn_residuals(result: Plain) -> list[Plain]:
+def drawn_residuals(result: DiagnosisResult) -> tuple[Residual, ...]:
     """Rows of the features farthest off, before or after, in their own order."""
-    rows = result["residuals"]
-    sizes = [max(abs(row["z_before"]), abs(row["z_after"])) for row in rows]
+    rows = result.residuals
+    sizes = [max(abs(row.z_before), abs(row.z_after)) for row in rows]
     chosen = sorted(range(len(rows)), key=lambda k: -sizes[k])[:MOST_RESIDUALS]
-    return [rows[k] for k in sorted(chosen)]
+    return tuple(rows[k] for k in sorted(chosen))
 
 
-def residual_chart(result: Plain) -> Spec:
+def residual_chart(result: DiagnosisResult) -> Spec:
     """Residuals before and after [σ] with the bands that a right model keeps to."""
     rows = drawn_residuals(result)[::-1]
-    names = [label(f"{row['condition']} · {feature_label(row['feature'])}") for row in rows]
+    names = [label(f"{row.condition} · {feature_label(row.feature)}") for row in rows]
     traces: list[Json] = [
         {
             "type": "bar",
             "orientation": "h",
-            "x": [row[key] for row in rows],
+            "x": sizes,
             "y": names,
             "name": words,
             "marker": {"color": colour},
             "hovertemplate": "%{y}<br>%{x:+.2f} σ<extra>" + words + "</extra>",
         }
-        for key, words, colour in (("z_after", "after", AFTER), ("z_before", "before", BEFORE))
+        for words, colour, sizes in (
+            ("after", AFTER, [row.z_after for row in rows]),
+            ("before", BEFORE, [row.z_before for row in rows]),
+        )
     ]
-    one, every = bands(len(result["residuals"]))
+    one, every = bands(len(result.residuals))
     layout: Json = {
         "xaxis": axis("measured − model [σ]", zeroline=True),
         "yaxis": axis("", tickfont={"size": 11}),
@@ -125,18 +137,21 @@ def bands(features: int) -> tuple[float, float]:
     return float(stats.norm.isf(0.025)), float(stats.norm.isf(0.025 / features))
 
 
-def pile_chart(picture: Plain) -> Spec:
+def pile_chart(picture: PileProfiles) -> Spec:
     """Profiles of one condition, mirrored about the middle, each with a band of one standard deviation [mm]."""
-    radius = [MM * r for r in picture["radius"]]
+    radius = [MM * r for r in picture.radius.tolist()]
     x = [-r for r in reversed(radius)] + radius
     traces: list[Json] = []
-    for key, colour, dash in (("measured", MEASURED, "solid"), ("before", BEFORE, "dot"), ("after", AFTER, "dash")):
-        profile = picture[key]
-        mean = [None if h is None else MM * h for h in _mirrored(profile["mean"])]
+    for words, profile, colour, dash in (
+        ("measured", picture.measured, MEASURED, "solid"),
+        ("before", picture.before, BEFORE, "dot"),
+        ("after", picture.after, AFTER, "dash"),
+    ):
+        mean = [MM * h if math.isfinite(h) else None for h in _mirrored(profile.mean)]
         known = [
             (at, MM * (middle - spread), MM * (middle + spread))
-            for at, middle, spread in zip(x, _mirrored(profile["mean"]), _mirrored(profile["sd"]), strict=True)
-            if middle is not None and spread is not None
+            for at, middle, spread in zip(x, _mirrored(profile.mean), _mirrored(profile.sd), strict=True)
+            if math.isfinite(middle) and math.isfinite(spread)
         ]
         traces.append(
             {
@@ -149,11 +164,11 @@ def pile_chart(picture: Plain) -> Spec:
                 "line": {"width": 0},
                 "hoverinfo": "skip",
                 "showlegend": False,
-                "name": f"{key} ± sd",
+                "name": f"{words} ± sd",
             }
         )
         stroke = line(colour, dash, 2.2)
-        traces.append({"type": "scatter", "mode": "lines", "x": x, "y": mean, "name": key, "line": stroke})
+        traces.append({"type": "scatter", "mode": "lines", "x": x, "y": mean, "name": words, "line": stroke})
     layout: Json = {
         "xaxis": axis("distance from the pile's middle [mm]"),
         "yaxis": axis("mean height [mm]", scaleanchor="x", rangemode="tozero"),
@@ -161,30 +176,30 @@ def pile_chart(picture: Plain) -> Spec:
     return chart(traces, layout, 320)
 
 
-def map_chart(picture: Plain) -> Spec:
+def map_chart(picture: ResidualMap) -> Spec:
     """Measured minus poured height over the plate [mm], before and after, with lines of the measured height."""
-    measured = MM * np.array(picture["measured"])
+    measured = MM * picture.measured
     n = len(measured)
-    at = (MM * picture["pixel"] * (np.arange(n) + 0.5 - n / 2)).round(3).tolist()
-    steps = {key: MM * np.array(picture[key]["height"]) for key in ("before", "after")}
-    reach = max(float(np.abs(step).max()) for step in steps.values()) or 1.0
+    at = (MM * picture.pixel * (np.arange(n) + 0.5 - n / 2)).round(3).tolist()
+    differences = (("before", picture.before), ("after", picture.after))
+    reach = max(float(np.abs(MM * one.height).max()) for _, one in differences) or 1.0
     colours: Json = {"colorscale": BELOW_TO_ABOVE, "cmin": -reach, "cmax": reach}
     layout: Json = {
         "coloraxis": colours | {"colorbar": {"title": {"text": "measured − model [mm]"}}},
         "showlegend": False,
     }
     traces: list[Json] = []
-    for panel, (key, step) in enumerate(steps.items()):
+    for panel, (words, difference) in enumerate(differences):
         axes = {"xaxis": f"x{suffix(panel)}", "yaxis": f"y{suffix(panel)}"}
         # Rows of a map go along x, rows of a heat map along y.
         traces.append(
             {
                 "type": "heatmap",
-                "name": key,
+                "name": words,
                 "x": at,
                 "y": at,
-                "z": step.T.round(3).tolist(),
-                "customdata": np.array(picture[key]["z"]).T.round(1).tolist(),
+                "z": (MM * difference.height).T.round(3).tolist(),
+                "customdata": difference.z.T.round(1).tolist(),
                 "coloraxis": "coloraxis",
                 "hovertemplate": "x %{x:.0f} mm, y %{y:.0f} mm<br>%{z:+.2f} mm, %{customdata:+.1f} σ<extra></extra>",
             }
@@ -193,11 +208,11 @@ def map_chart(picture: Plain) -> Spec:
         heights: Json = {"type": "contour", "x": at, "y": at, "z": measured.T.round(2).tolist(), "ncontours": 6}
         lines: Json = {"contours": {"coloring": "none"}, "line": {"width": 0.8, "color": INK}, "hoverinfo": "skip"}
         traces.append(heights | lines | {"showscale": False} | axes)
-        title = f"x [mm], {key}"
+        title = f"x [mm], {words}"
         layout[f"xaxis{suffix(panel)}"] = axis(title, domain=side_by_side(2, 0.1)[panel], anchor=f"y{suffix(panel)}")
         layout[f"yaxis{suffix(panel)}"] = axis("y [mm]", scaleanchor=f"x{suffix(panel)}", anchor=f"x{suffix(panel)}")
     return chart(traces, layout, 380)
 
 
-def _mirrored(values: list[float | None]) -> list[float | None]:
-    return [*reversed(values), *values]
+def _mirrored(values: npt.NDArray[np.float64]) -> list[float]:
+    return [*reversed(values.tolist()), *values.tolist()]

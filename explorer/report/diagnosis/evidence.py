@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from doe.diagnose.result import BASE, EffectRow
+from doe.holdout import OVERALL
+from doe.residual_map import ResidualMap
+from explorer.diagnosis.result import DiagnosisResult, ErrorRow, PileProfiles, Role
 from explorer.report.content import Block, Caution, Figure, Folded, Section, Table, Text
 from explorer.report.diagnosis.charts import bands, drawn_residuals, error_chart, map_chart, pile_chart, residual_chart
-from explorer.report.diagnosis.findings import (
-    BASE,
-    OVERALL,
-    Plain,
-    added,
+from explorer.report.diagnosis.wording import (
     amplitudes_of,
     chance,
     feature_label,
@@ -57,16 +59,16 @@ ERROR_CAPTION = (
 )
 
 
-def error(result: Plain) -> Section:
+def error(result: DiagnosisResult) -> Section:
     """Tables for held-out and fitted conditions; the held-out ones come first and open."""
     blocks: list[Block] = []
-    if added(result):
+    if result.added:
         blocks.append(Text(f"After: {final_model(result)}."))
     else:
         blocks.append(
             Text("No effect was added, so before and after are the same model, and there is no skill to state.")
         )
-    if result["error"]["holdout"]:
+    if result.error.holdout:
         blocks += [
             Text("On held-out conditions, which no model was fitted to:"),
             _error_table(result, "holdout", ERROR_CAPTION),
@@ -83,81 +85,81 @@ def error(result: Plain) -> Section:
     return Section("Error before and after", tuple(blocks))
 
 
-def _error_table(result: Plain, role: str, caption: str) -> Table:
-    return Table(ERROR_HEADER, tuple(_error_row(result, row) for row in result["error"][role]), caption)
+def _error_table(result: DiagnosisResult, role: Role, caption: str) -> Table:
+    return Table(ERROR_HEADER, tuple(_error_row(result, row) for row in result.error.of(role)), caption)
 
 
-def _error_row(result: Plain, row: Plain) -> tuple[str, ...]:
-    name = row["observable"]
-    known = added(result) and row["skill_low"] is not None
-    interval = f"{fixed(row['skill_low'])} … {fixed(row['skill_high'])}" if known else MISSING
+def _error_row(result: DiagnosisResult, row: ErrorRow) -> tuple[str, ...]:
+    name = row.observable
+    known = result.added and math.isfinite(row.skill_low)
+    interval = f"{fixed(row.skill_low)} … {fixed(row.skill_high)}" if known else MISSING
     return (
         feature_label(name) + (" (in measured σ)" if name == OVERALL else ""),
-        *(feature_value(result, name, row[key]) for key in ("before", "after", "noise_floor")),
-        fixed(row["ratio"]),
-        fixed(row["skill"]) if added(result) else MISSING,
+        *(feature_value(result, name, one) for one in (row.before, row.after, row.noise_floor)),
+        fixed(row.ratio),
+        fixed(row.skill) if result.added else MISSING,
         interval,
-        percent(row["coverage_before"]),
-        percent(row["coverage_after"]),
+        percent(row.coverage_before),
+        percent(row.coverage_after),
     )
 
 
-def pile(result: Plain) -> Section | None:
+def pile(result: DiagnosisResult) -> Section | None:
     """A picture per condition that has profiles, held-out ones first; None where none has."""
-    pictures = sorted(result["piles"], key=lambda row: row["role"] != "holdout")
+    pictures = sorted(result.piles, key=lambda row: row.role != "holdout")
     if not pictures:
         return None
     text = (
         "Mean height over the distance from the pile's own middle, mirrored; a band is one standard deviation between "
         "pours. Heights and radii have one scale."
     )
-    if not added(result):
+    if not result.added:
         text += " Before and after are the same model here."
     blocks: list[Block] = [Text(text)]
     for k, picture in enumerate(pictures, start=1):
-        blocks.append(Figure(f"pile-{k}", pile_chart(picture), f"Condition {picture['condition']}, {_role(picture)}."))
+        blocks.append(Figure(f"pile-{k}", pile_chart(picture), f"Condition {picture.condition}, {_role(picture)}."))
     return Section("The pile", tuple(blocks))
 
 
-def over_the_plate(result: Plain) -> Section | None:
+def over_the_plate(result: DiagnosisResult) -> Section | None:
     """Where in the scanned piles the residual sits; None without scans."""
-    if not result["maps"]:
+    if not result.maps:
         return None
     text = (
         "Mean measured height minus that of fresh pours, in pixels as wide as a body is thick; lines are the measured "
         "height. σ is the standard error of the difference by the scatter of measured and poured piles. A right model "
         "leaves about 1 σ everywhere."
     )
-    if not added(result):
+    if not result.added:
         text += " Before and after are the same model here."
     header = ("condition", "root mean square before", "after", "farthest off before, at x, y", "there before", "after")
-    rows = tuple(_map_row(picture) for picture in result["maps"])
+    rows = tuple(_map_row(picture) for picture in result.maps)
     figures = [
-        Figure(f"map-{k}", map_chart(picture), f"Condition {picture['condition']}, {_role(picture)}.")
-        for k, picture in enumerate(result["maps"], start=1)
+        Figure(f"map-{k}", map_chart(picture), f"Condition {picture.condition}, {_role(picture)}.")
+        for k, picture in enumerate(result.maps, start=1)
     ]
     caption = "Root mean squares where the measured pile is half a body high at least."
     return Section("Where in the pile it sits", (Text(text), *figures, Table(header, rows, caption)))
 
 
-def _map_row(picture: Plain) -> tuple[str, ...]:
+def _map_row(picture: ResidualMap) -> tuple[str, ...]:
     """Root mean squares where the pile is half a body high at least: the plate around it says nothing."""
-    before, after = (np.array(picture[key]["z"]) for key in ("before", "after"))
-    covered = np.array(picture["measured"]) >= 0.5 * picture["pixel"]
+    before, after = picture.before.z, picture.after.z
+    covered = picture.measured >= 0.5 * picture.pixel
     place = np.unravel_index(np.abs(before).argmax(), before.shape)
-    x, y = (1e3 * picture["pixel"] * (k + 0.5 - len(before) / 2) for k in place)
+    x, y = (1e3 * picture.pixel * (k + 0.5 - len(before) / 2) for k in place)
     means = (f"{fixed(float(np.sqrt((z[covered] ** 2).mean())) if covered.any() else 0.0)} σ" for z in (before, after))
     there = (f"{signed(float(z[place]))} σ" for z in (before, after))
-    return (picture["condition"], *means, f"{x:.0f}, {y:.0f} mm", *there)
+    return (picture.condition, *means, f"{x:.0f}, {y:.0f} mm", *there)
 
 
-def _role(picture: Plain) -> str:
-    return "held out" if picture["role"] == "holdout" else "fitted"
+def _role(picture: PileProfiles | ResidualMap) -> str:
+    return "held out" if picture.role == "holdout" else "fitted"
 
 
-def residuals(result: Plain) -> Section:
+def residuals(result: DiagnosisResult) -> Section:
     """Where the residual sits, the bar chart with its bands, and the numbers behind it."""
-    features, drawn = len(result["residuals"]), len(drawn_residuals(result))
+    features, drawn = len(result.residuals), len(drawn_residuals(result))
     one, every = bands(features)
     text = (
         "Measured mean minus model in units of σ, which holds the noise of the measured mean, the errors of the model "
@@ -178,26 +180,25 @@ def residuals(result: Plain) -> Section:
     )
 
 
-def _places(result: Plain) -> Table:
+def _places(result: DiagnosisResult) -> Table:
     rows = tuple(
-        (row["condition"], percent(row["share"]), feature_label(row["feature"]), f"{signed(row['z'])} σ")
-        for row in result["where"]
+        (row.condition, percent(row.share), feature_label(row.feature), f"{signed(row.z)} σ") for row in result.where
     )
     header = ("condition", "share of the squared residual", "feature farthest off", "measured − model")
     return Table(header, rows, "Of the calibrated declared model.")
 
 
-def _residual_table(result: Plain) -> Table:
+def _residual_table(result: DiagnosisResult) -> Table:
     rows = []
-    for row in result["residuals"]:
-        name = row["feature"]
-        values = (feature_value(result, name, row[key], 4) for key in ("measured", "before", "after"))
-        rows.append((row["condition"], feature_label(name), *values, signed(row["z_before"]), signed(row["z_after"])))
+    for row in result.residuals:
+        name = row.feature
+        values = (feature_value(result, name, one, 4) for one in (row.measured, row.before, row.after))
+        rows.append((row.condition, feature_label(name), *values, signed(row.z_before), signed(row.z_after)))
     header = ("condition", "feature", "measured", "before", "after", "residual before [σ]", "after [σ]")
     return Table(header, tuple(rows), "Models by the regression at their best fits.")
 
 
-def effects(result: Plain) -> Section:
+def effects(result: DiagnosisResult) -> Section:
     """What the data say of every effect, and beside it the range, literature and lever of each."""
     text = (
         "Log evidence: natural logarithm of the evidence for the effect, over all its amplitudes, signs and "
@@ -218,28 +219,28 @@ def effects(result: Plain) -> Section:
         "its strength",
         "pours",
     )
-    rows = tuple(_effect(row) for row in result["effects"])
+    rows = tuple(_effect(row) for row in result.effects)
     table = Table(header, rows, "The most probable first; amplitudes are posterior means.")
     return Section("Effects", (Text(text), table, _bounds(result)))
 
 
-def _effect(row: Plain) -> tuple[str, ...]:
-    alone = bool(row["reference"])
+def _effect(row: EffectRow) -> tuple[str, ...]:
+    alone = bool(row.reference)
     return (
-        spelled(row["name"]),
-        chance(row["probability"]),
-        signed(row["log_evidence"], 1),
-        amplitudes_of(row["amplitudes"]),
-        p_value(row["p"]),
-        f"{fixed(row['fitted_strength'], 1)} σ",
-        signed(row["cosine"]),
+        spelled(row.name),
+        chance(row.probability),
+        signed(row.log_evidence, 1),
+        amplitudes_of(row.amplitudes),
+        p_value(row.p),
+        f"{fixed(row.fitted_strength, 1)} σ",
+        signed(row.cosine),
         reference_text(row),
-        f"{fixed(row['strength'], 1)} σ" if alone else MISSING,
-        str(row["pours"]) if alone else MISSING,
+        f"{fixed(row.strength, 1)} σ" if alone else MISSING,
+        str(row.pours) if alone else MISSING,
     )
 
 
-def _bounds(result: Plain) -> Table:
+def _bounds(result: DiagnosisResult) -> Table:
     rows = tuple(
         (
             code(name),
@@ -248,25 +249,25 @@ def _bounds(result: Plain) -> Table:
             EFFECTS[name].literature,
             EFFECTS[name].lever,
         )
-        for name in (row["name"] for row in result["ranges"])
+        for name in (row.name for row in result.ranges)
     )
     header = ("effect", "range", "strongest supported", "by", "what reveals it")
     return Table(header, rows, "The range is that in which every condition can be set up.")
 
 
-def parameters(result: Plain) -> Section:
+def parameters(result: DiagnosisResult) -> Section:
     """Calibrated parameters without and with what is added, beside their measurement; a sentence for each far off."""
     rows = []
-    for row in result["parameters"]:
-        name = row["name"]
+    for row in result.parameters:
+        name = row.name
         measured = MISSING
-        if row["mean"] is not None:
-            measured = f"{parameter_value(name, row['mean'])} ± {parameter_value(name, row['sd'])}"
+        if row.mean is not None and row.sd is not None:
+            measured = f"{parameter_value(name, row.mean)} ± {parameter_value(name, row.sd)}"
         fits = (
-            f"{parameter_value(name, row[when])} ± {parameter_value(name, row[f'{when}_sd'])}"
-            for when in ("before", "after")
+            f"{parameter_value(name, value)} ± {parameter_value(name, sd)}"
+            for value, sd in ((row.before, row.before_sd), (row.after, row.after_sd))
         )
-        rows.append((parameter_label(name), measured, parameter_range(name, row["low"], row["high"]), *fits))
+        rows.append((parameter_label(name), measured, parameter_range(name, row.low, row.high), *fits))
     header = ("parameter", "measured", "range", "before", "after")
     text = (
         "Every model is compared with the data at all values that the measurement of a parameter allows, weighted by "
@@ -280,23 +281,21 @@ def parameters(result: Plain) -> Section:
     return Section("Parameters", tuple(blocks))
 
 
-def strained(result: Plain) -> list[str]:
+def strained(result: DiagnosisResult) -> list[str]:
     """A sentence for every parameter that the fit drives to an end of its range or far from its measured mean."""
     found = []
-    for row in result["parameters"]:
-        for when, model in (("before", BASE), ("after", result["final"])):
-            value = row[when]
-            if when == "after" and not added(result):
-                continue
+    for row in result.parameters:
+        models = ((BASE, row.before), (result.final, row.after))
+        for model, value in models if result.added else models[:1]:
             where = ""
-            if value in (row["low"], row["high"]):
-                where = f"at the {'lower' if value == row['low'] else 'upper'} end of its range"
-            elif row["mean"] is not None and abs(value - row["mean"]) > FAR_OFF * row["sd"]:
-                where = f"{fixed(abs(value - row['mean']) / row['sd'], 1)} standard deviations from its measurement"
+            if value in (row.low, row.high):
+                where = f"at the {'lower' if value == row.low else 'upper'} end of its range"
+            elif row.mean is not None and row.sd is not None and abs(value - row.mean) > FAR_OFF * row.sd:
+                where = f"{fixed(abs(value - row.mean) / row.sd, 1)} standard deviations from its measurement"
             if where:
                 found.append(
-                    f"To fit, {model_words(model)} needs {parameter_label(row['name'])} ({code(row['name'])}) {where}, "
-                    f"{parameter_value(row['name'], value)}. If the measurement is right, that is evidence against "
+                    f"To fit, {model_words(model)} needs {parameter_label(row.name)} ({code(row.name)}) {where}, "
+                    f"{parameter_value(row.name, value)}. If the measurement is right, that is evidence against "
                     "this model."
                 )
     return found

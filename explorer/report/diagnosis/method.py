@@ -4,22 +4,16 @@ from __future__ import annotations
 
 import shlex
 
+from doe.holdout import OVERALL
+from explorer.diagnosis.result import DiagnosisResult, answers
 from explorer.report.content import Block, Bullets, Code, Section, Table, Text
 from explorer.report.diagnosis.charts import likely
-from explorer.report.diagnosis.findings import (
-    OVERALL,
-    Plain,
-    added,
+from explorer.report.diagnosis.wording import (
     amplitudes_of,
-    answers,
     chance,
-    effect_row,
     feature_label,
     feature_value,
-    kind_of,
     model_words,
-    overall,
-    probability,
     spelled,
 )
 from explorer.report.units_for_people import (
@@ -35,23 +29,23 @@ from explorer.report.units_for_people import (
 OFFERS = {"scalars": "scalars", "profile": "scalars and height profiles", "scan": "scalars and scans of the surface"}
 
 
-def data(result: Plain) -> Section:
+def data(result: DiagnosisResult) -> Section:
     """Conditions, what each offers and what a scan would add, what is not used, and the scatter."""
-    offered = {row["condition"]: row for row in result["offered"]}
+    offered = {row.condition: row for row in result.offered}
     rows = []
-    for row in result["measured"]:
-        fitted = offered.get(row["condition"])
-        more = 0 if fitted is None else fitted["scan_would_add"]
+    for row in result.measured:
+        fitted = offered.get(row.condition)
+        more = 0 if fitted is None else fitted.scan_would_add
         rows.append(
             (
-                row["condition"],
-                "fitted" if row["role"] == "fit" else "held out",
-                row["rig"].replace("_", " "),
-                str(row["replicates"]),
-                "summaries" if fitted is None else OFFERS[fitted["offer"]],
-                str(len(row["summaries"]) if fitted is None else fitted["features"]),
+                row.condition,
+                "fitted" if row.role == "fit" else "held out",
+                row.rig.replace("_", " "),
+                str(row.replicates),
+                "summaries" if fitted is None else OFFERS[fitted.offer],
+                str(len(row.summaries) if fitted is None else fitted.features),
                 f"{more} features" if more else "nothing more",
-                enumeration([feature_label(name) for name in row["summaries"]]),
+                enumeration([feature_label(name) for name in row.summaries]),
             )
         )
     header = ("condition", "role", "rig", "pours", "offers", "compared", "a scan would add", "summaries")
@@ -62,13 +56,13 @@ def data(result: Plain) -> Section:
     )
     blocks: list[Block] = [Table(header, tuple(rows), caption)]
     for words, items in (
-        ("Not used:", result["data"]["ignored"]),
-        ("Changed in reading:", result["data"]["notes"]),
-        ("Offered, but left out because no pour varies or gives it:", list(map(_left_out, result["left_out"]))),
+        ("Not used:", result.data.ignored),
+        ("Changed in reading:", result.data.notes),
+        ("Offered, but left out because no pour varies or gives it:", list(map(_left_out, result.left_out))),
     ):
         if items:
             blocks += [Text(words), Bullets(tuple(items))]
-    scatter = result["scatter"]
+    scatter = result.scatter
     words = (
         "no more than simulated ones"
         if scatter <= 1.0
@@ -83,82 +77,79 @@ def _left_out(label: str) -> str:
     return f"{feature_label(feature)} ({condition})"
 
 
-def for_a_paper(result: Plain) -> Section:
+def for_a_paper(result: DiagnosisResult) -> Section:
     """Methods and result as two paragraphs of plain English."""
     return Section("For a paper", (Text(_methods(result)), Text(_result(result))))
 
 
-def _methods(result: Plain) -> str:
-    rule = {name: number(value) for name, value in result["rule"].items()}
+def _methods(result: DiagnosisResult) -> str:
+    rule = {name: number(value) for name, value in vars(result.rule).items()}
     conditions = enumeration(
-        [
-            f"{row['condition']} ({row['features']} features, {_pours(result, row['condition'])})"
-            for row in result["offered"]
-        ]
+        [f"{row.condition} ({row.features} features, {_pours(result, row.condition)})" for row in result.offered]
     )
-    moved = enumeration([parameter_label(row["name"]) for row in result["parameters"]])
+    moved = enumeration([parameter_label(row.name) for row in result.parameters])
     return (
         f"The measured pours of {conditions} were compared with discrete-element simulations of the declared model, "
-        f"alone and with each of {len(result['ranges'])} candidate effects. Features of the pile were whitened by the "
-        f"covariance of one simulated pour. A Bayesian linear regression on {result['pours']['settings']} simulated "
+        f"alone and with each of {len(result.ranges)} candidate effects. Features of the pile were whitened by the "
+        f"covariance of one simulated pour. A Bayesian linear regression on {result.pours.settings} simulated "
         "settings predicted them for every effect at any amplitude; the calibrated parameters "
         f"({moved}) were integrated out over their independent measurements. Prior probabilities were "
         f"{rule['prior_nothing']} that nothing is missing, {rule['prior_outside']} for something outside the library "
         f"and {rule['prior_pairs']} for two effects at once, the rest shared alike by the single effects; evidence was "
-        f"raised to the power {number(result['temperature'])}. An effect was named from a posterior probability of "
-        f"{number(result['threshold'])} on."
+        f"raised to the power {number(result.temperature)}. An effect was named from a posterior probability of "
+        f"{number(result.threshold)} on."
     )
 
 
-def _result(result: Plain) -> str:
-    if kind_of(result) == "unexplained" and not result["taken_back"]:
+def _result(result: DiagnosisResult) -> str:
+    if result.kind == "unexplained" and not result.taken_back:
         left = [answer for answer, _ in likely(result)]
     else:
-        left = answers(result["taken_back"] or result["verdict"])
-    odds = enumeration([f"{spelled(one)} {chance(probability(result, one))}" for one in left])
+        left = answers(result.taken_back or result.verdict)
+    odds = enumeration([f"{spelled(one)} {chance(result.probability(one))}" for one in left])
     sentence = f"The posterior probabilities were: {odds}."
     if len(left) == 1:
-        sentence = f"The posterior probability of {spelled(left[0])} was {chance(probability(result, left[0]))}."
-    row = effect_row(result, result["final"])
+        sentence = f"The posterior probability of {spelled(left[0])} was {chance(result.probability(left[0]))}."
+    row = result.effect_row(result.final)
     if row is not None:
         sentence += (
-            f" The amplitude of {spelled(row['name'])} was {amplitudes_of(row['amplitudes'])}; data as far off the "
-            f"best fit as these have p = {p_value(row['p'])}."
+            f" The amplitude of {spelled(row.name)} was {amplitudes_of(row.amplitudes)}; data as far off the "
+            f"best fit as these have p = {p_value(row.p)}."
         )
-    if kind_of(result) == "unexplained" and not result["taken_back"]:
-        best = effect_row(result, left[0])
-        rejected = "" if best is None else f" {spelled(left[0])} does not fit the data (p = {p_value(best['p'])})."
+    if result.kind == "unexplained" and not result.taken_back:
+        best = result.effect_row(left[0])
+        rejected = "" if best is None else f" {spelled(left[0])} does not fit the data (p = {p_value(best.p)})."
         sentence += f"{rejected} No effect of the library was accepted as an explanation."
-    total = overall(result, "holdout")
+    total = result.overall("holdout")
     if total is not None:
-        after = f", of the final model {feature_value(result, OVERALL, total['after'])}" if added(result) else ""
+        after = f", of the final model {feature_value(result, OVERALL, total.after)}" if result.added else ""
         sentence += (
             " On held-out conditions the root-mean-square error of the calibrated declared model, in standard "
-            f"deviations of a measured pour, was {feature_value(result, OVERALL, total['before'])}{after}, with a "
-            f"noise floor of {feature_value(result, OVERALL, total['noise_floor'])}."
+            f"deviations of a measured pour, was {feature_value(result, OVERALL, total.before)}{after}, with a "
+            f"noise floor of {feature_value(result, OVERALL, total.noise_floor)}."
         )
-    if result["taken_back"]:
-        told = result["held_out"]
+    told = result.held_out
+    if result.taken_back and told is not None:
         sentence += (
-            f" The held-out data contradicted that answer ({feature_label(told['summary'])} in {told['condition']}, "
-            f"p = {p_value(told['p'])}), and it was withdrawn."
+            f" The held-out data contradicted that answer ({feature_label(told.summary)} in {told.condition}, "
+            f"p = {p_value(told.p)}), and it was withdrawn."
         )
     return sentence
 
 
-def _pours(result: Plain, condition: str) -> str:
-    (pours,) = (row["replicates"] for row in result["measured"] if row["condition"] == condition)
+def _pours(result: DiagnosisResult, condition: str) -> str:
+    (pours,) = (row.replicates for row in result.measured if row.condition == condition)
     return f"{pours} pours"
 
 
-def how_reached(result: Plain) -> Section:
+def how_reached(result: DiagnosisResult) -> Section:
     """The method in six lines, with the numbers of its rules."""
-    rule = {name: number(value) for name, value in result["rule"].items()}
-    features = sum(row["features"] for row in result["offered"])
+    rule = {name: number(value) for name, value in vars(result.rule).items()}
+    features = sum(row.features for row in result.offered)
     lines = (
         f"The same {features} features are read from measured and simulated piles. Their far tails are drawn in, and "
         "they are whitened by the covariance of one simulated pour.",
-        f"{result['pours']['settings']} settings are poured: the declared model with its parameters moved, every "
+        f"{result.pours.settings} settings are poured: the declared model with its parameters moved, every "
         f"effect at an amplitude that shifts the data by about {rule['strong']} standard errors (or at the end of its "
         "range), and more of whatever stays in question.",
         "One regression over all pours gives every model at every amplitude, with its uncertainty. Parameters are "
@@ -166,51 +157,51 @@ def how_reached(result: Plain) -> Section:
         f"Probabilities follow from Student's t densities of the data, averaged over amplitudes, signs and directions, "
         f"and from the priors: {rule['prior_nothing']} for nothing missing, {rule['prior_outside']} for something "
         f"outside the library, {rule['prior_pairs']} for pairs, the rest for single effects. The temperature is "
-        f"{number(result['temperature'])}; below 1 the answer is less sure than the evidence says.",
-        f"What reaches {percent(result['threshold'])} is named if the data are likely under it (p ≥ {rule['fits']}). "
-        f"Else nothing is missing if that has {percent(result['rule']['nothing_at_once'])} or more "
-        f"({percent(result['rule']['nothing_from'])} after a follow-up), unexplained if something outside is the most "
+        f"{number(result.temperature)}; below 1 the answer is less sure than the evidence says.",
+        f"What reaches {percent(result.threshold)} is named if the data are likely under it (p ≥ {rule['fits']}). "
+        f"Else nothing is missing if that has {percent(result.rule.nothing_at_once)} or more "
+        f"({percent(result.rule.nothing_from)} after a follow-up), unexplained if something outside is the most "
         "probable, and ambiguous otherwise: the smallest set of answers that holds "
-        f"{percent(result['rule']['credible'])}.",
+        f"{percent(result.rule.credible)}.",
         "Fresh pours of the declared and the final model give the errors. Held-out data never choose; they take an "
         f"answer back where a summary contradicts it at p < {rule['contradicted']}, corrected for their number.",
     )
     blocks: list[Block] = [Bullets(lines)]
-    told = result["held_out"]
+    told = result.held_out
     if told is not None:
         blocks.append(
             Text(
-                f"Held-out data: farthest from fresh pours of {model_words(told['label'])} is "
-                f"{feature_label(told['summary'])} of {told['condition']}, by {fixed(told['farthest'], 1)} "
-                f"standard errors, p = {p_value(told['p'])}."
+                f"Held-out data: farthest from fresh pours of {model_words(told.label)} is "
+                f"{feature_label(told.summary)} of {told.condition}, by {fixed(told.farthest, 1)} "
+                f"standard errors, p = {p_value(told.p)}."
             )
         )
     return Section("How the answer was reached", tuple(blocks))
 
 
-def repeat(result: Plain) -> Section:
+def repeat(result: DiagnosisResult) -> Section:
     """The command that gives the same answer; pours that are in the store are not run again."""
-    pours = result["pours"]
+    pours = result.pours
     text = (
-        f"{pours['settings']} settings of the declared model and its effects, each poured in every fitted condition; "
-        f"{pours['run']} pours were run in {duration(result['timing']['total_s'])}, the others were in the store. "
+        f"{pours.settings} settings of the declared model and its effects, each poured in every fitted condition; "
+        f"{pours.run} pours were run in {duration(result.timing.total_s)}, the others were in the store. "
         "Pours have seeds of their own, so that the same order gives the same answer. `diagnosis.json` holds every "
         "number of this report."
     )
-    versions = tuple((name, version or "not installed") for name, version in result["versions"].items())
+    versions = tuple((name, version or "not installed") for name, version in result.versions.items())
     return Section("How to repeat", (Text(text), Code(command(result)), Table(("program", "version"), versions)))
 
 
-def command(result: Plain) -> str:
+def command(result: DiagnosisResult) -> str:
     """The order as a command line."""
-    order = result["order"]
-    parts = ["explorer", "diagnose", result["data"]["folder"], "--out", order["out"]]
-    if order["effects"]:
-        parts += ["--effects", ",".join(order["effects"])]
-    if order["budget"] is not None:
-        parts += ["--budget", str(order["budget"])]
-    if order["seed"]:
-        parts += ["--seed", str(order["seed"])]
-    if order["follow_up"]:
-        parts += ["--follow-up", order["follow_up"]]
+    order = result.order
+    parts = ["explorer", "diagnose", result.data.folder, "--out", order.out]
+    if order.effects:
+        parts += ["--effects", ",".join(order.effects)]
+    if order.budget is not None:
+        parts += ["--budget", str(order.budget)]
+    if order.seed:
+        parts += ["--seed", str(order.seed)]
+    if order.follow_up:
+        parts += ["--follow-up", order.follow_up]
     return shlex.join(parts)

@@ -7,20 +7,14 @@ from pathlib import Path
 
 import viser
 
+from doe.record import RecordError
 from explorer.background.result_file import ResultFile
 from explorer.diagnosis.process import RESULT, DiagnosisProcess, Question
+from explorer.diagnosis.result import DiagnosisResult
 from explorer.files.uploads import kept_measurements
 from explorer.report.diagnosis.answer import verdict_sentence
 from explorer.report.diagnosis.charts import likely
-from explorer.report.diagnosis.findings import (
-    Plain,
-    ResultVersionError,
-    chance,
-    checked,
-    feature_label,
-    feature_value,
-    spelled,
-)
+from explorer.report.diagnosis.wording import chance, feature_label, feature_value, spelled
 from explorer.report.diagnosis_plots import diagnosis_plots
 from explorer.viewer.actions import Post
 from explorer.viewer.study.candidates import Candidates
@@ -134,44 +128,42 @@ class DiagnosisPanel:
         folder = self._chooser.folder
         if folder is None:
             folder = self._diagnosis.out or next(iter(self._diagnosis.finished()), None)
-        result = self._file.read(folder)
+        content = self._file.read(folder)
         now = (folder, self._file.version)
         if now == self._shown:
             return
         self._shown = now
         try:
+            result = None if content is None else DiagnosisResult.from_dict(content)
             answer = "" if result is None else answer_markdown(result)
             plots = {} if result is None else diagnosis_plots(result)
-        except ResultVersionError as error:
+        except RecordError as error:
             answer, plots = escaped(f"{folder}: {error}"), {}
-        except (KeyError, IndexError, TypeError, ValueError) as error:
-            # A folder that somebody named may hold any JSON, also that of another version.
+        except (KeyError, IndexError, ValueError) as error:
+            # A folder that somebody named may hold names of effects, answers and conditions that are none.
             answer, plots = f"{escaped(str(folder))}: cannot be shown ({escaped(repr(error))})", {}
         self._answer.content = answer
         self._plots.offer(plots, now)
 
 
-def answer_markdown(result: Plain) -> str:
-    """The verdict in a sentence, the likely answers, and the errors before, after, and by noise alone.
-
-    Raises ResultVersionError for a result of another version of the program.
-    """
-    verdict, sentence = escaped(checked(result)["verdict"]), escaped(verdict_sentence(result).replace("`", ""))
+def answer_markdown(result: DiagnosisResult) -> str:
+    """The verdict in a sentence, the likely answers, and the errors before, after, and by noise alone."""
+    verdict, sentence = escaped(result.verdict), escaped(verdict_sentence(result).replace("`", ""))
     odds = "\n".join(
         f"| {escaped(spelled(one).replace('`', ''))} | {escaped(chance(p))} |" for one, p in _first(result)
     )
-    role, words = ("holdout", "held-out") if result["error"]["holdout"] else ("fit", "fitted")
+    errors, words = (result.error.holdout, "held-out") if result.error.holdout else (result.error.fit, "fitted")
     rows = "\n".join(
-        f"| {escaped(feature_label(row['observable']))} | "
+        f"| {escaped(feature_label(row.observable))} | "
         + " | ".join(
-            escaped(feature_value(result, row["observable"], row[key])) for key in ("before", "after", "noise_floor")
+            escaped(feature_value(result, row.observable, one)) for one in (row.before, row.after, row.noise_floor)
         )
         + " |"
-        for row in result["error"][role]
+        for row in errors
     )
     head = f"| Error on {words} data | Before | After | Noise floor |\n|:--|--:|--:|--:|"
     return f"**{verdict}** — {sentence}\n\n| Answer | Probability |\n|:--|--:|\n{odds}\n\n{head}\n{rows}"
 
 
-def _first(result: Plain) -> list[tuple[str, float]]:
+def _first(result: DiagnosisResult) -> list[tuple[str, float]]:
     return likely(result)[:ANSWERS]

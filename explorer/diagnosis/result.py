@@ -1,0 +1,285 @@
+"""What ``diagnosis.json`` holds: the answer, what it rests on, and the order that it came from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.declared.model import Effect
+from doe.diagnose.result import (
+    BASE,
+    NO_EFFECT,
+    UNEXPLAINED,
+    EffectRow,
+    HeldOut,
+    Level,
+    Model,
+    Offered,
+    ParameterRow,
+    Place,
+    Residual,
+    Suggestion,
+)
+from doe.holdout import OVERALL, HoldoutError
+from doe.record import Document, Record
+from doe.residual_map import ResidualMap
+
+FloatArray = npt.NDArray[np.float64]
+Role = Literal["fit", "holdout"]
+Kind = Literal["no_missing_effect", "effect", "effects", "ambiguous", "unexplained"]
+Confirmation = Literal["no holdout", "within noise", "confirmed", "not certain", "not confirmed"]
+
+
+@dataclass(frozen=True)
+class Probabilities(Record):
+    """That nothing is missing, and that something outside the library is; those of effects stand in their rows."""
+
+    nothing: float
+    outside: float
+
+
+@dataclass(frozen=True)
+class Rule(Record):
+    """Constants of the rule that the report tells (`doe.diagnose`)."""
+
+    prior_nothing: float
+    prior_outside: float
+    prior_pairs: float
+    fits: float
+    nothing_at_once: float
+    nothing_from: float
+    credible: float
+    contradicted: float
+    strong: float
+
+
+@dataclass(frozen=True)
+class ErrorRow(HoldoutError):
+    """An error with the unit of its observable, σ for all together."""
+
+    unit: str
+
+
+@dataclass(frozen=True)
+class Errors(Record):
+    """Errors by fresh pours on fitted and on held-out conditions, all observables together last; empty without such."""
+
+    fit: tuple[ErrorRow, ...]
+    holdout: tuple[ErrorRow, ...]
+
+    def of(self, role: Role) -> tuple[ErrorRow, ...]:
+        """The rows of one role."""
+        return self.holdout if role == "holdout" else self.fit
+
+
+@dataclass(frozen=True)
+class MeanAndDeviation(Record):
+    """Of several pours, number by number: mean and standard deviation, (k,)."""
+
+    mean: FloatArray
+    sd: FloatArray
+
+
+@dataclass(frozen=True)
+class PouredCondition(Record):
+    """Fresh pours of a model in one condition: how many could be read, mean and deviation of their summaries."""
+
+    condition: str
+    pours: int
+    mean: FloatArray
+    sd: FloatArray
+
+
+@dataclass(frozen=True)
+class PouredModel(Model):
+    """A calibrated model with its fresh pours. ``broken``: those that broke off or left nothing to be read."""
+
+    broken: int = field(kw_only=True)
+    conditions: tuple[PouredCondition, ...] = field(kw_only=True)
+
+
+@dataclass(frozen=True)
+class BeforeAndAfter(Record):
+    """The calibrated declared model and the final one; the same where nothing is added."""
+
+    before: PouredModel
+    after: PouredModel
+
+
+@dataclass(frozen=True)
+class MeasuredCondition(Record):
+    """A condition of the data. ``replicates``: measured pours."""
+
+    condition: str
+    role: Role
+    rig: str
+    replicates: int
+    summaries: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class PileProfiles(Record):
+    """Height [m] over the distance [m] from the pile's own middle in one condition, measured and poured."""
+
+    condition: str
+    role: Role
+    radius: FloatArray
+    measured: MeanAndDeviation
+    before: MeanAndDeviation
+    after: MeanAndDeviation
+
+
+@dataclass(frozen=True)
+class DataRead(Record):
+    """The folder that was read, what in it is not used, and what was changed in reading."""
+
+    folder: str
+    title: str
+    ignored: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Order(Record):
+    """What was asked for; no effects: all of them."""
+
+    out: str
+    effects: tuple[str, ...]
+    budget: int | None
+    seed: int
+    follow_up: str | None
+
+
+@dataclass(frozen=True)
+class PourCounts(Record):
+    """Pours that were run, not found in the store, and settings that were poured."""
+
+    run: int
+    settings: int
+
+
+@dataclass(frozen=True)
+class Duration(Record):
+    """Seconds in all."""
+
+    total_s: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiagnosisResult(Document):
+    """Everything that a diagnosis found: the content of ``diagnosis.json``. SI, residuals in σ.
+
+    Attributes
+    ----------
+    verdict, statement, names, taken_back, final
+        The answer (`doe.diagnose.verdict`): its kind with what is in it, a sentence, the effects or pairs in it, the
+        one that held-out data took back, the label of the final model.
+    probabilities, threshold, rule, temperature
+        How sure it is, and the numbers of the rule.
+    effects, levels, ranges, similar
+        What the data say of every effect, where each was poured, the ranges considered, and which look alike.
+    parameters, residuals, where, scatter, left_out, offered
+        The fit to the data, and what of them it rests on.
+    error, held_out, confirmation
+        Errors by fresh pours, what held-out data say of the final model, and both models.
+    next_experiment
+        The menu of follow-ups, the most telling first.
+    measured, piles, maps, data, units
+        The measured conditions; ``units``: of every summary.
+    order, pours, timing, versions
+        What was asked, what it took, and by which programs.
+    """
+
+    SCHEMA: ClassVar[int] = 3
+    NAME: ClassVar[str] = "diagnosis.json"
+
+    verdict: str
+    statement: str
+    names: tuple[str, ...]
+    probabilities: Probabilities
+    threshold: float
+    rule: Rule
+    temperature: float
+    taken_back: str
+    final: str
+    effects: tuple[EffectRow, ...]
+    levels: tuple[Level, ...]
+    ranges: tuple[Effect, ...]
+    parameters: tuple[ParameterRow, ...]
+    residuals: tuple[Residual, ...]
+    where: tuple[Place, ...]
+    similar: tuple[tuple[str, str, float], ...]
+    scatter: float
+    left_out: tuple[str, ...]
+    offered: tuple[Offered, ...]
+    error: Errors
+    held_out: HeldOut | None
+    next_experiment: tuple[Suggestion, ...]
+    confirmation: BeforeAndAfter
+    measured: tuple[MeasuredCondition, ...]
+    piles: tuple[PileProfiles, ...]
+    maps: tuple[ResidualMap, ...]
+    data: DataRead
+    order: Order
+    units: dict[str, str]
+    pours: PourCounts
+    timing: Duration
+    versions: dict[str, str | None]
+
+    @property
+    def kind(self) -> Kind:
+        """The kind of answer, without the names in it."""
+        head: Kind = self.verdict.partition(":")[0]  # type: ignore[assignment]
+        return head
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """The effects, or the pair "a+b", that the answer names; empty where it names none."""
+        return self.names if self.kind in ("effect", "effects") else ()
+
+    @property
+    def added(self) -> bool:
+        """Whether the final model holds an effect: before and after are the same model otherwise."""
+        return self.final != BASE
+
+    def ranked(self) -> list[tuple[str, float]]:
+        """Return every answer with its probability, the most probable first."""
+        found = {row.name: row.probability for row in self.effects}
+        found |= {NO_EFFECT: self.probabilities.nothing, UNEXPLAINED: self.probabilities.outside}
+        return sorted(found.items(), key=lambda one: -one[1])
+
+    def probability(self, answer: str) -> float:
+        """Return that of one answer; 0 of an effect that is so improbable that it has no row."""
+        return dict(self.ranked()).get(answer, 0.0)
+
+    def effect_row(self, label: str) -> EffectRow | None:
+        """Return the row of an effect or a pair; None where it has none."""
+        return next((row for row in self.effects if row.name == label), None)
+
+    def range_of(self, effect: str) -> Effect:
+        """Return the widest range of an effect's amplitudes."""
+        return next(one for one in self.ranges if one.name == effect)
+
+    def overall(self, role: Role) -> ErrorRow | None:
+        """Return the error of all observables together; None where the role has no condition."""
+        return next((row for row in self.error.of(role) if row.observable == OVERALL), None)
+
+    def confirmed(self) -> Confirmation:
+        """Return what the held-out conditions say of the final model, by its skill (`doe.holdout`)."""
+        row = self.overall("holdout")
+        if row is None:
+            return "no holdout"
+        if np.isnan(row.skill):
+            return "within noise"
+        if row.skill <= 0.0:
+            return "not confirmed"
+        return "confirmed" if row.skill_low > 0.0 else "not certain"
+
+
+def answers(verdict: str) -> list[str]:
+    """What a verdict leaves possible, the most probable first."""
+    kind, _, names = verdict.partition(":")
+    return names.split(",") if names else [kind]
