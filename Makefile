@@ -8,7 +8,7 @@ BIN := .venv/bin
 EXPLORER := $(BIN)/explorer
 
 .DEFAULT_GOAL := help
-.PHONY: help venv serve calibrate calibrate-quick diagnose test slow nightly pictures page-speed peers foreign golden clean
+.PHONY: help venv serve calibrate calibrate-quick diagnose test slow nightly pictures page-speed peers foreign rolling golden clean
 
 help: ## show this list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(firstword $(MAKEFILE_LIST)) | expand -t 18
@@ -56,6 +56,9 @@ page-speed: .venv/.ready ## frames, real-time factor and slider echo of the page
 
 foreign: .venv/.ready ## data sets poured by LIGGGHTS with effects that no file states, judged (an hour)
 	$(BIN)/python -m tests.peers.foreign_sets results/foreign.sqlite
+
+rolling: .venv/.ready ## trefoil_2's rolling friction poured by our solver and by LIGGGHTS, ten pairs (10 min)
+	$(BIN)/python -m tests.peers.rolling_pairs
 
 peers: .venv/.ready ## our solver against installed LIGGGHTS and YADE, with 18 pours each (hours)
 	$(BIN)/pytest tests/peers -m "slow or not slow" -s

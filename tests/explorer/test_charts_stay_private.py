@@ -45,7 +45,7 @@ def lab_page(folder):
 PAGES = {
     "study": lambda _: report_html(reported_studies.typed(reported_studies.result_of_case("two targets"))),
     "design": lambda _: design_html(run_analyse(AnalyseOrder("sunflower_extract", target=24.68))),
-    "diagnosis": lambda _: diagnosis_html(diagnosed.result_of_case("ambiguous")),
+    "diagnosis": lambda _: diagnosis_html(diagnosed.typed(diagnosed.result_of_case("ambiguous"))),
     "audit": lambda _: audit_html(audit_study(read_study(shipped_study()))),
     "lab": lab_page,
 }

@@ -10,8 +10,8 @@ import pytest
 from explorer.background.command_process import BackgroundError, CommandStatus
 from explorer.background.stage_progress import StageProgress
 from explorer.diagnosis.process import DiagnoseProcess, Question
+from explorer.diagnosis.result import DiagnosisResult
 from explorer.priority import BACKGROUND
-from explorer.report.diagnosis.findings import SCHEMA
 from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.study.diagnosis_panel import OWN, DiagnosisPanel, answer_markdown
@@ -19,7 +19,7 @@ from explorer.viewer.study.plot_view import NOTHING
 from solver import EFFECTS, AssetNotFoundError
 from solver.assets import measurement_folder, shipped_measurements
 from tests.explorer.background import only_folder, wait_for
-from tests.explorer.diagnosed import result_of_case
+from tests.explorer.diagnosed import result_of_case, typed
 
 PROGRAM = """
 import json, os, pathlib, sys, time
@@ -268,8 +268,13 @@ def test_effects_budget_and_queue_are_asked_for_on_the_page(server, tmp_path):
 def test_a_file_that_is_no_diagnosis_is_one_line(server, tmp_path):
     process, actions = FakeDiagnosis(), Actions()
     panel = DiagnosisPanel(server, process, shipped_measurements(), tmp_path / "uploads", actions.post)
-    (tmp_path / "diagnosis.json").write_text(json.dumps({"schema": SCHEMA, "verdict": "<script>"}))
+    (tmp_path / "diagnosis.json").write_text(json.dumps({"schema": DiagnosisResult.SCHEMA, "verdict": "<script>"}))
     process.out = tmp_path
+    panel.show("")
+    assert panel._answer.content.endswith("diagnosis.json: statement: is missing")
+    content = result_of_case("effect")
+    content["names"] = []
+    (tmp_path / "diagnosis.json").write_text(json.dumps(content))
     panel.show("")
     assert "cannot be shown" in panel._answer.content
     assert "<script>" not in panel._answer.content
@@ -290,7 +295,7 @@ def test_a_diagnosis_of_an_older_version_is_one_line(server, tmp_path):
 def test_the_answer_holds_probabilities_and_errors_before_after_and_by_noise_alone():
     for case, role in (("effect", "holdout"), ("no holdout", "fit")):
         result = result_of_case(case)
-        odds, _, errors = answer_markdown(result).partition("| Error on")
+        odds, _, errors = answer_markdown(typed(result)).partition("| Error on")
         shown = [line.strip("| ").split(" | ") for line in odds.splitlines() if line.startswith("| ")]
         assert shown[0] == ["Answer", "Probability"]
         first = result["effects"][0]

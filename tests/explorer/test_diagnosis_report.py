@@ -10,25 +10,23 @@ import pytest
 from scipy import stats
 
 from doe.diagnose.posterior import TEMPERATURE
-from explorer.diagnosis.run import SCHEMA as WRITTEN
+from doe.diagnose.result import Amplitude
+from doe.record import RecordError, VersionError
+from explorer.diagnosis.result import DiagnosisResult
+from explorer.report import diagnosis as report
 from explorer.report.content import Figure, Folded, Table
-from explorer.report.diagnosis import diagnosis_html, diagnosis_markdown, sections_of, write_diagnosis_report
-from explorer.report.diagnosis.answer import VISIBLE, cautions, verdict_sentence
+from explorer.report.diagnosis import answer, evidence, wording
+from explorer.report.diagnosis.answer import VISIBLE
 from explorer.report.diagnosis.charts import MOST_RESIDUALS, bands
-from explorer.report.diagnosis.evidence import strained
-from explorer.report.diagnosis.findings import (
-    SCHEMA,
+from explorer.report.diagnosis.wording import (
     SURFACE_LABELS,
-    ResultVersionError,
-    amplitude_text,
     chance,
     feature_label,
-    feature_value,
     size_text,
 )
 from solver import ASYMMETRY_NAMES, BULK_NAMES, HISTOGRAM_NAMES, PROFILE_NAMES, TEXTURE_NAMES
 from solver.effects import EFFECTS
-from tests.explorer.diagnosed import CASES, EXPECTED, HOSTILE, NAMES, SEEN_AS, result_of_case
+from tests.explorer.diagnosed import CASES, EXPECTED, HOSTILE, NAMES, SEEN_AS, result_of_case, typed
 
 
 @pytest.fixture(scope="module")
@@ -39,6 +37,21 @@ def results():
 @pytest.fixture(params=CASES)
 def result(request, results):
     return results[request.param]
+
+
+def of_content(make):
+    """``make`` of a result, for the content of its file."""
+    return lambda content, *more: make(typed(content), *more)
+
+
+diagnosis_html, diagnosis_markdown = of_content(report.diagnosis_html), of_content(report.diagnosis_markdown)
+sections_of, write_diagnosis_report = of_content(report.sections_of), of_content(report.write_diagnosis_report)
+cautions, verdict_sentence = of_content(answer.cautions), of_content(answer.verdict_sentence)
+strained, feature_value = of_content(evidence.strained), of_content(wording.feature_value)
+
+
+def amplitude_text(estimate):
+    return wording.amplitude_text(Amplitude.from_dict(estimate))
 
 
 def visible(page):
@@ -91,7 +104,7 @@ def test_every_kind_of_verdict_is_among_them(results):
 
 
 def test_what_is_written_is_what_is_read(result):
-    assert result["schema"] == WRITTEN == SCHEMA
+    assert typed(result).to_dict() == result
 
 
 def test_every_section_and_chart_is_on_the_page(result):
@@ -453,7 +466,8 @@ def test_features_read_as_words():
     assert {name: feature_label(name) for name in words} == words
 
 
-def test_every_feature_of_a_scan_has_words_and_a_unit():
+def test_every_feature_of_a_scan_has_words_and_a_unit(results):
+    diagnosis = typed(results["effect"])
     names = {*PROFILE_NAMES, *BULK_NAMES, *HISTOGRAM_NAMES, *TEXTURE_NAMES, *ASYMMETRY_NAMES}
     assert SURFACE_LABELS.keys() == names
     assert len(set(SURFACE_LABELS.values())) == len(names)
@@ -467,7 +481,7 @@ def test_every_feature_of_a_scan_has_words_and_a_unit():
         "skew_x_m": (-3e-4, "−0.3 mm"),
     }
     for name, (value, text) in values.items():
-        assert feature_value({"units": {}}, name, value) == text
+        assert wording.feature_value(diagnosis, name, value) == text
 
 
 def test_a_direction_round_the_plane_has_no_rounding_left_in_it():
@@ -522,14 +536,18 @@ def test_an_effect_that_fell_out_of_the_table_is_a_dash(results):
 
 
 @pytest.mark.parametrize(
-    ("schema", "maker"), [(1, "an older version"), (SCHEMA + 1, "another version"), (None, "another version")]
+    ("schema", "maker"), [(1, "an older version"), (4, "another version"), (None, "another version")]
 )
-def test_a_result_of_another_version_is_refused_in_one_line(results, tmp_path, schema, maker):
-    other = results["effect"] | {"schema": schema}
-    for refuse in (diagnosis_html, diagnosis_markdown, lambda result: write_diagnosis_report(result, tmp_path)):
-        with pytest.raises(ResultVersionError, match=rf"^diagnosis.json: made by {maker} of the program .*again$"):
-            refuse(other)
-    assert list(tmp_path.iterdir()) == []
+def test_a_result_of_another_version_is_refused_in_one_line(results, schema, maker):
+    with pytest.raises(VersionError, match=rf"^diagnosis.json: made by {maker} of the program .*again$"):
+        DiagnosisResult.from_dict(results["effect"] | {"schema": schema})
+
+
+def test_a_result_without_a_number_is_refused_in_one_line(results):
+    broken = copy.deepcopy(results["effect"])
+    del broken["effects"][0]["probability"]
+    with pytest.raises(RecordError, match=r"^diagnosis.json: effects\[0\].probability: is missing$"):
+        DiagnosisResult.from_dict(broken)
 
 
 def test_files_appear_complete_or_not_at_all(results, tmp_path):
@@ -537,7 +555,7 @@ def test_files_appear_complete_or_not_at_all(results, tmp_path):
     assert {path.name for path in tmp_path.iterdir()} == {"report.html", "report.md"}
     before = (tmp_path / "report.md").read_text(encoding="utf-8")
     broken = copy.deepcopy(results["effect"])
-    del broken["threshold"]
+    broken["effects"][0]["amplitudes"][0]["effect"] = "no such effect"
     with pytest.raises(KeyError):
         write_diagnosis_report(broken, tmp_path)
     assert (tmp_path / "report.md").read_text(encoding="utf-8") == before

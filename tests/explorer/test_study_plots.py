@@ -70,7 +70,7 @@ def test_texts_of_a_study_cannot_bring_markup():
 
 @pytest.mark.parametrize("case", sorted(diagnosed.CASES))
 def test_every_plot_of_every_kind_of_diagnosis_is_one_that_plotly_takes(case):
-    plots = diagnosis_plots(diagnosed.result_of_case(case))
+    plots = diagnosis_plots(diagnosed.typed(diagnosed.result_of_case(case)))
     assert next(iter(plots)) == "Probability of each answer"
     assert "Residuals before and after" in plots
     for plot in plots.values():

@@ -146,18 +146,21 @@ class ForeignAnswers(Answers):
             path = Path(folder) / INPUT
             path.write_text(recipe.text(path.read_text()))
             frame = run_liggghts(Path(folder)).final
-        owner = np.repeat(np.arange(deck.bodies), [len(deck.members(b)) for b in range(deck.bodies)])
-        members = np.bincount(owner)
-        low = np.bincount(owner, frame.position[:, 2]) / members < order.scene.rig.outlet_height
-        inside = np.abs(frame.position[:, :2]).max(axis=1) < order.scene.rig.domain_half_width
-        kept = low[owner] & inside
-        # A body that is half outside the domain is out.
-        whole = np.bincount(owner[kept], minlength=deck.bodies) == members
-        kept &= whole[owner]
-        centre, radius = frame.position[kept], frame.radius[kept]
-        pile = scanned_pile(order.scene, centre, radius, owner[kept])
+        centre, radius, owner = on_the_plate(order.scene, deck, frame)
+        pile = scanned_pile(order.scene, centre, radius, owner)
         read = observe_scan(pile, order.scene, dict.fromkeys(self.laboratory.readings))
         return Sample({name: float(x) for name, x in read.items()}, centre, radius)
+
+
+def on_the_plate(scene, deck, frame):
+    """Centre, radius and body of the spheres that have run out, of bodies that are wholly inside the domain."""
+    owner = np.repeat(np.arange(deck.bodies), [len(deck.members(b)) for b in range(deck.bodies)])
+    members = np.bincount(owner)
+    low = np.bincount(owner, frame.position[:, 2]) / members < scene.rig.outlet_height
+    kept = low[owner] & (np.abs(frame.position[:, :2]).max(axis=1) < scene.rig.domain_half_width)
+    # A body that is half outside the domain is out.
+    kept &= (np.bincount(owner[kept], minlength=deck.bodies) == members)[owner]
+    return frame.position[kept], frame.radius[kept], owner[kept]
 
 
 def main(store, numbers):

@@ -139,7 +139,7 @@ class DiagnosisPanel:
             plots = {} if result is None else diagnosis_plots(result)
         except RecordError as error:
             answer, plots = escaped(f"{folder}: {error}"), {}
-        except (KeyError, IndexError, ValueError) as error:
+        except (AssertionError, LookupError, ValueError) as error:
             # A folder that somebody named may hold names of effects, answers and conditions that are none.
             answer, plots = f"{escaped(str(folder))}: cannot be shown ({escaped(repr(error))})", {}
         self._answer.content = answer
