@@ -1,8 +1,8 @@
 """Is it the data, or this solver? The fitted condition of trefoil_2 with its true rolling friction, by both engines.
 
 ``make rolling``: every pour of this solver is repeated by LIGGGHTS with the same bodies at the same places, and what
-lies on the plate is read by the same code. Rows (SI) are in ``assets/validation/foreign/rolling_pairs.jsonl``; ten pairs
-take about 9 min on one core.
+lies on the plate is read by the same code. Rows (SI) are in ``assets/validation/foreign/rolling_pairs.jsonl``; ten
+pairs take about 9 min on one core.
 """
 
 import json
