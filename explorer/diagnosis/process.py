@@ -15,10 +15,11 @@ from doe.measurement.load import load_measurement
 from explorer.background.command_process import PROGRAM, BackgroundError, CommandProcess, CommandStatus
 from explorer.background.output_folders import finished, new_folder, newest_unfinished
 from explorer.background.waiting_line import WaitingLine
+from explorer.diagnosis.result import DiagnosisResult
 from solver import EFFECTS
 from solver.assets import measurement_folder
 
-RESULT = "diagnosis.json"
+RESULT = DiagnosisResult.NAME
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
@@ -24,11 +25,11 @@ from doe.diagnose.result import (
     Suggestion,
 )
 from doe.holdout import OVERALL, HoldoutError
+from doe.measurement.measurement import Role
 from doe.record import Document, Record
 from doe.residual_map import ResidualMap
 
 FloatArray = npt.NDArray[np.float64]
-Role = Literal["fit", "holdout"]
 Kind = Literal["no_missing_effect", "effect", "effects", "ambiguous", "unexplained"]
 Confirmation = Literal["no holdout", "within noise", "confirmed", "not certain", "not confirmed"]
 
@@ -69,6 +70,10 @@ class Errors(Record):
 
     fit: tuple[ErrorRow, ...]
     holdout: tuple[ErrorRow, ...]
+
+    def told(self) -> tuple[tuple[ErrorRow, ...], str]:
+        """Return the rows that are told first, and the word for their data: held-out ones, fitted ones without such."""
+        return (self.holdout, "held-out") if self.holdout else (self.fit, "fitted")
 
     def of(self, role: Role) -> tuple[ErrorRow, ...]:
         """The rows of one role."""
@@ -272,7 +277,7 @@ class DiagnosisResult(Document):
         row = self.overall("holdout")
         if row is None:
             return "no holdout"
-        if np.isnan(row.skill):
+        if math.isnan(row.skill):
             return "within noise"
         if row.skill <= 0.0:
             return "not confirmed"

@@ -113,7 +113,7 @@ def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> Diagnosis:
     text = json.dumps(result.to_dict(), ensure_ascii=False, allow_nan=False, indent=1)
     write_whole(order.out / result.NAME, text + "\n")
     write_diagnosis_report(result, order.out)
-    say(f"{order.out}/report.html, report.md, diagnosis.json")
+    say(f"{order.out}/report.html, report.md, {result.NAME}")
     if found.suggestions:
         write_next(order.out / "next", order.folder, measurement, found.suggestions[0])
         say(f"{order.out}/next: what to measure next, to be filled in; then --follow-up {order.out}/next")
@@ -189,7 +189,7 @@ def result_of(measurement: Measurement, order: DiagnoseOrder, found: Diagnosis, 
 
 def error_lines(result: DiagnosisResult) -> list[str]:
     """The table *before | after | noise floor* on held-out data, or on fitted data where there are none."""
-    rows, role = (result.error.holdout, "held-out") if result.error.holdout else (result.error.fit, "fitted")
+    rows, role = result.error.told()
     lines = [f"error on {role} data", f"{'observable':26} {'before':>10} {'after':>10} {'noise floor':>12}"]
     for row in rows:
         numbers = (row.before, row.after, row.noise_floor)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from functools import partial
 
-from explorer.diagnosis.result import DiagnosisResult, Role
+from doe.measurement.measurement import Role
+from explorer.diagnosis.result import DiagnosisResult
 from explorer.report.diagnosis.charts import error_chart, pile_chart, probability_chart, residual_chart
 from explorer.report.plot import Plot, Plots
 

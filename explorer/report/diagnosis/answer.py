@@ -446,7 +446,7 @@ def could_have_seen(result: DiagnosisResult) -> Section | None:
 
 def strength_at_end(result: DiagnosisResult, row: EffectRow) -> float:
     """Shift [σ] by the largest amplitude of an effect's range, in proportion to that of its reference amplitude."""
-    return float(row.strength) * _end(result, row) / math.hypot(*row.reference)
+    return row.strength * _end(result, row) / math.hypot(*row.reference)
 
 
 def visible_from(result: DiagnosisResult, row: EffectRow) -> str:

@@ -9,8 +9,9 @@ import numpy.typing as npt
 from scipy import stats
 
 from doe.diagnose.result import NO_EFFECT, UNEXPLAINED, Residual
+from doe.measurement.measurement import Role
 from doe.residual_map import ResidualMap
-from explorer.diagnosis.result import DiagnosisResult, PileProfiles, Role
+from explorer.diagnosis.result import DiagnosisResult, PileProfiles
 from explorer.report.content import Spec
 from explorer.report.diagnosis.wording import feature_label, spelled
 from explorer.report.figures.style import (

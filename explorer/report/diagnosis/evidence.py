@@ -8,8 +8,9 @@ import numpy as np
 
 from doe.diagnose.result import BASE, EffectRow
 from doe.holdout import OVERALL
+from doe.measurement.measurement import Role
 from doe.residual_map import ResidualMap
-from explorer.diagnosis.result import DiagnosisResult, ErrorRow, PileProfiles, Role
+from explorer.diagnosis.result import DiagnosisResult, ErrorRow, PileProfiles
 from explorer.report.content import Block, Caution, Figure, Folded, Section, Table, Text
 from explorer.report.diagnosis.charts import bands, drawn_residuals, error_chart, map_chart, pile_chart, residual_chart
 from explorer.report.diagnosis.wording import (

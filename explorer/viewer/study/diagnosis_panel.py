@@ -152,7 +152,7 @@ def answer_markdown(result: DiagnosisResult) -> str:
     odds = "\n".join(
         f"| {escaped(spelled(one).replace('`', ''))} | {escaped(chance(p))} |" for one, p in _first(result)
     )
-    errors, words = (result.error.holdout, "held-out") if result.error.holdout else (result.error.fit, "fitted")
+    errors, words = result.error.told()
     rows = "\n".join(
         f"| {escaped(feature_label(row.observable))} | "
         + " | ".join(
