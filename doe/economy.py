@@ -27,7 +27,7 @@ from solver import Scene, observable_names, parameters, value, with_values
 MARGIN = 0.3
 """Of a mean, in standard deviations of one pour with the full settings."""
 ALPHA, POWER = 0.05, 0.9
-OBSERVABLES = (
+COMPARED = (
     "angle_of_repose_deg",
     "angle_of_repose_cone_deg",
     "apex_height_m",
@@ -165,7 +165,7 @@ def compare(
 def judged(study: Study, economy: Economy, rows: Sequence[Sequence[Run]], pours: int) -> EconomyTest:
     """The comparison of what has been poured; ``rows`` as :func:`rows_of` has them."""
     names = list(settings_of(study))
-    asked = [one for one in OBSERVABLES if one in observable_names(study.scene)]
+    asked = [one for one in COMPARED if one in observable_names(study.scene)]
     compared: list[Compared] = []
     shares: list[Shares] = []
     costs = []

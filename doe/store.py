@@ -24,7 +24,7 @@ from typing import IO, Any
 
 import platformdirs
 
-from solver import PHYSICS, RIGS, RawPourError, Record, observe, unpacked
+from solver import PHYSICS, RIGS, RawPourError, Record, observables_in, observe, unpacked
 
 READINGS = 2
 """Version of what is read off a raw pour. Raise it when an outcome, an observable, a summary or a profile comes to be
@@ -93,7 +93,7 @@ def default_store() -> Path:
 def observables_in_rig(run: StoredRun) -> tuple[str, ...]:
     """Names of the observables of the rig of ``run``; none for a rig that is not known."""
     rig = RIGS.get(str(run.parameters.get(RIG)))
-    return rig().observables if rig is not None else ()
+    return observables_in(rig()) if rig is not None else ()
 
 
 def read_off(raw: bytes, reader: Reader) -> Readings:

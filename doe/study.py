@@ -25,6 +25,7 @@ from doe.record import Record
 from doe.study_table import Table, entries, names, one_of, only, required, section, whole
 from doe.target import Target, is_angle, target_from
 from solver import (
+    OBSERVABLES,
     ParameterError,
     Scene,
     asset_path,
@@ -86,13 +87,6 @@ class Study:
     seed: int = 1
 
 
-ESTIMATORS = (
-    "angle_of_repose_deg",
-    "angle_of_repose_above_one_body_deg",
-    "angle_of_repose_cone_deg",
-    "angle_of_repose_mass_cone_deg",
-    "angle_of_repose_volume_cone_deg",
-)
 KEYS = {
     "format", "title", "material", "dummies", "fallback", "rig", "insertion", "target", "factor", "assumption",
     "change", "scan", "profile", "estimators", "seed", "numerics", "effect",
@@ -173,7 +167,8 @@ def study_from(table: Table, path: Path) -> Study:
     wanted = section(table, "profile")
     profiles = {name: _profile(scene, name, section(wanted, name)) for name in wanted}
     given = observable_names(scene)
-    estimators = names(table.get("estimators", [e for e in ESTIMATORS if e in given]), "estimators", given)
+    unasked = [name for name in given if OBSERVABLES[name].estimator]
+    estimators = names(table.get("estimators", unasked), "estimators", given)
     return Study(
         name=path.stem,
         file=path,

@@ -13,7 +13,7 @@ from solver.body import Body, Members
 from solver.clump_fit import ClumpFit
 from solver.effects import EFFECTS, SetUpEffect, Telltale
 from solver.material_file import is_material, load_material
-from solver.observables import Value, observable_names, observe
+from solver.observables import OBSERVABLES, Value, observable_names, observables_in, observe
 from solver.observables.free_surface import slope_angle_deg
 from solver.observables.named import Named, all_names, named, observe_named, observe_scan
 from solver.observables.surface import HeightMap, coarsened, height_map
@@ -31,6 +31,7 @@ from solver.observables.surface_features import (
     without_holes,
 )
 from solver.params import Parameter, ParameterError, parse_quantity
+from solver.plugins import PluginError, Registry, instance_of
 from solver.pour_key import pour_key
 from solver.raw_pour import RawPourError, packed, unpacked
 from solver.record import Bodies, Entries, Outcome, Phase, Pile, Record, Spheres, Trace
@@ -87,6 +88,7 @@ __all__ = [
     "BULK_NAMES",
     "EFFECTS",
     "HISTOGRAM_NAMES",
+    "OBSERVABLES",
     "PHYSICS",
     "PROFILE_NAMES",
     "RIGS",
@@ -111,9 +113,11 @@ __all__ = [
     "PhotographError",
     "PhotographedPile",
     "Pile",
+    "PluginError",
     "Pour",
     "RawPourError",
     "Record",
+    "Registry",
     "Scene",
     "SetUpEffect",
     "Spheres",
@@ -129,10 +133,12 @@ __all__ = [
     "coarsened",
     "frame_of",
     "height_map",
+    "instance_of",
     "is_material",
     "load_material",
     "named",
     "observable_names",
+    "observables_in",
     "observe",
     "observe_named",
     "observe_scan",

@@ -5,10 +5,9 @@ A package adds a thing by an entry point in its ``pyproject.toml``, whose name i
     [project.entry-points."repose_explorer.plugins"]
     "effect.magnetism" = "my_package.magnetism:Magnetism"
 
-Kinds are ``contact_law``, ``design``, ``effect``, ``export``, ``observable``, ``panel``, ``rig`` and ``stage``; each has
-one protocol and one :class:`Registry`, which everything else lists from (``docs/plugins.md``). A plug-in is loaded when
-its kind is first asked for, so a thing that is never used costs nothing, and the file that defines one may import the
-protocol that it follows.
+Kinds are ``contact_law``, ``design``, ``effect``, ``export``, ``observable``, ``panel``, ``rig`` and ``stage``; each
+has one protocol and one :class:`Registry`, which everything else lists from (``docs/plugins.md``). A plug-in is loaded
+when its kind is first asked for, so that a file which defines one may import the protocol that it follows.
 """
 
 from __future__ import annotations

@@ -2,8 +2,9 @@
 
 A key covers what decides the bits of a pour and nothing else: the declared scene, the contents of mesh files, the seed,
 and the version of the physics. Parameters at their declared default are left out, so that a new parameter whose default
-changes nothing leaves every key as it was; a changed default is a change of the physics (`solver.version`). The
-kind of processor counts (CPU or GPU). Titles, docstrings, and code that cannot touch a pour have no part in it.
+changes nothing leaves every key as it was; a changed default is a change of the physics (`solver.version`). Of a rig or
+an effect from another package, its version counts. So does the kind of processor (CPU or GPU). Titles, docstrings, and
+code that cannot touch a pour have no part in it.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from typing import Any
 from solver.arch import chosen
 from solver.assets import asset_path
 from solver.body import Body, Members
+from solver.plugins import origin
 from solver.scene import Scene
 from solver.version import PHYSICS
 
@@ -43,11 +45,11 @@ def pour_key(scene: Scene, seed: int, variant: str = "") -> str:
 def _decisive(scene: Scene) -> dict[str, Any]:
     """What decides the bits, as JSON takes it: floats are written in the digits that give them back."""
     return {
-        "rig": [scene.rig.name, scene.rig.wall, *_set(scene.rig)],
+        "rig": [scene.rig.name, scene.rig.wall, *_set(scene.rig), *_package("rig", scene.rig.name)],
         "insertion": _set(scene.insertion),
         "numerics": _set(scene.numerics),
         **({"contact": changed} if (changed := _set(scene.contact)) else {}),
-        "effects": [[effect.name, *_set(effect)] for effect in scene.effects],
+        "effects": [[effect.name, *_set(effect), *_package("effect", effect.name)] for effect in scene.effects],
         "gravity": scene.gravity,
         "axis": scene.axis,
         "materials": [[material.name, *_set(material)] for material in scene.materials],
@@ -69,6 +71,12 @@ def _set(thing: Any) -> list[Any]:
         elif value != field.default:
             found.append([field.name, value])
     return found
+
+
+def _package(kind: str, name: str) -> list[str]:
+    """Package and version that a plug-in comes from; nothing for what this program has itself."""
+    package = origin(kind, name)
+    return [package] if package else []
 
 
 def _of_body(body: Body) -> list[Any]:

@@ -25,6 +25,7 @@ THIRD_PARTY_HOMES = {
 
 # The rest of doe is statistics and must stay testable without Taichi.
 DOE_PARTS_THAT_MAY_USE_THE_SOLVER = {
+    "doe/designs/__init__.py": "lists designs of other packages beside its own, by the registry of the solver",
     "doe/store.py": "keeps raw pours, and reads observables off them",
     "doe/runs.py": "reads what the solver says of a run: whether its outcome is valid",
     "doe/runner.py": "turns a row of a design into a batch of simulated worlds",

@@ -1,16 +1,40 @@
-"""Designs: which combinations of coded factor levels are run. One file per family; a design is an array
-(rows, factors), of integers where its levels are.
+"""Designs: which combinations of coded factor levels are run. One file per family (``design.py`` says how to add one);
+a design is an array (rows, factors), of integers where its levels are.
 """
 
-from doe.designs.box_behnken import box_behnken
-from doe.designs.central_composite import central_composite
-from doe.designs.factorial import factorial
-from doe.designs.plackett_burman import fold_over, interaction_aliases, plackett_burman
-from doe.designs.space_filling import latin_hypercube, sobol
+from doe.designs.box_behnken import BoxBehnken, box_behnken
+from doe.designs.central_composite import CentralComposite, central_composite
+from doe.designs.definitive_screening import DefinitiveScreening, definitive_screening
+from doe.designs.design import ALPHAS, Design, DesignOptions, Points, factor_letters
+from doe.designs.factorial import Factorial, factorial
+from doe.designs.plackett_burman import PlackettBurman, fold_over, interaction_aliases, plackett_burman
+from doe.designs.space_filling import LatinHypercube, Sobol, latin_hypercube, sobol
+from solver import Registry, instance_of
+
+DESIGNS: Registry[Design] = Registry(
+    "design",
+    (
+        PlackettBurman(),
+        DefinitiveScreening(),
+        BoxBehnken(),
+        CentralComposite(),
+        Factorial(),
+        LatinHypercube(),
+        Sobol(),
+    ),
+    instance_of(Design),
+)
 
 __all__ = [
+    "ALPHAS",
+    "DESIGNS",
+    "Design",
+    "DesignOptions",
+    "Points",
     "box_behnken",
     "central_composite",
+    "definitive_screening",
+    "factor_letters",
     "factorial",
     "fold_over",
     "interaction_aliases",

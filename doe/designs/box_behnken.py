@@ -13,6 +13,7 @@ from itertools import combinations, product
 import numpy as np
 import numpy.typing as npt
 
+from doe.designs.design import Design, DesignOptions, Points
 from doe.errors import StatisticsError
 
 TRIPLES = {
@@ -39,3 +40,16 @@ def box_behnken(factors: int = 3, centre: int = 5) -> npt.NDArray[np.int64]:
             point[list(moved)] = levels
             edges.append(point)
     return np.vstack([*edges, np.zeros((centre, factors), dtype=np.int64)])
+
+
+class BoxBehnken(Design):
+    """Three levels per factor, no corners."""
+
+    name = "box-behnken"
+    doc = "A full second-order model of 3 to 7 factors, without the corners of the cube."
+    options = ("centre",)
+
+    def points(self, factors: int, options: DesignOptions) -> Points:
+        """Edges, then centre runs, 5 by default."""
+        design = box_behnken(factors, 5 if options.centre is None else options.centre)
+        return Points(design.astype(np.float64))

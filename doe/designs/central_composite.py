@@ -7,17 +7,12 @@ higher, in which no main effect or interaction of two is confused with another.
 
 from __future__ import annotations
 
-from typing import Literal, get_args
-
 import numpy as np
-import numpy.typing as npt
 
+from doe.designs.design import ALPHAS, Alpha, Design, DesignOptions, FloatArray, Points
 from doe.designs.factorial import factorial, standard_generators
 from doe.errors import StatisticsError
 
-FloatArray = npt.NDArray[np.float64]
-Alpha = Literal["rotatable", "face-centred", "inscribed"]
-ALPHAS: tuple[str, ...] = get_args(Alpha)
 FACTORS = range(2, 8)
 HALVED_FROM = 5
 
@@ -40,3 +35,16 @@ def central_composite(factors: int, centre: int = 5, alpha: Alpha = "rotatable")
     axial = np.repeat(np.eye(factors), 2, axis=0) * np.tile([-distance, distance], factors)[:, None]
     design = np.vstack([corners, axial, np.zeros((centre, factors))])
     return design / distance if alpha == "inscribed" else design
+
+
+class CentralComposite(Design):
+    """Corners, axial points and centre runs."""
+
+    name = "central-composite"
+    doc = "A full second-order model of 2 to 7 factors: corners, axial points, centre."
+    options = ("centre", "alpha")
+
+    def points(self, factors: int, options: DesignOptions) -> Points:
+        """Corners, axial points, centre runs, 5 by default."""
+        design = central_composite(factors, 5 if options.centre is None else options.centre, options.alpha)
+        return Points(design, traits=(f"{options.alpha}, axial points at ±{np.abs(design).max():.4g}",))

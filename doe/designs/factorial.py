@@ -17,12 +17,11 @@ from itertools import combinations, product
 import numpy as np
 import numpy.typing as npt
 
+from doe.designs.design import LETTERS, Design, DesignOptions, Points, factor_letters, with_centre
 from doe.errors import StatisticsError
 from doe.record import Record
 
 IntArray = npt.NDArray[np.int64]
-LETTERS = "ABCDEFGHJKLMNOPQRSTUVWXYZ"
-"""Without I, which is the identity."""
 MOST_BASIC = 10
 """Factors of a full factorial, 1024 runs."""
 GENERATOR = re.compile(r"^\s*([A-Z])\s*=\s*([+\-−]?)\s*([A-Z]+)\s*$")
@@ -43,12 +42,6 @@ class Word(Record):
     def times(self, other: Word) -> Word:
         """Return the product; equal factors cancel."""
         return Word(self.sign * other.sign, self.factors ^ other.factors)
-
-
-def factor_letters(factors: int) -> tuple[str, ...]:
-    """Return the short names A, B, …, H, J, …, Z, AA, AB, … of `factors` factors."""
-    doubled = [a + b for a in LETTERS for b in LETTERS]
-    return tuple([*LETTERS, *doubled][:factors])
 
 
 def factorial(factors: int, generators: Sequence[str] = ()) -> IntArray:
@@ -158,3 +151,29 @@ STANDARD_FRACTIONS: dict[tuple[int, int], tuple[str, ...]] = {
     (8, 4): ("E=BCD", "F=ACD", "G=ABC", "H=ABD"),
 }
 """(factors, generators) → generators."""
+
+
+class Factorial(Design):
+    """All combinations of two levels, or a regular fraction."""
+
+    name = "factorial"
+    doc = "Two levels: every combination, or a fraction by generators; main effects and interactions."
+    options = ("centre", "generators", "fraction")
+
+    def points(self, factors: int, options: DesignOptions) -> Points:
+        """In standard order; centre runs only where they are asked for."""
+        if options.generators and options.fraction:
+            raise StatisticsError("fraction: has generators of its own; allowed: a fraction or generators")
+        generators = options.generators or (standard_generators(factors, options.fraction) if options.fraction else ())
+        name = f"2^({factors}−{len(generators)})" if generators else f"2^{factors}"
+        coded = with_centre(factorial(factors, generators), options.centre)
+        return Points(coded, traits=(name,), generators=tuple(generators), aliases=_aliases(factors, generators))
+
+
+def _aliases(factors: int, generators: Sequence[str]) -> tuple[str, ...]:
+    if not generators:
+        return ()
+    words = [word for _, word in generator_words(factors, generators)]
+    relation = " = ".join(word.text() for word in defining_relation(words))
+    chains = [" = ".join(word.text() or "mean" for word in chain) for chain in alias_chains(factors, words)]
+    return (f"I = {relation}", *(chain for chain in chains if "=" in chain))

@@ -14,6 +14,7 @@ from itertools import combinations
 import numpy as np
 import numpy.typing as npt
 
+from doe.designs.design import Design, DesignOptions, Points, factor_letters, with_centre
 from doe.errors import StatisticsError
 
 IntArray = npt.NDArray[np.int64]
@@ -44,6 +45,8 @@ GENERATOR_ROWS_28 = (
 )
 SIZES = tuple(range(8, 49, 4))
 """Numbers of runs that have a table."""
+MOST_ALIASES = 12
+"""Interactions that are listed per factor; the others are counted."""
 
 
 def plackett_burman(runs: int) -> IntArray:
@@ -129,3 +132,73 @@ def _block_cyclic(generators: IntArray) -> IntArray:
     width = generators.shape[1] // 3
     blocks = [np.roll(generators, shift * width, axis=1) for shift in range(3)]
     return np.vstack([*blocks, -np.ones((1, generators.shape[1]), dtype=np.int64)])
+
+
+class PlackettBurman(Design):
+    """Two levels, as few runs as there are factors and one."""
+
+    name = "plackett-burman"
+    doc = "Main effects of up to 47 factors in 8 to 48 runs; folded over, clear of interactions of two."
+    options = ("runs", "centre", "fold")
+    main_effects_only = True
+
+    def points(self, factors: int, options: DesignOptions) -> Points:
+        """The smallest table with a column for each factor, or that of ``runs`` rows; the mirror image after it."""
+        least = smallest_size(factors)
+        size = least if options.runs is None else options.runs
+        table = plackett_burman(size)
+        if factors > size - 1:
+            raise StatisticsError(
+                f"runs {size}: has {size - 1} columns for {factors} factors; allowed: at least {least}"
+            )
+        levels = fold_over(table) if options.fold else table
+        rows = with_centre(levels, options.centre)
+        traits = (f"{size} runs, {size - 1 - factors} columns without a factor",)
+        lines = alias_lines(levels[:, :factors])
+        return Points(
+            rows[:, :factors],
+            rows[:, factors:],
+            traits=(*traits, "folded over") if options.fold else traits,
+            aliases=lines,
+            notes=() if lines else _clear_of_interactions(levels[:, :factors]),
+        )
+
+
+def alias_lines(design: IntArray) -> tuple[str, ...]:
+    """Return a line per factor, by its letter, into which interactions of two leak, the largest shares first."""
+    letters = factor_letters(design.shape[1])
+    shares, pairs = interaction_aliases(design)
+    lines = []
+    for j, letter in enumerate(letters):
+        leaks = [(shares[j, p], "".join(letters[i] for i in pair)) for p, pair in enumerate(pairs)]
+        leaks = sorted((leak for leak in leaks if abs(leak[0]) > 1e-9), key=lambda leak: -abs(leak[0]))
+        if leaks:
+            shown = "".join(
+                f" {'−' if share < 0 else '+'} {_share(share)}{name}" for share, name in leaks[:MOST_ALIASES]
+            )
+            more = len(leaks) - MOST_ALIASES
+            lines.append(f"{letter}{shown}" + (f" and {more} more" if more > 0 else ""))
+    return tuple(lines)
+
+
+def _clear_of_interactions(design: IntArray) -> tuple[str, ...]:
+    """A sentence where main effects are clear of interactions of two, which are not clear of each other."""
+    shared = interaction_overlap(design)
+    if shared < 1e-9:
+        return ()
+    return (
+        "Main effects are clear of interactions of two factors; those share columns with each other, "
+        f"up to {_share(shared) or 'the whole '}of one. Three-factor interactions are not looked at.",
+    )
+
+
+def _share(value: float) -> str:
+    """A leak as a fraction: these designs have them in thirds, fifths, sevenths."""
+    size = abs(float(value))
+    if abs(size - 1) < 1e-9:
+        return ""
+    for denominator in range(2, 13):
+        numerator = size * denominator
+        if abs(numerator - round(numerator)) < 1e-9:
+            return f"{round(numerator)}/{denominator} "
+    return f"{size:.3f} "

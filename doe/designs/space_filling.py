@@ -7,12 +7,10 @@ scipy.stats.qmc). The hypercube is optimised against the centred discrepancy by 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import qmc
 
+from doe.designs.design import Design, DesignOptions, FloatArray, Points
 from doe.errors import StatisticsError
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def latin_hypercube(factors: int, runs: int, seed: int) -> FloatArray:
@@ -41,3 +39,28 @@ def _require(factors: int, runs: int) -> None:
         raise StatisticsError(f"factors = {factors}; at least one is needed")
     if runs < 2:
         raise StatisticsError(f"runs = {runs}; at least two are needed")
+
+
+class LatinHypercube(Design):
+    """Points spread over every factor's range."""
+
+    name = "lhs"
+    doc = "Points spread over the ranges (Latin hypercube), for a surrogate model."
+    options = ("runs",)
+
+    def points(self, factors: int, options: DesignOptions) -> Points:
+        """10 per factor by default."""
+        return Points(latin_hypercube(factors, options.runs or 10 * factors, options.seed))
+
+
+class Sobol(Design):
+    """The first points of a scrambled Sobol' sequence."""
+
+    name = "sobol"
+    doc = "Points spread over the ranges (Sobol' sequence), for a surrogate model; best as a power of two."
+    options = ("runs",)
+
+    def points(self, factors: int, options: DesignOptions) -> Points:
+        """By default the power of two at or above 10 per factor."""
+        usual = 2 ** int(np.ceil(np.log2(10 * factors)))
+        return Points(sobol(factors, options.runs or usual, options.seed))

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from doe.errors import MeasurementError
 from solver import (
+    OBSERVABLES,
     HeightMap,
     ParameterError,
     Pile,
@@ -45,24 +46,6 @@ class PileSurface:
         return height_map(self.spheres, np.zeros(2), half_width, pixel)
 
 
-SCALARS = (
-    "angle_of_repose_deg",
-    "angle_of_repose_left_deg",
-    "angle_of_repose_right_deg",
-    "angle_of_repose_deg@0",
-    "angle_of_repose_deg@45",
-    "angle_of_repose_deg@90",
-    "angle_of_repose_deg@135",
-    "apex_height_m",
-    "centre_height_m",
-    "footprint_r50_m",
-    "footprint_r90_m",
-    "centroid_x_m",
-    "centroid_y_m",
-    "stray_fraction",
-    "solid_fraction",
-)
-"""What is read off every scan."""
 PROFILE_PLACES = (np.arange(30) + 0.5) * 5e-3
 """Radii [m] of ``height_profile_m`` where the table lists none."""
 
@@ -127,7 +110,9 @@ def pile_values(
     piles: Mapping[int, Pile], scene: Scene, replicates: int, listed: Mapping[str, Array | None]
 ) -> dict[str, tuple[Array | None, Array]]:
     """Name → (places or None, values per replicate): what is read off every scan, and what the table ``listed``."""
-    wanted: dict[str, Array | None] = dict.fromkeys(SCALARS) | {"height_profile_m": PROFILE_PLACES}
+    wanted: dict[str, Array | None] = dict.fromkeys(name for name, known in OBSERVABLES.items() if known.scanned) | {
+        "height_profile_m": PROFILE_PLACES
+    }
     wanted |= {name: x for name, x in listed.items() if (known := named(name)) is not None and known.of_pile}
     values: dict[str, tuple[Array | None, Array]] = {
         name: (x, np.full(replicates if x is None else (replicates, x.size), np.nan)) for name, x in wanted.items()

@@ -14,27 +14,12 @@ import numpy as np
 from scipy import stats
 
 from doe.measurement.measurement import Condition, Measurement
-from doe.measurement.summaries import ASYMMETRY, summaries, summaries_of_data, summary_uncertainties
+from doe.measurement.summaries import summaries, summaries_of_data, summary_uncertainties
 from doe.record import Record
-from solver import EFFECTS, Telltale
+from solver import EFFECTS, Telltale, named
 
 DISCHARGE = ("discharge_", "discharged_mass_kg", "residual_mass_kg")
-STRAYS = ("stray_fraction", "footprint_r90_m", "left_domain_fraction")
-ASYMMETRIC = ("centroid_", ASYMMETRY, "angle_of_repose_left_deg", "angle_of_repose_right_deg")
-HEIGHT = ("apex_height_m", "centre_height_m", "height_profile_m", "surface_profile_m")
-SHAPE = ("angle_of_repose", "footprint_", "slope_", "dynamic_angle_deg", "draw_down_angle", *HEIGHT)
-FLOWING = ("surface_profile_m", "slope_", "dynamic_angle_deg")
-"""Read off a bed in motion."""
-FLOW = (*DISCHARGE, *STRAYS, *FLOWING)
-PACKING = ("solid_fraction", "bulk_density", *HEIGHT, *DISCHARGE)
-
-TELLTALES: dict[Telltale, tuple[str, ...]] = {
-    Telltale.SHAPE: SHAPE,
-    Telltale.FLOW: FLOW,
-    Telltale.ASYMMETRY: ASYMMETRIC,
-    Telltale.PACKING: PACKING,
-}
-"""Class of observables → beginnings of the names of the summaries that belong to it."""
+"""Beginnings of the names of what is read off the flow out of a container."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +70,8 @@ class Reach(Record):
 def reach_of(measurement: Measurement) -> Reach:
     """What ``measurement`` can tell; no simulation, no fit."""
     conditions = tuple(_condition_reach(condition) for condition in measurement.conditions)
-    fitted = [name for condition in measurement.fit for name in _all_names(condition)]
+    fitted = {part for condition in measurement.fit for summary in summaries(condition) for part in summary.parts}
+    seen = {telltale for name in fitted if (known := named(name)) is not None for telltale in known.telltales}
     equations = sum(
         resolution.standard_error > 0.0
         for condition in conditions
@@ -97,12 +83,10 @@ def reach_of(measurement: Measurement) -> Reach:
         equations=equations,
         unknowns=len(measurement.parameters),
         measured=sum(parameter.mean is not None for parameter in measurement.parameters),
-        has_discharge=_any(fitted, DISCHARGE),
-        has_asymmetry=_any(fitted, ASYMMETRIC),
+        has_discharge=any(name.startswith(DISCHARGE) for name in fitted),
+        has_asymmetry=Telltale.ASYMMETRY in seen,
         has_holdout=bool(measurement.holdout),
-        hidden_effects=tuple(
-            name for name, kind in EFFECTS.items() if not any(_any(fitted, TELLTALES[one]) for one in kind.telltales)
-        ),
+        hidden_effects=tuple(name for name, kind in EFFECTS.items() if not seen.intersection(kind.telltales)),
         warnings=(),
     )
     return Reach(**{**vars(reach), "warnings": _warnings(reach)})
@@ -126,16 +110,6 @@ def _resolution(name: str, unit: str, values: np.typing.NDArray[np.float64], sta
         error = sd / np.sqrt(n)
         return Resolution(name, unit, n, mean, sd, float(error), float(stats.t.ppf(0.975, n - 1) * error))
     return Resolution(name, unit, n, mean, stated, stated, float(stats.norm.ppf(0.975)) * stated)
-
-
-def _all_names(condition: Condition) -> list[str]:
-    """Names of the summaries and of what they are made of."""
-    chosen = summaries(condition)
-    return [summary.name for summary in chosen] + [part for summary in chosen for part in summary.parts]
-
-
-def _any(names: list[str], beginnings: tuple[str, ...]) -> bool:
-    return any(name.startswith(beginnings) for name in names)
 
 
 def _warnings(reach: Reach) -> tuple[str, ...]:

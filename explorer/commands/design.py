@@ -6,11 +6,11 @@ from pathlib import Path
 
 import typer
 
-from explorer.design.kinds import Alpha, Kind
+from explorer.design.kinds import Alpha
 
 
 def design(
-    kind: Kind = typer.Argument(help="Which design."),
+    kind: str = typer.Argument(metavar="DESIGN", help="Which design."),
     factors: str = typer.Option(
         ..., metavar="FILE", help="TOML with name, low, high and unit of every factor, or a shipped one's name."
     ),

@@ -11,7 +11,7 @@ import numpy as np
 
 from doe.analysis.analyse import Target, analyse_design
 from doe.analysis.models import ORDERS, Order
-from doe.designs.factorial import factor_letters
+from doe.designs import DESIGNS, factor_letters
 from doe.errors import StatisticsError
 from explorer.design.factors_file import read_factors, region_of
 from explorer.design.filled_sheet import read_sheet
@@ -83,10 +83,11 @@ def analyse_runs(runs: Runs, order: AnalyseOrder) -> DesignResult:
 
 
 def _order(runs: Runs, order: AnalyseOrder) -> Order | None:
-    """The order of the model; a Plackett–Burman design was made for the linear one."""
+    """The order of the model; a design for main effects only was made for the linear one."""
     if order.order is not None:
         return next(one for one in ORDERS if one == order.order)
-    if order.terms or runs.design != "plackett-burman":
+    design = DESIGNS.get(runs.design)
+    if order.terms or design is None or not design.main_effects_only:
         return None
     valid = int((~np.isnan(runs.responses)).sum())
     return "linear" if valid > len(runs.factors) + 1 else None

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from doe.ascent import Region
-from doe.designs.factorial import factor_letters
+from doe.designs import factor_letters
 from doe.errors import StudyFileError
 from doe.record import Record
 from doe.study_table import entries, number, only, required, whole

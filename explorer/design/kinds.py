@@ -1,19 +1,8 @@
-"""Names that the command line offers: designs, axial points, orders of the model."""
+"""Names that the command line offers: axial points, orders of the model."""
 
 from __future__ import annotations
 
 from enum import StrEnum
-
-
-class Kind(StrEnum):
-    """The designs."""
-
-    PLACKETT_BURMAN = "plackett-burman"
-    BOX_BEHNKEN = "box-behnken"
-    CENTRAL_COMPOSITE = "central-composite"
-    FACTORIAL = "factorial"
-    LHS = "lhs"
-    SOBOL = "sobol"
 
 
 class Alpha(StrEnum):

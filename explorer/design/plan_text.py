@@ -9,25 +9,20 @@ import numpy as np
 
 from doe.analysis.models import Order, bearable, highest_order, terms_of
 from doe.analysis.precision import TermPrecision, precision
-from doe.designs.factorial import alias_chains, defining_relation, factor_letters, generator_words
-from doe.designs.plackett_burman import interaction_aliases, interaction_overlap
+from doe.designs import factor_letters
 from doe.record import plain
 from explorer.design.factors_file import FactorsFile, region_of
-from explorer.design.kinds import Kind
 from explorer.design.plan import Plan
 from explorer.report.units_for_people import enumeration, number
 from explorer.tables.text_table import text_table
-
-MOST_ALIASES = 12
-"""Interactions that are listed per factor of a Plackett–Burman design; the others are counted."""
 
 
 def plan_result(plan: Plan, file: FactorsFile, sigma: float | None, effect: float | None) -> dict[str, Any]:
     """A design as JSON types."""
     return {
-        "design": plan.kind.value,
-        "traits": list(plan.traits),
-        "generators": list(plan.generators),
+        "design": plan.design.name,
+        "traits": list(plan.points.traits),
+        "generators": list(plan.points.generators),
         "rows": len(plan.coded),
         "replicates": plan.replicates,
         "runs": len(plan.sequence),
@@ -37,7 +32,7 @@ def plan_result(plan: Plan, file: FactorsFile, sigma: float | None, effect: floa
             for letter, factor in zip(factor_letters(len(file.factors)), file.factors, strict=True)
         ],
         "coded": plan.coded.tolist(),
-        "aliases": aliases(plan),
+        "aliases": list(plan.points.aliases),
         "model": planned_order(plan),
         "power": plain(list(_power(plan, sigma, effect))),
     }
@@ -47,7 +42,7 @@ def plan_text(plan: Plan, file: FactorsFile, sigma: float | None, effect: float 
     """A design in words and tables."""
     letters = factor_letters(len(file.factors))
     parts = [
-        f"{plan.kind}{''.join(f', {trait}' for trait in plan.traits)}: {len(plan.coded)} rows × {plan.replicates} "
+        f"{', '.join([plan.design.name, *plan.points.traits])}: {len(plan.coded)} rows × {plan.replicates} "
         f"= {len(plan.sequence)} runs",
         text_table(
             ["", "factor", "low", "high", "unit"],
@@ -58,56 +53,17 @@ def plan_text(plan: Plan, file: FactorsFile, sigma: float | None, effect: float 
         ),
         *_beyond(plan, file),
     ]
-    chains = aliases(plan)
-    if chains:
-        parts.append("aliases (what is on the left also holds what is on the right):\n" + "\n".join(chains))
-    return "\n\n".join([*parts, *_interactions_text(plan), _power_text(plan, sigma, effect)])
-
-
-def aliases(plan: Plan) -> list[str]:
-    """One line per confused column; empty where main effects and interactions of two are apart."""
-    k = plan.coded.shape[1]
-    letters = factor_letters(k)
-    if plan.kind == Kind.FACTORIAL and plan.generators:
-        words = [word for _, word in generator_words(k, plan.generators)]
-        relation = " = ".join(word.text() for word in defining_relation(words))
-        chains = [" = ".join(word.text() or "mean" for word in chain) for chain in alias_chains(k, words)]
-        return [f"I = {relation}", *(chain for chain in chains if "=" in chain)]
-    if plan.kind != Kind.PLACKETT_BURMAN:
-        return []
-    corners = plan.coded[plan.coded.any(axis=1)].astype(np.int64)
-    shares, pairs = interaction_aliases(corners)
-    lines = []
-    for j, letter in enumerate(letters):
-        leaks = [(shares[j, p], "".join(letters[i] for i in pair)) for p, pair in enumerate(pairs)]
-        leaks = sorted((leak for leak in leaks if abs(leak[0]) > 1e-9), key=lambda leak: -abs(leak[0]))
-        if leaks:
-            shown = "".join(
-                f" {'−' if share < 0 else '+'} {_share(share)}{name}" for share, name in leaks[:MOST_ALIASES]
-            )
-            more = len(leaks) - MOST_ALIASES
-            lines.append(f"{letter}{shown}" + (f" and {more} more" if more > 0 else ""))
-    return lines
-
-
-def _interactions_text(plan: Plan) -> list[str]:
-    """A sentence where main effects are clear of interactions of two, which are not clear of each other."""
-    if plan.kind != Kind.PLACKETT_BURMAN or aliases(plan):
-        return []
-    shared = interaction_overlap(plan.coded[plan.coded.any(axis=1)].astype(np.int64))
-    if shared < 1e-9:
-        return []
-    return [
-        "Main effects are clear of interactions of two factors; those share columns with each other, "
-        f"up to {_share(shared) or 'the whole '}of one. Three-factor interactions are not looked at."
-    ]
+    if plan.points.aliases:
+        lines = "\n".join(plan.points.aliases)
+        parts.append(f"aliases (what is on the left also holds what is on the right):\n{lines}")
+    return "\n\n".join([*parts, *plan.points.notes, _power_text(plan, sigma, effect)])
 
 
 def planned_order(plan: Plan) -> Order | None:
     """The model that the runs will bear; None where they leave no error even for the linear one."""
     letters = factor_letters(plan.coded.shape[1])
     values = np.zeros((len(plan.coded), plan.replicates))
-    if plan.kind == Kind.PLACKETT_BURMAN or not bearable(plan.coded, values, letters, terms_of(letters, "linear")):
+    if plan.design.main_effects_only or not bearable(plan.coded, values, letters, terms_of(letters, "linear")):
         return "linear" if bearable(plan.coded, values, letters, terms_of(letters, "linear")) else None
     return highest_order(plan.coded, values, letters)
 
@@ -159,18 +115,6 @@ def _beyond(plan: Plan, file: FactorsFile) -> list[str]:
         for factor, low, high in zip(file.factors, natural.min(axis=0), natural.max(axis=0), strict=True)
     ]
     return [f"The axial runs go beyond low … high: {enumeration(ends)}. --alpha inscribed keeps them within."]
-
-
-def _share(value: float) -> str:
-    """A leak as a fraction: Plackett–Burman designs have them in thirds, fifths, sevenths."""
-    size = abs(float(value))
-    if abs(size - 1) < 1e-9:
-        return ""
-    for denominator in range(2, 13):
-        numerator = size * denominator
-        if abs(numerator - round(numerator)) < 1e-9:
-            return f"{round(numerator)}/{denominator} "
-    return f"{size:.3f} "
 
 
 def _cell(value: float) -> str:

@@ -26,7 +26,12 @@ SEPARATOR = " | "
 def sheet_text(plan: Plan, file: FactorsFile) -> str:
     """The empty sheet."""
     stream = io.StringIO()
-    stream.write(SEPARATOR.join(["# design", plan.kind, *plan.traits, *plan.generators, f"seed {plan.seed}"]) + "\n")
+    stream.write(
+        SEPARATOR.join(
+            ["# design", plan.design.name, *plan.points.traits, *plan.points.generators, f"seed {plan.seed}"]
+        )
+        + "\n"
+    )
     for factor in file.factors:
         numbers = [written(factor.low), written(factor.high)]
         stream.write(

@@ -112,7 +112,7 @@ def sheet_answer(order: PlanOrder, factors: str, sigma: float | None) -> Answer:
     """`explorer design`: the runs of a design as a sheet to fill in."""
     file = read_factors(asset_path("designs", factors))
     plan = make_plan(order, file)
-    words = ["explorer", "design", order.kind.value, "--factors", factors, "--out", "runs.csv"]
+    words = ["explorer", "design", order.design, "--factors", factors, "--out", "runs.csv"]
     numbers = (
         ("--runs", order.runs),
         ("--replicates", order.replicates),

@@ -9,19 +9,12 @@ from functools import cache
 
 from explorer.screen_units import SCREEN_UNIT
 from solver import load_material, parameters
-from solver.observables import REGISTRY
+from solver.observables import OBSERVABLES
 from solver.params import UNITS
 
 MISSING = "–"
 """What stands for a number that could not be computed."""
 
-OBSERVABLE_LABELS = {
-    "angle_of_repose_deg": "angle of repose, silhouette",
-    "angle_of_repose_above_one_body_deg": "angle of repose, silhouette above one body",
-    "angle_of_repose_cone_deg": "angle of repose, mean cone",
-    "angle_of_repose_mass_cone_deg": "angle of repose, centre-of-mass cone",
-    "angle_of_repose_volume_cone_deg": "angle of repose, volume cone",
-}
 SYMBOLS = {"deg": "°", "kg/m3": "kg/m³", "m/s2": "m/s²", "kJ/m3": "kJ/m³", "mJ/m2": "mJ/m²", "1": ""}
 READING_UNIT = SCREEN_UNIT | {"J/m3": "kJ/m3", "J/m2": "mJ/m2", "N/m": "mN/m"}
 """What is written instead of the SI unit."""
@@ -70,7 +63,7 @@ def unit_of_observable(name: str) -> ReadingUnit:
     """Unit in which the observable ``name`` is read."""
     if name.startswith(OWN):
         return ReadingUnit(_own(name)[1], 1.0)
-    return reading_unit(REGISTRY[name].unit if name in REGISTRY else "1")
+    return reading_unit(OBSERVABLES[name].unit if name in OBSERVABLES else "1")
 
 
 def parameter_value(path: str, value: float | str | None) -> str:
@@ -120,7 +113,8 @@ def observable_label(name: str) -> str:
     """Words for an observable."""
     if name.startswith(OWN):
         return _own(name)[0]
-    return OBSERVABLE_LABELS.get(name, name.replace("_", " "))
+    known = OBSERVABLES.get(name)
+    return (known.label if known else "") or name.replace("_", " ")
 
 
 def observable_title(name: str) -> str:

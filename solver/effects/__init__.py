@@ -1,7 +1,8 @@
 """Physical effects that the base model lacks: one file each, all off until an amplitude is set.
 
 To add one: a file with a frozen dataclass of ``ContactEffect``, ``BodyEffect`` or ``SetUpEffect`` (``effect.py``), and
-its two lines here. Files, ``--set``, page, studies, diagnosis and the contract tests follow.
+its two lines here, or an entry point ``effect.NAME`` of a package of one's own (``solver/plugins.py``). Files,
+``--set``, page, studies, diagnosis and the contract tests follow.
 """
 
 from solver.effects.adhesion_jkr import AdhesionJKR
@@ -20,10 +21,11 @@ from solver.effects.size_dispersion import SizeDispersion
 from solver.effects.twisting import Twisting
 from solver.effects.velocity_dependent_restitution import VelocityDependentRestitution
 from solver.effects.wall_adhesion import WallAdhesion
+from solver.plugins import Registry, derived_from
 
-EFFECTS: dict[str, type[Effect]] = {
-    kind.name: kind
-    for kind in (
+EFFECTS: Registry[type[Effect]] = Registry(
+    "effect",
+    (
         RollingResistance,
         AdhesionJKR,
         AdhesionSJKR,
@@ -39,26 +41,35 @@ EFFECTS: dict[str, type[Effect]] = {
         DensityError,
         PlateTilt,
         FunnelOffset,
-    )
-}
-"""Effects by name."""
-
-CONTACT_EFFECTS: tuple[type[ContactEffect], ...] = tuple(
-    sorted((kind for kind in EFFECTS.values() if issubclass(kind, ContactEffect)), key=lambda kind: kind.stage)
+    ),
+    derived_from(Effect),
 )
-"""In the order of their stages."""
-BODY_EFFECTS: tuple[type[BodyEffect], ...] = tuple(k for k in EFFECTS.values() if issubclass(k, BodyEffect))
-SET_UP_EFFECTS: tuple[type[SetUpEffect], ...] = tuple(k for k in EFFECTS.values() if issubclass(k, SetUpEffect))
+
+
+def contact_effects() -> tuple[type[ContactEffect], ...]:
+    """Those of contacts, in the order of their stages."""
+    return tuple(sorted((k for k in EFFECTS.values() if issubclass(k, ContactEffect)), key=lambda kind: kind.stage))
+
+
+def body_effects() -> tuple[type[BodyEffect], ...]:
+    """Those of bodies in flight."""
+    return tuple(kind for kind in EFFECTS.values() if issubclass(kind, BodyEffect))
+
+
+def set_up_effects() -> tuple[type[SetUpEffect], ...]:
+    """Those of material and set-up."""
+    return tuple(kind for kind in EFFECTS.values() if issubclass(kind, SetUpEffect))
+
 
 __all__ = [
-    "BODY_EFFECTS",
-    "CONTACT_EFFECTS",
     "EFFECTS",
-    "SET_UP_EFFECTS",
     "BodyEffect",
     "ContactEffect",
     "Effect",
     "SetUpEffect",
     "Stage",
     "Telltale",
+    "body_effects",
+    "contact_effects",
+    "set_up_effects",
 ]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from solver.effects import BODY_EFFECTS, CONTACT_EFFECTS
+from solver.effects import body_effects, contact_effects
 from solver.effects.effect import BodyEffect, ContactEffect, Effect
 from solver.material import effective_youngs_modulus
 from solver.params import declared
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 Array = npt.NDArray[np.float64]
 
+CONTACT_EFFECTS, BODY_EFFECTS = contact_effects(), body_effects()
 KINDS: tuple[type[Effect], ...] = (*CONTACT_EFFECTS, *BODY_EFFECTS)
 WIDTHS = tuple(len(declared(kind, "")) for kind in KINDS)
 COLUMNS = (0, *accumulate(WIDTHS))

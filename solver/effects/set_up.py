@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from solver.effects import SET_UP_EFFECTS, SetUpEffect
+from solver.effects import SetUpEffect, set_up_effects
 
 if TYPE_CHECKING:
     from solver.scene import Scene
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 def actual(scene: Scene) -> Scene:
     """``scene`` after its set-up effects; they are off in the result, so doing it again changes nothing."""
-    for kind in SET_UP_EFFECTS:
+    for kind in set_up_effects():
         effect = scene.effect(kind.name)
         if isinstance(effect, SetUpEffect) and effect.on:
             scene = effect.applied(scene).without_effect(kind.name)

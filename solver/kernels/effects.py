@@ -6,8 +6,7 @@ its columns of ``effect.memory``.
 """
 
 from solver.backend import ti
-from solver.effects import BODY_EFFECTS, CONTACT_EFFECTS
-from solver.effects.columns import COLUMNS, COUPLE, HERTZ, KEPT, MEMORIES, MEMORY, WIDTHS
+from solver.effects.columns import BODY_EFFECTS, COLUMNS, CONTACT_EFFECTS, COUPLE, HERTZ, KEPT, MEMORIES, MEMORY, WIDTHS
 from solver.effects.touch import Flight
 from solver.kernels.geometry import rotation
 from solver.state import Vec3

@@ -10,13 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from solver.effects.effect import Telltale
+from solver.observables.observable import of_record
 from solver.observables.value import Value
+from solver.rigs.rig import DISCHARGE
 
 if TYPE_CHECKING:
     from solver.record import Record
 
 Array = npt.NDArray[np.float64]
-
 
 ROUNDING = 1e-9
 """Share of the mass that sums in another order may miss."""
@@ -84,3 +86,14 @@ def left_domain_fraction(record: Record) -> Value:
 
 def _time_of_share(share: float, record: Record) -> float:
     return time_of_share(share, *discharge_curve(record), record.poured_mass)
+
+
+FLOW, PACKING = Telltale.FLOW, Telltale.PACKING
+OBSERVABLES = (
+    of_record("discharge_t10_s", "s", discharge_t10, FLOW, PACKING, group=DISCHARGE),
+    of_record("discharge_t50_s", "s", discharge_t50, FLOW, PACKING, group=DISCHARGE),
+    of_record("discharge_t90_s", "s", discharge_t90, FLOW, PACKING, group=DISCHARGE),
+    of_record("discharge_time_s", "s", discharge_time, FLOW, PACKING, group=DISCHARGE),
+    of_record("residual_mass_kg", "kg", residual_mass, FLOW, PACKING, group=DISCHARGE),
+    of_record("left_domain_fraction", "1", left_domain_fraction, FLOW, group=DISCHARGE),
+)

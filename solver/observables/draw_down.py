@@ -14,10 +14,13 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 import numpy.typing as npt
 
+from solver.effects.effect import Telltale
+from solver.observables.observable import of_record
 from solver.observables.repose import flank_angles_deg
 from solver.observables.silhouette import PIXEL, largest_part, silhouette
 from solver.observables.value import Value, mean_value
 from solver.rigs.draw_down_box import DrawDownBox
+from solver.rigs.rig import DRAW_DOWN
 
 if TYPE_CHECKING:
     from solver.record import Record, Spheres
@@ -61,3 +64,11 @@ def _part(spheres: Spheres, chosen: npt.NDArray[np.bool_], floor: float) -> Sphe
     """The chosen spheres, with heights from ``floor`` [m]."""
     centre = spheres.centre[chosen] - np.array([0.0, 0.0, floor])
     return dataclasses.replace(spheres, centre=centre, radius=spheres.radius[chosen], body=spheres.body[chosen])
+
+
+SHAPE = Telltale.SHAPE
+OBSERVABLES = (
+    of_record("draw_down_angle_deg", "deg", draw_down_angle, SHAPE, group=DRAW_DOWN),
+    of_record("draw_down_angle_left_deg", "deg", draw_down_angle_left, SHAPE, group=DRAW_DOWN),
+    of_record("draw_down_angle_right_deg", "deg", draw_down_angle_right, SHAPE, group=DRAW_DOWN),
+)

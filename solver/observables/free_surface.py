@@ -17,8 +17,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from solver.effects.effect import Telltale
+from solver.observables.observable import of_record
 from solver.observables.silhouette import PIXEL, column_tops, largest_part, silhouette
 from solver.observables.value import Value, mean_value
+from solver.rigs.rig import FREE_SURFACE
 
 if TYPE_CHECKING:
     from solver.record import FreeSurface, Record, Spheres
@@ -123,3 +126,11 @@ def _chord(surface: FreeSurface) -> float:
 
 def _during(surface: FreeSurface, moments: npt.NDArray[np.int64]) -> FreeSurface:
     return dataclasses.replace(surface, time=surface.time[moments], height=surface.height[moments])
+
+
+SHAPE, FLOW = Telltale.SHAPE, Telltale.FLOW
+OBSERVABLES = (
+    of_record("dynamic_angle_deg", "deg", dynamic_angle, SHAPE, FLOW, group=FREE_SURFACE),
+    of_record("slope_deg", "deg", slope, SHAPE, FLOW, group=FREE_SURFACE),
+    of_record("slope_core_deg", "deg", slope_core, SHAPE, FLOW, group=FREE_SURFACE),
+)

@@ -1,6 +1,6 @@
 """Observables by the names of measured data: scalars and curves, of a run or of a scanned pile, by the same functions.
 
-A scalar is one of ``REGISTRY`` or a view ``angle_of_repose_deg@AZ`` from any azimuth. The curves:
+A scalar is one of ``OBSERVABLES`` or a view ``angle_of_repose_deg@AZ`` from any azimuth. The curves:
 
     discharged_mass_kg    over time [s]         0 before the first sample, held after the last
     height_profile_m      over radius [m]       rings 5 mm wide, linear between their middles
@@ -18,9 +18,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from solver.observables import REGISTRY, Observable, discharge_curve, height_profile, surface_profile
+from solver.effects.effect import Telltale
+from solver.observables import OBSERVABLES, Observable, discharge_curve, height_profile, surface_profile
 from solver.observables.packing import solid_fraction_of
-from solver.observables.pile import PROFILE_RING, angle_of_repose_at
+from solver.observables.pile import PROFILE_RING, view
 from solver.observables.reading import PileReading
 
 if TYPE_CHECKING:
@@ -44,12 +45,15 @@ class Named:
     """Unit of a curve's places; None: a scalar."""
     of_pile: bool
     """True if a scanned pile gives it."""
+    telltales: tuple[Telltale, ...]
+    """Classes of observables that it belongs to."""
 
 
+SHAPE, FLOW, PACKING = Telltale.SHAPE, Telltale.FLOW, Telltale.PACKING
 CURVES = (
-    Named("discharged_mass_kg", "kg", "s", of_pile=False),
-    Named("height_profile_m", "m", "m", of_pile=True),
-    Named("surface_profile_m", "m", "m", of_pile=False),
+    Named("discharged_mass_kg", "kg", "s", of_pile=False, telltales=(FLOW, PACKING)),
+    Named("height_profile_m", "m", "m", of_pile=True, telltales=(SHAPE, PACKING)),
+    Named("surface_profile_m", "m", "m", of_pile=False, telltales=(SHAPE, FLOW, PACKING)),
 )
 
 
@@ -61,12 +65,13 @@ def named(name: str) -> Named | None:
     scalar = _scalar(name)
     if scalar is None:
         return None
-    return Named(name, scalar.unit, None, scalar.needs == "pile" or name == "solid_fraction")
+    of_pile = scalar.needs == "pile" or name == "solid_fraction"
+    return Named(name, scalar.unit, None, of_pile, scalar.telltales)
 
 
 def all_names() -> tuple[str, ...]:
     """Every name but the views from azimuths beside the listed ones."""
-    return (*REGISTRY, *(curve.name for curve in CURVES))
+    return (*OBSERVABLES, *(curve.name for curve in CURVES))
 
 
 def observe_named(record: Record, wanted: Mapping[str, Array | None]) -> Readings:
@@ -76,7 +81,7 @@ def observe_named(record: Record, wanted: Mapping[str, Array | None]) -> Reading
         if name in readings:
             continue
         if x is None:
-            readings[name] = REGISTRY[name].function(record).value
+            readings[name] = OBSERVABLES[name].function(record).value
         else:
             readings[name] = RECORD_CURVES[name](record, x)
     return readings
@@ -110,13 +115,13 @@ def _of_pile(reading: PileReading, scene: Scene, wanted: Mapping[str, Array | No
 
 
 def _scalar(name: str) -> Observable | None:
-    if name in REGISTRY:
-        return REGISTRY[name]
+    if name in OBSERVABLES:
+        return OBSERVABLES[name]
     match = VIEW.fullmatch(name)
     if match is None:
         return None
-    azimuth = float(match[1]) % 180.0  # the mean of both flanks is the same from behind
-    return Observable(name, "deg", f"View from azimuth {match[1]}°.", angle_of_repose_at(azimuth), "pile")
+    # The mean of both flanks is the same from behind.
+    return view("angle_of_repose_deg", float(match[1]) % 180.0)
 
 
 def _discharged(record: Record, x: Array) -> Array:

@@ -7,8 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from solver.effects.effect import Telltale
+from solver.observables.observable import of_pile, of_record
 from solver.observables.reading import PileReading
 from solver.observables.value import Value
+from solver.rigs.rig import PILE
 
 if TYPE_CHECKING:
     from solver.record import Record
@@ -40,3 +43,9 @@ def _inner_density(reading: PileReading, per_mass: npt.NDArray[np.float64]) -> f
     inner = reading.radii <= reading.r50
     volume = reading.surface.volume(reading.r50)
     return float(pile.mass[inner] @ per_mass[pile.component[inner]]) / volume if volume > 0.0 else float("nan")
+
+
+OBSERVABLES = (
+    of_pile("bulk_density_kg_m3", "kg/m3", bulk_density, Telltale.PACKING, group=PILE),
+    of_record("solid_fraction", "1", solid_fraction, Telltale.PACKING, group=PILE, scanned=True),
+)

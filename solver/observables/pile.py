@@ -7,14 +7,18 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from solver.effects.effect import Telltale
 from solver.observables.cone import fitted_cone_angle_deg, mass_cone_angle_deg, volume_cone_angle_deg
 from solver.observables.footprint import radius_holding
+from solver.observables.observable import Observable, of_pile
 from solver.observables.reading import PileReading
 from solver.observables.silhouette import PIXEL, column_tops
 from solver.observables.surface import height_map, radial_profile
 from solver.observables.value import Value, mean_value
+from solver.rigs.rig import PILE
 
 Array = npt.NDArray[np.float64]
+SHAPE, FLOW, ASYMMETRY, PACKING = Telltale
 
 PROFILE_RING = 5.0e-3
 """Width of the rings of :func:`height_profile` [m]."""
@@ -46,6 +50,19 @@ def angle_of_repose_right(reading: PileReading) -> Value:
 def angle_of_repose_at(azimuth_deg: float) -> Callable[[PileReading], Value]:
     """The observable "one view, mean of both flanks" for any azimuth."""
     return lambda reading: mean_value(list(reading.view_deg(azimuth_deg)), "deg")
+
+
+def view(name: str, azimuth_deg: float) -> Observable:
+    """The observable "one view, mean of both flanks" from ``azimuth_deg``, as ``<name>@<azimuth>``."""
+    return of_pile(
+        f"{name}@{azimuth_deg:g}",
+        "deg",
+        angle_of_repose_at(azimuth_deg),
+        SHAPE,
+        group=PILE,
+        doc=f"Silhouette flank fit, view from azimuth {azimuth_deg:g}°, mean of both flanks.",
+        scanned=True,
+    )
 
 
 def angle_of_repose_cone(reading: PileReading) -> Value:
@@ -125,3 +142,64 @@ def height_profile(
         return middle, np.full(rings, np.nan)
     surface = height_map(reading.pile.spheres, reading.centre[:2], ring_width * rings, ring_width / 8.0)
     return radial_profile(surface, ring_width, rings)
+
+
+OBSERVABLES = (
+    of_pile(
+        "angle_of_repose_deg",
+        "deg",
+        angle_of_repose,
+        SHAPE,
+        group=PILE,
+        label="angle of repose, silhouette",
+        estimator=True,
+        scanned=True,
+    ),
+    of_pile("angle_of_repose_left_deg", "deg", angle_of_repose_left, SHAPE, ASYMMETRY, group=PILE, scanned=True),
+    of_pile("angle_of_repose_right_deg", "deg", angle_of_repose_right, SHAPE, ASYMMETRY, group=PILE, scanned=True),
+    *(view("angle_of_repose_deg", azimuth) for azimuth in (0, 45, 90, 135)),
+    of_pile(
+        "angle_of_repose_above_one_body_deg",
+        "deg",
+        angle_of_repose_above_one_body,
+        SHAPE,
+        group=PILE,
+        label="angle of repose, silhouette above one body",
+        estimator=True,
+    ),
+    of_pile(
+        "angle_of_repose_cone_deg",
+        "deg",
+        angle_of_repose_cone,
+        SHAPE,
+        group=PILE,
+        label="angle of repose, mean cone",
+        estimator=True,
+    ),
+    of_pile(
+        "angle_of_repose_mass_cone_deg",
+        "deg",
+        angle_of_repose_mass_cone,
+        SHAPE,
+        group=PILE,
+        label="angle of repose, centre-of-mass cone",
+        estimator=True,
+    ),
+    of_pile(
+        "angle_of_repose_volume_cone_deg",
+        "deg",
+        angle_of_repose_volume_cone,
+        SHAPE,
+        group=PILE,
+        label="angle of repose, volume cone",
+        estimator=True,
+    ),
+    of_pile("apex_height_m", "m", apex_height, SHAPE, PACKING, group=PILE, scanned=True),
+    of_pile("centre_height_m", "m", centre_height, SHAPE, PACKING, group=PILE, scanned=True),
+    of_pile("footprint_r50_m", "m", footprint_r50, SHAPE, group=PILE, scanned=True),
+    of_pile("footprint_r90_m", "m", footprint_r90, SHAPE, FLOW, group=PILE, scanned=True),
+    of_pile("centroid_x_m", "m", centroid_x, ASYMMETRY, group=PILE, scanned=True),
+    of_pile("centroid_y_m", "m", centroid_y, ASYMMETRY, group=PILE, scanned=True),
+    of_pile("stray_fraction", "1", stray_fraction, FLOW, group=PILE, scanned=True),
+)
+"""What is read off a pile on the plate, in the order of tables."""

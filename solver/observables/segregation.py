@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from solver.observables.observable import ComponentObservable, first_line
 from solver.observables.reading import PileReading
 from solver.observables.value import Value
 
@@ -42,3 +43,9 @@ def _shares(reading: PileReading, where: npt.NDArray[np.bool_]) -> dict[str, Val
 
 def _by_name(reading: PileReading, values: list[float]) -> dict[str, Value]:
     return {name: Value(value, "1") for name, value in zip(reading.pile.component_names, values, strict=True)}
+
+
+OBSERVABLES = tuple(
+    ComponentObservable(function.__name__, "1", first_line(function), function)
+    for function in (inner_mass_share, outer_mass_share, segregation_index)
+)

@@ -1,5 +1,6 @@
 """Rigs: one file per rig, listed here. Into ``RIGS`` bodies are poured, ``BENCH_RIGS`` measure a single body."""
 
+from solver.plugins import Registry, derived_from
 from solver.rigs.compression import Compression
 from solver.rigs.draw_down_box import DrawDownBox
 from solver.rigs.drop_plate_45 import DropPlate45
@@ -11,18 +12,15 @@ from solver.rigs.rig import BenchRig, PourRig, Rig
 from solver.rigs.rotating_drum import RotatingDrum
 from solver.rigs.surface import Plane, Pose, Revolved, Surface, TriangleMesh
 
-RIGS: dict[str, type[PourRig]] = {
-    "funnel": Funnel,
-    "mesh_funnel": MeshFunnel,
-    "lifting_cylinder": LiftingCylinder,
-    "draw_down_box": DrawDownBox,
-    "rotating_drum": RotatingDrum,
-}
+RIGS: Registry[type[PourRig]] = Registry(
+    "rig", (Funnel, MeshFunnel, LiftingCylinder, DrawDownBox, RotatingDrum), derived_from(PourRig)
+)
 BENCH_RIGS: dict[str, type[BenchRig]] = {
     "inclined_plane": InclinedPlane,
     "drop_plate_45": DropPlate45,
     "compression": Compression,
 }
+"""One per bench test; what is measured in it is a file of ``solver/bench_tests``."""
 
 __all__ = [
     "BENCH_RIGS",

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from solver.params import ParameterError, param
 from solver.rigs.feed import BoxFeed
 from solver.rigs.outlet import Slot
-from solver.rigs.rig import DISCHARGE, Action, Container, PourRig, Switch
+from solver.rigs.rig import DISCHARGE, DRAW_DOWN, Action, Container, PourRig, Switch
 from solver.rigs.surface import Surface, horizontal, rectangle
 from solver.rigs.turns import FACING_MINUS_Y, FACING_PLUS_Y, turned_plane
 
@@ -44,15 +44,13 @@ class DrawDownBox(PourRig):
 
     name = "draw_down_box"
     surface_names = ("plate", "front", "back", "left", "right", "left_shelf", "right_shelf", "gate")
-    observables = (
-        "draw_down_angle_deg",
-        "draw_down_angle_left_deg",
-        "draw_down_angle_right_deg",
+    gives = (
+        DRAW_DOWN,
         "angle_of_repose_deg@0",
         "angle_of_repose_left_deg",
         "angle_of_repose_right_deg",
         "apex_height_m",
-        *DISCHARGE,
+        DISCHARGE,
     )
     keeps_material = True
 

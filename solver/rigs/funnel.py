@@ -38,7 +38,7 @@ class Funnel(PourRig):
 
     name = "funnel"
     surface_names = ("plate", "cone", "gate")
-    observables = PILE + DISCHARGE
+    gives = (PILE, DISCHARGE)
     quarter_turns = True
     protocols = ("pour_through", "fill_then_open")
     refills = True

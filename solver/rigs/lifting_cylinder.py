@@ -39,7 +39,7 @@ class LiftingCylinder(PourRig):
 
     name = "lifting_cylinder"
     surface_names = ("plate", "cylinder")
-    observables = PILE + DISCHARGE
+    gives = (PILE, DISCHARGE)
     quarter_turns = True
 
     @property

@@ -56,7 +56,7 @@ class MeshFunnel(PourRig):
 
     name = "mesh_funnel"
     surface_names = ("plate", "cone", "gate")
-    observables = PILE + DISCHARGE
+    gives = (PILE, DISCHARGE)
     protocols = ("pour_through", "fill_then_open")
     refills = True
 

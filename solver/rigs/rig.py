@@ -1,4 +1,5 @@
-"""What the rest of the program asks of a rig. A new rig is one file with one frozen dataclass and one line in ``RIGS``.
+"""What the rest of the program asks of a rig. A new rig is one file with one frozen dataclass and one line in ``RIGS``,
+or an entry point ``rig.NAME`` of a package of one's own (``solver/plugins.py``).
 
 Bodies are poured into every rig in the same way (``solver/pour.py``): the rig is filled, the fill settles, the rig acts
 (a gate opens, a cylinder is lifted, a drum begins to turn), and the run ends, at rest or after a given time. All of it
@@ -19,39 +20,14 @@ from solver.rigs.surface import Surface
 
 NOTHING: Mapping[str, float | str] = MappingProxyType({})
 
-PILE = (
-    "angle_of_repose_deg",
-    "angle_of_repose_left_deg",
-    "angle_of_repose_right_deg",
-    "angle_of_repose_deg@0",
-    "angle_of_repose_deg@45",
-    "angle_of_repose_deg@90",
-    "angle_of_repose_deg@135",
-    "angle_of_repose_above_one_body_deg",
-    "angle_of_repose_cone_deg",
-    "angle_of_repose_mass_cone_deg",
-    "angle_of_repose_volume_cone_deg",
-    "apex_height_m",
-    "centre_height_m",
-    "footprint_r50_m",
-    "footprint_r90_m",
-    "centroid_x_m",
-    "centroid_y_m",
-    "stray_fraction",
-    "bulk_density_kg_m3",
-    "solid_fraction",
-)
-"""Observables of a free pile on the plate, whatever made it."""
-
-DISCHARGE = (
-    "discharge_t10_s",
-    "discharge_t50_s",
-    "discharge_t90_s",
-    "discharge_time_s",
-    "residual_mass_kg",
-    "left_domain_fraction",
-)
-"""Observables of the flow out of a container."""
+PILE = "pile"
+"""Group of the observables of a free pile on the plate, whatever made it."""
+DISCHARGE = "discharge"
+"""Those of the flow out of a container."""
+FREE_SURFACE = "free_surface"
+"""Those of the surface of a bed in motion."""
+DRAW_DOWN = "draw_down"
+"""Those of what stays above a slot."""
 
 
 @dataclass(frozen=True)
@@ -180,8 +156,8 @@ class PourRig(Rig, Protocol):
     """A rig that bodies are poured into."""
 
     @property
-    def observables(self) -> tuple[str, ...]:
-        """Names of what is read off a run by default."""
+    def gives(self) -> tuple[str, ...]:
+        """What is read off a run by default: groups of observables, and the names of single ones beside them."""
         ...
 
     @property
@@ -197,7 +173,7 @@ class PourRig(Rig, Protocol):
     @property
     def leaves_heap(self) -> bool:
         """Whether a heap's angle of repose is asked for: a flat layer is then no result (``Outcome.NO_HEAP``)."""
-        return "angle_of_repose_deg" in self.observables
+        return PILE in self.gives
 
     @property
     def quarter_turns(self) -> bool:

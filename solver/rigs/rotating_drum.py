@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 from solver.params import ParameterError, param
 from solver.rigs.feed import BoxFeed
-from solver.rigs.rig import EVERYWHERE, Action, Container, Move, PourRig, Watch
+from solver.rigs.rig import EVERYWHERE, FREE_SURFACE, Action, Container, Move, PourRig, Watch
 from solver.rigs.surface import Pose, Revolved, Surface
 from solver.rigs.turns import FACING_MINUS_Y, FACING_PLUS_Y, turned_plane
 
@@ -52,7 +52,7 @@ class RotatingDrum(PourRig):
 
     name = "rotating_drum"
     surface_names = ("shell", "front", "back")
-    observables = ("dynamic_angle_deg", "slope_deg", "slope_core_deg")
+    gives = (FREE_SURFACE,)
 
     @property
     def suits(self) -> Mapping[str, float | str]:

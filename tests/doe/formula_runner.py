@@ -6,7 +6,7 @@ import numpy as np
 
 from doe.runner import TRIES, seed_of
 from doe.runs import Run
-from doe.study import ESTIMATORS
+from solver import OBSERVABLES
 
 
 class FormulaRunner:
@@ -40,7 +40,8 @@ class FormulaRunner:
         noise = self.sigma * rng.normal()
         angle = self.formula(setting.values) + noise
         outcome = "jammed" if rng.uniform() < self.jam else self.ended
-        seen = {name: angle + 0.1 * k * rng.normal() for k, name in enumerate(ESTIMATORS)}
+        estimators = [name for name, one in OBSERVABLES.items() if one.estimator]
+        seen = {name: angle + 0.1 * k * rng.normal() for k, name in enumerate(estimators)}
         seen |= {name: formula(setting.values) + noise for name, formula in self.others.items()}
         seen["bulk_density_kg_m3"] = 150.0 + 5.0 * angle + rng.normal()
         key = hashlib.sha256(repr((setting.values, seed)).encode()).hexdigest()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from doe.economy import ECONOMIES, OBSERVABLES, compare, judged, pours_needed, rows_of, settings_of
+from doe.economy import COMPARED, ECONOMIES, compare, judged, pours_needed, rows_of, settings_of
 from doe.runs import Run
 from doe.study import load_study
 from solver import value, with_values
@@ -26,7 +26,7 @@ class Normal:
     def _one(self, k, setting, replicate):
         rng = np.random.default_rng([k, replicate])
         cheap = LARGER.name in setting.label
-        found = {name: float(rng.normal(20.0 + self._shift * cheap, 2.0)) for name in OBSERVABLES}
+        found = {name: float(rng.normal(20.0 + self._shift * cheap, 2.0)) for name in COMPARED}
         outcome = "time_limit" if cheap and rng.random() < self._lost else "at_rest"
         return Run(setting.label, replicate, 0, replicate, outcome, "", found, 2.0 if cheap else 3.0, "")
 
@@ -58,7 +58,7 @@ def test_piles_that_are_alike_are_accepted_and_told_tenth_by_tenth():
     told, runner = [], Normal()
     found = compare(STUDY, LARGER, runner, 1000, told.append)
     assert found.accepted
-    assert len(found.compared) == 3 * len(OBSERVABLES)
+    assert len(found.compared) == 3 * len(COMPARED)
     assert found.cost == pytest.approx(2.0 / 3.0)
     assert [one.pours for one in told] == [100 * k for k in range(1, 11)]
     assert {stage for stage, _ in runner.stages} == {"economy larger_steps"}
@@ -88,12 +88,12 @@ def test_a_share_of_false_acceptances_is_at_most_alpha():
         runs = []
         for row in rows:
             shift = 0.6 if LARGER.name in row.label else 0.0
-            draws = rng.normal(20.0 + shift, 2.0, (50, len(OBSERVABLES))).tolist()
-            found = [dict(zip(OBSERVABLES, line, strict=True)) for line in draws]
+            draws = rng.normal(20.0 + shift, 2.0, (50, len(COMPARED))).tolist()
+            found = [dict(zip(COMPARED, line, strict=True)) for line in draws]
             runs.append([Run(row.label, k, 0, k, "at_rest", "", one, 1.0, "") for k, one in enumerate(found)])
         passed += sum(one.equivalent for one in judged(STUDY, LARGER, runs, 50).compared)
     # 1080 independent tests at the margin, 5 % each: 54 ± 7; four standard deviations and the margin's own noise.
-    assert passed / (repetitions * 3 * len(OBSERVABLES)) < 0.08
+    assert passed / (repetitions * 3 * len(COMPARED)) < 0.08
 
 
 def test_settings_are_the_centre_and_the_two_softest_corners():
@@ -107,18 +107,18 @@ def test_settings_are_the_centre_and_the_two_softest_corners():
 @pytest.mark.parametrize("outcomes", [("jammed", "jammed"), ("at_rest", "jammed")])
 def test_pours_that_cannot_be_compared_prove_nothing(outcomes):
     rows = [
-        [Run(row.label, k, 0, k, outcome, "", dict.fromkeys(OBSERVABLES, 20.0 + k), 1.0, "") for k in range(4)]
+        [Run(row.label, k, 0, k, outcome, "", dict.fromkeys(COMPARED, 20.0 + k), 1.0, "") for k in range(4)]
         for row, outcome in zip(rows_of(STUDY, LARGER, 4), outcomes * 3, strict=True)
     ]
     found = judged(STUDY, LARGER, rows, 4)
-    assert len(found.compared) == 3 * len(OBSERVABLES)
+    assert len(found.compared) == 3 * len(COMPARED)
     assert not any(one.equivalent for one in found.compared)
     assert not found.accepted
 
 
 def test_without_any_scatter_nothing_is_shown():
     rows = [
-        [Run(row.label, k, 0, k, "at_rest", "", dict.fromkeys(OBSERVABLES, 30.0), 1.0, "") for k in range(4)]
+        [Run(row.label, k, 0, k, "at_rest", "", dict.fromkeys(COMPARED, 30.0), 1.0, "") for k in range(4)]
         for row in rows_of(STUDY, LARGER, 4)
     ]
     assert not judged(STUDY, LARGER, rows, 4).accepted

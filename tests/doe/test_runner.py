@@ -11,7 +11,7 @@ from doe.runner import TRIES, PourRunner, seed_of
 from doe.runs import Run, Setting, no_pile_shares, responses
 from doe.store import Store, StoreError
 from solver import load_material, with_values
-from solver.observables import REGISTRY, Observable, Value
+from solver.observables import OBSERVABLES, Observable, Value
 from solver.rigs import Funnel
 from solver.shape import Solid
 from tests.solver.observables.made_up import empty_pile, record_of
@@ -90,8 +90,8 @@ def test_a_new_observable_is_read_off_all_stored_pours_without_pouring(tmp_path,
         poured = sum(len(runs) for runs in first)
 
         heaviest = Observable("heaviest_kg", "kg", "", lambda record: Value(record.bodies.mass.max(), "kg"), "record")
-        monkeypatch.setitem(REGISTRY, heaviest.name, heaviest)
-        monkeypatch.setattr(Funnel, "observables", (*Funnel.observables, heaviest.name))
+        monkeypatch.setitem(OBSERVABLES.things, heaviest.name, heaviest)
+        monkeypatch.setattr(Funnel, "gives", (*Funnel.gives, heaviest.name))
         again = PourRunner(scene, store, "test", 1, pours=never).run("stage", settings)
         assert all(run.reused for runs in again for run in runs)
         flat = ([run for runs in rows for run in runs] for rows in (again, first))

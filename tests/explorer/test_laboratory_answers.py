@@ -7,7 +7,6 @@ import pytest
 
 from doe.laboratory import TESTS
 from explorer.design.analysis import AnalyseOrder
-from explorer.design.kinds import Kind
 from explorer.design.plan import PlanOrder
 from explorer.errors import CommandError
 from explorer.laboratory.answers import (
@@ -78,7 +77,7 @@ def test_a_picture_of_nothing_says_so(tmp_path):
 
 def test_a_sheet_is_that_of_the_command(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    answer = sheet_answer(PlanOrder(Kind.BOX_BEHNKEN, replicates=2), "sunflower_extract", 0.5)
+    answer = sheet_answer(PlanOrder("box-behnken", replicates=2), "sunflower_extract", 0.5)
     assert told(answer).startswith(answer.text.strip())
     assert (tmp_path / "runs.csv").read_bytes() == answer.files["runs.csv"]
 
@@ -86,8 +85,8 @@ def test_a_sheet_is_that_of_the_command(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("order", "said"),
     [
-        (PlanOrder(Kind.PLACKETT_BURMAN, runs=12, fold=True), "--runs 12 --fold"),
-        (PlanOrder(Kind.FACTORIAL, generators=("C=AB",)), "--generator C=AB"),
+        (PlanOrder("plackett-burman", runs=12, fold=True), "--runs 12 --fold"),
+        (PlanOrder("factorial", generators=("C=AB",)), "--generator C=AB"),
     ],
 )
 def test_options_of_a_design_are_part_of_its_command_line(order, said, tmp_path, monkeypatch):

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import viser
 
+from doe.designs import DESIGNS
 from explorer.design.analysis import AnalyseOrder
-from explorer.design.kinds import Kind
 from explorer.design.plan import PlanOrder
-from explorer.errors import CommandError
 from explorer.laboratory.answers import analysis_answer, sheet_answer
 from explorer.viewer.actions import Post
 from explorer.viewer.background_work import BackgroundWork
@@ -29,7 +28,7 @@ class DesignPanel:
         self._background, gui = background, server.gui
         with gui.add_folder("Your own design → runs", expand_by_default=False):
             self._kind = gui.add_dropdown(
-                "Design", tuple(kind.value for kind in Kind), initial_value="box-behnken", hint="Which runs are made."
+                "Design", tuple(DESIGNS), initial_value="box-behnken", hint="Which runs are made."
             )
             self._factors = UploadSlot(
                 server, "Factors", shipped_assets("designs"), (".toml",), folder, post, "Name, low, high, unit of each."
@@ -61,11 +60,8 @@ class DesignPanel:
         analyse.on_click(lambda _: post(self._analyse))
 
     def _make(self) -> None:
-        kind = str(self._kind.value)
-        if kind not in tuple(Kind):
-            raise CommandError(f"design {kind[:40]!r}: allowed are {', '.join(Kind)}")
         order = PlanOrder(
-            Kind(kind),
+            str(self._kind.value),
             runs=int(self._size.value) or None,
             replicates=int(self._replicates.value),
             fold=bool(self._fold.value),

@@ -10,7 +10,7 @@ from explorer.live.messages import Status
 from explorer.screen_units import checked, screen_unit, title
 from explorer.session import Session
 from explorer.viewer.actions import Post
-from solver.effects import SET_UP_EFFECTS
+from solver.effects import set_up_effects
 from solver.params import Parameter, declared
 from solver.scene import Scene, parameters, value, with_values
 
@@ -45,7 +45,7 @@ def rest_paths(scene: Scene) -> tuple[str, ...]:
 
 def effect_paths() -> tuple[str, ...]:
     """Parameters of the folder of effects of material and set-up."""
-    return tuple(path for kind in SET_UP_EFFECTS for path in declared(kind, f"effect.{kind.name}"))
+    return tuple(path for kind in set_up_effects() for path in declared(kind, f"effect.{kind.name}"))
 
 
 class RestartPanel:

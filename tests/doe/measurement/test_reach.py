@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from doe.measurement import load_measurement, reach_of
-from doe.measurement.reach import TELLTALES
-from solver import EFFECTS, Telltale
+from solver import EFFECTS, Telltale, all_names, named
 from solver.assets import measurement_folder
 from solver.effects.plate_tilt import PlateTilt
 from tests.doe.measurement.folders import MEASUREMENT, changed, write
@@ -81,12 +80,12 @@ class LeaningStand(PlateTilt):
 
 
 def test_a_new_effect_says_itself_what_reveals_it(tmp_path, monkeypatch):
-    monkeypatch.setitem(EFFECTS, "leaning_stand", LeaningStand)
+    monkeypatch.setitem(EFFECTS.things, "leaning_stand", LeaningStand)
     assert "leaning_stand" in reach(tmp_path).hidden_effects
     table = HEAD + "1,centroid_x_m,,0.1\n2,centroid_x_m,,0.2\n"
     assert "leaning_stand" not in reach(tmp_path, table).hidden_effects
 
 
-def test_every_class_of_observables_has_its_summaries():
-    assert set(TELLTALES) == set(Telltale)
-    assert all(TELLTALES.values())
+def test_every_observable_says_what_it_can_reveal():
+    assert all(named(name).telltales for name in all_names())
+    assert {telltale for name in all_names() for telltale in named(name).telltales} == set(Telltale)

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from solver.body import Body, Members
-from solver.effects import BODY_EFFECTS, CONTACT_EFFECTS, EFFECTS, Effect
+from solver.effects import EFFECTS, Effect, body_effects, contact_effects
 from solver.laboratory import FREE, GRAIN, RADIUS, ROOM, UPRIGHT, WALL, Laboratory, scene_of, sphere
 from solver.layout import layout
 from solver.material import Pair
@@ -37,8 +37,8 @@ FELT: dict[str, dict[str, float]] = {
 }
 """A value for every parameter of every effect."""
 
-IN_KERNELS = tuple(kind.name for kind in (*CONTACT_EFFECTS, *BODY_EFFECTS))
-ON_CONTACTS = tuple(kind.name for kind in CONTACT_EFFECTS)
+IN_KERNELS = tuple(kind.name for kind in (*contact_effects(), *body_effects()))
+ON_CONTACTS = tuple(kind.name for kind in contact_effects())
 
 
 def felt(name: str, **changes: float) -> Effect:

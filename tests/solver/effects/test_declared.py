@@ -9,7 +9,7 @@ import re
 import pytest
 
 from solver.assets import asset_path
-from solver.effects import BODY_EFFECTS, CONTACT_EFFECTS, EFFECTS, SET_UP_EFFECTS, ContactEffect, SetUpEffect, Telltale
+from solver.effects import EFFECTS, SetUpEffect, Telltale, body_effects, contact_effects, set_up_effects
 from solver.effects.columns import COLUMNS, COUPLE, KEPT, MEMORY, effect_table, kernel_effects
 from solver.effects.set_up import actual
 from solver.material_file import load_material, scene_from
@@ -90,7 +90,7 @@ def test_parameters_go_round_by_their_paths(name):
     assert back == SCENE
 
 
-@pytest.mark.parametrize("kind", SET_UP_EFFECTS)
+@pytest.mark.parametrize("kind", set_up_effects())
 def test_every_parameter_of_the_set_up_acts_and_is_carried_out_once(kind):
     scene = with_effects(SCENE, felt(kind.name))
     done = actual(scene)
@@ -103,7 +103,7 @@ def test_every_parameter_of_the_set_up_acts_and_is_carried_out_once(kind):
 
 def test_the_order_of_effects_does_not_matter():
     there = with_effects(SCENE, *(felt(name) for name in EFFECTS))
-    back = with_effects(SCENE, *(felt(name) for name in reversed(EFFECTS)))
+    back = with_effects(SCENE, *(felt(name) for name in reversed(tuple(EFFECTS))))
     assert there == back
     assert [effect.name for effect in there.effects] == list(EFFECTS)
 
@@ -147,7 +147,7 @@ RECKONED = {"capillary_bridge": (0.3 * math.cos(0.3), 1e-9, 1.15)}
 
 def test_columns_of_kernel_and_tables_agree():
     """Each effect's parameters stand in its own columns, of the pairs of classes on which it acts."""
-    for k, kind in enumerate((*CONTACT_EFFECTS, *BODY_EFFECTS)):
+    for k, kind in enumerate((*contact_effects(), *body_effects())):
         effect = felt(kind.name)
         table = effect_table(scene_with(effect), ("wall",))
         assert table.shape == (2, 2, COLUMNS[-1] + 1)
@@ -162,10 +162,10 @@ def test_columns_of_kernel_and_tables_agree():
         assert (table[0, :, -1] == 0.6).all()
     assert MEMORY[-1] == COUPLE
     assert KEPT == COUPLE + 4
-    assert sum(kind.memory for kind in CONTACT_EFFECTS) == COUPLE
+    assert sum(kind.memory for kind in contact_effects()) == COUPLE
 
 
 def test_contact_effects_stand_in_the_order_of_their_stages():
-    stages = [kind.stage for kind in CONTACT_EFFECTS if issubclass(kind, ContactEffect)]
+    stages = [kind.stage for kind in contact_effects()]
     assert stages == sorted(stages)
-    assert len(stages) + len(BODY_EFFECTS) + len(SET_UP_EFFECTS) == len(EFFECTS)
+    assert len(stages) + len(body_effects()) + len(set_up_effects()) == len(EFFECTS)

@@ -26,7 +26,7 @@ import trimesh
 from solver import clump
 from solver.assets import measurement_folder
 from solver.bench_tests import BENCH_TESTS
-from solver.effects import EFFECTS, SET_UP_EFFECTS
+from solver.effects import EFFECTS, set_up_effects
 from solver.effects.columns import kernel_effects
 from solver.insertion import Insertion
 from solver.laboratory import ROOM, UPRIGHT
@@ -100,7 +100,7 @@ def pours() -> dict[str, Scene]:
     several = {"body.spheres": "coarse", "rig.mass": 4e-3, "insertion.rate": 0.1, "insertion.lead": 0.02}
     several |= {"numerics.duration": 0.8, "body.seed.size_distribution": "uniform", "body.seed.size_spread": 0.1}
     found["pour of a mixture of solids"] = with_values(load_material("sunflower_extract"), several)
-    return found | {f"pour with {kind.name}": with_effects(funnel, felt(kind.name)) for kind in SET_UP_EFFECTS}
+    return found | {f"pour with {kind.name}": with_effects(funnel, felt(kind.name)) for kind in set_up_effects()}
 
 
 def heap_numbers(scenes: Mapping[str, Scene], worlds: int = 1, first: int = 0) -> tuple[Numbers, Numbers]:

@@ -1,0 +1,94 @@
+"""What a design family is to everything outside it: a name, the options that it takes, and the points that it makes.
+
+To add one: a file with a class of :class:`Design` and a line in ``DESIGNS``, or an entry point ``design.NAME`` of a
+package of one's own (``solver/plugins.py``). The command line, the page and study files list from there.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field, fields
+from typing import ClassVar, Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.record import Record
+
+FloatArray = npt.NDArray[np.float64]
+Alpha = Literal["rotatable", "face-centred", "inscribed"]
+ALPHAS: tuple[str, ...] = get_args(Alpha)
+LETTERS = "ABCDEFGHJKLMNOPQRSTUVWXYZ"
+"""Without I, which is the identity."""
+
+
+@dataclass(frozen=True)
+class DesignOptions(Record):
+    """What may be asked of a design; a family takes those that it names. None, 0, (), False: as usual for it."""
+
+    runs: int | None = None
+    """Size of a table, or number of points."""
+    centre: int | None = None
+    """Runs with every factor in the middle."""
+    fold: bool = False
+    """Whether the mirror image of every row is run too."""
+    generators: tuple[str, ...] = ()
+    """Of a fraction, such as "E=ABC"."""
+    fraction: int = 0
+    """P of the fraction 2^(k − P) by the usual generators."""
+    alpha: Alpha = "rotatable"
+    """Where the axial points stand."""
+    seed: int = 1
+    """Of a design that is drawn."""
+
+    def given(self) -> tuple[str, ...]:
+        """Names of the options that differ from what is usual, but for the seed."""
+        usual = DesignOptions()
+        names = (one.name for one in fields(self) if one.name != "seed")
+        return tuple(name for name in names if getattr(self, name) != getattr(usual, name))
+
+
+@dataclass(frozen=True)
+class Points:
+    """The rows of a design, and what is to be said of it."""
+
+    coded: FloatArray
+    """Levels in coded units, shape (rows, factors): low is −1, high is +1."""
+    unused: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    """Columns of its table that carry no factor, shape (rows, n): they serve as error. Empty: there are none."""
+    traits: tuple[str, ...] = ()
+    generators: tuple[str, ...] = ()
+    """Of a fraction."""
+    aliases: tuple[str, ...] = ()
+    """One line per column that is confused with others, factors by their letters."""
+    notes: tuple[str, ...] = ()
+    """Sentences that a reader must know."""
+
+
+class Design(ABC):
+    """A family of designs."""
+
+    name: ClassVar[str]
+    """As it is written on the command line and in study files."""
+    doc: ClassVar[str]
+    """What it is for, in one line."""
+    options: ClassVar[tuple[str, ...]] = ()
+    """Fields of :class:`DesignOptions` that it takes."""
+    main_effects_only: ClassVar[bool] = False
+    """Whether it is made for a model without interactions and squares."""
+
+    @abstractmethod
+    def points(self, factors: int, options: DesignOptions) -> Points:
+        """The rows for a number of factors; raises StatisticsError where there are none for it."""
+
+
+def factor_letters(factors: int) -> tuple[str, ...]:
+    """Return the short names A, B, …, H, J, …, Z, AA, AB, … of `factors` factors."""
+    doubled = [a + b for a in LETTERS for b in LETTERS]
+    return tuple([*LETTERS, *doubled][:factors])
+
+
+def with_centre(levels: npt.NDArray[np.int64], centre: int | None, usual: int = 0) -> FloatArray:
+    """``levels``, shape (rows, columns), followed by runs in the middle; ``usual`` many where None are asked for."""
+    runs = usual if centre is None else centre
+    return np.vstack([levels, np.zeros((runs, levels.shape[1]), dtype=np.int64)]).astype(np.float64)
