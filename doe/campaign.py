@@ -1,4 +1,6 @@
-"""The whole chain: pilot → screening → assumptions → scan → ascent → surface → optimum → verification."""
+"""The whole chain: pilot → screening → assumptions → scan → ascent → surface → optimum → verification, and whatever
+stages other packages add to it.
+"""
 
 from __future__ import annotations
 
@@ -6,22 +8,16 @@ import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
+from functools import partial
 
 from doe.errors import StatisticsError, StudyStopped
 from doe.partial import Analysis
 from doe.profile import Profile
 from doe.runs import Run, Runner, Setting
-from doe.stages.ascent import ascent
-from doe.stages.pilot import Bias, pilot
-from doe.stages.scan import scan
-from doe.stages.screening import assumptions, screening
-from doe.stages.surface import optimum, surface
-from doe.stages.verification import verification
+from doe.stages import stages_of
+from doe.stages.stage import Bias, Chain
 from doe.study import Study
-from doe.study_result import AllStages, StageResult
-
-Found = TypeVar("Found", bound=StageResult | None)
+from doe.study_result import AllStages, StageResult, Stages
 
 
 @dataclass(frozen=True)
@@ -49,43 +45,22 @@ def run_campaign(
     Raises StudyStopped where what the runs of a stage gave cannot be analysed.
     """
     seconds: dict[str, float] = {}
-    counted = CountingRunner(runner)
-
-    def timed(stage: str, work: Callable[[Runner], Found]) -> Found:
+    counted, found = CountingRunner(runner), Stages()
+    for stage in stages_of(study):
+        sized = profile if found.pilot is None else found.pilot.profile
+        work = partial(stage.run, Chain(study, sized, estimator_bias, found))
         started = time.perf_counter()
-        on_begin(stage, work)
+        on_begin(stage.name, work)
         try:
             result = work(counted)
         except StatisticsError as error:
             seen = ", ".join(f"{number} {outcome}" for outcome, number in counted.outcomes.items())
-            raise StudyStopped(stage, f"{error} (the last runs: {seen})", counted.runs) from error
-        seconds[stage] = time.perf_counter() - started
-        on_result(stage, result)
-        on_stage(stage, result.line if result is not None else "not declared in this study")
-        return result
-
-    piloted = timed("pilot", lambda by: pilot(study, profile, by, estimator_bias))
-    sized = piloted.profile
-    response = piloted.estimator
-    screened = timed("screening", lambda by: screening(study, sized, by, response))
-    assumed = timed("assumptions", lambda by: assumptions(study, sized, by, response))
-    noise = piloted.noise[study.targets[0].observable]
-    scanned = timed("scan", lambda by: scan(study, sized, by, noise))
-    walked = timed("ascent", lambda by: ascent(study, sized, by, screened, noise))
-    fitted = timed("surface", lambda by: surface(study, sized, by, walked.factors, walked.region))
-    chosen = timed("optimum", lambda _: optimum(study, fitted))
-    verified = timed("verification", lambda by: verification(study, sized, by, chosen.values))
-    stages = AllStages(
-        pilot=piloted,
-        screening=screened,
-        assumptions=assumed,
-        scan=scanned,
-        ascent=walked,
-        surface=fitted,
-        optimum=chosen,
-        verification=verified,
-    )
-    return Campaign(stages, seconds)
+            raise StudyStopped(stage.name, f"{error} (the last runs: {seen})", counted.runs) from error
+        seconds[stage.name] = time.perf_counter() - started
+        found = found.with_result(stage.name, result)
+        on_result(stage.name, result)
+        on_stage(stage.name, result.line if result is not None else "not declared in this study")
+    return Campaign(AllStages(**vars(found)), seconds)
 
 
 class CountingRunner:

@@ -93,13 +93,13 @@ def equal_variance(groups: Mapping[str, npt.ArrayLike]) -> EqualVariance:
     return EqualVariance(float(f), float(p), sigmas)
 
 
-def resolution(sigma: float, replicates: int, rows: int = 28, factors: int = 24) -> Resolution:
-    """Return what `replicates` runs resolve when one run scatters by `sigma`."""
+def resolution(sigma: float, replicates: int, rows: int = 28, factors: int = 24, efficiency: float = 1.0) -> Resolution:
+    """Return what `replicates` runs resolve when one run scatters by `sigma`; see `doe.power.smallest_main_effect`."""
     return Resolution(
         replicates,
         smallest_difference(sigma, replicates),
-        smallest_main_effect(sigma, replicates, rows),
-        smallest_main_effect(sigma, replicates, rows, comparisons=factors),
+        smallest_main_effect(sigma, replicates, rows, efficiency=efficiency),
+        smallest_main_effect(sigma, replicates, rows, comparisons=factors, efficiency=efficiency),
     )
 
 

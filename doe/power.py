@@ -67,15 +67,31 @@ def smallest_main_effect(
     alpha: float = 0.05,
     power: float = 0.8,
     comparisons: int = 1,
+    efficiency: float = 1.0,
 ) -> float:
-    """Return the main effect, mean(+) - mean(-), that a two-level design of `rows` x `replicates` runs
-    resolves.
+    """Return the main effect, the change from low to high, that a design of `rows` x `replicates` runs resolves.
 
-    SE = 2 sigma/sqrt(rows x replicates); the error has rows x (replicates - 1) degrees of freedom (pure
-    error), so the answer is NaN for one replicate. `comparisons` divides alpha (Bonferroni).
+    SE = 2 sigma/sqrt(efficiency x rows x replicates), see `main_effect_efficiency`; the error has
+    rows x (replicates - 1) degrees of freedom (pure error), so the answer is NaN for one replicate. `comparisons`
+    divides alpha (Bonferroni).
     """
-    standard_error = 2 * sigma / math.sqrt(rows * replicates)
+    standard_error = 2 * sigma / math.sqrt(efficiency * rows * replicates)
     return smallest_effect(standard_error, rows * (replicates - 1), alpha / comparisons, power)
+
+
+def main_effect_efficiency(design: FloatArray) -> float:
+    """Return the information on the worst known main effect of a design as a share of that in as many rows at ±1.
+
+    design: coded points, shape (rows, factors). Var(2 b_j) = 4 sigma²/(efficiency x rows) at worst; 1 for orthogonal
+    two-level designs, below it where rows stand in the middle or factors are correlated. Raises StatisticsError where
+    the rows cannot tell the factors apart.
+    """
+    model = np.column_stack([np.ones(len(design)), design])
+    if np.linalg.matrix_rank(model) < model.shape[1]:
+        raise StatisticsError(f"{len(design)} rows cannot tell {design.shape[1]} factors and the mean apart")
+    worst = float(np.diag(np.linalg.inv(model.T @ model))[1:].max())
+    # Rounding of the inverse is no loss: orthogonal designs have 1 exactly.
+    return round(1.0 / (len(design) * worst), 12)
 
 
 def smallest_linear_effect(
@@ -104,16 +120,22 @@ def replicates_for_difference(effect: float, sigma: float, alpha: float = 0.05, 
 
 
 def replicates_for_main_effect(
-    effect: float, sigma: float, rows: int = 28, alpha: float = 0.05, power: float = 0.8, comparisons: int = 1
+    effect: float,
+    sigma: float,
+    rows: int = 28,
+    alpha: float = 0.05,
+    power: float = 0.8,
+    comparisons: int = 1,
+    efficiency: float = 1.0,
 ) -> int:
-    """Return the least replicates per row (at least 2) with which a two-level design resolves a main effect.
+    """Return the least replicates per row (at least 2) with which a design resolves a main effect.
 
     Arguments as in `smallest_main_effect`. Raises StatisticsError unless effect > 0 and sigma > 0.
     """
     _require_positive(effect=effect, sigma=sigma)
 
     def enough(n: int) -> bool:
-        standard_error = 2 * sigma / math.sqrt(rows * n)
+        standard_error = 2 * sigma / math.sqrt(efficiency * rows * n)
         return t_test_power(effect, standard_error, rows * (n - 1), alpha / comparisons) >= power
 
     return _least_replicates(2, enough, effect, sigma)

@@ -1,9 +1,8 @@
-"""Screening: which factors of a two-level design move the response, judged by two error estimates side by
-side.
+"""Screening: which factors of a design move the response, judged by two error estimates side by side.
 
-Model: mean response of row r = intercept + sum_j effect_j/2 x_rj, fitted by least squares to the row means.
-effect = mean(+) - mean(-), in the unit of the response, when no row is missing. Sums of squares are partial
-(Type III) on the scale of row means: SS = runs/4 effect^2 for a complete design.
+Model: mean response of row r = intercept + sum_j effect_j/2 x_rj, fitted by least squares to the row means. The
+effect is the change from low to high, in the unit of the response: mean(+) - mean(-) of a two-level design without a
+missing row. Sums of squares are partial (Type III) on the scale of row means: SS = runs/4 effect^2 for such a design.
 
 Two errors: (a) what the factors leave unexplained, that is the dummy columns (Plackett and Burman 1946), with
 few degrees of freedom and inflated by aliased interactions; (b) the replicates of each row (pure error).
@@ -14,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -44,20 +44,20 @@ __all__ = ["FALLBACK", "SIGNIFICANT", "Screening", "Selected", "analyse_screenin
 
 
 def analyse_screening(
-    design: npt.NDArray[np.int64],
+    design: npt.NDArray[np.number[Any]],
     names: Sequence[str],
     responses: FloatArray,
     dummies: Sequence[str],
     alpha: float = 0.05,
 ) -> Screening:
-    """Estimate and test the effects of a two-level design.
+    """Estimate and test the main effects of a design.
 
-    design: levels -1/+1, shape (rows, columns). names: one per column. responses: shape (rows, replicates),
+    design: levels from -1 to +1, shape (rows, columns). names: one per column. responses: shape (rows, replicates),
     NaN where a run is missing. dummies: the names of columns that carry no factor. Rows without any valid run
     are left out and named; the factors are then estimated by least squares on the rest, and the dummies are
     no longer estimable.
 
-    Raises StatisticsError when shapes or names disagree, levels are not -1/+1 or the rows left cannot
+    Raises StatisticsError when shapes or names disagree, levels are beyond -1 … +1 or the rows left cannot
     separate the factors.
     """
     _require_consistent(design, names, dummies)
@@ -180,9 +180,9 @@ def _notes(
     return tuple(notes)
 
 
-def _require_consistent(design: npt.NDArray[np.int64], names: Sequence[str], dummies: Sequence[str]) -> None:
-    if design.ndim != 2 or not np.isin(design, (-1, 1)).all():
-        raise StatisticsError("design must be a matrix (rows, columns) of levels -1 and +1")
+def _require_consistent(design: npt.NDArray[np.number[Any]], names: Sequence[str], dummies: Sequence[str]) -> None:
+    if design.ndim != 2 or not (np.abs(design) <= 1).all():
+        raise StatisticsError("design must be a matrix (rows, columns) of levels from -1 to +1")
     if len(names) != design.shape[1] or len(set(names)) != len(names):
         raise StatisticsError(f"names has {len(names)} entries; allowed are {design.shape[1]} different names")
     for name in dummies:

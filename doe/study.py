@@ -2,7 +2,10 @@
 
 format = 1
 material = "name or file"      fallback = ["X4", …]
-dummies = 3                    columns of the screening that stay free of factors, at least
+dummies = 3                    columns of a Plackett–Burman table that stay free of factors, at least
+[screening]  [assumptions]  [surface]      design = "NAME" (doe/designs) of the stage, and its options: runs, centre,
+                               fold, generators, fraction, alpha, seed; Plackett–Burman of 28 and of 12 runs and
+                               Box–Behnken with 5 centre runs if not given
 estimators = [observables]     candidates for the screening's response; those of the targets always belong to them
 [rig] name and dimensions      [insertion] …      [numerics] …      [effect.NAME] what is switched on
 [[target]]      observable, mean, n, sd, weight, margin
@@ -11,17 +14,20 @@ estimators = [observables]     candidates for the screening's response; those of
 [[change]]      name, values = { path = value }          declared changes for the choice of the estimator
 [scan]          path, values                             one assumption in steps
 [profile.NAME]  spheres, mass and the numbers of runs
+[stage.NAME]    a stage of another package, with what it takes (doe/stages/stage.py)
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from doe.designs import ChosenDesign
 from doe.errors import StudyFileError
 from doe.factors import MIN_BODIES, bodies_touched, checked_levels
 from doe.profile import Profile, profile_from
 from doe.record import Record
+from doe.stage_designs import ASSUMPTIONS, SCREENING, SURFACE, main_effect_design, second_order_design
 from doe.study_table import Table, entries, names, one_of, only, required, section, whole
 from doe.target import Target, is_angle, target_from
 from solver import (
@@ -35,6 +41,7 @@ from solver import (
     observable_names,
     parameters,
     parse_quantity,
+    plugged_in,
     read_toml,
     with_set_up,
     with_values,
@@ -42,8 +49,6 @@ from solver import (
 
 CALIBRATED = 3
 """Factors that go on from the screening to the ascent and the response surface."""
-COLUMNS = 27
-"""Columns of the screening's design, one less than its rows; those without a factor are its dummies."""
 
 TRIES = 3
 """Seeds that are tried for one replicate; a run that jammed or broke is kept with its outcome and replaced."""
@@ -85,11 +90,17 @@ class Study:
     profiles: dict[str, Profile]
     estimators: tuple[str, ...]
     seed: int = 1
+    screening_design: ChosenDesign = SCREENING
+    assumption_design: ChosenDesign = ASSUMPTIONS
+    surface_design: ChosenDesign = SURFACE
+    further: dict[str, Table] = field(default_factory=dict)
+    """Stage of another package → its table."""
 
 
 KEYS = {
     "format", "title", "material", "dummies", "fallback", "rig", "insertion", "target", "factor", "assumption",
-    "change", "scan", "profile", "estimators", "seed", "numerics", "effect",
+    "change", "scan", "profile", "estimators", "seed", "numerics", "effect", "screening", "assumptions", "surface",
+    "stage",
 }  # fmt: skip
 
 
@@ -147,16 +158,13 @@ def study_from(table: Table, path: Path) -> Study:
     scene = with_set_up(load_material(str(table["material"]), relative_to=path.parent), table, path.parent)
     factors = tuple(_factor(scene, entry) for entry in entries(table, "factor"))
     scene = with_values(scene, {factor.path: factor.reference for factor in factors})
-    dummies = whole(table.get("dummies", 3), "dummies", least=1)
-    if not CALIBRATED <= len(factors) <= COLUMNS - dummies:
-        raise StudyFileError(
-            f"factor: {len(factors)} factors with {dummies} dummies; allowed: {CALIBRATED} to {COLUMNS - dummies} in a "
-            f"{COLUMNS + 1}-run design"
-        )
+    dummies = whole(table["dummies"], "dummies", least=1) if "dummies" in table else None
+    if len(factors) < CALIBRATED:
+        raise StudyFileError(f"factor: {len(factors)} factors; at least {CALIBRATED} are needed")
+    screening = main_effect_design(table, "screening", "factor", SCREENING, factors, dummies)
     assumptions = tuple(_levels(scene, entry, "assumption") for entry in entries(table, "assumption"))
     _refuse_twins([*factors, *assumptions])
-    if len(assumptions) > 8:
-        raise StudyFileError(f"assumption: {len(assumptions)} assumptions; at most 8 fit the 12-run design")
+    assumed = main_effect_design(table, "assumptions", "assumption", ASSUMPTIONS, assumptions, None)
     fallback = names(table.get("fallback", []), "fallback", [factor.name for factor in factors])
     if len(fallback) < CALIBRATED:
         raise StudyFileError(f"fallback: {len(fallback)} factors; at least {CALIBRATED} are needed")
@@ -183,7 +191,21 @@ def study_from(table: Table, path: Path) -> Study:
         profiles=profiles or {"standard": Profile("standard")},
         estimators=tuple(dict.fromkeys([*(target.observable for target in targets), *estimators])),
         seed=whole(table.get("seed", 1), "seed", least=0),
+        screening_design=screening,
+        assumption_design=assumed,
+        surface_design=second_order_design(table, "surface", SURFACE, CALIBRATED),
+        further=_further(section(table, "stage")),
     )
+
+
+def _further(tables: Table) -> dict[str, Table]:
+    """Tables of stages of other packages; what is in one is for its stage to check."""
+    known = plugged_in("stage")
+    for name in tables:
+        if name not in known:
+            allowed = f"allowed: {', '.join(known)}" if known else "no installed package has one"
+            raise StudyFileError(f"stage.{name}: no such stage; {allowed}")
+    return {name: section(tables, name) for name in tables}
 
 
 def _levels(scene: Scene, entry: Table, where: str) -> Factor:

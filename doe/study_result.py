@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields
-from typing import Any, ClassVar
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, ClassVar, Self
 
 from doe.profile import Profile
 from doe.record import Document, Record
@@ -14,6 +14,7 @@ from doe.stages.ascent import AscentResult
 from doe.stages.pilot import PilotResult
 from doe.stages.scan import ScanResult
 from doe.stages.screening import ScreeningResult
+from doe.stages.stage import FurtherResult
 from doe.stages.surface import OptimumResult, SurfaceResult
 from doe.stages.verification import VerificationResult
 from doe.study import TRIES, Factor, Study, Values
@@ -21,13 +22,24 @@ from doe.target import Target
 from solver import ClumpFit, Outcome
 
 StageResult = (
-    PilotResult | ScreeningResult | ScanResult | AscentResult | SurfaceResult | OptimumResult | VerificationResult
+    PilotResult
+    | ScreeningResult
+    | ScanResult
+    | AscentResult
+    | SurfaceResult
+    | OptimumResult
+    | VerificationResult
+    | FurtherResult
 )
+USUAL_DESIGNS = {"screening": "Plackett–Burman", "assumptions": "Plackett–Burman", "surface": "Box–Behnken"}
+"""Stage → title of its design, where a result says none: those of versions in which there was no choice."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class StudyDescription(Record):
-    """What was asked. ``contact``: choices of the contact law; ``tries``: seeds for one replicate."""
+    """What was asked. ``contact``: choices of the contact law; ``tries``: seeds for one replicate; ``designs``: stage →
+    title of its design.
+    """
 
     name: str
     title: str
@@ -41,6 +53,7 @@ class StudyDescription(Record):
     changes: dict[str, Values]
     seed: int | None = None
     tries: int = TRIES
+    designs: dict[str, str] = field(default_factory=lambda: dict(USUAL_DESIGNS))
 
     @staticmethod
     def of(study: Study, profile: Profile, tries: int = TRIES) -> StudyDescription:
@@ -59,6 +72,11 @@ class StudyDescription(Record):
             changes=study.changes,
             seed=study.seed,
             tries=tries,
+            designs={
+                "screening": study.screening_design.design.title,
+                "assumptions": study.assumption_design.design.title,
+                "surface": study.surface_design.design.title,
+            },
         )
 
 
@@ -74,11 +92,24 @@ class Stages(Record):
     surface: SurfaceResult | None = None
     optimum: OptimumResult | None = None
     verification: VerificationResult | None = None
+    further: dict[str, FurtherResult] = field(default_factory=dict)
+    """Those of other packages, by name."""
 
     def result_of(self, stage: str) -> StageResult | None:
-        """Return the result of a stage by its name, one of `STAGES`."""
-        found: StageResult | None = getattr(self, stage)
+        """Return the result of a stage by its name."""
+        found: StageResult | None = getattr(self, stage) if stage in OWN_STAGES else self.further.get(stage)
         return found
+
+    def with_result(self, stage: str, result: StageResult | None) -> Self:
+        """Return these results with that of one more stage."""
+        if isinstance(result, FurtherResult):
+            return replace(self, further=self.further | {stage: result})
+        changes: dict[str, Any] = {stage: result} if stage in OWN_STAGES else {}
+        return replace(self, **changes)
+
+    def stage_names(self) -> tuple[str, ...]:
+        """Return the names of the stages that these results are for."""
+        return (*OWN_STAGES, *self.further)
 
     def runs_of(self, stage: str) -> tuple[tuple[Run, ...], ...]:
         """Return the runs of each setting of a stage, failed ones included; empty where it made none."""
@@ -94,10 +125,11 @@ class Stages(Record):
 
     def all_runs(self) -> Iterator[tuple[str, Run]]:
         """Return (stage, run) of every run, failed ones included."""
-        return ((stage, run) for stage in STAGES for runs in self.runs_of(stage) for run in runs)
+        return ((stage, run) for stage in self.stage_names() for runs in self.runs_of(stage) for run in runs)
 
 
-STAGES = tuple(one.name for one in fields(Stages))
+OWN_STAGES = tuple(one.name for one in fields(Stages) if one.name != "further")
+"""The stages of this package, in running order."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -31,7 +31,7 @@ from solver.observables.surface_features import (
     without_holes,
 )
 from solver.params import Parameter, ParameterError, parse_quantity
-from solver.plugins import PluginError, Registry, instance_of
+from solver.plugins import PluginError, Registry, instance_of, plugged_in
 from solver.pour_key import pour_key
 from solver.raw_pour import RawPourError, packed, unpacked
 from solver.record import Bodies, Entries, Outcome, Phase, Pile, Record, Spheres, Trace
@@ -146,6 +146,7 @@ __all__ = [
     "packed",
     "parameters",
     "parse_quantity",
+    "plugged_in",
     "pour_key",
     "pour_rig",
     "poured_mass",

@@ -32,6 +32,7 @@ DOE_PARTS_THAT_MAY_USE_THE_SOLVER = {
     "doe/factors.py": "checks a factor's path and range against the declared parameters",
     "doe/economy.py": "changes the numerical settings of a study's scene",
     "doe/study.py": "reads a study file: its material, rig and insertion make a scene",
+    "doe/stages/__init__.py": "lists stages of other packages beside its own, by the registry of the solver",
     "doe/study_result.py": "says which outcomes are valid, and how well the clumps fit",
     "doe/measurement/": "a condition is a scene, and data and runs are read by the same functions",
     "doe/validation/": "laboratories that pour what the diagnosis is then asked about",

@@ -5,7 +5,7 @@ a design is an array (rows, factors), of integers where its levels are.
 from doe.designs.box_behnken import BoxBehnken, box_behnken
 from doe.designs.central_composite import CentralComposite, central_composite
 from doe.designs.definitive_screening import DefinitiveScreening, definitive_screening
-from doe.designs.design import ALPHAS, Design, DesignOptions, Points, factor_letters
+from doe.designs.design import ALPHAS, ChosenDesign, Design, DesignOptions, Points, factor_letters
 from doe.designs.factorial import Factorial, factorial
 from doe.designs.plackett_burman import PlackettBurman, fold_over, interaction_aliases, plackett_burman
 from doe.designs.space_filling import LatinHypercube, Sobol, latin_hypercube, sobol
@@ -28,8 +28,11 @@ DESIGNS: Registry[Design] = Registry(
 __all__ = [
     "ALPHAS",
     "DESIGNS",
+    "BoxBehnken",
+    "ChosenDesign",
     "Design",
     "DesignOptions",
+    "PlackettBurman",
     "Points",
     "box_behnken",
     "central_composite",

@@ -46,6 +46,7 @@ class BoxBehnken(Design):
     """Three levels per factor, no corners."""
 
     name = "box-behnken"
+    title = "Box–Behnken"
     doc = "A full second-order model of 3 to 7 factors, without the corners of the cube."
     options = ("centre",)
 

@@ -41,6 +41,7 @@ class CentralComposite(Design):
     """Corners, axial points and centre runs."""
 
     name = "central-composite"
+    title = "central composite"
     doc = "A full second-order model of 2 to 7 factors: corners, axial points, centre."
     options = ("centre", "alpha")
 

@@ -73,6 +73,7 @@ class DefinitiveScreening(Design):
     """2 m + 1 runs of three levels for k ≤ m factors."""
 
     name = "definitive-screening"
+    title = "definitive screening"
     doc = "Three levels: main effects clear of interactions and squares, and curvature seen, in about twice k runs."
     options = ("centre",)
 

@@ -70,6 +70,8 @@ class Design(ABC):
 
     name: ClassVar[str]
     """As it is written on the command line and in study files."""
+    title: ClassVar[str]
+    """As a sentence writes it."""
     doc: ClassVar[str]
     """What it is for, in one line."""
     options: ClassVar[tuple[str, ...]] = ()
@@ -80,6 +82,18 @@ class Design(ABC):
     @abstractmethod
     def points(self, factors: int, options: DesignOptions) -> Points:
         """The rows for a number of factors; raises StatisticsError where there are none for it."""
+
+
+@dataclass(frozen=True)
+class ChosenDesign:
+    """A design of a stage with its options, as a study file names it."""
+
+    design: Design
+    options: DesignOptions
+
+    def points(self, factors: int) -> Points:
+        """The rows for a number of factors; raises StatisticsError where there are none for it."""
+        return self.design.points(factors, self.options)
 
 
 def factor_letters(factors: int) -> tuple[str, ...]:

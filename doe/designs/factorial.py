@@ -157,6 +157,7 @@ class Factorial(Design):
     """All combinations of two levels, or a regular fraction."""
 
     name = "factorial"
+    title = "two-level factorial"
     doc = "Two levels: every combination, or a fraction by generators; main effects and interactions."
     options = ("centre", "generators", "fraction")
 

@@ -138,6 +138,7 @@ class PlackettBurman(Design):
     """Two levels, as few runs as there are factors and one."""
 
     name = "plackett-burman"
+    title = "Plackett–Burman"
     doc = "Main effects of up to 47 factors in 8 to 48 runs; folded over, clear of interactions of two."
     options = ("runs", "centre", "fold")
     main_effects_only = True

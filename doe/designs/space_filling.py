@@ -45,6 +45,7 @@ class LatinHypercube(Design):
     """Points spread over every factor's range."""
 
     name = "lhs"
+    title = "Latin hypercube"
     doc = "Points spread over the ranges (Latin hypercube), for a surrogate model."
     options = ("runs",)
 
@@ -57,6 +58,7 @@ class Sobol(Design):
     """The first points of a scrambled Sobol' sequence."""
 
     name = "sobol"
+    title = "Sobol'"
     doc = "Points spread over the ranges (Sobol' sequence), for a surrogate model; best as a power of two."
     options = ("runs",)
 

@@ -1,1 +1,46 @@
-"""Stages of a study, in the order in which they run; each takes what came before and returns a frozen result."""
+"""The stages of a study, one file each (``stage.py`` says how to add one)."""
+
+from doe.errors import StudyFileError
+from doe.profile import Profile
+from doe.stages.ascent import AscentStage
+from doe.stages.pilot import PilotStage
+from doe.stages.scan import ScanStage
+from doe.stages.screening import AssumptionStage, ScreeningStage
+from doe.stages.stage import Stage
+from doe.stages.surface import OptimumStage, SurfaceStage
+from doe.stages.verification import VerificationStage
+from doe.study import Study
+from solver import Registry, instance_of
+
+OWN: tuple[Stage, ...] = (
+    PilotStage(),
+    ScreeningStage(),
+    AssumptionStage(),
+    ScanStage(),
+    AscentStage(),
+    SurfaceStage(),
+    OptimumStage(),
+    VerificationStage(),
+)
+"""In running order."""
+STAGES: Registry[Stage] = Registry("stage", OWN, instance_of(Stage))
+
+
+def stages_of(study: Study) -> tuple[Stage, ...]:
+    """The stages of ``study`` in running order; raises StudyFileError for a table of one that does not suit it."""
+    order = list(OWN)
+    for name, table in study.further.items():
+        stage = STAGES[name]
+        stage.check(study, table)
+        before = [one.name for one in order]
+        if stage.after not in before:
+            raise StudyFileError(
+                f"stage.{name}: follows {stage.after!r}, which is no stage before it: {', '.join(before)}"
+            )
+        order.insert(before.index(stage.after) + 1, stage)
+    return tuple(order)
+
+
+def planned_runs(study: Study, profile: Profile) -> dict[str, int]:
+    """Valid runs that each stage will make, replacements of failed runs not counted."""
+    return {stage.name: stage.planned_runs(study, profile) for stage in stages_of(study)}

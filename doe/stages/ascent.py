@@ -15,6 +15,7 @@ from doe.record import Record
 from doe.runs import FloatArray, Run, Runner, Setting, responses
 from doe.screening import SIGNIFICANT
 from doe.stages.screening import ScreeningResult
+from doe.stages.stage import Chain, Stage, ended
 from doe.study import Factor, Study
 
 
@@ -104,3 +105,19 @@ def _notes(screened: ScreeningResult) -> tuple[str, ...]:
                 "which the direction is taken."
             )
     return tuple(notes)
+
+
+class AscentStage(Stage):
+    """The walk to the target."""
+
+    name = "ascent"
+    title = "Steepest ascent"
+
+    def planned_runs(self, study: Study, profile: Profile) -> int:
+        """Every step."""
+        return profile.ascent_steps * profile.ascent_replicates
+
+    def run(self, chain: Chain, runner: Runner) -> AscentResult:
+        """See :func:`ascent`."""
+        noise = ended(chain.found.pilot).noise[chain.study.targets[0].observable]
+        return ascent(chain.study, chain.profile, runner, ended(chain.found.screening), noise)

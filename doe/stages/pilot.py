@@ -7,16 +7,15 @@ from dataclasses import dataclass
 
 from doe.errors import StatisticsError
 from doe.pilot import BIAS_LIMIT_DEG, EqualVariance, Noise, Resolution, equal_variance, replicate_noise, resolution
+from doe.power import main_effect_efficiency
 from doe.profile import Profile
 from doe.record import Record
 from doe.runs import FloatArray, Run, Runner, Setting, responses
 from doe.separation import EstimatorChoice, choose_estimator
-from doe.stages.sizing import SCREENING_ROWS, StageSize, sized
+from doe.stages.sizing import StageSize, sized
+from doe.stages.stage import Bias, Chain, Stage
 from doe.study import Study
 from doe.target import is_angle
-
-Bias = dict[str, tuple[tuple[float, float], ...]]
-"""Estimator → its error [°] on piles of known angle, (mean, standard error) for each way to fill a cone with bodies."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,6 +65,8 @@ def pilot(study: Study, profile: Profile, runner: Runner, bias: Bias) -> PilotRe
     spread = _equal_variance({name: table[target] for name, table in tables.items()}, notes)
     after, sizes = sized(study, profile, noise[estimator].sigma, noise[target].sigma)
     notes += [size.statement for size in sizes if size.taken < size.needed]
+    screened = study.screening_design.points(len(study.factors)).coded
+    count, efficiency = len(screened), main_effect_efficiency(screened)
     return PilotResult(
         settings=tuple(settings),
         runs=tuple(tuple(runs) for runs in rows),
@@ -77,7 +78,7 @@ def pilot(study: Study, profile: Profile, runner: Runner, bias: Bias) -> PilotRe
         profile=after,
         sizes=sizes,
         resolutions=tuple(
-            resolution(noise[target].sigma, n, SCREENING_ROWS, len(study.factors)) for n in (1, 2, 3, 5, 10, 20)
+            resolution(noise[target].sigma, n, count, len(study.factors), efficiency) for n in (1, 2, 3, 5, 10, 20)
         ),
         notes=tuple(notes),
     )
@@ -110,3 +111,18 @@ def _equal_variance(groups: Mapping[str, FloatArray], notes: list[str]) -> Equal
             "reference setting is no more than a summary elsewhere."
         )
     return found
+
+
+class PilotStage(Stage):
+    """Noise, estimator and sizes."""
+
+    name = "pilot"
+    title = "Pilot"
+
+    def planned_runs(self, study: Study, profile: Profile) -> int:
+        """The reference setting, and the declared changes."""
+        return profile.pilot_runs + profile.change_runs * len(study.changes)
+
+    def run(self, chain: Chain, runner: Runner) -> PilotResult:
+        """See :func:`pilot`."""
+        return pilot(chain.study, chain.profile, runner, chain.bias)

@@ -12,6 +12,7 @@ from doe.power import smallest_effect
 from doe.profile import Profile
 from doe.record import Record
 from doe.runs import FloatArray, Run, Runner, Setting, no_pile_shares, responses
+from doe.stages.stage import Chain, Stage, ended
 from doe.study import Study
 from doe.target import observed_text
 
@@ -60,3 +61,19 @@ def scan(study: Study, profile: Profile, runner: Runner, noise: Noise) -> ScanRe
         runs=tuple(tuple(runs) for runs in rows),
         smallest_difference=smallest_effect(noise.sigma * math.sqrt(2.0 / profile.scan_replicates), noise.runs - 1),
     )
+
+
+class ScanStage(Stage):
+    """One assumption in steps."""
+
+    name = "scan"
+    title = "Scan"
+
+    def planned_runs(self, study: Study, profile: Profile) -> int:
+        """Every value."""
+        return len(study.scan_values) * profile.scan_replicates
+
+    def run(self, chain: Chain, runner: Runner) -> ScanResult | None:
+        """See :func:`scan`."""
+        noise = ended(chain.found.pilot).noise[chain.study.targets[0].observable]
+        return scan(chain.study, chain.profile, runner, noise)

@@ -1,4 +1,4 @@
-"""Screening: which factors move the response, in the 28-run Plackett–Burman design, and which go on."""
+"""Screening: which factors move the response, in the design that the study names, and which go on."""
 
 from __future__ import annotations
 
@@ -8,17 +8,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from doe.designs import plackett_burman
+from doe.designs import ChosenDesign
 from doe.errors import StatisticsError
 from doe.factors import MIN_BODIES, bodies_touched
 from doe.profile import Profile
 from doe.record import Record
 from doe.runs import FloatArray, Run, Runner, Setting, no_pile_shares, responses
 from doe.screening import Screening, Selected, analyse_screening, select_factors
-from doe.stages.sizing import ASSUMPTION_ROWS, SCREENING_ROWS
-from doe.study import CALIBRATED, COLUMNS, Factor, Study
+from doe.stages.stage import Chain, Stage, ended
+from doe.study import CALIBRATED, Factor, Study
 from doe.target import observed_text
 
 
@@ -34,7 +33,7 @@ class NotTestable(Record):
 
 @dataclass(frozen=True, kw_only=True)
 class ScreeningResult(Record):
-    """Runs and analysis of a two-level design.
+    """Runs and analysis of a design for main effects.
 
     ``analysis`` is of ``response`` (the estimator that the pilot chose), ``target_analysis`` of the target's own
     observable, ``no_pile_analysis`` of the share of runs without a pile (None if none failed).
@@ -74,14 +73,17 @@ class ScreeningResult(Record):
 
 
 def screening(study: Study, profile: Profile, runner: Runner, response: str) -> ScreeningResult:
-    """Run and analyse the 28-run design over the factors and dummies of the study."""
-    design = plackett_burman(SCREENING_ROWS)
-    spare = COLUMNS - len(study.factors)
-    names = [factor.name for factor in study.factors] + [f"dummy {k + 1}" for k in range(spare)]
+    """Run and analyse the design of the screening over the factors of the study."""
     untestable = not_testable(study, study.factors)
-    spare_factors = [entry.factor for entry in untestable]
-    result = two_level_study(
-        "screening", study, study.factors, names, design, profile.screening_replicates, runner, response, spare_factors
+    result = main_effects(
+        "screening",
+        study,
+        study.factors,
+        study.screening_design,
+        profile.screening_replicates,
+        runner,
+        response,
+        [entry.factor for entry in untestable],
     )
     estimated = {effect.name for effect in result.analysis.effects if not effect.is_dummy}
     exclude = [entry.factor for entry in untestable if entry.factor in estimated]
@@ -91,54 +93,47 @@ def screening(study: Study, profile: Profile, runner: Runner, response: str) -> 
 
 
 def assumptions(study: Study, profile: Profile, runner: Runner, response: str) -> ScreeningResult | None:
-    """The same, in the 12-run design, over what the source of the study does not state; None without any."""
+    """The same over what the source of the study does not state, in a design of their own; None without any."""
     if not study.assumptions:
         return None
-    design = plackett_burman(ASSUMPTION_ROWS)
-    names = [a.name for a in study.assumptions] + [f"dummy {k + 1}" for k in range(11 - len(study.assumptions))]
-    return two_level_study(
-        "assumptions",
-        study,
-        study.assumptions,
-        names,
-        design,
-        profile.assumption_replicates,
-        runner,
-        response,
-    )
+    design, replicates = study.assumption_design, profile.assumption_replicates
+    return main_effects("assumptions", study, study.assumptions, design, replicates, runner, response)
 
 
-def two_level_study(
+def main_effects(
     stage: str,
     study: Study,
     factors: Sequence[Factor],
-    names: Sequence[str],
-    design: npt.NDArray[np.int64],
+    chosen: ChosenDesign,
     replicates: int,
     runner: Runner,
     response: str,
     spare: Sequence[str] = (),
 ) -> ScreeningResult:
-    """Run the rows of a two-level design and analyse response, target and share without a pile.
+    """Run the rows of a design and analyse response, target and share without a pile.
 
-    ``spare`` names factors that may be given up, see :func:`analysed`.
+    Columns of its table without a factor are dummies. ``spare`` names factors that may be given up, see
+    :func:`analysed`.
     """
+    points = chosen.points(len(factors))
+    dummies = [f"dummy {k + 1}" for k in range(points.unused.shape[1])]
+    names = [factor.name for factor in factors] + dummies
+    design = np.hstack([points.coded, points.unused]) if dummies else points.coded
     settings = [
         Setting(
             f"row {k + 1}",
-            {factor.path: factor.level(float(level)) for factor, level in zip(factors, row, strict=False)},
+            {factor.path: factor.level(float(level)) for factor, level in zip(factors, row, strict=True)},
             replicates,
         )
-        for k, row in enumerate(design)
+        for k, row in enumerate(points.coded)
     ]
     rows = runner.run(stage, settings)
-    dummies = names[len(factors) :]
     lost = no_pile_shares(rows)
     return ScreeningResult(
         response=response,
         columns=tuple(names),
         factors=tuple(factors),
-        design=design.astype(float),
+        design=design,
         settings=tuple(settings),
         runs=tuple(tuple(runs) for runs in rows),
         analysis=analysed(design, names, responses(rows, response), dummies, spare),
@@ -151,7 +146,7 @@ def two_level_study(
 
 
 def analysed(
-    design: npt.NDArray[np.int64],
+    design: FloatArray,
     names: Sequence[str],
     values: FloatArray,
     dummies: Sequence[str],
@@ -183,3 +178,35 @@ def not_testable(study: Study, factors: Sequence[Factor]) -> tuple[NotTestable, 
             statement = f"not testable: {factor.path} acts on {bodies:.0f} bodies, fewer than {MIN_BODIES}"
             found.append(NotTestable(factor.name, factor.path, bodies, statement))
     return tuple(found)
+
+
+class ScreeningStage(Stage):
+    """Which factors act, and which go on."""
+
+    name = "screening"
+    title = "Screening"
+
+    def planned_runs(self, study: Study, profile: Profile) -> int:
+        """Every row of the design."""
+        return len(study.screening_design.points(len(study.factors)).coded) * profile.screening_replicates
+
+    def run(self, chain: Chain, runner: Runner) -> ScreeningResult:
+        """See :func:`screening`; the estimator is the pilot's choice."""
+        return screening(chain.study, chain.profile, runner, ended(chain.found.pilot).estimator)
+
+
+class AssumptionStage(Stage):
+    """Which assumptions act."""
+
+    name = "assumptions"
+    title = "Assumptions"
+
+    def planned_runs(self, study: Study, profile: Profile) -> int:
+        """Every row of the design, if there is anything assumed."""
+        if not study.assumptions:
+            return 0
+        return len(study.assumption_design.points(len(study.assumptions)).coded) * profile.assumption_replicates
+
+    def run(self, chain: Chain, runner: Runner) -> ScreeningResult | None:
+        """See :func:`assumptions`; the estimator is the pilot's choice."""
+        return assumptions(chain.study, chain.profile, runner, ended(chain.found.pilot).estimator)

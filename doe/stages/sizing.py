@@ -2,9 +2,9 @@
 
 Every stage has its own rows, its own comparison and the spread of the observable that it reads:
 
-    screening, assumptions   main effect of a two-level design, all of its factors at once (Bonferroni); the estimator
+    screening, assumptions   main effect of the stage's design, all of its factors at once (Bonferroni); the estimator
     ascent, scan             difference of two means; the target's observable
-    surface                  change from low to high of a linear term of the Box–Behnken design; the target's observable
+    surface                  change from low to high of a linear term of the stage's design; the target's observable
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from doe.designs import box_behnken
+from doe.designs import ChosenDesign
 from doe.power import (
-    FloatArray,
+    main_effect_efficiency,
     replicates_for_difference,
     replicates_for_linear_effect,
     replicates_for_main_effect,
@@ -24,12 +24,7 @@ from doe.power import (
 )
 from doe.profile import Profile
 from doe.record import Record
-from doe.study import CALIBRATED, COLUMNS, Study
-
-SCREENING_ROWS = COLUMNS + 1
-ASSUMPTION_ROWS = 12
-CENTRE_RUNS = 5
-"""Centre points of the Box–Behnken design."""
+from doe.study import CALIBRATED, Study
 
 
 @dataclass(frozen=True)
@@ -65,24 +60,6 @@ class _Rule:
     resolved: Callable[[float, int], float]
 
 
-def surface_design(factors: int = CALIBRATED) -> FloatArray:
-    """Coded points of the Box–Behnken design of the response surface, shape (points, factors)."""
-    return box_behnken(factors, centre=CENTRE_RUNS).astype(float)
-
-
-def planned_runs(study: Study, profile: Profile) -> dict[str, int]:
-    """Valid runs that each stage will make, replacements of failed runs not counted."""
-    return {
-        "pilot": profile.pilot_runs + profile.change_runs * len(study.changes),
-        "screening": SCREENING_ROWS * profile.screening_replicates,
-        "assumptions": ASSUMPTION_ROWS * profile.assumption_replicates if study.assumptions else 0,
-        "scan": len(study.scan_values) * profile.scan_replicates,
-        "ascent": profile.ascent_steps * profile.ascent_replicates,
-        "surface": len(surface_design()) * profile.surface_replicates,
-        "verification": profile.verification_runs,
-    }
-
-
 def sized(
     study: Study, profile: Profile, screening_sigma: float, target_sigma: float
 ) -> tuple[Profile, tuple[StageSize, ...]]:
@@ -105,12 +82,16 @@ def sized(
 
 
 def _rules(study: Study, screening_sigma: float, target_sigma: float) -> list[_Rule]:
-    edge = surface_design()
-    screening = _two_level("screening", "screening_replicates", screening_sigma, SCREENING_ROWS, len(study.factors))
+    points = study.surface_design.points(CALIBRATED).coded
+    screening = _main_effect(
+        "screening", "screening_replicates", screening_sigma, study.screening_design, len(study.factors)
+    )
     rules = [screening]
     if study.assumptions:
         count = len(study.assumptions)
-        rules.append(_two_level("assumptions", "assumption_replicates", screening_sigma, ASSUMPTION_ROWS, count))
+        rules.append(
+            _main_effect("assumptions", "assumption_replicates", screening_sigma, study.assumption_design, count)
+        )
     if study.scan_values:
         rules.append(_Rule("scan", "scan_replicates", target_sigma, replicates_for_difference, smallest_difference))
     rules.append(_Rule("ascent", "ascent_replicates", target_sigma, replicates_for_difference, smallest_difference))
@@ -119,18 +100,22 @@ def _rules(study: Study, screening_sigma: float, target_sigma: float) -> list[_R
             "surface",
             "surface_replicates",
             target_sigma,
-            lambda effect, sigma: replicates_for_linear_effect(effect, sigma, edge),
-            lambda sigma, n: smallest_linear_effect(sigma, n, edge),
+            lambda effect, sigma: replicates_for_linear_effect(effect, sigma, points),
+            lambda sigma, n: smallest_linear_effect(sigma, n, points),
         )
     )
     return rules
 
 
-def _two_level(stage: str, key: str, sigma: float, rows: int, factors: int) -> _Rule:
+def _main_effect(stage: str, key: str, sigma: float, design: ChosenDesign, factors: int) -> _Rule:
+    coded = design.points(factors).coded
+    rows, efficiency = len(coded), main_effect_efficiency(coded)
     return _Rule(
         stage,
         key,
         sigma,
-        lambda effect, sigma: replicates_for_main_effect(effect, sigma, rows, comparisons=factors),
-        lambda sigma, n: smallest_main_effect(sigma, n, rows, comparisons=factors),
+        lambda effect, sigma: replicates_for_main_effect(
+            effect, sigma, rows, comparisons=factors, efficiency=efficiency
+        ),
+        lambda sigma, n: smallest_main_effect(sigma, n, rows, comparisons=factors, efficiency=efficiency),
     )

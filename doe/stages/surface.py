@@ -1,4 +1,4 @@
-"""Response surface: Box–Behnken runs, a second-order model per target, and the optimum with its uncertainty."""
+"""Response surface: the runs of a design, a second-order model per target, and the optimum with its uncertainty."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from doe.power import smallest_effect
 from doe.profile import Profile
 from doe.record import Record
 from doe.runs import FloatArray, Run, Runner, Setting, no_pile_shares, responses
-from doe.stages.sizing import surface_design
-from doe.study import Factor, Study
+from doe.stages.stage import Chain, Stage, ended
+from doe.study import CALIBRATED, Factor, Study
 from doe.surface import Surface, fit_surface
 from doe.surface_anova import SurfaceAnova, analyse_surface
 
 
 @dataclass(frozen=True, kw_only=True)
 class SurfaceResult(Record):
-    """Runs of the Box–Behnken design and, per target in the study's order, model, ANOVA and canonical analysis."""
+    """Runs of the design and, per target in the study's order, model, ANOVA and canonical analysis."""
 
     factors: tuple[Factor, ...]
     region: Region
@@ -65,8 +65,8 @@ class OptimumResult(Record):
 def surface(
     study: Study, profile: Profile, runner: Runner, factors: tuple[Factor, ...], region: Region
 ) -> SurfaceResult:
-    """Run the edge points and centre points around the bracket and fit the model of each target."""
-    design = surface_design(len(factors))
+    """Run the points of the study's design around the bracket and fit the model of each target."""
+    design = study.surface_design.points(len(factors)).coded
     natural = region.natural(design)
     settings = [
         Setting(
@@ -118,3 +118,30 @@ def optimum(study: Study, fitted: SurfaceResult) -> OptimumResult:
         single=single,
         compromise=compromise,
     )
+
+
+class SurfaceStage(Stage):
+    """The response surface."""
+
+    name = "surface"
+    title = "Response surface"
+
+    def planned_runs(self, study: Study, profile: Profile) -> int:
+        """Every point of the design."""
+        return len(study.surface_design.points(CALIBRATED).coded) * profile.surface_replicates
+
+    def run(self, chain: Chain, runner: Runner) -> SurfaceResult:
+        """See :func:`surface`; around where the ascent passed the target."""
+        walked = ended(chain.found.ascent)
+        return surface(chain.study, chain.profile, runner, walked.factors, walked.region)
+
+
+class OptimumStage(Stage):
+    """The setting that gives the target; it makes no runs."""
+
+    name = "optimum"
+    title = "Optimum"
+
+    def run(self, chain: Chain, runner: Runner) -> OptimumResult:
+        """See :func:`optimum`."""
+        return optimum(chain.study, ended(chain.found.surface))

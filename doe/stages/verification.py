@@ -9,6 +9,7 @@ from doe.power import smallest_effect
 from doe.profile import Profile
 from doe.record import Record
 from doe.runs import Run, Runner, Setting, no_pile_shares, responses
+from doe.stages.stage import Chain, Stage, ended
 from doe.study import Study
 from doe.target import Target, observed_text
 from doe.verification import Verification, verify
@@ -65,3 +66,18 @@ def _smallest_difference(test: Verification) -> float:
     variance = sum(part for part, _ in parts)
     df = variance**2 / sum(part**2 / (n - 1) for part, n in parts) if variance > 0 else math.inf
     return smallest_effect(math.sqrt(variance), df) if variance > 0 else 0.0
+
+
+class VerificationStage(Stage):
+    """Fresh pours at the optimum."""
+
+    name = "verification"
+    title = "Verification"
+
+    def planned_runs(self, study: Study, profile: Profile) -> int:
+        """As the profile says."""
+        return profile.verification_runs
+
+    def run(self, chain: Chain, runner: Runner) -> VerificationResult:
+        """See :func:`verification`."""
+        return verification(chain.study, chain.profile, runner, ended(chain.found.optimum).values)

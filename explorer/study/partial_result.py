@@ -10,7 +10,6 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from doe.study_result import PartialStudy, StageResult, StudyDescription
 from explorer.files.whole_file import write_whole
@@ -28,11 +27,11 @@ class PartialResult:
         """``result`` is what ``stage`` found so far."""
         # A mean that no run has given yet is no finding.
         line = "" if re.search(r"\bnan\b", result.line) else result.line
-        self._write(replace(self._found, **_of(stage, result), partial=stage, line=line))
+        self._write(replace(self._found.with_result(stage, result), partial=stage, line=line))
 
     def keep(self, stage: str, result: StageResult | None) -> None:
         """``stage`` has ended with ``result``, None where the study has no such stage."""
-        self._found = replace(self._found, **_of(stage, result))
+        self._found = self._found.with_result(stage, result)
         self._write(self._found)
 
     def remove(self) -> None:
@@ -41,7 +40,3 @@ class PartialResult:
 
     def _write(self, content: PartialStudy) -> None:
         write_whole(self._file, json.dumps(content.to_dict(), ensure_ascii=False, allow_nan=False) + "\n")
-
-
-def _of(stage: str, result: StageResult | None) -> dict[str, Any]:
-    return {stage: result}

@@ -15,10 +15,10 @@ from doe.partial import PartialStages
 from doe.profile import Profile
 from doe.runner import PourRunner
 from doe.runs import Run
-from doe.stages.sizing import planned_runs
+from doe.stages import planned_runs
 from doe.store import Store, default_store
 from doe.study import TRIES, Study, load_study, with_profile
-from doe.study_result import STAGES, PouredBody, RunCounts, StudyDescription, StudyResult, Timing
+from doe.study_result import PouredBody, RunCounts, StudyDescription, StudyResult, Timing
 from explorer.errors import CommandError
 from explorer.files.run_result import versions
 from explorer.files.whole_file import write_whole
@@ -58,8 +58,7 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> float:
     path = order.store or default_store()
     store = Store(path)
     order.out.mkdir(parents=True, exist_ok=True)
-    counts = planned_runs(study, profile)
-    planned = {stage: counts.get(stage, 0) for stage in STAGES}
+    planned = planned_runs(study, profile)
     say(f"{study.name}, profile {profile.name}: {sum(planned.values())} runs of {1e3 * profile.mass:g} g; store {path}")
     progress = Progress(order.out / "progress.jsonl", planned, say, terminal=sys.stdout.isatty())
     progress.compiling()

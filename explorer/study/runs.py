@@ -6,14 +6,14 @@ from dataclasses import replace
 
 from doe.runs import Run
 from doe.study import Values, load_study, with_profile
-from doe.study_result import STAGES, AnyStudy
+from doe.study_result import AnyStudy
 from explorer.errors import CommandError
 from solver import Scene, pour_key, with_values
 
 
 def stages_with_runs(result: AnyStudy) -> tuple[str, ...]:
     """The stages that have made runs, in running order."""
-    return tuple(stage for stage in STAGES if result.runs_of(stage))
+    return tuple(stage for stage in result.stage_names() if result.runs_of(stage))
 
 
 def settings_of(result: AnyStudy, stage: str, label: str) -> Values:

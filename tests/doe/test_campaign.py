@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from doe.campaign import run_campaign
+from doe.designs import DESIGNS, ChosenDesign, DesignOptions
 from doe.errors import StudyStopped
 from doe.power import smallest_effect, smallest_main_effect
 from doe.profile import Profile
+from doe.stages import planned_runs
 from doe.stages.pilot import pilot
-from doe.stages.sizing import planned_runs
 from doe.study import load_study
-from doe.study_result import STAGES, RunCounts
+from doe.study_result import OWN_STAGES, RunCounts
 from doe.target import Target
 from tests.doe.formula_runner import FormulaRunner
 
@@ -21,6 +22,13 @@ FRICTION = "pair.seed.seed.static_friction"
 MODULUS = "material.seed.shear_modulus"
 BOUNCE = "pair.seed.seed.restitution"
 BIAS = dict.fromkeys(load_study("sunflower_extract").estimators, ((0.0, 0.1),) * 3)
+
+
+def chosen(name, **options):
+    """A design of a stage."""
+    return ChosenDesign(DESIGNS[name], DesignOptions(**options))
+
+
 PROFILE = Profile("test", pilot_runs=10, change_runs=6, verification_runs=20, mass=0.03)
 
 
@@ -48,8 +56,9 @@ def campaign(study):
 
 def test_stages_come_in_order_and_make_the_planned_runs(study, campaign):
     result, lines, runner = campaign
-    assert [stage for stage, _ in lines] == list(STAGES)
+    assert [stage for stage, _ in lines] == list(OWN_STAGES)
     planned = planned_runs(study, PROFILE)
+    assert planned.pop("optimum") == 0
     valid = dict.fromkeys(planned, 0)
     for stage, run in result.all_runs():
         valid[stage] += run.valid
@@ -58,20 +67,13 @@ def test_stages_come_in_order_and_make_the_planned_runs(study, campaign):
     assert RunCounts.of(result).by_outcome["jammed"] > 0
 
 
-def test_the_plan_counts_the_points_of_the_surface_that_is_run(study, monkeypatch):
-    monkeypatch.setattr("doe.stages.sizing.CENTRE_RUNS", 3)
-    runner = FormulaRunner(planted, sigma=0.8)
-    run_campaign(study, PROFILE, runner, BIAS)
-    assert planned_runs(study, PROFILE)["surface"] == runner.calls["surface"] == (12 + 3) * PROFILE.surface_replicates
-
-
-def test_the_pilot_tells_what_the_screening_s_own_design_resolves(study, monkeypatch):
-    monkeypatch.setattr("doe.stages.pilot.SCREENING_ROWS", 12)
+def test_the_pilot_tells_what_the_screening_s_own_design_resolves(study):
     profile = dataclasses.replace(PROFILE, change_runs=2)
-    fewer = pilot(study, profile, FormulaRunner(planted, sigma=0.8), BIAS)
-    sigma, factors = fewer.noise[study.targets[0].observable].sigma, len(study.factors)
-    assert fewer.resolutions[1].main_effect == smallest_main_effect(sigma, 2, 12)
-    assert fewer.resolutions[1].main_effect_bonferroni == smallest_main_effect(sigma, 2, 12, comparisons=factors)
+    more = dataclasses.replace(study, screening_design=chosen("plackett-burman", runs=40))
+    found = pilot(more, profile, FormulaRunner(planted, sigma=0.8), BIAS)
+    sigma, factors = found.noise[study.targets[0].observable].sigma, len(study.factors)
+    assert found.resolutions[1].main_effect == smallest_main_effect(sigma, 2, 40)
+    assert found.resolutions[1].main_effect_bonferroni == smallest_main_effect(sigma, 2, 40, comparisons=factors)
 
 
 def test_planted_factors_are_found_and_the_others_are_not(campaign):

@@ -217,7 +217,7 @@ def test_selection_refuses_a_short_fallback_and_unknown_names():
         ({"responses": np.full((28, 2), np.inf)}, "infinite"),
         ({"names": NAMES[:-1]}, "names has 26 entries"),
         ({"dummies": ["D9"]}, "'D9'"),
-        ({"design": 2 * DESIGN}, "levels -1 and"),
+        ({"design": 2 * DESIGN}, "levels from -1 to"),
     ],
 )
 def test_bad_input_is_named(change, message):

@@ -6,7 +6,7 @@ import json
 import pytest
 
 from doe.runner import TRIES
-from doe.study_result import STAGES
+from doe.study_result import OWN_STAGES
 from explorer.study import run as study_run
 from solver import asset_path
 from tests.doe.formula_runner import FormulaRunner
@@ -56,9 +56,9 @@ def test_a_study_leaves_result_and_reports(tmp_path):
     for name in ("report.html", "report.md"):
         assert (tmp_path / "out" / name).stat().st_size > 1000
     events = [json.loads(line) for line in (tmp_path / "out" / "progress.jsonl").read_text().splitlines()]
-    assert [event["stage"] for event in events if event["line"]] == list(STAGES)
+    assert [event["stage"] for event in events if event["line"]] == list(OWN_STAGES)
     assert events[-1]["done"] == events[-1]["planned"] == result["runs"]["total"]
-    assert list(events[0]["stages"]) == list(STAGES)
+    assert list(events[0]["stages"]) == list(OWN_STAGES)
     assert {name: done for name, (done, _) in events[-1]["stages"].items() if done} == result["runs"]["by_stage"]
     assert sum(event["run"] is not None for event in events) == result["runs"]["total"]
     assert not (tmp_path / "out" / "partial.json").exists()

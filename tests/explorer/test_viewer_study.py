@@ -6,7 +6,7 @@ import math
 import plotly.io
 import pytest
 
-from doe.stages.sizing import planned_runs
+from doe.stages import planned_runs
 from doe.study import load_study
 from explorer.background.command_process import CommandStatus
 from explorer.background.stage_progress import StageProgress, TriedRun

@@ -9,6 +9,7 @@ from explorer.report.content import Section
 from explorer.report.sections.ascent import ascent
 from explorer.report.sections.assumptions import assumptions, scan
 from explorer.report.sections.effects import effects
+from explorer.report.sections.further import further
 from explorer.report.sections.noise import noise
 from explorer.report.sections.optimum import optimum
 from explorer.report.sections.overview import overview
@@ -18,7 +19,7 @@ from explorer.report.sections.screening import screening
 from explorer.report.sections.surface import surface
 from explorer.report.sections.verification import verification
 
-SECTIONS: tuple[Callable[[StudyResult], Section | None], ...] = (
+STAGES_FOUND: tuple[Callable[[StudyResult], Section | None], ...] = (
     overview,
     verification,
     effects,
@@ -29,14 +30,12 @@ SECTIONS: tuple[Callable[[StudyResult], Section | None], ...] = (
     ascent,
     surface,
     optimum,
-    paper,
-    runs,
-    repeat,
 )
 """In the order of the page: what was found, then how."""
+AT_THE_END: tuple[Callable[[StudyResult], Section | None], ...] = (paper, runs, repeat)
 
 
 def sections_of(result: StudyResult) -> tuple[Section, ...]:
     """Every section that ``result`` has something for."""
-    found = (make(result) for make in SECTIONS)
-    return tuple(section for section in found if section is not None)
+    own, last = ((make(result) for make in makers) for makers in (STAGES_FOUND, AT_THE_END))
+    return tuple(section for section in (*own, *further(result), *last) if section is not None)

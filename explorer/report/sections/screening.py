@@ -27,12 +27,12 @@ ADJUSTMENTS: tuple[Adjustment, ...] = ("none", "holm")
 
 
 def screening(result: StudyResult) -> Section:
-    """Pareto, half-normal plot, the verdicts, effects and rows of the Plackett–Burman design."""
+    """Pareto, half-normal plot, the verdicts, effects and rows of the design."""
     part = result.screening
     analysis = part.analysis
     blocks: list[Block] = [
         Text(
-            f"{analysis.rows}-run Plackett–Burman design over {len(part.factors)} factors, "
+            f"{analysis.rows}-run {result.study.designs['screening']} design over {len(part.factors)} factors, "
             f"{analysis.runs} valid pours, response: {observable_label(part.response)}."
         ),
         Facts(tuple(_verdicts(part))),

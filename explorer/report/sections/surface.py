@@ -34,11 +34,12 @@ from explorer.report.units_for_people import (
 
 def surface(result: StudyResult) -> Section:
     """Model, ANOVA, equations and charts per target."""
-    part = result.surface
+    part, name = result.surface, result.study.designs["surface"]
     blocks: list[Block] = [
         Text(
-            f"Box–Behnken design of {len(part.design)} points over {len(part.factors)} factors, and "
-            "the full second-order model by least squares on every valid pour. The first model sees a change of "
+            f"{name[0].upper()}{name[1:]} design of {len(part.design)} points over "
+            f"{len(part.factors)} factors, and the full second-order model by least squares on every valid pour. The "
+            "first model sees a change of "
             f"{observed(part.observables[0], part.smallest_main_effect[0])} from the low to the high end of a factor "
             "with chance 0.8."
         ),

@@ -8,7 +8,7 @@ from pathlib import Path
 import viser
 
 from doe.record import RecordError
-from doe.stages.sizing import planned_runs
+from doe.stages import planned_runs
 from doe.study import Study, load_study
 from doe.study_result import AnyStudy, PartialStudy, study_from
 from explorer.background.result_file import ResultFile
