@@ -115,10 +115,10 @@ def options(
 
 
 app.command()(serve.serve)
-app.command()(simulate.simulate)
+app.command(cls=simulate.Rigs)(simulate.simulate)
 app.command()(calibrate.calibrate)
 app.command()(diagnose.diagnose)
-app.command()(design.design)
+app.command(cls=design.Designs)(design.design)
 app.command()(analyse.analyse)
 app.command()(runs.runs)
 app.command()(parameters.parameters)

@@ -2,15 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import typer
 
+from explorer.commands.listing import Listing
 from explorer.design.kinds import Alpha
 
 
+class Designs(Listing):
+    """Lists the designs."""
+
+    heading = "Designs"
+
+    def listed(self) -> Iterable[tuple[str, str]]:
+        """With what each is for."""
+        from doe.designs import DESIGNS
+
+        return ((name, design.doc) for name, design in DESIGNS.items())
+
+
 def design(
-    kind: str = typer.Argument(metavar="DESIGN", help="Which design."),
+    kind: str = typer.Argument(metavar="DESIGN", help="One of the designs below."),
     factors: str = typer.Option(
         ..., metavar="FILE", help="TOML with name, low, high and unit of every factor, or a shipped one's name."
     ),

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import inspect
 import os
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
+
+from explorer.commands.listing import Listing
 
 if TYPE_CHECKING:
     from solver import Record
@@ -18,11 +21,24 @@ CHECKPOINT_INTERVAL = 0.5
 """Simulated time [s] between two checkpoints."""
 
 
+class Rigs(Listing):
+    """Lists rigs and bench tests."""
+
+    heading = "Rigs and bench tests"
+
+    def listed(self) -> Iterable[tuple[str, str]]:
+        """With the first sentence of the file of each."""
+        from solver.rigs import BENCH_RIGS, RIGS
+
+        for name, kind in (*RIGS.items(), *BENCH_RIGS.items()):
+            text = " ".join((inspect.getdoc(inspect.getmodule(kind)) or "").split())
+            yield name, text.partition(". ")[0].rstrip(".") + "."
+
+
 def simulate(
     source: str = typer.Argument(
         metavar="RIG_OR_FILE",
-        help="A rig or bench test (funnel, lifting_cylinder, draw_down_box, rotating_drum, inclined_plane, "
-        "drop_plate_45, compression), or a material, set-up or study, by file or shipped name.",
+        help="A rig or bench test of those below, or a material, set-up or study, by file or shipped name.",
     ),
     material: str | None = typer.Option(None, help="Material in the rig: file or shipped name."),
     set_: list[str] = typer.Option([], "--set", metavar="PATH=VALUE", help="Set a parameter; may be repeated."),

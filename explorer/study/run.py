@@ -55,10 +55,10 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> float:
     study, profile = with_profile(load_study(order.study), order.profile)
     if order.out.is_file() or (holds_more_than(order.out, study.file) and not order.resume):
         raise CommandError(f"--out {order.out}: is not empty; name a new folder, or add --resume to go on there")
+    planned = planned_runs(study, profile)
     path = order.store or default_store()
     store = Store(path)
     order.out.mkdir(parents=True, exist_ok=True)
-    planned = planned_runs(study, profile)
     say(f"{study.name}, profile {profile.name}: {sum(planned.values())} runs of {1e3 * profile.mass:g} g; store {path}")
     progress = Progress(order.out / "progress.jsonl", planned, say, terminal=sys.stdout.isatty())
     progress.compiling()
