@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO, Any, Literal
 
-from explorer.background.stage_progress import StageProgress, TriedRun, with_event, with_run
+from explorer.background.progress import PROGRESS, ProgressEvent, StageProgress, TriedRun, with_event, with_run
 from explorer.errors import CommandError
 from explorer.priority import BACKGROUND, lowered, session_gives_way
 
@@ -90,7 +90,7 @@ class CommandProcess:
         """Go on in ``out``, where a command was stopped. Raises BackgroundError."""
         self.refuse_while_running()
         # A resumed command tells every stage again, so what it said before it was stopped is dropped.
-        progress = out / "progress.jsonl"
+        progress = out / PROGRESS
         self._read = progress.stat().st_size if progress.is_file() else 0
         self._launch(out, (*arguments, "--resume"))
 
@@ -178,7 +178,7 @@ class CommandProcess:
         return lines[-1][:300] if lines else f"no output; see {self._log()}"
 
     def _take_progress(self) -> None:
-        if self.out is None or not (file := self.out / "progress.jsonl").is_file():
+        if self.out is None or not (file := self.out / PROGRESS).is_file():
             return
         if file.stat().st_size < self._read:  # a resumed command begins the file anew
             self._read = 0
@@ -201,17 +201,18 @@ def _waker(group: int) -> subprocess.Popen[bytes]:
 def advanced(status: CommandStatus, line: bytes) -> CommandStatus:
     """``status`` after one line of ``progress.jsonl``; a line that is no such object leaves it as it is."""
     try:
-        event = json.loads(line)
-        eta = event["eta_s"]
-        stage, done, planned = str(event["stage"]), int(event["done"]), int(event["planned"])
-        eta_s = None if eta is None else float(eta)
-        result = event["line"]
-        stages, tried = with_event(status.stages, event), with_run(status.tried, event)
-    except (ValueError, KeyError, TypeError):
+        event = ProgressEvent.from_dict(json.loads(line))
+    except ValueError:  # no JSON, or JSON of something else
         return status
-    lines = status.lines if result is None else (*status.lines, str(result))
     return replace(
-        status, stage=stage, done=done, planned=planned, eta_s=eta_s, lines=lines, stages=stages, tried=tried
+        status,
+        stage=event.stage,
+        done=event.done,
+        planned=event.planned,
+        eta_s=event.eta_s,
+        lines=status.lines if event.line is None else (*status.lines, event.line),
+        stages=with_event(status.stages, event),
+        tried=with_run(status.tried, event),
     )
 
 

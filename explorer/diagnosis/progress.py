@@ -1,32 +1,25 @@
-"""Progress of a diagnosis: the same two readers as that of a study (`explorer.study.progress`), counted in pours."""
+"""Progress of a diagnosis, counted in the pours that the present part of the loop still needs."""
 
 from __future__ import annotations
 
-import json
-import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from doe.declared.pours import Ended
-from explorer.study.progress import told_run
-
-EVERY = 20.0
-"""Seconds between two lines of progress where there is no terminal."""
+from explorer.background.progress import ProgressEvent, ProgressWriter, TriedRun
 
 
 class PourProgress:
     """Tells which part of the loop runs, how many pours it still needs, and what a part has found."""
 
     def __init__(self, file: Path, say: Callable[[str], None], terminal: bool) -> None:
-        self._file, self._say, self._terminal = file, say, terminal
-        self._started = time.perf_counter()
-        self._said, self._done, self._part, self._part_began = 0.0, 0, "", 0.0
+        self._writer = ProgressWriter(file, say, terminal)
+        self._done, self._part, self._part_began = 0, "", 0.0
 
     @property
     def elapsed(self) -> float:
         """Seconds since the start."""
-        return time.perf_counter() - self._started
+        return self._writer.elapsed
 
     def compiling(self) -> None:
         """The diagnosis has begun; the first pour shows itself only after the solver is compiled."""
@@ -38,30 +31,21 @@ class PourProgress:
             self._part, self._part_began, self._done = part, self.elapsed, 0
         self._done += 1
         eta = left * (self.elapsed - self._part_began) / self._done if self._done > 1 else None
-        self._tell(part, left, eta, None, ended)
+        self._tell(part, left, eta, None, None if ended.valid else TriedRun.of(part, ended))
 
     def stage(self, line: str) -> None:
         """A part has ended with this finding."""
         self._tell(self._part, 0, None, line)
 
-    def _tell(self, part: str, left: int, eta: float | None, line: str | None, ended: Ended | None = None) -> None:
-        event: dict[str, Any] = {
-            "time": self.elapsed,
-            "stage": part,
-            "done": self._done,
-            "planned": self._done + left,
-            "eta_s": eta,
-            "line": line,
-        }
-        if ended is not None and not ended.valid:
-            event["run"] = told_run(ended)
-        with self._file.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(event, ensure_ascii=False) + "\n")
+    def _tell(self, part: str, left: int, eta: float | None, line: str | None, run: TriedRun | None = None) -> None:
+        event = ProgressEvent(
+            time=self.elapsed,
+            stage=part,
+            done=self._done,
+            planned=self._done + left,
+            eta_s=eta,
+            line=line,
+            run=run,
+        )
         about = "" if eta is None else f", about {eta:.0f} s"
-        if line is not None:
-            self._say(("\r\033[K" if self._terminal else "") + f"[{self.elapsed:6.0f} s] {line}")
-        elif self._terminal:
-            print(f"\r\033[K{part}: {left} pours left{about}", end="", flush=True)
-        elif self.elapsed - self._said > EVERY:
-            self._said = self.elapsed
-            self._say(f"[{self.elapsed:6.0f} s] {part}: {left} pours left{about}")
+        self._writer.tell(event, f"{part}: {left} pours left{about}", line)

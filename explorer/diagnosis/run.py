@@ -25,6 +25,7 @@ from doe.measurement.load import load_measurement
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.summaries import summaries
 from doe.store import Store, default_store
+from explorer.background.progress import PROGRESS
 from explorer.diagnosis.corrected import corrected_toml, study_toml
 from explorer.diagnosis.next_folder import read_next, write_next
 from explorer.diagnosis.progress import PourProgress
@@ -100,7 +101,7 @@ def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> Diagnosis:
         f"{order.folder}: {len(measurement.fit)} fitted and {len(measurement.holdout)} held-out conditions; store "
         f"{path}"
     )
-    progress = PourProgress(order.out / "progress.jsonl", say, terminal=sys.stdout.isatty())
+    progress = PourProgress(order.out / PROGRESS, say, terminal=sys.stdout.isatty())
     progress.compiling()
     with ExitStack() as stack:
         store = Store(path)

@@ -14,7 +14,7 @@ from typing import Protocol
 from doe.study import TRIES, load_study, with_profile
 from explorer.background.command_process import PROGRAM, BackgroundError, CommandProcess, CommandStatus
 from explorer.background.output_folders import finished, new_folder, newest_unfinished
-from explorer.background.stage_progress import given_up
+from explorer.background.progress import given_up
 from explorer.background.waiting_line import WaitingLine
 from explorer.files.whole_file import write_whole
 from explorer.study.edit import StudyEdits, edited_study

@@ -1,29 +1,19 @@
-"""Progress of a study: one line per event for a person, one JSON object per event for the page.
-
-``progress.jsonl``: {"time", "stage", "done", "planned", "eta_s", "line", "stages", "run"}; done and planned count runs
-of the whole study, ``line`` is what a stage found, once it has ended, ``stages`` maps every stage to its [done,
-planned], and ``run`` is the run that ended (`told_run`), null for any other event.
-"""
+"""Progress of a study, counted in runs of all its stages, and the time that is left."""
 
 from __future__ import annotations
 
-import json
 import signal
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
-from doe.declared.pours import Ended
 from doe.runs import Run
-
-EVERY = 2.0
-"""Seconds between two lines of progress where there is no terminal."""
+from explorer.background.progress import ProgressEvent, ProgressWriter, TriedRun
 
 
 class Progress:
-    """Counts runs, estimates the time left from the rate of finished runs, and tells both readers."""
+    """Counts runs and estimates the time left from the rate of finished runs."""
 
     def __init__(
         self,
@@ -33,18 +23,15 @@ class Progress:
         terminal: bool,
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
-        self._file, self._planned, self._say, self._terminal = file, dict(planned), say, terminal
-        self._clock = clock
+        self._writer, self._planned, self._clock = ProgressWriter(file, say, terminal, clock), dict(planned), clock
         self._done = dict.fromkeys(planned, 0)
-        self._started = clock()
-        self._said = 0.0
         self._fresh, self._working = 0, 0.0
         self._last: float | None = None
 
     @property
     def elapsed(self) -> float:
         """Seconds since the start."""
-        return self._clock() - self._started
+        return self._writer.elapsed
 
     def compiling(self) -> None:
         """The study has begun; the first run shows itself only after the solver is compiled."""
@@ -59,7 +46,7 @@ class Progress:
             self._working += run.wall_s if self._last is None else now - self._last
             self._last = now
             self._fresh += 1
-        self._tell(stage, None, told_run(run))
+        self._tell(stage, None, TriedRun.of(stage, run))
 
     def went_on(self) -> None:
         """The study was paused and goes on: the time since the last run says nothing about the rate."""
@@ -77,34 +64,20 @@ class Progress:
         rate = self._fresh / max(1e-9, self._working)
         return (sum(self._planned.values()) - sum(self._done.values())) / rate
 
-    def _tell(self, stage: str, line: str | None, run: dict[str, Any] | None = None) -> None:
+    def _tell(self, stage: str, line: str | None, run: TriedRun | None = None) -> None:
         done, planned, eta = sum(self._done.values()), sum(self._planned.values()), self.eta_s()
-        event: dict[str, Any] = {"time": self.elapsed, "stage": stage, "done": done, "planned": planned, "eta_s": eta}
-        stages = {name: [self._done.get(name, 0), count] for name, count in self._planned.items()}
-        event |= {"line": line, "stages": stages, "run": run}
-        with self._file.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(event, ensure_ascii=False) + "\n")
+        event = ProgressEvent(
+            time=self.elapsed,
+            stage=stage,
+            done=done,
+            planned=planned,
+            eta_s=eta,
+            line=line,
+            stages={name: (self._done.get(name, 0), count) for name, count in self._planned.items()},
+            run=run,
+        )
         left = "" if eta is None else f", about {eta / 60:.0f} min left" if eta > 90 else f", about {eta:.0f} s left"
-        if line is not None:
-            self._say(("\r\033[K" if self._terminal else "") + f"[{self.elapsed:6.0f} s] {stage}: {line}")
-        elif self._terminal:
-            print(f"\r\033[K{stage}: {done} of {planned} runs{left}", end="", flush=True)
-        elif self._clock() - self._said > EVERY * 10:
-            self._said = self._clock()
-            self._say(f"[{self.elapsed:6.0f} s] {stage}: {done} of {planned} runs{left}")
-
-
-def told_run(run: Run | Ended) -> dict[str, Any]:
-    """What the page is told of a run, or of a pour of a diagnosis, that has ended."""
-    return {
-        "label": run.label,
-        "replicate": run.replicate,
-        "attempt": run.attempt,
-        "seed": run.seed,
-        "outcome": run.outcome,
-        "message": run.message,
-        "valid": run.valid,
-    }
+        self._writer.tell(event, f"{stage}: {done} of {planned} runs{left}", line and f"{stage}: {line}")
 
 
 @contextmanager

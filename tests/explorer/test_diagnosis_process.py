@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from explorer.background.command_process import BackgroundError, CommandStatus
-from explorer.background.stage_progress import StageProgress
+from explorer.background.progress import StageProgress
 from explorer.diagnosis.process import DiagnoseProcess, Question
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.priority import BACKGROUND

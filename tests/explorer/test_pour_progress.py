@@ -4,7 +4,7 @@ import json
 
 from doe.declared.pours import Ended
 from explorer.background.command_process import CommandStatus
-from explorer.background.stage_progress import failures, with_event, with_run
+from explorer.background.progress import ProgressEvent, failures, with_event, with_run
 from explorer.diagnosis.progress import PourProgress
 from explorer.viewer.study.stage_table import stages_markdown
 from solver import Outcome
@@ -16,7 +16,8 @@ def test_a_pour_that_broke_off_is_told_with_its_seed(tmp_path):
     progress.pour("screening", 1, Ended("air_drag@2 1, fast", 12, Outcome.JAMMED, "the outlet is blocked"))
     stages, tried = (), ()
     for line in (tmp_path / "progress.jsonl").read_text().splitlines():
-        stages, tried = with_event(stages, json.loads(line)), with_run(tried, json.loads(line))
+        event = ProgressEvent.from_dict(json.loads(line))
+        stages, tried = with_event(stages, event), with_run(tried, event)
     (lost,) = failures(tried)
     assert (lost.run.label, lost.run.seed, lost.replaced_by) == ("air_drag@2 1, fast", 12, None)
     shown = stages_markdown(CommandStatus("running", stages=stages, tried=tried), "diagnosis", "Pours")

@@ -10,7 +10,7 @@ import pytest
 
 from doe.study import load_study
 from explorer.background.command_process import BackgroundError, CommandStatus, advanced
-from explorer.background.stage_progress import StageProgress, failures, given_up, with_event
+from explorer.background.progress import ProgressEvent, StageProgress, failures, given_up, with_event
 from explorer.background.waiting_line import MOST_WAITING
 from explorer.priority import BACKGROUND
 from explorer.study.edit import StudyEdits
@@ -312,8 +312,8 @@ def shipped(tmp_path):
 FAILING = """
 with (out / "progress.jsonl").open("a") as progress:
     for attempt in range(6 if "--tries" in arguments else 3):
-        run = {"label": "row 2", "replicate": 0, "attempt": attempt, "seed": 10 + attempt, "outcome": "jammed",
-               "message": "4 g stay", "valid": False}
+        run = {"stage": "screening", "label": "row 2", "replicate": 0, "attempt": attempt, "seed": 10 + attempt,
+               "outcome": "jammed", "message": "4 g stay", "valid": False}
         if attempt == 5:
             run |= {"outcome": "at_rest", "message": "", "valid": True}
         event = {"time": 1, "stage": "screening", "done": 3, "planned": 3, "eta_s": None, "line": None,
@@ -346,12 +346,11 @@ def test_a_retry_gives_more_seeds_to_replicates_without_a_valid_run(tmp_path):
 
 
 def test_a_finding_is_kept_with_its_stage():
-    event = {"stage": "scan", "done": 9, "planned": 20, "line": "first", "stages": {"scan": [4, 4], "ascent": [0, 16]}}
-    stages = with_event((), event)
+    counts = {"scan": (4, 4), "ascent": (0, 16)}
+    stages = with_event((), ProgressEvent(stage="scan", done=9, planned=20, line="first", stages=counts))
     assert stages == (StageProgress("scan", 4, 4, "first"), StageProgress("ascent", 0, 16))
-    stages = with_event(
-        stages, event | {"stage": "ascent", "line": None, "stages": {"scan": [4, 4], "ascent": [1, 16]}}
-    )
+    counts |= {"ascent": (1, 16)}
+    stages = with_event(stages, ProgressEvent(stage="ascent", done=10, planned=20, stages=counts))
     assert stages == (StageProgress("scan", 4, 4, "first"), StageProgress("ascent", 1, 16))
 
 
@@ -359,5 +358,5 @@ def test_a_command_that_counts_its_present_stage_only_has_a_row_for_each():
     stages = ()
     for name, done, line in (("compiling", 0, None), ("base", 1, None), ("base", 2, "ok"), ("base", 2, "really")):
         planned = 2 if name == "base" else 0
-        stages = with_event(stages, {"stage": name, "done": done, "planned": planned, "line": line})
+        stages = with_event(stages, ProgressEvent(stage=name, done=done, planned=planned, line=line))
     assert stages == (StageProgress("base", 2, 2, "ok; really"),)

@@ -9,7 +9,7 @@ import pytest
 from doe.stages import planned_runs
 from doe.study import load_study
 from explorer.background.command_process import CommandStatus
-from explorer.background.stage_progress import StageProgress, TriedRun
+from explorer.background.progress import StageProgress, TriedRun
 from explorer.report.plot import Plot
 from explorer.screen_units import InputError
 from explorer.viewer.actions import Actions

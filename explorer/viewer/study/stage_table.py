@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from explorer.background.command_process import CommandStatus
-from explorer.background.stage_progress import Failure, StageProgress, failures
+from explorer.background.progress import Failure, StageProgress, failures
 from explorer.viewer.study.process_view import STATE_WORDS, escaped, time_left
 
 FAILURES_SHOWN = 6
