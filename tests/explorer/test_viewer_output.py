@@ -15,12 +15,12 @@ from explorer.logs.recording_reader import read_recording
 from explorer.scene.file import load_scene
 from explorer.scene.source import SceneSource, material_source
 from explorer.viewer.actions import Actions
-from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.output.output_panel import DOWNLOAD, START, STOP, OutputPanel, command_html, picture
-from explorer.viewer.output.recording_switch import HTML, RRD, RecordingSwitch, session_recorder
+from explorer.viewer.output.recording_switch import HTML, RRD, session_recorder
 from explorer.viewer.output.scene_playback import BYTES_PER_BODY
-from tests.explorer.page_session import PageSession, finished, frame_of
+from explorer.viewer.panel import Now
+from tests.explorer.page_session import PageSession, finished, frame_of, page_context
 from tests.explorer.test_viewer_controls import event
 
 SOURCE = material_source("sunflower_extract")
@@ -64,11 +64,10 @@ class Bench:
     def __init__(self, server, folder, recorder=FileRecorder):
         self.session, self.actions, self.browser = PageSession(SOURCE), Actions(), Browser()
         self.session.newest = frame_of([0, 1, 2], [[0.0, 0.0, 0.01 * k] for k in range(3)])
-        self.background = BackgroundWork(self.actions.post)
-        self.recording = RecordingSwitch(server, folder, self.background, recorder)
-        self.panel = OutputPanel(
-            server, self.session, self.recording, folder / "kept", self.actions.post, self.background
-        )
+        page = page_context(server, self.session, self.actions.post, folder)
+        self.recording, self.background = page.recording, page.background
+        self.recording._open_rrd = recorder
+        self.panel = OutputPanel(page)
 
     def press(self, label):
         event(self.panel._exports[label], True, client=self.browser)
@@ -92,7 +91,7 @@ class Bench:
             self.recording.take(replace(frame, time=time), status)
 
     def told(self):
-        self.panel.show(self.session.status(), "")
+        self.panel.show(Now(self.session.status()))
         return self.panel._state.content
 
 
@@ -115,10 +114,10 @@ def recorded(server, tmp_path):
 
 
 def test_the_command_line_follows_what_is_on_the_screen(bench):
-    bench.panel.show(bench.session.status(), "")
+    bench.panel.show(Now(bench.session.status()))
     assert "explorer simulate sunflower_extract --seed 1<" in bench.panel._command.content
     bench.session.set_parameters({"pair.seed.seed.static_friction": 0.2})
-    bench.panel.show(bench.session.status(), "")
+    bench.panel.show(Now(bench.session.status()))
     assert "--set pair.seed.seed.static_friction=0.2" in bench.panel._command.content
 
 
@@ -175,7 +174,7 @@ def test_a_recording_is_begun_ended_and_sent(bench):
     assert bench.record(START) == ""
     assert "one is running" in bench.record(START)
     bench.take(3)
-    bench.panel.show(bench.session.status(), "")
+    bench.panel.show(Now(bench.session.status()))
     assert f"Recording into {bench.recording.path}" in bench.panel._state.content
     assert "stop it first" in bench.record(DOWNLOAD)
     assert bench.record(STOP) == ""
@@ -288,7 +287,7 @@ def test_the_end_of_the_page_leaves_a_whole_file(bench):
 
 
 def test_texts_of_the_state_are_escaped(bench):
-    bench.panel.show(bench.session.status(), "<img src=x>")
+    bench.panel.show(Now(bench.session.status(), notice="<img src=x>"))
     assert "<img" not in bench.panel._state.content
     assert bench.actions.carry_out() is None
     assert bench.record("Delete everything") == ""

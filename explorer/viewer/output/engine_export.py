@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from itertools import groupby
-from pathlib import Path
 from typing import Any
 
 import viser
@@ -12,26 +11,22 @@ from explorer.errors import CommandError
 from explorer.export import OWN, names
 from explorer.export.packed import packed_export
 from explorer.files.kept_scene import kept_scene
-from explorer.session import Session
-from explorer.viewer.actions import Post
-from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.output.send_file import send_file
+from explorer.viewer.panel import PageContext
 from solver.plugins import origin
 
 
 class EngineExport:
-    """List of programs and a button; ``folder`` keeps the scene."""
+    """List of programs and a button."""
 
-    def __init__(
-        self, server: viser.ViserServer, session: Session, folder: Path, post: Post, background: BackgroundWork
-    ) -> None:
-        self._session, self._folder, self._background = session, folder, background
-        self._program = server.gui.add_dropdown(
+    def __init__(self, page: PageContext) -> None:
+        self._session, self._folder, self._background = page.session, page.uploads, page.background
+        self._program = page.server.gui.add_dropdown(
             "For another program",
             names(),
             hint=f"{programs_text()} The conventions of all coefficients are in it.",
         )
-        self._button = server.gui.add_button(
+        self._button = page.server.gui.add_button(
             "Export (ZIP)", hint="Pours what is on the screen anew, in the background: up to some minutes."
         )
 
@@ -39,7 +34,7 @@ class EngineExport:
         def _(event: viser.GuiEvent[Any]) -> None:
             if event.client is not None:
                 client = event.client
-                post(lambda: self._export(client))
+                page.post(lambda: self._export(client))
 
     def _export(self, client: Any) -> None:
         program, status, folder = str(self._program.value), self._session.status(), self._folder

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from html import escape
-from pathlib import Path
 from typing import Any
 
 import viser
@@ -12,16 +11,13 @@ import viser
 from explorer.errors import CommandError
 from explorer.files.exports import bodies_csv, bodies_stl, png, zipped
 from explorer.live.frames import Frame
-from explorer.live.messages import Status
 from explorer.logs.recording import recorded_lines
 from explorer.scene.source import SceneSource, command_line
 from explorer.scene.text import material_toml
-from explorer.session import Session
-from explorer.viewer.actions import Post
-from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.output.engine_export import EngineExport
 from explorer.viewer.output.recording_switch import HTML, RRD, RecordingSwitch
 from explorer.viewer.output.send_file import send_file
+from explorer.viewer.panel import TAKE_ALONG, Now, PageContext, Panel
 from explorer.viewer.small_text import small_html
 from solver.scene import Scene
 
@@ -34,21 +30,16 @@ MOST_SENT = 200_000_000
 START, STOP, DOWNLOAD = "Start", "Stop", "Download"
 
 
-class OutputPanel:
-    """Command line, exports, and the switch of the recording; ``folder`` keeps scenes that are exported."""
+class OutputPanel(Panel):
+    """Command line, exports, and the switch of the recording."""
 
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        session: Session,
-        recording: RecordingSwitch,
-        folder: Path,
-        post: Post,
-        background: BackgroundWork,
-    ) -> None:
-        self._session, self._recording, self._background, self._post = session, recording, background, post
+    name, tab = "output", TAKE_ALONG
+
+    def __init__(self, page: PageContext) -> None:
+        self._session, self._recording, self._background = page.session, page.recording, page.background
+        self._post = page.post
         self._compared: tuple[SceneSource, Scene, int] | None = None
-        gui = server.gui
+        gui = page.server.gui
         gui.add_markdown("**This pour on the command line**, from the start with the parameters now in force:")
         self._command = gui.add_html("")
         gui.add_markdown("**Files of what is on the screen**")
@@ -62,7 +53,7 @@ class OutputPanel:
         for label, (hint, act) in hints.items():
             self._exports[label] = gui.add_button(label, hint=hint)
             self._listen(self._exports[label], act)
-        self.engine = EngineExport(server, session, folder, post, background)
+        self.engine = EngineExport(page)
         gui.add_markdown("**Recording** of the moving scene")
         self._kind = gui.add_dropdown(
             "Kind",
@@ -82,17 +73,21 @@ class OutputPanel:
         def _(event: viser.GuiEvent[Any]) -> None:
             if event.client_id is not None:
                 client, chosen = event.client, str(event.target.value)
-                post(lambda: self._record(client, chosen))
+                page.post(lambda: self._record(client, chosen))
 
-    def show(self, status: Status, notice: str) -> None:
-        """Command line and state of the recording; ``notice`` is the page's last message. In ``server.atomic()``."""
-        present = (self._session.source, status.scene, status.seed)
+    def show(self, now: Now) -> None:
+        """Command line and state of the recording, or the page's last message."""
+        present = (self._session.source, now.status.scene, now.status.seed)
         if self._compared is None or present != self._compared:
             self._compared = present
             self._command.content = command_html(*present)
-        state = recording_html(self._recording, self._background.busy_with, notice)
+        state = recording_html(self._recording, self._background.busy_with, now.notice)
         if self._state.content != state:
             self._state.content = state
+
+    def close(self) -> None:
+        """End a recording that was begun on the page, with its file whole."""
+        self._recording.close()
 
     def _listen(self, button: Any, act: Callable[[Any], None]) -> None:
         def pressed(event: viser.GuiEvent[Any]) -> None:
