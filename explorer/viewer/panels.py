@@ -9,7 +9,9 @@ from explorer.viewer.laboratory.laboratory_panel import LaboratoryPanel
 from explorer.viewer.laboratory.photograph_panel import PhotographPanel
 from explorer.viewer.laboratory.rig_panel import RigPanel
 from explorer.viewer.look.look_panel import LookPanel
+from explorer.viewer.output.engine_export import EngineExport
 from explorer.viewer.output.output_panel import OutputPanel
+from explorer.viewer.output.recording_panel import RecordingPanel
 from explorer.viewer.panel import Panel
 from explorer.viewer.pour.changes_panel import ChangesPanel
 from explorer.viewer.pour.chart import Chart
@@ -40,6 +42,8 @@ PANELS: Registry[type[Panel]] = Registry(
         SecondPile,
         LookPanel,
         OutputPanel,
+        EngineExport,
+        RecordingPanel,
         StudyPanel,
         DiagnosisPanel,
         LaboratoryPanel,

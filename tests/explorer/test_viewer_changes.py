@@ -122,7 +122,7 @@ def test_a_preset_of_ones_own_is_saved_offered_and_applied(bench, tmp_path):
     bench.panel._name.value = "my try"
     bench.actions.post(bench.panel._save)
     assert bench.turn() == ""
-    assert (tmp_path / "my try.toml").is_file()
+    assert (tmp_path / "presets" / "my try.toml").is_file()
     assert "my try (own)" in bench.panel._preset.options
     changed = bench.session.now.scene
     bench.press(DEFAULT)
@@ -144,7 +144,8 @@ def test_a_preset_that_is_not_offered_is_refused(bench, name):
 
 
 def test_a_bad_file_is_one_line_and_changes_nothing(bench, tmp_path):
-    (tmp_path / "bad.toml").write_text("format = 1\n[values]\n'pair.*.*.static_friction' = 'much'\n")
+    (tmp_path / "presets").mkdir()
+    (tmp_path / "presets" / "bad.toml").write_text("format = 1\n[values]\n'pair.*.*.static_friction' = 'much'\n")
     assert "is not a number" in bench.post(bench.panel._preset, "bad (own)")
     assert bench.session.asked == []
 

@@ -114,7 +114,7 @@ def test_a_rig_shows_its_own_parameters_and_the_bodies_that_are_poured(bench):
     assert {"rig.drop_height", "rig.specimen", "rig.drops", "rig.body"} == set(panel._inputs)
     other = material_source("nine_sphere_seed")
     bench.session.start(other.scene, 1, other)
-    panel.show()
+    panel.show(Now(bench.session.now))
     assert panel._inputs["rig.body"].options == tuple(body.name for body in other.scene.bodies)
 
 

@@ -53,8 +53,9 @@ class LookPanel(Panel):
         server, session, post = page.server, page.session, page.post
         self._server, self._session, self._settings = server, session, page.look
         self._status = session.status()
-        self._nodes = SceneNodes(server, self._status.scene)
-        look_at_height(server, scene_height(self._status.scene))
+        self._scene = self._status.scene
+        self._nodes = SceneNodes(server, self._scene)
+        look_at_height(server, scene_height(self._scene))
         self._colours = ColourPanel(server, page.colour_bar, self._settings, QUANTITIES, post)
         self._forces, self._chains = ForcePanel(server, self._settings, post), ForceChains(server)
         CutPanel(server, self._settings, post)
@@ -97,18 +98,20 @@ class LookPanel(Panel):
 
     def draw(self, now: Now) -> None:
         """Draw the newest frame; of a new pour nothing before there is one."""
-        before, self._status = self._status, now.status
-        if now.status.generation != before.generation:
-            self._show_scene(before.scene, now.status.scene)
+        generation, self._status = self._status.generation, now.status
+        if now.status.generation != generation:
+            self._clear(now.status.scene)
         if now.frame is not None:
+            fresh = self._drawn is None or now.frame.number != self._drawn.number
             self._show_frame(now.frame)
-            self._nodes.show_gate(now.status.gate_shut)
+            if fresh:
+                self._nodes.show_gate(now.status.gate_shut)
 
-    def _show_scene(self, before: Scene, scene: Scene) -> None:
-        """Another pour: its bodies and rig in place of others, and none of the bodies in sight."""
-        if (scene.bodies, scene.rig) != (before.bodies, before.rig):
+    def _clear(self, scene: Scene) -> None:
+        """Another pour: no bodies yet, and another rig where it has one."""
+        if (scene.bodies, scene.rig) != (self._scene.bodies, self._scene.rig):
             self._nodes.remove()
-            self._nodes = SceneNodes(self._server, scene)
+            self._nodes, self._scene, self._drawn = SceneNodes(self._server, scene), scene, None
             look_at_height(self._server, scene_height(scene))
         self._nodes.clear()
 

@@ -12,12 +12,14 @@ from explorer.export import OWN, names
 from explorer.export.packed import packed_export
 from explorer.files.kept_scene import kept_scene
 from explorer.viewer.output.send_file import send_file
-from explorer.viewer.panel import PageContext
+from explorer.viewer.panel import TAKE_ALONG, PageContext, Panel
 from solver.plugins import origin
 
 
-class EngineExport:
+class EngineExport(Panel):
     """List of programs and a button."""
+
+    name, tab = "engine", TAKE_ALONG
 
     def __init__(self, page: PageContext) -> None:
         self._session, self._folder, self._background = page.session, page.uploads, page.background
