@@ -5,6 +5,7 @@ import time
 from dataclasses import replace
 
 import pytest
+import viser
 
 from explorer.diagnosis.process import DiagnoseProcess
 from explorer.live.messages import Event, SessionState, Status
@@ -13,6 +14,8 @@ from explorer.scene.source import material_source, rig_source
 from explorer.viewer.app import serve
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.page import Page
+from explorer.viewer.panel import LOOK, SELDOM, Panel, Tab
+from explorer.viewer.panels import PANELS
 from solver.scene import value
 from tests.explorer.page_session import PageSession, frame_of
 
@@ -144,6 +147,69 @@ def test_the_end_of_serve_names_every_file_that_it_recorded(tmp_path, monkeypatc
         f"{tmp_path / 'live_2.rrd'}: 0.500 s, from 0.000 to 0.500 s",
     ]
     assert read_recording(tmp_path / "live_2.rrd").times == pytest.approx([0.0, 0.5])
+
+
+class Magnets(Panel):
+    """A made-up panel, in a folder of a tab of its own."""
+
+    name, tab, title = "magnets", Tab("Magnets", viser.Icon.MAGNET), "Pull"
+
+    def __init__(self, page):
+        self.text, self.drawn, self.dark, self.closed = page.server.gui.add_markdown(""), 0, True, False
+
+    def draw(self, now):
+        self.drawn += 1
+
+    def show(self, now):
+        self.text.content = f"{now.status.scene.rig.name}: {now.notice}"
+
+    def set_dark(self, dark):
+        self.dark = dark
+
+    def close(self):
+        self.closed = True
+
+
+class Poles(Magnets):
+    """Another one, in a tab that there is, without a folder."""
+
+    name, tab, title, every = "poles", LOOK, "", SELDOM
+
+
+class Absent(Magnets):
+    """One that this page has not, and so no tab for it."""
+
+    name, tab = "absent", Tab("Absent", viser.Icon.MAGNET)
+
+    @classmethod
+    def offered(cls, page):
+        return page.study is not None
+
+
+@pytest.fixture
+def plugged_in(monkeypatch):
+    for kind in (Magnets, Poles, Absent):
+        monkeypatch.setitem(PANELS.things, kind.name, kind)
+
+
+def test_a_panel_of_a_plug_in_stands_in_its_tab_and_follows_the_page(plugged_in, running):
+    page, _ = running
+    gui, magnets, poles = page._server.gui, page.panels["magnets"], page.panels["poles"]
+    tabs = next(handle._parent for handle in gui._container_handle_from_uuid.values() if hasattr(handle, "_parent"))
+    names = [tab._label for tab in tabs._tab_handles]
+    assert names == ["Pour", "Look", "Take along", "Diagnose", "Laboratory", "Magnets"]
+    (folder,) = tabs._tab_handles[-1]._children.values()
+    assert (folder.label, list(folder._children.values())) == ("Pull", [magnets.text])
+    assert list(tabs._tab_handles[1]._children.values())[-1] is poles.text
+    assert not {"absent", "study"} & page.panels.keys()
+    page._actions.post(lambda: float("strong"))
+    for panel in (magnets, poles):
+        wait_for(lambda panel=panel: panel.text.content == "funnel: could not convert string to float: 'strong'")
+        wait_for(lambda panel=panel: panel.drawn > 3)
+    page._actions.post(lambda: page._follow_theme(False))
+    wait_for(lambda: not magnets.dark)
+    page.close()
+    assert magnets.closed
 
 
 def test_an_event_that_is_no_change_is_no_mark(running):
