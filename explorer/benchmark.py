@@ -17,8 +17,9 @@ from typing import Any
 from explorer.export import bed as peer_bed
 from explorer.export.deck import Deck
 from explorer.export.deck_of_scene import deck_of
-from explorer.export.decks import WRITERS
+from explorer.export.liggghts import write_liggghts
 from explorer.export.run import PeerRun, PeerTimeout, run_liggghts, run_yade
+from explorer.export.yade import write_yade
 from explorer.scene.file import load_scene
 from solver.benchmark import Bed, Measurement, measure_batch, measure_bed, measure_pour, wide_bed
 from solver.benchmark.packed_bed import RADIUS, bed_name, bed_scene
@@ -29,6 +30,7 @@ POUR = "seed_pour"
 SEED = 1
 SHORT = 0.5
 """Simulated time of the short pour [s]."""
+WRITERS: dict[str, Callable[[Path, Deck], None]] = {"liggghts": write_liggghts, "yade": write_yade}
 OFTEN = 8
 """Pours of ours in a round of it, so that both engines take seconds and meet the same other work of the machine."""
 TO_REST = "pour to rest"

@@ -1,8 +1,8 @@
-"""Files for other programs: decks for engines, one file per engine, and what they share; VTK; material tables.
+"""Files for other programs: a file per target, and what they share.
 
-decks.py        deck writers by engine
+target.py       the protocol of a target
 deck.py         what a deck says, whatever the engine, and the file that holds it
-deck_of_scene.py  deck_of(record): the deck that repeats a pour of ours
+deck_of_scene.py  deck_of(record): the deck that repeats a pour of ours, and the protocol of an engine that takes one
 triangles.py    cone and gate as triangles, STL
 liggghts.py     LIGGGHTS-PUBLIC 3.8 (in.liggghts)
 yade.py         YADE 2023 (yade_pour.py, copied into the folder, reads deck.json)
@@ -10,12 +10,25 @@ bed.py          a bed of equal spheres for both, for timing
 impacts.py      single impacts in LIGGGHTS, for the verification
 frames.py       what the engines write: spheres of one moment
 run.py          run a folder with the installed engine, for a limited time, and time its stepping loop
-moments.py      a pour at given moments;  paraview.py them as VTK files
+paraview.py     a pour at given moments as VTK files
 material_table.py   a material as CSV for EDEM, with the convention of every coefficient
 """
 
-# Nothing of the solver is loaded here: the page names the programs, and its process has no Taichi.
-PROGRAMS = ("liggghts", "yade", "paraview", "edem")
-"""Everything that something can be exported to: decks for engines (`decks.py`), then files for others."""
+from explorer.export.liggghts import LIGGGHTS
+from explorer.export.material_table import EDEM
+from explorer.export.paraview import PARAVIEW
+from explorer.export.target import ExportTarget
+from explorer.export.yade import YADE
+from solver.plugins import Registry, instance_of, plugged_in
 
-__all__ = ["PROGRAMS"]
+OWN: tuple[ExportTarget, ...] = (LIGGGHTS, YADE, PARAVIEW, EDEM)
+EXPORTS: Registry[ExportTarget] = Registry("export", OWN, instance_of(ExportTarget))
+"""Everything that something can be exported to, by name."""
+
+
+def names() -> tuple[str, ...]:
+    """Names of all targets. No plug-in is loaded for them: it may load Taichi, which the page's process has not."""
+    return (*(target.name for target in OWN), *plugged_in(EXPORTS.kind))
+
+
+__all__ = ["EXPORTS", "OWN", "names"]

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Collection
+from pathlib import Path
 from typing import cast
 
 import numpy as np
 
 from explorer.errors import CommandError
 from explorer.export.deck import Array, Clump, Deck, Mesh
+from explorer.export.target import ExportOrder, ExportTarget
 from explorer.export.triangles import mesh_triangles, revolved_triangles
 from solver import Body, Entries, Record, Scene
 from solver.effects.rolling_resistance import RollingResistance
@@ -17,8 +20,32 @@ from solver.effects.set_up import actual
 from solver.rigs import Funnel, MeshFunnel, Plane, Revolved, Rig
 from solver.scene import pour_rig
 
-HOLDS = {"liggghts": (RollingResistance.name,), "yade": ()}
-"""Effects that an engine's deck can hold: its law has the same one."""
+HOLDS = (RollingResistance.name,)
+"""Effects of contacts that a deck can say; an engine may have the law of fewer."""
+
+
+class DeckTarget(ExportTarget):
+    """An engine that repeats a pour of ours from a deck."""
+
+    holds: tuple[str, ...] = ()
+    """Effects of contacts and flight that its law has as well."""
+
+    def check(self, scene: Scene) -> None:
+        """Raise :class:`CommandError` for what its deck cannot hold."""
+        check_exportable(scene, self.name, self.holds)
+
+    def write(self, folder: Path, order: ExportOrder) -> str:
+        """Pour, and write the deck of it."""
+        # Imported here: it loads Taichi, and a target can be named without.
+        from solver import run_pour
+
+        deck = deck_of(run_pour(order.scene, order.seed), order.time)
+        self.write_deck(folder, deck)
+        return f"{deck.bodies} bodies, {deck.steps} steps of {deck.dt:.4g} s; how to run it: README.txt"
+
+    def write_deck(self, folder: Path, deck: Deck) -> None:
+        """Write a deck into an existing folder."""
+        raise NotImplementedError
 
 
 def deck_of(record: Record, time: float | None = None) -> Deck:
@@ -32,7 +59,7 @@ def deck_of(record: Record, time: float | None = None) -> Deck:
         CommandError: the scene has something that no exported deck can hold.
     """
     scene = record.scene
-    check_exportable(scene, *HOLDS)
+    check_exportable(scene)
     steps = record.steps if time is None else math.ceil(time / record.dt)
     return assembled(
         scene,
@@ -45,23 +72,21 @@ def deck_of(record: Record, time: float | None = None) -> Deck:
     )
 
 
-def check_exportable(scene: Scene, *engines: str) -> None:
-    """Raise :class:`CommandError` if ``scene`` has something that the deck of none of ``engines`` can hold.
+def check_exportable(scene: Scene, engine: str = "any engine", holds: Collection[str] = HOLDS) -> None:
+    """Raise :class:`CommandError` if ``scene`` has something that a deck for ``engine`` cannot hold.
 
-    Effects of material and set-up are carried out in a deck; of those of contacts and flight ``HOLDS`` says which have
-    an equal there.
+    Effects of material and set-up are carried out in a deck; of those of contacts and flight ``holds`` are the ones
+    that have an equal there.
     """
     scene = actual(scene)
     for effect in scene.effects:
-        held = any(effect.name in HOLDS[engine] for engine in engines)
-        if effect.on and not held:
-            amplitude, where = f"effect.{effect.name}.{effect.amplitudes[0]}", " or ".join(engines)
-            raise CommandError(f"{amplitude}: {effect.numbers[0]:g} cannot be exported to {where}; allowed: 0")
+        if effect.on and effect.name not in holds:
+            amplitude = f"effect.{effect.name}.{effect.amplitudes[0]}"
+            raise CommandError(f"{amplitude}: {effect.numbers[0]:g} cannot be exported to {engine}; allowed: 0")
     if scene.contact.clump_rule != "body_mass":
         # No engine of these damps by the mass that acts at a contact.
         raise CommandError(
-            f"contact.clump_rule: {scene.contact.clump_rule!r} cannot be exported to {' or '.join(engines)}; "
-            "allowed: body_mass"
+            f"contact.clump_rule: {scene.contact.clump_rule!r} cannot be exported to {engine}; allowed: body_mass"
         )
     damping = rolling(scene).rolling_damping
     if rolling(scene).on and damping > 0.0:

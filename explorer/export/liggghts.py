@@ -26,10 +26,14 @@ import numpy.typing as npt
 
 from explorer.errors import CommandError
 from explorer.export.deck import Clump, Deck, write_deck
+from explorer.export.deck_of_scene import DeckTarget
 from explorer.export.frames import FINAL, TRAJECTORY
 from explorer.export.readme import write_readme
 from explorer.export.triangles import write_stl
+from solver.effects.rolling_resistance import RollingResistance
+from solver.effects.set_up import actual
 from solver.laws.restitution import normal_damping
+from solver.scene import Scene
 
 Array = npt.NDArray[np.float64]
 INPUT = "in.liggghts"
@@ -62,8 +66,7 @@ def unclamped_restitution(restitution: float) -> float:
 def write_liggghts(folder: Path, deck: Deck) -> None:
     """Write the deck into ``folder``; :class:`CommandError` for what LIGGGHTS cannot take."""
     for clump in deck.clumps:
-        if len(clump.radii) < 2:
-            raise CommandError(f"body {clump.name!r}: LIGGGHTS takes clumps of at least 2 spheres, not of one")
+        _check_clump(clump.name, len(clump.radii))
     text = "\n".join(_input(deck)) + "\n"
     for k, clump in enumerate(deck.clumps, start=1):
         rows = np.column_stack([clump.centres, clump.radii])
@@ -73,6 +76,26 @@ def write_liggghts(folder: Path, deck: Deck) -> None:
     (folder / INPUT).write_text(text, encoding="utf-8")
     write_deck(folder, deck)
     write_readme(folder, "liggghts", deck)
+
+
+class Liggghts(DeckTarget):
+    """LIGGGHTS as a target of an export."""
+
+    name, what = "liggghts", "a deck that runs as it is"
+    holds = (RollingResistance.name,)
+
+    def check(self, scene: Scene) -> None:
+        """Raise :class:`CommandError` for what a deck cannot hold, and for bodies of one sphere."""
+        super().check(scene)
+        for body in actual(scene).bodies:
+            _check_clump(body.name, len(body.clump.radii))
+
+    def write_deck(self, folder: Path, deck: Deck) -> None:
+        """Write a deck into an existing folder."""
+        write_liggghts(folder, deck)
+
+
+LIGGGHTS = Liggghts()
 
 
 @dataclass(frozen=True)
@@ -232,6 +255,11 @@ def _input(deck: Deck) -> list[str]:
         *_runs(deck, law),
         WRITE_FINAL,
     ]
+
+
+def _check_clump(name: str, spheres: int) -> None:
+    if spheres < 2:
+        raise CommandError(f"body {name!r}: LIGGGHTS takes clumps of at least 2 spheres, not of one")
 
 
 def _confirmations(moduli: list[float]) -> list[str]:

@@ -18,6 +18,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from explorer.export.liggghts import unclamped_restitution
+from explorer.export.target import ExportOrder, ExportTarget
 from solver import Body, Scene
 from solver.effects.set_up import actual
 from solver.material import Pair
@@ -54,6 +55,24 @@ def write_material_table(folder: Path, scene: Scene) -> None:
     others = [effect.name for effect in scene.effects if effect.on and effect.name not in (ROLLING, KINETIC)]
     words = f"Effects that these tables cannot hold: {', '.join(others)}.\n" if others else ""
     (folder / "README.txt").write_text(README.format(title=scene.title, effects=words), encoding="utf-8")
+
+
+class Edem(ExportTarget):
+    """EDEM as a target of an export."""
+
+    name, what = "edem", "tables of the material"
+    pours = False
+
+    def check(self, scene: Scene) -> None:
+        """Take everything: what the tables cannot hold is named in them."""
+
+    def write(self, folder: Path, order: ExportOrder) -> str:
+        """Write the tables."""
+        write_material_table(folder, order.scene)
+        return "materials, pairs and bodies; what the coefficients mean: conventions.csv"
+
+
+EDEM = Edem()
 
 
 def _materials(scene: Scene) -> Rows:

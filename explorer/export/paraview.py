@@ -8,25 +8,34 @@ from __future__ import annotations
 
 import importlib
 import xml.etree.ElementTree as ET
+from collections import deque
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from explorer.errors import CommandError
-from explorer.export.moments import Moment
+from explorer.export.target import ExportOrder, ExportTarget
 from explorer.scene.meshes import GATE_NAME, Triangles, body_triangles, rig_triangles
-from solver import Scene
-from solver.contacts import loads
+from solver import Bodies, Record, Scene, Spheres, value
+from solver.contacts import Contacts, loads
 from solver.insertion import rotation_matrix
+from solver.record_builder import member_spheres
 from solver.rigs import Rig
+
+if TYPE_CHECKING:
+    from solver import Job
+    from solver.pour import Pour
 
 Array = npt.NDArray[np.float64]
 Numbers = Mapping[str, npt.NDArray[Any]]
 Grid = tuple[Array, str, npt.NDArray[Any], Numbers, Numbers]
 """Points (n, 3) [m], type of the cells, their points, numbers per point, numbers per cell."""
+MOST = 2000
+"""Moments of one pour that are kept in memory."""
 
 README = """\
 {title}
@@ -47,9 +56,72 @@ surfaces   {surfaces}
 """
 
 
-def check_meshio() -> None:
-    """Raise :class:`CommandError` where the library that writes VTK files is missing; before anything is simulated."""
-    _meshio()
+@dataclass(frozen=True)
+class Moment:
+    """Bodies, their member spheres and contacts at one time, and where the rig's surfaces are then."""
+
+    time: float
+    """[s]."""
+    bodies: Bodies
+    spheres: Spheres
+    contacts: Contacts
+    poses: Array
+    """Of the surfaces: origin [m] and orientation wxyz, shape (k, 7)."""
+    gate_shut: bool
+    """Whether the rig is still being filled."""
+
+
+def moments(scene: Scene, seed: int, every: float | None) -> tuple[tuple[Moment, ...], Record]:
+    """Run a pour to its end: a moment each ``every`` s (to the next sample of its curves), and the last one.
+
+    Only the last one for None. Raises CommandError for more than ``MOST`` moments.
+    """
+    if every is not None and value(scene, "numerics.max_time") > MOST * every:
+        raise CommandError(
+            f"--every {every:g}: more than {MOST} moments of a pour of up to {scene.numerics.max_time:g} s"
+        )
+    # Imported here: it loads Taichi, and a target can be named without.
+    from solver import Job, run_queue
+
+    found: list[Moment] = []
+    last: list[Moment] = []
+
+    def look(_: Job, pour: Pour) -> None:
+        due = every is not None and pour.time >= len(found) * every - 1e-9
+        over = pour.steps_due() == 0
+        if due or over:
+            moment = _moment(pour)
+            (found if due else last).append(moment)
+
+    ((_, record),) = run_queue(deque([Job(scene, seed)]), [scene], threads=1, worlds=1, on_sample=look)
+    return (*found, *last), record
+
+
+def _moment(pour: Pour) -> Moment:
+    bodies = pour.bodies()
+    spheres = member_spheres(pour.scene, bodies)
+    return Moment(pour.time, bodies, spheres, pour.contacts(), pour.surface_poses().copy(), pour.gate_shut)
+
+
+class Paraview(ExportTarget):
+    """ParaView as a target of an export."""
+
+    name, what = "paraview", "shapes and contacts as VTK"
+    options = ("every",)
+    extra = "paraview"
+
+    def check(self, scene: Scene) -> None:
+        """Raise :class:`CommandError` where the library that writes VTK files is missing."""
+        _meshio()
+
+    def write(self, folder: Path, order: ExportOrder) -> str:
+        """Pour, and write the moments of it."""
+        seen, record = moments(order.scene, order.seed, order.every)
+        write_paraview(folder, record.scene, seen, order.seed, str(record.outcome))
+        return f"{len(seen)} moment(s), the last at {seen[-1].time:.4g} s; what is in them: README.txt"
+
+
+PARAVIEW = Paraview()
 
 
 def write_paraview(folder: Path, scene: Scene, seen: tuple[Moment, ...], seed: int, outcome: str) -> None:

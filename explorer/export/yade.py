@@ -19,9 +19,9 @@ import numpy as np
 
 from explorer.errors import CommandError
 from explorer.export.deck import Deck, write_deck
+from explorer.export.deck_of_scene import DeckTarget
 from explorer.export.readme import write_readme
 from explorer.export.triangles import write_stl
-from solver.laws.hertz_mindlin import tangential_damping
 from solver.laws.restitution import normal_damping
 
 SCRIPT = "yade_pour.py"
@@ -43,6 +43,9 @@ def write_yade(folder: Path, deck: Deck) -> None:
 
 def write_law(folder: Path, restitution: np.ndarray, friction: np.ndarray) -> None:
     """Write damping ratios and friction angles [rad] of all pairs of classes: ``law.json``."""
+    # Imported here: it loads Taichi, and a target can be named without.
+    from solver.laws.hertz_mindlin import tangential_damping
+
     tables = {
         "normal_damping": np.vectorize(normal_damping, otypes=[float])(restitution) / 2.0,
         "tangential_damping": np.vectorize(tangential_damping, otypes=[float])(restitution) / 2.0,
@@ -50,3 +53,16 @@ def write_law(folder: Path, restitution: np.ndarray, friction: np.ndarray) -> No
     }
     text = json.dumps({name: table.tolist() for name, table in tables.items()}, indent=1)
     (folder / LAW).write_text(text + "\n", encoding="utf-8")
+
+
+class Yade(DeckTarget):
+    """YADE as a target of an export."""
+
+    name, what = "yade", "a deck that runs as it is"
+
+    def write_deck(self, folder: Path, deck: Deck) -> None:
+        """Write a deck into an existing folder."""
+        write_yade(folder, deck)
+
+
+YADE = Yade()

@@ -10,8 +10,3 @@ from platformdirs import user_data_path
 def data_folder() -> Path:
     """Folder of this user's studies, diagnoses, presets, uploads and recordings."""
     return user_data_path("repose-explorer")
-
-
-def uploads_folder() -> Path:
-    """Folder of the files that browsers sent."""
-    return data_folder() / "uploads"

@@ -74,8 +74,7 @@ def serve(
         ending.callback(diagnosis.close)
         session = ending.enter_context(closing(Session()))
         session.start(scene, seed, source)
-        name = study_file.stem if study_file else ""
-        page = ending.enter_context(closing(Page(server, session, study, name, diagnosis, recorder)))
+        page = ending.enter_context(closing(Page(server, session, study, diagnosis, recorder)))
         ready(f"http://{address(host)}:{server.get_port()}")
         page.run(stop)
 

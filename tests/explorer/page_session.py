@@ -3,6 +3,7 @@
 import time
 from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from explorer.scene.changes import changes
 from explorer.scene.source import SceneSource
 from explorer.viewer.actions import Actions
 from explorer.viewer.background_work import BackgroundWork
+from explorer.viewer.panel import PageContext
 from solver.scene import Scene, with_values
 
 
@@ -47,6 +49,12 @@ class PageSession:
 
     def restart(self, scene: Scene | None = None, seed: int | None = None) -> None:
         self.start(scene or self.now.scene, self.now.seed if seed is None else seed)
+
+
+def page_context(server, session=None, post=None, data=Path("nowhere"), study=None, diagnosis=None):
+    """What panels are made with; without ``post`` an action is carried out at once."""
+    post = post or (lambda action: action())
+    return PageContext(server, session, post, study, diagnosis, data, server.gui.add_html("", visible=False))
 
 
 def finished(actions: Actions, background: BackgroundWork, patience: float = 30.0) -> str:

@@ -5,8 +5,10 @@ import json
 from explorer.background.command_process import CommandStatus
 from explorer.live.messages import SessionState, Status
 from explorer.viewer.actions import Actions
+from explorer.viewer.panel import Now
 from explorer.viewer.study.study_panel import StudyPanel
 from solver import asset_path, load_material
+from tests.explorer.page_session import page_context
 
 SCENE = load_material("sunflower_extract")
 
@@ -73,7 +75,10 @@ class PanelAtHand:
 
     def __init__(self, server):
         self.study, self.session, self.actions = FakeStudy(), FakeSession(), Actions()
-        self.panel = StudyPanel(server, self.study, "sunflower_extract", self.actions.post, self.session)
+        self.panel = StudyPanel(page_context(server, self.session, self.actions.post, study=self.study))
+
+    def show(self, notice=""):
+        self.panel.show(Now(self.session.status(), notice=notice))
 
     def enter(self, handle, value):
         handle.value = value

@@ -14,12 +14,14 @@ from explorer.diagnosis.result import DiagnosisResult
 from explorer.priority import BACKGROUND
 from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import guarded_server
+from explorer.viewer.panel import Now
 from explorer.viewer.study.diagnosis_panel import OWN, DiagnosisPanel, answer_markdown
 from explorer.viewer.study.plot_view import NOTHING
 from solver import EFFECTS, AssetNotFoundError
-from solver.assets import measurement_folder, shipped_measurements
+from solver.assets import measurement_folder
 from tests.explorer.background import only_folder, wait_for
 from tests.explorer.diagnosed import result_of_case, typed
+from tests.explorer.page_session import page_context
 
 PROGRAM = """
 import json, os, pathlib, sys, time
@@ -198,7 +200,7 @@ def server():
 
 def test_the_panel_asks_and_shows(server, tmp_path):
     process, actions = FakeDiagnosis(), Actions()
-    panel = DiagnosisPanel(server, process, shipped_measurements(), tmp_path / "uploads", actions.post)
+    panel = DiagnosisPanel(page_context(server, post=actions.post, data=tmp_path, diagnosis=process))
     panel._data.value = "trefoil_2"
     for button in ("Start", "Pause / go on", "Cancel", "Delete everything"):
         press(panel, button)
@@ -213,7 +215,7 @@ def test_the_panel_asks_and_shows(server, tmp_path):
     assert process.asked == [("start", Question("trefoil_2")), "pause", "cancel", ("resume", mine), "go on"]
     stages = (StageProgress("base model", 30, 30, "*64* settings"), StageProgress("screening", 5, 20))
     process.now = CommandStatus("running", "screening", 5, 20, 125.0, stages=stages)
-    panel.show("no such folder")
+    panel.show(Now(None, notice="no such folder"))
     assert panel._view._bar.value == 25.0
     text = panel._view._text.content
     assert "Known of this stage: 5 of 20 pours, time left 2 min 05 s" in text
@@ -224,7 +226,7 @@ def test_the_panel_asks_and_shows(server, tmp_path):
     process.now = CommandStatus("finished", message="report: /home/me/out/report.html")
     process.out = tmp_path
     (tmp_path / "diagnosis.json").write_text(json.dumps(result_of_case("effect")))
-    panel.show("")
+    panel.show(Now(None))
     assert panel._answer.content.startswith(r"**effect:adhesion\_sjkr**")
     assert "/home/me/out/report.html" in panel._view._text.content
     assert "Residuals before and after" in panel._plots._choice.options
@@ -234,10 +236,10 @@ def test_the_panel_asks_and_shows(server, tmp_path):
 
 def test_an_uploaded_data_set_can_be_diagnosed(server, tmp_path):
     process, actions = FakeDiagnosis(), Actions()
-    panel = DiagnosisPanel(server, process, shipped_measurements(), tmp_path / "uploads", actions.post)
+    panel = DiagnosisPanel(page_context(server, post=actions.post, data=tmp_path, diagnosis=process))
     kept = tmp_path / "uploads" / "mine-0123456789ab"
     shutil.copytree(measurement_folder("trefoil_1"), kept)
-    panel.show("")
+    panel.show(Now(None))
     assert "mine-0123456789ab" in panel._data.options
     panel._data.value = "mine-0123456789ab"
     press(panel, "Start")
@@ -247,7 +249,7 @@ def test_an_uploaded_data_set_can_be_diagnosed(server, tmp_path):
 
 def test_effects_budget_and_queue_are_asked_for_on_the_page(server, tmp_path):
     process, actions = FakeDiagnosis(), Actions()
-    panel = DiagnosisPanel(server, process, shipped_measurements(), tmp_path / "uploads", actions.post)
+    panel = DiagnosisPanel(page_context(server, post=actions.post, data=tmp_path, diagnosis=process))
     boxes = panel._candidates._boxes
     assert tuple(boxes) == tuple(EFFECTS)
     for name in EFFECTS:
@@ -257,7 +259,7 @@ def test_effects_budget_and_queue_are_asked_for_on_the_page(server, tmp_path):
     press(panel, "Clear queue")
     actions.carry_out()
     assert process.asked == [("queue", Question("trefoil_2", ("air_drag", "twisting"), 300)), "clear queue"]
-    panel.show("")
+    panel.show(Now(None))
     assert "Waiting: trefoil" in panel._view._text.content
     for box in boxes.values():
         box.value = False
@@ -267,15 +269,15 @@ def test_effects_budget_and_queue_are_asked_for_on_the_page(server, tmp_path):
 
 def test_a_file_that_is_no_diagnosis_is_one_line(server, tmp_path):
     process, actions = FakeDiagnosis(), Actions()
-    panel = DiagnosisPanel(server, process, shipped_measurements(), tmp_path / "uploads", actions.post)
+    panel = DiagnosisPanel(page_context(server, post=actions.post, data=tmp_path, diagnosis=process))
     (tmp_path / "diagnosis.json").write_text(json.dumps({"schema": DiagnosisResult.SCHEMA, "verdict": "<script>"}))
     process.out = tmp_path
-    panel.show("")
+    panel.show(Now(None))
     assert panel._answer.content.endswith("diagnosis.json: statement: is missing")
     content = result_of_case("effect")
     content["names"] = []
     (tmp_path / "diagnosis.json").write_text(json.dumps(content))
-    panel.show("")
+    panel.show(Now(None))
     assert "cannot be shown" in panel._answer.content
     assert "<script>" not in panel._answer.content
     assert panel._plots._choice.options == (NOTHING,)
@@ -283,10 +285,10 @@ def test_a_file_that_is_no_diagnosis_is_one_line(server, tmp_path):
 
 def test_a_diagnosis_of_an_older_version_is_one_line(server, tmp_path):
     process, actions = FakeDiagnosis(), Actions()
-    panel = DiagnosisPanel(server, process, shipped_measurements(), tmp_path / "uploads", actions.post)
+    panel = DiagnosisPanel(page_context(server, post=actions.post, data=tmp_path, diagnosis=process))
     (tmp_path / "diagnosis.json").write_text('{"schema": 1, "verdict": "no_missing_effect", "gates": []}')
     process.out = tmp_path
-    panel.show("")
+    panel.show(Now(None))
     assert "made by an older version of the program" in panel._answer.content
     assert "\n" not in panel._answer.content
     assert panel._plots._choice.options == (NOTHING,)

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from importlib.metadata import EntryPoint
 
 import numpy as np
 import pytest
@@ -9,17 +10,19 @@ import trimesh
 from scipy.integrate import solve_ivp
 
 from explorer.errors import CommandError
-from explorer.export import PROGRAMS
+from explorer.export import EXPORTS, names
 from explorer.export.bed import BED_WRITERS, Bed
 from explorer.export.deck import read_deck
-from explorer.export.deck_of_scene import assembled, deck_of
-from explorer.export.decks import WRITERS
+from explorer.export.deck_of_scene import DeckTarget, assembled, deck_of
 from explorer.export.frames import Frame, motion, read_frames, rigid_fit
 from explorer.export.liggghts import unclamped_restitution, write_liggghts
+from explorer.export.target import ExportTarget
 from explorer.export.triangles import revolved_triangles, write_stl
 from explorer.scene.file import load_scene, with_settings
+from explorer.viewer.output.engine_export import programs_text
 from solver import run_pour, with_values
 from solver.insertion import random_quaternion, rotation_matrix
+from solver.plugins import GROUP
 from solver.record import Entries
 from solver.rigs import Revolved
 from tests.explorer.beads import bead_scene
@@ -96,9 +99,9 @@ def test_a_shorter_time_leaves_out_who_enters_later(record):
     assert (half.entries.step < half.steps).all()
 
 
-@pytest.mark.parametrize("engine", WRITERS)
+@pytest.mark.parametrize("engine", [one for one in EXPORTS.values() if isinstance(one, DeckTarget)])
 def test_a_folder_is_complete_and_knows_no_other_place(engine, deck, tmp_path):
-    WRITERS[engine](tmp_path, deck)
+    engine.write_deck(tmp_path, deck)
     names = {path.name for path in tmp_path.iterdir()}
     assert {"README.txt", "deck.json", "cone.stl", "gate.stl"} <= names
     for path in tmp_path.iterdir():
@@ -206,11 +209,41 @@ def test_what_liggghts_cannot_take_is_one_line(taichi, tmp_path):
     beads = assembled(bead_scene(), 0, 1e-6, 1, entries)
     with pytest.raises(CommandError, match="'bead': LIGGGHTS takes clumps of at least 2 spheres"):
         write_liggghts(tmp_path, beads)
+    with pytest.raises(CommandError, match="'bead': LIGGGHTS takes clumps of at least 2 spheres"):
+        EXPORTS["liggghts"].check(bead_scene())
     dull = with_values(load_scene("seed_pour"), {"pair.seed.seed.restitution": 0.15})
     with pytest.raises(CommandError, match=r"restitution 0.15: .* allowed: 0.22 … 1"):
         write_liggghts(tmp_path, assembled(dull, 0, 1e-6, 1, entries))
     assert list(tmp_path.iterdir()) == []
 
 
-def test_every_program_that_is_named_can_be_written_for():
-    assert set(PROGRAMS) == {*WRITERS, "paraview", "edem"}
+class Tally(ExportTarget):
+    """A made-up program, which takes a file with the name of every material."""
+
+    name, what, pours, options = "tally", "a list of names", False, ("every",)
+
+    def check(self, scene):
+        if len(scene.materials) > 9:
+            raise CommandError("tally: too many materials")
+
+    def write(self, folder, order):
+        (folder / "names.txt").write_text("\n".join(one.name for one in order.scene.materials))
+        return f"every {order.every:g} s, seed {order.seed}"
+
+
+def test_a_program_of_a_plug_in_is_listed_and_written_for(tmp_path, monkeypatch):
+    monkeypatch.setitem(EXPORTS.things, "tally", Tally())
+    assert "tally     a list of names; nothing is poured; takes --every" in explorer("export", "--help").output
+    result = explorer("export", "seed_pour", tmp_path / "new", "--to", "tally", "--every", "0.5", "--seed", "3")
+    assert result.output == f"{tmp_path / 'new'}: every 0.5 s, seed 3\n"
+    assert "seed" in (tmp_path / "new" / "names.txt").read_text().splitlines()
+    line = refused(explorer("export", "seed_pour", tmp_path / "other", "--to", "edem", "--every", "0.5"))
+    assert line == "--every: belongs to --to paraview or tally, not to edem"
+
+
+def test_the_page_names_programs_of_plug_ins_without_loading_them(monkeypatch):
+    entry = EntryPoint("export.tally", "there.is.none:TALLY", GROUP)
+    for module in ("explorer.export", "solver.plugins"):
+        monkeypatch.setattr(f"{module}.plugged_in", lambda kind: {"tally": entry} if kind == "export" else {})
+    assert names() == ("liggghts", "yade", "paraview", "edem", "tally")
+    assert programs_text().endswith("edem: tables of the material. tally: of an unknown package.")

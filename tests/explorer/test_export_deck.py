@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from explorer.errors import CommandError
-from explorer.export.deck_of_scene import check_exportable, deck_of
+from explorer.export import EXPORTS
+from explorer.export.deck_of_scene import deck_of
 from explorer.export.readme import _differences
+from explorer.scene.file import load_scene
 from solver.effects import EFFECTS
 from solver.material import ContactModel
 from solver.sizes import SizeDistribution
@@ -24,31 +26,31 @@ def test_bodies_of_unequal_size_are_not_exported():
 
 def test_effects_on_contacts_and_flight_are_not_exported():
     scene = record_of(cone(20.0, 0.05), np.zeros(1), np.zeros(1), 0.03).scene
-    check_exportable(scene, "yade")
+    EXPORTS["yade"].check(scene)
     drag = scene.with_effect(EFFECTS["air_drag"](strength=0.3))
     for engine in ("liggghts", "yade"):
         refusal = rf"effect\.air_drag\.strength: 0\.3 cannot be exported to {engine}; allowed: 0"
         with pytest.raises(CommandError, match=refusal):
-            check_exportable(drag, engine)
+            EXPORTS[engine].check(drag)
 
 
 def test_rolling_resistance_goes_where_the_same_law_is():
-    scene = record_of(cone(20.0, 0.05), np.zeros(1), np.zeros(1), 0.03).scene
+    scene = load_scene("seed_pour")
     rolls = scene.with_effect(EFFECTS["rolling_resistance"](rolling_friction=0.3))
-    check_exportable(rolls, "liggghts")
+    EXPORTS["liggghts"].check(rolls)
     path = r"effect\.rolling_resistance\.rolling_friction"
     with pytest.raises(CommandError, match=rf"{path}: 0\.3 cannot be exported to yade; allowed: 0"):
-        check_exportable(rolls, "yade")
+        EXPORTS["yade"].check(rolls)
     damped = scene.with_effect(EFFECTS["rolling_resistance"](rolling_friction=0.3, rolling_damping=0.1))
     with pytest.raises(CommandError, match=r"rolling_damping: 0\.1 cannot be exported; allowed: 0"):
-        check_exportable(damped, "liggghts")
+        EXPORTS["liggghts"].check(damped)
 
 
 def test_effects_of_the_set_up_are_carried_out_first():
     scene = record_of(cone(20.0, 0.05), np.zeros(1), np.zeros(1), 0.03).scene
-    check_exportable(scene.with_effect(EFFECTS["plate_tilt"](tilt_x=2.0)), "yade")
+    EXPORTS["yade"].check(scene.with_effect(EFFECTS["plate_tilt"](tilt_x=2.0)))
     with pytest.raises(CommandError, match=r"size_distribution: 'log_normal' cannot be exported"):
-        check_exportable(scene.with_effect(EFFECTS["size_dispersion"](spread=0.1)), "yade")
+        EXPORTS["yade"].check(scene.with_effect(EFFECTS["size_dispersion"](spread=0.1)))
 
 
 def test_a_clump_rule_of_no_other_program_is_not_exported():
@@ -57,7 +59,7 @@ def test_a_clump_rule_of_no_other_program_is_not_exported():
     with pytest.raises(
         CommandError, match=r"contact\.clump_rule: 'local_mass' cannot be exported to yade; allowed: body"
     ):
-        check_exportable(local, "yade")
+        EXPORTS["yade"].check(local)
 
 
 @pytest.mark.parametrize(

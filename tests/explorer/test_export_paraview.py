@@ -1,6 +1,6 @@
 """A pour as VTK files, read back by the library that wrote them."""
 
-import importlib
+import sys
 import xml.etree.ElementTree as ET
 
 import numpy as np
@@ -8,8 +8,7 @@ import pytest
 import trimesh
 
 from explorer.errors import CommandError
-from explorer.export.moments import Moment, moments
-from explorer.export.paraview import collection, contact_grid, rig_grid, shape_grid, write_paraview
+from explorer.export.paraview import Moment, collection, contact_grid, moments, rig_grid, shape_grid, write_paraview
 from explorer.scene.file import load_scene, with_settings
 from solver.contacts import Contacts
 from tests.explorer.command_line import TINY, explorer, refused, settings
@@ -141,14 +140,7 @@ def test_a_collection_escapes_its_names():
 
 
 def test_without_the_library_it_is_one_line_before_anything_is_poured(tmp_path, monkeypatch):
-    real = importlib.import_module
-
-    def missing(name, *rest):
-        if name == "meshio":
-            raise ImportError(name)
-        return real(name, *rest)
-
-    monkeypatch.setattr(importlib, "import_module", missing)
+    monkeypatch.setitem(sys.modules, "meshio", None)
     line = refused(explorer("export", "funnel", tmp_path / "new", "--to", "paraview", *settings(TINY)))
     assert line.startswith("--to paraview: meshio, which writes VTK files, is not installed")
     assert not (tmp_path / "new").exists()

@@ -31,10 +31,10 @@ def page(tmp_path_factory):
     """A page in a thread of its own, and the session behind it; no one else uses that while the thread runs."""
     server, session, stop = guarded_server("127.0.0.1", 0, "test"), Session(), threading.Event()
     session.start(bead_scene(), 1)
-    page = Page(server, session, None, "", DiagnoseProcess(tmp_path_factory.mktemp("diagnoses"), None))
+    page = Page(server, session, None, DiagnoseProcess(tmp_path_factory.mktemp("diagnoses"), None))
     thread = threading.Thread(target=page.run, args=(stop,))
     thread.start()
-    yield SimpleNamespace(server=server, page=page, look=page._look)
+    yield SimpleNamespace(server=server, page=page, look=page.panels["look"])
     stop.set()
     thread.join()
     session.close()
@@ -121,7 +121,7 @@ def browser(page):
 
 
 def readout(page):
-    return page.page._readout.content
+    return page.page.panels["readout"]._html.content
 
 
 def status(page):
@@ -142,7 +142,7 @@ def test_left_arrow_goes_back_and_space_goes_on(page, browser):
     back = status(page)
     assert (back.state, back.earliest < 1e-3) == (SessionState.PAUSED, True)
     assert back.time == pytest.approx(before - 0.01, abs=0.002)
-    wait_for(lambda: page.look._drawn[1].time == back.time)
+    wait_for(lambda: page.look._drawn.time == back.time)
     wait_for(lambda: f"{back.time:.3f} s" in readout(page))
     browser.press(STEP)
     wait_for(lambda: status(page).time > back.time)
@@ -155,14 +155,14 @@ def test_keys_colour_the_bodies_and_the_solver_sends_what_that_takes(page, brows
     wait_for(lambda: page.page._session.details() is not None)
     details = page.page._session.details()
     assert len(details.load) == status(page).bodies
-    (node,) = page.page._nodes.bodies.nodes
+    (node,) = page.look._nodes.bodies.nodes
     wait_for(lambda: len(np.unique(node.batched_colors[: status(page).bodies], axis=0)) > 1)
 
 
 def test_a_click_into_the_scene_finds_a_body_and_one_beside_lets_it_go(page, browser):
     # Drawn anew after the colours of the test before.
     wait_for(lambda: page.look._drawn is not None)
-    frame = page.look._drawn[1]
+    frame = page.look._drawn
     top = int(np.argmax(frame.position[:, 2]))
     browser.click(frame.position[top] + [0, 0, 1.0], (0, 0, -1))
     wait_for(lambda: page.look._selected == top)
@@ -225,7 +225,7 @@ def test_a_browser_that_comes_back_finds_the_pour_as_it_is(page, browser):
 def test_shadows_are_switched_off_and_on(page, monkeypatch):
     lit = []
     monkeypatch.setattr(drawn_look, "light", lambda server, shadows: lit.append(shadows))
-    settings = page.page._look._settings
+    settings = page.look._settings
     for shadows in (False, True):
         page.page._actions.post(lambda shadows=shadows: settings.change(shadows=shadows))
         wait_for(lambda shadows=shadows: lit[-1:] == [shadows])

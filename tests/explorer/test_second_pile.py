@@ -10,9 +10,11 @@ from explorer.live.frames import Frame
 from explorer.live.messages import SessionState, Status
 from explorer.scene.file import load_scene
 from explorer.viewer.guarded_server import guarded_server
+from explorer.viewer.panel import Now
 from explorer.viewer.pour.second_pile import BESIDE, NONE, ROOT, SecondPile, comparison_markdown
 from solver import Outcome, with_values
 from solver.observables import Value
+from tests.explorer.page_session import page_context
 
 SCENE = with_values(load_scene("funnel"), {"rig.mass": 2e-3, "body.spheres": "coarse"})
 
@@ -69,7 +71,7 @@ def bench():
     """Server, first session, second session, and the panel; actions are carried out at once."""
     server = guarded_server("127.0.0.1", 0, "test")
     first, second = FakeSession(), FakeSession()
-    panel = SecondPile(server, first, lambda act: act(), lambda: second)
+    panel = SecondPile(page_context(server, first), lambda: second)
     yield SimpleNamespace(server=server, first=first, second=second, panel=panel)
     server.stop()
 
@@ -85,7 +87,7 @@ def test_it_is_poured_with_the_first_one_s_scene_and_seed_and_drawn_beside_it(be
     bench.panel._pour()
     assert bench.second.told == [("start", SCENE, 4)]
     bench.second.newest = frame(1)
-    bench.panel.show_bodies()
+    bench.panel.draw(Now(bench.first.now))
     assert f"{ROOT}/rig/cone" in nodes(bench.server)
     seeds = bench.server.scene._handle_from_node_name[f"{ROOT}/bodies/0"]
     assert seeds.batched_positions[0] == pytest.approx([0.05] * 3)
@@ -96,7 +98,7 @@ def test_it_stays_as_it_was_while_the_first_is_changed_and_the_difference_is_tol
     bench.panel._pour()
     rougher = with_values(SCENE, {"pair.seed.seed.static_friction": 0.9})
     bench.first.now = replace(bench.first.now, scene=rougher)
-    bench.panel.show(bench.first.now)
+    bench.panel.show(Now(bench.first.now))
     assert "pair.seed.seed.static_friction: 0.57 → 0.9" in bench.panel._text.content
     assert bench.second.now.scene == SCENE
 
@@ -105,13 +107,13 @@ def test_it_pauses_plays_and_keeps_speed_with_the_first(bench):
     bench.panel._pour()
     bench.second.told.clear()
     bench.first.now = replace(bench.first.now, state=SessionState.PAUSED, speed=0.5)
-    bench.panel.show(bench.first.now)
+    bench.panel.show(Now(bench.first.now))
     assert bench.second.told == ["pause", ("speed", 0.5)]
     bench.second.told.clear()
     bench.second.now = replace(bench.second.now, state=SessionState.PAUSED, speed=0.5)
-    bench.panel.show(bench.first.now)
+    bench.panel.show(Now(bench.first.now))
     assert bench.second.told == []
-    bench.panel.show(replace(bench.first.now, state=SessionState.RUNNING))
+    bench.panel.show(Now(replace(bench.first.now, state=SessionState.RUNNING)))
     assert bench.second.told == ["play"]
 
 
@@ -128,20 +130,20 @@ def test_where_the_first_stands_still_the_second_comes_to_its_moment(bench):
         (0.502, SessionState.PAUSED, None),
     ):
         bench.second.now = replace(bench.second.now, state=state, time=time, earliest=0.0)
-        bench.panel.show(first)
+        bench.panel.show(Now(first))
         assert bench.second.told == ([] if asked is None else [asked]), (time, state)
         bench.second.told.clear()
     bench.second.now = replace(bench.second.now, state=SessionState.PAUSED, time=0.7, earliest=0.6)
-    bench.panel.show(first)
+    bench.panel.show(Now(first))
     assert bench.second.told == []  # so far back nothing is kept
 
 
 def test_taken_away_it_leaves_nothing(bench):
     bench.panel._pour()
     bench.second.newest = frame(1)
-    bench.panel.show_bodies()
+    bench.panel.draw(Now(bench.first.now))
     bench.panel.close()
-    bench.panel.show(bench.first.now)
+    bench.panel.show(Now(bench.first.now))
     assert bench.second.told[-1] == "close"
     assert nodes(bench.server) == set()
     assert bench.panel._text.content == NONE

@@ -16,12 +16,13 @@ from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.look.camera import DIRECTIONS, go_along, go_to, link_to, view_of
 from explorer.viewer.look.inspector import NOBODY, body_html
-from explorer.viewer.look.look_tab import LookTab
+from explorer.viewer.look.look_panel import LookPanel
 from explorer.viewer.look.picking import first_crossing, nearest_hit
 from explorer.viewer.palette import SELECTED, linear
-from explorer.viewer.scene_nodes import SceneNodes
+from explorer.viewer.panel import Now
 from explorer.viewer.view import VIEW_FIELD
 from tests.explorer.beads import RADIUS, bead_scene
+from tests.explorer.page_session import page_context
 from tests.explorer.test_viewer_look import DETAILS, FRAME
 
 SCENE = bead_scene()
@@ -184,16 +185,15 @@ class FakeSession:
 @pytest.fixture
 def tab(server):
     session, actions = FakeSession(), Actions()
-    nodes = SceneNodes(server, SCENE)
-    tab = LookTab(server, session, server.gui.add_html(""), actions.post)
-    tab.show(nodes, BEADS, SCENE)
-    yield SimpleNamespace(tab=tab, session=session, actions=actions, nodes=nodes)
-    nodes.remove()
+    tab = LookPanel(page_context(server, session, actions.post))
+    tab.draw(Now(session.status(), BEADS))
+    yield SimpleNamespace(tab=tab, session=session, actions=actions, nodes=tab._nodes)
+    tab._nodes.remove()
 
 
 def click(tab, x, y):
     tab.tab.click(np.array([x, y, 1.0]), DOWN)
-    tab.tab.show(tab.nodes, BEADS, SCENE)
+    tab.tab.draw(Now(tab.session.status(), BEADS))
 
 
 def test_a_click_inspects_a_body_and_another_beside_lets_it_go(tab):
@@ -218,7 +218,7 @@ def test_a_body_that_is_cut_away_cannot_be_clicked(tab):
 def test_keys_go_from_body_to_body_among_those_in_sight(tab):
     def step(by):
         tab.tab._step(by)
-        tab.tab.show(tab.nodes, BEADS, SCENE)
+        tab.tab.draw(Now(tab.session.status(), BEADS))
         return tab.session.watched[1]
 
     assert step(1) == int(np.argmax(BEADS.position[:, 2]))  # at first the topmost
@@ -243,11 +243,11 @@ def test_a_camera_follows_until_the_body_is_let_go(tab, monkeypatch):
     tab.tab._follow(one)
     assert one.camera.look_at == pytest.approx(BEADS.position[1])
     moved = replace(BEADS, number=2, position=BEADS.position + np.float32([0, 0.01, 0]))
-    tab.tab.show(tab.nodes, moved, SCENE)
+    tab.tab.draw(Now(tab.session.status(), moved))
     assert one.camera.look_at == pytest.approx(moved.position[1])
     assert other.groups == 0
     tab.tab._release()
-    tab.tab.show(tab.nodes, replace(BEADS, number=3), SCENE)
+    tab.tab.draw(Now(tab.session.status(), replace(BEADS, number=3)))
     assert one.camera.look_at == pytest.approx(moved.position[1])
 
 
@@ -257,13 +257,13 @@ def test_a_follower_that_has_gone_is_forgotten(tab, monkeypatch):
     click(tab, 0.05, 0.0)
     tab.tab._follow(client)
     monkeypatch.setattr(tab.tab._server, "get_clients", dict)
-    tab.tab.show(tab.nodes, replace(BEADS, number=2), SCENE)
+    tab.tab.draw(Now(tab.session.status(), replace(BEADS, number=2)))
     assert tab.tab._followers == set()
 
 
 def test_another_pour_or_a_time_before_its_entry_lets_a_body_go(tab):
     click(tab, 0.05, 0.0)
-    tab.tab.show(tab.nodes, replace(BEADS, number=2, generation=2), SCENE)
+    tab.tab.draw(Now(tab.session.status(), replace(BEADS, number=2, generation=2)))
     assert tab.session.watched == (False, None)
     click(tab, 0.05, 0.0)
     click(tab, 0.05, 0.0)
@@ -271,22 +271,22 @@ def test_another_pour_or_a_time_before_its_entry_lets_a_body_go(tab):
     early = replace(
         BEADS, number=3, component=BEADS.component[:1], position=BEADS.position[:1], inside=BEADS.inside[:1]
     )
-    tab.tab.show(tab.nodes, replace(early, quaternion=BEADS.quaternion[:1], scale=BEADS.scale[:1]), SCENE)
+    tab.tab.draw(Now(tab.session.status(), replace(early, quaternion=BEADS.quaternion[:1], scale=BEADS.scale[:1])))
     assert tab.session.watched == (False, None)
 
 
 def test_what_is_asked_for_is_drawn_when_it_comes(tab):
     tab.tab._settings.change(colour_by="speed", chains=True)
-    tab.tab.show(tab.nodes, BEADS, SCENE)
+    tab.tab.draw(Now(tab.session.status(), BEADS))
     assert tab.session.watched == (True, None)
     assert not any(node.visible for node in tab.tab._chains._nodes)
     before = tab.nodes.bodies.nodes[0].batched_colors.copy()
     tab.session.found = DETAILS
-    tab.tab.show(tab.nodes, BEADS, SCENE)
+    tab.tab.draw(Now(tab.session.status(), BEADS))
     assert any(node.visible for node in tab.tab._chains._nodes)
     assert (tab.nodes.bodies.nodes[0].batched_colors != before).any()
     assert tab.nodes.bodies.nodes[0].opacity < 1.0
     tab.tab._settings.change(colour_by="component", chains=False)
-    tab.tab.show(tab.nodes, BEADS, SCENE)
+    tab.tab.draw(Now(tab.session.status(), BEADS))
     assert not any(node.visible for node in tab.tab._chains._nodes)
     assert tab.nodes.bodies.nodes[0].opacity is None

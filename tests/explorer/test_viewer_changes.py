@@ -9,9 +9,10 @@ from explorer.scene.changes import differences
 from explorer.scene.source import material_source
 from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import guarded_server
-from explorer.viewer.pour.changes_panel import BACK, MOST_SHOWN, POUR, REDO, UNDO, ChangesPanel, changes_html
+from explorer.viewer.panel import Now
+from explorer.viewer.pour.changes_panel import BACK, DEFAULT, MOST_SHOWN, REDO, UNDO, ChangesPanel, changes_html
 from solver.scene import value, with_values
-from tests.explorer.page_session import PageSession
+from tests.explorer.page_session import PageSession, page_context
 from tests.explorer.test_viewer_controls import event
 
 SOURCE = material_source("sunflower_extract")
@@ -23,14 +24,14 @@ class Bench:
 
     def __init__(self, server, folder):
         self.session, self.actions = PageSession(SOURCE), Actions()
-        self.panel = ChangesPanel(server, self.session, folder, self.actions.post)
+        self.panel = ChangesPanel(page_context(server, self.session, self.actions.post, folder))
         self.turn()
 
     def turn(self):
         """One turn of the page's loop: the notice, after all panels have followed."""
         notice = self.actions.carry_out()
-        self.panel.take(self.session.status())
-        self.panel.show(self.session.status())
+        self.panel.draw(Now(self.session.status()))
+        self.panel.show(Now(self.session.status()))
         return notice
 
     def post(self, handle, chosen):
@@ -111,7 +112,7 @@ def test_all_back_keeps_the_pour_and_the_default_is_a_new_one(bench):
     bench.change(friction=0.1, mass=0.012)
     bench.press(BACK)
     assert (bench.friction(), bench.session.asked) == (0.57, ["set_parameters"])
-    bench.press(POUR)
+    bench.press(DEFAULT)
     assert bench.session.now.scene == SOURCE.scene
     assert bench.session.asked == ["set_parameters", "start"]
 
@@ -121,10 +122,10 @@ def test_a_preset_of_ones_own_is_saved_offered_and_applied(bench, tmp_path):
     bench.panel._name.value = "my try"
     bench.actions.post(bench.panel._save)
     assert bench.turn() == ""
-    assert (tmp_path / "my try.toml").is_file()
+    assert (tmp_path / "presets" / "my try.toml").is_file()
     assert "my try (own)" in bench.panel._preset.options
     changed = bench.session.now.scene
-    bench.press(POUR)
+    bench.press(DEFAULT)
     # It names the mass, which acts on restart: a new pour.
     assert bench.post(bench.panel._preset, "my try (own)") == ""
     assert bench.session.now.scene == changed
@@ -143,7 +144,8 @@ def test_a_preset_that_is_not_offered_is_refused(bench, name):
 
 
 def test_a_bad_file_is_one_line_and_changes_nothing(bench, tmp_path):
-    (tmp_path / "bad.toml").write_text("format = 1\n[values]\n'pair.*.*.static_friction' = 'much'\n")
+    (tmp_path / "presets").mkdir()
+    (tmp_path / "presets" / "bad.toml").write_text("format = 1\n[values]\n'pair.*.*.static_friction' = 'much'\n")
     assert "is not a number" in bench.post(bench.panel._preset, "bad (own)")
     assert bench.session.asked == []
 

@@ -8,6 +8,7 @@ import pytest
 
 from explorer.live.messages import Event, SessionState
 from explorer.viewer.guarded_server import guarded_server
+from explorer.viewer.panel import Now
 from explorer.viewer.pour.chart import Chart, History
 from explorer.viewer.pour.marks import (
     LEGEND_INTERVAL,
@@ -21,6 +22,7 @@ from explorer.viewer.pour.marks import (
 )
 from explorer.viewer.pour.motion_chart import MotionChart, MotionHistory
 from solver.observables.value import Value
+from tests.explorer.page_session import page_context
 from tests.explorer.test_viewer_texts import STATUS
 
 FRICTION = "pair.bead.bead.static_friction: 0.3 → 0.1"
@@ -112,15 +114,15 @@ def test_energy_and_contacts_follow_the_statuses_and_begin_again():
 
 
 def test_the_spread_is_a_band_between_its_ends(server):
-    plot = Chart(server)._plot
+    plot = Chart(page_context(server))._plot
     (band,) = plot.bands
     assert [plot.series[k]["label"] for k in band["series"]] == ["+ spread", "− spread over flanks"]
 
 
 def test_a_change_reaches_both_charts_of_the_page(server):
-    for chart in (Chart(server), MotionChart(server)):
-        chart.show(STATUS, [])
+    for chart in (Chart(page_context(server)), MotionChart(page_context(server))):
+        chart.show(Now(STATUS))
         assert chart._plot.data[-1].sum() == 0
-        chart.show(STATUS, [change(1.2)])
+        chart.show(Now(STATUS, events=[change(1.2)]))
         assert chart._plot.data[0][chart._plot.data[-1] == 1].tolist() == [1.2]
         assert chart._plot.series[-1]["label"] == f"1.20 s {FRICTION}"

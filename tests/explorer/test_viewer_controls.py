@@ -10,7 +10,7 @@ from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.pour.live_controls import LiveControl, decade_mark, decades_around, mean_value
 from explorer.viewer.pour.live_panel import echo_html, effect_targets, live_parameters, material_targets, pair_targets
-from explorer.viewer.pour.restart_panel import PATHS, RestartPanel, entered, size_paths
+from explorer.viewer.pour.restart_panel import PATHS, SetUpInputs, entered, size_paths
 from solver import load_material, parameters, with_values
 from solver.rigs import RIGS
 from solver.scene import value, with_rig
@@ -94,7 +94,7 @@ def test_sizes_of_every_component_are_in_the_set_up(server):
     session = type(
         "Session", (), {"status": lambda _: first, "restart": lambda _, scene, seed: started.append(scene)}
     )()
-    panel = RestartPanel(server, session, SCENE, 1, lambda action: action())
+    panel = SetUpInputs(server, session, SCENE, 1, lambda action: action())
     assert [path for path in size_paths(SCENE) if KNOWN[path].live] == []
     panel._inputs["body.plate.size_distribution"].value = "log_normal"
     panel._inputs["body.plate.size_spread"].value = 0.2
@@ -115,7 +115,7 @@ def test_all_of_rig_and_feed_is_in_the_set_up(server, rig):
     scene, started = with_rig(SCENE, rig), []
     first = Status(SessionState.RUNNING, "", scene, seed=1, generation=1, speed=1.0)
     session = type("Session", (), {"status": lambda _: first, "restart": lambda _, made, seed: started.append(made)})()
-    panel = RestartPanel(server, session, scene, 1, lambda action: action())
+    panel = SetUpInputs(server, session, scene, 1, lambda action: action())
     known = parameters(scene).items()
     # A file is chosen or uploaded elsewhere (`scene_panel`).
     declared = {path for path, entry in known if path.startswith(("rig.", "insertion.")) and not entry.files}
@@ -137,7 +137,7 @@ def test_settings_of_the_next_pour_are_clamped_and_choices_checked():
 def test_the_set_up_follows_a_pour_that_somebody_else_started(server):
     first = Status(SessionState.RUNNING, "", SCENE, seed=1, generation=1, speed=1.0)
     session = type("Session", (), {"status": lambda _: first})()
-    panel = RestartPanel(server, session, SCENE, 1, lambda action: action())
+    panel = SetUpInputs(server, session, SCENE, 1, lambda action: action())
     panel._inputs["rig.mass"].value = 12.0
     panel.show(first)
     assert panel._inputs["rig.mass"].value == 12.0  # typed, and not yet asked for

@@ -9,18 +9,18 @@ from viser import UploadedFile
 from explorer.laboratory.answers import Answer
 from explorer.scene.source import material_source
 from explorer.viewer.actions import Actions
-from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.laboratory.answer_view import answer_html
 from explorer.viewer.laboratory.audit_panel import AuditPanel
 from explorer.viewer.laboratory.bench_panel import BenchPanel
 from explorer.viewer.laboratory.design_panel import DesignPanel
-from explorer.viewer.laboratory.laboratory_tab import LaboratoryTab
+from explorer.viewer.laboratory.laboratory_panel import LaboratoryPanel
 from explorer.viewer.laboratory.numbers import positive
 from explorer.viewer.laboratory.photograph_panel import PhotographPanel
 from explorer.viewer.laboratory.rig_panel import RigPanel
+from explorer.viewer.panel import Now
 from solver.assets import asset_path
-from tests.explorer.page_session import PageSession, finished
+from tests.explorer.page_session import PageSession, finished, page_context
 from tests.explorer.test_viewer_controls import event
 
 
@@ -36,14 +36,11 @@ class Bench:
 
     def __init__(self, server, folder):
         self.actions, self.folder = Actions(), folder
-        self.background = BackgroundWork(self.actions.post)
         self.session = PageSession(material_source("sunflower_extract"))
-        post = self.actions.post
-        self.bench = BenchPanel(server, self.session, folder, post, self.background)
-        self.rig = RigPanel(server, self.session, folder, post, self.background)
-        self.photograph = PhotographPanel(server, self.session, folder, post, self.background)
-        self.design = DesignPanel(server, folder, post, self.background)
-        self.audit = AuditPanel(server, folder, post, self.background)
+        page = page_context(server, self.session, self.actions.post, folder)
+        self.background = page.bench_work
+        self.bench, self.rig, self.photograph = BenchPanel(page), RigPanel(page), PhotographPanel(page)
+        self.design, self.audit = DesignPanel(page), AuditPanel(page)
 
     def do(self, act):
         self.actions.post(act)
@@ -117,7 +114,7 @@ def test_a_rig_shows_its_own_parameters_and_the_bodies_that_are_poured(bench):
     assert {"rig.drop_height", "rig.specimen", "rig.drops", "rig.body"} == set(panel._inputs)
     other = material_source("nine_sphere_seed")
     bench.session.start(other.scene, 1, other)
-    panel.show()
+    panel.show(Now(bench.session.now))
     assert panel._inputs["rig.body"].options == tuple(body.name for body in other.scene.bodies)
 
 
@@ -207,12 +204,12 @@ def test_text_from_files_is_shown_as_text(bench):
 
 def test_the_tab_tells_what_is_done_and_what_was_refused(server, tmp_path):
     actions = Actions()
-    tab = LaboratoryTab(server, PageSession(material_source("sunflower_extract")), tmp_path, actions.post)
-    tab.show("mine.csv: line 2: <steep>")
+    session = PageSession(material_source("sunflower_extract"))
+    tab = LaboratoryPanel(page_context(server, session, actions.post, tmp_path))
+    tab.show(Now(session.now, notice="mine.csv: line 2: <steep>"))
     assert "&lt;steep&gt;" in tab._state.content
-    tab.set_dark(False)
     tab._background.start("auditing", lambda: None, lambda _: None)
-    tab.show("")
+    tab.show(Now(session.now))
     assert "Busy auditing" in tab._state.content
     finished(actions, tab._background)
 

@@ -11,12 +11,11 @@ from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.pour.live_panel import LivePanel
 from explorer.viewer.pour.pair_matrix import BOXES, PairMatrix, matrix_html, pair_parameters, triangle
 from explorer.viewer.pour.restart_panel import RestartPanel
-from explorer.viewer.pour.scene_bound import SceneBound
 from solver.material import Pair
 from solver.params import declared
 from solver.scene import canonical, parameters, value, with_rig, with_values
 from tests.explorer.beads import bead_scene
-from tests.explorer.page_session import PageSession
+from tests.explorer.page_session import PageSession, page_context
 from tests.explorer.test_viewer_controls import event
 
 SOURCE = material_source("sunflower_extract")
@@ -113,15 +112,15 @@ def test_the_table_is_symmetric_and_tells_what_is_missing():
 
 def test_panels_follow_a_scene_with_other_parameters(server):
     session = PageSession(SOURCE)
-    live = SceneBound(server, lambda scene: LivePanel(server, session, scene, lambda action: action()), SCENE)
-    set_up = SceneBound(server, lambda scene: RestartPanel(server, session, scene, 1, lambda action: action()), SCENE)
-    first = live.panel(SCENE)
-    assert live.panel(with_values(SCENE, {"pair.seed.seed.static_friction": 0.1})) is first
+    page = page_context(server, session)
+    live, set_up = LivePanel(page), RestartPanel(page)
+    first = live.controls(SCENE)
+    assert live.controls(with_values(SCENE, {"pair.seed.seed.static_friction": 0.1})) is first
     drum = with_rig(SCENE, "rotating_drum")
-    assert "rig.speed_rpm" in set_up.panel(drum)._inputs
-    assert "rig.outlet_height" not in set_up.panel(drum)._inputs
+    assert "rig.speed_rpm" in set_up.controls(drum)._inputs
+    assert "rig.outlet_height" not in set_up.controls(drum)._inputs
     session.start(bead_scene(), 1)
-    second = live.panel(bead_scene())
+    second = live.controls(bead_scene())
     assert second is not first
     second.show(session.status())
     assert value(bead_scene(), "pair.bead.steel.static_friction") == row(second._matrices[0], "steel").handle.value

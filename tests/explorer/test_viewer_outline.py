@@ -15,12 +15,13 @@ from explorer.files.measured_curves import MeasuredCurve, measured_curves
 from explorer.viewer.actions import Actions
 from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.guarded_server import guarded_server
+from explorer.viewer.panel import Now
 from explorer.viewer.pour.outline_nodes import flank_segments, in_world, measured_segments
 from explorer.viewer.pour.outline_panel import NONE, OWN, OutlinePanel
 from explorer.viewer.pour.outline_svg import WAITING, corners_of, outline_html, outline_svg
 from solver.assets import measurement_folder
 from solver.observables.reading import PileReading
-from tests.explorer.page_session import finished
+from tests.explorer.page_session import finished, page_context
 from tests.explorer.test_uploads import archive, drum_files
 from tests.explorer.test_viewer_controls import event
 from tests.explorer.test_viewer_texts import STATUS
@@ -107,14 +108,14 @@ def test_a_free_surface_is_drawn_about_the_axis_of_its_drum():
 
 @pytest.fixture
 def bench(server, tmp_path):
-    return Bench(server, tmp_path / "uploads")
+    return Bench(server, tmp_path)
 
 
 class Bench:
-    def __init__(self, server, uploads):
+    def __init__(self, server, data):
         self.actions = Actions()
-        self.background = BackgroundWork(self.actions.post)
-        self.panel = OutlinePanel(server, ("granudrum_mcc",), uploads, self.actions.post, self.background)
+        page = page_context(server, post=self.actions.post, data=data)
+        self.panel, self.background = OutlinePanel(page), page.background
 
     def sent(self, handle, value):
         """What came of a browser's input: the line of a refusal, or ""."""
@@ -124,16 +125,16 @@ class Bench:
 
 def test_measured_data_are_laid_over_the_pile_and_taken_off(bench):
     panel = bench.panel
-    panel.show(replace(STATUS, outline=FRONT))
+    panel.show(Now(replace(STATUS, outline=FRONT)))
     assert bench.sent(panel._data, "granudrum_mcc") == ""
     assert panel._curve.options == ("drum_15rpm: free surface", "drum_45rpm: free surface")
     bench.sent(panel._curve, "drum_45rpm: free surface")
-    panel.show(replace(STATUS, outline=FRONT))
+    panel.show(Now(replace(STATUS, outline=FRONT)))
     assert "drum_45rpm: free surface" in panel._html.content
     assert panel._nodes._measured.visible
     assert panel._nodes._flanks.visible
     bench.sent(panel._data, NONE)
-    panel.show(replace(STATUS, outline=None))
+    panel.show(Now(replace(STATUS, outline=None)))
     assert "measured" not in panel._html.content
     assert not panel._nodes._measured.visible
     assert not panel._nodes._flanks.visible
@@ -162,7 +163,7 @@ def test_a_single_curve_is_drawn_and_a_bad_file_leaves_it(bench):
     assert bench.sent(panel._upload, UploadedFile("photo.csv", b"u_m,z_m\n-0.02,0\n0,0.01\n0.02,0\n")) == ""
     assert (panel._curve.options, panel._data.value) == (("photo.csv",), NONE)
     assert "photo.csv: not a text file" in bench.sent(panel._upload, UploadedFile("photo.csv", b"\xff"))
-    panel.show(replace(STATUS, outline=FRONT))
+    panel.show(Now(replace(STATUS, outline=FRONT)))
     assert "measured, photo.csv" in panel._html.content
 
 

@@ -15,12 +15,14 @@ from explorer.logs.recording_reader import read_recording
 from explorer.scene.file import load_scene
 from explorer.scene.source import SceneSource, material_source
 from explorer.viewer.actions import Actions
-from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.guarded_server import guarded_server
-from explorer.viewer.output.output_panel import DOWNLOAD, START, STOP, OutputPanel, command_html, picture
-from explorer.viewer.output.recording_switch import HTML, RRD, RecordingSwitch, session_recorder
+from explorer.viewer.output.engine_export import EngineExport
+from explorer.viewer.output.output_panel import OutputPanel, command_html, picture
+from explorer.viewer.output.recording_panel import DOWNLOAD, START, STOP, RecordingPanel
+from explorer.viewer.output.recording_switch import HTML, RRD, session_recorder
 from explorer.viewer.output.scene_playback import BYTES_PER_BODY
-from tests.explorer.page_session import PageSession, finished, frame_of
+from explorer.viewer.panel import Now
+from tests.explorer.page_session import PageSession, finished, frame_of, page_context
 from tests.explorer.test_viewer_controls import event
 
 SOURCE = material_source("sunflower_extract")
@@ -64,18 +66,17 @@ class Bench:
     def __init__(self, server, folder, recorder=FileRecorder):
         self.session, self.actions, self.browser = PageSession(SOURCE), Actions(), Browser()
         self.session.newest = frame_of([0, 1, 2], [[0.0, 0.0, 0.01 * k] for k in range(3)])
-        self.background = BackgroundWork(self.actions.post)
-        self.recording = RecordingSwitch(server, folder, self.background, recorder)
-        self.panel = OutputPanel(
-            server, self.session, self.recording, folder / "kept", self.actions.post, self.background
-        )
+        page = page_context(server, self.session, self.actions.post, folder)
+        self.recording, self.background = page.recording, page.background
+        self.recording._open_rrd = recorder
+        self.panel, self.engine, self.switch = OutputPanel(page), EngineExport(page), RecordingPanel(page)
 
     def press(self, label):
         event(self.panel._exports[label], True, client=self.browser)
         return finished(self.actions, self.background)
 
     def record(self, chosen):
-        event(self.panel._switch, chosen, client=self.browser)
+        event(self.switch._switch, chosen, client=self.browser)
         return finished(self.actions, self.background)
 
     def take(self, times):
@@ -92,8 +93,8 @@ class Bench:
             self.recording.take(replace(frame, time=time), status)
 
     def told(self):
-        self.panel.show(self.session.status(), "")
-        return self.panel._state.content
+        self.switch.show(Now(self.session.status()))
+        return self.switch._state.content
 
 
 @pytest.fixture(scope="module")
@@ -115,10 +116,10 @@ def recorded(server, tmp_path):
 
 
 def test_the_command_line_follows_what_is_on_the_screen(bench):
-    bench.panel.show(bench.session.status(), "")
+    bench.panel.show(Now(bench.session.status()))
     assert "explorer simulate sunflower_extract --seed 1<" in bench.panel._command.content
     bench.session.set_parameters({"pair.seed.seed.static_friction": 0.2})
-    bench.panel.show(bench.session.status(), "")
+    bench.panel.show(Now(bench.session.status()))
     assert "--set pair.seed.seed.static_friction=0.2" in bench.panel._command.content
 
 
@@ -127,7 +128,7 @@ def test_the_pour_is_exported_for_another_program(bench, monkeypatch):
     monkeypatch.setattr(
         "explorer.viewer.output.engine_export.packed_export", lambda scene, *order: asked.append(order) or b"zip"
     )
-    engine = bench.panel.engine
+    engine = bench.engine
     engine._program.value = "yade"
     event(engine._button, True, client=bench.browser)
     assert finished(bench.actions, bench.background) == ""
@@ -175,8 +176,8 @@ def test_a_recording_is_begun_ended_and_sent(bench):
     assert bench.record(START) == ""
     assert "one is running" in bench.record(START)
     bench.take(3)
-    bench.panel.show(bench.session.status(), "")
-    assert f"Recording into {bench.recording.path}" in bench.panel._state.content
+    bench.switch.show(Now(bench.session.status()))
+    assert f"Recording into {bench.recording.path}" in bench.switch._state.content
     assert "stop it first" in bench.record(DOWNLOAD)
     assert bench.record(STOP) == ""
     bench.take(2)
@@ -244,7 +245,7 @@ def test_a_recording_without_a_frame_is_none(recorded):
 
 
 def test_the_scene_as_a_web_page_holds_what_moved(server, bench):
-    bench.panel._kind.value = HTML
+    bench.switch._kind.value = HTML
     node = server.scene.add_frame("/moving")
     assert bench.record(START) == ""
     for k in range(3):
@@ -262,7 +263,7 @@ def test_the_scene_as_a_web_page_holds_what_moved(server, bench):
 
 def test_a_web_page_that_is_full_is_ended_and_written(bench, monkeypatch):
     monkeypatch.setattr("explorer.viewer.output.scene_playback.MOST_BYTES", 2.5 * BYTES_PER_BODY)
-    bench.panel._kind.value = HTML
+    bench.switch._kind.value = HTML
     assert bench.record(START) == ""
     bench.take(2)
     assert bench.recording.running
@@ -273,13 +274,13 @@ def test_a_web_page_that_is_full_is_ended_and_written(bench, monkeypatch):
 
 
 def test_a_kind_that_is_not_offered_is_refused(bench):
-    bench.panel._kind.value = "<script>"
+    bench.switch._kind.value = "<script>"
     assert "allowed: " in bench.record(START)
     assert not bench.recording.running
 
 
 def test_the_end_of_the_page_leaves_a_whole_file(bench):
-    bench.panel._kind.value = RRD
+    bench.switch._kind.value = RRD
     assert bench.record(START) == ""
     bench.take(4)
     bench.recording.close()
@@ -288,8 +289,8 @@ def test_the_end_of_the_page_leaves_a_whole_file(bench):
 
 
 def test_texts_of_the_state_are_escaped(bench):
-    bench.panel.show(bench.session.status(), "<img src=x>")
-    assert "<img" not in bench.panel._state.content
+    bench.switch.show(Now(bench.session.status(), notice="<img src=x>"))
+    assert "<img" not in bench.switch._state.content
     assert bench.actions.carry_out() is None
     assert bench.record("Delete everything") == ""
     assert not bench.recording.running

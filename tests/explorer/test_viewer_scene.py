@@ -7,14 +7,14 @@ from explorer.scene.file import load_scene
 from explorer.scene.source import material_source
 from explorer.scene.text import material_toml
 from explorer.viewer.actions import Actions
-from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.guarded_server import guarded_server
+from explorer.viewer.panel import Now
 from explorer.viewer.pour.scene_panel import OWN, ScenePanel
 from solver.assets import asset_path
 from solver.rigs import RIGS
 from solver.scene import with_values
 from tests.explorer.beads import bead_scene
-from tests.explorer.page_session import PageSession, finished
+from tests.explorer.page_session import PageSession, finished, page_context
 from tests.explorer.test_uploads import stl
 from tests.explorer.test_viewer_controls import event
 from tests.solver.rigs.test_mesh_funnel import cone, exported
@@ -30,10 +30,10 @@ def server():
 
 
 class Bench:
-    def __init__(self, server, folder):
+    def __init__(self, server, data):
         self.session, self.actions = PageSession(SOURCE), Actions()
-        self.background = BackgroundWork(self.actions.post)
-        self.panel = ScenePanel(server, self.session, folder, self.actions.post, self.background)
+        page = page_context(server, self.session, self.actions.post, data)
+        self.panel, self.background = ScenePanel(page), page.background
 
     def pour(self):
         self.actions.post(self.panel._pour)
@@ -47,7 +47,7 @@ class Bench:
 @pytest.fixture
 def bench(server, tmp_path, monkeypatch):
     monkeypatch.setenv("REPOSE_CACHE", str(tmp_path / "cache"))
-    return Bench(server, tmp_path / "uploads")
+    return Bench(server, tmp_path)
 
 
 @pytest.mark.parametrize("rig", RIGS)
@@ -59,7 +59,7 @@ def test_every_rig_and_shipped_material_can_be_poured(bench, rig, material):
     assert bench.session.source.scene == bench.session.now.scene
     # As another browser sees it.
     bench.panel._rig.value, bench.panel._material.value = "funnel", OWN
-    bench.panel.show(bench.session.status())
+    bench.panel.show(Now(bench.session.status()))
     assert (bench.panel._rig.value, bench.panel._material.value) == (rig, material)
 
 
@@ -99,13 +99,13 @@ def test_bodies_that_do_not_fit_into_the_rig_are_refused(bench, tmp_path):
 
 def test_a_mesh_becomes_the_shape_of_the_chosen_body(bench):
     bench.session.start(with_values(bead_scene(), {"body.spheres": "coarse"}), 5)
-    bench.panel.show(bench.session.status())
+    bench.panel.show(Now(bench.session.status()))
     assert bench.panel._body.options == ("bead",)
     assert bench.upload("box.stl", stl()) == ""
     assert bench.session.now.seed == 5
     assert bench.session.now.scene.bodies[0].shape.kind == "mesh"
     # It is a material of one's own now, and can be poured in another rig.
-    bench.panel.show(bench.session.status())
+    bench.panel.show(Now(bench.session.status()))
     assert bench.panel._material.value == OWN
     assert material_source(bench.panel._file.value).scene == bench.session.now.scene
     assert bench.session.source.scene == bench.session.now.scene
@@ -113,7 +113,7 @@ def test_a_mesh_becomes_the_shape_of_the_chosen_body(bench):
 
 def test_a_bad_mesh_changes_nothing(bench):
     bench.session.start(bead_scene(), 1)
-    bench.panel.show(bench.session.status())
+    bench.panel.show(Now(bench.session.status()))
     before = (list(bench.session.asked), bench.session.now)
     assert "not watertight" in bench.upload("open.stl", stl(holes=2))
     bench.panel._unit.value = "league"
@@ -123,11 +123,11 @@ def test_a_bad_mesh_changes_nothing(bench):
 
 def test_a_mesh_becomes_the_funnel_and_a_bad_one_changes_nothing(bench):
     bench.session.start(with_values(bead_scene(), {"body.spheres": "coarse"}), 5)
-    bench.panel.show(bench.session.status())
+    bench.panel.show(Now(bench.session.status()))
     hopper = asset_path("meshes", "square_hopper").read_bytes()
     assert bench.upload("hopper.stl", hopper, "_funnel") == ""
     assert (bench.session.now.seed, bench.session.now.scene.rig.name) == (5, "mesh_funnel")
-    bench.panel.show(bench.session.status())
+    bench.panel.show(Now(bench.session.status()))
     assert (bench.panel._rig.value, bench.panel._material.value) == ("mesh_funnel", OWN)
     before = (list(bench.session.asked), bench.session.now)
     assert "narrower than a body" in bench.upload("narrow.stl", exported(cone(outlet=4.0)), "_funnel")

@@ -14,6 +14,7 @@ from explorer.report.plot import Plot
 from explorer.screen_units import InputError
 from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import guarded_server
+from explorer.viewer.panel import Now
 from explorer.viewer.study.order_panel import number_on_screen
 from explorer.viewer.study.plot_theme import Drawn
 from explorer.viewer.study.plot_view import NOTHING, PlotView
@@ -22,6 +23,7 @@ from explorer.viewer.study.stage_table import stages_markdown
 from explorer.viewer.study.study_panel import NONE, StudyPanel
 from explorer.viewer.theme import ThemeSwitch
 from tests.explorer import reported_studies
+from tests.explorer.page_session import page_context
 from tests.explorer.study_panel_at_hand import (
     OWN_PROFILES,
     FakeSession,
@@ -80,7 +82,7 @@ def test_the_profiles_of_the_study_file_are_offered_and_started(server, tmp_path
 
 
 def test_an_empty_page_says_what_to_do(table):
-    table.panel.show("")
+    table.show()
     assert "Press *Start*" in table.panel._plots._caption.content
     assert table.panel._plots._choice.options == (NOTHING,)
     assert table.panel._plots._chart is None  # plotly.js is not sent for nothing
@@ -102,7 +104,7 @@ def test_stages_failed_runs_and_the_queue_are_told(table):
         tried=(jam, TriedRun("screening", "row 3", 0, 1, 9, "at_rest", "", True)),
     )
     table.study.queued = ("standard", "full, changed")
-    table.panel.show("no")
+    table.show("no")
     text = table.panel._view._text.content
     assert "28 of 112 runs, time left 2 min 05 s" in text
     assert "| pilot | 20 of 20 | done | 22 ± 3" in text
@@ -125,7 +127,7 @@ def test_a_paused_command_and_one_that_found_no_replacement_say_so():
 
 def test_a_finished_study_is_drawn_and_stays_while_nothing_changes(table, result, tmp_path):
     table.study.out = written(tmp_path / "study-1", result)
-    table.panel.show("")
+    table.show()
     plots = table.panel._plots
     assert plots._choice.options[-1] == PROFILER
     assert drawn(plots)["layout"]["xaxis"]["title"]["text"] == "noise σ of one pour [°]"
@@ -134,23 +136,22 @@ def test_a_finished_study_is_drawn_and_stays_while_nothing_changes(table, result
     assert first["layout"]["xaxis"]["title"]["text"] == "outlet height [mm]"
     assert plots._caption.content.startswith("Band: the target")
     before = plots._chart.figure
-    table.panel.show("")
+    table.show()
     assert plots._chart.figure is before
     (tmp_path / "study-1" / "result.json").write_text(json.dumps(result | {"scan": None}))
-    table.panel.show("")
+    table.show()
     assert "Scan of an assumption" not in plots._choice.options
     assert drawn(plots) != first
 
 
 def test_dark_and_light(table, result, tmp_path):
     table.study.out = written(tmp_path / "study-1", result)
-    table.panel.show("")
+    table.show()
     dark = drawn(table.panel._plots)["layout"]["template"]["layout"]
-    table.panel.dark = False
+    table.panel.set_dark(False)
     light = drawn(table.panel._plots)["layout"]["template"]["layout"]
     # plotly_dark writes light text, plotly_white dark text
     assert (dark["font"]["color"], light["font"]["color"]) == ("#f2f5fa", "#2a3f5f")
-    assert table.panel.dark is False
     assert set(light) == set(plotly.io.templates["plotly_white"].to_plotly_json()["layout"])
 
 
@@ -196,8 +197,8 @@ def test_a_study_that_runs_shows_what_it_has(table, result, tmp_path):
     }
     table.study.out = written(tmp_path / "study-1", partial, "partial.json")
     table.study.now = CommandStatus("running", "screening", 40, 100, stages=(StageProgress("screening", 20, 84),))
-    table.panel.show("")
-    table.panel.show("")
+    table.show()
+    table.show()
     assert r"| screening | 20 of 84 | ▶ | so far: X7 \*acts\* |" in table.panel._view._text.content
     assert "Half-normal" in table.panel._plots._choice.options
     assert "Ascent path" not in table.panel._plots._choice.options
@@ -205,7 +206,7 @@ def test_a_study_that_runs_shows_what_it_has(table, result, tmp_path):
     # finished: the result counts, and a partial one that was left behind does not
     written(tmp_path / "study-1", result)
     table.study.now = CommandStatus("finished")
-    table.panel.show("")
+    table.show()
     assert "Ascent path" in table.panel._plots._choice.options
 
 
@@ -252,8 +253,8 @@ def test_what_is_shown_as_in_the_file_is_no_change(table):
 def test_a_study_file_that_cannot_be_read_leaves_the_page_standing(server, tmp_path):
     table = FakeStudy()
     table.study_file = tmp_path / "gone.toml"
-    panel = StudyPanel(server, table, "gone", Actions().post, FakeSession())
+    panel = StudyPanel(page_context(server, FakeSession(), Actions().post, study=table))
     assert "cannot be read" in panel._order._told.content
     assert panel._profile.options == (NONE,)
     assert not panel._order.edits
-    panel.show("")
+    panel.show(Now(FakeSession().status()))

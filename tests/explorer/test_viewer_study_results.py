@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from explorer.viewer.guarded_server import guarded_server
+from explorer.viewer.panel import Now
 from explorer.viewer.study.plot_view import NOTHING
 from explorer.viewer.study.profiler_panel import TITLE as PROFILER
 from explorer.viewer.study.study_panel import PRESENT, set_live
@@ -33,7 +34,7 @@ def table(server):
 
 def test_the_profiler_follows_its_sliders_and_sets_the_live_pour(table, result, tmp_path):
     table.study.out = written(tmp_path / "study-1", result)
-    table.panel.show("")
+    table.show()
     profiler, plots = table.panel._profiler, table.panel._plots
     found = result["optimum"]["single"]
     assert f"**{found['predicted']:.2f}° ± " in profiler._words.content
@@ -64,7 +65,7 @@ def test_the_profiler_follows_its_sliders_and_sets_the_live_pour(table, result, 
 
 def test_every_target_has_a_profiler(table, tmp_path):
     table.study.out = written(tmp_path / "study-1", reported_studies.result_of_case("two targets"))
-    table.panel.show("")
+    table.show()
     profiler, plots = table.panel._profiler, table.panel._plots
     titles = [title for title in plots._choice.options if title.startswith(PROFILER)]
     assert len(titles) == 2
@@ -95,7 +96,7 @@ def test_values_that_act_on_restart_begin_the_pour_anew():
 
 def test_any_run_is_poured_again(table, result, tmp_path):
     table.study.out = written(tmp_path / "study-1", result)
-    table.panel.show("")
+    table.show()
     runs = table.panel._runs
     table.enter(runs._stage, "surface")
     chosen = runs._run.options[3]
@@ -121,7 +122,7 @@ def test_a_result_from_elsewhere_is_added_and_compared(table, result, tmp_path):
     table.study.done = (written(tmp_path / "study-2", result),)
     away = written(tmp_path / "away-3", other)
     panel = table.panel
-    panel.show("")
+    panel.show(Now(FakeSession().status()))
     assert panel._chooser._list.options == (PRESENT, "study-2")
     assert panel._chooser.folder is None
     comparison = panel._comparison
@@ -147,13 +148,13 @@ def test_a_file_that_is_no_result_is_one_line(table, tmp_path, content):
     folder.mkdir()
     (folder / "result.json").write_text(content)
     table.study.out = Path(folder)
-    table.panel.show("")
-    table.panel.show("")
+    table.show()
+    table.show()
     if content != "{}":
         assert "odd-1: cannot be shown" in table.panel._view._text.content.replace("\\", "")
     for bad in ("[]", "{", ""):
         (folder / "result.json").write_text(bad)
-        table.panel.show("")
+        table.show()
         assert table.panel._plots._choice.options == (NOTHING,)
         table.panel._chooser._text.value = str(folder)
         with pytest.raises(ValueError, match="cannot be read"):

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from explorer.export import EXPORTS
 from explorer.export.deck_of_scene import assembled
-from explorer.export.decks import WRITERS
 from explorer.export.frames import TRAJECTORY, Motion, motion, read_frames
 from explorer.export.liggghts import INPUT
 from explorer.export.run import run_liggghts, run_yade
@@ -89,7 +89,7 @@ def theirs(case, engine, folder):
     LIGGGHTS's step k is our k − 1 and its velocities are half a step younger: v dt and g dt, far below 1 %.
     """
     deck = case.deck
-    WRITERS[engine](folder, deck)
+    EXPORTS[engine].write_deck(folder, deck)
     if not case.tangential_damping:
         _undamp(folder, engine)
     RUNNERS[engine](folder, dump_every=case.every)

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
+from explorer.export import EXPORTS
 from explorer.export.deck_of_scene import deck_of
-from explorer.export.decks import WRITERS
 from explorer.export.frames import motion
 from explorer.export.run import run_liggghts, run_yade
 from explorer.scene.file import load_scene
@@ -40,7 +40,7 @@ def of_ours(record):
 def of_theirs(record, engine, folder):
     """Reading of the same pour by ``engine``, run in ``folder``."""
     deck = deck_of(record, TIME)
-    WRITERS[engine](folder, deck)
+    EXPORTS[engine].write_deck(folder, deck)
     frame = RUNNERS[engine](folder).final
     found = motion(deck, frame)
     owner = np.repeat(np.arange(deck.bodies, dtype=np.int32), [len(deck.members(b)) for b in range(deck.bodies)])

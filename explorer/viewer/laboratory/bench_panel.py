@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import viser
@@ -13,57 +12,55 @@ from explorer.laboratory.measured_pour import measured_source
 from explorer.laboratory.run import LabOrder, analysed
 from explorer.laboratory.solver_answers import twin_answer
 from explorer.scene.source import SceneSource
-from explorer.session import Session
-from explorer.viewer.actions import Post
-from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.laboratory.answer_view import AnswerView
 from explorer.viewer.laboratory.upload_slot import UploadSlot
+from explorer.viewer.panel import LABORATORY, PageContext, Panel
 from solver.assets import shipped_assets
 
 NO_COMPRESSION = "none"
 WAITING = "Choose a test; its readings are those of the shipped example until you upload yours. Then: Evaluate."
 
 
-class BenchPanel:
-    """Test, readings, answer; ``folder`` keeps uploads."""
+class BenchPanel(Panel):
+    """Test, readings, answer."""
 
-    def __init__(
-        self, server: viser.ViserServer, session: Session, folder: Path, post: Post, background: BackgroundWork
-    ) -> None:
-        self._session, self._folder, self._background = session, folder, background
-        tests, gui = shipped_assets("laboratory"), server.gui
-        with gui.add_folder("Bench test → parameters", expand_by_default=False):
-            self._test = gui.add_dropdown("Test", tests, hint="What was measured; columns: doe/laboratory/README.md.")
-            self._readings = UploadSlot(
-                server, "Readings", (tests[0],), (".csv",), folder, post, "One row per replicate or point of a curve."
-            )
-            self._compression = UploadSlot(
-                server,
-                "Compression readings",
-                (NO_COMPRESSION, "compression"),
-                (".csv",),
-                folder,
-                post,
-                "With shear: of the same components, for Poisson's ratio.",
-            )
-            self._left_out = gui.add_text(
-                "Leave out", "", hint="With composition: components that are not poured; the rest is scaled to one."
-            )
-            self._twin = gui.add_checkbox(
-                "Repeat it on the solver",
-                False,
-                hint="The same test with the parameters just found, in the background: does it give them back?",
-            )
-            self._bias = gui.add_checkbox(
-                "Where the formula misses",
-                False,
-                hint="What the test's usual formula gives over a range of what was put in (drop, compression, shear).",
-            )
-            evaluate = gui.add_button("Evaluate", hint="Mean, spread, interval, normality, outliers, parameters.")
-            pour = gui.add_button(
-                "Pour with these parameters", hint="The present material with what was measured, as a file of its own."
-            )
-            self.view = AnswerView(server, WAITING, post, charts=True)
+    name, tab, title = "bench", LABORATORY, "Bench test → parameters"
+
+    def __init__(self, page: PageContext) -> None:
+        server, gui, folder, post = page.server, page.server.gui, page.uploads, page.post
+        self._session, self._folder, self._background = page.session, folder, page.bench_work
+        tests = shipped_assets("laboratory")
+        self._test = gui.add_dropdown("Test", tests, hint="What was measured; columns: doe/laboratory/README.md.")
+        self._readings = UploadSlot(
+            server, "Readings", (tests[0],), (".csv",), folder, post, "One row per replicate or point of a curve."
+        )
+        self._compression = UploadSlot(
+            server,
+            "Compression readings",
+            (NO_COMPRESSION, "compression"),
+            (".csv",),
+            folder,
+            post,
+            "With shear: of the same components, for Poisson's ratio.",
+        )
+        self._left_out = gui.add_text(
+            "Leave out", "", hint="With composition: components that are not poured; the rest is scaled to one."
+        )
+        self._twin = gui.add_checkbox(
+            "Repeat it on the solver",
+            False,
+            hint="The same test with the parameters just found, in the background: does it give them back?",
+        )
+        self._bias = gui.add_checkbox(
+            "Where the formula misses",
+            False,
+            hint="What the test's usual formula gives over a range of what was put in (drop, compression, shear).",
+        )
+        evaluate = gui.add_button("Evaluate", hint="Mean, spread, interval, normality, outliers, parameters.")
+        pour = gui.add_button(
+            "Pour with these parameters", hint="The present material with what was measured, as a file of its own."
+        )
+        self.view = AnswerView(server, WAITING, post, charts=True)
         evaluate.on_click(lambda _: post(self._evaluate))
         pour.on_click(lambda _: post(self._pour))
 
@@ -72,6 +69,10 @@ class BenchPanel:
             if event.client_id is not None:
                 test = str(event.target.value)
                 post(lambda: self._readings.offer((test,)))
+
+    def set_dark(self, dark: bool) -> None:
+        """Charts for a dark page, or a light one."""
+        self.view.set_dark(dark)
 
     def _order(self) -> LabOrder:
         test, beside = str(self._test.value), self._compression.chosen

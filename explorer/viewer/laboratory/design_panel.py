@@ -2,30 +2,28 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-import viser
-
 from doe.designs import DESIGNS
 from explorer.design.analysis import AnalyseOrder
 from explorer.design.plan import PlanOrder
 from explorer.laboratory.answers import analysis_answer, sheet_answer
-from explorer.viewer.actions import Post
-from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.laboratory.answer_view import AnswerView
 from explorer.viewer.laboratory.numbers import number_or_none, positive
 from explorer.viewer.laboratory.upload_slot import UploadSlot
+from explorer.viewer.panel import LABORATORY, PageContext, Panel
 from solver.assets import shipped_assets
 
 SHEET = "Name the factors in a TOML file (explorer/design/README.md), or take the shipped one, then: Make the sheet."
 FILLED = "Fill the responses into the sheet, upload it, then: Analyse."
 
 
-class DesignPanel:
-    """Factors → sheet, and filled sheet → effects, model, optimum; ``folder`` keeps uploads."""
+class DesignPanel(Panel):
+    """Factors → sheet, and filled sheet → effects, model, optimum."""
 
-    def __init__(self, server: viser.ViserServer, folder: Path, post: Post, background: BackgroundWork) -> None:
-        self._background, gui = background, server.gui
+    name, tab = "design", LABORATORY
+
+    def __init__(self, page: PageContext) -> None:
+        server, gui, folder, post = page.server, page.server.gui, page.uploads, page.post
+        self._background = page.bench_work
         with gui.add_folder("Your own design → runs", expand_by_default=False):
             self._kind = gui.add_dropdown(
                 "Design", tuple(DESIGNS), initial_value="box-behnken", hint="Which runs are made."
@@ -58,6 +56,10 @@ class DesignPanel:
             self.analysis = AnswerView(server, FILLED, post, charts=True)
         make.on_click(lambda _: post(self._make))
         analyse.on_click(lambda _: post(self._analyse))
+
+    def set_dark(self, dark: bool) -> None:
+        """Charts for a dark page, or a light one."""
+        self.analysis.set_dark(dark)
 
     def _make(self) -> None:
         order = PlanOrder(

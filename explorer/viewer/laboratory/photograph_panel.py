@@ -3,52 +3,47 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
-
-import viser
 
 from explorer.files.measured_file import PICTURES
 from explorer.laboratory.answers import Answer, Ruler, photograph_answer
 from explorer.laboratory.solver_answers import compared_answer
-from explorer.session import Session
-from explorer.viewer.actions import Post
-from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.laboratory.answer_view import AnswerView
 from explorer.viewer.laboratory.numbers import positive
 from explorer.viewer.laboratory.upload_slot import UploadSlot
+from explorer.viewer.panel import LABORATORY, PageContext, Panel
 from solver.assets import shipped_assets
 
 WAITING = "Camera level, the plate's edge in view. Choose a shipped picture or upload one, then: Read the angle."
 
 
-class PhotographPanel:
-    """Picture, scale, answer; ``folder`` keeps uploads, and the pours that pictures are compared with."""
+class PhotographPanel(Panel):
+    """Picture, scale, answer; uploads are kept, and the pours that pictures are compared with."""
 
-    def __init__(
-        self, server: viser.ViserServer, session: Session, folder: Path, post: Post, background: BackgroundWork
-    ) -> None:
-        self._session, self._folder, self._background, gui = session, folder, background, server.gui
-        with gui.add_folder("Photograph → angle of repose", expand_by_default=False):
-            self._photo = UploadSlot(
-                server, "Photograph", shipped_assets("photographs"), PICTURES, folder, post, "One pile, from the side."
-            )
-            self._scale = gui.add_number(
-                "Scale [mm per pixel]", 0.0, min=0.0, max=10.0, step=0.001, hint="0: lengths stay in pixels."
-            )
-            self._bar = gui.add_number(
-                "Reference bar [mm]",
-                0.0,
-                min=0.0,
-                max=10_000.0,
-                step=0.1,
-                hint="Length of the one straight bar in the picture, in place of the scale; 0: there is none.",
-            )
-            read = gui.add_button("Read the angle", hint="By the estimator of the simulated piles.")
-            beside = gui.add_button(
-                "Read it beside a pour",
-                hint="Pours what is on the screen once more, in the background, and reads both piles by the same fit.",
-            )
-            self.view = AnswerView(server, WAITING, post)
+    name, tab, title = "photograph", LABORATORY, "Photograph → angle of repose"
+
+    def __init__(self, page: PageContext) -> None:
+        server, gui, folder, post = page.server, page.server.gui, page.uploads, page.post
+        self._session, self._folder, self._background = page.session, folder, page.bench_work
+        self._photo = UploadSlot(
+            server, "Photograph", shipped_assets("photographs"), PICTURES, folder, post, "One pile, from the side."
+        )
+        self._scale = gui.add_number(
+            "Scale [mm per pixel]", 0.0, min=0.0, max=10.0, step=0.001, hint="0: lengths stay in pixels."
+        )
+        self._bar = gui.add_number(
+            "Reference bar [mm]",
+            0.0,
+            min=0.0,
+            max=10_000.0,
+            step=0.1,
+            hint="Length of the one straight bar in the picture, in place of the scale; 0: there is none.",
+        )
+        read = gui.add_button("Read the angle", hint="By the estimator of the simulated piles.")
+        beside = gui.add_button(
+            "Read it beside a pour",
+            hint="Pours what is on the screen once more, in the background, and reads both piles by the same fit.",
+        )
+        self.view = AnswerView(server, WAITING, post)
         read.on_click(lambda _: post(self._read))
         beside.on_click(lambda _: post(self._compare))
 

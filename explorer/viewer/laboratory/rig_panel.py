@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import viser
 
 from explorer.errors import CommandError
 from explorer.laboratory.solver_answers import rig_answer
-from explorer.session import Session
-from explorer.viewer.actions import Post
-from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.laboratory.answer_view import AnswerView
+from explorer.viewer.panel import LABORATORY, Now, PageContext, Panel
 from explorer.viewer.pour.restart_panel import entered, parameter_input
 from solver.params import Parameter
 from solver.rigs import BENCH_RIGS
@@ -21,39 +18,41 @@ from solver.scene import Scene, parameters, with_rig
 WAITING = "Puts one body, with the parameters of the pour on the screen, to a test. Choose rig and body, then: Run."
 
 
-class RigPanel:
-    """Rig, its parameters, answer; ``folder`` keeps the material as it was."""
+class RigPanel(Panel):
+    """Rig, its parameters, answer; the material is kept as it was."""
 
-    def __init__(
-        self, server: viser.ViserServer, session: Session, folder: Path, post: Post, background: BackgroundWork
-    ) -> None:
-        self._session, self._folder, self._background, self._gui = session, folder, background, server.gui
+    name, tab, title = "rig", LABORATORY, "Bench test on the solver"
+
+    def __init__(self, page: PageContext) -> None:
+        server, gui, folder, post = page.server, page.server.gui, page.uploads, page.post
+        self._session, self._folder, self._background, self._gui = page.session, folder, page.bench_work, gui
         self._declared: dict[str, Parameter] = {}
         self._inputs: dict[str, Any] = {}
-        with server.gui.add_folder("Bench test on the solver", expand_by_default=False):
-            self._rig = server.gui.add_dropdown(
-                "Rig",
-                tuple(BENCH_RIGS),
-                hint="Rigs that bodies are poured into are chosen under Pour, Rig and material.",
-            )
-            self._place = server.gui.add_folder(None)
-            self._offer(session.status().scene)
-            run = server.gui.add_button(
-                "Run", hint="On the material of the rig's wall; up to a minute, in the background."
-            )
-            self.view = AnswerView(server, WAITING, post, charts=True)
+        self._rig = gui.add_dropdown(
+            "Rig",
+            tuple(BENCH_RIGS),
+            hint="Rigs that bodies are poured into are chosen under Pour, Rig and material.",
+        )
+        self._place = gui.add_folder(None)
+        self._offer(page.session.status().scene)
+        run = gui.add_button("Run", hint="On the material of the rig's wall; up to a minute, in the background.")
+        self.view = AnswerView(server, WAITING, post, charts=True)
         run.on_click(lambda _: post(self._run))
 
         @self._rig.on_update
         def _(event: viser.GuiEvent[Any]) -> None:
             if event.client_id is not None:
-                post(lambda: self._offer(session.status().scene))
+                post(lambda: self._offer(page.session.status().scene))
 
-    def show(self) -> None:
-        """Offer the bodies of what is being poured; call it inside ``server.atomic()``."""
-        scene = self._session.status().scene
+    def show(self, now: Now) -> None:
+        """Offer the bodies of what is being poured."""
+        scene = now.status.scene
         if self._declared["rig.body"].choices != tuple(body.name for body in scene.bodies):
             self._offer(scene)
+
+    def set_dark(self, dark: bool) -> None:
+        """Charts for a dark page, or a light one."""
+        self.view.set_dark(dark)
 
     def _offer(self, scene: Scene) -> None:
         """Boxes and lists for the parameters of the chosen rig, in place of those of the one before."""

@@ -1,27 +1,20 @@
-"""What is taken along: the command line of what is on the screen, files of it, pictures and recordings."""
+"""What is taken along of what is on the screen: the command line that repeats it, files, pictures."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from html import escape
-from pathlib import Path
 from typing import Any
 
 import viser
 
 from explorer.errors import CommandError
-from explorer.files.exports import bodies_csv, bodies_stl, png, zipped
+from explorer.files.exports import bodies_csv, bodies_stl, png
 from explorer.live.frames import Frame
-from explorer.live.messages import Status
-from explorer.logs.recording import recorded_lines
 from explorer.scene.source import SceneSource, command_line
 from explorer.scene.text import material_toml
-from explorer.session import Session
-from explorer.viewer.actions import Post
-from explorer.viewer.background_work import BackgroundWork
-from explorer.viewer.output.engine_export import EngineExport
-from explorer.viewer.output.recording_switch import HTML, RRD, RecordingSwitch
 from explorer.viewer.output.send_file import send_file
+from explorer.viewer.panel import TAKE_ALONG, Now, PageContext, Panel
 from explorer.viewer.small_text import small_html
 from solver.scene import Scene
 
@@ -29,26 +22,17 @@ LARGEST_PICTURE = (1440, 2560)
 """Height and width [pixels]."""
 RENDER_WAIT = 30.0
 """Seconds that a browser has to draw a picture."""
-MOST_SENT = 200_000_000
-"""Bytes of a recording that are sent to a browser."""
-START, STOP, DOWNLOAD = "Start", "Stop", "Download"
 
 
-class OutputPanel:
-    """Command line, exports, and the switch of the recording; ``folder`` keeps scenes that are exported."""
+class OutputPanel(Panel):
+    """Command line, and exports."""
 
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        session: Session,
-        recording: RecordingSwitch,
-        folder: Path,
-        post: Post,
-        background: BackgroundWork,
-    ) -> None:
-        self._session, self._recording, self._background, self._post = session, recording, background, post
+    name, tab = "output", TAKE_ALONG
+
+    def __init__(self, page: PageContext) -> None:
+        self._session, self._background, self._post = page.session, page.background, page.post
         self._compared: tuple[SceneSource, Scene, int] | None = None
-        gui = server.gui
+        gui = page.server.gui
         gui.add_markdown("**This pour on the command line**, from the start with the parameters now in force:")
         self._command = gui.add_html("")
         gui.add_markdown("**Files of what is on the screen**")
@@ -62,37 +46,13 @@ class OutputPanel:
         for label, (hint, act) in hints.items():
             self._exports[label] = gui.add_button(label, hint=hint)
             self._listen(self._exports[label], act)
-        self.engine = EngineExport(server, session, folder, post, background)
-        gui.add_markdown("**Recording** of the moving scene")
-        self._kind = gui.add_dropdown(
-            "Kind",
-            (RRD, HTML),
-            hint="rerun: bodies, curves, changes, parameters, for `explorer replay`. Web page: the scene alone, one "
-            "file for any browser.",
-        )
-        self._switch = gui.add_button_group(
-            "Record",
-            (START, STOP, DOWNLOAD),
-            hint="Every pour that is begun meanwhile has a file of its own; Download sends several as a ZIP file. "
-            "Recordings stay in the folder named below.",
-        )
-        self._state = gui.add_html("")
 
-        @self._switch.on_click
-        def _(event: viser.GuiEvent[Any]) -> None:
-            if event.client_id is not None:
-                client, chosen = event.client, str(event.target.value)
-                post(lambda: self._record(client, chosen))
-
-    def show(self, status: Status, notice: str) -> None:
-        """Command line and state of the recording; ``notice`` is the page's last message. In ``server.atomic()``."""
-        present = (self._session.source, status.scene, status.seed)
+    def show(self, now: Now) -> None:
+        """The command line of what is on the screen."""
+        present = (self._session.source, now.status.scene, now.status.seed)
         if self._compared is None or present != self._compared:
             self._compared = present
             self._command.content = command_html(*present)
-        state = recording_html(self._recording, self._background.busy_with, notice)
-        if self._state.content != state:
-            self._state.content = state
 
     def _listen(self, button: Any, act: Callable[[Any], None]) -> None:
         def pressed(event: viser.GuiEvent[Any]) -> None:
@@ -132,26 +92,6 @@ class OutputPanel:
             raise CommandError("no body has entered yet")
         return frame, self._session.status().scene
 
-    def _record(self, client: Any, chosen: str) -> None:
-        if chosen == START:
-            self._recording.begin(str(self._kind.value))
-        elif chosen == STOP:
-            self._recording.end()
-        elif chosen == DOWNLOAD and client is not None:
-            files = self._recording.files()
-            size = sum(file.stat().st_size for file in files)
-            if size > MOST_SENT:
-                listed = ", ".join(map(str, files))
-                raise CommandError(f"recording: {size / 1e6:.0f} MB are too much to send; fetch {listed}")
-            if len(files) == 1:
-                send_file(client, files[0].name, files[0].read_bytes())
-            else:
-                self._background.start(
-                    "packing the recording",
-                    lambda: zipped({file.name: file for file in files}),
-                    lambda made: send_file(client, f"{files[0].stem}.zip", made),
-                )
-
 
 def picture(client: Any) -> bytes:
     """The scene as ``client`` sees it, as PNG; CommandError where its browser does not draw it."""
@@ -174,20 +114,3 @@ def command_html(source: SceneSource, scene: Scene, seed: int) -> str:
         line, select = f"None: {error}", "auto"
     style = f"display:block; user-select:{select}; white-space:pre-wrap; padding:0.4em; margin-bottom:0.6em"
     return small_html(f"<code style='{style}; background:rgba(128,150,170,0.14)'>{escape(line)}</code>")
-
-
-def recording_html(recording: RecordingSwitch, busy_with: str, notice: str) -> str:
-    """What is being recorded or done, and where the files are."""
-    lines = [notice, f"Busy {busy_with}." if busy_with else ""]
-    pours = recording.pours
-    if recording.running:
-        so_far = f" (pour {len(pours)} of this recording)" if len(pours) > 1 else ""
-        lines.append(f"Recording into {pours[-1].path if pours else recording.path}{so_far}")
-    elif pours:
-        lines += recorded_lines(pours)
-        if len(pours) > 1 and not busy_with:
-            files = recording.files()
-            lines.append(f"Download sends {files[0].name}" if len(files) == 1 else "Download sends all in one ZIP file")
-    elif recording.path is not None and recording.path.is_file():
-        lines.append(f"Recorded: {recording.path}")
-    return small_html("<br>".join(escape(line) for line in lines if line))

@@ -5,72 +5,69 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from html import escape
-from pathlib import Path
 from typing import Any
 
 import viser
 
-from explorer.live.messages import Status
 from explorer.parameter_history import LiveValues, ParameterHistory
 from explorer.scene.changes import Difference, differences, shown
 from explorer.scene.presets import Preset, preset_names, preset_path, preset_values, read_preset, save_preset
 from explorer.session import Session
-from explorer.viewer.actions import Post
 from explorer.viewer.buttons import add_keys, button_group
+from explorer.viewer.panel import POUR, Now, PageContext, Panel
 from explorer.viewer.small_text import small_html
 from solver.scene import Scene, parameters, with_values
 
-UNDO, REDO, BACK, POUR = "Undo (Z)", "Redo (Y)", "All back", "Pour the default"
+UNDO, REDO, BACK, DEFAULT = "Undo (Z)", "Redo (Y)", "All back", "Pour the default"
 KEYS: dict[str, Any] = {UNDO: "Z", REDO: "Y"}
 MOST_SHOWN = 40
 ONE = "one parameter …"
 NO_PRESET = "choose …"
 
 
-class ChangesPanel:
-    """Buttons, list and presets; ``folder`` is where the user's presets are."""
+class ChangesPanel(Panel):
+    """Buttons, list and presets."""
 
-    def __init__(self, server: viser.ViserServer, session: Session, folder: Path, post: Post) -> None:
-        self._session, self._folder = session, folder
+    name, tab, title, folded = "changes", POUR, "Changes and presets", False
+
+    def __init__(self, page: PageContext) -> None:
+        gui, post = page.server.gui, page.post
+        self._session, self._folder = page.session, page.data / "presets"
         self._history = ParameterHistory()
         self._compared: tuple[Scene, Scene] | None = None
         self._differences: tuple[Difference, ...] = ()
-        acts = {UNDO: self._undo, REDO: self._redo, BACK: self._back, POUR: self._pour_default}
-        gui = server.gui
-        with gui.add_folder("Changes and presets"):
-            self._buttons = button_group(
-                gui,
-                "Changes",
-                acts,
-                post,
-                hint="Undo and redo: changes of what acts now, not of what needs a new pour. All back: those return to "
-                "the default. Pour the default: everything does, with a new pour.",
-            )
-            self._list = gui.add_html("")
-            self._one = gui.add_dropdown("Back to default", (ONE,), hint="One parameter returns to its default.")
-            self._preset = gui.add_dropdown(
-                "Preset", (NO_PRESET, *preset_names(folder)), hint="Sets the values that it names, at once."
-            )
-            self._about = gui.add_html("")
-            self._name = gui.add_text(
-                "Name", "", hint="Name of a preset of your own: letters, digits, blanks, - and _."
-            )
-            save = gui.add_button("Save as preset", hint="Keeps everything that differs from the default.")
+        acts = {UNDO: self._undo, REDO: self._redo, BACK: self._back, DEFAULT: self._pour_default}
+        self._buttons = button_group(
+            gui,
+            "Changes",
+            acts,
+            post,
+            hint="Undo and redo: changes of what acts now, not of what needs a new pour. All back: those return to "
+            "the default. Pour the default: everything does, with a new pour.",
+        )
+        self._list = gui.add_html("")
+        self._one = gui.add_dropdown("Back to default", (ONE,), hint="One parameter returns to its default.")
+        self._preset = gui.add_dropdown(
+            "Preset", (NO_PRESET, *preset_names(self._folder)), hint="Sets the values that it names, at once."
+        )
+        self._about = gui.add_html("")
+        self._name = gui.add_text("Name", "", hint="Name of a preset of your own: letters, digits, blanks, - and _.")
+        save = gui.add_button("Save as preset", hint="Keeps everything that differs from the default.")
         save.on_click(lambda _: post(self._save))
         _on_choice(self._one.on_update, lambda chosen: post(lambda: self._one_back(chosen)))
         _on_choice(self._preset.on_update, lambda chosen: post(lambda: self._apply(chosen)))
         add_keys(gui, acts, KEYS, post)
 
-    def take(self, status: Status) -> None:
-        """Take note of the parameters in force; call it as often as there may be a new status."""
-        self._history.take(status.scene, time.monotonic())
+    def draw(self, now: Now) -> None:
+        """Take note of the parameters in force."""
+        self._history.take(now.status.scene, time.monotonic())
 
-    def show(self, status: Status) -> None:
-        """The list against the default; call it inside ``server.atomic()``."""
-        default = self._session.source.scene
-        if self._compared is None or self._compared[0] is not default or self._compared[1] != status.scene:
-            self._compared = (default, status.scene)
-            self._differences = tuple(differences(default, status.scene))
+    def show(self, now: Now) -> None:
+        """The list against the default."""
+        default, scene = self._session.source.scene, now.status.scene
+        if self._compared is None or self._compared[0] is not default or self._compared[1] != scene:
+            self._compared = (default, scene)
+            self._differences = tuple(differences(default, scene))
             live = tuple(one.path for one in self._differences if one.live)
             self._one.options = (ONE, *live)
         if self._one.value != ONE:

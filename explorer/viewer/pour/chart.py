@@ -12,7 +12,7 @@ import numpy.typing as npt
 import viser
 import viser.uplot
 
-from explorer.live.messages import Event, Status
+from explorer.live.messages import Status
 from explorer.viewer.palette import (
     ANGLE_LINE,
     ANGLE_SPREAD_BAND,
@@ -22,6 +22,7 @@ from explorer.viewer.palette import (
     MARK_LINE,
     MASS_LINE,
 )
+from explorer.viewer.panel import POUR, Now, PageContext, Panel
 from explorer.viewer.pour.marks import NO_MARKS, Marks, with_marks
 from explorer.viewer.pour.readout import angle_of_repose_deg
 from solver.observables.value import Value
@@ -112,13 +113,15 @@ class History:
         return with_marks((moments, np.maximum(angle - around, 0.0), angle + around, angle, mass), marks)
 
 
-class Chart:
+class Chart(Panel):
     """The chart on the page."""
 
-    def __init__(self, server: viser.ViserServer) -> None:
+    name, tab = "chart", POUR
+
+    def __init__(self, page: PageContext) -> None:
         self._history, self._top_deg = History(), LEAST_TOP_DEG
         self._marks = Marks()
-        self._plot = server.gui.add_uplot(
+        self._plot = page.server.gui.add_uplot(
             self._history.drawn(()),
             _series(NO_MARKS),
             bands=(viser.uplot.Band(series=SPREAD, fill=ANGLE_SPREAD_BAND),),
@@ -128,8 +131,9 @@ class Chart:
             padding=(12, 8, 0, 0),
         )
 
-    def show(self, status: Status, events: Sequence[Event] = ()) -> None:
-        """Draw what is new, and mark the changes among ``events``; call it inside ``server.atomic()``."""
+    def show(self, now: Now) -> None:
+        """Draw what is new, and mark the changes."""
+        status, events = now.status, now.events
         marked = self._marks.take(events, status.generation)
         if self._history.add(status) or marked:
             columns = self._history.drawn(self._marks.times)

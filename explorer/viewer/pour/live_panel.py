@@ -12,8 +12,11 @@ from explorer.live.messages import Status
 from explorer.screen_units import quantity, title
 from explorer.session import Session
 from explorer.viewer.actions import Post
+from explorer.viewer.panel import POUR
 from explorer.viewer.pour.live_controls import LiveControl
 from explorer.viewer.pour.pair_matrix import PairMatrix, pair_parameters
+from explorer.viewer.pour.scene_bound import SceneBound
+from explorer.viewer.tour import Stop
 from solver.effects import EFFECTS, SetUpEffect
 from solver.params import Parameter
 from solver.scene import Scene, parameters, value
@@ -22,7 +25,22 @@ Targets = dict[str, tuple[str, ...]]
 """Text of a choice → prefixes of the parameter paths that it stands for."""
 
 
-class LivePanel:
+class LivePanel(SceneBound["LiveSections"]):
+    """What acts on the running pour."""
+
+    name, tab = "live", POUR
+    stop = Stop(
+        "Turn a parameter",
+        "Everything under *acts now* changes the pile that lies there. Take **Pair → all pairs → Static friction** to "
+        "zero, and it flows apart. The line *In the solver* tells what is in force, not what the slider shows.",
+    )
+
+    def build(self, scene: Scene) -> LiveSections:
+        """Make the sections for ``scene``."""
+        return LiveSections(self._page.server, self._page.session, scene, self._page.post)
+
+
+class LiveSections:
     """One section per kind of thing that has live parameters (materials, pairs of materials)."""
 
     def __init__(self, server: viser.ViserServer, session: Session, scene: Scene, post: Post) -> None:

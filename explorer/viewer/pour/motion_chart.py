@@ -11,8 +11,9 @@ import numpy.typing as npt
 import viser
 import viser.uplot
 
-from explorer.live.messages import Event, SessionState, Status
+from explorer.live.messages import SessionState, Status
 from explorer.viewer.palette import CONTACTS_LINE, ENERGY_LINE, MARK_LINE
+from explorer.viewer.panel import POUR, Now, PageContext, Panel
 from explorer.viewer.pour.chart import Curve, axis, line
 from explorer.viewer.pour.marks import NO_MARKS, Marks, with_marks
 
@@ -50,13 +51,15 @@ class MotionHistory:
         return with_marks((moments, energy, self._contacts.columns()[1]), marks)
 
 
-class MotionChart:
+class MotionChart(Panel):
     """The chart on the page."""
 
-    def __init__(self, server: viser.ViserServer) -> None:
+    name, tab = "motion", POUR
+
+    def __init__(self, page: PageContext) -> None:
         self._history = MotionHistory()
         self._marks = Marks()
-        self._plot = server.gui.add_uplot(
+        self._plot = page.server.gui.add_uplot(
             self._history.drawn(()),
             _series(NO_MARKS),
             scales={"x": viser.uplot.Scale(time=False), "mark": viser.uplot.Scale(range=(0.0, 1.0))},
@@ -65,8 +68,9 @@ class MotionChart:
             padding=(12, 8, 0, 0),
         )
 
-    def show(self, status: Status, events: Sequence[Event]) -> None:
-        """Draw what is new, and mark the changes among ``events``; call it inside ``server.atomic()``."""
+    def show(self, now: Now) -> None:
+        """Draw what is new, and mark the changes."""
+        status, events = now.status, now.events
         marked = self._marks.take(events, status.generation)
         if self._history.add(status) or marked:
             self._plot.data = self._history.drawn(self._marks.times)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,55 +12,51 @@ import viser
 from explorer.files.measured_curves import MeasuredCurve, measured_curves
 from explorer.files.measured_file import SUFFIXES, measured_file
 from explorer.files.uploads import unpacked_measurement
-from explorer.live.messages import Status
-from explorer.viewer.actions import Post
-from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.buttons import on_upload
+from explorer.viewer.panel import POUR, Now, PageContext, Panel
 from explorer.viewer.pour.outline_nodes import OutlineNodes
 from explorer.viewer.pour.outline_svg import outline_html
+from solver.assets import shipped_measurements
 from solver.observables.outline import Outline
 
 NONE, OWN = "none", "folder below"
 
 
-class OutlinePanel:
-    """Drawing, and the choice of what is laid over it; ``shipped`` are names of data sets, ``uploads`` keeps others."""
+class OutlinePanel(Panel):
+    """Drawing, and the choice of what is laid over it: data sets that are shipped, and others."""
 
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        shipped: Sequence[str],
-        uploads: Path,
-        post: Post,
-        background: BackgroundWork,
-    ) -> None:
-        self._background, self._uploads, self._nodes = background, uploads, OutlineNodes(server)
+    name, tab, title, folded = "outline", POUR, "Silhouette and flank fit", False
+
+    def __init__(self, page: PageContext) -> None:
+        gui, post = page.server.gui, page.post
+        self._background, self._uploads, self._nodes = page.background, page.uploads, OutlineNodes(page.server)
         self._drawn: tuple[Outline | None, MeasuredCurve | None, bool] = (None, None, False)
         self._curves: Mapping[str, MeasuredCurve] = {}
         self._measured: MeasuredCurve | None = None
-        with server.gui.add_folder("Silhouette and flank fit"):
-            self._html = server.gui.add_html(outline_html(None, None))
-            self._in_scene = server.gui.add_checkbox(
-                "Lines in 3-D", True, hint="Draw the lines of the flanks, and what was measured, in the scene too."
+        self._html = gui.add_html(outline_html(None, None))
+        self._in_scene = gui.add_checkbox(
+            "Lines in 3-D", True, hint="Draw the lines of the flanks, and what was measured, in the scene too."
+        )
+        with gui.add_folder("Measured data over it", expand_by_default=False):
+            self._data = gui.add_dropdown(
+                "Measured",
+                (NONE, *shipped_measurements(), OWN),
+                hint="Lay a measured silhouette or profile over the pile.",
             )
-            with server.gui.add_folder("Measured data over it", expand_by_default=False):
-                self._data = server.gui.add_dropdown(
-                    "Measured", (NONE, *shipped, OWN), hint="Lay a measured silhouette or profile over the pile."
-                )
-                self._folder = server.gui.add_text(
-                    "Folder", "", hint="Folder with measurement.toml, on the machine that serves this page."
-                )
-                self._pixel = server.gui.add_number(
-                    "Photograph [mm per pixel]", 0.0, min=0.0, max=10.0, step=0.001, hint="Scale of a picture to come."
-                )
-                self._upload = server.gui.add_upload_button(
-                    "Upload measured data",
-                    mime_type=",".join((".zip", *SUFFIXES)),
-                    hint="A folder with measurement.toml as .zip, which is kept and can be diagnosed too; a scanned "
-                    "pile (.npz: xyz, radius), the points of an outline (.csv: u_m,z_m) or a photograph (.jpg, .png), "
-                    "which are drawn only.",
-                )
-                self._curve = server.gui.add_dropdown("Curve", (NONE,), disabled=True, hint="Which of its curves.")
+            self._folder = gui.add_text(
+                "Folder", "", hint="Folder with measurement.toml, on the machine that serves this page."
+            )
+            self._pixel = gui.add_number(
+                "Photograph [mm per pixel]", 0.0, min=0.0, max=10.0, step=0.001, hint="Scale of a picture to come."
+            )
+            self._upload = gui.add_upload_button(
+                "Upload measured data",
+                mime_type=",".join((".zip", *SUFFIXES)),
+                hint="A folder with measurement.toml as .zip, which is kept and can be diagnosed too; a scanned "
+                "pile (.npz: xyz, radius), the points of an outline (.csv: u_m,z_m) or a photograph (.jpg, .png), "
+                "which are drawn only.",
+            )
+            self._curve = gui.add_dropdown("Curve", (NONE,), disabled=True, hint="Which of its curves.")
 
         @self._data.on_update
         def _(event: viser.GuiEvent[Any]) -> None:
@@ -81,14 +77,14 @@ class OutlinePanel:
 
         on_upload(self._upload, self._take, post)
 
-    def show(self, status: Status) -> None:
-        """Draw what is new; call it inside ``server.atomic()``."""
-        now = (status.outline, self._measured, bool(self._in_scene.value))
-        if all(new is old for new, old in zip(now, self._drawn, strict=True)):
+    def show(self, now: Now) -> None:
+        """Draw what is new."""
+        drawn = (now.status.outline, self._measured, bool(self._in_scene.value))
+        if all(new is old for new, old in zip(drawn, self._drawn, strict=True)):
             return
-        self._drawn = now
-        self._nodes.show(*now)
-        html = outline_html(status.outline, self._measured)
+        self._drawn = drawn
+        self._nodes.show(*drawn)
+        html = outline_html(now.status.outline, self._measured)
         if self._html.content != html:
             self._html.content = html
 

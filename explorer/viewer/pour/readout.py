@@ -9,7 +9,9 @@ from itertools import groupby
 
 from explorer.live.angle_reader import LEAST_SHARE_BELOW
 from explorer.live.messages import Event, SessionState, Status
+from explorer.viewer.look.look import COMPONENT
 from explorer.viewer.palette import css
+from explorer.viewer.panel import POUR, Now, PageContext, Panel
 from explorer.viewer.scene_nodes import component_colour
 from solver.record import Outcome, Phase
 from solver.scene import Scene
@@ -72,6 +74,21 @@ STYLE = """<style>
 .pour .note {margin-top: 0.4em; padding: 0.25em 0.5em; border-radius: 0.3em;
   background: rgba(128,150,170,0.14); overflow-wrap: anywhere;}
 </style>"""
+
+
+class Readout(Panel):
+    """The readout on the page."""
+
+    name, tab = "readout", POUR
+
+    def __init__(self, page: PageContext) -> None:
+        self._look, self._html = page.look, page.server.gui.add_html("")
+
+    def show(self, now: Now) -> None:
+        """Tell what the pour is doing, and what was refused last."""
+        html = readout_html(now.status, now.events, now.notice, self._look.look.colour_by == COMPONENT)
+        if self._html.content != html:
+            self._html.content = html
 
 
 def readout_html(status: Status, events: Sequence[Event], notice: str, by_component: bool = True) -> str:

@@ -10,6 +10,9 @@ from explorer.live.messages import Status
 from explorer.screen_units import checked, screen_unit, title
 from explorer.session import Session
 from explorer.viewer.actions import Post
+from explorer.viewer.panel import POUR
+from explorer.viewer.pour.scene_bound import SceneBound
+from explorer.viewer.tour import Stop
 from solver.effects import set_up_effects
 from solver.params import Parameter, declared
 from solver.scene import Scene, parameters, value, with_values
@@ -48,7 +51,23 @@ def effect_paths() -> tuple[str, ...]:
     return tuple(path for kind in set_up_effects() for path in declared(kind, f"effect.{kind.name}"))
 
 
-class RestartPanel:
+class RestartPanel(SceneBound["SetUpInputs"]):
+    """What acts on the next pour."""
+
+    name, tab = "set_up", POUR
+    stop = Stop(
+        "Change the set-up",
+        "What stands under *on restart* (mass, outlet, feed, sizes) waits for **Restart with this set-up**. The same "
+        "seed gives the same pour, to the last bit.",
+    )
+
+    def build(self, scene: Scene) -> SetUpInputs:
+        """Make the inputs for ``scene``."""
+        session = self._page.session
+        return SetUpInputs(self._page.server, session, scene, session.status().seed, self._page.post)
+
+
+class SetUpInputs:
     """Number boxes and choices made from the declarations; a button pours anew with all of them."""
 
     def __init__(self, server: viser.ViserServer, session: Session, scene: Scene, seed: int, post: Post) -> None:

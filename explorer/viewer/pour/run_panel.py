@@ -8,10 +8,10 @@ import viser
 
 from explorer.live.messages import SessionState
 from explorer.screen_units import checked
-from explorer.session import Session
-from explorer.viewer.actions import Post
 from explorer.viewer.buttons import add_keys, button_group
+from explorer.viewer.panel import POUR, PageContext, Panel
 from explorer.viewer.slider_hands import SliderHands
+from explorer.viewer.tour import Stop
 
 PLAY_PAUSE, BACK, STEP, RESTART = "Play / pause (space)", "◀ Back (←)", "Step ▶ (→)", "Restart (R)"
 KEYS: dict[str, Any] = {PLAY_PAUSE: "space", RESTART: "R"}
@@ -20,10 +20,21 @@ SLOWEST, FASTEST = 0.05, 2.0
 """Range of the speed slider: simulated seconds per second."""
 
 
-class RunPanel:
+class RunPanel(Panel):
     """Buttons and keys that act on the pour as a whole."""
 
-    def __init__(self, server: viser.ViserServer, session: Session, post: Post) -> None:
+    name, tab = "run", POUR
+    stop = Stop(
+        "The pour",
+        "Bodies fall through the funnel and pile up, computed while you watch. **Space** pauses and plays, the **right "
+        "arrow** goes on by 10 ms and the **left arrow** back, **R** pours anew. Drag to turn the view, scroll to come "
+        "closer.\n\n"
+        "The big number is the angle of repose of the pile as it lies, ± its spread over the flanks. The lines below "
+        "it say what the solver is doing, and how fast compared with real time.",
+    )
+
+    def __init__(self, page: PageContext) -> None:
+        server, session, post = page.server, page.session, page.post
         self._session = session
         acts = {PLAY_PAUSE: self._toggle, BACK: session.step_back, STEP: session.step, RESTART: session.restart}
         button_group(

@@ -2,40 +2,57 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, Generic, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 import viser
 
+from explorer.live.messages import Status
+from explorer.viewer.panel import Now, PageContext, Panel
 from solver.scene import Scene, parameters
 
-Panel = TypeVar("Panel")
+
+class SceneControls(Protocol):
+    """Controls for the parameters of one scene."""
+
+    def show(self, status: Status) -> None:
+        """Follow the solver; called inside ``server.atomic()``."""
 
 
-class SceneBound(Generic[Panel]):
-    """Holds the place of a panel on the page; ``build`` makes it for a scene."""
+Controls = TypeVar("Controls", bound=SceneControls)
 
-    def __init__(self, server: viser.ViserServer, build: Callable[[Scene], Panel], scene: Scene) -> None:
-        self._server, self._build = server, build
+
+class SceneBound(Panel, Generic[Controls]):
+    """Holds the place of controls on the page; :meth:`build` makes them for a scene."""
+
+    def __init__(self, page: PageContext) -> None:
+        self._page, scene = page, page.session.status().scene
         # Without a title a folder is no more than a place that keeps its order among its neighbours.
-        self._place = server.gui.add_folder(None)
-        self._layout: Any = None
+        self._place = page.server.gui.add_folder(None)
+        self._layout: object = None
         self._contents: viser.GuiFolderHandle | None = None
-        self._panel = self.panel(scene)
+        self._controls = self.controls(scene)
 
-    def panel(self, scene: Scene) -> Panel:
-        """The panel for ``scene``: the present one where it fits, otherwise a new one in its place."""
+    def build(self, scene: Scene) -> Controls:
+        """Make the controls for ``scene``."""
+        raise NotImplementedError
+
+    def controls(self, scene: Scene) -> Controls:
+        """Those for ``scene``: the present ones where they fit, otherwise new ones in their place."""
         wanted = layout(scene)
         if wanted == self._layout:
-            return self._panel
+            return self._controls
         if self._contents is not None:
             self._contents.remove()
         with self._place:
-            self._contents = self._server.gui.add_folder(None)
+            self._contents = self._page.server.gui.add_folder(None)
             with self._contents:
-                self._panel = self._build(scene)
+                self._controls = self.build(scene)
         self._layout = wanted
-        return self._panel
+        return self._controls
+
+    def show(self, now: Now) -> None:
+        """Follow the solver, with other controls where the scene asks for them."""
+        self.controls(now.status.scene).show(now.status)
 
 
 def layout(scene: Scene) -> tuple[object, ...]:

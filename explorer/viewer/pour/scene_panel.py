@@ -3,18 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
-
-import viser
 
 from explorer.errors import CommandError
 from explorer.files.mesh_uploads import funnel_source, shaped_source
-from explorer.live.messages import Status
 from explorer.scene.source import SceneSource, rig_source
-from explorer.session import Session
-from explorer.viewer.actions import Post
-from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.buttons import on_upload
+from explorer.viewer.panel import POUR, Now, PageContext, Panel
 from explorer.viewer.small_text import small_html
 from solver.assets import shipped_assets
 from solver.mesh_file import LENGTH_UNITS, SUFFIXES
@@ -29,49 +23,49 @@ UNIT_OF_FILE = "as usual"
 WORKING = "Reading what was asked for; the pour goes on until that is done."
 
 
-class ScenePanel:
-    """Choices of rig and material with a button, uploads of a body's shape and of a funnel; ``folder`` keeps them."""
+class ScenePanel(Panel):
+    """Choices of rig and material with a button, uploads of a body's shape and of a funnel."""
 
-    def __init__(
-        self, server: viser.ViserServer, session: Session, folder: Path, post: Post, background: BackgroundWork
-    ) -> None:
-        self._session, self._folder, self._background = session, folder, background
-        scene = session.status().scene
+    name, tab, title = "scene", POUR, "Rig and material"
+
+    def __init__(self, page: PageContext) -> None:
+        gui, post = page.server.gui, page.post
+        self._session, self._folder, self._background = page.session, page.uploads, page.background
+        scene = page.session.status().scene
         self._generation = 0
         self._shipped = shipped_assets("materials")
-        gui = server.gui
-        with gui.add_folder("Rig and material", expand_by_default=False):
-            self._rig = gui.add_dropdown("Rig", tuple(RIGS), hint="What the bodies are poured into.")
-            self._material = gui.add_dropdown(
-                "Material", (*self._shipped, OWN), hint="Materials that come with the program, or a file of your own."
+        self._rig = gui.add_dropdown("Rig", tuple(RIGS), hint="What the bodies are poured into.")
+        self._material = gui.add_dropdown(
+            "Material", (*self._shipped, OWN), hint="Materials that come with the program, or a file of your own."
+        )
+        self._file = gui.add_text("File", "", hint="Material file (TOML), on the machine that serves this page.")
+        pour = gui.add_button("Pour this", hint="A new pour; changes are then counted from this material and rig.")
+        with gui.add_folder("Shape or funnel from a mesh", expand_by_default=False):
+            self._unit = gui.add_dropdown(
+                "Unit",
+                (UNIT_OF_FILE, *LENGTH_UNITS),
+                hint="Unit of the coordinates in the file; as usual: metres in .glb, millimetres in the others.",
             )
-            self._file = gui.add_text("File", "", hint="Material file (TOML), on the machine that serves this page.")
-            pour = gui.add_button("Pour this", hint="A new pour; changes are then counted from this material and rig.")
-            with gui.add_folder("Shape or funnel from a mesh", expand_by_default=False):
-                self._unit = gui.add_dropdown(
-                    "Unit",
-                    (UNIT_OF_FILE, *LENGTH_UNITS),
-                    hint="Unit of the coordinates in the file; as usual: metres in .glb, millimetres in the others.",
-                )
-                self._body = gui.add_dropdown("Body", _names(scene), hint="The component that gets the shape.")
-                self._upload = gui.add_upload_button(
-                    "Upload a body and pour",
-                    mime_type=",".join(SUFFIXES),
-                    hint="A closed surface (STL, OBJ, PLY, GLB). Its member spheres are fitted first.",
-                )
-                self._funnel = gui.add_upload_button(
-                    "Upload a funnel and pour",
-                    mime_type=",".join(SUFFIXES),
-                    hint="A surface, z up, open at both ends, thin or with walls; its outlet is put over the plate.",
-                )
-            self._doing = gui.add_html("")
+            self._body = gui.add_dropdown("Body", _names(scene), hint="The component that gets the shape.")
+            self._upload = gui.add_upload_button(
+                "Upload a body and pour",
+                mime_type=",".join(SUFFIXES),
+                hint="A closed surface (STL, OBJ, PLY, GLB). Its member spheres are fitted first.",
+            )
+            self._funnel = gui.add_upload_button(
+                "Upload a funnel and pour",
+                mime_type=",".join(SUFFIXES),
+                hint="A surface, z up, open at both ends, thin or with walls; its outlet is put over the plate.",
+            )
+        self._doing = gui.add_html("")
         pour.on_click(lambda _: post(self._pour))
 
         on_upload(self._upload, self._take_shape, post)
         on_upload(self._funnel, self._take_funnel, post)
 
-    def show(self, status: Status) -> None:
-        """Follow a pour that somebody else started; call it inside ``server.atomic()``."""
+    def show(self, now: Now) -> None:
+        """Follow a pour that somebody else started."""
+        status = now.status
         if status.generation != self._generation:
             self._generation = status.generation
             if status.scene.rig.name in RIGS:

@@ -17,8 +17,8 @@ from explorer.live.messages import SessionState, Status
 from explorer.scene.changes import changes
 from explorer.scene.meshes import scene_height
 from explorer.session import Session
-from explorer.viewer.actions import Post
 from explorer.viewer.buttons import button_group
+from explorer.viewer.panel import POUR, Now, PageContext, Panel
 from explorer.viewer.pour.readout import OUTCOME_WORDS, STATE_WORDS, angle_of_repose_deg
 from explorer.viewer.scene_nodes import PLATE_RADIUS, SceneNodes
 from explorer.viewer.view import MIDDLE
@@ -32,13 +32,14 @@ DIFFERENCES_SHOWN = 6
 NONE = "None yet. *Pour beside* keeps a pile as it is now, to compare with what you change."
 
 
-class SecondPile:
+class SecondPile(Panel):
     """Controls and nodes of the second pile. ``open_session`` makes the session that it runs in."""
 
-    def __init__(
-        self, server: viser.ViserServer, session: Session, post: Post, open_session: Callable[[], Session] = Session
-    ) -> None:
-        self._server, self._first, self._open = server, session, open_session
+    name, tab, title = "second_pile", POUR, "Second pile"
+
+    def __init__(self, page: PageContext, open_session: Callable[[], Session] = Session) -> None:
+        server, gui = page.server, page.server.gui
+        self._server, self._first, self._open = server, page.session, open_session
         self._second: Session | None = None
         self._nodes: SceneNodes | None = None
         self._drawn: Scene | None = None
@@ -46,15 +47,14 @@ class SecondPile:
         self._kept_for: object = None
         server.scene.add_frame(ROOT, show_axes=False, position=(BESIDE, 0.0, 0.0))
         acts = {"Pour beside": self._pour, "Take away": self.close}
-        with server.gui.add_folder("Second pile", expand_by_default=False):
-            button_group(
-                server.gui,
-                "Second pile",
-                acts,
-                post,
-                hint="The same seed, with the parameters as they are now; it stays so while you change the first pile.",
-            )
-            self._text = server.gui.add_markdown(NONE)
+        button_group(
+            gui,
+            "Second pile",
+            acts,
+            page.post,
+            hint="The same seed, with the parameters as they are now; it stays so while you change the first pile.",
+        )
+        self._text = gui.add_markdown(NONE)
 
     def _pour(self) -> None:
         status = self._first.status()
@@ -70,8 +70,8 @@ class SecondPile:
             self._second = None
             self._remove_nodes()
 
-    def show_bodies(self) -> None:
-        """Draw its newest frame; call it inside ``server.atomic()``, as often as the first pile is drawn."""
+    def draw(self, now: Now) -> None:
+        """Draw its newest frame."""
         if self._second is None:
             return
         status, frame = self._second.status(), self._second.frame()
@@ -83,8 +83,9 @@ class SecondPile:
             self._nodes.show(frame)
             self._nodes.show_gate(status.gate_shut)
 
-    def show(self, first: Status) -> None:
-        """Tell both results, and let time go or stand as in the first; call it inside ``server.atomic()``."""
+    def show(self, now: Now) -> None:
+        """Tell both results, and let time go or stand as in the first."""
+        first = now.status
         second = None if self._second is None else self._second.status()
         moments = None if second is None else (second.state, second.time, first.state, first.time, first.speed)
         if self._second is not None and second is not None and moments != self._kept_for:

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
-from pathlib import Path
-
-import viser
+from collections.abc import Hashable
 
 from doe.record import RecordError
 from explorer.background.result_file import ResultFile
-from explorer.diagnosis.process import RESULT, DiagnosisProcess, Question
+from explorer.diagnosis.process import RESULT, Question
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.files.uploads import kept_measurements
 from explorer.report.diagnosis.answer import verdict_sentence
 from explorer.report.diagnosis.charts import likely
 from explorer.report.diagnosis.wording import chance, feature_label, feature_value, spelled
 from explorer.report.diagnosis_plots import diagnosis_plots
-from explorer.viewer.actions import Post
+from explorer.viewer.panel import DIAGNOSE, SELDOM, Now, PageContext, Panel
 from explorer.viewer.study.candidates import Candidates
 from explorer.viewer.study.plot_view import PlotView
 from explorer.viewer.study.process_view import ProcessView, escaped, waiting_markdown
 from explorer.viewer.study.result_chooser import ResultChooser
 from explorer.viewer.study.stage_table import stages_markdown
+from explorer.viewer.tour import Stop
+from solver.assets import shipped_measurements
 
 FIRST = "trefoil_2"
 """Chosen at first, where it is shipped: the data set of `make diagnose`."""
@@ -36,21 +35,20 @@ EMPTY = (
 )
 
 
-class DiagnosisPanel:
-    """Talks to a :class:`DiagnosisProcess`; ``shipped``: names of data sets to choose from; ``uploads``: the others."""
+class DiagnosisPanel(Panel):
+    """Talks to a :class:`DiagnosisProcess`; data sets to choose from are those shipped, and those uploaded."""
 
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        diagnosis: DiagnosisProcess,
-        shipped: Sequence[str],
-        uploads: Path,
-        post: Post,
-        dark: bool = True,
-    ) -> None:
-        gui = server.gui
+    name, tab, every = "diagnosis", DIAGNOSE, SELDOM
+    stop = Stop(
+        "Diagnose",
+        "The tab **Diagnose** takes measured data and asks which physical effect the declared model lacks, or whether "
+        "nothing is missing. The answer comes with the error on data that were not fitted, before and after.",
+    )
+
+    def __init__(self, page: PageContext) -> None:
+        server, gui, diagnosis, post = page.server, page.server.gui, page.diagnosis, page.post
         self._diagnosis, self._file = diagnosis, ResultFile(RESULT)
-        self._shipped, self._uploads = tuple(shipped), uploads
+        self._shipped, self._uploads = shipped_measurements(), page.uploads
         self._shown: Hashable = None
         gui.add_markdown(
             "Which physical effect do measured data ask for that the declared model lacks, and how sure is that? With "
@@ -60,7 +58,7 @@ class DiagnosisPanel:
         self._data = gui.add_dropdown(
             "Measured data",
             self._offered(),
-            initial_value=FIRST if FIRST in shipped else OWN,
+            initial_value=FIRST if FIRST in self._shipped else OWN,
             hint="Data sets that come with the program, those uploaded in the tab Pour, or a folder of your own.",
         )
         self._folder = gui.add_text(
@@ -72,16 +70,11 @@ class DiagnosisPanel:
         more = {"Resume": self._resume, "Queue": self._queue, "Clear queue": diagnosis.clear_queue}
         self._view = ProcessView(server, "Diagnosis", acts, post, more)
         self._answer = gui.add_markdown("")
-        self._plots = PlotView(server, "Chart", EMPTY, post, dark)
+        self._plots = PlotView(server, "Chart", EMPTY, post)
         self._chooser = ResultChooser(server, "Result", PRESENT, RESULT, post, self._follow)
 
-    @property
-    def dark(self) -> bool:
-        """Whether the charts are for a dark page."""
-        return self._plots.dark
-
-    @dark.setter
-    def dark(self, dark: bool) -> None:
+    def set_dark(self, dark: bool) -> None:
+        """Charts for a dark page, or a light one."""
         self._plots.dark = dark
 
     def _start(self) -> None:
@@ -108,17 +101,14 @@ class DiagnosisPanel:
         data = str(kept_measurements(self._uploads).get(chosen, chosen))
         return Question(data, self._candidates.effects, self._candidates.budget)
 
-    def show(self, notice: str) -> None:
-        """Ask the diagnosis how far it is; ``notice`` is the page's own last message, such as a refused click.
-
-        Call it inside ``server.atomic()``, about twice a second.
-        """
+    def show(self, now: Now) -> None:
+        """Ask the diagnosis how far it is."""
         offered = self._offered()
         if tuple(self._data.options) != offered:
             self._data.options = offered
         status = self._diagnosis.status()
         # How much more is poured, in this stage and after it, is decided by what comes out.
-        text = stages_markdown(status, "diagnosis", "Pours", notice, counted="Known of this stage")
+        text = stages_markdown(status, "diagnosis", "Pours", now.notice, counted="Known of this stage")
         self._view.show(status, text + waiting_markdown(self._diagnosis.waiting()))
         self._chooser.offer(self._diagnosis.finished())
         self._follow()
@@ -129,10 +119,10 @@ class DiagnosisPanel:
         if folder is None:
             folder = self._diagnosis.out or next(iter(self._diagnosis.finished()), None)
         content = self._file.read(folder)
-        now = (folder, self._file.version)
-        if now == self._shown:
+        shown = (folder, self._file.version)
+        if shown == self._shown:
             return
-        self._shown = now
+        self._shown = shown
         try:
             result = None if content is None else DiagnosisResult.from_dict(content)
             answer = "" if result is None else answer_markdown(result)
@@ -143,7 +133,7 @@ class DiagnosisPanel:
             # A folder that somebody named may hold names of effects, answers and conditions that are none.
             answer, plots = f"{escaped(str(folder))}: cannot be shown ({escaped(repr(error))})", {}
         self._answer.content = answer
-        self._plots.offer(plots, now)
+        self._plots.offer(plots, shown)
 
 
 def answer_markdown(result: DiagnosisResult) -> str:

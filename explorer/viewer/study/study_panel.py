@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Hashable, Mapping
 from pathlib import Path
 
-import viser
-
 from doe.record import RecordError
 from doe.stages import planned_runs
 from doe.study import Study, load_study
@@ -14,8 +12,8 @@ from doe.study_result import AnyStudy, PartialStudy, study_from
 from explorer.background.result_file import ResultFile
 from explorer.report.study_plots import study_plots
 from explorer.session import Session
-from explorer.study.process import PARTIAL, RESULT, StudyProcess
-from explorer.viewer.actions import Post
+from explorer.study.process import PARTIAL, RESULT
+from explorer.viewer.panel import CALIBRATE, SELDOM, Now, PageContext, Panel
 from explorer.viewer.study.comparison_panel import ComparisonPanel
 from explorer.viewer.study.order_panel import OrderPanel
 from explorer.viewer.study.plot_view import PlotView
@@ -24,6 +22,7 @@ from explorer.viewer.study.profiler_panel import ProfilerPanel
 from explorer.viewer.study.result_chooser import ResultChooser, title
 from explorer.viewer.study.run_chooser import RunChooser
 from explorer.viewer.study.stage_table import stages_markdown
+from explorer.viewer.tour import Stop
 from solver import Scene, canonical, parameters, with_values
 
 PRESENT = "present or newest study"
@@ -34,26 +33,32 @@ EMPTY = (
 )
 
 
-class StudyPanel:
+class StudyPanel(Panel):
     """Talks to a :class:`StudyProcess`; what a result says is read and drawn by `explorer.report`."""
 
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        study: StudyProcess,
-        name: str,
-        post: Post,
-        session: Session,
-        dark: bool = True,
-    ) -> None:
-        gui = server.gui
-        self._study, self._session = study, session
+    name, tab, every = "study", CALIBRATE, SELDOM
+    stop = Stop(
+        "Calibrate",
+        "The tab **Calibrate** runs a whole study in the background: screening, steepest ascent, response surface, "
+        "optimum, verification. The pour goes on meanwhile, and a cancelled study resumes where it stopped.",
+    )
+
+    @classmethod
+    def offered(cls, page: PageContext) -> bool:
+        """Where the page has a study."""
+        return page.study is not None
+
+    def __init__(self, page: PageContext) -> None:
+        assert page.study is not None
+        server, gui, study, post = page.server, page.server.gui, page.study, page.post
+        self._study, self._session = study, page.session
         loaded = _loaded(study.study_file)
         self._alive, self._over = ResultFile(PARTIAL, RESULT), ResultFile(RESULT, PARTIAL)
         self._shown: Hashable = None
         self._trouble = ""
         self._so_far = ("", "")
-        gui.add_markdown(f"**{escaped(name)}** — screening, steepest ascent, response surface, optimum, verification.")
+        name = escaped(study.study_file.stem)
+        gui.add_markdown(f"**{name}** — screening, steepest ascent, response surface, optimum, verification.")
         self._profile = gui.add_dropdown(
             "Profile",
             (NONE,) if loaded is None else tuple(loaded.profiles),
@@ -64,32 +69,24 @@ class StudyPanel:
         acts = {"Start": self._start, "Pause / go on": self._pause, "Cancel": study.cancel}
         more = {"Resume": study.resume, "Retry": study.retry, "Queue": self._queue, "Clear queue": study.clear_queue}
         self._view = ProcessView(server, "Study", acts, post, more)
-        self._plots = PlotView(server, "Chart", EMPTY, post, dark)
+        self._plots = PlotView(server, "Chart", EMPTY, post)
         self._chooser = ResultChooser(server, "Result", PRESENT, RESULT, post, self._follow)
         with gui.add_folder("Profiler", expand_by_default=False):
             self._profiler = ProfilerPanel(server, post, self._plots.show_anew, self._set_live)
         with gui.add_folder("Runs, poured again", expand_by_default=False):
-            self._runs = RunChooser(server, session, post)
+            self._runs = RunChooser(server, page.session, post)
         with gui.add_folder("Compare two studies", expand_by_default=False):
             self._comparison = ComparisonPanel(server, post)
 
-    @property
-    def dark(self) -> bool:
-        """Whether the charts are for a dark page."""
-        return self._plots.dark
-
-    @dark.setter
-    def dark(self, dark: bool) -> None:
+    def set_dark(self, dark: bool) -> None:
+        """Charts for a dark page, or a light one."""
         self._plots.dark = dark
 
-    def show(self, notice: str) -> None:
-        """Ask the study how far it is; ``notice`` is the page's own last message, such as a refused click.
-
-        Call it inside ``server.atomic()``, about twice a second.
-        """
+    def show(self, now: Now) -> None:
+        """Ask the study how far it is."""
         status = self._study.status()
         stage, line = self._so_far
-        text = stages_markdown(status, "study", "Runs", notice, line if stage == status.stage else "")
+        text = stages_markdown(status, "study", "Runs", now.notice, line if stage == status.stage else "")
         text += waiting_markdown(self._study.waiting())
         if self._trouble:
             text += f"\n\n{escaped(self._trouble)}"
@@ -118,15 +115,15 @@ class StudyPanel:
         file = self._alive if present and self._study.status().alive else self._over
         folder = self._present() if folder is None else folder
         content = file.read(folder)
-        now = (folder, file.version)
-        if now == self._shown:
+        shown = (folder, file.version)
+        if shown == self._shown:
             return
-        self._shown, self._trouble = now, ""
+        self._shown, self._trouble = shown, ""
         try:
             result = None if content is None else study_from(content)
             if present:
                 self._so_far = (result.partial or "", result.line) if isinstance(result, PartialStudy) else ("", "")
-            self._show_result(result, "" if folder is None else title(folder), now)
+            self._show_result(result, "" if folder is None else title(folder), shown)
         except RecordError as error:
             # A folder that somebody named may hold any JSON, also that of another version.
             self._trouble = f"{folder}: cannot be shown ({error})"

@@ -11,7 +11,6 @@ from explorer.live.details import Details
 from explorer.live.frames import Frame
 from explorer.scene.meshes import scene_height
 from explorer.screen_units import InputError
-from explorer.session import Session
 from explorer.viewer.actions import Post
 from explorer.viewer.buttons import ClientAction, add_client_key, client_buttons
 from explorer.viewer.look.camera import go_along
@@ -23,10 +22,12 @@ from explorer.viewer.look.drawn_look import DrawnLook
 from explorer.viewer.look.force_chains import ForceChains
 from explorer.viewer.look.force_panel import ForcePanel
 from explorer.viewer.look.inspector import body_html
-from explorer.viewer.look.look import COMPONENT, in_sight
-from explorer.viewer.look.look_settings import LookSettings
+from explorer.viewer.look.look import in_sight
 from explorer.viewer.look.picking import nearest_hit
+from explorer.viewer.panel import LOOK, Now, PageContext, Panel
 from explorer.viewer.scene_nodes import SceneNodes
+from explorer.viewer.tour import Stop
+from explorer.viewer.view import look_at_height
 from solver.scene import Scene
 
 FOLLOW, RELEASE = "Follow", "Release"
@@ -37,31 +38,35 @@ BEFORE_KEY: Any = "P"
 AFTER_KEY: Any = "N"
 
 
-class LookTab:
-    """Draws the newest frame as the person wants to see it. Call :meth:`show` in the page's loop.
+class LookPanel(Panel):
+    """Draws the newest frame as the person wants to see it, and holds all that is set of that."""
 
-    ``bar`` explains the colours; it stands where it is seen beside every tab.
-    """
+    name, tab = "look", LOOK
+    stop = Stop(
+        "Look closer, and take along",
+        "The tab **Look** colours the bodies by speed, force or neighbours (**C**), draws force chains (**K**), cuts "
+        "the pile open, and tells about a body that you click. **Take along** has the command that repeats what you "
+        "see, tables, pictures, meshes and recordings.",
+    )
 
-    def __init__(self, server: viser.ViserServer, session: Session, bar: viser.GuiHtmlHandle, post: Post) -> None:
-        self._server, self._session = server, session
-        self._settings = LookSettings(post)
-        self._colours = ColourPanel(server, bar, self._settings, QUANTITIES, post)
+    def __init__(self, page: PageContext) -> None:
+        server, session, post = page.server, page.session, page.post
+        self._server, self._session, self._settings = server, session, page.look
+        self._status = session.status()
+        self._scene = self._status.scene
+        self._nodes = SceneNodes(server, self._scene)
+        look_at_height(server, scene_height(self._scene))
+        self._colours = ColourPanel(server, page.colour_bar, self._settings, QUANTITIES, post)
         self._forces, self._chains = ForcePanel(server, self._settings, post), ForceChains(server)
         CutPanel(server, self._settings, post)
         self._on_page = DrawnLook(server)
         self._selected: int | None = None
         self._followers: set[int] = set()
-        self._drawn: tuple[SceneNodes, Frame] | None = None
+        self._drawn: Frame | None = None
         self._chained_for: object = None
         self._told_for: object = None
         CameraPanel(server, post, lambda: scene_height(session.status().scene), self._stay)
         self._add_inspector(post)
-
-    @property
-    def by_component(self) -> bool:
-        """Whether a body's colour says what it is."""
-        return self._settings.look.colour_by == COMPONENT
 
     def _add_inspector(self, post: Post) -> None:
         gui = self._server.gui
@@ -91,21 +96,39 @@ class LookTab:
             origin, direction = event.ray_origin, event.ray_direction
             post(lambda: self.click(np.array(origin, dtype=float), np.array(direction, dtype=float)))
 
-    def show(self, nodes: SceneNodes, frame: Frame, scene: Scene) -> None:
-        """Draw ``frame``; call it inside ``server.atomic()``, as often as the page looks for frames."""
-        look, details = self._settings.look, self._session.details()
-        if self._drawn is None or self._drawn[1].generation != frame.generation:
+    def draw(self, now: Now) -> None:
+        """Draw the newest frame; of a new pour nothing before there is one."""
+        generation, self._status = self._status.generation, now.status
+        if now.status.generation != generation:
+            self._clear(now.status.scene)
+        if now.frame is not None:
+            fresh = self._drawn is None or now.frame.number != self._drawn.number
+            self._show_frame(now.frame)
+            if fresh:
+                self._nodes.show_gate(now.status.gate_shut)
+
+    def _clear(self, scene: Scene) -> None:
+        """Another pour: no bodies yet, and another rig where it has one."""
+        if (scene.bodies, scene.rig) != (self._scene.bodies, self._scene.rig):
+            self._nodes.remove()
+            self._nodes, self._scene, self._drawn = SceneNodes(self._server, scene), scene, None
+            look_at_height(self._server, scene_height(scene))
+        self._nodes.clear()
+
+    def _show_frame(self, frame: Frame) -> None:
+        look, details, nodes = self._settings.look, self._session.details(), self._nodes
+        if self._drawn is None or self._drawn.generation != frame.generation:
             self._release()
         if self._selected is not None and self._selected >= len(frame.component):
             self._release()  # the pour was brought back to before it entered
         self._session.watch(look.needs_details or self._selected is not None, self._selected)
-        self._drawn = nodes, frame
+        self._drawn = frame
         seen = in_sight(frame, look)
         if self._on_page.move(nodes, frame, look, seen):
             self._go_along(frame)
         self._on_page.paint(nodes, frame, look, self._colours.quantity, details, self._selected)
         self._show_chains(frame, seen, details)
-        self._tell(scene, frame, details)
+        self._tell(frame, details)
 
     def _show_chains(self, frame: Frame, seen: Any, details: Details | None) -> None:
         look = self._settings.look
@@ -120,21 +143,21 @@ class LookTab:
         else:
             self._chains.hide()
 
-    def _tell(self, scene: Scene, frame: Frame, details: Details | None) -> None:
+    def _tell(self, frame: Frame, details: Details | None) -> None:
         told = (self._settings.look, self._selected, frame.generation, details.number if details is not None else 0)
         if told == self._told_for:
             return
         self._told_for = told
         self._colours.show(details)
         self._forces.show(details)
-        self._text.content = body_html(scene, frame, details, self._selected)
+        self._text.content = body_html(self._status.scene, frame, details, self._selected)
 
     def click(self, origin: Any, direction: Any) -> None:
         """A click into the scene: its ray [m] meets a body, which is inspected from now on, or none."""
         if self._drawn is None:
             return
-        nodes, frame = self._drawn
-        hit = nearest_hit(nodes.meshes, frame, in_sight(frame, self._settings.look), origin, direction)
+        seen = in_sight(self._drawn, self._settings.look)
+        hit = nearest_hit(self._nodes.meshes, self._drawn, seen, origin, direction)
         if hit != self._selected:
             self._release()
             self._selected = hit
@@ -143,12 +166,11 @@ class LookTab:
         """Inspect the body in sight that entered next (by = 1) or before (-1), around; without one the topmost."""
         if self._drawn is None:
             return
-        _, frame = self._drawn
-        seen = np.flatnonzero(in_sight(frame, self._settings.look))
+        seen = np.flatnonzero(in_sight(self._drawn, self._settings.look))
         if len(seen) == 0:
             raise InputError("no body is in sight")
         if self._selected is None:
-            self._selected = int(seen[np.argmax(frame.position[seen, 2])])
+            self._selected = int(seen[np.argmax(self._drawn.position[seen, 2])])
             return
         place = (
             np.searchsorted(seen, self._selected, side="right") if by > 0 else np.searchsorted(seen, self._selected) - 1
@@ -165,7 +187,7 @@ class LookTab:
             raise InputError("click a body first: there is none to follow")
         self._followers ^= {client.client_id}
         if self._drawn is not None:
-            self._go_along(self._drawn[1])
+            self._go_along(self._drawn)
 
     def _go_along(self, frame: Frame) -> None:
         if self._selected is None or not self._followers:

@@ -1,0 +1,34 @@
+"""The head of the tab "Laboratory", whose panels do what `lab`, `measure`, `design`, `analyse` and `audit` do."""
+
+from __future__ import annotations
+
+from html import escape
+
+from explorer.viewer.panel import LABORATORY, Now, PageContext, Panel
+from explorer.viewer.small_text import small_html
+from explorer.viewer.tour import Stop
+
+
+class LaboratoryPanel(Panel):
+    """What the tab is for, and what is being done in it."""
+
+    name, tab = "laboratory", LABORATORY
+    stop = Stop(
+        "Laboratory",
+        "The tab **Laboratory** works on what you have measured: readings of bench tests, photographs of a pile, a "
+        "filled sheet of runs, the tables of a publication. Shipped examples stand in each list.",
+    )
+
+    def __init__(self, page: PageContext) -> None:
+        self._background = page.bench_work
+        page.server.gui.add_markdown(
+            "From readings, photographs and tables to parameters; single bodies on the solver."
+        )
+        self._state = page.server.gui.add_html("")
+
+    def show(self, now: Now) -> None:
+        """What is being done, or the page's last message."""
+        busy = self._background.busy_with
+        state = small_html(escape(f"Busy {busy}." if busy else now.notice))
+        if self._state.content != state:
+            self._state.content = state

@@ -1,0 +1,96 @@
+"""Recordings of the moving scene: begun, ended and taken along by a person."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import Any
+
+import viser
+
+from explorer.errors import CommandError
+from explorer.files.exports import zipped
+from explorer.logs.recording import recorded_lines
+from explorer.viewer.output.recording_switch import HTML, RRD, RecordingSwitch
+from explorer.viewer.output.send_file import send_file
+from explorer.viewer.panel import TAKE_ALONG, Now, PageContext, Panel
+from explorer.viewer.small_text import small_html
+
+MOST_SENT = 200_000_000
+"""Bytes of a recording that are sent to a browser."""
+START, STOP, DOWNLOAD = "Start", "Stop", "Download"
+
+
+class RecordingPanel(Panel):
+    """Kind, buttons, and where the files are; the page hands its frames to the recording itself."""
+
+    name, tab = "recording", TAKE_ALONG
+
+    def __init__(self, page: PageContext) -> None:
+        self._recording, self._background, gui = page.recording, page.background, page.server.gui
+        gui.add_markdown("**Recording** of the moving scene")
+        self._kind = gui.add_dropdown(
+            "Kind",
+            (RRD, HTML),
+            hint="rerun: bodies, curves, changes, parameters, for `explorer replay`. Web page: the scene alone, one "
+            "file for any browser.",
+        )
+        self._switch = gui.add_button_group(
+            "Record",
+            (START, STOP, DOWNLOAD),
+            hint="Every pour that is begun meanwhile has a file of its own; Download sends several as a ZIP file. "
+            "Recordings stay in the folder named below.",
+        )
+        self._state = gui.add_html("")
+
+        @self._switch.on_click
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None:
+                client, chosen = event.client, str(event.target.value)
+                page.post(lambda: self._record(client, chosen))
+
+    def show(self, now: Now) -> None:
+        """State of the recording, or the page's last message."""
+        state = recording_html(self._recording, self._background.busy_with, now.notice)
+        if self._state.content != state:
+            self._state.content = state
+
+    def close(self) -> None:
+        """End a recording that was begun on the page, with its file whole."""
+        self._recording.close()
+
+    def _record(self, client: Any, chosen: str) -> None:
+        if chosen == START:
+            self._recording.begin(str(self._kind.value))
+        elif chosen == STOP:
+            self._recording.end()
+        elif chosen == DOWNLOAD and client is not None:
+            files = self._recording.files()
+            size = sum(file.stat().st_size for file in files)
+            if size > MOST_SENT:
+                listed = ", ".join(map(str, files))
+                raise CommandError(f"recording: {size / 1e6:.0f} MB are too much to send; fetch {listed}")
+            if len(files) == 1:
+                send_file(client, files[0].name, files[0].read_bytes())
+            else:
+                self._background.start(
+                    "packing the recording",
+                    lambda: zipped({file.name: file for file in files}),
+                    lambda made: send_file(client, f"{files[0].stem}.zip", made),
+                )
+
+
+def recording_html(recording: RecordingSwitch, busy_with: str, notice: str) -> str:
+    """What is being recorded or done, and where the files are."""
+    lines = [notice, f"Busy {busy_with}." if busy_with else ""]
+    pours = recording.pours
+    if recording.running:
+        so_far = f" (pour {len(pours)} of this recording)" if len(pours) > 1 else ""
+        lines.append(f"Recording into {pours[-1].path if pours else recording.path}{so_far}")
+    elif pours:
+        lines += recorded_lines(pours)
+        if len(pours) > 1 and not busy_with:
+            files = recording.files()
+            lines.append(f"Download sends {files[0].name}" if len(files) == 1 else "Download sends all in one ZIP file")
+    elif recording.path is not None and recording.path.is_file():
+        lines.append(f"Recorded: {recording.path}")
+    return small_html("<br>".join(escape(line) for line in lines if line))

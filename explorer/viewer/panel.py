@@ -1,0 +1,133 @@
+"""What a panel of the page is: its protocol, the tabs, what it is made with, and what it is shown.
+
+A new panel is a class in a file of its own and a line in ``panels.py``, or an entry point ``panel.NAME`` of a package.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import viser
+
+from explorer.diagnosis.process import DiagnosisProcess
+from explorer.live.frames import Frame
+from explorer.live.messages import Event, Status
+from explorer.session import Session
+from explorer.study.process import StudyProcess
+from explorer.viewer.actions import Post
+from explorer.viewer.background_work import BackgroundWork
+from explorer.viewer.look.look_settings import LookSettings
+from explorer.viewer.output.recording_switch import RecordingSwitch
+from explorer.viewer.tour import Stop
+
+OFTEN, SELDOM = 0.2, 0.5
+"""Seconds between two looks of a panel: at the pour, and at what runs in the background."""
+
+
+@dataclass(frozen=True)
+class Tab:
+    """A tab of the page; those of the same name and icon are one."""
+
+    name: str
+    icon: viser.IconName
+
+
+POUR = Tab("Pour", viser.Icon.PLAYER_PLAY)
+LOOK = Tab("Look", viser.Icon.EYE)
+TAKE_ALONG = Tab("Take along", viser.Icon.DOWNLOAD)
+CALIBRATE = Tab("Calibrate", viser.Icon.TARGET)
+DIAGNOSE = Tab("Diagnose", viser.Icon.STETHOSCOPE)
+LABORATORY = Tab("Laboratory", viser.Icon.FLASK)
+TABS = (POUR, LOOK, TAKE_ALONG, CALIBRATE, DIAGNOSE, LABORATORY)
+"""In order; another one that a panel names comes after them."""
+
+
+@dataclass(frozen=True)
+class PageContext:
+    """What panels are made with, and what they have in common."""
+
+    server: viser.ViserServer
+    session: Session
+    post: Post
+    study: StudyProcess | None
+    """None: the page has no study."""
+    diagnosis: DiagnosisProcess
+    data: Path
+    """Folder of what the user made: presets, uploads, recordings."""
+    colour_bar: viser.GuiHtmlHandle
+    """Explains the colours of bodies, beside every tab."""
+
+    @property
+    def uploads(self) -> Path:
+        """Folder of the files that browsers sent."""
+        return self.data / "uploads"
+
+    @cached_property
+    def background(self) -> BackgroundWork:
+        """Work about the pour and its files that takes seconds."""
+        return BackgroundWork(self.post)
+
+    @cached_property
+    def bench_work(self) -> BackgroundWork:
+        """Work of the laboratory, beside the other."""
+        return BackgroundWork(self.post)
+
+    @cached_property
+    def recording(self) -> RecordingSwitch:
+        """Recordings that are begun and ended on the page."""
+        return RecordingSwitch(self.server, self.data / "recordings", self.background)
+
+    @cached_property
+    def look(self) -> LookSettings:
+        """How the pour is drawn."""
+        return LookSettings(self.post)
+
+
+@dataclass(frozen=True)
+class Now:
+    """What there is to show in one turn of the page's loop."""
+
+    status: Status
+    frame: Frame | None = None
+    """The newest one; None before a body has entered."""
+    events: Sequence[Event] = ()
+    notice: str = ""
+    """The page's own last message, such as a refused click."""
+
+
+class Panel:
+    """A block of controls; derive from this one. What a panel leaves as it is here does nothing."""
+
+    name: str
+    tab: Tab
+    title: str = ""
+    """Of the folder in the tab that it stands in; without one it stands in the tab itself."""
+    folded: bool = True
+    """Whether that folder is closed at first."""
+    every: float = OFTEN
+    """Seconds between two calls of :meth:`show`; where they are no more than ``OFTEN``, also after every change."""
+    stop: Stop | None = None
+    """Window of the guided tour that leads to it."""
+
+    def __init__(self, page: PageContext) -> None:
+        """Make the controls; tab and folder are open."""
+
+    @classmethod
+    def offered(cls, page: PageContext) -> bool:
+        """Whether this page has it."""
+        return True
+
+    def draw(self, now: Now) -> None:
+        """Move what moves, and miss nothing: some 30 times a second, inside ``server.atomic()``."""
+
+    def show(self, now: Now) -> None:
+        """Tell what is new, inside ``server.atomic()``; what is shown already is left alone."""
+
+    def set_dark(self, dark: bool) -> None:
+        """Follow the page: dark, or light."""
+
+    def close(self) -> None:
+        """End what the panel has started."""

@@ -1,0 +1,57 @@
+"""The panels of the page in their order: those of this program, then those of installed packages."""
+
+from __future__ import annotations
+
+from explorer.viewer.laboratory.audit_panel import AuditPanel
+from explorer.viewer.laboratory.bench_panel import BenchPanel
+from explorer.viewer.laboratory.design_panel import DesignPanel
+from explorer.viewer.laboratory.laboratory_panel import LaboratoryPanel
+from explorer.viewer.laboratory.photograph_panel import PhotographPanel
+from explorer.viewer.laboratory.rig_panel import RigPanel
+from explorer.viewer.look.look_panel import LookPanel
+from explorer.viewer.output.engine_export import EngineExport
+from explorer.viewer.output.output_panel import OutputPanel
+from explorer.viewer.output.recording_panel import RecordingPanel
+from explorer.viewer.panel import Panel
+from explorer.viewer.pour.changes_panel import ChangesPanel
+from explorer.viewer.pour.chart import Chart
+from explorer.viewer.pour.live_panel import LivePanel
+from explorer.viewer.pour.motion_chart import MotionChart
+from explorer.viewer.pour.outline_panel import OutlinePanel
+from explorer.viewer.pour.readout import Readout
+from explorer.viewer.pour.restart_panel import RestartPanel
+from explorer.viewer.pour.run_panel import RunPanel
+from explorer.viewer.pour.scene_panel import ScenePanel
+from explorer.viewer.pour.second_pile import SecondPile
+from explorer.viewer.study.diagnosis_panel import DiagnosisPanel
+from explorer.viewer.study.study_panel import StudyPanel
+from solver.plugins import Registry, derived_from
+
+PANELS: Registry[type[Panel]] = Registry(
+    "panel",
+    (
+        RunPanel,
+        Readout,
+        Chart,
+        MotionChart,
+        OutlinePanel,
+        LivePanel,
+        ChangesPanel,
+        ScenePanel,
+        RestartPanel,
+        SecondPile,
+        LookPanel,
+        OutputPanel,
+        EngineExport,
+        RecordingPanel,
+        StudyPanel,
+        DiagnosisPanel,
+        LaboratoryPanel,
+        BenchPanel,
+        RigPanel,
+        PhotographPanel,
+        DesignPanel,
+        AuditPanel,
+    ),
+    derived_from(Panel),
+)
