@@ -5,7 +5,7 @@ The command writes ``progress.jsonl`` into its output folder, one object per eve
     {"time": seconds, "stage": text, "done": runs, "planned": runs, "eta_s": seconds or null, "line": text or null}
 
 and, where the command tells it, "stages": {name: [done, planned]} and "run", one run that ended
-(`explorer.study.progress`).
+(`explorer.background.progress`).
 """
 
 from __future__ import annotations

@@ -6,8 +6,10 @@ One :class:`ProgressEvent` per line. The command tells a person at the same time
 from __future__ import annotations
 
 import json
+import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -101,6 +103,126 @@ class ProgressWriter:
         elif self.elapsed - self._said > EVERY:
             self._said = self.elapsed
             self._say(f"[{self.elapsed:6.0f} s] {state}")
+
+
+class RunProgress:
+    """Progress of a study: counts the runs of all its stages, and estimates the time left from their rate."""
+
+    def __init__(
+        self,
+        file: Path,
+        planned: dict[str, int],
+        say: Callable[[str], None],
+        terminal: bool,
+        clock: Callable[[], float] = time.perf_counter,
+    ) -> None:
+        self._writer, self._planned, self._clock = ProgressWriter(file, say, terminal, clock), dict(planned), clock
+        self._done = dict.fromkeys(planned, 0)
+        self._fresh, self._working = 0, 0.0
+        self._last: float | None = None
+
+    @property
+    def elapsed(self) -> float:
+        """Seconds since the start."""
+        return self._writer.elapsed
+
+    def compiling(self) -> None:
+        """The study has begun; the first run shows itself only after the solver is compiled."""
+        self._tell("compiling the solver", None)
+
+    def run(self, stage: str, run: Run, remaining: int) -> None:
+        """A run has ended; ``remaining`` replicates of its stage are still to come."""
+        self._done[stage] = self._done.get(stage, 0) + 1
+        self._planned[stage] = self._done[stage] + remaining
+        if not run.reused:
+            now = self._clock()
+            self._working += run.wall_s if self._last is None else now - self._last
+            self._last = now
+            self._fresh += 1
+        self._tell(stage, None, TriedRun.of(stage, run))
+
+    def went_on(self) -> None:
+        """The study was paused and goes on: the time since the last run says nothing about the rate."""
+        if self._last is not None:
+            self._last = self._clock()
+
+    def stage(self, stage: str, line: str) -> None:
+        """A stage has ended with this finding."""
+        self._tell(stage, line)
+
+    def eta_s(self) -> float | None:
+        """Seconds left at the rate so far; None before the first run that was really made."""
+        if not self._fresh:
+            return None
+        rate = self._fresh / max(1e-9, self._working)
+        return (sum(self._planned.values()) - sum(self._done.values())) / rate
+
+    def _tell(self, stage: str, line: str | None, run: TriedRun | None = None) -> None:
+        done, planned, eta = sum(self._done.values()), sum(self._planned.values()), self.eta_s()
+        event = ProgressEvent(
+            time=self.elapsed,
+            stage=stage,
+            done=done,
+            planned=planned,
+            eta_s=eta,
+            line=line,
+            stages={name: (self._done.get(name, 0), count) for name, count in self._planned.items()},
+            run=run,
+        )
+        left = "" if eta is None else f", about {eta / 60:.0f} min left" if eta > 90 else f", about {eta:.0f} s left"
+        self._writer.tell(event, f"{stage}: {done} of {planned} runs{left}", line and f"{stage}: {line}")
+
+
+class PourProgress:
+    """Progress of a diagnosis: which part of its loop runs, and how many pours that still needs."""
+
+    def __init__(self, file: Path, say: Callable[[str], None], terminal: bool) -> None:
+        self._writer = ProgressWriter(file, say, terminal)
+        self._done, self._part, self._part_began = 0, "", 0.0
+
+    @property
+    def elapsed(self) -> float:
+        """Seconds since the start."""
+        return self._writer.elapsed
+
+    def compiling(self) -> None:
+        """The diagnosis has begun; the first pour shows itself only after the solver is compiled."""
+        self._tell("compiling the solver", 0, None, None)
+
+    def pour(self, part: str, left: int, ended: Ended) -> None:
+        """A pour of ``part`` has ended so; ``left`` are still to come."""
+        if part != self._part:
+            self._part, self._part_began, self._done = part, self.elapsed, 0
+        self._done += 1
+        eta = left * (self.elapsed - self._part_began) / self._done if self._done > 1 else None
+        self._tell(part, left, eta, None, None if ended.valid else TriedRun.of(part, ended))
+
+    def stage(self, line: str) -> None:
+        """A part has ended with this finding."""
+        self._tell(self._part, 0, None, line)
+
+    def _tell(self, part: str, left: int, eta: float | None, line: str | None, run: TriedRun | None = None) -> None:
+        event = ProgressEvent(
+            time=self.elapsed,
+            stage=part,
+            done=self._done,
+            planned=self._done + left,
+            eta_s=eta,
+            line=line,
+            run=run,
+        )
+        about = "" if eta is None else f", about {eta:.0f} s"
+        self._writer.tell(event, f"{part}: {left} pours left{about}", line)
+
+
+@contextmanager
+def told_of_pauses(went_on: Callable[[], None]) -> Iterator[None]:
+    """Call ``went_on`` whenever this process goes on after a pause (SIGCONT); main thread only."""
+    before = signal.signal(signal.SIGCONT, lambda number, frame: went_on())
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGCONT, before)
 
 
 @dataclass(frozen=True)

@@ -25,10 +25,9 @@ from doe.measurement.load import load_measurement
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.summaries import summaries
 from doe.store import Store, default_store
-from explorer.background.progress import PROGRESS
+from explorer.background.progress import PROGRESS, PourProgress
 from explorer.diagnosis.corrected import corrected_toml, study_toml
 from explorer.diagnosis.next_folder import read_next, write_next
-from explorer.diagnosis.progress import PourProgress
 from explorer.diagnosis.result import (
     BeforeAndAfter,
     DataRead,

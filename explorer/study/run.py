@@ -19,13 +19,12 @@ from doe.stages import planned_runs
 from doe.store import Store, default_store
 from doe.study import TRIES, Study, load_study, with_profile
 from doe.study_result import PouredBody, RunCounts, StudyDescription, StudyResult, Timing
-from explorer.background.progress import PROGRESS
+from explorer.background.progress import PROGRESS, RunProgress, told_of_pauses
 from explorer.errors import CommandError
 from explorer.files.run_result import versions
 from explorer.files.whole_file import write_whole
 from explorer.report import write_report
 from explorer.study.partial_result import PartialResult
-from explorer.study.progress import Progress, told_of_pauses
 from solver import Crew
 from solver.arch import chosen
 from solver.observables.made_up import estimator_bias
@@ -61,7 +60,7 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> float:
     store = Store(path)
     order.out.mkdir(parents=True, exist_ok=True)
     say(f"{study.name}, profile {profile.name}: {sum(planned.values())} runs of {1e3 * profile.mass:g} g; store {path}")
-    progress = Progress(order.out / PROGRESS, planned, say, terminal=sys.stdout.isatty())
+    progress = RunProgress(order.out / PROGRESS, planned, say, terminal=sys.stdout.isatty())
     progress.compiling()
     partial = PartialResult(order.out, StudyDescription.of(study, profile, order.tries))
     follower = PartialStages(partial.show)

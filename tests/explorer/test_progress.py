@@ -7,7 +7,7 @@ import signal
 import pytest
 
 from doe.runs import Setting
-from explorer.study.progress import Progress, told_of_pauses
+from explorer.background.progress import RunProgress, told_of_pauses
 from tests.doe.formula_runner import FormulaRunner
 
 
@@ -23,7 +23,7 @@ RUNS = [run for row in FormulaRunner(lambda values: 20.0, jam=0.3).run("scan", [
 
 
 def progress_of(tmp_path, clock):
-    return Progress(tmp_path / "progress.jsonl", {"pilot": 4, "scan": 12}, lambda line: None, False, clock)
+    return RunProgress(tmp_path / "progress.jsonl", {"pilot": 4, "scan": 12}, lambda line: None, False, clock)
 
 
 def events(tmp_path):
