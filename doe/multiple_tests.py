@@ -44,10 +44,10 @@ def holm(p_values: FloatArray) -> FloatArray:
     """Return step-down adjusted p values (Holm 1979, Scand. J. Stat. 6:65), shape of the input; NaN stays
     NaN.
     """
-    adjusted = np.full(p_values.shape, np.nan)
-    order = [int(i) for i in np.argsort(p_values) if not np.isnan(p_values[i])]
-    running = 0.0
-    for rank, i in enumerate(order):
-        running = max(running, min(1.0, (len(order) - rank) * float(p_values[i])))
-        adjusted[i] = running
+    # Imported where they are used: statsmodels takes a second to load, and a page or a plan needs none of it.
+    from statsmodels.stats.multitest import multipletests
+
+    adjusted, known = np.full(p_values.shape, np.nan), ~np.isnan(p_values)
+    if known.any():
+        adjusted[known] = multipletests(p_values[known], method="holm")[1]
     return adjusted

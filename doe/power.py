@@ -2,7 +2,7 @@
 
 Notation: sigma = standard deviation of one run; SE = standard error of the effect under test; an effect delta
 is tested by t = estimate/SE against Student's t, and under delta that t is noncentral with shift delta/SE.
-Source: Cohen 1988, Statistical Power Analysis, ch. 2; the same numbers as statsmodels' TTestIndPower.
+Source: Cohen 1988, Statistical Power Analysis, ch. 2; computed by statsmodels.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
-from scipy import optimize, stats
+from scipy import optimize
 
 from doe.errors import StatisticsError
 from doe.surface import second_order_terms
@@ -27,10 +27,11 @@ def t_test_power(effect: float, standard_error: float, df: float, alpha: float =
 
     `effect` and `standard_error` share one unit; `df` are the degrees of freedom of the error estimate.
     """
-    limit = stats.t.ppf(1 - alpha / 2, df)
+    from statsmodels.stats.power import ttest_power
+
     shift = abs(effect) / standard_error
-    beyond, opposite = stats.nct.sf(limit, df, shift), stats.nct.cdf(-limit, df, shift)
-    # scipy returns NaN for the far tail once it underflows; that tail is then zero to double precision.
+    beyond, opposite = (ttest_power(shift, 1, alpha / 2, df, alternative=side) for side in ("larger", "smaller"))
+    # The far tail is NaN once it underflows; it is then zero to double precision.
     return float(min(1.0, beyond + (opposite if np.isfinite(opposite) else 0.0)))
 
 

@@ -37,6 +37,7 @@ from doe.screening_result import (
     Screening,
     Selected,
 )
+from doe.surface import least_squares
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -71,11 +72,12 @@ def analyse_screening(
 
     complete = bool(valid.all())
     used = np.ones_like(is_dummy) if complete else ~is_dummy
-    estimator = 2 * np.linalg.pinv(with_intercept(levels[:, used]))[1:]
+    found = least_squares(with_intercept(levels[:, used]), means)
+    estimator = 2 * found.model.pinv_wexog[1:]
     effects = np.full(len(names), np.nan)
-    effects[used] = estimator @ means
+    effects[used] = 2 * found.params[1:]
     norms = np.full(len(names), np.nan)
-    norms[used] = (estimator**2).sum(axis=1)
+    norms[used] = 4 * np.diag(found.normalized_cov_params)[1:]
     sums = effects**2 / norms
     total = float(means @ means)
 

@@ -15,6 +15,7 @@ from scipy import stats
 from doe.multiple_tests import holm
 from doe.power import smallest_effect
 from doe.screening_result import EffectTest, ErrorEstimate
+from doe.surface import least_squares
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -32,8 +33,7 @@ def error_of_dummies(
     df = model.shape[0] - model.shape[1]
     if df < 1:
         return None, math.nan
-    residual = means - model @ np.linalg.lstsq(model, means, rcond=None)[0]
-    sigma = math.sqrt(float(residual @ residual) / df)
+    sigma = math.sqrt(float(least_squares(model, means).mse_resid))
     return error_estimate("dummies", sigma, df, sigma * np.sqrt(norms), alpha), sigma
 
 
@@ -98,10 +98,5 @@ def unexplained_by_factors(
     df = model.shape[0] - model.shape[1]
     if df < 1 or df_pure < 1 or sigma == 0:
         return math.nan, math.nan
-    weight = np.sqrt(counts)
-    residual = (
-        weight * means
-        - (weight[:, None] * model) @ np.linalg.lstsq(weight[:, None] * model, weight * means, rcond=None)[0]
-    )
-    f = float(residual @ residual) / df / sigma**2
+    f = float(least_squares(model, means, counts).mse_resid) / sigma**2
     return f, float(stats.f.sf(f, df, df_pure))

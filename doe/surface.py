@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -109,11 +110,11 @@ def fit_surface(
     df = observed.size - size
     if df < 1:
         raise StatisticsError(f"responses: {observed.size} valid runs leave no error; {size + 1} are needed")
-    fitted = fitted_coefficients(model, observed)
-    predicted = model @ fitted
-    inverse: FloatArray = np.linalg.inv(model.T @ model).astype(np.float64)
+    found = least_squares(model, observed)
+    predicted = model @ found.params + observed[0]
     coefficients, padded = np.zeros(included.size), np.zeros((included.size, included.size))
-    coefficients[included], padded[np.ix_(included, included)] = fitted, inverse
+    coefficients[included], padded[np.ix_(included, included)] = found.params, found.normalized_cov_params
+    coefficients[0] += observed[0]
     return Surface(
         region=region,
         terms=term_names(region.names),
@@ -121,14 +122,14 @@ def fit_surface(
         coefficients=coefficients,
         coefficients_natural=natural_coefficients(coefficients, region),
         information_inverse=padded,
-        mse=float(((observed - predicted) ** 2).sum()) / df,
+        mse=float(found.mse_resid),
         df_residual=df,
         points=points,
         row_of_run=row.astype(np.int64),
         point_of_run=point_of_run.reshape(-1).astype(np.int64),
         observed=observed,
         predicted=predicted,
-        leverage=np.einsum("ni,ij,nj->n", model, inverse, model),
+        leverage=found.get_influence().hat_matrix_diag,
         missing_runs=int(values.size - observed.size),
     )
 
@@ -147,8 +148,20 @@ def included_terms(names: Sequence[str], terms: Sequence[str] | None) -> BoolArr
     return np.array([k == 0 or term in terms for k, term in enumerate(known)])
 
 
+def least_squares(model: FloatArray, observed: FloatArray, weights: FloatArray | None = None) -> Any:
+    """Return statsmodels' results of (weighted) least squares on a model matrix, (n, p) with ones first, and n values.
+
+    The first observation is subtracted before, so that a constant response gives exact zeros.
+    """
+    # Imported where it is used: statsmodels takes a second to load, and a page needs none of it.
+    from statsmodels.regression.linear_model import OLS, WLS
+
+    shifted = observed - observed[0]
+    return (OLS(shifted, model) if weights is None else WLS(shifted, model, weights)).fit()
+
+
 def fitted_coefficients(model: FloatArray, observed: FloatArray) -> FloatArray:
-    """Return least-squares coefficients; observed of shape (n,) or (n, sets) gives (p,) or (p, sets).
+    """Return least-squares coefficients of many responses at once; observed of shape (n, sets) gives (p, sets).
 
     The first observation is subtracted before and returned to the intercept (the first term) after, so that a
     constant response gives exact zeros elsewhere.

@@ -11,15 +11,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
 from doe.record import Record
-from doe.surface import Surface, second_order_terms
+from doe.surface import Surface, least_squares, second_order_terms
 
 FloatArray = npt.NDArray[np.float64]
+FULL = 1 - 1e-9
+"""A leverage above this is one: the run is fitted exactly, and nothing can be said against it."""
 
 
 @dataclass(frozen=True)
@@ -71,21 +74,25 @@ def analyse_surface(surface: Surface) -> SurfaceAnova:
 
     A response without variation gives NaN for every ratio, and a note.
     """
+    model = second_order_terms(surface.points)[:, surface.included]
+    found = least_squares(model, surface.observed)
     residuals = surface.observed - surface.predicted
-    n, p = surface.observed.size, int(surface.included.sum())
+    n, p = model.shape
     mean = float(surface.observed.mean())
-    residual_ss = float(residuals @ residuals)
+    residual_ss = float(found.ssr)
     total_ss = _total_sum_of_squares(surface.observed)
     model_ss = max(0.0, total_ss - residual_ss)
     mse = surface.mse if total_ss > 0 else 0.0
     model_row = _tested("model", model_ss, p - 1, mse, surface.df_residual)
     chosen = np.flatnonzero(surface.included)[1:]
-    term_ss = surface.coefficients[chosen] ** 2 / np.diag(surface.information_inverse)[chosen]
+    term_ss = found.params[1:] ** 2 / np.diag(found.normalized_cov_params)[1:]
     term_rows = [
         _tested(surface.terms[k], float(ss) if total_ss > 0 else 0.0, 1, mse, surface.df_residual)
         for k, ss in zip(chosen, term_ss, strict=True)
     ]
-    press = _press(surface.leverage, residuals)
+    influence = found.get_influence()
+    # A run that is indispensable to the fit cannot be predicted from the others.
+    press = math.inf if (surface.leverage > FULL).any() else float((influence.resid_press**2).sum())
     predicted_r2 = _ratio(total_ss - press, total_ss)
     rows = (
         model_row,
@@ -107,7 +114,7 @@ def analyse_surface(surface: Surface) -> SurfaceAnova:
         press=press,
         adequate_precision=_ratio(float(np.ptp(surface.predicted)), math.sqrt(p * mse / n)),
         coefficient_standard_errors=np.sqrt(mse * np.diag(surface.information_inverse)),
-        studentized_residuals=_externally_studentized(residuals, surface.leverage, mse, surface.df_residual),
+        studentized_residuals=_externally_studentized(influence, mse, surface.df_residual),
         better_than_noise=better,
         notes=_notes(rows, total_ss, predicted_r2, better, bool(surface.included.all())),
     )
@@ -130,7 +137,10 @@ def _tested(source: str, sum_of_squares: float, df: int, error_ms: float, error_
 
 
 def _lack_of_fit(surface: Surface, residual_ss: float) -> tuple[AnovaRow, ...]:
-    """Return the rows "lack_of_fit" and "pure_error" as far as they have degrees of freedom."""
+    """Return the rows "lack_of_fit" and "pure_error" as far as they have degrees of freedom.
+
+    By hand: in exact replicates what is left of them by rounding must not become an error.
+    """
     counts = np.bincount(surface.point_of_run)
     means = np.bincount(surface.point_of_run, weights=surface.observed) / counts
     within = surface.observed - means[surface.point_of_run]
@@ -143,13 +153,6 @@ def _lack_of_fit(surface: Surface, residual_ss: float) -> tuple[AnovaRow, ...]:
     if pure_df > 0:
         rows.append(AnovaRow("pure_error", pure_ss, pure_df, pure_ss / pure_df, math.nan, math.nan))
     return tuple(rows)
-
-
-def _press(leverage: FloatArray, residuals: FloatArray) -> float:
-    """Return sum (e_i/(1 - h_i))^2; infinite when a run is indispensable to the fit (h_i = 1)."""
-    if (leverage > 1 - 1e-9).any():
-        return math.inf
-    return float(((residuals / (1 - leverage)) ** 2).sum())
 
 
 def _press_by_row(surface: Surface, residuals: FloatArray) -> float:
@@ -170,15 +173,17 @@ def _press_by_row(surface: Surface, residuals: FloatArray) -> float:
     return total
 
 
-def _externally_studentized(residuals: FloatArray, leverage: FloatArray, mse: float, df: int) -> FloatArray:
-    """Return e_i/sqrt(s_(i)^2 (1 - h_i)) with s_(i)^2 estimated without run i; NaN where that is not
+def _externally_studentized(influence: Any, mse: float, df: int) -> FloatArray:
+    """Return r_i sqrt((df - 1)/(df - r_i^2)), the residuals by an error that is estimated without run i.
+
+    The same as statsmodels' `resid_studentized_external`, which fits the model once per run. NaN where that is not
     defined.
     """
     if mse == 0 or df < 2:
-        return np.full(residuals.shape, np.nan)
+        return np.full(influence.nobs, np.nan)
     with np.errstate(invalid="ignore", divide="ignore"):
-        without = (df * mse - residuals**2 / (1 - leverage)) / (df - 1)
-        return np.asarray(residuals / np.sqrt(without * (1 - leverage)))
+        internal = influence.resid_studentized_internal
+        return np.asarray(internal * np.sqrt((df - 1) / (df - internal**2)))
 
 
 def _notes(

@@ -15,12 +15,10 @@ import numpy.typing as npt
 from scipy import stats
 
 from doe.record import Record
-from doe.surface import Surface
-from doe.surface_anova import SurfaceAnova
+from doe.surface import Surface, least_squares, second_order_terms
+from doe.surface_anova import FULL, SurfaceAnova
 
 FloatArray = npt.NDArray[np.float64]
-FULL = 1 - 1e-9
-"""A leverage above this is one: the run is fitted exactly, and nothing can be said against it."""
 
 
 @dataclass(frozen=True)
@@ -48,22 +46,27 @@ class Diagnostics(Record):
 
 def diagnose_fit(surface: Surface, anova: SurfaceAnova) -> Diagnostics:
     """Return the diagnostics of every run of a fitted surface."""
-    h, e = surface.leverage, surface.observed - surface.predicted
-    n, p = e.size, int(surface.included.sum())
+    model = second_order_terms(surface.points)[:, surface.included]
+    influence = least_squares(model, surface.observed).get_influence()
+    h, (n, p) = surface.leverage, model.shape
     testable = (h < FULL) & (surface.mse > 0)
-    free = np.where(testable, 1 - h, np.nan)
     with np.errstate(invalid="ignore", divide="ignore"):
-        internal = e / np.sqrt(surface.mse * free)
-        odds = h / free
-    external = np.where(testable, anova.studentized_residuals, np.nan)
-    cooks = internal**2 * odds / p
+        internal, cooks, external = (
+            np.where(testable, values, np.nan)
+            for values in (
+                influence.resid_studentized_internal,
+                influence.cooks_distance[0],
+                anova.studentized_residuals,
+            )
+        )
+        odds = h / np.where(testable, 1 - h, np.nan)
     df = surface.df_residual - 1
     limit = float(stats.t.ppf(1 - 0.025 / n, df)) if df > 0 else math.nan
     known = internal[np.isfinite(internal)]
     # Three values are the least that the test takes; equal ones carry no shape.
     normal = known.size >= 3 and float(np.ptp(known)) > 0
     return Diagnostics(
-        residual=e,
+        residual=surface.observed - surface.predicted,
         leverage=h,
         internal=internal,
         external=external,

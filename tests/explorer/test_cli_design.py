@@ -85,7 +85,8 @@ def test_table_8_gives_table_9_the_papers_equation_and_a_solution(tmp_path):
     assert single["reached"]
     assert single["predicted"] == pytest.approx(24.68, abs=1e-5)
     assert single["unidentified"] == ["A", "B", "C"]
-    assert single["reachable_high"] == pytest.approx(28.34, abs=5e-3)
+    # 28.335 by the printed angles: half a unit of the last digit, and rounding.
+    assert single["reachable_high"] == pytest.approx(28.34, abs=5e-3 + 1e-9)
     assert single["solution_share"] == pytest.approx([0.77, 0.76, 1.0], abs=5e-3)
     canonical = result["analysis"]["model"]["canonical"]
     assert (canonical["kind"], canonical["inside"]) == ("saddle", False)
