@@ -1,6 +1,6 @@
 """A laboratory's CSV file → rows in SI, with one clear line for whatever is wrong.
 
-First the names of the columns, then one row per reading; cells and numbers as `doe.csv_table` reads them. ``#`` starts
+First the names of the columns, then one row per reading; cells and numbers as `doe.table_file` reads them. ``#`` starts
 a comment: a reading behind it is left out and stays visible. Rows are counted as a spreadsheet does, the first line of
 the file being row 1.
 """
@@ -13,9 +13,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from doe.csv_table import csv_table
 from doe.laboratory.columns import Column, Layout
-from doe.text_file import read_text
+from doe.table_file import read_table as read_cells
 
 MOST_BYTES = 50_000_000
 NAME = re.compile(r"[A-Za-z0-9_-]{1,60}")
@@ -59,8 +58,7 @@ class Table:
 
 def read_table(path: Path, layout: Layout) -> Table:
     """The readings in ``path``; LaboratoryError in one line naming file, row and column."""
-    text = read_text(path, MOST_BYTES, LaboratoryError)
-    found = csv_table(text, lambda row, what: LaboratoryError(f"{path}, row {row}: {what}"), trailing_comments=True)
+    found = read_cells(path, MOST_BYTES, LaboratoryError, ", row {}", comments=True)
     if not found.rows:
         raise LaboratoryError(f"{path}: no rows; allowed: {_columns_text(layout)}, and readings below")
     (line, header), *readings = found.rows

@@ -1,7 +1,8 @@
 """A condition's table in long form: replicate,observable,x,value[,unit] → one array per observable.
 
-Cells and numbers as `doe.csv_table` reads them; ``#`` starts a comment. Numbers are SI, angles degrees, unless a column
-``unit`` names another unit of the value. A scalar has an empty x, a curve a place. Missing rows are missing data (NaN).
+Cells and numbers as `doe.table_file` reads them; ``#`` starts a comment. Numbers are SI, angles degrees, unless a
+column ``unit`` names another unit of the value. A scalar has an empty x, a curve a place. Missing rows are missing data
+(NaN).
 """
 
 from __future__ import annotations
@@ -14,9 +15,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from doe.csv_table import csv_table
 from doe.errors import MeasurementError
-from doe.text_file import read_text
+from doe.table_file import read_table
 from solver import ParameterError, all_names, named, parse_quantity
 
 Array = npt.NDArray[np.float64]
@@ -72,8 +72,7 @@ def read_long_form(path: Path) -> LongForm:
 
 def _rows(path: Path) -> Iterator[Row | str]:
     """Rows in order; of a row with an unknown observable its name."""
-    text = read_text(path, MOST_BYTES, MeasurementError)
-    table = csv_table(text, lambda line, what: MeasurementError(f"{path}:{line}: {what}"), trailing_comments=True)
+    table = read_table(path, MOST_BYTES, MeasurementError, ":{}", comments=True)
     if not table.rows:
         return
     (line, header), *rows = table.rows

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from doe.audit import Printed, printed, printed_or_none
-from doe.csv_table import csv_table
 from doe.errors import AuditError
-from doe.text_file import read_text
+from doe.table_file import read_table as read_cells
 
 MOST_BYTES = 2_000_000
 """Bytes of one file; published tables hold thousands."""
@@ -67,8 +66,7 @@ def read_table(folder: Path, name: str) -> Table:
     if Path(name).name != name or not name:
         raise AuditError(f"{name!r} is not the name of a file beside study.toml")
     path = folder / name
-    text = read_text(path, MOST_BYTES, AuditError)
-    table = csv_table(text, lambda line, what: AuditError(f"{path}, line {line}: {what}"))
+    table = read_cells(path, MOST_BYTES, AuditError)
     if len(table.rows) < 2:
         raise AuditError(f"{path}: a line of column names and at least one row are needed")
     (_, header), *rows = table.rows

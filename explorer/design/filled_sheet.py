@@ -1,7 +1,7 @@
 """Reading a filled sheet: from this program, from a spreadsheet that saved it, or from any CSV with a factors file.
 
-Cells and numbers as `doe.csv_table` reads them. A cell that cannot be read is named by its line in the file (the row of
-a spreadsheet) and its column.
+Cells and numbers as `doe.table_file` reads them. A cell that cannot be read is named by its line in the file (the row
+of a spreadsheet) and its column.
 """
 
 from __future__ import annotations
@@ -12,9 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from doe.csv_table import CsvTable, csv_table
 from doe.errors import StudyFileError
-from doe.text_file import read_text
+from doe.table_file import CellTable, read_table
 from explorer.design.factors_file import RESERVED, Factor, make_factor, no_repeats
 from explorer.errors import CommandError
 
@@ -37,7 +36,7 @@ class Sheet:
     units: dict[str, str]
     cells: tuple[tuple[str, ...], ...]
     lines: tuple[int, ...]
-    table: CsvTable
+    table: CellTable
 
     @property
     def responses(self) -> list[str]:
@@ -63,8 +62,7 @@ def read_sheet(path: Path, factors: Sequence[Factor] = ()) -> Sheet:
 
     Raises CommandError with one line: file, line, column, what is allowed.
     """
-    text = read_text(path, MOST_BYTES, CommandError)
-    table = csv_table(text, lambda line, what: CommandError(f"{path}, line {line}: {what}"))
+    table = read_table(path, MOST_BYTES, CommandError)
     design, declared = _declarations(path, table)
     known = tuple(factors) or declared
     if not known:
@@ -95,7 +93,7 @@ def read_sheet(path: Path, factors: Sequence[Factor] = ()) -> Sheet:
     return Sheet(path, design, known, columns, units, tuple(cells), tuple(lines), table)
 
 
-def _declarations(path: Path, table: CsvTable) -> tuple[str, tuple[Factor, ...]]:
+def _declarations(path: Path, table: CellTable) -> tuple[str, tuple[Factor, ...]]:
     """The design and the factors that the comments declare."""
     design, factors = "", []
     for line, comment in table.comments:

@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import escape
 
-from doe.csv_table import csv_table
 from doe.diagnose.menu import as_suggested
 from doe.diagnose.next_experiment import SURE
 from doe.diagnose.result import BASE, Suggestion
@@ -31,7 +30,7 @@ from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.parameter_table import read_parameters
 from doe.record import plain
 from doe.study_table import Table, entries, section
-from doe.text_file import read_text
+from doe.table_file import read_table, read_text
 from explorer.errors import CommandError
 from explorer.files.whole_file import write_whole
 from explorer.report.diagnosis.wording import spelled
@@ -142,8 +141,7 @@ def _is_label(label: Any) -> bool:
 
 
 def _holds_value(table: Path) -> bool:
-    text = read_text(table, MOST_BYTES, MeasurementError)
-    found = csv_table(text, lambda line, what: MeasurementError(f"{table}:{line}: {what}"), trailing_comments=True)
+    found = read_table(table, MOST_BYTES, MeasurementError, ":{}", comments=True)
     at = COLUMNS.index("value")
     return any(len(cells) > at and cells[at] for _, cells in found.rows[1:])
 

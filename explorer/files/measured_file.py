@@ -2,7 +2,7 @@
 
 .npz   xyz (n, 3) [m], radius (n,) [m]: spheres of the bodies on the plate, as in a measured data set
 .csv   a line u_m,z_m, then one point per line: to the right and above the plate [m]; # starts a comment;
-       cells and numbers as `doe.csv_table` reads them
+       cells and numbers as `doe.table_file` reads them
 .jpg   (.jpeg, .png) a photograph along the plate, read like `explorer measure` does; it needs the length of a pixel
 """
 
@@ -17,7 +17,7 @@ from tempfile import NamedTemporaryFile
 import numpy as np
 import numpy.typing as npt
 
-from doe.csv_table import CsvTable, csv_table
+from doe.table_file import CellTable, csv_table, decoded
 from explorer.errors import CommandError
 from explorer.files.measured_curves import MeasuredCurve
 from solver.observables.outline import outline
@@ -101,10 +101,9 @@ def scanned_spheres(content: bytes) -> Spheres:
 
 
 def _points(name: str, content: bytes) -> MeasuredCurve:
-    try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise CommandError("not a text file in UTF-8") from None
+    text = decoded(content)
+    if text is None:
+        raise CommandError("not a text file")
     table = csv_table(text, lambda line, what: CommandError(f"line {line}: {what}"))
     line, head = table.rows[0] if table.rows else (1, [])
     if head != COLUMNS:
@@ -117,7 +116,7 @@ def _points(name: str, content: bytes) -> MeasuredCurve:
     return MeasuredCurve(name, ordered[:, 0], ordered[:, 1])
 
 
-def _point(table: CsvTable, line: int, cells: list[str]) -> list[float]:
+def _point(table: CellTable, line: int, cells: list[str]) -> list[float]:
     if len(cells) != len(COLUMNS):
         raise CommandError(f"line {line}: {len(cells)} cells; allowed: 2, one each for u_m,z_m")
     point = [table.number(cell) for cell in cells]

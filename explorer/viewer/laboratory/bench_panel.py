@@ -7,6 +7,7 @@ from typing import Any
 
 import viser
 
+from doe.table_file import SUFFIXES
 from explorer.laboratory.answers import bench_answer
 from explorer.laboratory.measured_pour import measured_source
 from explorer.laboratory.run import LabOrder, analysed
@@ -32,13 +33,13 @@ class BenchPanel(Panel):
         tests = shipped_assets("laboratory")
         self._test = gui.add_dropdown("Test", tests, hint="What was measured; columns: doe/laboratory/README.md.")
         self._readings = UploadSlot(
-            server, "Readings", (tests[0],), (".csv",), folder, post, "One row per replicate or point of a curve."
+            server, "Readings", (tests[0],), SUFFIXES, folder, post, "One row per replicate or point of a curve."
         )
         self._compression = UploadSlot(
             server,
             "Compression readings",
             (NO_COMPRESSION, "compression"),
-            (".csv",),
+            SUFFIXES,
             folder,
             post,
             "With shear: of the same components, for Poisson's ratio.",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from doe.designs import DESIGNS
+from doe.table_file import SUFFIXES
 from explorer.design.analysis import AnalyseOrder
 from explorer.design.plan import PlanOrder
 from explorer.laboratory.answers import analysis_answer, sheet_answer
@@ -48,7 +49,7 @@ class DesignPanel(Panel):
             self.sheet = AnswerView(server, SHEET, post)
         with gui.add_folder("Filled sheet → model and optimum", expand_by_default=False):
             self._filled = UploadSlot(
-                server, "Sheet", shipped_assets("runs"), (".csv",), folder, post, "From any laboratory or engine."
+                server, "Sheet", shipped_assets("runs"), SUFFIXES, folder, post, "From any laboratory or engine."
             )
             self._response = gui.add_text("Response", "", hint="Column to analyse; empty where there is only one.")
             self._target = gui.add_text("Target", "", hint="Value that the response should have; empty: none.")

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from doe.csv_table import csv_table
+from doe.table_file import csv_table
 
 
 def table(text, **more):

@@ -1,0 +1,176 @@
+"""Tables that people bring: CSV as any spreadsheet saves it, or a workbook (.xlsx), of which the first sheet is read.
+
+CSV has its cells between commas, semicolons or tabs, and its numbers with a decimal point or comma. Programs set to
+German, French and many other languages write ``;`` between cells and a comma in numbers. The header decides: what
+stands in it most often is the delimiter, and only beside a comma as the delimiter a comma is no decimal sign. The
+characters are UTF-8 with or without a mark, UTF-16 with one, or else Windows's (cp1252). Lines that begin with # are
+comments, also where a spreadsheet has quoted them or filled them up with delimiters.
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import io
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+DELIMITERS = (",", ";", "\t")
+WORKBOOK = ".xlsx"
+SUFFIXES = (".csv", WORKBOOK)
+"""Of files with a table."""
+UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+
+
+@dataclass(frozen=True)
+class CellTable:
+    """Rows and comments by the number of the line in which they begin, from 1 on.
+
+    rows: the header first; cells without spaces around them. Rows without any content are left out, and so are empty
+    cells behind the last name of the header.
+    """
+
+    rows: tuple[tuple[int, list[str]], ...]
+    comments: tuple[tuple[int, str], ...]
+    decimal_comma: bool
+
+    def plain(self, text: str) -> str:
+        """The text of a number with a decimal point."""
+        return text.replace(",", ".") if self.decimal_comma else text
+
+    def number(self, text: str) -> float:
+        """A cell as a number; NaN where it is not a finite one."""
+        plain = self.plain(text).replace("−", "-")
+        try:
+            value = float(plain)
+        except ValueError:
+            return math.nan
+        # Python reads 1_000 as a thousand; no spreadsheet means that.
+        return value if math.isfinite(value) and "_" not in plain else math.nan
+
+
+def read_table(
+    path: Path, most_bytes: int, wrong: Callable[[str], Exception], place: str = ", line {}", comments: bool = False
+) -> CellTable:
+    """The table in the file ``path``.
+
+    Args:
+        path: CSV, or a workbook where it ends in .xlsx.
+        most_bytes: a larger file is refused.
+        wrong: makes the error about a file or a line of it; its message begins with ``path``.
+        place: how a line is named behind ``path``.
+        comments: whether # also begins a comment behind the cells of a row.
+    """
+    content = _content(path, most_bytes, wrong)
+    if path.suffix.lower() == WORKBOOK:
+        return _of_workbook(content, lambda what: wrong(f"{path}: {what}"))
+    text = decoded(content)
+    if text is None:
+        raise wrong(f"{path}: neither text nor a workbook ({WORKBOOK})")
+    return csv_table(text, lambda line, what: wrong(f"{path}{place.format(line)}: {what}"), comments)
+
+
+def read_text(path: Path, most_bytes: int, wrong: Callable[[str], Exception]) -> str:
+    """The text in ``path``, lines ending in ``\\n``; raises ``wrong(line)``, the line naming the file, otherwise."""
+    text = decoded(_content(path, most_bytes, wrong))
+    if text is None:
+        raise wrong(f"{path}: not a text file")
+    return text
+
+
+def decoded(content: bytes) -> str | None:
+    """``content`` as text, lines ending in ``\\n``; None where it is none."""
+    encodings = ("utf-16",) if content.startswith(UTF_16) else ("utf-8-sig", "cp1252")
+    for encoding in encodings:
+        try:
+            text = content.decode(encoding)
+        except UnicodeDecodeError:
+            continue
+        return None if "\0" in text else text.replace("\r\n", "\n").replace("\r", "\n")
+    return None
+
+
+def _content(path: Path, most_bytes: int, wrong: Callable[[str], Exception]) -> bytes:
+    try:
+        size = path.stat().st_size
+        if size > most_bytes:
+            raise wrong(f"{path}: {size} bytes; allowed: up to {most_bytes}")
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise wrong(f"{path}: no such file") from None
+    except OSError as error:
+        raise wrong(f"{path}: {error.strerror}") from None
+
+
+def _of_workbook(content: bytes, wrong: Callable[[str], Exception]) -> CellTable:
+    """The first sheet; numbers have a decimal point there, whatever is shown on a screen."""
+    # Imported where it is used: it takes a second, and hardly anybody brings a workbook.
+    import pandas
+
+    try:
+        frame = pandas.read_excel(io.BytesIO(content), header=None, dtype=str, keep_default_na=False, engine="openpyxl")
+    except Exception as error:  # whatever a ZIP reader and an XML parser raise for what is no workbook
+        raise wrong(f"cannot be read as a workbook: {error}") from None
+    comments: list[tuple[int, str]] = []
+    rows: list[tuple[int, list[str]]] = []
+    for number, cells in enumerate(frame.to_numpy().tolist(), start=1):
+        texts = [str(cell).strip() for cell in cells]
+        if texts and texts[0].startswith("#"):
+            comments.append((number, " ".join(texts).strip()))
+        elif kept := _trimmed(texts, len(rows[0][1]) if rows else 0):
+            rows.append((number, kept))
+    return CellTable(tuple(rows), tuple(comments), decimal_comma=False)
+
+
+def csv_table(text: str, wrong: Callable[[int, str], Exception], trailing_comments: bool = False) -> CellTable:
+    """The table in ``text``.
+
+    Args:
+        text: content of the file (:func:`decoded`).
+        wrong: makes the error about a line that cannot be split into cells, from its number and what is wrong.
+        trailing_comments: whether # also begins a comment behind the cells of a row.
+    """
+    lines: list[tuple[int, str]] = []
+    comments: list[tuple[int, str]] = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        comment = line.strip().strip('"').rstrip(",;\t\"' ")
+        if comment.startswith("#"):
+            comments.append((number, comment))
+            continue
+        content = _without_comment(line) if trailing_comments and "#" in line else line
+        if content.strip(" ,;\t"):
+            lines.append((number, content))
+    delimiter = max(DELIMITERS, key=lines[0][1].count) if lines else ","
+    return CellTable(tuple(_rows(lines, delimiter, wrong)), tuple(comments), delimiter != ",")
+
+
+def _without_comment(line: str) -> str:
+    """``line`` up to the first # that stands outside quotes."""
+    end = next((k for k, sign in enumerate(line) if sign == "#" and line.count('"', 0, k) % 2 == 0), len(line))
+    return line[:end]
+
+
+def _rows(
+    lines: list[tuple[int, str]], delimiter: str, wrong: Callable[[int, str], Exception]
+) -> list[tuple[int, list[str]]]:
+    reader = csv.reader((f"{line}\n" for _, line in lines), delimiter=delimiter, strict=True)
+    rows: list[tuple[int, list[str]]] = []
+    while reader.line_num < len(lines):
+        # A cell in quotes may hold line breaks: the row is named by its first line.
+        number = lines[reader.line_num][0]
+        try:
+            cells = [cell.strip() for cell in next(reader)]
+        except csv.Error as error:
+            raise wrong(number, f"cannot be read as cells: {error}") from None
+        if kept := _trimmed(cells, len(rows[0][1]) if rows else 0):
+            rows.append((number, kept))
+    return rows
+
+
+def _trimmed(cells: list[str], width: int) -> list[str]:
+    """``cells`` without empty ones behind the first ``width``; [] where all are empty."""
+    while len(cells) > width and not cells[-1]:
+        cells.pop()
+    return cells if any(cells) else []
