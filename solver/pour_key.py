@@ -17,6 +17,7 @@ from typing import Any
 from solver.arch import chosen
 from solver.assets import asset_path
 from solver.body import Body, Members
+from solver.plugins import origin
 from solver.scene import Scene
 from solver.version import PHYSICS
 
@@ -47,6 +48,7 @@ def _decisive(scene: Scene) -> dict[str, Any]:
         "insertion": _set(scene.insertion),
         "numerics": _set(scene.numerics),
         **({"contact": changed} if (changed := _set(scene.contact)) else {}),
+        **({"law of": package} if (package := origin("contact_law", scene.contact.law)) else {}),
         "effects": [[effect.name, *_set(effect)] for effect in scene.effects],
         "gravity": scene.gravity,
         "axis": scene.axis,

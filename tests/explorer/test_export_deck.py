@@ -8,8 +8,8 @@ import pytest
 from explorer.errors import CommandError
 from explorer.export.deck_of_scene import check_exportable, deck_of
 from explorer.export.readme import _differences
+from solver.contact_model import ContactModel
 from solver.effects import EFFECTS
-from solver.material import ContactModel
 from solver.sizes import SizeDistribution
 from tests.solver.observables.made_up import cone, record_of
 

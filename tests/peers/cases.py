@@ -16,6 +16,7 @@ from explorer.scene.file import load_scene
 from solver.effects import EFFECTS
 from solver.insertion import rotation_matrix
 from solver.laboratory import Laboratory
+from solver.laws import HertzMindlin
 from solver.record import Entries
 from solver.scene import with_values
 from solver.time_step import time_step
@@ -69,7 +70,7 @@ def ours(case):
     lab = Laboratory(case.scene, len(case.position), dt=case.dt, active=(case.plate, False, False))
     if not case.tangential_damping:
         table = law_table(case.scene)
-        table[..., 4] = 0.0
+        table[..., HertzMindlin.columns.index("shear_damping")] = 0.0
         lab.batch.set_law(0, table)
     for b in range(len(case.position)):
         lab.put(b, case.position[b], velocity=case.velocity[b], quaternion=case.quaternion[b])

@@ -26,12 +26,13 @@ import trimesh
 from solver import clump
 from solver.assets import measurement_folder
 from solver.bench_tests import BENCH_TESTS
+from solver.contact_model import ContactModel
 from solver.effects import EFFECTS, SET_UP_EFFECTS
 from solver.effects.columns import kernel_effects
 from solver.insertion import Insertion
 from solver.laboratory import ROOM, UPRIGHT
 from solver.layout import layout
-from solver.material import ContactModel, Material, Pair
+from solver.material import Material, Pair
 from solver.material_file import load_material
 from solver.numerics import Numerics
 from solver.pour import Pour
