@@ -14,11 +14,14 @@ from explorer.export.triangles import mesh_triangles, revolved_triangles
 from solver import Body, Entries, Record, Scene
 from solver.effects.rolling_resistance import RollingResistance
 from solver.effects.set_up import actual
+from solver.laws import HertzMindlin, LinearSpringDashpot
 from solver.rigs import Funnel, MeshFunnel, Plane, Revolved, Rig
 from solver.scene import pour_rig
 
 HOLDS = {"liggghts": (RollingResistance.name,), "yade": ()}
 """Effects that an engine's deck can hold: its law has the same one."""
+LAWS = {"liggghts": (HertzMindlin.name, LinearSpringDashpot.name), "yade": (HertzMindlin.name,)}
+"""Contact laws that an engine has; YADE's linear ones take a stiffness of the pair of materials, whatever R* and m*."""
 
 
 def deck_of(record: Record, time: float | None = None) -> Deck:
@@ -57,6 +60,10 @@ def check_exportable(scene: Scene, *engines: str) -> None:
         if effect.on and not held:
             amplitude, where = f"effect.{effect.name}.{effect.amplitudes[0]}", " or ".join(engines)
             raise CommandError(f"{amplitude}: {effect.numbers[0]:g} cannot be exported to {where}; allowed: 0")
+    laws = {law: None for engine in engines for law in LAWS[engine]}
+    if scene.contact.law not in laws:
+        where, allowed = " or ".join(engines), ", ".join(laws)
+        raise CommandError(f"contact.law: {scene.contact.law!r} cannot be exported to {where}; allowed: {allowed}")
     if scene.contact.clump_rule != "body_mass":
         # No engine of these damps by the mass that acts at a contact.
         raise CommandError(
@@ -106,6 +113,8 @@ def assembled(
         friction=friction,
         restitution=restitution,
         rolling_friction=rolling(scene).rolling_friction,
+        law=scene.contact.law,
+        characteristic_velocity=scene.contact.characteristic_velocity,
         tangential_law=scene.contact.tangential_law,
         tangential_dashpot=scene.contact.tangential_dashpot,
         entries=entries,

@@ -21,6 +21,7 @@ from explorer.errors import CommandError
 from explorer.export.deck import Deck, write_deck
 from explorer.export.readme import write_readme
 from explorer.export.triangles import write_stl
+from solver.laws import HertzMindlin
 from solver.laws.hertz_mindlin import tangential_damping
 from solver.laws.restitution import normal_damping
 
@@ -33,6 +34,8 @@ def write_yade(folder: Path, deck: Deck) -> None:
     """Write the deck into ``folder``; :class:`CommandError` for what YADE's law does not have."""
     if deck.rolling_friction > 0.0:
         raise CommandError(f"rolling friction {deck.rolling_friction:g}: not in the deck for YADE; allowed: 0")
+    if deck.law != HertzMindlin.name:
+        raise CommandError(f"contact law {deck.law!r}: not in the deck for YADE; allowed: {HertzMindlin.name}")
     write_deck(folder, deck)
     write_law(folder, deck.restitution, deck.friction)
     for mesh in deck.meshes:

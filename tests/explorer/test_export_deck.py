@@ -60,11 +60,29 @@ def test_a_clump_rule_of_no_other_program_is_not_exported():
         check_exportable(local, "yade")
 
 
+def test_a_law_goes_where_the_engine_has_it():
+    scene = record_of(cone(20.0, 0.05), np.zeros(1), np.zeros(1), 0.03).scene
+    linear = dataclasses.replace(scene, contact=ContactModel(law="linear_spring_dashpot"))
+    check_exportable(linear, "liggghts")
+    with pytest.raises(
+        CommandError,
+        match=r"contact\.law: 'linear_spring_dashpot' cannot be exported to yade; allowed: hertz_mindlin$",
+    ):
+        check_exportable(linear, "yade")
+    foreign = dataclasses.replace(scene, contact=ContactModel(law="magnetic"))
+    for engine in ("liggghts", "yade"):
+        with pytest.raises(
+            CommandError, match=rf"contact\.law: 'magnetic' cannot be exported to {engine}; allowed: he"
+        ):
+            check_exportable(foreign, engine)
+
+
 @pytest.mark.parametrize(
     ("contact", "law", "dashpot"),
     [
         (ContactModel(), "not so here (contact.tangential_law = mindlin_rescale)", "here for both"),
         (ContactModel(tangential_law="mindlin", tangential_dashpot="uncapped"), "as here", "here as well"),
+        (ContactModel(law="linear_spring_dashpot"), "contact.law = linear_spring_dashpot", "here for both"),
     ],
 )
 def test_the_readme_of_a_deck_says_which_tangential_law_was_used_here(contact, law, dashpot):
