@@ -71,9 +71,7 @@ def test_a_law_goes_where_the_engine_has_it():
         check_exportable(linear, "yade")
     foreign = dataclasses.replace(scene, contact=ContactModel(law="magnetic"))
     for engine in ("liggghts", "yade"):
-        with pytest.raises(
-            CommandError, match=rf"contact\.law: 'magnetic' cannot be exported to {engine}; allowed: he"
-        ):
+        with pytest.raises(CommandError, match=rf"contact\.law: 'magnetic' cannot be exported to {engine}; allowed"):
             check_exportable(foreign, engine)
 
 
