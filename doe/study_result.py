@@ -27,7 +27,7 @@ StageResult = (
 
 @dataclass(frozen=True, kw_only=True)
 class StudyDescription(Record):
-    """What was asked. ``contact``: choices of the contact law; ``tries``: seeds for one replicate."""
+    """What was asked. ``contact``: the contact law and its conventions; ``tries``: seeds for one replicate."""
 
     name: str
     title: str
@@ -45,7 +45,6 @@ class StudyDescription(Record):
     @staticmethod
     def of(study: Study, profile: Profile, tries: int = TRIES) -> StudyDescription:
         """Return the description of a study that is run with ``profile``."""
-        contact = study.scene.contact
         return StudyDescription(
             name=study.name,
             title=study.scene.title,
@@ -55,7 +54,7 @@ class StudyDescription(Record):
             factors=study.factors,
             assumptions=study.assumptions,
             assumed=tuple(study.scene.assumed),
-            contact={one.name: str(getattr(contact, one.name)) for one in fields(contact)},
+            contact=study.scene.contact.stated,
             changes=study.changes,
             seed=study.seed,
             tries=tries,

@@ -65,6 +65,16 @@ class ContactModel:
         return self.clump_rule == "local_mass_shared"
 
     @property
+    def stated(self) -> dict[str, str]:
+        """The law and what of its conventions matters to it, by name: for whoever repeats a run."""
+        names = ("law", "clump_rule", *CONTACT_LAWS[self.law].reads, "tangential_dashpot")
+        return {name: str(getattr(self, name)) for name in names}
+
+    def carries(self, effect: str) -> bool:
+        """Whether the effect of that name may act beside the law."""
+        return effect not in CONTACT_LAWS[self.law].refuses
+
+    @property
     def places(self) -> dict[str, int]:
         """Places of the conventions in their lists of choices, as the kernels take them."""
         return {

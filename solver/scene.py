@@ -24,7 +24,6 @@ from solver.contact_model import ContactModel
 from solver.effects import EFFECTS, Effect
 from solver.effects.set_up import actual
 from solver.insertion import Insertion
-from solver.laws import CONTACT_LAWS
 from solver.material import Material, Pair
 from solver.numerics import Numerics
 from solver.params import Parameter, ParameterError, declared
@@ -206,7 +205,7 @@ def check(scene: Scene) -> None:
     """Raise :class:`ParameterError` where the parts of a scene, as it is after its set-up effects, do not fit."""
     scene = actual(scene)
     for effect in scene.effects:
-        if effect.on and effect.name in CONTACT_LAWS[scene.contact.law].refuses:
+        if effect.on and not scene.contact.carries(effect.name):
             raise ParameterError(
                 f"effect.{effect.name}.{effect.amplitudes[0]}: {effect.numbers[0]:g} does not go with contact.law "
                 f"{scene.contact.law}; allowed: 0"

@@ -1,9 +1,9 @@
 """Single impacts in LIGGGHTS: the cases of ``solver.verification`` as input, run, and read back.
 
-The law is that of every other deck here (``liggghts.py``): ``hertz tangential history``, or ``hooke`` for linear springs,
-with ``limitForce on`` and a restitution whose damping is ours, so that the normal force is the same function. Hertz's
-tangential force stays LIGGGHTS's own: a displacement times the present stiffness 8 G* a, whether the contact is loaded
-or unloaded (LIGGGHTS-PUBLIC 3.8.0, ``tangential_model_history.h``), where ours is a force that is scaled down on
+The law is that of every other deck here (``liggghts.py``): ``hertz tangential history``, or ``hooke`` for linear
+springs, with ``limitForce on`` and a restitution whose damping is ours, so that the normal force is the same function.
+Hertz's tangential force stays LIGGGHTS's own: a displacement times the present stiffness 8 G* a, whether the contact is
+loaded or unloaded (LIGGGHTS-PUBLIC 3.8.0, ``tangential_model_history.h``), where ours is a force that is scaled down on
 unloading.
 """
 

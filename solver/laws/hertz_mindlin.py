@@ -117,7 +117,8 @@ class HertzMindlin(ContactLaw):
     """Nonlinear springs of elastic spheres; the default."""
 
     name = "hertz_mindlin"
-    doc = "Hertz–Mindlin (no slip) with viscous damping and tangential history"
+    title = "Hertz–Mindlin"
+    reads = ("tangential_law",)
     columns = ("e_star", "g_star", "friction", "normal_damping", "shear_damping")
     ramped = ("e_star", "g_star", "normal_damping", "shear_damping")
     spring_column = "g_star"

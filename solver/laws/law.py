@@ -29,8 +29,10 @@ class ContactLaw:
     """Base of all laws."""
 
     name: ClassVar[str]
-    doc: ClassVar[str]
-    """One line for lists and pages."""
+    title: ClassVar[str]
+    """What a report calls it."""
+    reads: ClassVar[tuple[str, ...]] = ()
+    """Parameters ``contact.…`` that it reads beside ``clump_rule`` and ``tangential_dashpot``."""
     columns: ClassVar[tuple[str, ...]]
     """Constants of a pair of materials, as the kernels read them; ``e_star`` [Pa] and ``friction`` are among them."""
     ramped: ClassVar[tuple[str, ...]]

@@ -105,7 +105,8 @@ class LinearSpringDashpot(ContactLaw):
     """Springs whose stiffness is that of a Hertzian impact at one speed."""
 
     name = "linear_spring_dashpot"
-    doc = "linear springs and dashpots (Hookean) with tangential history"
+    title = "linear springs and dashpots"
+    reads = ("characteristic_velocity",)
     columns = ("e_star", "stiffness", "friction", "damping")
     ramped = ("e_star", "stiffness", "damping")
     spring_column = "stiffness"

@@ -88,8 +88,9 @@ def test_linear_springs_are_those_of_its_model_hooke():
         for v_t, surface_speed in ((0.0, 0.0), (0.2, 0.0), (0.5, 1.0), (3.0, 0.0))
     ]
     theirs_now = liggghts_engine(contact=contact).rebounds(impacts)
-    for one, other in zip(rebounds(impacts, contact=contact), theirs_now, strict=True):
-        # 2000 steps per contact, and its velocities are half a step younger.
-        assert one.v_n == pytest.approx(other.v_n, abs=1e-3)
-        assert one.v_t == pytest.approx(other.v_t, abs=1e-3)
-        assert one.surface_speed == pytest.approx(other.surface_speed, abs=2e-3)
+    for before, one, other in zip(impacts, rebounds(impacts, contact=contact), theirs_now, strict=True):
+        # As the force ends, a dashpot alone acts on what slides fast, in some steps or none.
+        loose = 4e-3 if before.v_t > 1.0 else 1e-4
+        assert one.v_n == pytest.approx(other.v_n, abs=1e-4)
+        assert one.v_t == pytest.approx(other.v_t, abs=loose)
+        assert one.surface_speed == pytest.approx(other.surface_speed, abs=loose)
