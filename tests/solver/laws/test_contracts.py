@@ -15,10 +15,11 @@ from solver.laws import CONTACT_LAWS, ContactLaw, HertzMindlin, LinearSpringDash
 from solver.layout import layout
 from solver.material_file import scene_from
 from solver.params import ParameterError
+from solver.retune import RAMP_TIME, Ramp, spring_ratio
 from solver.run import Job, capacity_for, run_pours
 from solver.scene import parameters, with_values
 from solver.verification.impacts import Impact, rebounds
-from solver.world import Batch, compiled_in
+from solver.world import Batch, compiled_in, law_table
 from tests.solver.effects.cases import FELT, IN_KERNELS, felt, scene_with, tumble, with_effects
 from tests.solver.effects.test_contracts import momenta
 from tests.solver.pour_digests import digest
@@ -162,6 +163,23 @@ def test_rolling_takes_the_tangential_stiffness_of_the_law(law):
         LinearSpringDashpot.name: lambda: row["stiffness"] * (RADIUS**2 * mass) ** 0.2,
     }[law]()
     assert torque == pytest.approx(stiffness * RADIUS**2 * spin * dt, rel=1e-6)
+
+
+@every_law
+def test_a_running_pile_approaches_stiffness_and_damping_and_takes_friction_at_once(law):
+    """Four times G: halfway twice the modulus, and springs that keep their displacement pull as k_t grows."""
+    stiff = dataclasses.replace(GRAIN, shear_modulus=4.0 * GRAIN.shear_modulus)
+    before, after = (
+        law_table(under(law, bench(grain=grain, friction=mu))) for grain, mu in ((GRAIN, 0.3), (stiff, 0.6))
+    )
+    kind = CONTACT_LAWS[law]
+    ramp = Ramp(kind, before, after, 1.0)
+    half = dict(zip(kind.columns, ramp.table(1.0 + 0.5 * RAMP_TIME)[0, 0], strict=True))
+    assert half["e_star"] == pytest.approx(2.0 * before[0, 0, kind.columns.index("e_star")])
+    assert half["friction"] == 0.6
+    assert np.array_equal(ramp.table(1.0 + RAMP_TIME), after)
+    grown = {HertzMindlin.name: 4.0, LinearSpringDashpot.name: 4.0**0.8}[law]
+    assert spring_ratio(kind, before, after)[0, 0] == pytest.approx(grown)
 
 
 SMALL = with_values(QUICK, {"rig.mass": "4g"})
