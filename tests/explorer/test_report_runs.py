@@ -64,4 +64,4 @@ def test_the_contact_law_is_named_with_the_conventions_that_matter_to_it():
         ({"law": "uninstalled", "clump_rule": "body_mass"}, "Contact law: uninstalled; clump rule body_mass ("),
     ):
         result["study"]["contact"] = contact
-        assert words in report_markdown(typed(result))
+        assert words in report_markdown(typed(result)).replace("\\_", "_")
