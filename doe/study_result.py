@@ -37,8 +37,10 @@ USUAL_DESIGNS = {"screening": "Plackett–Burman", "assumptions": "Plackett–Bu
 
 @dataclass(frozen=True, kw_only=True)
 class StudyDescription(Record):
-    """What was asked. ``contact``: choices of the contact law; ``tries``: seeds for one replicate; ``designs``: stage →
-    title of its design.
+    """What was asked.
+
+    ``contact``: the contact law and its conventions; ``tries``: seeds for one replicate; ``designs``: stage → title of
+    its design.
     """
 
     name: str
@@ -58,7 +60,6 @@ class StudyDescription(Record):
     @staticmethod
     def of(study: Study, profile: Profile, tries: int = TRIES) -> StudyDescription:
         """Return the description of a study that is run with ``profile``."""
-        contact = study.scene.contact
         return StudyDescription(
             name=study.name,
             title=study.scene.title,
@@ -68,7 +69,7 @@ class StudyDescription(Record):
             factors=study.factors,
             assumptions=study.assumptions,
             assumed=tuple(study.scene.assumed),
-            contact={one.name: str(getattr(contact, one.name)) for one in fields(contact)},
+            contact=study.scene.contact.stated,
             changes=study.changes,
             seed=study.seed,
             tries=tries,

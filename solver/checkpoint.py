@@ -103,7 +103,7 @@ def resumed(batch: Batch, w: int, scene: Scene, kept: Checkpoint) -> Pour:
     pour._table = np.array(decided["table"])
     if decided["ramp"] is not None:
         before, after, start = decided["ramp"]
-        pour._ramp = Ramp(np.array(before), np.array(after), start)
+        pour._ramp = Ramp(pour._law, np.array(before), np.array(after), start)
     pour.supply.entries = [
         Entry(time, step, Pose(np.array(position), np.array(quaternion)), np.array(velocity))
         for time, step, position, quaternion, velocity in decided["entries"]

@@ -223,16 +223,16 @@ class Rooms:
 
     def __init__(self) -> None:
         self._capacity: Capacity | None = None
-        self._batches: dict[tuple[bool, ...], Batch] = {}
+        self._batches: dict[tuple[str, bool, bool], Batch] = {}
 
     def make(self, scenes: Sequence[Scene]) -> list[Capacity]:
         """Make room for ``scenes``, and leave what is there; returns the sizes of their batches."""
-        from solver.run import capacity_for
+        from solver.run import sizes_for
 
-        needed = capacity_for(scenes, 1)
+        needed = sizes_for(scenes, 1)
         self._capacity = needed if self._capacity is None else self._capacity.joined(needed)
         # Without effects first: kernels depend on what was allocated before.
-        return sorted({self._size(scene) for scene in scenes}, key=lambda size: (size.effects, size.sharing))
+        return sorted({self._size(scene) for scene in scenes}, key=lambda size: (size.law, size.effects, size.sharing))
 
     def begin(self, scenes: Sequence[Scene]) -> None:
         """Make room for ``scenes`` and start Taichi, with kernels that this process or another one compiles."""
@@ -252,7 +252,7 @@ class Rooms:
         from solver.world import Batch
 
         wanted = self._size(scene)
-        variant = (wanted.effects, wanted.sharing)
+        variant = (wanted.law, wanted.effects, wanted.sharing)
         if variant not in self._batches or self._batches[variant].capacity != wanted:
             self._batches[variant] = Batch(wanted)
         return self._batches[variant]

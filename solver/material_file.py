@@ -2,7 +2,7 @@
 
 format = 1
 gravity = [0.0, 0.0, -9.81]
-contact_law = "hertz_mindlin"
+contact_law = "hertz_mindlin"        the same as law in [contact]
 assumed = [paths of values that nobody measured]
 [materials.<name>]       density, and two of youngs_modulus, shear_modulus, poisson_ratio (SI or with a unit)
 [[body]]                 name, material, mass_fraction, shape, … (`solver.body_table`)
@@ -20,6 +20,8 @@ from typing import Any
 from solver.assets import asset_path
 from solver.body import Body
 from solver.body_table import read_body
+from solver.contact_model import ContactModel
+from solver.laws import CONTACT_LAWS, HertzMindlin
 from solver.material import Material, Pair
 from solver.params import ParameterError, declared, parse_quantity
 from solver.rigs import Funnel
@@ -67,8 +69,9 @@ def scene_from(table: dict[str, Any], path: Path) -> Scene:
         raise ParameterError(f"unknown key {unknown[0]!r}; allowed: {', '.join(sorted(KNOWN))}")
     if table.get("format") != 1:
         raise ParameterError(f"format: {table.get('format')!r} is not 1")
-    if table.get("contact_law", "hertz_mindlin") != "hertz_mindlin":
-        raise ParameterError(f"contact_law: {table['contact_law']!r} is not hertz_mindlin")
+    law = str(table.get("contact_law", HertzMindlin.name))
+    if law not in CONTACT_LAWS:
+        raise ParameterError(f"contact_law: {law!r} is not one of {', '.join(CONTACT_LAWS)}")
     materials = tuple(_material(name, entry) for name, entry in table_at(table, "materials").items())
     bodies = tuple(read_body(entry, materials, path) for entry in list_at(table, "body"))
     if not bodies:
@@ -84,10 +87,14 @@ def scene_from(table: dict[str, Any], path: Path) -> Scene:
         bodies=bodies,
         pairs=tuple(_pairs(table_at(table, "pair"))),
         rig=Funnel(wall=_wall(table, materials, bodies)),
+        contact=ContactModel(law=law),
         gravity=vector(table.get("gravity", (0.0, 0.0, -9.81)), "gravity"),
         assumed=tuple(str(name) for name in list_at(table, "assumed")),
     )
-    return with_set_up(scene, table, path.parent)
+    scene = with_set_up(scene, table, path.parent)
+    if "contact_law" in table and scene.contact.law != law:
+        raise ParameterError(f"contact_law: {law!r} is not the {scene.contact.law!r} of contact.law")
+    return scene
 
 
 def _wall(table: dict[str, Any], materials: tuple[Material, ...], bodies: tuple[Body, ...]) -> str:

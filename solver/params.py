@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -101,10 +102,13 @@ def param(
     doc: str,
     live: bool = False,
     scale: str = "linear",
-    choices: tuple[str, ...] = (),
+    choices: Iterable[str] = (),
     files: tuple[str, ...] = (),
 ) -> Any:
-    """Declare a dataclass field that is a parameter: default (SI), unit, allowed range, one-line doc."""
+    """Declare a dataclass field that is a parameter: default (SI), unit, allowed range, one-line doc.
+
+    ``choices`` may be a registry (``solver.plugins``): its names are asked for with the first value that is looked up.
+    """
     metadata = {
         "unit": unit,
         "low": low,
@@ -130,7 +134,8 @@ def _declared(kind: Any, prefix: str) -> dict[str, Parameter]:
     for field in dataclasses.fields(kind):
         if "parameter" in field.metadata:
             path = f"{prefix}.{field.name}"
-            found[path] = Parameter(path=path, **field.metadata["parameter"])
+            known = field.metadata["parameter"]
+            found[path] = Parameter(path=path, **known | {"choices": tuple(known["choices"])})
     return found
 
 

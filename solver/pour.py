@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from solver.contacts import Contacts, contacts_from
 from solver.effects.set_up import actual
+from solver.laws import CONTACT_LAWS
 from solver.observables.free_surface import surface_heights
 from solver.raw_pour import packed, unpacked
 from solver.record import Bodies, Outcome, Phase, Record, Verdict
@@ -59,7 +60,7 @@ class Pour:
         self.supply = Supply(scene, seed)
         self.dt = time_step(scene)
         batch.load(w, scene, self.supply.layout, self.dt, (True,) * len(self.rig.surfaces()))
-        self._table = law_table(scene)
+        self._law, self._table = CONTACT_LAWS[scene.contact.law], law_table(scene)
         self._ramp: Ramp | None = None
         self._ramp_left = 0
         self.energy_put_in = 0.0
@@ -154,7 +155,7 @@ class Pour:
         target = law_table(scene)
         self.batch.set_effects(self.w, scene)
         self.scene = scene
-        self._ramp = Ramp(self._table, target, self.time)
+        self._ramp = Ramp(self._law, self._table, target, self.time)
         self._set_time_step(min(self.dt, time_step(scene)))
         self.energy_put_in = 0.0
         self._set_table(self._ramp.table(self.time))
@@ -328,7 +329,7 @@ class Pour:
         elastic = SUMMARY_COLUMNS.index("elastic")
         before = self.batch.measure(self.w)[self.w, elastic]
         self.batch.set_law(self.w, table)
-        self.batch.scale_springs(self.w, spring_ratio(self._table, table))
+        self.batch.scale_springs(self.w, spring_ratio(self._law, self._table, table))
         self._table = table
         gained = float(self.batch.measure(self.w)[self.w, elastic] - before)
         self.energy_put_in += gained

@@ -49,6 +49,7 @@ def _decisive(scene: Scene) -> dict[str, Any]:
         "insertion": _set(scene.insertion),
         "numerics": _set(scene.numerics),
         **({"contact": changed} if (changed := _set(scene.contact)) else {}),
+        **({"law of": package} if (package := origin("contact_law", scene.contact.law)) else {}),
         "effects": [[effect.name, *_set(effect), *_package("effect", effect.name)] for effect in scene.effects],
         "gravity": scene.gravity,
         "axis": scene.axis,

@@ -46,6 +46,11 @@ class Job:
 
 
 def capacity_for(scenes: Sequence[Scene], worlds: int) -> Capacity:
+    """A batch for any of ``scenes``, which share a contact law: :func:`sizes_for` them, and what is compiled in."""
+    return replace(sizes_for(scenes, worlds), **compiled_in([actual(scene) for scene in scenes]))
+
+
+def sizes_for(scenes: Sequence[Scene], worlds: int) -> Capacity:
     """Sizes that hold any of ``scenes``, rounded up so that a small change of the mixture fits as well."""
     scenes = [actual(scene) for scene in scenes]
     bodies = members = kinds = 0
@@ -66,7 +71,6 @@ def capacity_for(scenes: Sequence[Scene], worlds: int) -> Capacity:
         triangles=max(1, *(len(table.corners) for table in tables)),
         cells=max(1, *(len(table.first) for table in tables)),
         cell_items=max(1, *(len(table.items) for table in tables)),
-        **compiled_in(scenes),
     ).rounded()
 
 
@@ -81,31 +85,35 @@ def run_queue(
 
     ``room`` lists scenes that any job has to fit into, ``worlds`` is the number of pours in flight (default: four per
     thread), ``on_sample`` is called with (job, pour) at every moment of decision. Equal job → equal bits, whatever else
-    is in flight.
+    is in flight. Pours of different contact laws run in a batch each.
     """
     backend.init(threads=threads)
     slots = worlds or WORLDS_PER_THREAD * (threads or os.cpu_count() or 1)
-    batch = Batch(capacity_for(room, slots))
-    running: dict[int, tuple[Job, Pour]] = {}
-    steps = np.zeros(slots, dtype=np.int32)
+    by_law = {law: [one for one in room if one.contact.law == law] for law in {one.contact.law: None for one in room}}
+    batches = {law: Batch(capacity_for(scenes, slots)) for law, scenes in by_law.items()}
+    running: dict[tuple[str, int], tuple[Job, Pour]] = {}
     # A thread works on a contiguous share of the worlds: fill the shares evenly.
     places = sorted(range(slots), key=lambda w: (w % max(1, slots // (threads or os.cpu_count() or 1)), w))
     while True:
-        for w in places:
-            if w not in running and queue:
-                job = queue.popleft()
-                running[w] = (job, job.begin(batch, w))
+        while queue and len(running) < slots:
+            job = queue.popleft()
+            law = job.scene.contact.law
+            free = next((law, w) for w in places if (law, w) not in running)
+            running[free] = (job, job.begin(batches[law], free[1]))
         if not running:
             return
-        for w in range(slots):
-            steps[w] = running[w][1].steps_due() if w in running else 0
-        summary = batch.advance(steps)
-        for w, (job, pour) in list(running.items()):
-            if pour.after(int(steps[w]), summary[w]) and on_sample is not None:
-                on_sample(job, pour)
-            if pour.steps_due() == 0:
-                del running[w]
-                yield job, pour.record()
+        for law, batch in batches.items():
+            due = [running[law, w][1].steps_due() if (law, w) in running else 0 for w in range(slots)]
+            if not any(due):
+                continue
+            summary = batch.advance(np.array(due, dtype=np.int32))
+            for w in [w for of, w in list(running) if of == law]:
+                job, pour = running[law, w]
+                if pour.after(due[w], summary[w]) and on_sample is not None:
+                    on_sample(job, pour)
+                if pour.steps_due() == 0:
+                    del running[law, w]
+                    yield job, pour.record()
 
 
 def run_job(batch: Batch, job: Job) -> Record:

@@ -20,10 +20,11 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 from solver.body import SPHERES, Body, body_parameters, counts, with_body_value, with_densities
+from solver.contact_model import ContactModel
 from solver.effects import EFFECTS, Effect
 from solver.effects.set_up import actual
 from solver.insertion import Insertion
-from solver.material import ContactModel, Material, Pair
+from solver.material import Material, Pair
 from solver.numerics import Numerics
 from solver.params import Parameter, ParameterError, declared
 from solver.rigs import BENCH_RIGS, RIGS, Funnel, PourRig, Rig
@@ -203,6 +204,12 @@ def with_values(scene: Scene, values: dict[str, Any]) -> Scene:
 def check(scene: Scene) -> None:
     """Raise :class:`ParameterError` where the parts of a scene, as it is after its set-up effects, do not fit."""
     scene = actual(scene)
+    for effect in scene.effects:
+        if effect.on and not scene.contact.carries(effect.name):
+            raise ParameterError(
+                f"effect.{effect.name}.{effect.amplitudes[0]}: {effect.numbers[0]:g} does not go with contact.law "
+                f"{scene.contact.law}; allowed: 0"
+            )
     for body in scene.bodies:
         scene.material(body.material)
         scene.contact_pair(body, scene.rig.wall)

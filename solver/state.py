@@ -10,10 +10,10 @@ from functools import cache
 
 from solver.backend import ti
 from solver.effects.columns import COLUMNS, KEPT
+from solver.laws import CONTACT_LAWS, HertzMindlin
 
 Vec3 = ti.types.vector(3, ti.f64)
 Vec4 = ti.types.vector(4, ti.f64)
-Vec5 = ti.types.vector(5, ti.f64)
 Ints3 = ti.types.vector(3, ti.i32)
 Mat3 = ti.types.matrix(3, 3, ti.f64)
 
@@ -45,9 +45,9 @@ WORLD = {
     "taken_out": ti.f64,  # kinetic and potential energy of bodies that were taken out [J]
     "domain": ti.f64,  # bodies beyond |x| or |y| of this are taken out [m]
     "grip": ti.f64,  # distance at which effects may still hold surfaces that have touched [m]
-    "clump_rule": ti.i32,  # place in ``material.CLUMP_RULES``
-    "tangential_law": ti.i32,  # place in ``material.TANGENTIAL_LAWS``
-    "tangential_dashpot": ti.i32,  # place in ``material.TANGENTIAL_DASHPOTS``
+    "clump_rule": ti.i32,  # place in ``contact_model.CLUMP_RULES``
+    "tangential_law": ti.i32,  # place in ``contact_model.TANGENTIAL_LAWS``
+    "tangential_dashpot": ti.i32,  # place in ``contact_model.TANGENTIAL_DASHPOTS``
     "outlet": ti.f64,  # height of the outlet [m]
     "inlet_radius": ti.f64,  # radius of the feed opening [m]
 }
@@ -211,6 +211,8 @@ class Capacity:
     """Whether effects are compiled in: the base model is faster without."""
     sharing: bool = False
     """Whether the rule is compiled in by which contacts of a pair of clumps share."""
+    law: str = HertzMindlin.name
+    """The contact law that is compiled in."""
     cells: int = 1
     """Cells of all meshes' grids, and one more."""
     cell_items: int = 1
@@ -271,7 +273,9 @@ class State:
         self.mesh_cell = Group({"first": ti.i32}, (c.worlds, c.cells))  # where the cell's triangles begin
         self.mesh_item = Group({"triangle": ti.i32}, (c.worlds, c.cell_items))
         self.candidate = Group({"triangle": ti.i32}, (c.worlds, c.candidates))
-        self.law = Group({"row": Vec5}, (c.worlds, c.kinds * c.kinds))
+        self.contact_law = CONTACT_LAWS[c.law]
+        self.law_row = ti.types.struct(**dict.fromkeys(self.contact_law.columns, ti.f64))
+        self.law = Group({"row": self.law_row}, (c.worlds, c.kinds * c.kinds))
         # Parameters of effects by contact class, and what they keep of a contact (``effects/columns.py``).
         self.effects = c.effects
         room = (c.worlds, c.contacts, KEPT) if c.effects else (1, 1, 1)

@@ -3,8 +3,9 @@
 Two limits, the smaller one rules:
 
     Rayleigh    dt = f T_R,  T_R = π R √(ρ/G) / (0.1631 ν + 0.8766)   of the smallest member sphere (EDEM, LIGGGHTS)
-    body        dt = b √(m_eff / k),  k = 2 E* √(R δ) at the overlap that a 2 m/s impact makes, with the mass that a
-                body shows at its far end, 1/m_eff = 1/m + reach²/I (a rod's tip is lighter than the rod)
+    body        dt = b √(m_eff / k),  k the stiffness dF/dδ of the contact law at the overlap that a 2 m/s impact makes
+                (Hertz: 2 E* √(R δ)), with the mass that a body shows at its far end, 1/m_eff = 1/m + reach²/I (a rod's
+                tip is lighter than the rod)
 
 f is ``numerics.rayleigh_fraction``, b ``numerics.impact_fraction``. With f = 1 and b = 2 (leapfrog: ω dt < 2), the same
 two are the limit of stability. Both limits are proportional to the size of a body, so the smallest that its
@@ -17,6 +18,7 @@ import math
 
 from solver.clump import scaled
 from solver.effects import ContactEffect
+from solver.laws import CONTACT_LAWS
 from solver.material import Material, effective_youngs_modulus
 from solver.scene import Scene
 
@@ -43,7 +45,7 @@ def stability_limit(scene: Scene) -> float:
 
 
 def _smallest(scene: Scene, of_rayleigh: float, of_body: float) -> float:
-    wall = scene.material(scene.rig.wall)
+    wall, law = scene.material(scene.rig.wall), CONTACT_LAWS[scene.contact.law]
     steps = []
     for body in scene.bodies:
         clump, material = scaled(body.clump, body.sizes.low), scene.material(body.material)
@@ -51,8 +53,7 @@ def _smallest(scene: Scene, of_rayleigh: float, of_body: float) -> float:
         steps.append(of_rayleigh * rayleigh_time(smallest, material))
         e_star = max(effective_youngs_modulus(material, other) for other in (*scene.materials, wall))
         largest = float(clump.radii.max())
-        overlap = (15.0 * clump.mass * IMPACT_SPEED**2 / (16.0 * e_star * math.sqrt(largest))) ** 0.4
-        stiffness = 2.0 * e_star * math.sqrt(largest * overlap)
+        stiffness = law.stiffness(e_star, largest, clump.mass, IMPACT_SPEED, scene.contact)
         tip = 1.0 / (1.0 / clump.mass + clump.bounding_radius**2 / float(min(clump.inertia[1:])))
         steps.append(of_body * math.sqrt(tip / stiffness))
     stiffest = max((effect.stiffening for effect in scene.effects if isinstance(effect, ContactEffect)), default=1.0)

@@ -1,6 +1,7 @@
 """A batch of worlds: the only owner of mutable state. NumPy in, NumPy out; no formula of physics stands here."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +12,7 @@ from solver.effects.columns import effect_table, kernel_effects, reach_of_pulls
 from solver.kernels import changing, loading, reading, touching
 from solver.kernels.batch import advance, measure, take_out
 from solver.kernels.neighbours import MOST
-from solver.laws.hertz_mindlin import constants
+from solver.laws import CONTACT_LAWS
 from solver.layout import Layout
 from solver.moving_state import Moving
 from solver.rigs.rig import Container
@@ -45,25 +46,6 @@ SUMMARY_COLUMNS = (
 )
 """Columns of a summary, SI; what they mean stands in ``state.SUMMARY`` and ``state.WORLD``."""
 
-SETTINGS = (
-    "dt",
-    "skin",
-    "cell",
-    "sleep_speed",
-    "sleep_time",
-    "domain",
-    "outlet",
-    "inlet_radius",
-    "clump_rule",
-    "tangential_law",
-    "tangential_dashpot",
-    "gravity_x",
-    "gravity_y",
-    "gravity_z",
-)
-"""Columns of the row that sets up a world, in the order in which ``kernels.loading.load_world`` reads them, SI; what
-they mean stands in ``state.WORLD``."""
-
 
 def wall_materials(scene: Scene) -> tuple[str, ...]:
     """Materials of the rig's surfaces, each once, in order of appearance."""
@@ -71,33 +53,40 @@ def wall_materials(scene: Scene) -> tuple[str, ...]:
 
 
 def law_table(scene: Scene) -> Array:
-    """Contact constants of all pairs of classes, shape (kinds, kinds, 5): the bodies, then the wall materials."""
-    walls = wall_materials(scene)
+    """Constants of the contact law, shape (kinds, kinds, its columns): the bodies, then the wall materials."""
+    walls, law = wall_materials(scene), CONTACT_LAWS[scene.contact.law]
     n = len(scene.bodies)
     materials = [scene.material(body.material) for body in scene.bodies] + [scene.material(name) for name in walls]
-    table = np.zeros((n + len(walls), n + len(walls), 5))
+    table = np.zeros((n + len(walls), n + len(walls), len(law.columns)))
     for a, one in enumerate(scene.bodies):
         others: tuple[Body | str, ...] = (*scene.bodies, *walls)
         for b, other in enumerate(others):
-            row = constants(materials[a], materials[b], scene.contact_pair(one, other))
+            row = law.constants(materials[a], materials[b], scene.contact_pair(one, other), scene.contact)
             table[a, b] = table[b, a] = row
     return table
 
 
-def compiled_in(scenes: Sequence[Scene]) -> dict[str, bool]:
-    """What kernels for ``scenes`` need beside the base model, by field of :class:`Capacity`."""
+def compiled_in(scenes: Sequence[Scene]) -> dict[str, Any]:
+    """What kernels for ``scenes`` are compiled with, by field of :class:`Capacity`: effects, sharing, contact law.
+
+    Raises ValueError for scenes of several laws, which share no kernels.
+    """
+    law, *others = sorted({scene.contact.law for scene in scenes})
+    if others:
+        raise ValueError(f"contact.law: {law} and {others[0]} cannot share a batch")
     return {
+        "law": law,
         "effects": any(kernel_effects(scene) for scene in scenes),
         "sharing": any(scene.contact.shares for scene in scenes),
     }
 
 
-def settings_of(scene: Scene, bodies: Layout, dt: float) -> dict[str, float]:
-    """What a world is set up with, by ``SETTINGS``."""
+def settings_of(scene: Scene, bodies: Layout, dt: float) -> dict[str, Any]:
+    """What a world is set up with, by ``loading.SETTINGS``."""
     numerics, inside = scene.numerics, scene.rig.container(0.0)
-    gravity = dict(zip(("gravity_x", "gravity_y", "gravity_z"), scene.gravity, strict=True))
     return {
         "dt": dt,
+        "gravity": scene.gravity,
         "skin": numerics.skin,
         "cell": 2.0 * float(bodies.numbers[:, 4].max()) + 2.0 * MOST * numerics.skin,
         "sleep_speed": numerics.sleep_speed if any(scene.gravity) else 0.0,
@@ -105,8 +94,8 @@ def settings_of(scene: Scene, bodies: Layout, dt: float) -> dict[str, float]:
         "domain": scene.rig.domain_half_width,
         "outlet": inside.height,
         "inlet_radius": inside.radius,
-        **dict(zip(("clump_rule", "tangential_law", "tangential_dashpot"), scene.contact.numbers, strict=True)),
-    } | gravity
+        **scene.contact.places,
+    }
 
 
 class Batch:
@@ -127,8 +116,9 @@ class Batch:
                 raise ValueError(f"{needed} {name} do not fit into a batch of {getattr(self.capacity, name)}")
         if scene.contact.shares and not self.capacity.sharing:
             raise ValueError("contact.clump_rule: the batch was made for rules by which contacts do not share")
-        settings = settings_of(scene, bodies, dt)
-        loading.load_world(s, w, np.array([settings[name] for name in SETTINGS]))
+        if scene.contact.law != self.capacity.law:
+            raise ValueError(f"contact.law: the batch was made for {self.capacity.law}, not for {scene.contact.law}")
+        loading.load_world(s, w, loading.Settings(**settings_of(scene, bodies, dt)))
         loading.load_bodies(s, w, bodies.numbers, bodies.places, bodies.spheres, bodies.owner)
         self._load_walls(w, scene, wall_tables(scene.rig.surfaces()), active)
         self._scenes[w] = scene

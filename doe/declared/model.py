@@ -120,8 +120,12 @@ class Declared(Record):
 
 
 def declare(measurement: Measurement, effects: Sequence[str]) -> Declared:
-    """The declared model: parameters, effects with their widest ranges, fitted conditions."""
+    """The declared model: parameters, effects with their widest ranges, fitted conditions.
+
+    Effects that a contact law does not go with are no candidates.
+    """
     scenes = [condition.scene for condition in measurement.conditions]
+    effects = [name for name in effects if all(scene.contact.carries(name) for scene in scenes)]
     return Declared(
         tuple(box_of(p) for p in measurement.parameters),
         tuple(widest(name, scenes) for name in effects),

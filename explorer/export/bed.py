@@ -20,7 +20,7 @@ import numpy.typing as npt
 from explorer.export.liggghts import (
     INPUT,
     WRITE_FINAL,
-    ContactLaw,
+    ContactSettings,
     FreeSpheres,
     gravity_lines,
     run_lines,
@@ -70,7 +70,7 @@ def write_liggghts_bed(folder: Path, bed: Bed) -> None:
     table = np.full((2, 2), bed.restitution), np.full((2, 2), bed.friction)
     largest = float(bed.radius.max())
     room = np.array([np.array(bed.low) - 4.0 * largest, np.array(bed.high) + 4.0 * largest])
-    settings, law = settings_lines(room, 2, SKIN * largest), ContactLaw()
+    settings, law = settings_lines(room, 2, SKIN * largest), ContactSettings()
     walls = [
         law.plane_line("low_x", 2, "x", bed.low[0]),
         law.plane_line("high_x", 2, "x", bed.high[0]),

@@ -70,6 +70,10 @@ class Deck:
     """e of a single contact, shape (classes, classes)."""
     rolling_friction: float
     """μ_r of all contacts: a torque spring k_t R*² with its cap at μ_r R* F_n; 0: nothing resists rolling."""
+    law: str
+    """Name of the law here (``solver.laws``)."""
+    characteristic_velocity: float
+    """Of linear springs [m/s]; Hertz–Mindlin does not read it."""
     tangential_law: str
     tangential_dashpot: str
     """Conventions that the pour was calculated with here (``solver.material``); an engine has its own."""

@@ -17,11 +17,14 @@ from explorer.export.triangles import mesh_triangles, revolved_triangles
 from solver import Body, Entries, Record, Scene
 from solver.effects.rolling_resistance import RollingResistance
 from solver.effects.set_up import actual
+from solver.laws import HertzMindlin, LinearSpringDashpot
 from solver.rigs import Funnel, MeshFunnel, Plane, Revolved, Rig
 from solver.scene import pour_rig
 
 HOLDS = (RollingResistance.name,)
 """Effects of contacts that a deck can say; an engine may have the law of fewer."""
+LAWS = (HertzMindlin.name, LinearSpringDashpot.name)
+"""Contact laws that a deck can say; an engine may have fewer."""
 
 
 class DeckTarget(ExportTarget):
@@ -29,10 +32,12 @@ class DeckTarget(ExportTarget):
 
     holds: tuple[str, ...] = ()
     """Effects of contacts and flight that its law has as well."""
+    laws: tuple[str, ...] = (HertzMindlin.name,)
+    """Contact laws that it has."""
 
     def check(self, scene: Scene) -> None:
         """Raise :class:`CommandError` for what its deck cannot hold."""
-        check_exportable(scene, self.name, self.holds)
+        check_exportable(scene, self.name, self.holds, self.laws)
 
     def write(self, folder: Path, order: ExportOrder) -> str:
         """Pour, and write the deck of it."""
@@ -72,17 +77,22 @@ def deck_of(record: Record, time: float | None = None) -> Deck:
     )
 
 
-def check_exportable(scene: Scene, engine: str = "any engine", holds: Collection[str] = HOLDS) -> None:
+def check_exportable(
+    scene: Scene, engine: str = "any engine", holds: Collection[str] = HOLDS, laws: Collection[str] = LAWS
+) -> None:
     """Raise :class:`CommandError` if ``scene`` has something that a deck for ``engine`` cannot hold.
 
     Effects of material and set-up are carried out in a deck; of those of contacts and flight ``holds`` are the ones
-    that have an equal there.
+    that have an equal there, and ``laws`` the contact laws.
     """
     scene = actual(scene)
     for effect in scene.effects:
         if effect.on and effect.name not in holds:
             amplitude = f"effect.{effect.name}.{effect.amplitudes[0]}"
             raise CommandError(f"{amplitude}: {effect.numbers[0]:g} cannot be exported to {engine}; allowed: 0")
+    if scene.contact.law not in laws:
+        allowed = ", ".join(laws)
+        raise CommandError(f"contact.law: {scene.contact.law!r} cannot be exported to {engine}; allowed: {allowed}")
     if scene.contact.clump_rule != "body_mass":
         # No engine of these damps by the mass that acts at a contact.
         raise CommandError(
@@ -131,6 +141,8 @@ def assembled(
         friction=friction,
         restitution=restitution,
         rolling_friction=rolling(scene).rolling_friction,
+        law=scene.contact.law,
+        characteristic_velocity=scene.contact.characteristic_velocity,
         tangential_law=scene.contact.tangential_law,
         tangential_dashpot=scene.contact.tangential_dashpot,
         entries=entries,

@@ -1,9 +1,10 @@
 """Single impacts in LIGGGHTS: the cases of ``solver.verification`` as input, run, and read back.
 
-The law is that of every other deck here (``liggghts.py``): ``hertz tangential history`` with ``limitForce on`` and a
-restitution whose damping is ours, so that the normal force is the same function. The tangential force stays
-LIGGGHTS's own: a displacement times the present stiffness 8 G* a, whether the contact is loaded or unloaded
-(LIGGGHTS-PUBLIC 3.8.0, ``tangential_model_history.h``), where ours is a force that is scaled down on unloading.
+The law is that of every other deck here (``liggghts.py``): ``hertz tangential history``, or ``hooke`` for linear
+springs, with ``limitForce on`` and a restitution whose damping is ours, so that the normal force is the same function.
+Hertz's tangential force stays LIGGGHTS's own: a displacement times the present stiffness 8 G* a, whether the contact is
+loaded or unloaded (LIGGGHTS-PUBLIC 3.8.0, ``tangential_model_history.h``), where ours is a force that is scaled down on
+unloading.
 """
 
 from __future__ import annotations
@@ -21,16 +22,18 @@ from explorer.export.frames import Frame
 from explorer.export.liggghts import (
     INPUT,
     WRITE_FINAL,
-    ContactLaw,
+    ContactSettings,
     FreeSpheres,
     run_lines,
     settings_lines,
     write_spheres,
 )
 from explorer.export.run import run_liggghts
+from solver.contact_model import ContactModel
 from solver.material import Material
 from solver.verification.chung_ooi import RIGID
 from solver.verification.impacts import (
+    DECLARED_BY_NOBODY,
     STEPS_PER_CONTACT,
     Engine,
     Impact,
@@ -42,19 +45,23 @@ from solver.verification.impacts import (
 
 Array = npt.NDArray[np.float64]
 DATA = "spheres.data"
+BY_DEFAULT = ContactSettings()
+"""Hertz–Mindlin, nothing resists rolling."""
 SKIN = 0.4
 """Reach of the contact list beyond touching, in radii of the largest sphere."""
 LENGTH = 4.0
 """Of a run, in elastic contact times: a damped contact with e = 0.5 lasts 1.3 of them."""
 
 
-def liggghts_engine(limit: float | None = None) -> Engine:
+def liggghts_engine(limit: float | None = None, contact: ContactModel = DECLARED_BY_NOBODY) -> Engine:
     """LIGGGHTS as an engine of the verification; each call is one run in a temporary folder.
 
     Parameters
     ----------
     limit
         Wall time after which a run is stopped [s]; None: never.
+    contact
+        Its law is run; conventions are LIGGGHTS's own.
 
     Raises
     ------
@@ -62,10 +69,12 @@ def liggghts_engine(limit: float | None = None) -> Engine:
         On a call: LIGGGHTS is not installed, failed, or took longer than ``limit``; or a sphere has not left the
         plane or its target at the end.
     """
-    return Engine("LIGGGHTS", functools.partial(_rebounds, limit=limit), functools.partial(_struck, limit=limit))
+    law = ContactSettings(law=contact.law, characteristic_velocity=contact.characteristic_velocity)
+    on_plane, on_target = (functools.partial(one, limit=limit, law=law) for one in (_rebounds, _struck))
+    return Engine("LIGGGHTS", on_plane, on_target)
 
 
-def plane_input(folder: Path, impacts: Sequence[Impact]) -> None:
+def plane_input(folder: Path, impacts: Sequence[Impact], law: ContactSettings = BY_DEFAULT) -> None:
     """Write ``in.liggghts`` and ``spheres.data`` for impacts on the rigid plane z = 0, ``STEPS_PER_CONTACT`` each.
 
     Every kind of sphere (material, restitution, friction) is a type of its own, the plane the last one.
@@ -86,10 +95,10 @@ def plane_input(folder: Path, impacts: Sequence[Impact]) -> None:
     times = [contact_time(i) for i in impacts]
     dt = min(times) / STEPS_PER_CONTACT
     materials = [*(material for material, _, _ in kinds), RIGID]
-    _write(folder, spheres, materials, restitution, friction, dt, round(LENGTH * max(times) / dt), plane=True)
+    _write(folder, law, spheres, materials, restitution, friction, dt, round(LENGTH * max(times) / dt), plane=True)
 
 
-def target_input(folder: Path, impacts: Sequence[Impact], target: Target) -> None:
+def target_input(folder: Path, impacts: Sequence[Impact], target: Target, law: ContactSettings = BY_DEFAULT) -> None:
     """Write the same files for impacts on a free sphere each; balls are numbered first, then the targets."""
     one, n = impacts[0], len(impacts)
     place = np.zeros((2 * n, 3))
@@ -106,11 +115,12 @@ def target_input(folder: Path, impacts: Sequence[Impact], target: Target) -> Non
     )
     tables = np.full((2, 2), one.restitution), np.full((2, 2), one.friction)
     dt, steps = struck_time(one, target) / STEPS_PER_CONTACT, round(LENGTH * STEPS_PER_CONTACT)
-    _write(folder, spheres, [one.material, target.material], *tables, dt, steps, plane=False)
+    _write(folder, law, spheres, [one.material, target.material], *tables, dt, steps, plane=False)
 
 
 def _write(
     folder: Path,
+    law: ContactSettings,
     spheres: FreeSpheres,
     materials: Sequence[Material],
     restitution: Array,
@@ -119,7 +129,7 @@ def _write(
     steps: int,
     plane: bool,
 ) -> None:
-    law, largest, n = ContactLaw(), float(spheres.radius.max()), len(materials)
+    largest, n = float(spheres.radius.max()), len(materials)
     room = np.array([spheres.position.min(axis=0), spheres.position.max(axis=0)])
     room += np.array([[-4.0 * largest], [4.0 * largest]])
     settings = settings_lines(room, n, SKIN * largest)
@@ -139,10 +149,10 @@ def _write(
     write_spheres(folder / DATA, spheres, n, room)
 
 
-def _rebounds(impacts: Sequence[Impact], limit: float | None) -> list[Rebound]:
+def _rebounds(impacts: Sequence[Impact], limit: float | None, law: ContactSettings) -> list[Rebound]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        plane_input(folder, impacts)
+        plane_input(folder, impacts, law)
         final = run_liggghts(folder, limit=limit).final
     _apart(final.position[:, 2] - final.radius)
     return [
@@ -151,10 +161,10 @@ def _rebounds(impacts: Sequence[Impact], limit: float | None) -> list[Rebound]:
     ]
 
 
-def _struck(impacts: Sequence[Impact], target: Target, limit: float | None) -> list[Rebound]:
+def _struck(impacts: Sequence[Impact], target: Target, limit: float | None, law: ContactSettings) -> list[Rebound]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        target_input(folder, impacts, target)
+        target_input(folder, impacts, target, law)
         final = run_liggghts(folder, limit=limit).final
     n = len(impacts)
     ball, hit = _part(final, slice(0, n)), _part(final, slice(n, 2 * n))

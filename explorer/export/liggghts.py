@@ -2,17 +2,18 @@
 
 What makes it repeat our pour, in the order of the input:
 
-- ``limitForce on`` cuts tension as our law does, and every restitution is replaced by the one whose damping is ours
-  (:func:`unclamped_restitution`), so the two normal laws are the same function.
+- ``limitForce on`` cuts tension as our laws do, and every restitution is replaced by the one whose damping is ours
+  (:func:`unclamped_restitution`), so the normal laws are the same functions.
 - ``mass … inertia_tensor … use_density`` takes the declared centre of mass; ``use_volume`` would shift it to a Monte
   Carlo estimate. The reduced mass of a contact is that of the bodies by itself.
 - One ``fix insert/pack`` per body in a cube of 0.2 nm, with the orientation as a quaternion, at its own step. LIGGGHTS
   inserts after it moved the bodies of a step, so its step k + 1 is our k.
 - ``boundary m`` lets the box follow bodies that roll out of it; ``f`` would delete them.
 
-What stays different: the tangential spring is a displacement times the present stiffness (ours is a force that does
-not grow while the contact is loaded), it is projected when the normal turns (ours keeps its length), and its damping
-follows from the replaced restitution (18 % stronger at e = 0.5).
+What stays different with Hertz–Mindlin: the tangential spring is a displacement times the present stiffness (ours is a
+force that does not grow while the contact is loaded), it is projected when the normal turns (ours keeps its length),
+and its damping follows from the replaced restitution (18 % stronger at e = 0.5). Of linear springs the projection alone
+is different where ``contact.tangential_dashpot`` is uncapped: stiffness and both dampings are those of ours.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ from explorer.export.readme import write_readme
 from explorer.export.triangles import write_stl
 from solver.effects.rolling_resistance import RollingResistance
 from solver.effects.set_up import actual
+from solver.laws import HertzMindlin, LinearSpringDashpot
 from solver.laws.restitution import normal_damping
 from solver.scene import Scene
 
@@ -49,15 +51,19 @@ SKIN, CELL = 0.9, 6.0
 """Reach of the contact list beyond touching, and size of its cells, in radii of the largest sphere: the fastest that
 were found for the seed pour. By default the box is cut into cells of half a contact distance, and to empty millions of
 them takes longer than everything else."""
-MODEL = "model hertz tangential history"
+MODELS = {
+    HertzMindlin.name: "model hertz tangential history",
+    LinearSpringDashpot.name: "model hooke tangential history",
+}
+"""What our laws are called there."""
 ROLLING = " rolling_friction epsd2"
 """Added to the model where something resists rolling: the law of our ``rolling_resistance``, without a dashpot."""
 
 
 def unclamped_restitution(restitution: float) -> float:
-    """The e for which LIGGGHTS's damping, 2 √(5/6) |β(e)|, is our c_n.
+    """The e for which LIGGGHTS's damping ratio, |β(e)| in both laws, is our ζ; 0 where ζ ≥ 1.
 
-    β = ln e / √(ln² e + π²), so e = exp(−π b / √(1 − b²)) with b = c_n / (2 √(5/6)); 0 where b ≥ 1.
+    β = ln e / √(ln² e + π²), so e = exp(−π b / √(1 − b²)) with b = ζ = c_n / (2 √(5/6)).
     """
     b = normal_damping(restitution) / (2.0 * math.sqrt(5.0 / 6.0))
     return math.exp(-math.pi * b / math.sqrt(1.0 - b * b)) if b < 1.0 else 0.0
@@ -83,6 +89,7 @@ class Liggghts(DeckTarget):
 
     name, what = "liggghts", "a deck that runs as it is"
     holds = (RollingResistance.name,)
+    laws = (HertzMindlin.name, LinearSpringDashpot.name)
 
     def check(self, scene: Scene) -> None:
         """Raise :class:`CommandError` for what a deck cannot hold, and for bodies of one sphere."""
@@ -99,15 +106,18 @@ LIGGGHTS = Liggghts()
 
 
 @dataclass(frozen=True)
-class ContactLaw:
+class ContactSettings:
     """The law between particles and at walls, in words of LIGGGHTS: with our rolling resistance where there is one."""
 
     rolling_friction: float = 0.0
+    law: str = HertzMindlin.name
+    characteristic_velocity: float = 1.0
+    """[m/s]; of linear springs."""
 
     @property
     def words(self) -> str:
         """The model of a pair style or a wall."""
-        return MODEL + (ROLLING if self.rolling_friction > 0.0 else "")
+        return MODELS[self.law] + (ROLLING if self.rolling_friction > 0.0 else "")
 
     def pair_lines(self, moduli: list[float], ratios: list[float], restitution: Array, friction: Array) -> list[str]:
         """Materials by class and pairs of classes, and the law between particles.
@@ -127,6 +137,7 @@ class ContactLaw:
             f"fix poisson all property/global poissonsRatio peratomtype {_row(ratios)}",
             f"fix restitution all property/global coefficientRestitution peratomtypepair {n} {_row(replaced.ravel())}",
             f"fix friction all property/global coefficientFriction peratomtypepair {n} {_row(friction.ravel())}",
+            *self._velocity_lines(),
             *self._rolling_lines(n),
             f"pair_style gran {self.words} limitForce on",
             "pair_coeff * *",
@@ -141,6 +152,11 @@ class ContactLaw:
         """All meshes as one wall; LIGGGHTS allows no more than one of this kind."""
         meshes = f"n_meshes {len(names)} meshes {' '.join(names)}"
         return [f"fix walls all wall/gran {self.words} mesh {meshes} limitForce on"] if names else []
+
+    def _velocity_lines(self) -> list[str]:
+        if self.law != LinearSpringDashpot.name:
+            return []
+        return [f"fix speed all property/global characteristicVelocity scalar {self.characteristic_velocity!r}"]
 
     def _rolling_lines(self, n: int) -> list[str]:
         if not self.rolling_friction > 0.0:
@@ -237,7 +253,7 @@ WRITE_FINAL = f'write_dump all custom {FINAL} {COLUMNS} modify sort id format "{
 def _input(deck: Deck) -> list[str]:
     moduli = [*(clump.youngs_modulus for clump in deck.clumps), deck.wall_youngs_modulus]
     ratios = [*(clump.poisson_ratio for clump in deck.clumps), deck.wall_poisson_ratio]
-    wall, law = len(moduli), ContactLaw(deck.rolling_friction)
+    wall, law = len(moduli), ContactSettings(deck.rolling_friction, deck.law, deck.characteristic_velocity)
     largest = max(float(clump.radii.max()) for clump in deck.clumps)
     return [
         f"# {deck.title}, seed {deck.seed}: {deck.bodies} bodies, {deck.steps} steps of {deck.dt:.6g} s",
@@ -290,7 +306,7 @@ def _insertion_lines(deck: Deck, body: int) -> list[str]:
     ]
 
 
-def _runs(deck: Deck, law: ContactLaw) -> list[str]:
+def _runs(deck: Deck, law: ContactSettings) -> list[str]:
     """Runs between the moments at which a mesh is taken away; one step more than ours, since theirs begin at 1.
 
     The wall is declared anew without it: contacts with the other meshes start over without a tangential spring.

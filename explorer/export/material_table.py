@@ -17,13 +17,19 @@ import csv
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from explorer.errors import CommandError
 from explorer.export.liggghts import unclamped_restitution
 from explorer.export.target import ExportOrder, ExportTarget
 from solver import Body, Scene
 from solver.effects.set_up import actual
+from solver.laws import HertzMindlin, LinearSpringDashpot
 from solver.material import Pair
 
 Rows = list[Sequence[str]]
+DAMPING_OF = {
+    HertzMindlin.name: "Thornton, Cummins & Cleary (2013)",
+    LinearSpringDashpot.name: "Schwager & Poeschel (2007)",
+}
 ROLLING, KINETIC = "rolling_resistance", "kinetic_friction"
 
 README = """\
@@ -35,14 +41,23 @@ interactions.csv  one row per pair of components, and of each with the wall
 bodies.csv        mass and principal moments of inertia of every component, from its true solid
 conventions.csv   READ THIS FIRST: what each number means here, what EDEM makes of it, and whether it transfers
 
-The law here is Hertz–Mindlin without slip, as EDEM's default is. Rolling friction does not transfer between engines and
+{law} Rolling friction does not transfer between engines and
 has to be calibrated again where it is not 0.
 {effects}"""
+LAWS = {
+    HertzMindlin.name: "The law here is Hertz–Mindlin without slip, as EDEM's default is.",
+    LinearSpringDashpot.name: "The law here is LINEAR springs and dashpots, which EDEM's default is not.",
+}
 
 
 def write_material_table(folder: Path, scene: Scene) -> None:
-    """Write the tables of ``scene``, its set-up effects carried out, and a README into an existing folder."""
+    """Write the tables of ``scene``, its set-up effects carried out, and a README into an existing folder.
+
+    Raises CommandError for a contact law whose conventions are not known here.
+    """
     scene = actual(scene)
+    if scene.contact.law not in LAWS:
+        raise CommandError(f"contact.law: {scene.contact.law!r} cannot be exported to edem; allowed: {', '.join(LAWS)}")
     tables = {
         "materials.csv": _materials(scene),
         "interactions.csv": _interactions(scene),
@@ -54,7 +69,8 @@ def write_material_table(folder: Path, scene: Scene) -> None:
             csv.writer(file, lineterminator="\n").writerows(rows)
     others = [effect.name for effect in scene.effects if effect.on and effect.name not in (ROLLING, KINETIC)]
     words = f"Effects that these tables cannot hold: {', '.join(others)}.\n" if others else ""
-    (folder / "README.txt").write_text(README.format(title=scene.title, effects=words), encoding="utf-8")
+    text = README.format(title=scene.title, law=LAWS[scene.contact.law], effects=words)
+    (folder / "README.txt").write_text(text, encoding="utf-8")
 
 
 class Edem(ExportTarget):
@@ -153,11 +169,12 @@ def _conventions(scene: Scene) -> Rows:
         (
             "restitution",
             "1",
-            "of one central impact, returned exactly: damping of Thornton, Cummins & Cleary (2013), never pulling",
+            f"of one central impact, returned exactly: damping of {DAMPING_OF[scene.contact.law]}, never pulling",
             "damping 2 sqrt(5/6) |beta| sqrt(S_n m*), beta = ln e/sqrt(ln^2 e + pi^2): returns e only if the force may "
             "pull at the end of the contact",
             "yes, if the force may pull; else type in restitution_same_damping, which gives the same damping as here",
         ),
+        *_linear(scene),
         (
             "clump rule",
             "-",
@@ -196,6 +213,22 @@ def _conventions(scene: Scene) -> Rows:
             numbers = ", ".join(f"{name} = {getattr(effect, name):g}" for name in effect.amplitudes)
             rows.append((f"effect {effect.name}", "SI", numbers, "not in these tables", "no"))
     return rows
+
+
+def _linear(scene: Scene) -> Rows:
+    """What is said of linear springs alone."""
+    if scene.contact.law == HertzMindlin.name:
+        return []
+    return [
+        (
+            "contact law",
+            "-",
+            f"contact.law = {scene.contact.law}: k_n = k_t = 16/15 E* sqrt(R*) (15 m* V^2/(16 E* sqrt(R*)))^(1/5), "
+            f"V = {_number(scene.contact.characteristic_velocity)} m/s; dashpots 2 zeta sqrt(m* k_n) both ways",
+            "Hertz-Mindlin unless another model is chosen",
+            "no: choose a linear model with this stiffness",
+        )
+    ]
 
 
 def _rolling(scene: Scene) -> tuple[float, bool]:

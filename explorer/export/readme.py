@@ -6,6 +6,7 @@ import textwrap
 from pathlib import Path
 
 from explorer.export.deck import Deck
+from solver.laws import HertzMindlin
 
 RUN = {
     "liggghts": """\
@@ -28,6 +29,12 @@ FILES = {
         yade_pour.py  the script           law.json       damping ratios and friction angles of all pairs""",
 }
 DIFFERENCES = {
+    "linear": """\
+        contact.law = {law_name}, characteristic velocity {speed:g} m/s; model hooke tangential history there.
+        Normal force: the same function (limitForce on, and restitutions replaced by those with the same damping).
+        Tangential force: LIGGGHTS's spring is projected when the normal turns, ours keeps its length. Coulomb's limit
+        holds for its spring alone{dashpot}.
+        Where a body is placed is drawn in a cube of 0.2 nm. Counting of steps: its step k + 1 is our k.""",
     "liggghts": """\
         Normal force: the same function (limitForce on, and restitutions replaced by those with the same damping).
         Tangential force: LIGGGHTS stores a displacement and multiplies it with the present stiffness, so the force
@@ -111,6 +118,9 @@ def _differences(engine: str, deck: Deck) -> str:
     law = f"{', as' if same else '; not so'} here (contact.tangential_law = {deck.tangential_law})"
     both = "; here as well" if deck.tangential_dashpot == "uncapped" else ", here for both"
     dashpot = f"{both} (contact.tangential_dashpot = {deck.tangential_dashpot})"
+    if deck.law != HertzMindlin.name:
+        speed = deck.characteristic_velocity
+        return DIFFERENCES["linear"].format(law_name=deck.law, speed=speed, dashpot=dashpot)
     return DIFFERENCES[engine].format(law=law, dashpot=dashpot)
 
 

@@ -22,6 +22,8 @@ from explorer.export.deck import Deck, write_deck
 from explorer.export.deck_of_scene import DeckTarget
 from explorer.export.readme import write_readme
 from explorer.export.triangles import write_stl
+from solver.laws import HertzMindlin
+from solver.laws.hertz_mindlin import tangential_damping
 from solver.laws.restitution import normal_damping
 
 SCRIPT = "yade_pour.py"
@@ -33,6 +35,8 @@ def write_yade(folder: Path, deck: Deck) -> None:
     """Write the deck into ``folder``; :class:`CommandError` for what YADE's law does not have."""
     if deck.rolling_friction > 0.0:
         raise CommandError(f"rolling friction {deck.rolling_friction:g}: not in the deck for YADE; allowed: 0")
+    if deck.law != HertzMindlin.name:
+        raise CommandError(f"contact law {deck.law!r}: not in the deck for YADE; allowed: {HertzMindlin.name}")
     write_deck(folder, deck)
     write_law(folder, deck.restitution, deck.friction)
     for mesh in deck.meshes:
@@ -43,9 +47,6 @@ def write_yade(folder: Path, deck: Deck) -> None:
 
 def write_law(folder: Path, restitution: np.ndarray, friction: np.ndarray) -> None:
     """Write damping ratios and friction angles [rad] of all pairs of classes: ``law.json``."""
-    # Imported here: it loads Taichi, and a target can be named without.
-    from solver.laws.hertz_mindlin import tangential_damping
-
     tables = {
         "normal_damping": np.vectorize(normal_damping, otypes=[float])(restitution) / 2.0,
         "tangential_damping": np.vectorize(tangential_damping, otypes=[float])(restitution) / 2.0,

@@ -17,7 +17,9 @@ import numpy.typing as npt
 
 from solver.bench_tests.bench import Bench, ball, held
 from solver.bench_tests.result import BenchResult, Quantity
+from solver.laws import HertzMindlin
 from solver.material import effective_shear_modulus, effective_youngs_modulus
+from solver.params import ParameterError
 from solver.rigs.compression import Compression
 from solver.scene import Scene
 
@@ -32,7 +34,12 @@ SETTLING = 0.02
 
 
 def measure(scene: Scene, seed: int) -> BenchResult:
-    """Squeeze and shear; E* and G* beside those of the two materials, and the paper's apparent modulus."""
+    """Squeeze and shear; E* and G* beside those of the two materials, and the paper's apparent modulus.
+
+    Raises ParameterError under another contact law than Hertz's: there the force says nothing of moduli in this way.
+    """
+    if scene.contact.law != HertzMindlin.name:
+        raise ParameterError(f"contact.law: {scene.contact.law!r} in a {scene.rig.name}; allowed: {HertzMindlin.name}")
     body = next(body for body in scene.bodies if body.name == cast(Compression, scene.rig).body)
     specimen = ball(body)
     radius = float(specimen.clump.radii[0])

@@ -33,7 +33,8 @@ Touch = ti.types.struct(
     limit=ti.f64,  # then TANGENTIAL: largest tangential force [N]
     torque=Vec3,  # ROLLING, TWISTING: torque on i, its opposite on j [N m]
 )
-"""One contact. ``k_t = 8 G* a`` is the tangential stiffness of the contact law [N/m]."""
+"""One contact. ``k_t = 8 G* a`` is the tangential stiffness of the contact law [N/m]: a law with another formula shows
+the G* with which it is."""
 
 Flight = ti.types.struct(
     velocity=Vec3,  # [m/s]

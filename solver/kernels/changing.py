@@ -3,7 +3,7 @@
 from solver.backend import serial, ti
 from solver.kernels.sleep import rouse_all
 from solver.kernels.tables import Row, Table
-from solver.state import Vec3, Vec4, Vec5
+from solver.state import Vec3, Vec4
 
 
 @ti.func
@@ -15,12 +15,12 @@ def disturb(s: ti.template(), w):
 
 @ti.kernel
 def load_law(s: ti.template(), w: ti.i32, table: Table, kinds: ti.i32):
-    """Contact constants of every pair of kinds, shape (kinds², 5), row a · kinds + b."""
+    """Contact constants of every pair of kinds, by the law's columns, row a · kinds + b."""
     s.world.kinds[w] = kinds
     rouse_all(s, w)
     ti.loop_config(serialize=ti.static(serial()))
     for k in range(table.shape[0]):
-        s.law.row[w, k] = Vec5(table[k, 0], table[k, 1], table[k, 2], table[k, 3], table[k, 4])
+        s.law.row[w, k] = s.law_row(*[table[k, c] for c in ti.static(range(len(s.contact_law.columns)))])
 
 
 @ti.kernel

@@ -23,7 +23,7 @@ from solver.kernels.meeting import meet
 from solver.state import Vec3
 
 BODY_MASS, LOCAL_MASS, SHARED = 0, 1, 2
-"""Places in ``material.CLUMP_RULES``."""
+"""Places in ``contact_model.CLUMP_RULES``."""
 
 
 @ti.func

@@ -8,14 +8,7 @@ from solver.kernels.clump_rules import BODY_MASS, SHARED, contact_point, local_m
 from solver.kernels.effects import forget, keep, last_couple, pass_stage
 from solver.kernels.meeting import lasts, meet
 from solver.kernels.walls import surface_velocity
-from solver.laws.hertz_mindlin import (
-    normal_damper,
-    normal_force,
-    normal_spring_force,
-    spring_energy,
-    spring_energy_gain,
-    tangential_force,
-)
+from solver.laws.law import normal_force, tangential_force
 from solver.state import Vec3
 
 HELD_OVERLAP = 1e-45
@@ -23,9 +16,16 @@ HELD_OVERLAP = 1e-45
 
 
 @ti.func
+def scale_of(s: ti.template(), w, k, law):
+    """What the contact law takes of the bodies of entry ``k``."""
+    return s.contact_law.scale(law, s.contact.reduced_radius[w, k], s.contact.reduced_mass[w, k])
+
+
+@ti.func
 def lose(s: ti.template(), w, k, law):
     """Entry ``k`` has come apart: its spring is gone, and so is the energy in it."""
-    energy = spring_energy(law, s.contact.spring[w, k].norm_sqr(), s.contact.radius[w, k])
+    spring2 = s.contact.spring[w, k].norm_sqr()
+    energy = s.contact_law.shear_energy(law, scale_of(s, w, k, law), spring2, s.contact.radius[w, k])
     s.world.dissipated[w] = s.world.dissipated[w] + energy
     s.contact.radius[w, k] = 0.0
     s.contact.spring[w, k] = Vec3(0.0, 0.0, 0.0)
@@ -53,6 +53,7 @@ def touch_of(s: ti.template(), w, k, n, overlap, velocity, omega, a, elastic, da
     """What effects see of entry ``k`` before they act."""
     row = s.contact.law[w, k]
     law = s.law.row[w, row]
+    scale = scale_of(s, w, k, law)
     v_n = velocity.dot(n)
     return Touch(
         normal=n,
@@ -64,16 +65,16 @@ def touch_of(s: ti.template(), w, k, n, overlap, velocity, omega, a, elastic, da
         omega=omega,
         dt=s.world.dt[w],
         before=s.contact.radius[w, k],
-        e_star=law[0],
-        g_star=law[1],
+        e_star=law.e_star,
+        g_star=s.contact_law.shear_modulus(law, scale, a),
         restitution=s.effect.row[w, row, ti.static(COLUMNS[-1])],
-        friction=law[2],
+        friction=law.friction,
         radius=a,
         elastic=elastic,
         adhesive=elastic,
         work=0.0,
         damper=damper,
-        shear_damper=law[4] * ti.sqrt(a * mass),
+        shear_damper=s.contact_law.shear_damper(law, scale, a, mass),
         floor=0.0,
         pull=0.0,
         held=0,
@@ -96,6 +97,7 @@ def respond(s: ti.template(), w, k, n, overlap, velocity, omega, mass, part, sti
     """
     dt = s.world.dt[w]
     law = s.law.row[w, s.contact.law[w, k]]
+    scale = scale_of(s, w, k, law)
     before = s.contact.radius[w, k]
     v_n = velocity.dot(n)
     v_t = velocity - v_n * n
@@ -104,11 +106,11 @@ def respond(s: ti.template(), w, k, n, overlap, velocity, omega, mass, part, sti
         pressed = ti.max(HELD_OVERLAP, overlap)
     contact_radius = ti.sqrt(s.contact.reduced_radius[w, k] * pressed)
     hertz_radius = contact_radius
-    hertz = normal_spring_force(law, contact_radius, pressed)
-    damper = normal_damper(law, ti.sqrt(contact_radius * mass), before, pressed, v_n, dt)
-    elastic, floor, pull, released, last_half = hertz, 0.0, 0.0, 0, 0.0
+    spring_force = s.contact_law.normal_spring_force(law, scale, contact_radius, pressed)
+    damper = s.contact_law.normal_damper(law, scale, contact_radius, mass, before, pressed, v_n, dt)
+    elastic, floor, pull, released, last_half = spring_force, 0.0, 0.0, 0, 0.0
     if ti.static(s.sharing):
-        elastic, damper = part * hertz, part * damper
+        elastic, damper = part * spring_force, part * damper
     touch = Touch(force=0.0)
     if ti.static(s.effects):
         touch = touch_of(s, w, k, n, overlap, velocity, omega, contact_radius, elastic, damper, mass)
@@ -118,22 +120,22 @@ def respond(s: ti.template(), w, k, n, overlap, velocity, omega, mass, part, sti
         floor, pull = touch.floor, touch.pull
         if overlap <= 0.0 and touch.held == 0:
             released = 1
-    inertia = ti.sqrt(contact_radius * mass)
     expected = v_n
     if before > 0.0:
         expected = s.contact.expected[w, k]
     f_n = normal_force(elastic, damper, v_n, expected, mass, dt, floor)
-    limit = law[2] * f_n
+    limit = law.friction * f_n
     if ti.static(s.effects):
         touch.force = f_n
-        touch.limit = law[2] * ti.max(0.0, f_n + pull)
+        touch.limit = law.friction * ti.max(0.0, f_n + pull)
         touch = pass_stage(s, w, k, touch, Stage.TANGENTIAL, still)
         limit = touch.limit
     old, last_loss = s.contact.spring[w, k], s.contact.loss[w, k]
     displaced, uncapped = s.world.tangential_law[w], s.world.tangential_dashpot[w]
-    spring, f_t = tangential_force(
-        law, contact_radius, before, old, n, v_t, inertia, limit, dt, part, displaced, uncapped
-    )
+    shear_stiffness = s.contact_law.shear_stiffness(law, scale, contact_radius) * part
+    shear_damper = s.contact_law.shear_damper(law, scale, contact_radius, mass) * part
+    growth = s.contact_law.growth(contact_radius, before, displaced)
+    spring, f_t = tangential_force(shear_stiffness, shear_damper, growth, old, n, v_t, limit, dt, uncapped)
     force, torque = f_n * n + f_t, Vec3(0.0, 0.0, 0.0)
     if ti.static(s.effects):
         touch = pass_stage(s, w, k, touch, Stage.ROLLING, still)
@@ -143,9 +145,9 @@ def respond(s: ti.template(), w, k, n, overlap, velocity, omega, mass, part, sti
     # it now, half when the next velocity is known; less what has gone into the spring.
     taken, stored = 0.0, 0.0
     if not still:
-        loss = (hertz - f_n) * n - f_t
+        loss = (spring_force - f_n) * n - f_t
         taken = 0.5 * dt * (loss + last_loss).dot(velocity)
-        stored = spring_energy_gain(law, old.norm_sqr(), before, spring.norm_sqr(), contact_radius)
+        stored = s.contact_law.shear_energy_gain(law, scale, old.norm_sqr(), before, spring.norm_sqr(), contact_radius)
         if ti.static(s.effects):
             taken -= 0.5 * dt * (torque + last_couple(s, w, k)).dot(omega)
             last_half = 0.5 * dt * (last_loss.dot(velocity) - last_couple(s, w, k).dot(omega))

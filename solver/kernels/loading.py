@@ -3,8 +3,8 @@
 from solver.backend import serial, ti
 from solver.effects.air_drag import shape_factors
 from solver.kernels.geometry import rotation
-from solver.kernels.tables import IntRow, IntTable, Row, Table
-from solver.state import Ints3, Mat3, Vec3, Vec4
+from solver.kernels.tables import IntRow, IntTable, Table
+from solver.state import WORLD, Ints3, Mat3, Vec3, Vec4
 
 
 @ti.func
@@ -13,21 +13,29 @@ def triple(table: ti.template(), row, column):
     return Vec3(table[row, column], table[row, column + 1], table[row, column + 2])
 
 
+SETTINGS = (
+    *("dt", "gravity", "skin", "cell", "sleep_speed", "sleep_time", "domain", "outlet", "inlet_radius"),
+    *("clump_rule", "tangential_law", "tangential_dashpot"),
+)
+"""What a world is set up with: fields of ``state.WORLD``."""
+Settings = ti.types.struct(**{name: WORLD[name] for name in SETTINGS})
+
+
 @ti.kernel
-def load_world(s: ti.template(), w: ti.i32, settings: Row):
-    """Empty world ``w`` and set it up; the columns of ``settings`` are those of ``world.SETTINGS``."""
-    s.world.dt[w] = settings[0]
-    s.world.skin[w] = settings[1]
-    s.world.cell[w] = settings[2]
-    s.world.sleep_speed[w] = settings[3]
-    s.world.sleep_time[w] = settings[4]
-    s.world.domain[w] = settings[5]
-    s.world.outlet[w] = settings[6]
-    s.world.inlet_radius[w] = settings[7]
-    s.world.clump_rule[w] = ti.cast(settings[8], ti.i32)
-    s.world.tangential_law[w] = ti.cast(settings[9], ti.i32)
-    s.world.tangential_dashpot[w] = ti.cast(settings[10], ti.i32)
-    s.world.gravity[w] = Vec3(settings[11], settings[12], settings[13])
+def load_world(s: ti.template(), w: ti.i32, settings: Settings):
+    """Empty world ``w`` and set it up."""
+    s.world.dt[w] = settings.dt
+    s.world.gravity[w] = settings.gravity
+    s.world.skin[w] = settings.skin
+    s.world.cell[w] = settings.cell
+    s.world.sleep_speed[w] = settings.sleep_speed
+    s.world.sleep_time[w] = settings.sleep_time
+    s.world.domain[w] = settings.domain
+    s.world.outlet[w] = settings.outlet
+    s.world.inlet_radius[w] = settings.inlet_radius
+    s.world.clump_rule[w] = settings.clump_rule
+    s.world.tangential_law[w] = settings.tangential_law
+    s.world.tangential_dashpot[w] = settings.tangential_dashpot
     s.world.grip[w] = 0.0
     s.world.outdated[w] = 1
     s.world.bodies[w] = 0

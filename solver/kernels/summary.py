@@ -2,8 +2,8 @@
 
 from solver.backend import ti
 from solver.effects.columns import HERTZ
+from solver.kernels.contacts import scale_of
 from solver.kernels.motion import energy_per_mass
-from solver.laws.hertz_mindlin import hertz_energy, spring_energy
 from solver.numerics import ROLLING_SLOPE
 
 
@@ -45,7 +45,9 @@ def sum_contacts(s: ti.template(), w):
             if ti.static(s.effects):
                 hertz = s.memory.number[w, k, HERTZ]
             overlap = hertz * hertz / s.contact.reduced_radius[w, k]
-            energy = hertz_energy(law, hertz, overlap) + spring_energy(law, s.contact.spring[w, k].norm_sqr(), radius)
+            scale, spring2 = scale_of(s, w, k, law), s.contact.spring[w, k].norm_sqr()
+            energy = s.contact_law.normal_energy(law, scale, hertz, overlap)
+            energy += s.contact_law.shear_energy(law, scale, spring2, radius)
             s.summary.elastic[w] = s.summary.elastic[w] + energy
             s.summary.touching[w] = s.summary.touching[w] + 1
             if s.contact.b[w, k] >= 0:

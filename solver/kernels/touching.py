@@ -2,8 +2,8 @@
 
 from solver.backend import serial, ti
 from solver.effects.columns import HERTZ
+from solver.kernels.contacts import scale_of
 from solver.kernels.meeting import lasts, meet
-from solver.laws.hertz_mindlin import normal_spring_force
 from solver.state import Vec3
 
 Table = ti.types.ndarray(dtype=ti.f64, ndim=2)
@@ -14,7 +14,7 @@ IntRow = ti.types.ndarray(dtype=ti.i32, ndim=1)
 def read_contacts(s: ti.template(), world: ti.i32, out: Table, count: IntRow):
     """One row per acting contact: body a, body b or -1 - wall, point (3), normal from b to a (3), force on a (3).
 
-    The force is that of the last step: the elastic part of Hertz along the normal, less the part that takes energy
+    The force is that of the last step: the elastic part along the normal, less the part that takes energy
     (``contact.loss``), which holds damping and friction. ``count[0]`` says how many rows are filled.
     """
     ti.loop_config(serialize=ti.static(serial()))
@@ -32,7 +32,8 @@ def read_contacts(s: ti.template(), world: ti.i32, out: Table, count: IntRow):
                     if ti.static(s.effects):
                         hertz = s.memory.number[w, k, HERTZ]
                     pressed = hertz * hertz / s.contact.reduced_radius[w, k]
-                    elastic = normal_spring_force(s.law.row[w, s.contact.law[w, k]], hertz, pressed)
+                    law = s.law.row[w, s.contact.law[w, k]]
+                    elastic = s.contact_law.normal_spring_force(law, scale_of(s, w, k, law), hertz, pressed)
                     force = elastic * n - s.contact.loss[w, k]
                     out[found, 0] = ti.cast(a, ti.f64)
                     out[found, 1] = ti.cast(s.contact.b[w, k], ti.f64)

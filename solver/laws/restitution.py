@@ -1,11 +1,12 @@
-"""Damping that gives back the restitution that was asked for: the exact inverse of the damped Hertz contact.
+"""Damping that gives back the restitution that was asked for: the exact inverse of the damped contact, of either law.
 
 An impact with the normal force of `hertz_mindlin.py` is, with k = 4/3 E* √R*, overlap δ and mass m*,
 
     m* δ'' = −max(0, k δ^(3/2) + c_n √(3/2 k m*) δ^(1/4) δ'),   δ(0) = 0,  δ'(0) = v
 
 (2 E* a = 3/2 k √δ). With s ∝ δ^(5/4) as the coordinate and dθ ∝ δ^(1/4) dt as the clock it becomes the linear damped
-oscillator d²s/dθ² + 2 ζ ds/dθ + s = 0, with ζ = √0.3 c_n (Antypov & Elliott 2011, EPL 94:50004). The force is never
+oscillator d²s/dθ² + 2 ζ ds/dθ + s = 0, with ζ = √0.3 c_n (Antypov & Elliott 2011, EPL 94:50004); the contact of
+`linear_spring_dashpot.py` is that oscillator as it stands, with s = δ and ζ = γ/(2 √(m* k_n)). The force is never
 tensile, so the impact is over when s + 2 ζ ds/dθ = 0, before the overlap is (as in Schwager & Pöschel 2007, Granular
 Matter 9:465, for the linear dashpot). The solution at that moment, put together, is
 
@@ -22,18 +23,23 @@ CRITICAL = 2.0
 """−ln e at ζ = 1, where both branches meet."""
 
 
-def exponent(damping_ratio: float) -> float:
+def exponent(zeta: float) -> float:
     """−ln e of an impact with damping ratio ζ, dimensionless; increases from 0 without limit."""
-    if damping_ratio < 1.0:
-        phi = math.asin(damping_ratio)
+    if zeta < 1.0:
+        phi = math.asin(zeta)
         return (math.pi - 2.0 * phi) * math.tan(phi)
-    psi = math.acosh(damping_ratio)
+    psi = math.acosh(zeta)
     return 2.0 * psi / math.tanh(psi) if psi > 0.0 else CRITICAL
 
 
-@lru_cache(maxsize=1024)
 def normal_damping(restitution: float) -> float:
-    """c_n, dimensionless, for a restitution 0 < e ≤ 1; 0 for e = 1. Good to 1e-9 of itself."""
+    """c_n of the Hertzian contact, dimensionless, for a restitution 0 < e ≤ 1; 0 for e = 1."""
+    return damping_ratio(restitution) / math.sqrt(0.3)
+
+
+@lru_cache(maxsize=1024)
+def damping_ratio(restitution: float) -> float:
+    """ζ, dimensionless, for a restitution 0 < e ≤ 1; 0 for e = 1. Good to 1e-9 of itself."""
     if not 0.0 < restitution <= 1.0:
         raise ValueError(f"restitution: {restitution:g} is outside 0 … 1 (0 itself has no finite damping)")
     wanted = -math.log(restitution)
@@ -42,7 +48,7 @@ def normal_damping(restitution: float) -> float:
     while True:
         middle = 0.5 * (low + high)
         if middle in (low, high):
-            return middle / math.sqrt(0.3)
+            return middle
         if exponent(middle) < wanted:
             low = middle
         else:

@@ -111,6 +111,18 @@ def test_a_folder_is_complete_and_knows_no_other_place(engine, deck, tmp_path):
         assert "{" not in text or path.suffix in (".json", ".py", ".liggghts")
 
 
+def test_linear_springs_are_liggghts_s_model_hooke_and_nothing_of_yade_s(deck, tmp_path):
+    linear = dataclasses.replace(deck, law="linear_spring_dashpot", characteristic_velocity=0.4)
+    write_liggghts(tmp_path, linear)
+    lines = (tmp_path / "in.liggghts").read_text().splitlines()
+    assert "fix speed all property/global characteristicVelocity scalar 0.4" in lines
+    models = [line.split(" model ")[1] for line in lines if " model " in line]
+    assert {" ".join(words.split()[:3]) for words in models} == {"hooke tangential history"}
+    assert read_deck(tmp_path).law == "linear_spring_dashpot"
+    with pytest.raises(CommandError, match="contact law 'linear_spring_dashpot': not in the deck for YADE; allowed: h"):
+        EXPORTS["yade"].write_deck(tmp_path, linear)
+
+
 def test_the_gate_is_taken_away_at_its_step_in_liggghts(deck, tmp_path):
     meshes = tuple(dataclasses.replace(mesh, until_step=700 if mesh.name == "gate" else -1) for mesh in deck.meshes)
     write_liggghts(tmp_path, dataclasses.replace(deck, meshes=meshes, steps=1000))

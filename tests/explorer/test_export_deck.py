@@ -10,8 +10,8 @@ from explorer.export import EXPORTS
 from explorer.export.deck_of_scene import deck_of
 from explorer.export.readme import _differences
 from explorer.scene.file import load_scene
+from solver.contact_model import ContactModel
 from solver.effects import EFFECTS
-from solver.material import ContactModel
 from solver.sizes import SizeDistribution
 from tests.solver.observables.made_up import cone, record_of
 
@@ -62,11 +62,27 @@ def test_a_clump_rule_of_no_other_program_is_not_exported():
         EXPORTS["yade"].check(local)
 
 
+def test_a_law_goes_where_the_engine_has_it():
+    scene = record_of(cone(20.0, 0.05), np.zeros(1), np.zeros(1), 0.03).scene
+    linear = dataclasses.replace(scene, contact=ContactModel(law="linear_spring_dashpot"))
+    EXPORTS["liggghts"].check(linear)
+    with pytest.raises(
+        CommandError,
+        match=r"contact\.law: 'linear_spring_dashpot' cannot be exported to yade; allowed: hertz_mindlin$",
+    ):
+        EXPORTS["yade"].check(linear)
+    foreign = dataclasses.replace(scene, contact=ContactModel(law="magnetic"))
+    for engine in ("liggghts", "yade"):
+        with pytest.raises(CommandError, match=rf"contact\.law: 'magnetic' cannot be exported to {engine}; allowed"):
+            EXPORTS[engine].check(foreign)
+
+
 @pytest.mark.parametrize(
     ("contact", "law", "dashpot"),
     [
         (ContactModel(), "not so here (contact.tangential_law = mindlin_rescale)", "here for both"),
         (ContactModel(tangential_law="mindlin", tangential_dashpot="uncapped"), "as here", "here as well"),
+        (ContactModel(law="linear_spring_dashpot"), "contact.law = linear_spring_dashpot", "here for both"),
     ],
 )
 def test_the_readme_of_a_deck_says_which_tangential_law_was_used_here(contact, law, dashpot):

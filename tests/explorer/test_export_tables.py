@@ -24,6 +24,18 @@ def tables(folder, settings=()):
     return found
 
 
+def test_another_law_is_named_and_does_not_transfer(tmp_path):
+    (tmp_path / "hertz").mkdir()
+    assert "contact law" not in {row["quantity"] for row in tables(tmp_path / "hertz")["conventions"]}
+    assert "Hertz–Mindlin without slip" in (tmp_path / "hertz" / "README.txt").read_text(encoding="utf-8")
+    linear = ["contact.law=linear_spring_dashpot", "contact.characteristic_velocity=0.4m/s"]
+    row = next(row for row in tables(tmp_path, linear)["conventions"] if row["quantity"] == "contact law")
+    assert "linear_spring_dashpot" in row["here"]
+    assert "V = 0.4 m/s" in row["here"]
+    assert row["transfers"].startswith("no")
+    assert "LINEAR springs" in (tmp_path / "README.txt").read_text(encoding="utf-8")
+
+
 def test_the_declared_numbers_are_in_the_tables(tmp_path):
     found = tables(tmp_path, ["material.seed.shear_modulus=60MPa"])
     seed = found["materials"][0]

@@ -4,6 +4,7 @@ import importlib
 import re
 
 from explorer.report import report_html, report_markdown
+from solver.contact_model import ContactModel
 from tests.explorer.reported_studies import PROFILE, result_of_case, table, typed, visible
 
 
@@ -46,3 +47,21 @@ def test_numbers_of_the_method_are_printed_from_where_they_are_decided(monkeypat
     assert "main effects in the 36-run design" in text
     assert "misses by more than 7.5° under" in text
     assert "touch fewer than 9 bodies" in text
+
+
+def test_the_contact_law_is_named_with_the_conventions_that_matter_to_it():
+    result = result_of_case("planted")
+    for contact, words in (
+        ({"clump_rule": "body_mass"}, "Contact law: Hertz–Mindlin; clump rule body_mass ("),
+        (
+            ContactModel().stated,
+            "Contact law: Hertz–Mindlin; clump rule body_mass, tangential law mindlin_rescale, tan",
+        ),
+        (
+            ContactModel(law="linear_spring_dashpot").stated,
+            "Contact law: linear springs and dashpots; clump rule body_mass, characteristic velocity 1.0, tangential d",
+        ),
+        ({"law": "uninstalled", "clump_rule": "body_mass"}, "Contact law: uninstalled; clump rule body_mass ("),
+    ):
+        result["study"]["contact"] = contact
+        assert words in report_markdown(typed(result)).replace("\\_", "_")

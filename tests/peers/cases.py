@@ -2,7 +2,7 @@
 
 import dataclasses
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from explorer.scene.file import load_scene
 from solver.effects import EFFECTS
 from solver.insertion import rotation_matrix
 from solver.laboratory import Laboratory
+from solver.laws import HertzMindlin
 from solver.record import Entries
 from solver.scene import with_values
 from solver.time_step import time_step
@@ -39,13 +40,15 @@ class Case:
     tangential_damping: bool = True
     plate: bool = True
     rolling_friction: float = 0.0
+    contact: dict[str, str] = field(default_factory=dict)
+    """Settings of ``contact``, by path."""
 
     @property
     def scene(self):
         """The seed pour's scene with the friction of the case for all pairs; without a plate there is no weight."""
         paths = ("pair.seed.seed.static_friction", "pair.seed.rigid_sieve_plate.static_friction")
         scene = with_values(
-            load_scene("seed_pour"), dict.fromkeys(paths, self.friction) | {"numerics.sleep_speed": 0.0}
+            load_scene("seed_pour"), dict.fromkeys(paths, self.friction) | {"numerics.sleep_speed": 0.0} | self.contact
         )
         scene = scene.with_effect(EFFECTS["rolling_resistance"](rolling_friction=self.rolling_friction))
         return scene if self.plate else dataclasses.replace(scene, gravity=(0.0, 0.0, 0.0))
@@ -69,7 +72,7 @@ def ours(case):
     lab = Laboratory(case.scene, len(case.position), dt=case.dt, active=(case.plate, False, False))
     if not case.tangential_damping:
         table = law_table(case.scene)
-        table[..., 4] = 0.0
+        table[..., HertzMindlin.columns.index("shear_damping")] = 0.0
         lab.batch.set_law(0, table)
     for b in range(len(case.position)):
         lab.put(b, case.position[b], velocity=case.velocity[b], quaternion=case.quaternion[b])

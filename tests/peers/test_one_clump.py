@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from explorer.export.frames import Motion
+from solver.laws import LinearSpringDashpot
 from tests.peers.cases import Case, deviation, impact_ends, ours, theirs
 from tests.peers.reference import drop
 
@@ -77,6 +78,19 @@ def test_with_friction_but_no_tangential_dashpot_the_motion_is_the_same(engine, 
     case = falling(friction, tangential_damping=False)
     found = compared(case, ours(case), theirs(case, engine, tmp_path))
     assert max(found.place, found.velocity, found.spin) < PER_CENT
+
+
+@pytest.mark.peers("liggghts")
+@pytest.mark.parametrize("friction", [0.1, 0.73])
+def test_with_linear_springs_the_motion_is_the_same_as_exported(friction, tmp_path):
+    """Its ``model hooke``, dashpots and all: nothing but the cap differs, which ours leaves out here."""
+    linear = {"contact.law": LinearSpringDashpot.name, "contact.tangential_dashpot": "uncapped"}
+    case = falling(friction, contact=linear)
+    own = ours(case)
+    found = compared(case, own, theirs(case, "liggghts", tmp_path))
+    assert max(found.place, found.velocity, found.spin) < PER_CENT
+    # And it is another motion than Hertz's.
+    assert compared(case, own, ours(falling(friction))).spin > 2 * PER_CENT
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -5,9 +5,12 @@ import pytest
 
 from solver.backend import ti
 from solver.laboratory import GRAIN, RADIUS, Laboratory, bench
-from solver.laws.hertz_mindlin import normal_damping, tangential_damping, tangential_force
+from solver.laws import HertzMindlin
+from solver.laws.hertz_mindlin import tangential_damping
+from solver.laws.law import tangential_force
+from solver.laws.restitution import normal_damping
 from solver.material import effective_shear_modulus, effective_youngs_modulus
-from solver.state import Vec3, Vec5
+from solver.state import Vec3
 
 pytestmark = pytest.mark.usefixtures("taichi")
 
@@ -32,17 +35,20 @@ def test_damping_constants():
     assert normal_damping(1.0) == tangential_damping(1.0) == 0.0
 
 
+ROW = ti.types.struct(**dict.fromkeys(HertzMindlin.columns, ti.f64))
+
+
 @ti.kernel
-def shear(inputs: ti.types.ndarray(dtype=ti.f64, ndim=1), out: ti.types.ndarray(dtype=ti.f64, ndim=1)):
-    """tangential_force on: law (5), a, a_before, spring (3), n (3), v_t (3), inertia, limit, dt."""
+def shear(law: ROW, inputs: ti.types.ndarray(dtype=ti.f64, ndim=1), out: ti.types.ndarray(dtype=ti.f64, ndim=1)):
+    """The tangential force of Hertz–Mindlin on: a, a_before, spring (3), n (3), v_t (3), mass, limit, dt."""
     for _ in range(1):
-        law = Vec5(inputs[0], inputs[1], inputs[2], inputs[3], inputs[4])
-        old = Vec3(inputs[7], inputs[8], inputs[9])
-        n = Vec3(inputs[10], inputs[11], inputs[12])
-        v_t = Vec3(inputs[13], inputs[14], inputs[15])
-        spring, force = tangential_force(
-            law, inputs[5], inputs[6], old, n, v_t, inputs[16], inputs[17], inputs[18], 1.0, 0, 0
-        )
+        a, a_before, mass = inputs[0], inputs[1], inputs[11]
+        old = Vec3(inputs[2], inputs[3], inputs[4])
+        n = Vec3(inputs[5], inputs[6], inputs[7])
+        v_t = Vec3(inputs[8], inputs[9], inputs[10])
+        stiffness, damper = HertzMindlin.shear_stiffness(law, 0.0, a), HertzMindlin.shear_damper(law, 0.0, a, mass)
+        growth = HertzMindlin.growth(a, a_before, 0)
+        spring, force = tangential_force(stiffness, damper, growth, old, n, v_t, inputs[12], inputs[13], 0)
         for d in ti.static(range(3)):
             out[d] = spring[d]
             out[3 + d] = force[d]
@@ -50,9 +56,9 @@ def shear(inputs: ti.types.ndarray(dtype=ti.f64, ndim=1), out: ti.types.ndarray(
 
 def sheared(spring, n, v_t=(0, 0, 0), a=2e-4, a_before=2e-4, friction=1e3, damping=0.0):
     """New spring and force with G* = 1 MPa, √(a m*) = 1, F_n = 1 N, dt = 1 µs."""
-    inputs = [0.0, 1e6, friction, 0.0, damping, a, a_before, *spring, *n, *v_t, 1.0, friction, 1e-6]
+    law = ROW(e_star=0.0, g_star=1e6, friction=friction, normal_damping=0.0, shear_damping=damping)
     out = np.zeros(6)
-    shear(np.array(inputs, dtype=float), out)
+    shear(law, np.array([a, a_before, *spring, *n, *v_t, 1.0 / a, friction, 1e-6], dtype=float), out)
     return out[:3], out[3:]
 
 

@@ -29,6 +29,7 @@ HEAP = with_values(QUICK, {"rig.mass": "12g"})
 POURS = {
     "pour_through": HEAP,
     "fill_then_open": with_values(HEAP, {"insertion.protocol": "fill_then_open"}),
+    "linear springs": with_values(HEAP, {"contact.law": "linear_spring_dashpot"}),
     # Strays leave the domain early, and take their energy with them.
     "strays": with_values(HEAP, {"rig.domain_half_width": "60mm"}),
 }

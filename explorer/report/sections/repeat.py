@@ -11,6 +11,7 @@ from doe.study_result import PouredBody, StudyDescription, StudyResult
 from explorer.report.content import Block, Code, Section, Table, Text
 from explorer.report.units_for_people import MISSING, duration, enumeration, fixed, number, percent
 from solver.assets import shipped_assets
+from solver.laws import CONTACT_LAWS, HertzMindlin
 
 
 def runs(result: StudyResult) -> Section:
@@ -33,8 +34,11 @@ def runs(result: StudyResult) -> Section:
         Table(("stage", *(name.replace("_", " ") for name in names), "pours"), tuple(rows)),
     ]
     if contact := result.study.contact:
-        named = ", ".join(f"{name.replace('_', ' ')} {choice}" for name, choice in contact.items())
-        blocks.append(Text(f"Contact law: Hertz–Mindlin; {named} (`explorer parameters`, contact.*)."))
+        # Results of before there were several have no name of one.
+        law = contact.get("law", HertzMindlin.name)
+        title = CONTACT_LAWS[law].title if law in CONTACT_LAWS else law
+        named = ", ".join(f"{name.replace('_', ' ')} {choice}" for name, choice in contact.items() if name != "law")
+        blocks.append(Text(f"Contact law: {title}; {named} (`explorer parameters`, contact.*)."))
     if result.shapes:
         blocks.append(_shapes(result.shapes))
     return Section("Runs", tuple(blocks))

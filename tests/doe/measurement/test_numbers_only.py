@@ -11,6 +11,7 @@ from doe.measurement import load_measurement
 from doe.validation.laboratory import TREFOILS, read_laboratory
 from solver import EFFECTS
 from solver.assets import measurement_folder
+from solver.laws import LinearSpringDashpot
 from tests.doe.validation.disguise import disguise
 
 
@@ -60,3 +61,12 @@ def test_so_it_is_with_a_shipped_data_set(tmp_path):
     shutil.copytree(shipped, tmp_path / "air_drag")
     disguise(tmp_path / "air_drag", np.random.default_rng(2))
     assert_same(asked(shipped), asked(tmp_path / "air_drag"))
+
+
+def test_effects_that_the_contact_law_does_not_go_with_are_no_candidates(tmp_path):
+    """Linear springs refuse what begins with Hertz's force; no amplitude of it could be set up."""
+    shutil.copytree(measurement_folder("trefoil_2"), tmp_path / "linear")
+    material = tmp_path / "linear" / "material.toml"
+    material.write_text(material.read_text().replace("hertz_mindlin", LinearSpringDashpot.name))
+    declared = declare(load_measurement(tmp_path / "linear"), tuple(EFFECTS))
+    assert [effect.name for effect in declared.effects] == [n for n in EFFECTS if n not in LinearSpringDashpot.refuses]

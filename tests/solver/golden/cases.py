@@ -26,12 +26,13 @@ import trimesh
 from solver import clump
 from solver.assets import measurement_folder
 from solver.bench_tests import BENCH_TESTS
+from solver.contact_model import ContactModel
 from solver.effects import EFFECTS, set_up_effects
-from solver.effects.columns import kernel_effects
 from solver.insertion import Insertion
 from solver.laboratory import ROOM, UPRIGHT
+from solver.laws import CONTACT_LAWS, HertzMindlin
 from solver.layout import layout
-from solver.material import ContactModel, Material, Pair
+from solver.material import Material, Pair
 from solver.material_file import load_material
 from solver.numerics import Numerics
 from solver.pour import Pour
@@ -40,7 +41,7 @@ from solver.run import capacity_for
 from solver.scene import Scene, pour_rig, with_rig, with_values
 from solver.shape import Kind, Solid, mass_properties
 from solver.time_step import time_step
-from solver.world import SUMMARY_COLUMNS, Batch
+from solver.world import SUMMARY_COLUMNS, Batch, compiled_in
 from tests.solver.effects.cases import IN_KERNELS, felt, with_effects
 
 Array = npt.NDArray[np.float64]
@@ -105,9 +106,7 @@ def pours() -> dict[str, Scene]:
 
 def heap_numbers(scenes: Mapping[str, Scene], worlds: int = 1, first: int = 0) -> tuple[Numbers, Numbers]:
     """States of heaps after ``FIRST`` and after ``HEAP_STEPS`` steps, in a batch of ``worlds`` from ``first`` on."""
-    effects = any(map(kernel_effects, scenes.values()))
-    sharing = any(scene.contact.shares for scene in scenes.values())
-    batch = Batch(dataclasses.replace(ROOM, worlds=worlds, effects=effects, sharing=sharing))
+    batch = Batch(dataclasses.replace(ROOM, worlds=worlds, **compiled_in(list(scenes.values()))))
     steps = np.zeros(worlds, dtype=np.int32)
     for w, scene in enumerate(scenes.values(), start=first):
         batch.load(w, scene, layout(scene, np.zeros(CLUMPS, dtype=np.int32)), time_step(scene), (True, True, False))
@@ -200,6 +199,7 @@ def everything(folder: Path) -> tuple[Numbers, Numbers]:
     poured = pours()
     # A batch with room for a mesh is another kernel.
     meshes = {name: poured.pop(name) for name in [*poured] if "mesh" in name}
+    funnel, other_laws = poured["pour, funnel, pour_through"], [law for law in CONTACT_LAWS if law != HertzMindlin.name]
     early: Numbers = {}
     late: Numbers = {}
     for first, last in (
@@ -209,6 +209,8 @@ def everything(folder: Path) -> tuple[Numbers, Numbers]:
         heap_numbers({"heap, local_mass_shared": SHARED}),
         pour_numbers(poured),
         pour_numbers(meshes),
+        *(heap_numbers({f"heap, {law}": with_values(TREFOIL, {"contact.law": law})}) for law in other_laws),
+        *(pour_numbers({f"pour, funnel, {law}": with_values(funnel, {"contact.law": law})}) for law in other_laws),
     ):
         early |= first
         late |= last

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from solver.effects import EFFECTS
+from solver.laws import CONTACT_LAWS, HertzMindlin
 from solver.rigs import BENCH_RIGS, RIGS
 from tests.solver.golden import golden_file
 from tests.solver.golden.golden_file import (
@@ -38,9 +39,9 @@ def test_the_bits_of_today_are_those_of_this_physics(tmp_path):
     assert unrecorded(kept, now) is None
 
 
-def test_every_effect_rig_and_batch_size_is_a_case():
+def test_every_effect_rig_law_and_batch_size_is_a_case():
     names = list(read().machines[0].digests)
-    for one in (*EFFECTS, *RIGS, *BENCH_RIGS):
+    for one in (*EFFECTS, *RIGS, *BENCH_RIGS, *(set(CONTACT_LAWS) - {HertzMindlin.name})):
         assert any(one in name for name in names), one
     assert {"heap, alone", "heap, second of three"} <= set(names)
 
