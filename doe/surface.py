@@ -157,7 +157,7 @@ def least_squares(model: FloatArray, observed: FloatArray, weights: FloatArray |
     from statsmodels.regression.linear_model import OLS, WLS
 
     shifted = observed - observed[0]
-    return (OLS(shifted, model) if weights is None else WLS(shifted, model, weights)).fit()
+    return (OLS(shifted, model) if weights is None else WLS(shifted, model, weights)).fit(method="qr")
 
 
 def fitted_coefficients(model: FloatArray, observed: FloatArray) -> FloatArray:

@@ -1,10 +1,12 @@
-"""Cells, comments and numbers of a CSV file in every dialect that a spreadsheet writes."""
+"""Cells, comments and numbers of a table in every dialect that a spreadsheet writes, and of a workbook."""
 
 import math
+import re
 
+import openpyxl
 import pytest
 
-from doe.table_file import csv_table
+from doe.table_file import csv_table, read_table, read_text
 
 
 def table(text, **more):
@@ -65,3 +67,75 @@ def test_a_quote_that_never_ends_is_refused_by_the_line_where_it_begins():
 
 def test_nothing_but_comments_has_no_rows():
     assert table("# only\n\n").rows == table("").rows == ()
+
+
+SAID = "# Versuch für Ölsaat\nname;x\nä;1,5\n"
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        SAID.encode(),
+        b"\xef\xbb\xbf" + SAID.encode(),
+        SAID.encode("cp1252"),
+        SAID.encode("utf-16"),
+        b"\xfe\xff" + SAID.encode("utf-16-be"),
+        SAID.replace("\n", "\r\n").encode("cp1252"),
+    ],
+    ids=["utf-8", "utf-8 with a mark", "cp1252", "utf-16", "utf-16 big endian", "Windows"],
+)
+def test_a_file_is_read_in_whatever_characters_it_was_saved(tmp_path, content):
+    path = tmp_path / "t.csv"
+    path.write_bytes(content)
+    found = read_table(path, 1000, ValueError)
+    assert found.rows == ((2, ["name", "x"]), (3, ["ä", "1,5"]))
+    assert found.comments == ((1, "# Versuch für Ölsaat"),)
+    assert read_text(path, 1000, ValueError) == SAID
+
+
+def test_a_workbook_is_read_by_its_first_sheet(tmp_path):
+    book = openpyxl.Workbook()
+    for row in (["# Versuch"], ["name", "x", None], [], ["ä", 1.5], ["b", 2], ["c", "1e-3", None, "odd"]):
+        book.active.append(row)
+    book.create_sheet("other").append(["name", "y"])
+    book.save(tmp_path / "t.xlsx")
+    found = read_table(tmp_path / "t.xlsx", 100_000, ValueError)
+    assert found.comments == ((1, "# Versuch"),)
+    assert found.rows == (
+        (2, ["name", "x"]),
+        (4, ["ä", "1.5"]),
+        (5, ["b", "2"]),
+        (6, ["c", "1e-3", "", "odd"]),
+    )
+    assert [found.number(cells[1]) for _, cells in found.rows[1:]] == [1.5, 2.0, 1e-3]
+
+
+def refused(path, most=100):
+    with pytest.raises(ValueError, match=re.escape(str(path))) as caught:
+        read_table(path, most, ValueError)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("content", [b"a\0b", b"\xff\xfe\x00", b"\x81\xff"])
+def test_what_is_no_text(tmp_path, content):
+    path = tmp_path / "t.csv"
+    path.write_bytes(content)
+    assert refused(path) == f"{path}: neither text nor a workbook (.xlsx)"
+    path = tmp_path / "t.xlsx"
+    path.write_bytes(content)
+    assert refused(path).startswith(f"{path}: cannot be read as a workbook: ")
+
+
+def test_too_large_missing_and_a_folder(tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_text("x" * 101)
+    assert refused(path) == f"{path}: 101 bytes; allowed: up to 100"
+    assert refused(tmp_path / "none") == f"{tmp_path / 'none'}: no such file"
+    assert refused(tmp_path, most=10**6) == f"{tmp_path}: Is a directory"
+
+
+def test_a_line_is_named_as_it_is_asked_for(tmp_path):
+    path = tmp_path / "t.csv"
+    path.write_text('x,y\n1,"2\n')
+    with pytest.raises(ValueError, match=re.escape(f"{path}, row 2: cannot be read as cells")):
+        read_table(path, 100, ValueError, ", row {}")

@@ -293,7 +293,7 @@ SPOILED = {
     ),
     "significant": ("study.toml", '["F1"', '["G1"', "screening.significant: 'G1' is not one of F1"),
     "empty": ("shares.csv", None, "", "a line of column names and at least one row are needed"),
-    "binary": ("shares.csv", None, b"\xff\xfe\x00", "not a text file in UTF-8"),
+    "binary": ("shares.csv", None, b"\xff\xfe\x00", "neither text nor a workbook"),
 }
 
 

@@ -212,8 +212,8 @@ def test_a_cell_that_cannot_be_read_is_named_by_line_and_column(tmp_path, old, n
         (b"# factor | x | 0 | 1\nx,y\n", "no line with a run"),
         (b"# factor | x | 0 | 1\nx,y\n" + b"1" * 140_000 + b",2\n", "line 3: cannot be read as cells"),
         (b"# factor | x | 0 | 1\nx,y\n0,\n1,\n", "column y: every cell is empty"),
-        (b"\xff\xfe\x00", "UTF-8"),
-        (b"PK\x00\x03", "not a text file"),
+        (b"\xff\xfe\x00", "neither text nor a workbook"),
+        (b"PK\x00\x03", "neither text nor a workbook"),
     ],
 )
 def test_a_file_that_is_no_filled_sheet_gets_one_line(tmp_path, content, message):

@@ -180,7 +180,8 @@ def shape_numbers(folder: Path) -> Numbers:
 
 def defaults() -> dict[str, float | str]:
     """Declared default of every parameter that has one, by path: the key of a stored pour leaves these out."""
-    kinds = {"insertion": Insertion, "numerics": Numerics} | {f"rig[{n}]": k for n, k in (RIGS | BENCH_RIGS).items()}
+    kinds = {"insertion": Insertion, "numerics": Numerics}
+    kinds |= {f"rig[{name}]": kind for name, kind in (*RIGS.items(), *BENCH_RIGS.items())}
     kinds |= {f"effect.{name}": kind for name, kind in EFFECTS.items()}
     kinds |= {"material": Material, "pair": Pair, "contact": ContactModel}
     return {
