@@ -48,7 +48,7 @@ slow: .venv/.ready ## the tests marked slow, but for those of `make peers`
 nightly: .venv/.ready ## what is too long for CI (80 min at most); writes docs/nightly.md
 	$(BIN)/python -m tests.nightly
 
-pictures: .venv/.ready ## the README's pictures, taken from the running program (needs Chromium; 6 min)
+pictures: .venv/.ready ## the pictures of README and docs, taken from the running program (needs Chromium; 6 min)
 	$(BIN)/python -m tests.browser.pictures
 
 page-speed: .venv/.ready ## frames, real-time factor and slider echo of the page, alone and beside a study (2 min)

@@ -5,6 +5,8 @@ over a made-up file that breaks it, so that no rule can pass by finding nothing.
 """
 
 import ast
+import re
+import tomllib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -417,3 +419,15 @@ def test_public_names_are_read_in_both_spellings():
 def test_parts_that_may_use_the_solver_exist():
     missing = [path for path in DOE_PARTS_THAT_MAY_USE_THE_SOLVER if not (ROOT / path).exists()]
     assert missing == []
+
+
+def test_every_declared_dependency_is_used():
+    """One that nothing imports is installed by every user for nothing."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    extras = [name for extra, names in project["optional-dependencies"].items() if extra != "test" for name in names]
+    declared = {re.match(r"[\w-]+", line)[0] for line in (*project["dependencies"], *extras)}
+    modules = {"pillow": "PIL", "rerun-sdk": "rerun", "tomli-w": "tomli_w"}
+    used = {found.top for source in repository_sources(*PACKAGES) for found in imports(source)}
+    # pandas loads it by its name.
+    used |= {"openpyxl"} if 'engine="openpyxl"' in (ROOT / "doe/table_file.py").read_text() else set()
+    assert {name for name in declared if modules.get(name, name) not in used} == set()

@@ -63,11 +63,11 @@ def explorer(site, *arguments, cwd=None):
     return done.stdout
 
 
-def said(site, code):
+def said(site, code, *arguments):
     """What a few lines of Python print, as JSON."""
-    done = python(site, "-c", code)
+    done = python(site, "-c", code, *arguments)
     assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    return json.loads(done.stdout.splitlines()[0])
 
 
 def test_the_package_has_one_thing_of_every_kind():
@@ -193,20 +193,72 @@ def test_an_export_target_is_offered_and_writes_its_files(site, tmp_path):
     assert f"{len(rows) - 1} bodies in points.csv" in said_so
 
 
-def test_a_panel_stands_on_the_page_in_its_tab(site):
+def test_a_panel_stands_on_the_page_in_a_tab_of_its_own_and_is_shown(site, tmp_path):
     code = """
 import json
-import viser
-from explorer.viewer.panel import Now
-from explorer.viewer.panels import PANELS
-from tests.explorer.page_session import PageSession
-print(json.dumps([PANELS["notes"].tab.name, list(PANELS)[-1]]))
+import sys
+import threading
+from pathlib import Path
+from explorer.diagnosis.process import DiagnoseProcess
+from explorer.scene.source import material_source
+from explorer.viewer.guarded_server import guarded_server
+from explorer.viewer.page import Page
+from tests.explorer.test_viewer_page import Session
+folder = Path(sys.argv[1])
+server = guarded_server("127.0.0.1", 0, "test")
+diagnosis = DiagnoseProcess(folder / "diagnoses", folder / "runs.sqlite")
+page = Page(server, Session(material_source("sunflower_extract")), None, diagnosis)
+notes = page.panels["notes"]
+notes._text.value = "the seed hangs"
+stop = threading.Event()
+show, shown = notes.show, []
+def watched(now):
+    show(now)
+    shown.append(notes._time.value)
+    stop.set()
+notes.show = watched
+page.run(stop)
+handles = server.gui._container_handle_from_uuid.values()
+tabs = next(one._parent for one in handles if hasattr(one, "_parent"))
+print(json.dumps([[tab._label for tab in tabs._tab_handles], shown[-1]]))
+page.close()
+diagnosis.close()
+server.stop()
 """
-    assert said(site, code) == ["Notes", "notes"]
+    names, written = said(site, code, str(tmp_path))
+    assert names[-1] == "Notes"
+    assert written == "0.000 s"
 
 
-def test_a_contact_law_acts_and_is_a_choice(site, tmp_path):
-    raise NotImplementedError
+def test_a_contact_law_is_a_choice_and_acts(site, tmp_path):
+    law = "contact.law=soft_springs"
+    assert pours(site, tmp_path, "funnel", law)["outcomes"]
+    refused = python(site, "-m", "explorer", "simulate", "funnel", "--set", "contact.law=hooke")
+    assert "hertz_mindlin, linear_spring_dashpot, soft_springs" in refused.stderr
+    exported = python(site, "-m", "explorer", "export", "funnel", str(tmp_path / "out"), "--to", "yade", "--set", law)
+    assert "'soft_springs' cannot be exported to yade; allowed: hertz_mindlin" in exported.stderr
+    # An elastic impact lasts π √(m/k): four times softer, twice as long.
+    code = """
+import dataclasses
+import json
+from solver import backend
+from solver.contact_model import ContactModel
+from solver.laboratory import RADIUS, Laboratory, bench
+backend.init(threads=1)
+lasted = []
+for name in ("linear_spring_dashpot", "soft_springs"):
+    scene = dataclasses.replace(bench(restitution=1.0), contact=ContactModel(law=name))
+    lab = Laboratory(scene, 1, dt=1e-7)
+    lab.put(0, (0.0, 0.0, RADIUS), velocity=(0.0, 0.0, -0.5))
+    steps = 0
+    while steps == 0 or lab.state()[0][2] < RADIUS:
+        lab.run(20)
+        steps += 20
+    lasted.append(steps)
+print(json.dumps(lasted))
+"""
+    stiff, soft = said(site, code)
+    assert soft / stiff == pytest.approx(2.0, abs=2 * 20 / stiff)
 
 
 def test_stored_pours_keep_their_keys_and_know_the_package_that_acted(site, tmp_path):

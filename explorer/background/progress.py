@@ -77,15 +77,16 @@ class ProgressWriter:
     Args:
         file: a line per event is added to it.
         say: takes a line for a person.
-        terminal: whether a line may be written over.
+        terminal: whether there is one, for a bar.
         clock: seconds.
     """
 
     def __init__(
         self, file: Path, say: Callable[[str], None], terminal: bool, clock: Callable[[], float] = time.perf_counter
     ) -> None:
-        self._file, self._say, self._terminal, self._clock = file, say, terminal, clock
+        self._file, self._say, self._clock = file, say, clock
         self._started, self._said = clock(), 0.0
+        self._bar = _Bar() if terminal else None
 
     @property
     def elapsed(self) -> float:
@@ -96,13 +97,38 @@ class ProgressWriter:
         """Tell ``event``; in words: ``finding`` where there is one, else ``state``, which is not said each time."""
         with self._file.open("a", encoding="utf-8") as file:
             file.write(json.dumps(event.to_dict(), ensure_ascii=False) + "\n")
+        if self._bar is not None:
+            self._bar.show(state, event.done, event.planned)
         if finding is not None:
-            self._say(("\r\033[K" if self._terminal else "") + f"[{self.elapsed:6.0f} s] {finding}")
-        elif self._terminal:
-            print(f"\r\033[K{state}", end="", flush=True)
-        elif self.elapsed - self._said > EVERY:
+            self._say(f"[{self.elapsed:6.0f} s] {finding}")
+        elif self._bar is None and self.elapsed - self._said > EVERY:
             self._said = self.elapsed
             self._say(f"[{self.elapsed:6.0f} s] {state}")
+
+    def close(self) -> None:
+        """Take the bar of a terminal away."""
+        if self._bar is not None:
+            self._bar.close()
+
+
+class _Bar:
+    """A bar in the last line of a terminal; what is printed meanwhile stands above it."""
+
+    def __init__(self) -> None:
+        # Imported where it is used: the page reads progress, and has no terminal.
+        from rich.progress import BarColumn, Progress, TextColumn
+
+        self._progress = Progress(TextColumn("{task.description}"), BarColumn(), transient=True)
+        self._task = self._progress.add_task("", total=None)
+
+    def show(self, state: str, done: int, planned: int) -> None:
+        """``done`` of ``planned``; as long as nothing is planned the bar only moves."""
+        self._progress.start()
+        self._progress.update(self._task, description=state, completed=done, total=planned or None)
+
+    def close(self) -> None:
+        """Take it away."""
+        self._progress.stop()
 
 
 class RunProgress:
@@ -125,6 +151,10 @@ class RunProgress:
     def elapsed(self) -> float:
         """Seconds since the start."""
         return self._writer.elapsed
+
+    def close(self) -> None:
+        """It is over, however it ended."""
+        self._writer.close()
 
     def compiling(self) -> None:
         """The study has begun; the first run shows itself only after the solver is compiled."""
@@ -184,6 +214,10 @@ class PourProgress:
     def elapsed(self) -> float:
         """Seconds since the start."""
         return self._writer.elapsed
+
+    def close(self) -> None:
+        """It is over, however it ended."""
+        self._writer.close()
 
     def compiling(self) -> None:
         """The diagnosis has begun; the first pour shows itself only after the solver is compiled."""

@@ -103,6 +103,7 @@ def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> Diagnosis:
     progress = PourProgress(order.out / PROGRESS, say, terminal=sys.stdout.isatty())
     progress.compiling()
     with ExitStack() as stack:
+        stack.callback(progress.close)
         store = Store(path)
         stack.callback(store.close)
         crew = stack.enter_context(Crew(order.threads))

@@ -70,6 +70,7 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> float:
         follower.add(stage, run)
 
     with ExitStack() as stack:
+        stack.callback(progress.close)
         stack.enter_context(told_of_pauses(progress.went_on))
         stack.callback(store.close)
         recorder = stack.enter_context(_recorder(order.record)) if order.record else None

@@ -1,4 +1,4 @@
-"""The README's pictures, taken from the running program in headless Chromium: `make pictures`.
+"""The pictures of README and docs/page.md, taken from the running program in headless Chromium: `make pictures`.
 
 A quick study is run first, so that its tab has something to show, and the diagnosis that `make diagnose` has left is
 taken where there is one; everything is written to a data folder of its own.

@@ -1,6 +1,6 @@
 """Data from another engine (LIGGGHTS), with and without an effect that their files do not declare. Slow: half an hour.
 
-When it last ran stands in ``docs/nightly.md``; whole runs with all fifteen effects stand in the README.
+When it last ran stands in ``docs/nightly.md``; whole runs with all fifteen effects stand in ``docs/missing_effect.md``.
 """
 
 import pytest
