@@ -63,7 +63,7 @@ def test_a_clump_rule_of_no_other_program_is_not_exported():
 
 
 def test_a_law_goes_where_the_engine_has_it():
-    scene = record_of(cone(20.0, 0.05), np.zeros(1), np.zeros(1), 0.03).scene
+    scene = load_scene("funnel")
     linear = dataclasses.replace(scene, contact=ContactModel(law="linear_spring_dashpot"))
     EXPORTS["liggghts"].check(linear)
     with pytest.raises(

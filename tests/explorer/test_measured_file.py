@@ -44,7 +44,7 @@ def test_the_points_of_an_outline_are_drawn_from_left_to_right():
         ("a.csv", b"u_m,z_m\n0,zero\n", "line 2, column z_m: 'zero'"),
         ("a.csv", b"u_m,z_m\n0,nan\n0,1\n", "line 2, column z_m: 'nan'; allowed: a finite number in m"),
         ("a.csv", b"# nothing else\n", "u_m,z_m"),
-        ("a.csv", b"\xff\xfe", "UTF-8"),
+        ("a.csv", b"a\0", "not a text file"),
         ("a.npz", b"no archive", "cannot be read as .npz"),
         ("a.npz", SCAN.read_bytes()[:-99], "cannot be read as .npz"),
         ("a.npz", npz(xyz=np.zeros((2, 3))), "xyz and radius"),
