@@ -29,6 +29,7 @@ from doe.profile import Profile, profile_from
 from doe.record import Record
 from doe.stage_designs import ASSUMPTIONS, SCREENING, SURFACE, main_effect_design, second_order_design
 from doe.study_table import Table, entries, names, one_of, only, required, section, whole
+from doe.surface import term_names
 from doe.target import Target, is_angle, target_from
 from solver import (
     OBSERVABLES,
@@ -140,7 +141,21 @@ def with_profile(study: Study, name: str) -> tuple[Study, Profile]:
             f"{study.file}: fallback: {listed} bodies in profile {name}; at least {CALIBRATED} factors that act on "
             f"{MIN_BODIES} bodies or more are needed"
         )
+    _refuse_without_error(study, profile)
     return replace(study, scene=scene), profile
+
+
+def _refuse_without_error(study: Study, profile: Profile) -> None:
+    """A response surface needs a run more than it has terms; better said now than after all other stages."""
+    rows, terms = (
+        len(study.surface_design.points(CALIBRATED).coded),
+        len(term_names([str(k) for k in range(CALIBRATED)])),
+    )
+    if rows * profile.surface_replicates <= terms:
+        raise ParameterError(
+            f"{study.file}: profile.{profile.name}.surface_replicates: {profile.surface_replicates} of {rows} points "
+            f"leave no error for the {terms} terms of the surface; allowed: at least {terms // rows + 1}"
+        )
 
 
 def study_from(table: Table, path: Path) -> Study:

@@ -91,11 +91,15 @@ def instance_of(base: type) -> Callable[[Any], bool]:
     return lambda thing: base in type(thing).__mro__
 
 
-@lru_cache
 def plugged_in(kind: str) -> dict[str, EntryPoint]:
     """Entry points of installed packages for ``kind`` by the name of the thing; none of them is loaded."""
-    found = (entry for entry in entry_points(group=GROUP) if entry.name.partition(".")[0] == kind)
-    return {entry.name.partition(".")[2]: entry for entry in sorted(found, key=lambda entry: entry.name)}
+    return {name: entry for (of, _, name), entry in _installed().items() if of == kind}
+
+
+@lru_cache
+def _installed() -> dict[tuple[str, str, str], EntryPoint]:
+    """Every entry point of the group by its name in three parts, read once: it takes 10 ms."""
+    return {entry.name.partition("."): entry for entry in sorted(entry_points(group=GROUP), key=lambda one: one.name)}
 
 
 def origin(kind: str, name: str) -> str:

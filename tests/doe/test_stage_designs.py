@@ -1,6 +1,7 @@
 """Stages take their designs from the study file: what is planted is found by each, and what cannot do is refused."""
 
 import copy
+import dataclasses
 import json
 import tomllib
 
@@ -12,8 +13,8 @@ from doe.errors import StudyFileError
 from doe.power import main_effect_efficiency, smallest_main_effect
 from doe.profile import Profile
 from doe.stages import planned_runs
-from doe.study import load_study, study_from
-from solver import asset_path
+from doe.study import load_study, study_from, with_profile
+from solver import ParameterError, asset_path
 from tests.doe.formula_runner import FormulaRunner
 
 PATH = asset_path("studies", "sunflower_extract")
@@ -126,6 +127,17 @@ def test_the_result_says_which_designs_were_run():
 def test_a_design_that_cannot_do_is_refused_with_its_key(tables, message):
     with pytest.raises(StudyFileError, match=message):
         study_with(**tables)
+
+
+def test_a_surface_without_a_run_for_the_error_is_refused_before_anything_is_poured():
+    study = study_with(surface={"design": "sobol", "runs": 10})
+    one = dataclasses.replace(study, profiles={"one": Profile("one", surface_replicates=1)})
+    with pytest.raises(
+        ParameterError, match=r"surface_replicates: 1 of 10 points leave no error for the 10 terms .* 2$"
+    ):
+        with_profile(one, "one")
+    two = dataclasses.replace(study, profiles={"two": Profile("two", surface_replicates=2)})
+    assert with_profile(two, "two")[1].surface_replicates == 2
 
 
 def test_efficiency_is_one_for_orthogonal_two_level_designs_and_the_share_of_moved_rows_otherwise():
