@@ -251,7 +251,8 @@ def test_wrong_shapes_are_named():
 def test_the_results_are_plain_json():
     surface = paper_surface()
     for result in (surface, analyse_surface(surface), canonical_analysis(surface)):
-        json.dumps(result.to_dict(), allow_nan=False)
+        kept = json.loads(json.dumps(result.to_dict(), allow_nan=False))
+        assert type(result).from_dict(kept).to_dict() == kept
 
 
 def test_a_run_that_the_fit_cannot_do_without_has_no_left_out_residual(recwarn):

@@ -35,4 +35,7 @@ def test_a_process_that_is_gone_is_no_trouble():
     process = multiprocessing.get_context("spawn").Process(target=int)
     process.start()
     process.join()
+    mine = AUTOGROUP.read_text() if AUTOGROUP.exists() else None
     session_gives_way(process.pid, LIVE)
+    assert not Path(f"/proc/{process.pid}").exists()
+    assert (AUTOGROUP.read_text() if AUTOGROUP.exists() else None) == mine

@@ -92,8 +92,9 @@ def test_page_stays_below_six_megabytes(result):
 
 def test_charts_are_valid_for_plotly(result):
     for spec in figures_of(result).values():
-        go.Figure(spec)  # raises ValueError for an unknown or malformed property
-        json.dumps(spec, allow_nan=False)
+        drawn = go.Figure(spec)  # raises ValueError for an unknown or malformed property
+        assert 0 < len(drawn.data) == len(spec["data"])
+        assert json.loads(json.dumps(spec, allow_nan=False))["data"]
 
 
 def test_tables_are_rectangular(result):

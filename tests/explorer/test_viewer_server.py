@@ -81,6 +81,7 @@ def test_a_host_of_another_machine_and_an_impossible_port_are_refused():
 
 def test_port_zero_is_a_free_one():
     port = free_port("127.0.0.1", 0)
+    assert 1024 < port < 65536
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", port))
 
