@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import numpy as np
-from explorer.export.target import ExportOrder, ExportTarget
 
+from explorer.export.target import ExportOrder, ExportTarget
 from solver import run_pour
 from solver.scene import Scene
 

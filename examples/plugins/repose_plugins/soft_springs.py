@@ -5,7 +5,6 @@ constants are others. The restitution is kept, as the damping ratio is.
 """
 
 from solver.contact_model import ContactModel
-
 from solver.laws import LinearSpringDashpot
 from solver.material import Material, Pair
 
