@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -42,8 +43,12 @@ def smallest_effect(standard_error: float, df: float, alpha: float = 0.05, power
     """
     if df < 1 or not math.isfinite(standard_error):
         return math.nan
-    if standard_error == 0:
-        return 0.0
+    return standard_error * _smallest_shift(df, alpha, power) if standard_error > 0 else 0.0
+
+
+@lru_cache(maxsize=4096)
+def _smallest_shift(df: float, alpha: float, power: float) -> float:
+    """Return the effect in standard errors; the same few are asked for again and again."""
 
     def shortfall(shift: float) -> float:
         return t_test_power(shift, 1.0, df, alpha) - power
@@ -51,7 +56,7 @@ def smallest_effect(standard_error: float, df: float, alpha: float = 0.05, power
     upper = 2.0
     while shortfall(upper) < 0:
         upper *= 2
-    return standard_error * float(optimize.brentq(shortfall, 0.0, upper))
+    return float(optimize.brentq(shortfall, 0.0, upper))
 
 
 def smallest_difference(sigma: float, replicates: int, alpha: float = 0.05, power: float = 0.8) -> float:
