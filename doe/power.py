@@ -16,7 +16,7 @@ import numpy.typing as npt
 from scipy import optimize
 
 from doe.errors import StatisticsError
-from doe.surface import second_order_terms
+from doe.surface import second_order_terms, with_intercept
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -92,7 +92,7 @@ def main_effect_efficiency(design: FloatArray) -> float:
     two-level designs, below it where rows stand in the middle or factors are correlated. Raises StatisticsError where
     the rows cannot tell the factors apart.
     """
-    model = np.column_stack([np.ones(len(design)), design])
+    model = with_intercept(design)
     if np.linalg.matrix_rank(model) < model.shape[1]:
         raise StatisticsError(f"{len(design)} rows cannot tell {design.shape[1]} factors and the mean apart")
     worst = float(np.diag(np.linalg.inv(model.T @ model))[1:].max())

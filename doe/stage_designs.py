@@ -11,7 +11,7 @@ import numpy as np
 from doe.designs import ALPHAS, DESIGNS, BoxBehnken, ChosenDesign, DesignOptions, PlackettBurman, Points
 from doe.errors import StatisticsError, StudyFileError
 from doe.study_table import Table, one_of, only, section, whole
-from doe.surface import second_order_terms
+from doe.surface import second_order_terms, with_intercept
 
 if TYPE_CHECKING:
     from doe.study import Factor
@@ -49,7 +49,7 @@ def main_effect_design(
             f"{whose}: {len(factors)} {whose}s with {free} dummies; allowed: up to {most} in a {len(points.coded)}-run "
             f"{name} design"
         )
-    model = np.column_stack([np.ones(len(points.coded)), points.coded])
+    model = with_intercept(points.coded)
     if np.linalg.matrix_rank(model) < model.shape[1]:
         raise StudyFileError(f"{key}.design: {name} cannot tell the main effects of {len(factors)} {whose}s apart")
     named = [factor.name for factor in factors if isinstance(factor.low, str)]

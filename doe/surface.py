@@ -148,6 +148,11 @@ def included_terms(names: Sequence[str], terms: Sequence[str] | None) -> BoolArr
     return np.array([k == 0 or term in terms for k, term in enumerate(known)])
 
 
+def with_intercept(levels: FloatArray) -> FloatArray:
+    """Return the model matrix of main effects (rows, 1 + columns): a column of ones, then the levels."""
+    return np.column_stack([np.ones(levels.shape[0]), levels])
+
+
 def least_squares(model: FloatArray, observed: FloatArray, weights: FloatArray | None = None) -> Any:
     """Return statsmodels' results of (weighted) least squares on a model matrix, (n, p) with ones first, and n values.
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, fields
+from functools import lru_cache
 from typing import ClassVar, Literal, get_args
 
 import numpy as np
@@ -91,8 +92,10 @@ class ChosenDesign:
     design: Design
     options: DesignOptions
 
+    # Asked for at every look at a study that runs, and a Latin hypercube is optimised for seconds.
+    @lru_cache(maxsize=64)  # noqa: B019 (a study file has three of them)
     def points(self, factors: int) -> Points:
-        """The rows for a number of factors; raises StatisticsError where there are none for it."""
+        """The rows for a number of factors, not to be changed; raises StatisticsError where there are none for it."""
         return self.design.points(factors, self.options)
 
 
@@ -102,7 +105,6 @@ def factor_letters(factors: int) -> tuple[str, ...]:
     return tuple([*LETTERS, *doubled][:factors])
 
 
-def with_centre(levels: npt.NDArray[np.int64], centre: int | None, usual: int = 0) -> FloatArray:
-    """``levels``, shape (rows, columns), followed by runs in the middle; ``usual`` many where None are asked for."""
-    runs = usual if centre is None else centre
-    return np.vstack([levels, np.zeros((runs, levels.shape[1]), dtype=np.int64)]).astype(np.float64)
+def with_centre(levels: npt.NDArray[np.int64], centre: int | None) -> FloatArray:
+    """``levels``, shape (rows, columns), followed by as many runs in the middle as are asked for."""
+    return np.vstack([levels, np.zeros((centre or 0, levels.shape[1]), dtype=np.int64)]).astype(np.float64)
