@@ -1,6 +1,6 @@
 """The store: every pour that finished, kept raw in one SQLite file and found again by what was poured.
 
-A pour is kept once and for all under the key of what decides its bits (`solver.pour_key`). What is read off it, its
+A pour is kept once and for all under the key of what decides its bits (`solver.pours.pour_key`). What is read off it, its
 outcome, its observables and the summaries of a diagnosis, is kept beside it with the version of the readings, and read
 anew from the raw pour where that version has changed or a name is missing: a new observable costs no pour.
 
@@ -80,7 +80,7 @@ class StoredRun:
     steps: int
     wall_s: float
     raw: bytes
-    """See `solver.raw_pour`; empty for a run stored before raw pours were kept."""
+    """See `solver.pours.raw_pour`; empty for a run stored before raw pours were kept."""
     created: float = 0.0
 
 

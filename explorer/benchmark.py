@@ -21,9 +21,18 @@ from explorer.export.liggghts import write_liggghts
 from explorer.export.run import PeerRun, PeerTimeout, run_liggghts, run_yade
 from explorer.export.yade import write_yade
 from explorer.scene.file import load_scene
-from solver.benchmark import Bed, Measurement, measure_batch, measure_bed, measure_pour, wide_bed
-from solver.benchmark.packed_bed import RADIUS, bed_name, bed_scene
-from solver.time_step import time_step
+from solver.benchmark import (
+    RADIUS,
+    Bed,
+    Measurement,
+    bed_name,
+    bed_scene,
+    measure_batch,
+    measure_bed,
+    measure_pour,
+    wide_bed,
+)
+from solver.scenes.time_step import time_step
 
 POUR = "seed_pour"
 """The shipped set-up on which engines are compared."""
@@ -254,7 +263,7 @@ def _size(deck: Deck) -> tuple[int, int]:
 def _deck(scene: Any, duration: float) -> Deck:
     """What the peers are told: the bodies enter as they did in our own run."""
     from solver import run_pour
-    from solver.scene import with_values
+    from solver.scenes.scene import with_values
 
     return deck_of(run_pour(with_values(scene, {"numerics.max_time": duration}), SEED, threads=1), duration)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from solver.record import Outcome
+from solver.pours.record import Outcome
 
 
 def outcome_text(outcome: Outcome, message: str) -> str:

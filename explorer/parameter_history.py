@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from explorer.errors import CommandError
-from solver.scene import Scene, parameters, values
+from solver.scenes.scene import Scene, parameters, values
 
 LiveValues = Mapping[str, Any]
 """Path → value in SI, of all live parameters."""

@@ -34,7 +34,7 @@ from explorer.live.messages import (
 from explorer.live.solver_process import SolverProcess
 from explorer.scene.source import SceneSource
 from solver.params import ParameterError
-from solver.scene import Scene, body_counts, canonical, parameters, poured_mass, with_values
+from solver.scenes.scene import Scene, body_counts, canonical, parameters, poured_mass, with_values
 
 SPEED_RANGE = (0.01, 10.0)
 """Allowed ratio of simulated to wall time."""

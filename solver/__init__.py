@@ -9,13 +9,11 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from solver.assets import AssetNotFoundError, asset_path
-from solver.body import Body, Members
-from solver.clump_fit import ClumpFit
 from solver.effects import EFFECTS, SetUpEffect, Telltale
-from solver.material_file import is_material, load_material
 from solver.observables import OBSERVABLES, Value, observable_names, observables_in, observe
 from solver.observables.free_surface import slope_angle_deg
 from solver.observables.named import Named, all_names, named, observe_named, observe_scan
+from solver.observables.scan import scanned_pile
 from solver.observables.surface import HeightMap, coarsened, height_map
 from solver.observables.surface_features import (
     ASYMMETRY_NAMES,
@@ -32,12 +30,13 @@ from solver.observables.surface_features import (
 )
 from solver.params import Parameter, ParameterError, parse_quantity
 from solver.plugins import PluginError, Registry, instance_of, plugged_in
-from solver.pour_key import pour_key
-from solver.raw_pour import RawPourError, packed, unpacked
-from solver.record import Bodies, Entries, Outcome, Phase, Pile, Record, Spheres, Trace
+from solver.pours.pour_key import pour_key
+from solver.pours.raw_pour import RawPourError, packed, unpacked
+from solver.pours.record import Bodies, Entries, Outcome, Phase, Pile, Record, Spheres, Trace
 from solver.rigs import RIGS
-from solver.scan import scanned_pile
-from solver.scene import (
+from solver.scenes.body import Body, Members
+from solver.scenes.material_file import is_material, load_material
+from solver.scenes.scene import (
     Scene,
     body_counts,
     canonical,
@@ -48,32 +47,33 @@ from solver.scene import (
     with_rig,
     with_values,
 )
-from solver.set_up import with_set_up, with_settings
+from solver.scenes.set_up import with_set_up, with_settings
+from solver.shapes.clump_error import ClumpFit
 from solver.toml_table import read_toml
 from solver.version import PHYSICS
 
 if TYPE_CHECKING:
-    from solver.crew import Crew, begin_worker, warm_up
+    from solver.engine.world import Batch
     from solver.photograph import PhotographedPile, PhotographError, open_picture, read_photograph
-    from solver.pour import Pour
-    from solver.run import Job, capacity_for, run_pour, run_pours, run_queue
-    from solver.world import Batch
+    from solver.pours.pour import Pour
+    from solver.pours.run import Job, capacity_for, run_pour, run_pours, run_queue
+    from solver.pours.worker_pool import Crew, begin_worker, warm_up
 
 _LATE = {
-    "Batch": "solver.world",
-    "Crew": "solver.crew",
-    "Job": "solver.run",
+    "Batch": "solver.engine.world",
+    "Crew": "solver.pours.worker_pool",
+    "Job": "solver.pours.run",
     "PhotographError": "solver.photograph",
     "PhotographedPile": "solver.photograph",
-    "Pour": "solver.pour",
-    "begin_worker": "solver.crew",
-    "capacity_for": "solver.run",
+    "Pour": "solver.pours.pour",
+    "begin_worker": "solver.pours.worker_pool",
+    "capacity_for": "solver.pours.run",
     "open_picture": "solver.photograph",
     "read_photograph": "solver.photograph",
-    "run_pour": "solver.run",
-    "run_pours": "solver.run",
-    "run_queue": "solver.run",
-    "warm_up": "solver.crew",
+    "run_pour": "solver.pours.run",
+    "run_pours": "solver.pours.run",
+    "run_queue": "solver.pours.run",
+    "warm_up": "solver.pours.worker_pool",
 }
 
 

@@ -100,7 +100,7 @@ def measurement_folder(name: str) -> Path:
 
 
 def shipped_fits() -> Path:
-    """Folder of the member spheres of shipped bodies (`solver.clump_cache`)."""
+    """Folder of the member spheres of shipped bodies (`solver.shapes.clump`)."""
     return _folder("clumps")
 
 

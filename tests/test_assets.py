@@ -218,8 +218,8 @@ def test_all_ten_tables_are_shipped():
 def test_the_benchmark_s_pour_is_the_one_that_its_file_describes():
     from explorer.scene.file import load_scene
     from solver import body_counts
-    from solver.shape import Solid, mass_properties
-    from solver.time_step import time_step
+    from solver.scenes.time_step import time_step
+    from solver.shapes.solid import Solid, mass_properties
 
     scene = load_scene("seed_pour")
     body = scene.bodies[0]

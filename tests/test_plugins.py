@@ -242,8 +242,8 @@ def test_a_contact_law_is_a_choice_and_acts(site, tmp_path):
 import dataclasses
 import json
 from solver import backend
-from solver.contact_model import ContactModel
-from solver.laboratory import RADIUS, Laboratory, bench
+from solver.scenes.contact_model import ContactModel
+from solver.single_body.laboratory import RADIUS, Laboratory, bench
 backend.init(threads=1)
 lasted = []
 for name in ("linear_spring_dashpot", "soft_springs"):

@@ -17,18 +17,7 @@ from doe.measurement.features import feature_set, features_of_record
 from doe.measurement.measurement import Condition, Observation
 from doe.runner import Pours, seed_of, stored_run
 from doe.store import Reader, Store, StoredRun
-from solver import (
-    EFFECTS,
-    Job,
-    Outcome,
-    ParameterError,
-    Record,
-    Scene,
-    observe_named,
-    pour_key,
-    unpacked,
-    with_values,
-)
+from solver import EFFECTS, Job, Outcome, ParameterError, Record, Scene, observe_named, pour_key, unpacked, with_values
 
 PROFILE = "height_profile_m"
 ROOT = 0

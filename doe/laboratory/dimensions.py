@@ -3,7 +3,7 @@
     geometric mean diameter   D = (L W T)^(1/3), L the longest dimension of a piece
     sphericity                φ = D/L
     size_spread               c = SD(D)/mean(D), the coefficient of variation; a material's `size_spread` is the
-                              deviation of the linear size over its mean (`solver.sizes`): the same number
+                              deviation of the linear size over its mean (`solver.scenes.sizes`): the same number
 
 The interval of c is the modified one of McKay: with u = χ²(n − 1) at 1 − α/2 and α/2 an end is
 c/√(((u + 2)/n − 1) c² + u/(n − 1)). Its standard error is c √(1/(2(n − 1)) + c²/n). Both take D as normal;

@@ -15,7 +15,7 @@ from explorer.commands.listing import Listing
 
 if TYPE_CHECKING:
     from solver import Record
-    from solver.pour import Pour
+    from solver.pours.pour import Pour
 
 CHECKPOINT_INTERVAL = 0.5
 """Simulated time [s] between two checkpoints."""
@@ -71,9 +71,9 @@ def simulate(
     from explorer.tables.pours import RunTable
     from solver import Crew, Job, run_pours
     from solver.arch import chosen
-    from solver.bench_tests import run_bench_test
-    from solver.checkpoint import read_checkpoint
+    from solver.pours.checkpoint import read_checkpoint
     from solver.rigs import BENCH_RIGS
+    from solver.single_body import run_bench_test
 
     if replicates > 1 and (checkpoint or resume):
         raise CommandError("--checkpoint and --resume are for one pour, not for --replicates")

@@ -76,7 +76,7 @@ class Deck:
     """Of linear springs [m/s]; Hertz–Mindlin does not read it."""
     tangential_law: str
     tangential_dashpot: str
-    """Conventions that the pour was calculated with here (``solver.material``); an engine has its own."""
+    """Conventions that the pour was calculated with here (``solver.scenes.material``); an engine has its own."""
     entries: Entries
     plate: float | None
     """Height of the infinite plate [m]; None: there is none."""

@@ -16,10 +16,9 @@ from explorer.export.target import ExportOrder, ExportTarget
 from explorer.export.triangles import mesh_triangles, revolved_triangles
 from solver import Body, Entries, Record, Scene
 from solver.effects.rolling_resistance import RollingResistance
-from solver.effects.set_up import actual
 from solver.laws import HertzMindlin, LinearSpringDashpot
 from solver.rigs import Funnel, MeshFunnel, Plane, Revolved, Rig
-from solver.scene import pour_rig
+from solver.scenes.scene import actual, pour_rig
 
 HOLDS = (RollingResistance.name,)
 """Effects of contacts that a deck can say; an engine may have the law of fewer."""

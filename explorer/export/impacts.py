@@ -29,8 +29,8 @@ from explorer.export.liggghts import (
     write_spheres,
 )
 from explorer.export.run import run_liggghts
-from solver.contact_model import ContactModel
-from solver.material import Material
+from solver.scenes.contact_model import ContactModel
+from solver.scenes.material import Material
 from solver.verification.chung_ooi import RIGID
 from solver.verification.impacts import (
     DECLARED_BY_NOBODY,

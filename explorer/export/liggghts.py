@@ -32,10 +32,9 @@ from explorer.export.frames import FINAL, TRAJECTORY
 from explorer.export.readme import write_readme
 from explorer.export.triangles import write_stl
 from solver.effects.rolling_resistance import RollingResistance
-from solver.effects.set_up import actual
 from solver.laws import HertzMindlin, LinearSpringDashpot
 from solver.laws.restitution import normal_damping
-from solver.scene import Scene
+from solver.scenes.scene import Scene, actual
 
 Array = npt.NDArray[np.float64]
 INPUT = "in.liggghts"

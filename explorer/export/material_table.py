@@ -21,9 +21,9 @@ from explorer.errors import CommandError
 from explorer.export.liggghts import unclamped_restitution
 from explorer.export.target import ExportOrder, ExportTarget
 from solver import Body, Scene
-from solver.effects.set_up import actual
 from solver.laws import HertzMindlin, LinearSpringDashpot
-from solver.material import Pair
+from solver.scenes.material import Pair
+from solver.scenes.scene import actual
 
 Rows = list[Sequence[str]]
 DAMPING_OF = {

@@ -21,14 +21,14 @@ from explorer.errors import CommandError
 from explorer.export.target import ExportOrder, ExportTarget
 from explorer.scene.meshes import GATE_NAME, Triangles, body_triangles, rig_triangles
 from solver import Bodies, Record, Scene, Spheres, value
-from solver.contacts import Contacts, loads
-from solver.insertion import rotation_matrix
-from solver.record_builder import member_spheres
+from solver.pours.contacts import Contacts, loads
+from solver.pours.record_builder import member_spheres
 from solver.rigs import Rig
+from solver.scenes.insertion import rotation_matrix
 
 if TYPE_CHECKING:
     from solver import Job
-    from solver.pour import Pour
+    from solver.pours.pour import Pour
 
 Array = npt.NDArray[np.float64]
 Numbers = Mapping[str, npt.NDArray[Any]]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from solver.scene import Scene
+from solver.scenes.scene import Scene
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from solver.insertion import rotation_matrix
 from solver.rigs import Revolved, TriangleMesh
+from solver.scenes.insertion import rotation_matrix
 
 Array = npt.NDArray[np.float64]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from explorer.files.whole_file import write_whole_bytes
-from solver.checkpoint import checkpoint_bytes, checkpoint_of
-from solver.pour import Pour
+from solver.pours.checkpoint import checkpoint_bytes, checkpoint_of
+from solver.pours.pour import Pour
 
 
 class CheckpointWriter:

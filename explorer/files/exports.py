@@ -18,8 +18,8 @@ import trimesh
 from explorer.errors import CommandError
 from explorer.live.frames import Frame
 from explorer.scene.meshes import Triangles, body_triangles
-from solver.insertion import rotation_matrix
-from solver.scene import Scene
+from solver.scenes.insertion import rotation_matrix
+from solver.scenes.scene import Scene
 
 MM = 1e3
 MOST_TRIANGLES = 4_000_000

@@ -14,8 +14,7 @@ from doe.measurement.measurement import Condition
 from doe.measurement.piles import pile_files, read_pile
 from explorer.errors import CommandError
 from solver.assets import measurement_folder
-from solver.observables.outline import Flanks, outline
-from solver.observables.repose import AZIMUTHS_DEG
+from solver.observables.repose import AZIMUTHS_DEG, Flanks, outline
 from solver.rigs.rotating_drum import RotatingDrum
 
 Array = npt.NDArray[np.float64]

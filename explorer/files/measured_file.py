@@ -20,10 +20,9 @@ import numpy.typing as npt
 from doe.table_file import CellTable, csv_table, decoded
 from explorer.errors import CommandError
 from explorer.files.measured_curves import MeasuredCurve
-from solver.observables.outline import outline
-from solver.observables.repose import AZIMUTHS_DEG
+from solver.observables.repose import AZIMUTHS_DEG, outline
 from solver.photograph import PhotographError, Refusal, open_picture, read_photograph
-from solver.record import Spheres
+from solver.pours.record import Spheres
 
 Array = npt.NDArray[np.float64]
 

@@ -15,10 +15,10 @@ from explorer.files.whole_file import write_whole, write_whole_bytes
 from explorer.scene.source import SceneSource, material_source
 from explorer.scene.text import material_toml
 from explorer.shape.mesh_solid import FIXED_UNIT, MOST_FACES_DRAWN, USUAL_UNIT, mesh_solid
-from solver.mesh_file import SUFFIXES
 from solver.rigs import MeshFunnel
-from solver.scene import Scene, check, with_rig, with_values
-from solver.shape import Solid, surface_mesh
+from solver.scenes.scene import Scene, check, with_rig, with_values
+from solver.shapes.mesh_file import SUFFIXES
+from solver.shapes.solid import Solid, surface_mesh
 
 KEPT = ("mass", "outlet_height", "domain_half_width")
 """Parameters of the rig of before that the funnel has as well."""

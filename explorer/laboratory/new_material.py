@@ -12,7 +12,7 @@ from explorer.laboratory.part import measured_text, merged, read_part, with_part
 from explorer.scene.starter_files import material_text, new_path
 from explorer.scene.text import material_toml
 from solver import ParameterError, Scene, asset_path, load_material, read_toml
-from solver.material_file import scene_from
+from solver.scenes.material_file import scene_from
 
 STARTER = "the starter material"
 

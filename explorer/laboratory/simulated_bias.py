@@ -9,7 +9,7 @@ from doe.laboratory.drop_flight import flight, tangential_share
 from explorer.errors import CommandError
 from explorer.laboratory.twin import bench_scene
 from solver import Scene, with_values
-from solver.bench_tests import BenchResult, run_bench_test
+from solver.single_body import BenchResult, run_bench_test
 
 FIRST_READING = 0.02
 """The twin's squeezing is shown from this share of its largest strain on: before, few steps fell into a reading."""

@@ -24,9 +24,9 @@ from doe.laboratory import Derived, LabResult
 from explorer.errors import CommandError
 from explorer.laboratory.twin_row import CLOSES, RIGS, TwinRow
 from solver import Scene, with_rig, with_values
-from solver.bench_tests import BenchResult, run_bench_test
-from solver.body import Body
-from solver.material import Material
+from solver.scenes.body import Body
+from solver.scenes.material import Material
+from solver.single_body import BenchResult, run_bench_test
 
 TILT_RATE = 5.0
 """Of the inclined plane [°/s]; the angle moves by less than a hundredth of a degree against the rig's own 1 °/s."""
@@ -95,8 +95,8 @@ def _restitution(of: tuple[str, ...], own: dict[str, Derived], scene: Scene) -> 
 def restitution_that_lands(bench: Scene, measured: float) -> float | None:
     """The e with which the ball of the drop rig gives L/(2H) = ``measured``; None if no e that is allowed does."""
     # Only here: the drop alone, without the study beside it.
-    from solver.bench_tests.bench import UPRIGHT, ball
-    from solver.bench_tests.drop_plate_45 import drop, paper_estimate
+    from solver.single_body.bench import UPRIGHT, ball
+    from solver.single_body.drop_plate_45 import drop, paper_estimate
 
     gravity, height = math.hypot(*bench.gravity), bench.rig.drop_height  # type: ignore[attr-defined]
     body = next(body for body in bench.bodies if body.name == bench.rig.body)  # type: ignore[attr-defined]

@@ -11,11 +11,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 
-from solver.observables.outline import Outline
+from solver.observables.observable import Value
 from solver.observables.pile import angle_of_repose, angle_of_repose_left, angle_of_repose_right
 from solver.observables.reading import PileReading
-from solver.observables.value import Value
-from solver.record import Pile
+from solver.observables.repose import Outline
+from solver.pours.record import Pile
 
 LEAST_SHARE_BELOW = 0.25
 """Share of the poured mass that has to lie below the outlet: the first few bodies are no pile that has an angle."""

@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from explorer.live.frames import MAX_BODIES
 from explorer.live.slots import SlotReader, SlotWriter, shared_slots
-from solver.contacts import Contacts, coordination_numbers, loads
-from solver.record import Bodies
+from solver.pours.contacts import Contacts, coordination_numbers, loads
+from solver.pours.record import Bodies
 
 Floats = npt.NDArray[np.float32]
 Ints = npt.NDArray[np.int32]

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from explorer.live.slots import SlotReader, SlotWriter, shared_slots
-from solver.record import Bodies
+from solver.pours.record import Bodies
 
 MAX_BODIES = 32768
 """Bodies for which there is room in a frame."""

@@ -11,8 +11,8 @@ import math
 from dataclasses import dataclass
 
 from explorer.live.angle_reader import Angles
-from solver.rewind import Kept
-from solver.scene import Scene
+from solver.pours.checkpoint import Kept
+from solver.scenes.scene import Scene
 
 ROOM = 128 * 2**20
 """Memory [B] for all moments; one takes 72 kB with 29 bodies of 30 spheres, 1.8 MB with 2000 spheres in a bed."""

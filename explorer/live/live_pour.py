@@ -33,12 +33,12 @@ from explorer.live.single_pour import begun, endless, launch
 from explorer.outcomes import outcome_text
 from explorer.scene.changes import changes
 from solver.effects.columns import kernel_effects
+from solver.engine.world import Batch
 from solver.params import ParameterError
-from solver.record import Outcome
-from solver.rewind import keep, put_back
-from solver.scene import with_values
-from solver.time_step import stability_limit
-from solver.world import Batch
+from solver.pours.checkpoint import keep, put_back
+from solver.pours.record import Outcome
+from solver.scenes.scene import with_values
+from solver.scenes.time_step import stability_limit
 
 KEPT_EVERY = 0.02
 """Simulated time [s] between two moments that can be come back to at once; those between are run again."""

@@ -11,10 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from solver.observables.outline import Outline
-from solver.observables.value import Value
-from solver.record import Outcome, Phase
-from solver.scene import Scene
+from solver.observables.observable import Value
+from solver.observables.repose import Outline
+from solver.pours.record import Outcome, Phase
+from solver.scenes.scene import Scene
 
 
 class SessionState(StrEnum):
@@ -118,7 +118,7 @@ class Status:
     dt: float = 0.0
     """Time step [s]."""
     dt_limit: float = math.nan
-    """Time step from which on the motion is unstable [s] (``solver.time_step.stability_limit``)."""
+    """Time step from which on the motion is unstable [s] (``solver.scenes.time_step.stability_limit``)."""
     earliest: float = math.nan
     """Simulated time [s] to which the pour can be brought back."""
     bodies: int = 0

@@ -7,8 +7,8 @@ import math
 from explorer.live.details import DetailWriter
 from explorer.live.frames import FrameWriter
 from explorer.live.messages import Watch
-from solver.pour import Pour
-from solver.record import Outcome
+from solver.pours.pour import Pour
+from solver.pours.record import Outcome
 
 FRAME_INTERVAL = 1.0 / 60.0
 """Wall time [s] between published frames."""

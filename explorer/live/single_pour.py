@@ -8,10 +8,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from solver.pour import Pour
-from solver.run import capacity_for
-from solver.scene import Scene
-from solver.world import Batch
+from solver.engine.world import Batch
+from solver.pours.pour import Pour
+from solver.pours.run import capacity_for
+from solver.scenes.scene import Scene
 
 
 def begun(scene: Scene, seed: int, announce: Callable[[str], None]) -> Pour:

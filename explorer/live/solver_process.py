@@ -9,7 +9,7 @@ from explorer.live.details import detail_reader, shared_details
 from explorer.live.frames import FrameReader, shared_block
 from explorer.live.messages import Close, Command, Report
 from explorer.live.process import run
-from solver.crew import deaf_to_interrupts
+from solver.pours.worker_pool import deaf_to_interrupts
 
 CLOSE_WAIT = 3.0
 """Seconds that it has to end by itself."""

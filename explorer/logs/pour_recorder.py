@@ -18,10 +18,10 @@ from solver import Outcome, Record
 from solver.observables import observe
 from solver.observables.pile import angle_of_repose
 from solver.observables.reading import PileReading
-from solver.record_builder import lying, member_spheres, pile_of
+from solver.pours.record_builder import lying, member_spheres, pile_of
 
 if TYPE_CHECKING:
-    from solver.pour import Pour
+    from solver.pours.pour import Pour
 
 ANGLE_INTERVAL = 0.1
 """Simulated time [s] between readings of the angle."""

@@ -15,7 +15,7 @@ from explorer.logs.pour_log import PourLog
 from explorer.logs.recording import FRAME_INTERVAL, RecordedPour
 from explorer.outcomes import outcome_text
 from explorer.scene.changes import changes
-from solver.scene import Scene
+from solver.scenes.scene import Scene
 
 
 class SessionRecorder:

@@ -11,7 +11,7 @@ from explorer.logs.pour_recorder import PourRecorder, recorder_of
 from solver import Record
 
 if TYPE_CHECKING:
-    from solver.pour import Pour
+    from solver.pours.pour import Pour
 
 RECORDED_STAGE = "verification"
 

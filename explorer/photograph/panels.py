@@ -13,7 +13,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from explorer.photograph.simulated import SimulatedPiles
 from explorer.tables.photograph import angle_text
-from solver.observables.outline import flank_feet
+from solver.observables.repose import flank_feet
 from solver.photograph import PhotographedPile, Picture, Refusal
 
 Array = npt.NDArray[np.float64]

@@ -11,9 +11,8 @@ import numpy.typing as npt
 from explorer.errors import CommandError
 from explorer.outcomes import outcome_text
 from explorer.scene.file import load_scene
-from solver.observables.outline import Outline, flank_feet, outline
-from solver.observables.repose import AZIMUTHS_DEG
-from solver.record import Spheres
+from solver.observables.repose import AZIMUTHS_DEG, Outline, flank_feet, outline
+from solver.pours.record import Spheres
 
 Array = npt.NDArray[np.float64]
 SEED = 1

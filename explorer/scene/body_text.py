@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from solver.clump_fit import measured_fit
-from solver.shape import Solid, mass_properties
+from solver.shapes.clump_error import measured_fit
+from solver.shapes.solid import Solid, mass_properties
 
 Array = npt.NDArray[np.float64]
 

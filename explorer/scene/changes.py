@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from explorer.screen_units import quantity
-from solver.scene import Scene, parameters, values
+from solver.scenes.scene import Scene, parameters, values
 
 
 @dataclass(frozen=True)

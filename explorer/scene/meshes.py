@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 import trimesh
 
-from solver.body import Body, Members
-from solver.insertion import rotation_matrix
 from solver.rigs import Plane, Revolved, Rig, Surface, TriangleMesh
-from solver.scene import Scene, pour_rig
-from solver.shape import surface_mesh
+from solver.scenes.body import Body, Members
+from solver.scenes.insertion import rotation_matrix
+from solver.scenes.scene import Scene, pour_rig
+from solver.shapes.solid import surface_mesh
 
 SIDES = 96
 """Corners of a circle."""

@@ -23,7 +23,7 @@ from explorer.files.whole_file import write_whole
 from explorer.scene.changes import Difference
 from solver.assets import asset_path, shipped_assets
 from solver.params import ParameterError
-from solver.scene import Scene, canonical, parameters
+from solver.scenes.scene import Scene, canonical, parameters
 from solver.toml_table import as_table, read_toml, refuse_unknown, table_at
 
 KEYS = ("format", "title", "about", "values")

@@ -12,8 +12,8 @@ from explorer.scene.changes import Difference, differences
 from explorer.scene.file import load_scene, material_scene, study_scene
 from explorer.screen_units import SCREEN_UNIT
 from solver.params import UNITS, ParameterError, parse_quantity
-from solver.scene import Scene, with_rig
-from solver.set_up import with_settings
+from solver.scenes.scene import Scene, with_rig
+from solver.scenes.set_up import with_settings
 from solver.toml_table import read_toml
 
 PROGRAM = ("explorer", "simulate")

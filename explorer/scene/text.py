@@ -1,4 +1,4 @@
-"""A scene as the text of a material file that `solver.material_file` reads back as the same scene.
+"""A scene as the text of a material file that `solver.scenes.material_file` reads back as the same scene.
 
 Everything is written out in SI: materials, bodies, pairs, rig, insertion, numerics and the effects that are on. Numbers
 keep all their digits; meshes are named by their full path.
@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from solver import Scene, parameters, value
-from solver.body import Body, Members
-from solver.shape import Solid
+from solver.scenes.body import Body, Members
+from solver.shapes.solid import Solid
 
 SET_UP = ("rig", "insertion", "numerics")
 

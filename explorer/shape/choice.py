@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from solver.clump import DEMANDS
-from solver.shape import Solid, mass_properties
-from solver.sphere_error import SphereError, sphere_error
-from solver.sphere_number import doubling, fitted
+from solver.shapes.clump import DEMANDS
+from solver.shapes.clump_error import SphereError, sphere_error
+from solver.shapes.solid import Solid, mass_properties
+from solver.shapes.sphere_number import doubling, fitted
 
 Array = npt.NDArray[np.float64]
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from explorer.errors import CommandError
 from explorer.tables.shape import mm
-from solver.mesh_file import LENGTH_UNITS
-from solver.shape import Solid, surface_mesh
+from solver.shapes.mesh_file import LENGTH_UNITS
+from solver.shapes.solid import Solid, surface_mesh
 
 LEAST_EXTENT, LARGEST_EXTENT = 2e-4, 0.5
 """Longest outer dimension of a body [m], the range of a declared one; outside it the unit is probably another."""

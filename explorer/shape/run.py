@@ -15,8 +15,8 @@ from explorer.scene.body_text import body_text
 from explorer.shape.choice import Fitted, fewest, fits, shown_numbers, standard_limit
 from explorer.shape.mesh_solid import MOST_FACES_DRAWN, USUAL_UNIT, mesh_solid
 from explorer.tables.shape import error_line, heading, mm, solid_line
-from solver.clump import MOST_SPHERES
-from solver.shape import Solid, mass_properties, surface_mesh
+from solver.shapes.clump import MOST_SPHERES
+from solver.shapes.solid import Solid, mass_properties, surface_mesh
 
 USUAL_DENSITY = 1000.0
 NAME = re.compile(r"[^\s.\"\\]+")

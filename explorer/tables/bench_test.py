@@ -17,7 +17,7 @@ from explorer.tables.text_table import text_table
 from solver import Scene
 
 if TYPE_CHECKING:  # it loads Taichi, and the page reads tables without
-    from solver.bench_tests import BenchResult
+    from solver.single_body import BenchResult
 
 
 def bench_data(scene: Scene, result: BenchResult) -> dict[str, Any]:

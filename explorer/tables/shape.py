@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from explorer.tables.text_table import table_line
-from solver.shape import MassProperties
-from solver.sphere_error import SphereError
+from solver.shapes.clump_error import SphereError
+from solver.shapes.solid import MassProperties
 
 COLUMNS = {
     "spheres": -7,

@@ -18,7 +18,7 @@ from explorer.study.process import CalibrationProcess
 from explorer.viewer.guarded_server import address, guarded_server
 from explorer.viewer.output.recording_switch import session_recorder
 from explorer.viewer.page import Page
-from solver.scene import Scene
+from solver.scenes.scene import Scene
 
 LABEL = "Granular material explorer"
 

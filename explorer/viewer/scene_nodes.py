@@ -12,7 +12,7 @@ from explorer.live.frames import Frame
 from explorer.scene.meshes import GATE_NAME, PLATE_NAME, body_triangles, rig_poses, rig_triangles, rim_circles
 from explorer.viewer.body_nodes import BodyNodes, Kind
 from explorer.viewer.palette import BODY_COLOURS, GLASS, PLATE, RIM, RING, Colour
-from solver.scene import Scene, body_counts
+from solver.scenes.scene import Scene, body_counts
 
 Array = npt.NDArray[np.float64]
 

@@ -10,12 +10,12 @@ import numpy.typing as npt
 
 from solver.effects import body_effects, contact_effects
 from solver.effects.effect import BodyEffect, ContactEffect, Effect
-from solver.material import effective_youngs_modulus
 from solver.params import declared
+from solver.scenes.material import effective_youngs_modulus
 
 if TYPE_CHECKING:
-    from solver.body import Body
-    from solver.scene import Scene
+    from solver.scenes.body import Body
+    from solver.scenes.scene import Scene
 
 Array = npt.NDArray[np.float64]
 

@@ -8,9 +8,9 @@ Vanishes for x → 0. At x = M − M₀ a moisture content (dry basis) of M inst
 from dataclasses import dataclass, replace
 from typing import Any
 
-from solver.body import Body, Members
 from solver.effects.effect import SetUpEffect, Telltale
 from solver.params import param
+from solver.scenes.body import Body, Members
 
 
 @dataclass(frozen=True)

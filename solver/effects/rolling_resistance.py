@@ -8,14 +8,36 @@
 tan⁻¹ μ_r, and rolls with an acceleration lowered by μ_r g cos α beyond.
 Source: Ai, Chen, Rotter & Ooi 2011, Powder Technology 206:269; LIGGGHTS-PUBLIC `rolling_model_epsd2.h`. On member
 spheres of clumps it stands for what their shape lacks: edges and roughness finer than a sphere.
+
+Springs that a contact carries along: turned with its normal, capped in length.
 """
 
 from dataclasses import dataclass
 
 from solver.effects.effect import ContactEffect, Stage, Telltale
 from solver.effects.kernel import kernel_function, ti
-from solver.effects.spring import capped, turned_with
 from solver.params import param
+
+
+@kernel_function
+def turned_with(spring, n):
+    """``spring`` laid into the plane across the new normal ``n``, with its length kept."""
+    flat = spring - spring.dot(n) * n
+    length2, flat2 = spring.dot(spring), flat.dot(flat)
+    scale = 0.0
+    if flat2 > 0.0:
+        scale = ti.sqrt(length2 / flat2)
+    return scale * flat
+
+
+@kernel_function
+def capped(vector, limit):
+    """``vector``, shortened to the length ``limit`` if it is longer."""
+    length2 = vector.dot(vector)
+    scale = 1.0
+    if length2 > limit * limit:
+        scale = limit / ti.sqrt(length2)
+    return scale * vector
 
 
 @kernel_function

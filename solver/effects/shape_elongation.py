@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from solver.body import DIMENSIONS, Body, Members
 from solver.effects.effect import SetUpEffect, Telltale
 from solver.params import ParameterError, param
+from solver.scenes.body import DIMENSIONS, Body, Members
 
 
 @dataclass(frozen=True)

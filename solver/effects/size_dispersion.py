@@ -1,6 +1,6 @@
 """Sizes scatter although the declared bodies are all alike: log-normal linear sizes with the mean kept.
 
-    s ~ log-normal, E[s] = 1, standard deviation σ        (``solver/sizes.py``)
+    s ~ log-normal, E[s] = 1, standard deviation σ        (``solver/scenes/sizes.py``)
 
 Vanishes for σ → 0. The mass poured stays, so the number of bodies falls by E[s³] = 1 + 3 σ² + ….
 Source: log-normal sizes of comminuted and natural grains, e.g. Allen 1997, Particle Size Measurement.
@@ -11,7 +11,7 @@ from typing import Any
 
 from solver.effects.effect import SetUpEffect, Telltale
 from solver.params import ParameterError, param
-from solver.sizes import MOST_SPREAD, SizeDistribution
+from solver.scenes.sizes import MOST_SPREAD, SizeDistribution
 
 
 @dataclass(frozen=True)

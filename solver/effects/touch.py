@@ -1,7 +1,7 @@
 """What an effect sees of one contact and of one body, inside a kernel."""
 
 from solver.backend import ti
-from solver.state import Vec3, Vec4
+from solver.engine.state import Vec3, Vec4
 
 Touch = ti.types.struct(
     # Geometry and motion: body i is pushed by j along the normal, from j to i.

@@ -23,7 +23,7 @@ import math
 from solver.effects.kernel import kernel_function, ti
 from solver.laws.law import ContactLaw
 from solver.laws.restitution import normal_damping
-from solver.material import Material, Pair, effective_shear_modulus, effective_youngs_modulus
+from solver.scenes.material import Material, Pair, effective_shear_modulus, effective_youngs_modulus
 
 
 def tangential_damping(restitution: float) -> float:

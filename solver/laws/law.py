@@ -17,10 +17,10 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from solver.effects.kernel import kernel_function, ti
-from solver.material import Material, Pair
+from solver.scenes.material import Material, Pair
 
 if TYPE_CHECKING:
-    from solver.contact_model import ContactModel
+    from solver.scenes.contact_model import ContactModel
 
 KernelCall = Callable[..., Any]
 

@@ -27,10 +27,10 @@ from typing import TYPE_CHECKING
 from solver.effects.kernel import kernel_function, ti
 from solver.laws.law import ContactLaw
 from solver.laws.restitution import damping_ratio
-from solver.material import Material, Pair, effective_youngs_modulus
+from solver.scenes.material import Material, Pair, effective_youngs_modulus
 
 if TYPE_CHECKING:
-    from solver.contact_model import ContactModel
+    from solver.scenes.contact_model import ContactModel
 
 
 @kernel_function

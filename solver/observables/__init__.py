@@ -15,18 +15,17 @@ import numpy as np
 from solver.observables import discharge, draw_down, free_surface, packing, pile, segregation
 from solver.observables.discharge import discharge_curve
 from solver.observables.free_surface import surface_profile
-from solver.observables.observable import ComponentObservable, Observable
+from solver.observables.observable import ComponentObservable, Observable, Value
 from solver.observables.pile import height_profile
 from solver.observables.reading import PileReading
 from solver.observables.repose import AZIMUTHS_DEG, flank_angles_deg
 from solver.observables.silhouette import largest_part, silhouette
-from solver.observables.value import Value
 from solver.plugins import Registry, instance_of
 from solver.rigs import PourRig
-from solver.scene import Scene, pour_rig
+from solver.scenes.scene import Scene, pour_rig
 
 if TYPE_CHECKING:
-    from solver.record import Pile, Record
+    from solver.pours.record import Pile, Record
 
 __all__ = [
     "AZIMUTHS_DEG",

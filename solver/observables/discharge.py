@@ -11,12 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from solver.effects.effect import Telltale
-from solver.observables.observable import of_record
-from solver.observables.value import Value
+from solver.observables.observable import Value, of_record
 from solver.rigs.rig import DISCHARGE
 
 if TYPE_CHECKING:
-    from solver.record import Record
+    from solver.pours.record import Record
 
 Array = npt.NDArray[np.float64]
 

@@ -15,15 +15,14 @@ import numpy as np
 import numpy.typing as npt
 
 from solver.effects.effect import Telltale
-from solver.observables.observable import of_record
+from solver.observables.observable import Value, mean_value, of_record
 from solver.observables.repose import flank_angles_deg
 from solver.observables.silhouette import PIXEL, largest_part, silhouette
-from solver.observables.value import Value, mean_value
 from solver.rigs.draw_down_box import DrawDownBox
 from solver.rigs.rig import DRAW_DOWN
 
 if TYPE_CHECKING:
-    from solver.record import Record, Spheres
+    from solver.pours.record import Record, Spheres
 
 
 def draw_down_angle(record: Record) -> Value:

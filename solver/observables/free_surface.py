@@ -18,13 +18,12 @@ import numpy as np
 import numpy.typing as npt
 
 from solver.effects.effect import Telltale
-from solver.observables.observable import of_record
+from solver.observables.observable import Value, mean_value, of_record
 from solver.observables.silhouette import PIXEL, column_tops, largest_part, silhouette
-from solver.observables.value import Value, mean_value
 from solver.rigs.rig import FREE_SURFACE
 
 if TYPE_CHECKING:
-    from solver.record import FreeSurface, Record, Spheres
+    from solver.pours.record import FreeSurface, Record, Spheres
 
 Array = npt.NDArray[np.float64]
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from solver.observables.pile import apex_height
 from solver.observables.reading import PileReading
-from solver.record import Outcome, Pile, Verdict
+from solver.pours.record import Outcome, Pile, Verdict
 from solver.rigs import PourRig
 
 LEAST_HEIGHT = 2.5

@@ -10,9 +10,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from solver.insertion import random_quaternion, rotation_matrix
 from solver.observables import observe_pile
-from solver.record import Pile, Spheres
+from solver.pours.record import Pile, Spheres
+from solver.scenes.insertion import random_quaternion, rotation_matrix
 
 Array = npt.NDArray[np.float64]
 

@@ -25,8 +25,8 @@ from solver.observables.pile import PROFILE_RING, view
 from solver.observables.reading import PileReading
 
 if TYPE_CHECKING:
-    from solver.record import Pile, Record
-    from solver.scene import Scene
+    from solver.pours.record import Pile, Record
+    from solver.scenes.scene import Scene
 
 Array = npt.NDArray[np.float64]
 Readings = dict[str, float | Array]

@@ -2,20 +2,43 @@
 
 To add one: a function and a line in the table of its file, or an entry point ``observable.NAME`` of a package of one's
 own (``solver/plugins.py``). Every rig that gives its group gives it; page, studies, measured data and reports follow.
+
+What an observable returns: a number with its unit and, where one exists, its spread.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+
 from solver.effects.effect import Telltale
 from solver.observables.reading import PileReading
-from solver.observables.value import Value
 
 if TYPE_CHECKING:
-    from solver.record import Record
+    from solver.pours.record import Record
+
+
+@dataclass(frozen=True)
+class Value:
+    """One observed number. NaN means: not measurable on this record."""
+
+    value: float
+    unit: str
+    spread: float | None = None
+    """Sample standard deviation of the parts that ``value`` is the mean of (views, flanks), same unit."""
+
+
+def mean_value(parts: Sequence[float], unit: str) -> Value:
+    """Mean and sample standard deviation of those ``parts`` that could be measured; NaN where none could."""
+    finite = np.asarray(parts, dtype=np.float64)
+    finite = finite[np.isfinite(finite)]
+    if finite.size == 0:
+        return Value(float("nan"), unit, None)
+    spread = float(finite.std(ddof=1)) if finite.size > 1 else None
+    return Value(float(finite.mean()), unit, spread)
 
 
 @dataclass(frozen=True)

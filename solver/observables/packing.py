@@ -8,14 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from solver.effects.effect import Telltale
-from solver.observables.observable import of_pile, of_record
+from solver.observables.observable import Value, of_pile, of_record
 from solver.observables.reading import PileReading
-from solver.observables.value import Value
 from solver.rigs.rig import PILE
 
 if TYPE_CHECKING:
-    from solver.record import Record
-    from solver.scene import Scene
+    from solver.pours.record import Record
+    from solver.scenes.scene import Scene
 
 
 def bulk_density(reading: PileReading) -> Value:

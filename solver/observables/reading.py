@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from solver.observables import footprint
-from solver.observables.outline import Outline, outline_of
-from solver.observables.repose import AZIMUTHS_DEG, flank_angles_deg, flank_lines
+from solver.observables import surface
+from solver.observables.repose import AZIMUTHS_DEG, Outline, flank_angles_deg, flank_lines, outline_of
 from solver.observables.silhouette import PIXEL, Image, largest_part, left_edge, silhouette, top_bodies
 from solver.observables.surface import HeightMap, height_map
 
 if TYPE_CHECKING:
-    from solver.record import Pile
+    from solver.pours.record import Pile
 
 Array = npt.NDArray[np.float64]
 
@@ -83,27 +82,27 @@ class PileReading:
     @cached_property
     def thickness(self) -> float:
         """Thickness of a body [m]."""
-        return footprint.body_thickness(self.pile)
+        return surface.body_thickness(self.pile)
 
     @cached_property
     def grain_thickness(self) -> float:
         """The same as a mean over the pile's mass [m]: what the height of a heap is compared with."""
-        return footprint.grain_thickness(self.pile)
+        return surface.grain_thickness(self.pile)
 
     @cached_property
     def centre(self) -> Array:
         """Centre of mass [m], shape (3,)."""
-        return footprint.centre_of_mass(self.pile)
+        return surface.centre_of_mass(self.pile)
 
     @cached_property
     def radii(self) -> Array:
         """Distances of the bodies from the centre of mass in the plane of the plate [m], shape (n,)."""
-        return footprint.mass_radii(self.pile)
+        return surface.mass_radii(self.pile)
 
     @cached_property
     def r50(self) -> float:
         """Radius that holds half of the mass [m]."""
-        return footprint.radius_holding(0.5, self.radii, self.pile.mass)
+        return surface.radius_holding(0.5, self.radii, self.pile.mass)
 
     @cached_property
     def surface(self) -> HeightMap | None:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from solver.observables.observable import ComponentObservable, first_line
+from solver.observables.observable import ComponentObservable, Value, first_line
 from solver.observables.reading import PileReading
-from solver.observables.value import Value
 
 
 def inner_mass_share(reading: PileReading) -> dict[str, Value]:

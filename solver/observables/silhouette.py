@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
-    from solver.record import Spheres
+    from solver.pours.record import Spheres
 
 Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.bool_]

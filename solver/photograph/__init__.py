@@ -1,6 +1,6 @@
 """A photographed pile as one of ours: picture file → silhouette → the outline and flank lines of simulated piles.
 
-Beside `solver/scan.py`, which does the same for a scanned pile, and below ``doe``, so that measured data sets and the
+Beside `solver/observables/scan.py`, which does the same for a scanned pile, and below ``doe``, so that measured data sets and the
 command line read pictures by the same function. NumPy, SciPy and Pillow; no kernels.
 """
 

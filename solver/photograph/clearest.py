@@ -14,9 +14,8 @@ from PIL import Image as PillowImage
 from scipy import ndimage
 
 from solver.photograph import checks
+from solver.photograph.backdrop import Candidate, Illumination, candidates, illumination, stands_out
 from solver.photograph.base_line import BaseLine, check_tilt, rough_base_line
-from solver.photograph.illumination import Illumination, illumination
-from solver.photograph.parts import Candidate, candidates, stands_out
 from solver.photograph.refusal import NotAPile, Reason
 
 Array = npt.NDArray[np.float64]

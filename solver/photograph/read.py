@@ -14,14 +14,21 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from solver.observables.outline import Outline, flank_feet, outline_of
-from solver.observables.repose import FlankLine
+from solver.observables.repose import FlankLine, Outline, flank_feet, outline_of
 from solver.observables.silhouette import column_tops
 from solver.photograph import checks
 from solver.photograph.base_line import BaseLine, check_tilt, given_base_line, sharp_base_line
 from solver.photograph.clearest import find_pile
-from solver.photograph.edge import Patch, silhouettes, upright
-from solver.photograph.edge_quality import edge_contrast, edge_width, faintest, pixel_noise, roughness
+from solver.photograph.edge import (
+    Patch,
+    edge_contrast,
+    edge_width,
+    faintest,
+    pixel_noise,
+    roughness,
+    silhouettes,
+    upright,
+)
 from solver.photograph.picture import Picture
 from solver.photograph.reading_error import Angles, angles_of
 from solver.photograph.refusal import NotAPile, Reason, Refusal

@@ -14,9 +14,8 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from solver.observables.silhouette import EIGHT_NEIGHBOURS
+from solver.photograph.backdrop import LEAST_CONTRAST, LEAST_SIGNAL, illumination, thresholds
 from solver.photograph.clearest import ROUGH, reduced_grey
-from solver.photograph.illumination import illumination
-from solver.photograph.parts import LEAST_CONTRAST, LEAST_SIGNAL, thresholds
 from solver.photograph.picture import Picture
 from solver.photograph.refusal import NotAPile, Reason
 

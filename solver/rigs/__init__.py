@@ -20,7 +20,7 @@ BENCH_RIGS: dict[str, type[BenchRig]] = {
     "drop_plate_45": DropPlate45,
     "compression": Compression,
 }
-"""One per bench test; what is measured in it is a file of ``solver/bench_tests``."""
+"""One per bench test; what is measured in it is a file of ``solver/single_body``."""
 
 __all__ = [
     "BENCH_RIGS",

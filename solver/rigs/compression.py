@@ -4,7 +4,7 @@
     shear     dF_t/du = 8 G* a per contact, a = √(R δ), u half of the shift of the upper plate       →  G*
 
 The specimen is a ball of the body's volume, because a Hertzian contact needs a radius; it is held so that it cannot
-roll, and gravity is off, as a scale is tared. ``bench_tests/compression.py`` runs the test. Bodies here are rigid with
+roll, and gravity is off, as a scale is tared. ``single_body/compression.py`` runs the test. Bodies here are rigid with
 Hertzian contacts: there is no elastic cube whose stress over strain is a modulus, and what the paper's Equation (1)
 gives depends on how far one presses.
 Source of the test: Processes 2022, 10, 185, §2.3; Hertz 1882; Mindlin 1949.
@@ -16,8 +16,7 @@ from dataclasses import dataclass
 
 from solver.params import param
 from solver.rigs.rig import BenchRig
-from solver.rigs.surface import Surface, horizontal
-from solver.rigs.turns import FACING_DOWN, turned_plane
+from solver.rigs.surface import FACING_DOWN, Surface, horizontal, turned_plane
 
 
 @dataclass(frozen=True)

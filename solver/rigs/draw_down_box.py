@@ -23,8 +23,7 @@ from solver.params import ParameterError, param
 from solver.rigs.feed import BoxFeed
 from solver.rigs.outlet import Slot
 from solver.rigs.rig import DISCHARGE, DRAW_DOWN, Action, Container, PourRig, Switch
-from solver.rigs.surface import Surface, horizontal, rectangle
-from solver.rigs.turns import FACING_MINUS_Y, FACING_PLUS_Y, turned_plane
+from solver.rigs.surface import FACING_MINUS_Y, FACING_PLUS_Y, Surface, horizontal, rectangle, turned_plane
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
-    from solver.record import Bodies, Spheres
+    from solver.pours.record import Bodies, Spheres
 
 Array = npt.NDArray[np.float64]
 

@@ -22,8 +22,7 @@ from dataclasses import dataclass
 from solver.params import ParameterError, param
 from solver.rigs.feed import BoxFeed
 from solver.rigs.rig import EVERYWHERE, FREE_SURFACE, Action, Container, Move, PourRig, Watch
-from solver.rigs.surface import Pose, Revolved, Surface
-from solver.rigs.turns import FACING_MINUS_Y, FACING_PLUS_Y, turned_plane
+from solver.rigs.surface import FACING_MINUS_Y, FACING_PLUS_Y, Pose, Revolved, Surface, turned_plane
 
 FEED_BOTTOM, FEED_WIDTH, FEED_TOP = 0.1, 0.6, 0.75
 """The feed: between these heights above the axis and within this half width, in radii of the drum. Its upper corners

@@ -1,7 +1,11 @@
-"""Surfaces that rigs are made of: planes, straight lines turned about an axis, and triangle meshes, in any pose."""
+"""Surfaces that rigs are made of: planes, straight lines turned about an axis, and triangle meshes, in any pose.
+
+Quaternions that turn a surface's local z axis into a direction of the world, and planes that face one.
+"""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
@@ -94,3 +98,27 @@ def load_mesh(path: Path, material: str, metres_per_unit: float, pose: Pose = Po
     vertices = tuple((float(x), float(y), float(z)) for x, y, z in mesh.vertices * metres_per_unit)
     faces = tuple((int(a), int(b), int(c)) for a, b, c in mesh.faces)
     return TriangleMesh(vertices, faces, material, pose)
+
+
+Vector = tuple[float, float, float]
+
+Quaternion = tuple[float, float, float, float]
+
+HALF = math.sqrt(0.5)
+
+FACING_PLUS_Y: Quaternion = (HALF, -HALF, 0.0, 0.0)
+
+"""A quarter turn about −x: local z becomes +y."""
+
+FACING_MINUS_Y: Quaternion = (HALF, HALF, 0.0, 0.0)
+
+"""A quarter turn about +x: local z becomes −y."""
+
+FACING_DOWN: Quaternion = (0.0, 1.0, 0.0, 0.0)
+
+"""Half a turn about x: local z becomes −z."""
+
+
+def turned_plane(origin: Vector, quaternion: Quaternion, material: str) -> Plane:
+    """A plane through ``origin`` [m] whose side with bodies is the turned local +z."""
+    return Plane(material, Pose(origin, quaternion))

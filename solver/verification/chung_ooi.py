@@ -8,7 +8,7 @@ curve costs about 0.5 % of its span. The planes are rigid: E → infinity, so 1/
 
 from __future__ import annotations
 
-from solver.material import Material
+from solver.scenes.material import Material
 
 DIGITISED = "Chung & Ooi 2011, digitised by Kratos"
 

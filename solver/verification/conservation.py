@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import ellipk
 
-from solver.body import Body, Members
-from solver.insertion import rotation_matrix
-from solver.laboratory import EARTH, GRAIN, RADIUS, WALL, Laboratory, bench, scene_of, sphere
-from solver.material import Pair
+from solver.scenes.body import Body, Members
+from solver.scenes.insertion import rotation_matrix
+from solver.scenes.material import Pair
+from solver.single_body.laboratory import EARTH, GRAIN, RADIUS, WALL, Laboratory, bench, scene_of, sphere
 from solver.verification.row import Row, of_scale, of_value
 
 Array = npt.NDArray[np.float64]

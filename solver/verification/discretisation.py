@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 
-from solver.laboratory import GRAIN, RADIUS, Laboratory, bench, sphere
+from solver.single_body.laboratory import GRAIN, RADIUS, Laboratory, bench, sphere
 from solver.verification.impacts import STEPS_PER_CONTACT, Impact, contact_time, rebounds
 from solver.verification.row import Row, of_value
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from solver.body import Body, Members
-from solver.laboratory import EARTH, GRAIN, RADIUS, WALL, Laboratory, bench
-from solver.material import effective_youngs_modulus
+from solver.scenes.body import Body, Members
+from solver.scenes.material import effective_youngs_modulus
+from solver.single_body.laboratory import EARTH, GRAIN, RADIUS, WALL, Laboratory, bench
 from solver.verification.row import Row, of_scale, of_value
 
 GRAVITY = 9.81

@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import beta, betaincinv
 
-from solver.laboratory import Laboratory, scene_of, sphere
-from solver.material import Material, Pair, effective_youngs_modulus
+from solver.scenes.material import Material, Pair, effective_youngs_modulus
+from solver.single_body.laboratory import Laboratory, scene_of, sphere
 from solver.verification.chung_ooi import ALUMINIUM_T2, GLASS, LIMESTONE, MAGNESIUM, RIGID
 from solver.verification.impacts import hertz_depth
 from solver.verification.row import Row, of_scale, of_value

@@ -13,9 +13,9 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
-from solver.contact_model import ContactModel
-from solver.laboratory import Laboratory, scene_of, sphere
-from solver.material import Material, Pair, effective_youngs_modulus
+from solver.scenes.contact_model import ContactModel
+from solver.scenes.material import Material, Pair, effective_youngs_modulus
+from solver.single_body.laboratory import Laboratory, scene_of, sphere
 from solver.verification.chung_ooi import RIGID
 
 Array = npt.NDArray[np.float64]

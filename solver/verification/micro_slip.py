@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from solver.material import Material
+from solver.scenes.material import Material
 from solver.verification.chung_ooi import (
     DIGITISED,
     POLYETHYLENE,

@@ -14,7 +14,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from solver.material import Material
+from solver.scenes.material import Material
 from solver.verification.chung_ooi import (
     ALUMINIUM,
     DIGITISED,

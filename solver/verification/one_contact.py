@@ -24,7 +24,7 @@ import numpy as np
 
 from solver.laws.hertz_mindlin import tangential_damping
 from solver.laws.restitution import normal_damping
-from solver.material import effective_shear_modulus, effective_youngs_modulus
+from solver.scenes.material import effective_shear_modulus, effective_youngs_modulus
 from solver.verification.chung_ooi import RIGID
 from solver.verification.impacts import Impact, Rebound, hertz_depth
 

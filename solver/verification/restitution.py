@@ -11,8 +11,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from solver.laboratory import GRAIN, RADIUS, bench
-from solver.time_step import time_step
+from solver.scenes.time_step import time_step
+from solver.single_body.laboratory import GRAIN, RADIUS, bench
 from solver.verification.chung_ooi import CAST_IRON, OXIDE
 from solver.verification.impacts import Impact, rebounds
 from solver.verification.row import Row, of_value

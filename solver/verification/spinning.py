@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from solver.material import Material
+from solver.scenes.material import Material
 from solver.verification.chung_ooi import ALUMINIUM, DIGITISED, NYLON, T6_BETA, Curve, span
 from solver.verification.impacts import OURS, Engine, Impact, Rebound, rebounds
 from solver.verification.one_contact import integrated

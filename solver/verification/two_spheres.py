@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from solver.laboratory import Laboratory, scene_of, sphere
-from solver.material import Material, Pair, effective_youngs_modulus
+from solver.scenes.material import Material, Pair, effective_youngs_modulus
+from solver.single_body.laboratory import Laboratory, scene_of, sphere
 from solver.verification.chung_ooi import (
     ALUMINIUM,
     COPPER,

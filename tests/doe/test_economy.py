@@ -7,7 +7,7 @@ from doe.economy import COMPARED, ECONOMIES, compare, judged, pours_needed, rows
 from doe.runs import Run
 from doe.study import load_study
 from solver import value, with_values
-from solver.time_step import time_step
+from solver.scenes.time_step import time_step
 
 STUDY = load_study("sunflower_extract")
 LARGER = ECONOMIES["larger_steps"]

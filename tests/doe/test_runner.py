@@ -13,7 +13,7 @@ from doe.store import Store, StoreError
 from solver import load_material, with_values
 from solver.observables import OBSERVABLES, Observable, Value
 from solver.rigs import Funnel
-from solver.shape import Solid
+from solver.shapes.solid import Solid
 from tests.solver.observables.made_up import empty_pile, record_of
 
 TINY = {"body.spheres": "coarse", "rig.mass": "1.5g", "insertion.rate": "100g/s"}

@@ -1,10 +1,10 @@
 """A scene of few glass beads: as small a pour as there is, for tests of what surrounds the solver."""
 
-from solver.body import Body, Members
-from solver.insertion import Insertion
-from solver.material import Material, Pair
 from solver.rigs import Funnel
-from solver.scene import Scene
+from solver.scenes.body import Body, Members
+from solver.scenes.insertion import Insertion
+from solver.scenes.material import Material, Pair
+from solver.scenes.scene import Scene
 
 RADIUS = 6e-3
 GLASS = Material("glass", density=2500.0, shear_modulus=1e7, poisson_ratio=0.25)

@@ -14,7 +14,7 @@ from explorer.scene.source import SceneSource
 from explorer.viewer.actions import Actions
 from explorer.viewer.background_work import BackgroundWork
 from explorer.viewer.panel import PageContext
-from solver.scene import Scene, with_values
+from solver.scenes.scene import Scene, with_values
 
 
 class PageSession:

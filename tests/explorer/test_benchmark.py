@@ -14,8 +14,7 @@ from explorer.cli import app
 from explorer.export.run import PeerTimeout
 from explorer.scene.file import load_scene
 from explorer.tables.benchmark import fallen, markdown, result_of, table_text
-from solver.benchmark import Measurement, measure_bed, measure_pour, shuffled
-from solver.benchmark.packed_bed import RADIUS, SPACING, Bed, Box, side_by_side
+from solver.benchmark import RADIUS, SPACING, Bed, Box, Measurement, measure_bed, measure_pour, shuffled, side_by_side
 
 NAN = math.nan
 

@@ -10,7 +10,7 @@ from PIL import Image
 from explorer.files.measured_file import measured_file
 from solver.assets import measurement_folder, shipped_assets
 from solver.observables.silhouette import largest_part, silhouette
-from solver.record import Spheres
+from solver.pours.record import Spheres
 from tests.explorer.command_line import explorer, refused
 from tests.solver.photograph.rendered import Look, fitted, photograph, save, solid_cover
 

@@ -9,7 +9,7 @@ import trimesh
 
 from explorer.scene.file import load_scene
 from explorer.scene.meshes import body_triangles
-from solver.shape import Solid, mass_properties
+from solver.shapes.solid import Solid, mass_properties
 from tests.explorer.command_line import TINY, explorer, refused, settings
 from tests.solver.meshes import bent_rod, saved
 

@@ -4,7 +4,7 @@ import pytest
 
 import solver
 from solver.effects.columns import kernel_effects
-from solver.run import capacity_for
+from solver.pours.run import capacity_for
 from tests.explorer.command_line import explorer, refused
 
 

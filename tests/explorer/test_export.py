@@ -21,10 +21,10 @@ from explorer.export.triangles import revolved_triangles, write_stl
 from explorer.scene.file import load_scene, with_settings
 from explorer.viewer.output.engine_export import programs_text
 from solver import run_pour, with_values
-from solver.insertion import random_quaternion, rotation_matrix
 from solver.plugins import GROUP
-from solver.record import Entries
+from solver.pours.record import Entries
 from solver.rigs import Revolved
+from solver.scenes.insertion import random_quaternion, rotation_matrix
 from tests.explorer.beads import bead_scene
 from tests.explorer.command_line import TINY, explorer, refused, settings
 

@@ -10,9 +10,9 @@ from explorer.export import EXPORTS
 from explorer.export.deck_of_scene import deck_of
 from explorer.export.readme import _differences
 from explorer.scene.file import load_scene
-from solver.contact_model import ContactModel
 from solver.effects import EFFECTS
-from solver.sizes import SizeDistribution
+from solver.scenes.contact_model import ContactModel
+from solver.scenes.sizes import SizeDistribution
 from tests.solver.observables.made_up import cone, record_of
 
 

@@ -10,7 +10,7 @@ import trimesh
 from explorer.errors import CommandError
 from explorer.export.paraview import Moment, collection, contact_grid, moments, rig_grid, shape_grid, write_paraview
 from explorer.scene.file import load_scene, with_settings
-from solver.contacts import Contacts
+from solver.pours.contacts import Contacts
 from tests.explorer.command_line import TINY, explorer, refused, settings
 
 

@@ -14,7 +14,7 @@ from explorer.laboratory.part import part_table, with_part
 from explorer.laboratory.simulated_bias import simulated_bias
 from explorer.laboratory.twin import bench_scene, restitution_that_lands, specimen, twins
 from solver import load_material, with_values
-from solver.bench_tests import run_bench_test
+from solver.single_body import run_bench_test
 from tests.explorer.command_line import explorer, refused
 
 pytestmark = pytest.mark.usefixtures("taichi")

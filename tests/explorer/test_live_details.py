@@ -7,7 +7,7 @@ import pytest
 
 from explorer.live.details import MAX_CONTACTS, DetailWriter, detail_reader, most_wanted, shared_details
 from explorer.live.messages import StepBack, Watch
-from solver.contacts import Contacts
+from solver.pours.contacts import Contacts
 from tests.explorer.beads import MASS
 from tests.explorer.test_live_frames import bodies
 from tests.explorer.test_live_history import live, run  # noqa: F401

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from explorer.live.frames import FrameReader, FrameWriter, shared_block
-from solver.record import Bodies
+from solver.pours.record import Bodies
 
 
 def bodies(n, shift=0.0):

@@ -10,8 +10,8 @@ from explorer.live.details import DetailWriter, detail_reader, shared_details
 from explorer.live.frames import FrameReader, FrameWriter, shared_block
 from explorer.live.history import History, thinnest
 from explorer.live.messages import Event, SessionState, SetParameters, Start, Status, Step, StepBack
-from solver.record import Outcome
-from solver.scene import value
+from solver.pours.record import Outcome
+from solver.scenes.scene import value
 from tests.explorer.beads import bead_scene
 
 FRICTION = "pair.bead.steel.static_friction"

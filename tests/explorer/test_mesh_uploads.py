@@ -7,8 +7,8 @@ from explorer.errors import CommandError
 from explorer.files.mesh_uploads import FEED_SHARE, funnel_source, shaped_source
 from explorer.scene.file import load_scene
 from solver.assets import asset_path
-from solver.scene import with_values
-from solver.shape import mass_properties
+from solver.scenes.scene import with_values
+from solver.shapes.solid import mass_properties
 from tests.explorer.beads import bead_scene
 from tests.explorer.test_uploads import stl
 from tests.solver.rigs.test_mesh_funnel import cone, exported

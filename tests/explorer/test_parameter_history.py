@@ -6,7 +6,7 @@ from explorer.errors import CommandError
 from explorer.parameter_history import MERGED, ParameterHistory, live_values
 from explorer.scene.changes import changes, differences
 from solver import load_material, parameters, value, with_values
-from solver.scene import values
+from solver.scenes.scene import values
 
 SCENE = load_material("sunflower_extract")
 A, B = "pair.seed.seed.static_friction", "pair.seed.seed.restitution"

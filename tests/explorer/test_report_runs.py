@@ -4,7 +4,7 @@ import importlib
 import re
 
 from explorer.report import report_html, report_markdown
-from solver.contact_model import ContactModel
+from solver.scenes.contact_model import ContactModel
 from tests.explorer.reported_studies import PROFILE, result_of_case, table, typed, visible
 
 

@@ -11,10 +11,10 @@ from explorer.live.frames import FrameReader, FrameWriter, shared_block
 from explorer.scene.file import load_scene, with_settings
 from explorer.scene.meshes import PLATE_OVERHANG, rig_poses, rig_triangles, rim_circles, scene_height
 from solver.assets import asset_path
-from solver.insertion import rotation_matrix
 from solver.params import ParameterError
 from solver.rigs import BENCH_RIGS, RIGS
-from solver.set_up import with_settings as with_rig_settings
+from solver.scenes.insertion import rotation_matrix
+from solver.scenes.set_up import with_settings as with_rig_settings
 from tests.explorer.beads import bead_scene
 from tests.explorer.command_line import explorer, refused
 from tests.explorer.test_live_frames import bodies

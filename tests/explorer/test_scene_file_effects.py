@@ -5,7 +5,7 @@ import pytest
 from explorer.scene.file import load_scene, with_settings
 from solver.assets import asset_path
 from solver.params import ParameterError
-from solver.scene import value
+from solver.scenes.scene import value
 
 SET_UP = """format = 1
 material = "sunflower_extract"

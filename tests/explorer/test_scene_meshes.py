@@ -5,7 +5,7 @@ import pytest
 
 from explorer.scene.meshes import PLATE_OVERHANG, body_triangles, rig_triangles
 from solver import load_material
-from solver.body import Body, Members
+from solver.scenes.body import Body, Members
 
 
 @pytest.fixture(scope="module")

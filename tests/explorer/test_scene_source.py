@@ -15,7 +15,7 @@ from explorer.scene.file import study_path, with_settings
 from explorer.scene.source import SceneSource, command_line, material_source, rig_source, setting_text, study_source
 from explorer.scene.text import material_toml
 from solver.rigs import RIGS
-from solver.scene import value, with_rig, with_values
+from solver.scenes.scene import value, with_rig, with_values
 
 SUNFLOWER = material_source("sunflower_extract")
 

@@ -10,9 +10,9 @@ from explorer.scene.file import load_scene
 from explorer.scene.text import material_toml
 from solver import load_material, value, with_rig, with_settings, with_values
 from solver.assets import measurement_folder, shipped_assets
-from solver.clump_fit import ClumpFit
 from solver.effects import EFFECTS
-from solver.shape import Solid
+from solver.shapes.clump_error import ClumpFit
+from solver.shapes.solid import Solid
 from tests.doe.measurement.folders import MATERIAL
 from tests.explorer.diagnosed import CASES, PARAMETERS, diagnosed
 

@@ -15,10 +15,10 @@ from explorer.live.frames import MAX_BODIES
 from explorer.live.messages import SessionState
 from explorer.session import SPEED_RANGE, Session, SessionError
 from solver.params import ParameterError
-from solver.record import Outcome, Phase
-from solver.scene import value, with_values
-from solver.shape import Solid
-from solver.time_step import time_step
+from solver.pours.record import Outcome, Phase
+from solver.scenes.scene import value, with_values
+from solver.scenes.time_step import time_step
+from solver.shapes.solid import Solid
 from tests.explorer.beads import MASS, bead_scene
 
 PATIENCE = 60.0

@@ -11,7 +11,7 @@ from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.panel import Now
 from explorer.viewer.pour.changes_panel import BACK, DEFAULT, MOST_SHOWN, REDO, UNDO, ChangesPanel, changes_html
-from solver.scene import value, with_values
+from solver.scenes.scene import value, with_values
 from tests.explorer.page_session import PageSession, page_context
 from tests.explorer.test_viewer_controls import event
 

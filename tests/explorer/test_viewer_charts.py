@@ -21,7 +21,7 @@ from explorer.viewer.pour.marks import (
     with_marks,
 )
 from explorer.viewer.pour.motion_chart import MotionChart, MotionHistory
-from solver.observables.value import Value
+from solver.observables.observable import Value
 from tests.explorer.page_session import page_context
 from tests.explorer.test_viewer_texts import STATUS
 

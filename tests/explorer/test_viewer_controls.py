@@ -13,8 +13,8 @@ from explorer.viewer.pour.live_panel import echo_html, effect_targets, live_para
 from explorer.viewer.pour.restart_panel import PATHS, SetUpInputs, entered, size_paths
 from solver import load_material, parameters, with_values
 from solver.rigs import RIGS
-from solver.scene import value, with_rig
-from solver.sizes import SizeDistribution
+from solver.scenes.scene import value, with_rig
+from solver.scenes.sizes import SizeDistribution
 
 SCENE = load_material("sunflower_extract")
 KNOWN = parameters(SCENE)

@@ -11,9 +11,9 @@ from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.pour.live_panel import LivePanel
 from explorer.viewer.pour.pair_matrix import BOXES, PairMatrix, matrix_html, pair_parameters, triangle
 from explorer.viewer.pour.restart_panel import RestartPanel
-from solver.material import Pair
 from solver.params import declared
-from solver.scene import canonical, parameters, value, with_rig, with_values
+from solver.scenes.material import Pair
+from solver.scenes.scene import canonical, parameters, value, with_rig, with_values
 from tests.explorer.beads import bead_scene
 from tests.explorer.page_session import PageSession, page_context
 from tests.explorer.test_viewer_controls import event

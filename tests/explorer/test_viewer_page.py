@@ -16,7 +16,7 @@ from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.page import Page
 from explorer.viewer.panel import LOOK, SELDOM, Panel, Tab
 from explorer.viewer.panels import PANELS
-from solver.scene import value
+from solver.scenes.scene import value
 from tests.explorer.page_session import PageSession, frame_of
 
 SOURCE = material_source("sunflower_extract")

@@ -12,7 +12,7 @@ from explorer.viewer.panel import Now
 from explorer.viewer.pour.scene_panel import OWN, ScenePanel
 from solver.assets import asset_path
 from solver.rigs import RIGS
-from solver.scene import with_values
+from solver.scenes.scene import with_values
 from tests.explorer.beads import bead_scene
 from tests.explorer.page_session import PageSession, finished, page_context
 from tests.explorer.test_uploads import stl

@@ -10,7 +10,7 @@ from explorer.viewer.panel import Now
 from explorer.viewer.study.plot_view import NOTHING
 from explorer.viewer.study.profiler_panel import TITLE as PROFILER
 from explorer.viewer.study.study_panel import PRESENT, set_live
-from solver.scene import value
+from solver.scenes.scene import value
 from tests.explorer import reported_studies
 from tests.explorer.study_panel_at_hand import FakeSession, PanelAtHand, drawn, written
 

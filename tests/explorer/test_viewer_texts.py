@@ -24,8 +24,8 @@ from explorer.viewer.pour.readout import (
     time_step_text,
 )
 from explorer.viewer.study.process_view import escaped, progress, time_left
-from solver.observables.value import Value
-from solver.record import Outcome, Phase
+from solver.observables.observable import Value
+from solver.pours.record import Outcome, Phase
 from tests.explorer.beads import bead_scene
 
 STATUS = Status(

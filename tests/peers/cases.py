@@ -14,13 +14,13 @@ from explorer.export.run import run_liggghts, run_yade
 from explorer.export.yade import LAW
 from explorer.scene.file import load_scene
 from solver.effects import EFFECTS
-from solver.insertion import rotation_matrix
-from solver.laboratory import Laboratory
+from solver.engine.world import law_table
 from solver.laws import HertzMindlin
-from solver.record import Entries
-from solver.scene import with_values
-from solver.time_step import time_step
-from solver.world import law_table
+from solver.pours.record import Entries
+from solver.scenes.insertion import rotation_matrix
+from solver.scenes.scene import with_values
+from solver.scenes.time_step import time_step
+from solver.single_body.laboratory import Laboratory
 
 RUNNERS = {"liggghts": run_liggghts, "yade": run_yade}
 LENGTH = 24.6e-3

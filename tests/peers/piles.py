@@ -11,8 +11,8 @@ from explorer.export.frames import motion
 from explorer.export.run import run_liggghts, run_yade
 from explorer.scene.file import load_scene
 from solver.observables import observe_pile
-from solver.observables.footprint import centre_of_mass
-from solver.record import Pile, Spheres
+from solver.observables.surface import centre_of_mass
+from solver.pours.record import Pile, Spheres
 
 RUNNERS = {"liggghts": run_liggghts, "yade": run_yade}
 TIME = 4.0

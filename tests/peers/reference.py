@@ -12,10 +12,10 @@ tangential laws differ:
 
 import numpy as np
 
-from solver.insertion import rotation_matrix
 from solver.laws.hertz_mindlin import tangential_damping
 from solver.laws.restitution import normal_damping
-from solver.material import effective_shear_modulus, effective_youngs_modulus
+from solver.scenes.insertion import rotation_matrix
+from solver.scenes.material import effective_shear_modulus, effective_youngs_modulus
 
 MIDPOINT_ITERATIONS = 3
 

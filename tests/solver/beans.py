@@ -2,8 +2,8 @@
 
 import dataclasses
 
-from solver.scene import Scene, with_rig, with_values
-from solver.shape import Solid
+from solver.scenes.scene import Scene, with_rig, with_values
+from solver.shapes.solid import Solid
 from tests.solver.golden.cases import TREFOIL
 
 BEAN = dataclasses.replace(

@@ -8,9 +8,9 @@ import json
 import sys
 
 from solver import backend
-from solver.record import Record
-from solver.run import Job, run_pours
-from solver.scene import with_values
+from solver.pours.record import Record
+from solver.pours.run import Job, run_pours
+from solver.scenes.scene import with_values
 from tests.solver.test_pour import QUICK
 
 HEAP = with_values(QUICK, {"rig.mass": "8g"})

@@ -12,10 +12,9 @@ import numpy as np
 
 from explorer.scene.starter_files import write_material
 from solver.assets import shipped_assets, shipped_fits
-from solver.clump import RESOLUTIONS, _new_fit
-from solver.clump_cache import Fit, fit_name, read_fit, write_fit
-from solver.material_file import load_material
-from solver.shape import Solid
+from solver.scenes.material_file import load_material
+from solver.shapes.clump import RESOLUTIONS, Fit, _new_fit, fit_name, read_fit, write_fit
+from solver.shapes.solid import Solid
 from solver.version import FITTING
 
 SLACK = 1e-9

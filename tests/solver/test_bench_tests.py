@@ -6,12 +6,12 @@ import math
 import numpy as np
 import pytest
 
-from solver.bench_tests import BENCH_TESTS, run_bench_test
-from solver.bench_tests.drop_plate_45 import Rebound, paper_estimate, restitution
-from solver.material_file import load_material
 from solver.params import ParameterError
 from solver.rigs import BENCH_RIGS
-from solver.set_up import with_settings
+from solver.scenes.material_file import load_material
+from solver.scenes.set_up import with_settings
+from solver.single_body import BENCH_TESTS, run_bench_test
+from solver.single_body.drop_plate_45 import Rebound, paper_estimate, restitution
 from tests.explorer.beads import GLASS, MASS, STEEL, bead_scene
 from tests.explorer.beads import RADIUS as BEAD
 
@@ -149,7 +149,7 @@ def test_without_friction_there_is_no_shear_modulus_to_measure():
 
 
 def test_a_specimen_is_a_ball_of_the_body_s_mass():
-    from solver.bench_tests.bench import ball
+    from solver.single_body.bench import ball
 
     (bead,) = bead_scene().bodies
     assert ball(bead).clump.radii == pytest.approx([BEAD])

@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from solver.body import Body, Members
-from solver.insertion import random_quaternion, rotation_matrix
-from solver.kernels.neighbours import AHEAD, LEAST, MOST
-from solver.laboratory import GRAIN, ROOM, WALL, Laboratory, scene_of
-from solver.material import Pair
+from solver.engine.kernels.neighbours import AHEAD, LEAST, MOST
+from solver.scenes.body import Body, Members
+from solver.scenes.insertion import random_quaternion, rotation_matrix
+from solver.scenes.material import Pair
+from solver.single_body.laboratory import GRAIN, ROOM, WALL, Laboratory, scene_of
 
 pytestmark = pytest.mark.usefixtures("taichi")
 

@@ -8,10 +8,10 @@ import pytest
 import trimesh
 
 from solver.assets import asset_path
-from solver.material_file import load_material, scene_from
 from solver.params import ParameterError
-from solver.scene import value, with_values
-from solver.sizes import SizeDistribution
+from solver.scenes.material_file import load_material, scene_from
+from solver.scenes.scene import value, with_values
+from solver.scenes.sizes import SizeDistribution
 
 PATH = asset_path("materials", "sunflower_extract")
 TABLE = tomllib.loads(PATH.read_text())

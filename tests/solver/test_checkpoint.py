@@ -6,13 +6,13 @@ from collections import deque
 import numpy as np
 import pytest
 
-from solver.checkpoint import checkpoint_bytes, checkpoint_of, read_checkpoint, resumed
-from solver.material_file import load_material
+from solver.engine.world import Batch
 from solver.params import ParameterError
-from solver.pour import Pour
-from solver.run import Job, capacity_for, run_queue
-from solver.scene import with_values
-from solver.world import Batch
+from solver.pours.checkpoint import checkpoint_bytes, checkpoint_of, read_checkpoint, resumed
+from solver.pours.pour import Pour
+from solver.pours.run import Job, capacity_for, run_queue
+from solver.scenes.material_file import load_material
+from solver.scenes.scene import with_values
 
 pytestmark = pytest.mark.usefixtures("taichi")
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from solver.clump import Clump, _fit_spheres, explicit_clump, fit_clump
-from solver.shape import ShapeError, Solid, mass_properties, surface_mesh
-from solver.sphere_fit import Target, _Residuals, orbits_of
-from solver.sphere_union import distance_to_union, union_volume
+from solver.shapes.clump import Clump, _fit_spheres, explicit_clump, fit_clump
+from solver.shapes.solid import ShapeError, Solid, mass_properties, surface_mesh
+from solver.shapes.sphere_fit import Target, _Residuals, orbits_of
+from solver.shapes.sphere_union import distance_to_union, union_volume
 
 SEED = Solid("ellipsoid", (27.92e-3, 11.18e-3, 6.11e-3))
 PLATE = Solid("box", (27.53e-3, 15.02e-3, 5.0e-3))

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from solver.clump_cache import kept_fit
-from solver.clump_fit import ClumpFit
-from solver.shape import Solid
+from solver.shapes.clump import kept_fit
+from solver.shapes.clump_error import ClumpFit
+from solver.shapes.solid import Solid
 
 SEED = Solid("ellipsoid", (27.5e-3, 11.5e-3, 6.5e-3))
 """Not one of the shipped bodies, whose fits are shipped."""

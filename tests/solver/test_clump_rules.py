@@ -10,14 +10,14 @@ import math
 import numpy as np
 import pytest
 
-from solver.body import Body, Members
-from solver.insertion import rotation_matrix
-from solver.laboratory import EARTH, GRAIN, Laboratory, bench
-from solver.material_file import load_material
-from solver.pour import Pour
-from solver.run import capacity_for
-from solver.scene import with_values
-from solver.world import Batch
+from solver.engine.world import Batch
+from solver.pours.pour import Pour
+from solver.pours.run import capacity_for
+from solver.scenes.body import Body, Members
+from solver.scenes.insertion import rotation_matrix
+from solver.scenes.material_file import load_material
+from solver.scenes.scene import with_values
+from solver.single_body.laboratory import EARTH, GRAIN, Laboratory, bench
 from tests.solver.pour_digests import HEAP, digest
 
 pytestmark = pytest.mark.usefixtures("taichi")

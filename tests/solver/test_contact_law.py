@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from solver.backend import ti
-from solver.laboratory import GRAIN, RADIUS, Laboratory, bench
+from solver.engine.state import Vec3
 from solver.laws import HertzMindlin
 from solver.laws.hertz_mindlin import tangential_damping
 from solver.laws.law import tangential_force
 from solver.laws.restitution import normal_damping
-from solver.material import effective_shear_modulus, effective_youngs_modulus
-from solver.state import Vec3
+from solver.scenes.material import effective_shear_modulus, effective_youngs_modulus
+from solver.single_body.laboratory import GRAIN, RADIUS, Laboratory, bench
 
 pytestmark = pytest.mark.usefixtures("taichi")
 

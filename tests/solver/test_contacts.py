@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from solver.contacts import Contacts, coordination_numbers, loads
-from solver.pour import Pour
-from solver.run import capacity_for
-from solver.world import Batch
+from solver.engine.world import Batch
+from solver.pours.contacts import Contacts, coordination_numbers, loads
+from solver.pours.pour import Pour
+from solver.pours.run import capacity_for
 from tests.solver.test_checkpoint import HEAP
 from tests.solver.test_rewind import drive
 

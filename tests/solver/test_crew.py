@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from solver import load_material, with_values
-from solver.crew import Crew, Rooms, deaf_to_interrupts
-from solver.run import Job, run_pours
+from solver.pours.run import Job, run_pours
+from solver.pours.worker_pool import Crew, Rooms, deaf_to_interrupts
 
 HEAP = with_values(
     load_material("sunflower_extract"), {"rig.mass": 0.003, "body.spheres": "coarse", "numerics.max_time": 0.4}

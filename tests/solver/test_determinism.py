@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from solver.backend import ti
-from solver.pour import Pour
-from solver.run import Job, capacity_for, run_pours
-from solver.scene import with_values
-from solver.world import SUMMARY_COLUMNS, Batch
+from solver.engine.world import SUMMARY_COLUMNS, Batch
+from solver.pours.pour import Pour
+from solver.pours.run import Job, capacity_for, run_pours
+from solver.scenes.scene import with_values
 from tests.solver.effects.cases import all_felt
 from tests.solver.pour_digests import HEAP, JOBS, SHUT, WORLDS, digest, digests
 

@@ -11,14 +11,14 @@ import dataclasses
 import numpy as np
 import pytest
 
-from solver.body import Body, Members
-from solver.laboratory import EARTH, GRAIN, RADIUS, Bench, Laboratory, bench
-from solver.pour import Pour
-from solver.record import Outcome
+from solver.engine.world import Batch
+from solver.pours.pour import Pour
+from solver.pours.record import Outcome
+from solver.pours.run import Job, capacity_for, run_pour, run_pours
 from solver.rigs.surface import Pose, Revolved, rectangle
-from solver.run import Job, capacity_for, run_pour, run_pours
-from solver.scene import with_values
-from solver.world import Batch
+from solver.scenes.body import Body, Members
+from solver.scenes.scene import with_values
+from solver.single_body.laboratory import EARTH, GRAIN, RADIUS, Bench, Laboratory, bench
 from tests.solver.test_pour import QUICK
 
 pytestmark = pytest.mark.usefixtures("taichi")

@@ -9,9 +9,10 @@ import time
 
 import pytest
 
-from solver import backend, kernel_cache, load_material, warm_up, with_values
-from solver.kernel_cache import compiled_once, missing
-from solver.state import Capacity
+from solver import backend, load_material, warm_up, with_values
+from solver.engine.state import Capacity
+from solver.pours import kernel_cache
+from solver.pours.kernel_cache import compiled_once, missing
 
 ONE = Capacity(worlds=1, bodies=128, members=1024, contacts=16384)
 OTHER = Capacity(worlds=1, bodies=256, members=1024, contacts=16384)
@@ -30,8 +31,8 @@ if sys.argv[1] == "killed":
 
 HOLDER = """
 import sys
-from solver.kernel_cache import compiled_once
-from solver.state import Capacity
+from solver.pours.kernel_cache import compiled_once
+from solver.engine.state import Capacity
 with compiled_once([Capacity(worlds=1, bodies=128, members=1024, contacts=16384)]) as mine:
     print(len(mine), flush=True)
     sys.stdin.read()

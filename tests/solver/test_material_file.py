@@ -6,10 +6,10 @@ import tomllib
 import pytest
 
 from solver.assets import asset_path
-from solver.body import counts
-from solver.material_file import load_material, scene_from
 from solver.params import ParameterError, parse_quantity
-from solver.scene import canonical, parameters, value, with_values
+from solver.scenes.body import counts
+from solver.scenes.material_file import load_material, scene_from
+from solver.scenes.scene import canonical, parameters, value, with_values
 
 PATH = asset_path("materials", "sunflower_extract")
 TABLE = tomllib.loads(PATH.read_text())

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from solver import mesh_file
-from solver.mesh_file import MeshFileError, read_solid_mesh
-from solver.shape import ShapeError, Solid, mass_properties
+from solver.shapes import mesh_file
+from solver.shapes.mesh_file import MeshFileError, read_solid_mesh
+from solver.shapes.solid import ShapeError, Solid, mass_properties
 from tests.solver.meshes import angle_bar, bent_rod, crossed_boxes, ring, saved
 
 BOX = (20.0, 12.0, 6.0)

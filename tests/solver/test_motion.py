@@ -5,10 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from solver.body import Body, Members
-from solver.insertion import rotation_matrix
-from solver.laboratory import EARTH, GRAIN, RADIUS, UPRIGHT, Laboratory, bench
-from solver.material_file import load_material
+from solver.scenes.body import Body, Members
+from solver.scenes.insertion import rotation_matrix
+from solver.scenes.material_file import load_material
+from solver.single_body.laboratory import EARTH, GRAIN, RADIUS, UPRIGHT, Laboratory, bench
 
 pytestmark = pytest.mark.usefixtures("taichi")
 

@@ -7,15 +7,15 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from solver.backend import ti
-from solver.insertion import rotation_matrix
-from solver.kernels.geometry import nearest_on_revolved
-from solver.laboratory import RADIUS, ROOM, UPRIGHT, Laboratory, bench
-from solver.layout import layout
-from solver.material_file import load_material
-from solver.run import Job, run_pours
-from solver.scene import with_values
-from solver.state import Vec3, Vec4
-from solver.world import SUMMARY_COLUMNS, Batch
+from solver.engine.kernels.geometry import nearest_on_revolved
+from solver.engine.layout import layout
+from solver.engine.state import Vec3, Vec4
+from solver.engine.world import SUMMARY_COLUMNS, Batch
+from solver.pours.run import Job, run_pours
+from solver.scenes.insertion import rotation_matrix
+from solver.scenes.material_file import load_material
+from solver.scenes.scene import with_values
+from solver.single_body.laboratory import RADIUS, ROOM, UPRIGHT, Laboratory, bench
 
 pytestmark = pytest.mark.usefixtures("taichi")
 

@@ -5,13 +5,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from solver.material_file import load_material
-from solver.pour import Pour
-from solver.record import Outcome, Phase
-from solver.retune import RAMP_TIME
-from solver.run import Job, capacity_for, run_pour, run_pours
-from solver.scene import with_values
-from solver.world import SUMMARY_COLUMNS, Batch
+from solver.engine.world import SUMMARY_COLUMNS, Batch
+from solver.pours.parameter_ramp import RAMP_TIME
+from solver.pours.pour import Pour
+from solver.pours.record import Outcome, Phase
+from solver.pours.run import Job, capacity_for, run_pour, run_pours
+from solver.scenes.material_file import load_material
+from solver.scenes.scene import with_values
 from tests.solver.beans import BEAN, BEANS
 
 pytestmark = pytest.mark.usefixtures("taichi")

@@ -10,13 +10,13 @@ from pathlib import Path
 import pytest
 
 from solver import load_material, pour_key, value, with_rig, with_values
-from solver.body import Members
 from solver.effects import EFFECTS
-from solver.insertion import Insertion
-from solver.numerics import Numerics
 from solver.params import param
-from solver.scene import parameters
-from solver.shape import Solid
+from solver.scenes.body import Members
+from solver.scenes.insertion import Insertion
+from solver.scenes.numerics import Numerics
+from solver.scenes.scene import parameters
+from solver.shapes.solid import Solid
 from tests.explorer.beads import bead_scene
 from tests.solver.effects.cases import FELT
 
@@ -116,7 +116,9 @@ def test_docstrings_and_comments_of_the_solver_do_not_count(tmp_path):
     for path in files:
         text = path.read_text(encoding="utf-8")
         path.write_text(text.replace('"""', '"""Reworded. ', 1) + "# a comment\n", encoding="utf-8")
-    program = "import solver; print(solver.__file__, solver.pour_key(solver.load_material('sunflower_extract'), 1))"
+    program = (
+        "import solver; print(solver.__file__, solver.pours.pour_key(solver.load_material('sunflower_extract'), 1))"
+    )
     out = subprocess.run(
         [sys.executable, "-c", program], cwd=tmp_path, env={"PYTHONPATH": str(tmp_path)}, capture_output=True, text=True
     )

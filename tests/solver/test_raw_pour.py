@@ -9,7 +9,7 @@ import pytest
 
 from solver import RawPourError, observe, packed, run_pour, unpacked, with_values
 from solver.observables.silhouette import PIXEL
-from solver.raw_pour import LENGTH
+from solver.pours.raw_pour import LENGTH
 from tests.doe.golden_readings import RAW_POURS
 from tests.solver.golden.cases import pours
 from tests.solver.observables.made_up import empty_pile, record_of

@@ -9,14 +9,14 @@ without it stands still. In one (small pile 8) a seed settles by 0.19 mm and the
 import numpy as np
 import pytest
 
-from solver.material_file import load_material
+from solver.engine.world import Batch
 from solver.observables import observe_pile
-from solver.pour import Pour
-from solver.record import Outcome
-from solver.record_builder import lying, pile_of
-from solver.run import Job, capacity_for, run_pours
-from solver.scene import with_values
-from solver.world import Batch
+from solver.pours.pour import Pour
+from solver.pours.record import Outcome
+from solver.pours.record_builder import lying, pile_of
+from solver.pours.run import Job, capacity_for, run_pours
+from solver.scenes.material_file import load_material
+from solver.scenes.scene import with_values
 from tests.solver.test_pour import QUICK, apex_of
 
 pytestmark = [pytest.mark.usefixtures("taichi"), pytest.mark.slow]

@@ -5,16 +5,16 @@ import dataclasses
 import numpy as np
 import pytest
 
-from solver.moving_state import LOADED_ONCE, SCRATCH
-from solver.pour import Pour
-from solver.record import Outcome
-from solver.rewind import keep, put_back
-from solver.run import capacity_for
-from solver.scene import with_values
-from solver.set_up import with_settings
-from solver.snapshot import take
-from solver.state import BODY, MEMBER, state
-from solver.world import Batch
+from solver.engine.moving_state import LOADED_ONCE, SCRATCH
+from solver.engine.snapshot import take
+from solver.engine.state import BODY, MEMBER, state
+from solver.engine.world import Batch
+from solver.pours.checkpoint import keep, put_back
+from solver.pours.pour import Pour
+from solver.pours.record import Outcome
+from solver.pours.run import capacity_for
+from solver.scenes.scene import with_values
+from solver.scenes.set_up import with_settings
 from tests.solver.test_checkpoint import GATED, HEAP, same
 
 pytestmark = pytest.mark.usefixtures("taichi")

@@ -15,13 +15,13 @@ import numpy as np
 import pytest
 import trimesh
 
-from solver.laboratory import EARTH, RADIUS, Bench, Laboratory, bench
 from solver.observables import observe
-from solver.record import Outcome
+from solver.pours.record import Outcome
+from solver.pours.run import Job, run_pours
 from solver.rigs import Funnel
 from solver.rigs.surface import Pose, Revolved, TriangleMesh
-from solver.run import Job, run_pours
-from solver.scene import with_values
+from solver.scenes.scene import with_values
+from solver.single_body.laboratory import EARTH, RADIUS, Bench, Laboratory, bench
 from tests.solver.test_pour import QUICK
 
 pytestmark = pytest.mark.usefixtures("taichi")

@@ -5,11 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from solver.insertion import random_quaternion, rotation_matrix
-from solver.material_file import load_material
+from solver.observables.scan import centre_weights, scanned_pile
 from solver.params import ParameterError
-from solver.scan import centre_weights, scanned_pile
-from solver.scene import with_values
+from solver.scenes.insertion import random_quaternion, rotation_matrix
+from solver.scenes.material_file import load_material
+from solver.scenes.scene import with_values
 
 SUNFLOWER = load_material("sunflower_extract")
 SEEDS = with_values(

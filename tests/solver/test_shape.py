@@ -11,8 +11,8 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from solver.shape import ShapeError, Solid, mass_properties, principal_extents, surface_mesh
-from solver.solid_points import interior_points, surface_points
+from solver.shapes.solid import ShapeError, Solid, mass_properties, principal_extents, surface_mesh
+from solver.shapes.solid_points import interior_points, surface_points
 
 SEED = Solid("ellipsoid", (27.92e-3, 11.18e-3, 6.11e-3))
 PLATE = Solid("box", (27.53e-3, 15.02e-3, 5.0e-3))

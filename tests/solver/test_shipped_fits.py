@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from solver.assets import shipped_fits
-from solver.clump import _new_fit
-from solver.clump_cache import fit_name, read_fit
+from solver.shapes.clump import _new_fit, fit_name, read_fit
 from tests.solver.shipped_fits import SLACK, fitted
 
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.special import ndtri
 
 from solver.params import ParameterError
-from solver.size_table import measured_spread, quantile_spread
+from solver.scenes.material_file import measured_spread, quantile_spread
 
 
 @pytest.mark.parametrize("t", [0.01, 0.1, 0.4])

@@ -8,18 +8,18 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from solver.body import counts
-from solver.clump import fit_clump, scaled
-from solver.insertion import shuffled_components
-from solver.layout import layout, outline
-from solver.material_file import load_material
+from solver.engine.layout import layout, outline
 from solver.params import ParameterError
-from solver.record import Outcome
-from solver.run import Job, run_pour, run_pours
-from solver.scene import value, with_values
-from solver.shape import Solid
-from solver.sizes import KINDS, SizeDistribution, drawn_sizes
-from solver.time_step import time_step
+from solver.pours.record import Outcome
+from solver.pours.run import Job, run_pour, run_pours
+from solver.scenes.body import counts
+from solver.scenes.insertion import shuffled_components
+from solver.scenes.material_file import load_material
+from solver.scenes.scene import value, with_values
+from solver.scenes.sizes import KINDS, SizeDistribution, drawn_sizes
+from solver.scenes.time_step import time_step
+from solver.shapes.clump import fit_clump, scaled
+from solver.shapes.solid import Solid
 
 SHIPPED = load_material("sunflower_extract")
 COARSE = with_values(SHIPPED, {"body.spheres": "coarse", "rig.mass": "4g"})

@@ -8,15 +8,15 @@ import dataclasses
 import numpy as np
 import pytest
 
-from solver.body import Body, Members
-from solver.insertion import rotation_matrix
-from solver.kernels.sleep import BALANCE, WAKE
-from solver.laboratory import EARTH, PLATE, RADIUS, Bench, Laboratory, bench
-from solver.pour import Pour
+from solver.engine.kernels.sleep import BALANCE, WAKE
+from solver.engine.world import SUMMARY_COLUMNS, Batch, law_table
+from solver.pours.pour import Pour
+from solver.pours.run import capacity_for
 from solver.rigs.surface import Pose, Revolved, horizontal
-from solver.run import capacity_for
-from solver.scene import with_values
-from solver.world import SUMMARY_COLUMNS, Batch, law_table
+from solver.scenes.body import Body, Members
+from solver.scenes.insertion import rotation_matrix
+from solver.scenes.scene import with_values
+from solver.single_body.laboratory import EARTH, PLATE, RADIUS, Bench, Laboratory, bench
 from tests.solver.test_pour import QUICK
 
 pytestmark = pytest.mark.usefixtures("taichi")

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.laboratory import EARTH, RADIUS, ROOM, bench
-from solver.layout import layout
-from solver.state import Capacity
-from solver.time_step import time_step
-from solver.world import Batch
+from solver.engine.layout import layout
+from solver.engine.state import Capacity
+from solver.engine.world import Batch
+from solver.scenes.time_step import time_step
+from solver.single_body.laboratory import EARTH, RADIUS, ROOM, bench
 
 pytestmark = pytest.mark.usefixtures("taichi")
 

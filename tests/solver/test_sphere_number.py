@@ -7,10 +7,10 @@ import pytest
 import trimesh
 from scipy.integrate import dblquad
 
-from solver.clump import fit_clump
-from solver.shape import ShapeError, Solid, mass_properties
-from solver.sphere_error import distance_to_mesh, sphere_error, union_moments
-from solver.sphere_number import deviation, doubling, fitted, general_target
+from solver.shapes.clump import fit_clump
+from solver.shapes.clump_error import distance_to_mesh, sphere_error, union_moments
+from solver.shapes.solid import ShapeError, Solid, mass_properties
+from solver.shapes.sphere_number import deviation, doubling, fitted, general_target
 from tests.solver.meshes import angle_bar, bent_rod, ring, saved
 
 MESHES = {"ring": ring(), "bend": bent_rod(), "angle": angle_bar()}

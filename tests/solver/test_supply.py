@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from solver import load_material, with_values
-from solver.record import Spheres
-from solver.scene import pour_rig
-from solver.supply import Supply
+from solver.pours.record import Spheres
+from solver.pours.supply import Supply
+from solver.scenes.scene import pour_rig
 
 SCENE = with_values(
     load_material("sunflower_extract"), {"rig.mass": 0.003, "body.spheres": "coarse", "insertion.rate": 0.01}

@@ -5,14 +5,14 @@ import dataclasses
 import numpy as np
 import pytest
 
-from solver.insertion import rotation_matrix
-from solver.laboratory import FREE, ROOM, Bench, Laboratory, bench
-from solver.layout import layout
-from solver.material_file import load_material
+from solver.engine.layout import layout
+from solver.engine.world import Batch
 from solver.rigs.surface import horizontal
-from solver.scene import with_values
-from solver.time_step import rayleigh_time, stability_limit, time_step
-from solver.world import Batch
+from solver.scenes.insertion import rotation_matrix
+from solver.scenes.material_file import load_material
+from solver.scenes.scene import with_values
+from solver.scenes.time_step import rayleigh_time, stability_limit, time_step
+from solver.single_body.laboratory import FREE, ROOM, Bench, Laboratory, bench
 
 SCENE = with_values(load_material("sunflower_extract"), {"body.spheres": "coarse"})
 HALF = float(np.sqrt(0.5))

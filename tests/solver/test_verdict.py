@@ -2,11 +2,11 @@
 
 import pytest
 
-from solver.numerics import Numerics
-from solver.record import Outcome
+from solver.pours.record import Outcome
+from solver.pours.verdict import RUNNING, Moment, verdict
 from solver.rigs import RIGS
 from solver.rigs.outlet import Obstruction
-from solver.verdict import RUNNING, Moment, verdict
+from solver.scenes.numerics import Numerics
 
 SOUND = {"finite": 1.0, "overflow": 0.0, "lost": 0.0, "overlap": 0.0}
 ALONE, HOLDING = Obstruction("petiole", 0.4e-3, 0.0), Obstruction("petiole", 0.4e-3, 4.2e-3)

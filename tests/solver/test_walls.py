@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from solver.insertion import rotation_matrix
-from solver.laboratory import EARTH, FREE, RADIUS, Laboratory, bench, sphere
-from solver.mesh_wall import LEAVE, SEE_GUARD, mesh_wall
+from solver.engine.wall_tables import LEAVE, SEE_GUARD, mesh_wall
 from solver.params import ParameterError
 from solver.rigs.rig import BareRig
 from solver.rigs.surface import Plane, Pose, Revolved, TriangleMesh, load_mesh, rectangle
+from solver.scenes.insertion import rotation_matrix
+from solver.single_body.laboratory import EARTH, FREE, RADIUS, Laboratory, bench, sphere
 
 pytestmark = pytest.mark.usefixtures("taichi")
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.kernels.loading import SETTINGS
-from solver.kernels.neighbours import MOST
-from solver.laboratory import ROOM, bench
-from solver.layout import layout
+from solver.engine.kernels.neighbours import MOST
+from solver.engine.kernels.transfer import SETTINGS
+from solver.engine.layout import layout
+from solver.engine.world import Batch
 from solver.rigs import Funnel
-from solver.world import Batch
+from solver.single_body.laboratory import ROOM, bench
 
 pytestmark = pytest.mark.usefixtures("taichi")
 

@@ -1,9 +1,8 @@
 """The mass of the heaviest body that was poured, given by every rig that leaves a pile."""
 
 from solver.effects.effect import Telltale
-from solver.observables.observable import Observable
-from solver.observables.value import Value
-from solver.record import Record
+from solver.observables.observable import Observable, Value
+from solver.pours.record import Record
 from solver.rigs.rig import PILE
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from explorer.export.target import ExportOrder, ExportTarget
 from solver import run_pour
-from solver.scene import Scene
+from solver.scenes.scene import Scene
 
 
 class Points(ExportTarget):

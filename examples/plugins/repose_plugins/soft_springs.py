@@ -4,9 +4,9 @@ A law of one's own overrides more of ``solver.laws.ContactLaw``: here its kernel
 constants are others. The restitution is kept, as the damping ratio is.
 """
 
-from solver.contact_model import ContactModel
 from solver.laws import LinearSpringDashpot
-from solver.material import Material, Pair
+from solver.scenes.contact_model import ContactModel
+from solver.scenes.material import Material, Pair
 
 SHARE = 0.25
 

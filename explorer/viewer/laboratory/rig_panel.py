@@ -13,7 +13,7 @@ from explorer.viewer.panel import LABORATORY, Now, PageContext, Panel
 from explorer.viewer.pour.restart_panel import entered, parameter_input
 from solver.params import Parameter
 from solver.rigs import BENCH_RIGS
-from solver.scene import Scene, parameters, with_rig
+from solver.scenes.scene import Scene, parameters, with_rig
 
 WAITING = "Puts one body, with the parameters of the pour on the screen, to a test. Choose rig and body, then: Run."
 

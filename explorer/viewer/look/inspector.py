@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from explorer.live.details import Details
 from explorer.live.frames import Frame
-from solver.scene import Scene
+from solver.scenes.scene import Scene
 
 NOBODY = "Click a body, or press N, to see what it is, where it goes and what it touches."
 CONTACTS_SHOWN = 12

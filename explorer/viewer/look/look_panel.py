@@ -28,7 +28,7 @@ from explorer.viewer.panel import LOOK, Now, PageContext, Panel
 from explorer.viewer.scene_nodes import SceneNodes
 from explorer.viewer.tour import Stop
 from explorer.viewer.view import look_at_height
-from solver.scene import Scene
+from solver.scenes.scene import Scene
 
 FOLLOW, RELEASE = "Follow", "Release"
 BEFORE, AFTER = "Previous", "Next"

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from explorer.live.frames import Frame
 from explorer.scene.meshes import Triangles
-from solver.insertion import rotation_matrix
+from solver.scenes.insertion import rotation_matrix
 
 Array = npt.NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from explorer.session import Session
 from explorer.viewer.buttons import add_keys, button_group
 from explorer.viewer.panel import POUR, Now, PageContext, Panel
 from explorer.viewer.small_text import small_html
-from solver.scene import Scene, parameters, with_values
+from solver.scenes.scene import Scene, parameters, with_values
 
 UNDO, REDO, BACK, DEFAULT = "Undo (Z)", "Redo (Y)", "All back", "Pour the default"
 KEYS: dict[str, Any] = {UNDO: "Z", REDO: "Y"}

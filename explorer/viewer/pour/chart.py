@@ -25,7 +25,7 @@ from explorer.viewer.palette import (
 from explorer.viewer.panel import POUR, Now, PageContext, Panel
 from explorer.viewer.pour.marks import NO_MARKS, Marks, with_marks
 from explorer.viewer.pour.readout import angle_of_repose_deg
-from solver.observables.value import Value
+from solver.observables.observable import Value
 
 Array = npt.NDArray[np.float64]
 

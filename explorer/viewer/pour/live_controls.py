@@ -13,7 +13,7 @@ import viser
 from explorer.screen_units import checked, screen_unit, title
 from explorer.viewer.actions import Post
 from solver.params import Parameter
-from solver.scene import Scene, value
+from solver.scenes.scene import Scene, value
 
 Apply = Callable[[Mapping[str, float | str]], None]
 """Hands new values (SI, by path) to the solver."""

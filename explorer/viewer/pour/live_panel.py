@@ -19,7 +19,7 @@ from explorer.viewer.pour.scene_bound import SceneBound
 from explorer.viewer.tour import Stop
 from solver.effects import EFFECTS, SetUpEffect
 from solver.params import Parameter
-from solver.scene import Scene, parameters, value
+from solver.scenes.scene import Scene, parameters, value
 
 Targets = dict[str, tuple[str, ...]]
 """Text of a choice → prefixes of the parameter paths that it stands for."""

@@ -12,8 +12,7 @@ import viser
 from explorer.files.measured_curves import MeasuredCurve
 from explorer.viewer.palette import FLANK, MEASURED, Colour
 from explorer.viewer.pour.outline_svg import corners_of
-from solver.observables.outline import Outline
-from solver.observables.repose import AZIMUTHS_DEG
+from solver.observables.repose import AZIMUTHS_DEG, Outline
 
 Array = npt.NDArray[np.float64]
 

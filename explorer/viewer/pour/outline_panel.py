@@ -17,7 +17,7 @@ from explorer.viewer.panel import POUR, Now, PageContext, Panel
 from explorer.viewer.pour.outline_nodes import OutlineNodes
 from explorer.viewer.pour.outline_svg import outline_html
 from solver.assets import shipped_measurements
-from solver.observables.outline import Outline
+from solver.observables.repose import Outline
 
 NONE, OWN = "none", "folder below"
 

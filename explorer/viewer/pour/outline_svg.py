@@ -10,8 +10,7 @@ import numpy.typing as npt
 from explorer.files.measured_curves import MeasuredCurve
 from explorer.viewer.palette import FLANK, MEASURED, css
 from explorer.viewer.small_text import small_html
-from solver.observables.outline import Flanks, Outline
-from solver.observables.repose import FlankLine
+from solver.observables.repose import FlankLine, Flanks, Outline
 
 Array = npt.NDArray[np.float64]
 

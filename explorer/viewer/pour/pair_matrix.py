@@ -18,9 +18,9 @@ from explorer.screen_units import InputError, checked, quantity, screen_unit, ti
 from explorer.viewer.actions import Post
 from explorer.viewer.pour.live_controls import HANDS_OFF, LINEAR_STEP, Apply, screen_range
 from explorer.viewer.small_text import small_html
-from solver.material import Pair
 from solver.params import Parameter, declared
-from solver.scene import Scene, value
+from solver.scenes.material import Pair
+from solver.scenes.scene import Scene, value
 
 BOXES = 3
 """Most boxes in a row: viser's longest vector."""

@@ -13,8 +13,8 @@ from explorer.viewer.look.look import COMPONENT
 from explorer.viewer.palette import css
 from explorer.viewer.panel import POUR, Now, PageContext, Panel
 from explorer.viewer.scene_nodes import component_colour
-from solver.record import Outcome, Phase
-from solver.scene import Scene
+from solver.pours.record import Outcome, Phase
+from solver.scenes.scene import Scene
 
 EVENTS_SHOWN = 3
 

@@ -15,7 +15,7 @@ from explorer.viewer.pour.scene_bound import SceneBound
 from explorer.viewer.tour import Stop
 from solver.effects import set_up_effects
 from solver.params import Parameter, declared
-from solver.scene import Scene, parameters, value, with_values
+from solver.scenes.scene import Scene, parameters, value, with_values
 
 PATHS = (
     "rig.mass",

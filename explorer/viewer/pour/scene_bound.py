@@ -8,7 +8,7 @@ import viser
 
 from explorer.live.messages import Status
 from explorer.viewer.panel import Now, PageContext, Panel
-from solver.scene import Scene, parameters
+from solver.scenes.scene import Scene, parameters
 
 
 class SceneControls(Protocol):

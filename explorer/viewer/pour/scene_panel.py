@@ -11,9 +11,9 @@ from explorer.viewer.buttons import on_upload
 from explorer.viewer.panel import POUR, Now, PageContext, Panel
 from explorer.viewer.small_text import small_html
 from solver.assets import shipped_assets
-from solver.mesh_file import LENGTH_UNITS, SUFFIXES
 from solver.rigs import RIGS
-from solver.scene import Scene, check
+from solver.scenes.scene import Scene, check
+from solver.shapes.mesh_file import LENGTH_UNITS, SUFFIXES
 
 OWN = "file below"
 """Choice of the list that takes the file in the text field."""

@@ -22,8 +22,8 @@ from explorer.viewer.panel import POUR, Now, PageContext, Panel
 from explorer.viewer.pour.readout import OUTCOME_WORDS, STATE_WORDS, angle_of_repose_deg
 from explorer.viewer.scene_nodes import PLATE_RADIUS, SceneNodes
 from explorer.viewer.view import MIDDLE
-from solver.record import Outcome
-from solver.scene import Scene
+from solver.pours.record import Outcome
+from solver.scenes.scene import Scene
 
 ROOT = "/second"
 BESIDE = 2.15 * PLATE_RADIUS

@@ -10,7 +10,7 @@ from scipy import optimize, stats
 from doe.laboratory import LaboratoryError, analyse
 from doe.laboratory.dimensions import variation_interval
 from solver.assets import asset_path
-from solver.sizes import SizeDistribution, drawn_sizes
+from solver.scenes.sizes import SizeDistribution, drawn_sizes
 from tests.doe.laboratory.readings import assert_one_line, written
 
 HEAD = "component,replicate,length_mm,width_mm,thickness_mm\n"

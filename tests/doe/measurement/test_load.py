@@ -10,8 +10,8 @@ from doe.measurement import load_measurement, reach_of, summaries_of_data, summa
 from doe.record import plain
 from solver import value, with_values
 from solver.assets import AssetNotFoundError, asset_path, measurement_folder
-from solver.insertion import Insertion
 from solver.rigs import Funnel
+from solver.scenes.insertion import Insertion
 from tests.doe.measurement.folders import MATERIAL, MEASUREMENT, TABLE, changed, write, write_pile
 
 FACTORS = "table4_plackett_burman_factors"

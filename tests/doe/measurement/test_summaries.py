@@ -18,7 +18,7 @@ from doe.measurement.piles import read_pile
 from doe.measurement.summaries import ASYMMETRY, MOST, PREFERRED, Summary
 from solver.assets import measurement_folder
 from solver.observables.free_surface import column_places
-from solver.record import FreeSurface
+from solver.pours.record import FreeSurface
 from tests.doe.measurement.folders import TABLE, write
 from tests.solver.observables.made_up import pile_of, record_of
 

@@ -4,14 +4,14 @@ import dataclasses
 
 import numpy as np
 
-from solver.body import Body, Members
 from solver.effects import EFFECTS, Effect, body_effects, contact_effects
-from solver.laboratory import FREE, GRAIN, RADIUS, ROOM, UPRIGHT, WALL, Laboratory, scene_of, sphere
-from solver.layout import layout
-from solver.material import Pair
+from solver.engine.layout import layout
+from solver.engine.world import SUMMARY_COLUMNS, Batch
 from solver.rigs.surface import Plane, Pose
-from solver.time_step import time_step
-from solver.world import SUMMARY_COLUMNS, Batch
+from solver.scenes.body import Body, Members
+from solver.scenes.material import Pair
+from solver.scenes.time_step import time_step
+from solver.single_body.laboratory import FREE, GRAIN, RADIUS, ROOM, UPRIGHT, WALL, Laboratory, scene_of, sphere
 
 ROOM_WITH_EFFECTS = dataclasses.replace(ROOM, effects=True)
 """That of a laboratory with an effect on."""

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from solver.backend import ti
-from solver.body import Body, Members
 from solver.effects.air_drag import AIR_DENSITY, AIR_VISCOSITY, drag_coefficient, shape_factors, shown_area
-from solver.laboratory import EARTH, RADIUS, Laboratory, sphere
-from solver.layout import outline
-from solver.material import Material
-from solver.state import Vec3
+from solver.engine.layout import outline
+from solver.engine.state import Vec3
+from solver.scenes.body import Body, Members
+from solver.scenes.material import Material
+from solver.single_body.laboratory import EARTH, RADIUS, Laboratory, sphere
 from tests.solver.effects.cases import felt, scene_with
 
 pytestmark = pytest.mark.usefixtures("taichi")

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from solver.effects import EFFECTS
-from solver.insertion import rotation_matrix
-from solver.laboratory import EARTH, GRAIN, RADIUS, WALL, Laboratory, sphere
 from solver.params import declared
+from solver.scenes.insertion import rotation_matrix
+from solver.single_body.laboratory import EARTH, GRAIN, RADIUS, WALL, Laboratory, sphere
 from tests.solver.effects.cases import (
     FELT,
     IN_KERNELS,

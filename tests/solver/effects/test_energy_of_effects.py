@@ -9,8 +9,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from solver.body import Body, Members
-from solver.laboratory import EARTH, GRAIN, RADIUS, Laboratory
+from solver.scenes.body import Body, Members
+from solver.single_body.laboratory import EARTH, GRAIN, RADIUS, Laboratory
 from tests.solver.effects.cases import IN_KERNELS, all_felt, felt, scene_with, with_effects
 
 pytestmark = pytest.mark.usefixtures("taichi")

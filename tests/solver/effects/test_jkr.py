@@ -6,8 +6,8 @@ from scipy.optimize import brentq
 
 from solver.backend import ti
 from solver.effects.jkr import grip, pulls, root
-from solver.laboratory import GRAIN, RADIUS, WALL, Laboratory, sphere
-from solver.material import effective_youngs_modulus
+from solver.scenes.material import effective_youngs_modulus
+from solver.single_body.laboratory import GRAIN, RADIUS, WALL, Laboratory, sphere
 from tests.solver.effects.cases import felt, heavy, scene_with
 
 pytestmark = pytest.mark.usefixtures("taichi")

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from solver.laboratory import GRAIN, RADIUS, WALL, Laboratory
-from solver.material import effective_youngs_modulus
+from solver.scenes.material import effective_youngs_modulus
+from solver.single_body.laboratory import GRAIN, RADIUS, WALL, Laboratory
 from tests.solver.effects.cases import felt, hertz_rest, scene_with, sled
 
 pytestmark = pytest.mark.usefixtures("taichi")

@@ -10,8 +10,8 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
 from solver.effects.air_drag import AIR_DENSITY, AIR_VISCOSITY
-from solver.laboratory import EARTH, RADIUS, Laboratory, sphere
-from solver.material import Material
+from solver.scenes.material import Material
+from solver.single_body.laboratory import EARTH, RADIUS, Laboratory, sphere
 from tests.solver.effects.cases import felt, scene_with
 from tests.solver.effects.test_air_drag import haider_levenspiel
 

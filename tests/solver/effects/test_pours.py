@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from solver.checkpoint import checkpoint_bytes, checkpoint_of, read_checkpoint, resumed
-from solver.laboratory import ROOM
-from solver.material_file import load_material
+from solver.engine.world import Batch
 from solver.params import ParameterError
-from solver.pour import Pour
-from solver.run import capacity_for
-from solver.scene import with_values
-from solver.world import Batch
+from solver.pours.checkpoint import checkpoint_bytes, checkpoint_of, read_checkpoint, resumed
+from solver.pours.pour import Pour
+from solver.pours.run import capacity_for
+from solver.scenes.material_file import load_material
+from solver.scenes.scene import with_values
+from solver.single_body.laboratory import ROOM
 from tests.solver.effects.cases import ROOM_WITH_EFFECTS, felt, with_effects
 
 pytestmark = pytest.mark.usefixtures("taichi")

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from solver.backend import ti
-from solver.contact_model import ContactModel
 from solver.effects.velocity_dependent_restitution import damping_of
-from solver.laboratory import EARTH, GRAIN, RADIUS, WALL, Laboratory
 from solver.laws import CONTACT_LAWS, HertzMindlin
 from solver.laws.restitution import normal_damping
-from solver.material import effective_youngs_modulus
+from solver.scenes.contact_model import ContactModel
+from solver.scenes.material import effective_youngs_modulus
+from solver.single_body.laboratory import EARTH, GRAIN, RADIUS, WALL, Laboratory
 from tests.solver.effects.cases import felt, heavy, hertz_rest, scene_with
 
 pytestmark = pytest.mark.usefixtures("taichi")

@@ -7,10 +7,10 @@ from solver.backend import ti
 from solver.effects.rolling_resistance import rolling_torque
 from solver.effects.touch import Touch
 from solver.effects.twisting import twisting_torque
-from solver.laboratory import EARTH, GRAIN, RADIUS, WALL, Laboratory, sphere
+from solver.engine.state import Vec3
 from solver.laws.hertz_mindlin import tangential_damping
-from solver.material import effective_shear_modulus, effective_youngs_modulus
-from solver.state import Vec3
+from solver.scenes.material import effective_shear_modulus, effective_youngs_modulus
+from solver.single_body.laboratory import EARTH, GRAIN, RADIUS, WALL, Laboratory, sphere
 from tests.solver.effects.cases import felt, hertz_rest, scene_with
 
 pytestmark = pytest.mark.usefixtures("taichi")

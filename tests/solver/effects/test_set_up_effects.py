@@ -3,16 +3,15 @@
 import numpy as np
 import pytest
 
-from solver.body import Body, Members
-from solver.effects.set_up import actual
-from solver.laboratory import EARTH, GRAIN, PLATE, RADIUS, WALL, Laboratory, scene_of
-from solver.material import Pair, effective_youngs_modulus
-from solver.material_file import load_material
+from solver.engine.world import Batch
 from solver.params import ParameterError
-from solver.pour import Pour
-from solver.scene import body_counts, poured_mass, with_values
-from solver.shape import Solid
-from solver.world import Batch
+from solver.pours.pour import Pour
+from solver.scenes.body import Body, Members
+from solver.scenes.material import Pair, effective_youngs_modulus
+from solver.scenes.material_file import load_material
+from solver.scenes.scene import actual, body_counts, poured_mass, with_values
+from solver.shapes.solid import Solid
+from solver.single_body.laboratory import EARTH, GRAIN, PLATE, RADIUS, WALL, Laboratory, scene_of
 from tests.solver.effects.cases import ROOM, felt, hertz_rest, scene_with, sled, with_effects
 
 SCENE = load_material("sunflower_extract")

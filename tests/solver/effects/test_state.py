@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from solver.effects.columns import COUPLE, HERTZ, MEMORY
-from solver.kernels.neighbours import MOST
-from solver.laboratory import EARTH, RADIUS, ROOM, Laboratory
-from solver.time_step import time_step
+from solver.engine.kernels.neighbours import MOST
+from solver.scenes.time_step import time_step
+from solver.single_body.laboratory import EARTH, RADIUS, ROOM, Laboratory
 from tests.solver.effects.cases import (
     ROOM_WITH_EFFECTS,
     THREE_WORLDS,

@@ -23,25 +23,25 @@ import numpy as np
 import numpy.typing as npt
 import trimesh
 
-from solver import clump
 from solver.assets import measurement_folder
-from solver.bench_tests import BENCH_TESTS
-from solver.contact_model import ContactModel
 from solver.effects import EFFECTS, set_up_effects
-from solver.insertion import Insertion
-from solver.laboratory import ROOM, UPRIGHT
+from solver.engine.layout import layout
+from solver.engine.world import SUMMARY_COLUMNS, Batch, compiled_in
 from solver.laws import CONTACT_LAWS, HertzMindlin
-from solver.layout import layout
-from solver.material import Material, Pair
-from solver.material_file import load_material
-from solver.numerics import Numerics
-from solver.pour import Pour
+from solver.pours.pour import Pour
+from solver.pours.run import capacity_for
 from solver.rigs import BENCH_RIGS, RIGS
-from solver.run import capacity_for
-from solver.scene import Scene, pour_rig, with_rig, with_values
-from solver.shape import Kind, Solid, mass_properties
-from solver.time_step import time_step
-from solver.world import SUMMARY_COLUMNS, Batch, compiled_in
+from solver.scenes.contact_model import ContactModel
+from solver.scenes.insertion import Insertion
+from solver.scenes.material import Material, Pair
+from solver.scenes.material_file import load_material
+from solver.scenes.numerics import Numerics
+from solver.scenes.scene import Scene, pour_rig, with_rig, with_values
+from solver.scenes.time_step import time_step
+from solver.shapes import clump
+from solver.shapes.solid import Kind, Solid, mass_properties
+from solver.single_body import BENCH_TESTS
+from solver.single_body.laboratory import ROOM, UPRIGHT
 from tests.solver.effects.cases import IN_KERNELS, felt, with_effects
 
 Array = npt.NDArray[np.float64]

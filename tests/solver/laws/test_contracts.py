@@ -7,19 +7,19 @@ import numpy as np
 import pytest
 
 from solver import pour_key
-from solver.contact_model import ContactModel
 from solver.effects import EFFECTS
-from solver.insertion import rotation_matrix
-from solver.laboratory import EARTH, FREE, GRAIN, RADIUS, ROOM, WALL, Laboratory, bench, sphere
+from solver.engine.layout import layout
+from solver.engine.world import Batch, compiled_in, law_table
 from solver.laws import CONTACT_LAWS, ContactLaw, HertzMindlin, LinearSpringDashpot
-from solver.layout import layout
-from solver.material_file import scene_from
 from solver.params import ParameterError
-from solver.retune import RAMP_TIME, Ramp, spring_ratio
-from solver.run import Job, capacity_for, run_pours
-from solver.scene import parameters, with_values
+from solver.pours.parameter_ramp import RAMP_TIME, Ramp, spring_ratio
+from solver.pours.run import Job, capacity_for, run_pours
+from solver.scenes.contact_model import ContactModel
+from solver.scenes.insertion import rotation_matrix
+from solver.scenes.material_file import scene_from
+from solver.scenes.scene import parameters, with_values
+from solver.single_body.laboratory import EARTH, FREE, GRAIN, RADIUS, ROOM, WALL, Laboratory, bench, sphere
 from solver.verification.impacts import Impact, rebounds
-from solver.world import Batch, compiled_in, law_table
 from tests.solver.effects.cases import FELT, IN_KERNELS, felt, scene_with, tumble, with_effects
 from tests.solver.effects.test_contracts import momenta
 from tests.solver.pour_digests import digest
@@ -255,7 +255,7 @@ def test_the_package_of_a_law_is_in_the_key_of_a_pour(softer, monkeypatch):
     keys = set()
     for version in ("", "grains 1.0", "grains 1.1"):
         # The module, not the function of its name that the package exports.
-        module = importlib.import_module("solver.pour_key")
+        module = importlib.import_module("solver.pours.pour_key")
         monkeypatch.setattr(module, "origin", lambda kind, name, version=version: version)
         keys.add(pour_key(softer, 1))
     assert len(keys) == 3

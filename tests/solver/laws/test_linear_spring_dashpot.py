@@ -6,12 +6,12 @@ import math
 import numpy as np
 import pytest
 
-from solver.body import Body, Members
-from solver.contact_model import ContactModel
-from solver.laboratory import GRAIN, RADIUS, Laboratory, bench
 from solver.laws import LinearSpringDashpot
 from solver.laws.restitution import damping_ratio
-from solver.material import effective_youngs_modulus
+from solver.scenes.body import Body, Members
+from solver.scenes.contact_model import ContactModel
+from solver.scenes.material import effective_youngs_modulus
+from solver.single_body.laboratory import GRAIN, RADIUS, Laboratory, bench
 from solver.verification.impacts import hertz_depth
 
 pytestmark = pytest.mark.usefixtures("taichi")

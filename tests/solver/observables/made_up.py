@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from solver.body import Body, Members
-from solver.material import Material
 from solver.observables.made_up import SEED_AXES, cone, pile_of, seed_spheres, seeds_in_cone, solid_of
-from solver.record import Bodies, Outcome, Pile, Record, Spheres, Trace
-from solver.record_builder import entries_of
-from solver.scene import Scene
+from solver.pours.record import Bodies, Outcome, Pile, Record, Spheres, Trace
+from solver.pours.record_builder import entries_of
+from solver.scenes.body import Body, Members
+from solver.scenes.material import Material
+from solver.scenes.scene import Scene
 
 __all__ = [
     "SEED_AXES",

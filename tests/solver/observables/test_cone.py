@@ -7,11 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.observables.cone import fitted_cone_angle_deg, mass_cone_angle_deg, volume_cone_angle_deg
 from solver.observables.pile import (
     angle_of_repose_cone,
     angle_of_repose_mass_cone,
     angle_of_repose_volume_cone,
+    fitted_cone_angle_deg,
+    mass_cone_angle_deg,
+    volume_cone_angle_deg,
 )
 from solver.observables.reading import PileReading
 from tests.solver.observables.made_up import cone, moved, seeds_in_cone

@@ -5,7 +5,7 @@ import pytest
 
 from solver.observables.draw_down import slopes_deg
 from solver.observables.silhouette import PIXEL
-from solver.record import Spheres
+from solver.pours.record import Spheres
 
 BEAD = 1e-3
 FLOOR = 0.2

@@ -22,7 +22,7 @@ def test_what_is_no_angle_has_no_bias_on_a_cone_of_known_angle(bias):
 
 
 def test_readings_differ_as_in_the_table_of_the_cone_estimators(bias):
-    """solver.observables.cone gives −0.2°, +11.3° and +20.9° for the centre-of-mass cone, to 0.9° over 60 piles."""
+    """solver.observables.pile gives −0.2°, +11.3° and +20.9° for the centre-of-mass cone, to 0.9° over 60 piles."""
     means = [mean for mean, _ in bias["angle_of_repose_mass_cone_deg"]]
     # Four piles: three standard errors of about 1.5° each.
     assert means == pytest.approx([-0.2, 11.3, 20.9], abs=4.5)

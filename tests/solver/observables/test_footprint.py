@@ -7,7 +7,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solver.observables.footprint import body_thickness, radius_holding
 from solver.observables.packing import bulk_density, solid_fraction
 from solver.observables.pile import (
     centroid_x,
@@ -18,6 +17,7 @@ from solver.observables.pile import (
     stray_fraction,
 )
 from solver.observables.reading import PileReading
+from solver.observables.surface import body_thickness, radius_holding
 from tests.solver.observables.made_up import (
     SEED_AXES,
     balls,

@@ -18,7 +18,7 @@ from solver.observables.free_surface import (
     time_profile,
 )
 from solver.observables.silhouette import PIXEL
-from solver.record import FreeSurface, Spheres
+from solver.pours.record import FreeSurface, Spheres
 from tests.solver.observables.made_up import empty_pile, record_of
 
 RADIUS = 42e-3

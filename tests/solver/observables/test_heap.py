@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from doe.store import observables_of, read_off
-from solver.observables.footprint import body_thickness, grain_thickness
 from solver.observables.heap import told, why_no_heap
 from solver.observables.reading import PileReading
-from solver.raw_pour import packed, unpacked
-from solver.record import Outcome, Pile, Spheres
+from solver.observables.surface import body_thickness, grain_thickness
+from solver.pours.raw_pour import packed, unpacked
+from solver.pours.record import Outcome, Pile, Spheres
+from solver.pours.run import run_pour
 from solver.rigs import RIGS
-from solver.run import run_pour
-from solver.scene import with_values
+from solver.scenes.scene import with_values
 from tests.solver.beans import heap, two_layers
 from tests.solver.observables.made_up import balls, empty_pile, joined, seeds_in_cone
 

@@ -5,15 +5,15 @@ import dataclasses
 import numpy as np
 import pytest
 
-from solver.body import Body, Members
-from solver.material import Material
 from solver.observables import PileReading, height_profile, observe, observe_pile
 from solver.observables.free_surface import column_places
 from solver.observables.named import all_names, named, observe_named, observe_scan
 from solver.observables.packing import solid_fraction
 from solver.observables.pile import centre_height
-from solver.record import FreeSurface
-from solver.scene import Scene
+from solver.pours.record import FreeSurface
+from solver.scenes.body import Body, Members
+from solver.scenes.material import Material
+from solver.scenes.scene import Scene
 from tests.solver.observables.made_up import cone, empty_pile, record_of, seeds_in_cone
 
 SEEDS = seeds_in_cone(25.0, 60, np.random.default_rng(1), reach=0.5)

@@ -16,7 +16,7 @@ from solver.observables import (
     observe_pile,
     silhouette,
 )
-from solver.record import Pile, Record, Spheres
+from solver.pours.record import Pile, Record, Spheres
 from solver.rigs import Funnel
 from tests.solver.observables.made_up import balls, empty_pile, record_of, seeds_in_cone
 

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from solver.observables.outline import outline
 from solver.observables.reading import PileReading
-from solver.observables.repose import flank_angles_deg, flank_lines
+from solver.observables.repose import flank_angles_deg, flank_lines, outline
 from solver.observables.silhouette import PIXEL
-from solver.record import Spheres
+from solver.pours.record import Spheres
 from tests.solver.observables.made_up import cone, moved, oblique_cone
 
 

@@ -16,7 +16,7 @@ from solver.observables.pile import (
 from solver.observables.reading import PileReading
 from solver.observables.repose import AZIMUTHS_DEG, flank_angles_deg
 from solver.observables.silhouette import Image
-from solver.record import Pile
+from solver.pours.record import Pile
 from tests.solver.observables.made_up import (
     balls,
     cone,

@@ -7,7 +7,7 @@ import pytest
 
 from solver.observables.reading import PileReading
 from solver.observables.segregation import inner_mass_share, outer_mass_share, segregation_index
-from solver.record import Pile
+from solver.pours.record import Pile
 from tests.solver.observables.made_up import balls, empty_pile
 
 

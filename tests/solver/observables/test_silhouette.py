@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from solver.observables.silhouette import PIXEL, column_tops, largest_part, silhouette
-from solver.record import Spheres
+from solver.pours.record import Spheres
 from tests.solver.observables.made_up import balls, empty_pile, moved
 
 

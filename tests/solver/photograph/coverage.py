@@ -11,7 +11,7 @@ from solver.assets import measurement_folder
 from solver.observables.made_up import seeds_in_cone
 from solver.observables.silhouette import largest_part, silhouette
 from solver.photograph import PhotographedPile, read_photograph
-from solver.record import Spheres
+from solver.pours.record import Spheres
 from tests.solver.photograph.rendered import Look, fitted, image_cover, photograph, picture_of, solid_cover
 
 HALF = 0.44

@@ -9,7 +9,7 @@ import numpy as np
 
 from solver.assets import measurement_folder
 from solver.observables.silhouette import silhouette
-from solver.record import Spheres
+from solver.pours.record import Spheres
 from tests.solver.photograph.rendered import Look, image_cover, jpeg_bytes, photograph, solid_cover
 
 FOLDER = Path(__file__).parents[3] / "assets/photographs"

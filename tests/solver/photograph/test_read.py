@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.observables.outline import outline
-from solver.observables.repose import flank_angles_deg
+from solver.observables.repose import flank_angles_deg, outline
 from solver.observables.silhouette import largest_part, silhouette
 from solver.photograph import PhotographedPile, read_photograph
-from solver.record import Spheres
+from solver.pours.record import Spheres
 from tests.solver.photograph.coverage import scanned_spheres
 from tests.solver.photograph.rendered import Look, image_cover, photograph, picture_of, solid_cover
 

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 import trimesh
 
-from solver.material_file import load_material
 from solver.params import ParameterError
-from solver.pour_key import pour_key
-from solver.record import Outcome
+from solver.pours.pour_key import pour_key
+from solver.pours.record import Outcome
+from solver.pours.run import run_pour
 from solver.rigs import Funnel, MeshFunnel
-from solver.run import run_pour
-from solver.scene import parameters, with_values
-from solver.set_up import with_set_up, with_settings
+from solver.scenes.material_file import load_material
+from solver.scenes.scene import parameters, with_values
+from solver.scenes.set_up import with_set_up, with_settings
 from tests.explorer.beads import bead_scene
 
 SECTIONS = 96

@@ -5,14 +5,14 @@ import dataclasses
 import numpy as np
 import pytest
 
-from solver.body import Members
-from solver.pour import Pour
-from solver.raw_pour import packed, unpacked
-from solver.record import Bodies, Outcome, Spheres
+from solver.engine.world import Batch
+from solver.pours.pour import Pour
+from solver.pours.raw_pour import packed, unpacked
+from solver.pours.record import Bodies, Outcome, Spheres
+from solver.pours.run import capacity_for
 from solver.rigs.outlet import RoundOutlet, Slot, obstruction
-from solver.run import capacity_for
-from solver.scene import with_values
-from solver.world import Batch
+from solver.scenes.body import Members
+from solver.scenes.scene import with_values
 from tests.solver.test_pour import COARSE
 
 HEIGHT, HALF = 0.065, 0.015

@@ -6,14 +6,14 @@ import dataclasses
 import numpy as np
 import pytest
 
-from solver.material_file import load_material
+from solver.engine.world import Batch
 from solver.observables import observables_in, observe
-from solver.pour import Pour
-from solver.record import Outcome, Phase
-from solver.run import Job, capacity_for, run_pours
-from solver.scene import with_values
-from solver.set_up import with_settings
-from solver.world import Batch
+from solver.pours.pour import Pour
+from solver.pours.record import Outcome, Phase
+from solver.pours.run import Job, capacity_for, run_pours
+from solver.scenes.material_file import load_material
+from solver.scenes.scene import with_values
+from solver.scenes.set_up import with_settings
 from tests.explorer.beads import bead_scene
 
 pytestmark = pytest.mark.usefixtures("taichi")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from solver.contact_model import ContactModel
+from solver.scenes.contact_model import ContactModel
 from solver.verification.chung_ooi import ALUMINIUM, OXIDE, STEEL
 from solver.verification.conservation import tumbling_period
 from solver.verification.hertz import Elastic

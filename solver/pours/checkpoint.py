@@ -1,0 +1,202 @@
+"""A pour interrupted and gone on with: the same bits as one that was never interrupted.
+
+A checkpoint file (``.npz``) holds the world's arrays (``solver/engine/snapshot.py``) and what the pour has decided so far. It
+belongs to one scene, seed and version of the solver; for any other it is refused.
+
+A pour brought back to an earlier moment of its own, in the same batch: from there it repeats the same bits.
+
+Quicker than a checkpoint (``solver/pours/checkpoint.py``), which can be kept in a file and go on elsewhere.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from solver.engine.moving_state import Moving
+from solver.engine.snapshot import TABLES, Arrays
+from solver.engine.world import Batch
+from solver.params import ParameterError
+from solver.pours.parameter_ramp import Ramp
+from solver.pours.pour import Pour
+from solver.pours.pour_key import pour_key
+from solver.pours.record import Outcome
+from solver.pours.supply import Entry
+from solver.scenes.insertion import Pose
+from solver.scenes.scene import Scene, actual
+
+PLAIN = (
+    "dt",
+    "energy_put_in",
+    "_supplied",
+    "steps",
+    "_time_base",
+    "_steps_base",
+    "samples",
+    "_moving",
+    "_quiet_samples",
+    "_began",
+    "_left",
+    "_ramp_left",
+)
+
+"""Parts of a pour that are numbers, text, or lists of them."""
+
+HEAD = "pour.json"
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """One interrupted pour."""
+
+    seed: int
+    fingerprint: str
+    """Of scene and solver."""
+    decided: dict[str, Any]
+    """What the pour has decided so far, as JSON takes it."""
+    world: Arrays
+
+
+def fingerprint(scene: Scene) -> str:
+    """The same for pours of one key (mesh files by their contents), where a checkpoint holds the same arrays."""
+    held = [f"{group}.{name}" for group, table in TABLES.items() for name in table]
+    return hashlib.sha256(f"{pour_key(scene, seed=0)} {PLAIN} {held}".encode()).hexdigest()
+
+
+def checkpoint_of(pour: Pour) -> Checkpoint:
+    """The present state of ``pour``, between two launches."""
+    decided: dict[str, Any] = {name: getattr(pour, name) for name in PLAIN}
+    decided["ended"], decided["told"] = pour.ended, (pour.outcome, pour.message)
+    decided["random"] = pour.supply.random.bit_generator.state
+    decided["done"] = len(pour.rig.actions()) - len(pour._to_do)
+    decided["table"] = pour._table.tolist()
+    decided["ramp"] = None
+    if pour._ramp is not None:
+        decided["ramp"] = [pour._ramp.before.tolist(), pour._ramp.after.tolist(), pour._ramp.start]
+    decided["entries"] = [
+        [time, step, pose.position.tolist(), pose.quaternion.tolist(), velocity.tolist()]
+        for time, step, pose, velocity in pour.supply.entries
+    ]
+    decided["free_surface"] = [[time, heights.tolist()] for time, heights in pour._free_surface]
+    # A round trip now makes an unfit value fail here, and what is restored the same as what is read from a file.
+    decided = json.loads(json.dumps(decided))
+    return Checkpoint(pour.seed, fingerprint(pour.scene), decided, pour.batch.take(pour.w))
+
+
+def resumed(batch: Batch, w: int, scene: Scene, kept: Checkpoint) -> Pour:
+    """The pour of ``kept`` in world ``w``, to be driven on.
+
+    Raises ParameterError if ``scene`` or the solver is not the one that was interrupted.
+    """
+    if kept.fingerprint != fingerprint(actual(scene)):
+        raise ParameterError("the checkpoint is of another scene or of another version of the solver")
+    pour = Pour(batch, w, scene, kept.seed)
+    decided = kept.decided
+    for name in PLAIN:
+        setattr(pour, name, decided[name])
+    (ended, why), (told, message) = decided["ended"], decided["told"]
+    pour.ended, pour.outcome, pour.message = (Outcome(ended), why), Outcome(told), message
+    pour.supply.random.bit_generator.state = decided["random"]
+    pour._to_do = list(pour.rig.actions())[decided["done"] :]
+    pour._inside = pour.container
+    pour._table = np.array(decided["table"])
+    if decided["ramp"] is not None:
+        before, after, start = decided["ramp"]
+        pour._ramp = Ramp(pour._law, np.array(before), np.array(after), start)
+    pour.supply.entries = [
+        Entry(time, step, Pose(np.array(position), np.array(quaternion)), np.array(velocity))
+        for time, step, position, quaternion, velocity in decided["entries"]
+    ]
+    pour._free_surface = [(time, np.array(heights)) for time, heights in decided["free_surface"]]
+    batch.set_law(w, pour._table)
+    batch.put(w, kept.world)
+    return pour
+
+
+def checkpoint_bytes(kept: Checkpoint) -> bytes:
+    """Contents of a checkpoint file."""
+    head = {"seed": kept.seed, "fingerprint": kept.fingerprint, "decided": kept.decided}
+    buffer = io.BytesIO()
+    text = np.frombuffer(json.dumps(head).encode(), dtype=np.uint8)
+    np.savez_compressed(buffer, allow_pickle=False, **{HEAD: text, **kept.world})
+    return buffer.getvalue()
+
+
+def read_checkpoint(path: Path) -> Checkpoint:
+    """A checkpoint from its file; ParameterError naming the file if it is none."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            world = {name: file[name] for name in file.files if name != HEAD}
+            head = json.loads(bytes(file[HEAD]))
+        return Checkpoint(head["seed"], head["fingerprint"], head["decided"], world)
+    except FileNotFoundError:
+        raise ParameterError(f"{path}: no such file") from None
+    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        raise ParameterError(f"{path}: not a checkpoint, or a damaged one ({error})") from error
+
+
+DECIDED = (*(name for name in PLAIN if name != "samples"), "ended", "outcome", "message", "_table", "_ramp", "_inside")
+
+"""What a pour has decided, in values that it replaces and never changes."""
+
+
+@dataclass(frozen=True)
+class Kept:
+    """One moment of a pour."""
+
+    time: float
+    """[s]"""
+    scene: Scene
+    """With the parameters that were in force."""
+    decided: Mapping[str, Any]
+    lengths: tuple[int, ...]
+    to_do: tuple[Any, ...]
+    random: Mapping[str, Any]
+    world: Moving
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that it takes [B], but for a few hundred."""
+        return self.world.nbytes
+
+
+def growing(pour: Pour) -> tuple[list[Any], ...]:
+    """Lists that only grow, so that their length is enough to have them as they were."""
+    return pour.samples, pour.supply.entries, pour._free_surface
+
+
+def keep(pour: Pour) -> Kept:
+    """The present moment of ``pour``, between two launches."""
+    places = pour.supply.layout
+    return Kept(
+        time=pour.time,
+        scene=pour.scene,
+        decided={name: getattr(pour, name) for name in DECIDED},
+        lengths=tuple(map(len, growing(pour))),
+        to_do=tuple(pour._to_do),
+        random=pour.supply.random.bit_generator.state,
+        world=pour.batch.take_moving(pour.w, len(places.numbers), len(places.spheres)),
+    )
+
+
+def put_back(pour: Pour, kept: Kept) -> None:
+    """Bring ``pour`` back to ``kept``, one of its earlier moments; what came after is forgotten."""
+    for name, found in kept.decided.items():
+        setattr(pour, name, found)
+    for rows, length in zip(growing(pour), kept.lengths, strict=True):
+        del rows[length:]
+    pour.scene = kept.scene
+    pour._to_do = list(kept.to_do)
+    pour.supply.random.bit_generator.state = kept.random
+    # These two wake every body; what follows puts the sleepers back to sleep.
+    pour.batch.set_law(pour.w, pour._table)
+    pour.batch.set_effects(pour.w, kept.scene)
+    pour.batch.put_moving(pour.w, kept.world)

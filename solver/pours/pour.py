@@ -1,0 +1,342 @@
+"""One pour in one world of a batch: bodies enter, the rig acts, they pile up or flow, and the run ends.
+
+The rig says what it does and when a run is over (``rigs/rig.py``); nothing here knows a funnel from a drum. Everything
+that decides about a run happens at fixed simulated moments, every ``numerics.sample_interval``: bodies enter, curves
+are sampled, surfaces are set in motion, phases and outcomes are detected. How the steps in between are cut into
+launches makes no difference to a single bit.
+"""
+
+from __future__ import annotations
+
+import math
+import time as clock
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from solver.engine.world import SUMMARY_COLUMNS, Batch, law_table
+from solver.laws import CONTACT_LAWS
+from solver.observables.free_surface import surface_heights
+from solver.pours.contacts import Contacts, contacts_from
+from solver.pours.parameter_ramp import RAMP_STEPS, RAMP_TIME, Ramp, spring_ratio
+from solver.pours.raw_pour import packed, unpacked
+from solver.pours.record import Bodies, Outcome, Phase, Record, Verdict
+from solver.pours.record_builder import (
+    bodies_of,
+    entries_of,
+    free_surface_of,
+    lying,
+    measured_from,
+    member_spheres,
+    pile_of,
+    rolling_away,
+    trace_of,
+)
+from solver.pours.supply import Supply
+from solver.pours.verdict import RUNNING, Moment, may_be_over, stalled, verdict
+from solver.rigs.outlet import Obstruction, obstruction
+from solver.rigs.rig import Container, Switch
+from solver.scenes.scene import Scene, actual, pour_rig
+from solver.scenes.time_step import time_step
+
+SETTLE_LIMIT = 1.0
+
+"""``fill_then_open``: the rig acts this long [s] after the last body entered even if the fill still moves."""
+
+Summary = dict[str, float]
+
+
+class Pour:
+    """State of one pour; ``scene`` is the one with its set-up effects carried out.
+
+    Drive it with :meth:`steps_due`, ``batch.advance`` and :meth:`after`.
+    """
+
+    def __init__(self, batch: Batch, w: int, scene: Scene, seed: int) -> None:
+        scene = actual(scene)
+        self.batch, self.w, self.scene, self.seed = batch, w, scene, seed
+        self.rig = pour_rig(scene)
+        self.supply = Supply(scene, seed)
+        self.dt = time_step(scene)
+        batch.load(w, scene, self.supply.layout, self.dt, (True,) * len(self.rig.surfaces()))
+        self._law, self._table = CONTACT_LAWS[scene.contact.law], law_table(scene)
+        self._ramp: Ramp | None = None
+        self._ramp_left = 0
+        self.energy_put_in = 0.0
+        self._supplied = 0.0
+        self.steps = 0
+        self._time_base, self._steps_base = 0.0, 0
+        self.ended = self.outcome, self.message = RUNNING
+        self.samples: list[Summary] = []
+        self._free_surface: list[tuple[float, npt.NDArray[np.float64]]] = []
+        self._moving, self._quiet_samples = 0.0, 0
+        self._began: float | None = None if scene.insertion.protocol == "fill_then_open" else 0.0
+        self._to_do, self._inside = list(self.rig.actions()), self.container
+        self._act()
+        self._started = clock.perf_counter()
+        self._left = self._interval_steps()
+        self._insert()
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s], whatever the launches."""
+        return self._time_base + (self.steps - self._steps_base) * self.dt
+
+    @property
+    def entered(self) -> int:
+        """Number of bodies that have entered."""
+        return self.supply.entered
+
+    @property
+    def gate_shut(self) -> bool:
+        """Whether the rig is still being filled and has not begun to act."""
+        return self._began is None
+
+    @property
+    def gate_opened(self) -> float:
+        """Time [s] at which the rig began to act; 0 for ``pour_through``, and as long as it has not."""
+        return self._began or 0.0
+
+    @property
+    def container(self) -> Container:
+        """The inside of the rig at this moment."""
+        return self.rig.container(0.0 if self._began is None else self.time - self._began)
+
+    @property
+    def phase(self) -> Phase:
+        """Where the pour is."""
+        if self.ended[0] == Outcome.AT_REST:
+            return Phase.AT_REST
+        if self.supply.missing > 0 or self.gate_shut:
+            return Phase.FILL
+        if self.rig.running_time is not None:
+            return Phase.RUN
+        return Phase.DISCHARGE if self.samples and self.samples[-1]["in_funnel"] > 0.0 else Phase.PILE
+
+    def steps_due(self, at_most: int | None = None) -> int:
+        """Steps to run next: to the next moment of decision, or fewer; 0 when the pour is over."""
+        if self.outcome != Outcome.RUNNING:
+            return 0
+        limit = self._left
+        if self._ramp is not None:
+            limit = min(limit, self._ramp_left)
+        return limit if at_most is None else min(limit, at_most)
+
+    def decides_after(self, steps: int) -> bool:
+        """Whether ``steps`` more lead to a moment of decision."""
+        return steps >= self._left
+
+    def after(self, steps: int, row: npt.NDArray[np.float64] | None = None) -> bool:
+        """Take note of ``steps`` that were run. True at a moment of decision; it asks for this world's summary."""
+        if row is None and self.decides_after(steps):
+            raise ValueError("a moment of decision asks for the world's summary")
+        self.steps += steps
+        self._left -= steps
+        if self._ramp is not None:
+            # At moments of its own: a launch that was cut short must not change the bits of what follows.
+            self._ramp_left -= steps
+            if self._ramp_left <= 0:
+                self._follow_ramp(self._ramp)
+        if self._left > 0 or row is None:
+            return False
+        self._left = self._interval_steps()
+        self._sample(dict(zip(SUMMARY_COLUMNS, row.tolist(), strict=True)))
+        return True
+
+    def retune(self, scene: Scene) -> None:
+        """Let the running pour follow the material of ``scene``; wakes it up if it had come to rest.
+
+        Friction and effects act at once; stiffness and damping are ramped (see ``solver/pours/parameter_ramp.py``). Only materials,
+        pairs and effects of contacts and bodies may differ from the present scene; anything else takes a new pour. For
+        effects the batch needs them compiled in (RuntimeError otherwise): see :meth:`move_to`.
+        """
+        scene = actual(scene)
+        target = law_table(scene)
+        self.batch.set_effects(self.w, scene)
+        self.scene = scene
+        self._ramp = Ramp(self._law, self._table, target, self.time)
+        self._set_time_step(min(self.dt, time_step(scene)))
+        self.energy_put_in = 0.0
+        self._set_table(self._ramp.table(self.time))
+        self._ramp_left = self._ramp_steps()
+        self._quiet_samples = 0
+        if self.ended[0] in (Outcome.AT_REST, Outcome.JAMMED, Outcome.OBSTRUCTED):
+            self.ended = self.outcome, self.message = RUNNING
+
+    def move_to(self, batch: Batch) -> None:
+        """Go on in ``batch``, in the same world, with the same bits: for instance in one with effects compiled in."""
+        kept = self.batch.take(self.w)
+        batch.load(self.w, self.scene, self.supply.layout, self.dt, (True,) * len(self.rig.surfaces()))
+        batch.set_law(self.w, self._table)
+        batch.put(self.w, kept)
+        self.batch = batch
+
+    def bodies(self) -> Bodies:
+        """Present state of all bodies that have entered."""
+        return bodies_of(self.scene, self.supply.order, self.supply.layout, self.batch.bodies(self.w, self.entered))
+
+    def surface_poses(self) -> npt.NDArray[np.float64]:
+        """Where the rig's surfaces are: origin [m] and orientation wxyz, shape (k, 7)."""
+        return self.batch.surface_state(self.w)[:, :7]
+
+    def contacts(self) -> Contacts:
+        """Present contacts of the bodies, with each other and with the rig."""
+        return contacts_from(self.batch.contacts(self.w))
+
+    def record(self) -> Record:
+        """What the run leaves behind."""
+        state = self.batch.bodies(self.w, self.entered)
+        bodies = bodies_of(self.scene, self.supply.order, self.supply.layout, state)
+        spheres = member_spheres(self.scene, bodies)
+        # What rolls away is no part of a pile at rest; at a given moment it lies where it is, for a camera as well.
+        rolling = None if self.scene.numerics.duration > 0.0 else rolling_away(self.scene, self.container, state)
+        in_pile = lying(self.container, bodies, rolling)
+        return Record(
+            scene=self.scene,
+            seed=self.seed,
+            outcome=self.outcome,
+            message=self.message,
+            ended=self.ended,
+            bodies=bodies,
+            spheres=spheres,
+            in_pile=in_pile,
+            pile=measured_from(pile_of(bodies, spheres, in_pile), self.scene.axis),
+            free_surface=free_surface_of(self.rig.watch, self._free_surface),
+            trace=trace_of(self.samples),
+            entries=entries_of(self.supply.order, self.supply.entries),
+            gate_opened=self.gate_opened,
+            poured_mass=self.supply.mass,
+            dt=self.dt,
+            steps=self.steps,
+            wall_s=clock.perf_counter() - self._started,
+        )
+
+    def _interval_steps(self) -> int:
+        """Steps to the next moment of decision; the moment of the reading is one, wherever it falls."""
+        numerics = self.scene.numerics
+        interval = round(numerics.sample_interval / self.dt)
+        if numerics.duration > self.time:
+            interval = min(interval, math.ceil((numerics.duration - self.time) / self.dt - 1e-6))
+        return max(1, interval)
+
+    def _insert(self) -> None:
+        if (self._began is not None and not self.rig.refills) or not self.supply.due(self.time):
+            return
+        there = member_spheres(self.scene, self.bodies())
+        for b, entry in self.supply.placed(self.rig.feed(), there, self.time, self.steps):
+            self.batch.enter(self.w, b, entry.pose.position, entry.pose.quaternion, entry.velocity, np.zeros(3))
+            self._supplied += self._mechanical_energy(b, entry.pose.position, entry.velocity)
+
+    def _act(self) -> None:
+        """Carry out what the rig has to do by now."""
+        if self._began is None:
+            return
+        # Less a hair: the sum of many steps must not miss a moment by rounding.
+        while self._to_do and self._to_do[0].after <= self.time - self._began + 1e-9:
+            action = self._to_do.pop(0)
+            if isinstance(action, Switch):
+                self.batch.set_active(self.w, action.surface, action.active)
+            else:
+                self.batch.set_motion(self.w, action.surface, action.velocity, action.angular_velocity)
+        if self.container != self._inside:
+            self._inside = self.container
+            self.batch.set_container(self.w, self._inside)
+
+    def _mechanical_energy(self, b: int, position: npt.NDArray[np.float64], velocity: npt.NDArray[np.float64]) -> float:
+        """Kinetic and potential energy [J] of body ``b`` that does not turn."""
+        mass, gravity = self.supply.layout.numbers[b, 0], np.array(self.scene.gravity)
+        return float(mass * (0.5 * velocity @ velocity - gravity @ position))
+
+    def _sample(self, row: Summary) -> None:
+        row["time"] = self.time
+        row["supplied"] = self._supplied
+        row["entered"] = self.supply.entered_mass
+        row["lost"] = float(self.batch.take_out(self.w))
+        self.samples.append(row)
+        self._insert()
+        self._moving = max(row["speed"], row["funnel_speed"] if self.gate_shut else 0.0)
+        self._quiet_samples = self._quiet_samples + 1 if self._moving < self.scene.numerics.rest_speed else 0
+        self._watch()
+        self.ended = verdict(self.rig, self.scene.numerics, self._moment(row))
+        self.outcome, self.message = self._told()
+        waiting = self.time > self.supply.last_entry + SETTLE_LIMIT
+        if self.gate_shut and (self.supply.missing == 0 or self._blocked()) and (self._quiet() or waiting):
+            self._began, self._quiet_samples = self.time, 0
+        self._act()
+
+    def _watch(self) -> None:
+        """Keep the free surface of this moment, if the rig wants it."""
+        watch = self.rig.watch
+        if watch is not None and self._began is not None and self.time - self._began >= watch.after:
+            spheres = member_spheres(self.scene, self.bodies())
+            self._free_surface.append((self.time, surface_heights(spheres, watch.half_width) - watch.height))
+
+    def _told(self) -> Verdict:
+        """What the pour, if it has ended, has left: read off the raw pour, so that a stored one tells the same."""
+        if self.ended[0] != Outcome.AT_REST or not self.rig.leaves_heap:
+            return self.ended
+        kept = unpacked(packed(self.record()))
+        return kept.outcome, kept.message
+
+    def _quiet(self) -> bool:
+        numerics = self.scene.numerics
+        return self._quiet_samples * numerics.sample_interval >= numerics.rest_time
+
+    def _blocked(self) -> bool:
+        """The next body has been due for long and finds no place: the rig is full to the feed opening."""
+        return self.supply.overdue(self.time, SETTLE_LIMIT)
+
+    def _across(self) -> Obstruction | None:
+        """What lies across the outlet now."""
+        outlet, inside = self.rig.outlet, self.container
+        if outlet is None:
+            return None
+        bodies = self.bodies()
+        there = np.hypot(bodies.position[:, 0], bodies.position[:, 1]) < inside.radius
+        held = bodies.inside & there & (bodies.position[:, 2] > inside.height)
+        spheres = member_spheres(self.scene, bodies)
+        return obstruction(outlet, inside.height, bodies, spheres, held, self.rig.keeps_material)
+
+    def _moment(self, row: Summary) -> Moment:
+        moment = Moment(
+            time=self.time,
+            row=row,
+            acting=None if self._began is None else self.time - self._began,
+            acted=not self._to_do,
+            missing=self.supply.missing,
+            blocked=self._blocked(),
+            quiet=self._quiet(),
+            stalled=stalled(self.samples, self.scene.numerics, max(self.supply.last_entry, self.gate_opened)),
+            speed=self._moving,
+            room=self.batch.capacity.contacts,
+            poured_mass=self.supply.mass,
+        )
+        return replace(moment, across=self._across()) if may_be_over(moment) else moment
+
+    def _ramp_steps(self) -> int:
+        """Steps between two changes of the constants."""
+        return max(1, math.ceil(RAMP_TIME / RAMP_STEPS / self.dt))
+
+    def _follow_ramp(self, ramp: Ramp) -> None:
+        self._ramp_left = self._ramp_steps()
+        self._set_table(ramp.table(self.time))
+        if ramp.over(self.time):
+            self._ramp = None
+            self._set_time_step(time_step(self.scene))
+
+    def _set_table(self, table: npt.NDArray[np.float64]) -> None:
+        elastic = SUMMARY_COLUMNS.index("elastic")
+        before = self.batch.measure(self.w)[self.w, elastic]
+        self.batch.set_law(self.w, table)
+        self.batch.scale_springs(self.w, spring_ratio(self._law, self._table, table))
+        self._table = table
+        gained = float(self.batch.measure(self.w)[self.w, elastic] - before)
+        self.energy_put_in += gained
+        self._supplied += gained
+
+    def _set_time_step(self, dt: float) -> None:
+        self._time_base, self._steps_base = self.time, self.steps
+        self._left = max(1, math.ceil(self._left * self.dt / dt))
+        self.dt = dt
+        self.batch.set_time_step(self.w, dt)

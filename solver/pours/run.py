@@ -1,0 +1,151 @@
+"""Run many pours: a batch of worlds whose slots are filled again as pours finish."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from solver import backend
+from solver.engine.state import Capacity
+from solver.engine.wall_tables import wall_tables
+from solver.engine.world import Batch, compiled_in, wall_materials
+from solver.pours.checkpoint import Checkpoint, resumed
+from solver.pours.pour import Pour
+from solver.pours.record import Record
+from solver.scenes.scene import Scene, actual, body_counts
+
+CONTACTS_PER_MEMBER = 16
+
+"""Room in the contact list: entries per member sphere. A bed of long bodies holds 2–4."""
+
+WORLDS_PER_THREAD = 4
+
+"""Pours in flight per thread: enough to even out that some are free flight and some a packed pile."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One pour to run."""
+
+    scene: Scene
+    seed: int
+    tag: int = 0
+    """A number of the caller's own, handed back with the record."""
+    interrupted: Checkpoint | None = None
+    """Go on from here instead of beginning."""
+
+    def begin(self, batch: Batch, w: int) -> Pour:
+        """The pour in world ``w``, ready to be driven."""
+        if self.interrupted is not None:
+            return resumed(batch, w, self.scene, self.interrupted)
+        return Pour(batch, w, self.scene, self.seed)
+
+
+def capacity_for(scenes: Sequence[Scene], worlds: int) -> Capacity:
+    """A batch for any of ``scenes``, which share a contact law: :func:`sizes_for` them, and what is compiled in."""
+    return replace(sizes_for(scenes, worlds), **compiled_in([actual(scene) for scene in scenes]))
+
+
+def sizes_for(scenes: Sequence[Scene], worlds: int) -> Capacity:
+    """Sizes that hold any of ``scenes``, rounded up so that a small change of the mixture fits as well."""
+    scenes = [actual(scene) for scene in scenes]
+    bodies = members = kinds = 0
+    for scene in scenes:
+        numbers = body_counts(scene)
+        bodies = max(bodies, sum(numbers))
+        members = max(members, sum(n * len(b.clump.radii) for n, b in zip(numbers, scene.bodies, strict=True)))
+        kinds = max(kinds, len(scene.bodies) + len(wall_materials(scene)))
+    tables = [wall_tables(scene.rig.surfaces()) for scene in scenes]
+    return Capacity(
+        worlds=worlds,
+        bodies=bodies,
+        members=members,
+        contacts=CONTACTS_PER_MEMBER * members,
+        kinds=kinds,
+        walls=max(8, *(len(table.poses) for table in tables)),
+        surfaces=max(8, *(len(table.surfaces) for table in tables)),
+        triangles=max(1, *(len(table.corners) for table in tables)),
+        cells=max(1, *(len(table.first) for table in tables)),
+        cell_items=max(1, *(len(table.items) for table in tables)),
+    ).rounded()
+
+
+def run_queue(
+    queue: deque[Job],
+    room: Sequence[Scene],
+    threads: int | None = None,
+    worlds: int | None = None,
+    on_sample: Callable[[Job, Pour], None] | None = None,
+) -> Iterator[tuple[Job, Record]]:
+    """Run the jobs in ``queue`` and yield (job, record) as each finishes; jobs may be appended meanwhile.
+
+    ``room`` lists scenes that any job has to fit into, ``worlds`` is the number of pours in flight (default: four per
+    thread), ``on_sample`` is called with (job, pour) at every moment of decision. Equal job → equal bits, whatever else
+    is in flight. Pours of different contact laws run in a batch each.
+    """
+    backend.init(threads=threads)
+    slots = worlds or WORLDS_PER_THREAD * (threads or os.cpu_count() or 1)
+    by_law = {law: [one for one in room if one.contact.law == law] for law in {one.contact.law: None for one in room}}
+    batches = {law: Batch(capacity_for(scenes, slots)) for law, scenes in by_law.items()}
+    running: dict[tuple[str, int], tuple[Job, Pour]] = {}
+    # A thread works on a contiguous share of the worlds: fill the shares evenly.
+    places = sorted(range(slots), key=lambda w: (w % max(1, slots // (threads or os.cpu_count() or 1)), w))
+    while True:
+        while queue and len(running) < slots:
+            job = queue.popleft()
+            law = job.scene.contact.law
+            free = next((law, w) for w in places if (law, w) not in running)
+            running[free] = (job, job.begin(batches[law], free[1]))
+        if not running:
+            return
+        for law, batch in batches.items():
+            due = [running[law, w][1].steps_due() if (law, w) in running else 0 for w in range(slots)]
+            if not any(due):
+                continue
+            summary = batch.advance(np.array(due, dtype=np.int32))
+            for w in [w for of, w in list(running) if of == law]:
+                job, pour = running[law, w]
+                if pour.after(due[w], summary[w]) and on_sample is not None:
+                    on_sample(job, pour)
+                if pour.steps_due() == 0:
+                    del running[law, w]
+                    yield job, pour.record()
+
+
+def run_job(batch: Batch, job: Job) -> Record:
+    """Run one job in world 0 of ``batch``, which nothing else uses meanwhile."""
+    pour = job.begin(batch, 0)
+    steps = np.zeros(batch.capacity.worlds, dtype=np.int32)
+    while (due := pour.steps_due()) > 0:
+        steps[0] = due
+        pour.after(due, batch.advance(steps)[0])
+    return pour.record()
+
+
+def run_pours(
+    jobs: Sequence[Job],
+    threads: int | None = None,
+    worlds: int | None = None,
+    on_sample: Callable[[int, Pour], None] | None = None,
+) -> Iterator[tuple[int, Record]]:
+    """Run ``jobs`` and yield (index of the job, record) as each finishes (see :func:`run_queue`)."""
+    if not jobs:
+        return
+    tagged = deque(replace(job, tag=k) for k, job in enumerate(jobs))
+    slots = min(len(jobs), worlds or WORLDS_PER_THREAD * (threads or os.cpu_count() or 1))
+
+    def sample(job: Job, pour: Pour) -> None:
+        if on_sample is not None:
+            on_sample(job.tag, pour)
+
+    for job, record in run_queue(tagged, [job.scene for job in jobs], threads, slots, sample):
+        yield job.tag, record
+
+
+def run_pour(scene: Scene, seed: int, threads: int | None = None) -> Record:
+    """Run one pour to its end."""
+    return next(run_pours([Job(scene, seed)], threads=threads))[1]

@@ -1,0 +1,277 @@
+"""Worker processes that run pours side by side: one thread and one world each, so that none waits for another.
+
+In one process all worlds wait at the end of a launch for the slowest, and while Python feeds and samples one world the
+other cores rest: two threads of :func:`solver.pours.run.run_queue` do the work of 1.5, two workers that of 2. The bits are
+the same. Of workers that need kernels which nobody has compiled yet, one compiles them and the others wait. A worker
+ends with its pipe: at :meth:`Crew.close`, or when the process that made it is gone.
+"""
+
+from __future__ import annotations
+
+import multiprocessing as mp
+import os
+import signal
+import sys
+from collections import deque
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from multiprocessing import resource_tracker
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from solver.scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from solver.engine.state import Capacity
+    from solver.engine.world import Batch
+    from solver.pours.record import Record
+    from solver.pours.run import Job
+
+MOMENTS = 3
+
+"""Moments of decision of a pour after which its kernels are compiled."""
+
+GONE = "a worker process has ended before its work was done"
+
+
+class Crew:
+    """Processes that are started when they are first needed and kept for the next queue."""
+
+    def __init__(self, workers: int | None = None) -> None:
+        self.workers = workers or os.cpu_count() or 1
+        """How many pour at the same time."""
+        self._processes: list[tuple[BaseProcess, Connection]] = []
+
+    def run_queue(self, queue: deque[Job], room: Sequence[Scene]) -> Iterator[tuple[Job, Record]]:
+        """Run the jobs in ``queue`` and yield (job, record) as each finishes; jobs may be appended meanwhile.
+
+        ``room`` lists scenes that any job has to fit into. Raises RuntimeError with a worker's error, or if one died.
+        """
+        if not self._processes:
+            self._processes = [_worker() for _ in range(self.workers)]
+        for _, pipe in self._processes:
+            _send(pipe, list(room))
+        idle = [pipe for _, pipe in self._processes]
+        busy: dict[Connection, Job] = {}
+        try:
+            while queue or busy:
+                while queue and idle:
+                    pipe = idle.pop(0)
+                    busy[pipe] = queue.popleft()
+                    _send(pipe, busy[pipe])
+                for pipe in [ready for ready in wait(list(busy)) if isinstance(ready, Connection)]:
+                    record = _answer(pipe)
+                    idle.append(pipe)
+                    yield busy.pop(pipe), record
+        finally:
+            if busy:  # left before the end: what still runs is of no use
+                self.close(at_once=True)
+
+    def close(self, at_once: bool = False) -> None:
+        """End the workers; ``at_once`` also those that are in the middle of a pour."""
+        for process, pipe in self._processes:
+            pipe.close()
+            if at_once:
+                process.kill()
+            process.join()
+        self._processes = []
+
+    def __enter__(self) -> Crew:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close(at_once=error[0] is not None)
+
+
+def warm_up(rooms: Sequence[Sequence[Scene]], workers: int | None = None) -> Iterator[tuple[int, float | None]]:
+    """Have the kernels compiled and kept that a crew needs for the scenes of each room.
+
+    Args:
+        rooms: scenes that are to be run by one crew, as in :meth:`Crew.run_queue`.
+        workers: processes at once, by default one per core.
+
+    Yields:
+        (number of the room, seconds that it took) as each is done; None for kernels that were kept already, or by
+        another room.
+
+    Raises:
+        RuntimeError: a worker's error, or one died.
+    """
+    from solver.pours.kernel_cache import missing
+
+    alike: dict[tuple[Capacity, ...], list[int]] = {}
+    for k, room in enumerate(rooms):
+        alike.setdefault(tuple(Rooms().make(room)), []).append(k)
+    waiting = deque(alike.items())
+    busy: dict[Connection, tuple[list[int], BaseProcess, float]] = {}
+    try:
+        while waiting or busy:
+            while waiting and len(busy) < (workers or os.cpu_count() or 1):
+                sizes, numbers = waiting.popleft()
+                if not missing(sizes):
+                    yield from ((k, None) for k in numbers)
+                    continue
+                # A process for each: kernels depend on what was allocated before.
+                process, pipe = _worker()
+                busy[pipe] = numbers, process, perf_counter()
+                _send(pipe, list(rooms[numbers[0]]))
+                _send(pipe, None)
+            for pipe in [ready for ready in wait(list(busy)) if isinstance(ready, Connection)] if busy else []:
+                _answer(pipe)
+                numbers, process, began = busy.pop(pipe)
+                pipe.close()
+                process.join()
+                yield numbers[0], perf_counter() - began
+                yield from ((k, None) for k in numbers[1:])
+    finally:
+        for pipe, (_, process, _) in busy.items():
+            process.kill()
+            pipe.close()
+            process.join()
+
+
+def _worker() -> tuple[BaseProcess, Connection]:
+    ours, theirs = mp.Pipe()
+    process = mp.get_context("spawn").Process(target=_work, args=(theirs,), name="pours")
+    with deaf_to_interrupts():
+        process.start()
+    theirs.close()
+    return process, ours
+
+
+def _send(pipe: Connection, order: Any) -> None:
+    try:
+        pipe.send(order)
+    except OSError:
+        raise RuntimeError(GONE) from None
+
+
+def _answer(pipe: Connection) -> Any:
+    try:
+        answer = pipe.recv()
+    except (EOFError, OSError):
+        raise RuntimeError(GONE) from None
+    if isinstance(answer, BaseException):
+        raise RuntimeError(f"a pour broke off: {answer!r}") from answer
+    return answer
+
+
+@contextmanager
+def deaf_to_interrupts() -> Iterator[None]:
+    """Processes that are started within do not hear Ctrl-C, from their first moment on.
+
+    It reaches the whole group. A process can ignore it by itself only once it has imported what it runs, and until
+    then would print a traceback.
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    # Started with the first process otherwise, and that lets Ctrl-C through again.
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def begin_worker() -> None:
+    """Make this a worker process: one CPU thread, and Ctrl-C left to the process in charge."""
+    # It reaches the whole group; the process in charge decides, and its end closes the pipe.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    from solver import backend
+
+    backend.init(threads=1)
+
+
+def _work(pipe: Connection) -> None:
+    """Run what comes through ``pipe``: a list of scenes makes room for them, a job is answered by its record.
+
+    None is answered by None: what came before is done.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # at once: what follows is imported for a second
+    from solver.pours.run import run_job
+
+    rooms, begun = Rooms(), False
+    while True:
+        try:
+            order = pipe.recv()
+        except EOFError:
+            return
+        try:
+            if isinstance(order, list):
+                (rooms.make if begun else rooms.begin)(order)
+                begun = True
+                continue
+            answer: Any = None if order is None else run_job(rooms.for_scene(order.scene), order)
+        except Exception as error:  # whatever it is, the process in charge has to know
+            answer = error
+        try:
+            pipe.send(answer)
+        except BrokenPipeError:
+            return
+
+
+class Rooms:
+    """A worker's batches of one world: a scene without effects runs in one that has none compiled in (0.8 of the time).
+
+    They are kept as long as they are large enough, since another size would compile anew.
+    """
+
+    def __init__(self) -> None:
+        self._capacity: Capacity | None = None
+        self._batches: dict[tuple[str, bool, bool], Batch] = {}
+
+    def make(self, scenes: Sequence[Scene]) -> list[Capacity]:
+        """Make room for ``scenes``, and leave what is there; returns the sizes of their batches."""
+        from solver.pours.run import sizes_for
+
+        needed = sizes_for(scenes, 1)
+        self._capacity = needed if self._capacity is None else self._capacity.joined(needed)
+        # Without effects first: kernels depend on what was allocated before.
+        return sorted({self._size(scene) for scene in scenes}, key=lambda size: (size.law, size.effects, size.sharing))
+
+    def begin(self, scenes: Sequence[Scene]) -> None:
+        """Make room for ``scenes`` and start Taichi, with kernels that this process or another one compiles."""
+        from solver.pours.kernel_cache import compiled_once
+
+        sizes = self.make(scenes)
+        examples = {self._size(scene): scene for scene in scenes}
+        with compiled_once(sizes) as mine:
+            begin_worker()
+            for size in sizes:
+                batch = self.for_scene(examples[size])
+                if size in mine:
+                    _pour_for_a_moment(batch, examples[size])
+
+    def for_scene(self, scene: Scene) -> Batch:
+        """The batch for ``scene``."""
+        from solver.engine.world import Batch
+
+        wanted = self._size(scene)
+        variant = (wanted.law, wanted.effects, wanted.sharing)
+        if variant not in self._batches or self._batches[variant].capacity != wanted:
+            self._batches[variant] = Batch(wanted)
+        return self._batches[variant]
+
+    def _size(self, scene: Scene) -> Capacity:
+        from solver.engine.world import compiled_in
+
+        assert self._capacity is not None, "room is made before the first job"
+        return replace(self._capacity, **compiled_in([scene]))
+
+
+def _pour_for_a_moment(batch: Batch, scene: Scene) -> None:
+    """Compile the kernels of a pour, all but a few small ones that its later moments need."""
+    from solver.pours.pour import Pour
+
+    pour = Pour(batch, 0, scene, seed=1)
+    for _ in range(MOMENTS):
+        if due := pour.steps_due():
+            pour.after(due, batch.advance(np.array([due], dtype=np.int32))[0])
+    pour.bodies()

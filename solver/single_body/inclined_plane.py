@@ -1,0 +1,106 @@
+"""Angle at which a body begins to slide (``rigs/inclined_plane.py``).
+
+First a fast tilt finds the angle roughly, then a slow one from ``MARGIN`` below it measures. Sliding is noticed late,
+at ``SLIDING`` speed. As the tilt grows in proportion to time, so does the acceleration: √v grows in proportion to the
+time, and to the tilt, since the onset, which is where the line through two of its values meets zero.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import cast
+
+import numpy as np
+
+from solver.rigs.inclined_plane import InclinedPlane
+from solver.scenes.scene import Scene
+from solver.single_body.bench import Bench, BenchResult, Quantity, held
+
+FAST = 20.0
+
+"""Speed of the first tilt, and of the way to where the second begins [°/s]."""
+
+MARGIN = 3.0
+
+"""How far below the rough angle the slow tilt begins [°]."""
+
+STEEPEST = 85.0
+
+"""Tilt at which a body that holds is given up [°]."""
+
+SLIDING = 1e-3
+
+"""Speed at which the body slides [m/s]."""
+
+MOMENT = 1e-3
+
+"""Simulated time between two changes of the tilt [s]."""
+
+SETTLING = 0.1
+
+"""Time to settle on the level plane [s]."""
+
+Path = list[tuple[float, float, float]]
+
+"""Tilt [°], displacement [m], speed [m/s]."""
+
+
+def measure(scene: Scene, seed: int) -> BenchResult:
+    """Tilt the plane under the held body; the angle of sliding beside atan μ_s of the pair."""
+    rig = cast(InclinedPlane, scene.rig)
+    body = next(body for body in scene.bodies if body.name == rig.body)
+    rough, _ = _tilt(scene, rig, 0.0, FAST)
+    slow = min(rig.tilt_rate, FAST)
+    angle, path = _tilt(scene, rig, max(0.0, rough - MARGIN), slow) if math.isfinite(rough) else (rough, [])
+    friction = scene.contact_pair(body, rig.wall).static_friction
+    return BenchResult(
+        test=rig.name,
+        body=body.name,
+        wall=rig.wall,
+        quantities=(
+            Quantity("sliding_angle_deg", "deg", angle, math.degrees(math.atan(friction))),
+            Quantity("static_friction", "1", math.tan(math.radians(angle)), friction),
+        ),
+        series=(
+            ("tilt_deg", tuple(tilt for tilt, _, _ in path)),
+            ("displacement_m", tuple(displacement for _, displacement, _ in path)),
+        ),
+        note="" if math.isfinite(angle) else f"the body still holds at {STEEPEST:g} deg",
+    )
+
+
+def _tilt(scene: Scene, rig: InclinedPlane, start: float, rate: float) -> tuple[float, Path]:
+    """Angle of sliding [°], NaN if the body holds, and the path; the tilt grows by ``rate`` [°/s] from ``start`` on."""
+    body = next(body for body in scene.bodies if body.name == rig.body)
+    bench = Bench(scene, rig, held(body))
+    gravity = math.hypot(*scene.gravity)
+    clump = body.clump
+    bench.put(np.array([0.0, 0.0, float((clump.radii - clump.centres[:, 2]).max())]))
+    _set_tilt(bench, gravity, 0.0)
+    bench.run(SETTLING)
+    origin, tilt, path = float(bench.state()[0]), 0.0, Path()
+    moment = bench.steps_of(MOMENT)
+    while tilt < STEEPEST:
+        tilt += (rate if tilt >= start else FAST) * moment
+        _set_tilt(bench, gravity, tilt)
+        bench.run(MOMENT)
+        state = bench.state()
+        path.append((tilt, float(state[0]) - origin, float(state[7])))
+        if state[7] > SLIDING:
+            return _onset(path), path
+    return math.nan, path
+
+
+def _onset(path: Path) -> float:
+    """Tilt [°] where √v = 0, on the line through the first moment above a quarter of ``SLIDING`` and the last one."""
+    first, _, slow = next(moment for moment in path if moment[2] > 0.25 * SLIDING)
+    last, _, fast = path[-1]
+    if last == first:
+        return first
+    return max(0.0, first - (last - first) * math.sqrt(slow) / (math.sqrt(fast) - math.sqrt(slow)))
+
+
+def _set_tilt(bench: Bench, gravity: float, tilt_deg: float) -> None:
+    """Turn gravity so that the plane slopes down towards +x."""
+    angle = math.radians(tilt_deg)
+    bench.batch.set_gravity(0, (gravity * math.sin(angle), 0.0, -gravity * math.cos(angle)))
