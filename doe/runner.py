@@ -10,7 +10,7 @@ import numpy as np
 
 from doe.runs import Run, Setting
 from doe.store import READINGS, RIG, Reader, Store, StoredRun, StoreError, observables_of, read_off
-from doe.study import TRIES
+from doe.studies.study import TRIES
 from solver import PHYSICS, Job, Scene, observable_names, packed, parameters, pour_key, run_queue, value, with_values
 from solver import Record as PourRecord
 

@@ -13,8 +13,8 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from doe.analysis.t_tests import Sample
 from doe.record import Record
-from doe.t_tests import Sample
 from solver import Outcome
 
 FloatArray = npt.NDArray[np.float64]

@@ -7,7 +7,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from doe.record import Record
-from doe.study_table import Table, number, one_of, only, positive, required, whole
+from doe.studies.study_table import Table, number, one_of, only, positive, required, whole
 
 
 @dataclass(frozen=True)

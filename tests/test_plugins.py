@@ -115,7 +115,7 @@ def test_an_observable_is_read_named_and_a_target_of_studies(site, tmp_path):
     code = """
 import json
 import tomllib
-from doe.study import study_from
+from doe.studies.study import study_from
 from explorer.report.units_for_people import observable_label
 from solver import asset_path, named
 path = asset_path("studies", "sunflower_extract")
@@ -171,7 +171,7 @@ def test_a_stage_runs_in_the_study_that_names_it_with_a_design_of_the_package(si
     code = f"""
 import json
 from pathlib import Path
-from doe.study_result import study_from
+from doe.studies.study_result import study_from
 from explorer.report.sections import sections_of
 result = study_from(json.loads(Path({str(tmp_path / "out" / "result.json")!r}).read_text()))
 print(json.dumps([section.title for section in sections_of(result)]))

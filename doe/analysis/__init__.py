@@ -1,1 +1,1 @@
-"""The analysis of a design that was run anywhere: which model its runs can bear, and what that model says."""
+"""What may be concluded from runs: effects, surfaces, optima, t tests and power. Statistics only: no solver, no files."""

@@ -13,18 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from doe.analysis.box_cox import BoxCox, box_cox
+from doe.analysis.canonical import Canonical, RidgePath, canonical_analysis, ridge_analysis
 from doe.analysis.contrasts import Contrasts, Curvature, curvature, is_regular, regular_contrasts, screening_contrasts
-from doe.analysis.diagnostics import Diagnostics, diagnose_fit
+from doe.analysis.model_adequacy import BoxCox, Diagnostics, box_cox, diagnose_fit
 from doe.analysis.models import Order, OrderFit, bearable, fit_summary, hierarchical, highest_order, terms_of
-from doe.analysis.ridge import RidgePath, ridge_analysis
-from doe.ascent import Region
-from doe.canonical import Canonical, canonical_analysis
-from doe.optimum import Optimum, find_optimum
+from doe.analysis.optimum import Optimum, find_optimum
+from doe.analysis.screening import Screening, analyse_screening
+from doe.analysis.steepest_ascent import Region
+from doe.analysis.surface import Surface, fit_surface, term_names
+from doe.analysis.surface_anova import SurfaceAnova, analyse_surface
 from doe.record import Record
-from doe.screening import Screening, analyse_screening
-from doe.surface import Surface, fit_surface, term_names
-from doe.surface_anova import SurfaceAnova, analyse_surface
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -15,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
+from doe.analysis.replicates import row_moments
 from doe.designs.plackett_burman import plackett_burman
 from doe.record import Record
-from doe.replicates import row_moments
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]

@@ -16,12 +16,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from doe.ascent import Region
+from doe.analysis.replicates import require_matrix
+from doe.analysis.steepest_ascent import Region
+from doe.analysis.surface import fit_surface, included_terms, second_order_terms
+from doe.analysis.surface_anova import analyse_surface
 from doe.errors import StatisticsError
 from doe.record import Record
-from doe.replicates import require_matrix
-from doe.surface import fit_surface, included_terms, second_order_terms
-from doe.surface_anova import analyse_surface
 
 FloatArray = npt.NDArray[np.float64]
 Order = Literal["linear", "interactions", "quadratic"]
@@ -73,7 +73,7 @@ def hierarchical(names: Sequence[str], terms: Sequence[str]) -> tuple[str, ...]:
 
 
 def fit_summary(coded: FloatArray, responses: FloatArray, region: Region) -> tuple[OrderFit, ...]:
-    """Return the three orders on the valid runs; shapes as in `doe.surface.fit_surface`."""
+    """Return the three orders on the valid runs; shapes as in `doe.analysis.surface.fit_surface`."""
     found: list[OrderFit] = []
     before = _mean_only(responses)
     for order in ORDERS:

@@ -89,7 +89,7 @@ class Quote:
 class DropTest:
     """A restitution test: a body falls freely on an inclined plate and lands beside it.
 
-    formula: restitution from what was measured (see `doe.audit.drop_test`). fall: height above the plate [m];
+    formula: restitution from what was measured (see `doe.audit.restitution_formula`). fall: height above the plate [m];
     landing: height of the plate above the floor [m], equal to fall if None.
     """
 

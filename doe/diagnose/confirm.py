@@ -30,7 +30,7 @@ from doe.diagnose.result import HeldOut, Model
 from doe.measurement.features import coarse_map
 from doe.measurement.measurement import Condition
 from doe.measurement.piles import PileSurface
-from doe.residual_map import ResidualMap, height_difference, pooled_deviation
+from doe.measurement.residual_map import ResidualMap, height_difference, pooled_deviation
 
 FloatArray = npt.NDArray[np.float64]
 

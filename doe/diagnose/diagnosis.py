@@ -30,8 +30,8 @@ from doe.errors import MeasurementError
 from doe.holdout import HoldoutCondition, HoldoutError, holdout_errors
 from doe.measurement.features import SCAN, feature_set
 from doe.measurement.measurement import Condition, Measurement
+from doe.measurement.residual_map import ResidualMap
 from doe.measurement.summaries import summaries_of_data, summary_names
-from doe.residual_map import ResidualMap
 from doe.runner import Pours
 from doe.store import Store
 

@@ -1,9 +1,9 @@
 """From the readings of a bench test to parameters of a material: statistics on tables, no solver and no picture."""
 
 from doe.laboratory.analysis import TESTS, analyse
+from doe.laboratory.replicates import Summary, summarise
 from doe.laboratory.result import CurveFit, Derived, Estimate, LabResult
-from doe.laboratory.summary import Summary, summarise
-from doe.laboratory.table import LaboratoryError, read_table
+from doe.laboratory.tables import LaboratoryError, read_table
 
 __all__ = [
     "TESTS",

@@ -6,13 +6,12 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 
-from doe.laboratory import columns, weighing
-from doe.laboratory.columns import Layout
+from doe.laboratory import tables, weighing
 from doe.laboratory.contact import friction, restitution
 from doe.laboratory.dimensions import FLAT, SHAPES, dimensions, size_spreads
 from doe.laboratory.elastic import moduli, poisson_ratios
 from doe.laboratory.result import LabResult
-from doe.laboratory.table import LaboratoryError, Table, read_table
+from doe.laboratory.tables import LaboratoryError, Layout, Table, read_table
 
 
 @dataclass(frozen=True)
@@ -66,14 +65,14 @@ def _dimensions(table: Table) -> LabResult:
 
 
 TESTS: dict[str, BenchTest] = {
-    "compression": BenchTest(columns.FORCE_DISPLACEMENT, _compression),
-    "shear": BenchTest(columns.FORCE_DISPLACEMENT, _shear),
-    "inclined_plane": BenchTest(columns.INCLINED_PLANE, _inclined_plane),
-    "drop": BenchTest(columns.DROP, _drop),
-    "moisture": BenchTest(columns.MOISTURE, _moisture),
-    "density": BenchTest(columns.IMMERSION, _density),
-    "composition": BenchTest(columns.COMPOSITION, _composition),
-    "dimensions": BenchTest(columns.DIMENSIONS, _dimensions),
+    "compression": BenchTest(tables.FORCE_DISPLACEMENT, _compression),
+    "shear": BenchTest(tables.FORCE_DISPLACEMENT, _shear),
+    "inclined_plane": BenchTest(tables.INCLINED_PLANE, _inclined_plane),
+    "drop": BenchTest(tables.DROP, _drop),
+    "moisture": BenchTest(tables.MOISTURE, _moisture),
+    "density": BenchTest(tables.IMMERSION, _density),
+    "composition": BenchTest(tables.COMPOSITION, _composition),
+    "dimensions": BenchTest(tables.DIMENSIONS, _dimensions),
 }
 
 

@@ -15,8 +15,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from doe.laboratory.drop_flight import flight, tangential_share
-from doe.laboratory.table import LaboratoryError
+from doe.laboratory.contact import flight, tangential_share
+from doe.laboratory.tables import LaboratoryError
 from doe.record import Record
 
 RESTITUTIONS = (0.2, 0.35, 0.5, 0.65, 0.8)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from doe.laboratory.replicates import summarise
 from doe.laboratory.result import Derived
-from doe.laboratory.summary import summarise
-from doe.laboratory.table import Row, Table
+from doe.laboratory.tables import Row, Table
 
 
 def derived(

@@ -21,7 +21,7 @@ from scipy import stats
 
 from doe.laboratory.derive import no_parameter, per_row
 from doe.laboratory.result import Derived, Estimate
-from doe.laboratory.table import Row, Table
+from doe.laboratory.tables import Row, Table
 
 SHAPES = (
     "dimensions are not written as a shape: they do not tell an ellipsoid from a box. Put the means into the body's "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from doe.laboratory.linear_range import LinearRange
-from doe.laboratory.summary import Summary
+from doe.laboratory.replicates import Summary
 from doe.record import Record
 
 CONDITIONS = ("drop_height",)

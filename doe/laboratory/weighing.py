@@ -16,7 +16,7 @@ from collections.abc import Collection
 
 from doe.laboratory.derive import derived, no_parameter, per_row
 from doe.laboratory.result import Derived
-from doe.laboratory.table import LaboratoryError, Row, Table
+from doe.laboratory.tables import LaboratoryError, Row, Table
 
 FRACTIONS = "the fractions of a sample add up to one, so that their errors hang together"
 

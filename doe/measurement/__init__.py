@@ -6,8 +6,8 @@ functions.
 
 from doe.measurement.load import load_measurement
 from doe.measurement.measurement import Condition, CrossCheck, MeasuredParameter, Measurement, Observation
+from doe.measurement.observations import readings_of_data, readings_of_record
 from doe.measurement.reach import Reach, reach_of
-from doe.measurement.readings import readings_of_data, readings_of_record
 from doe.measurement.summaries import (
     summaries_of_data,
     summaries_of_record,

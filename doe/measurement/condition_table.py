@@ -24,7 +24,7 @@ from typing import Any
 
 from doe.errors import MeasurementError
 from doe.measurement.measurement import MeasuredParameter
-from doe.study_table import Table, number, one_of, only, section
+from doe.studies.study_table import Table, number, one_of, only, section
 from solver import (
     EFFECTS,
     Scene,

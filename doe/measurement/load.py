@@ -18,14 +18,13 @@ from pathlib import Path
 from doe.errors import MeasurementError, StudyFileError
 from doe.measurement.condition_table import KEYS as CONDITION_KEYS
 from doe.measurement.condition_table import condition_scene, in_rig, is_turned
-from doe.measurement.feasible import narrowed
 from doe.measurement.measurement import Condition, CrossCheck, MeasuredParameter, Measurement, Role
 from doe.measurement.observations import read_observations
-from doe.measurement.parameter_table import read_parameters
+from doe.measurement.parameter_table import narrowed, read_parameters
 from doe.measurement.photographs import photograph_entries, photograph_values
 from doe.measurement.piles import pile_files, pile_surfaces
 from doe.measurement.scans import UpperSurface, read_scans, scan_files, scan_settings
-from doe.study_table import Table, entries, one_of, only, required, section, whole
+from doe.studies.study_table import Table, entries, one_of, only, required, section, whole
 from solver import AssetNotFoundError, ParameterError, Scene, all_names, load_material, named, parse_quantity, read_toml
 
 FILE = "measurement.toml"

@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.errors import MeasurementError
-from doe.study_table import Table, number, only, required, whole
+from doe.studies.study_table import Table, number, only, required, whole
 from solver import PhotographedPile, PhotographError, open_picture, parse_quantity, read_photograph
 
 Array = npt.NDArray[np.float64]

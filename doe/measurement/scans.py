@@ -34,7 +34,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from doe.errors import MeasurementError
-from doe.study_table import Table, number, only
+from doe.studies.study_table import Table, number, only
 from solver import HeightMap, ParameterError, parse_quantity
 
 Array = npt.NDArray[np.float64]

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.measurement.measurement import Condition
-from doe.measurement.readings import PROFILE, SLOPES, Readings, readings_of_data, readings_of_record
+from doe.measurement.observations import PROFILE, SLOPES, Readings, readings_of_data, readings_of_record
 from solver import Record
 
 Array = npt.NDArray[np.float64]

@@ -1,7 +1,6 @@
 """The stages of a study, one file each (``stage.py`` says how to add one)."""
 
 from doe.errors import StudyFileError
-from doe.profile import Profile
 from doe.stages.ascent import AscentStage
 from doe.stages.pilot import PilotStage
 from doe.stages.scan import ScanStage
@@ -9,7 +8,8 @@ from doe.stages.screening import AssumptionStage, ScreeningStage
 from doe.stages.stage import Stage
 from doe.stages.surface import OptimumStage, SurfaceStage
 from doe.stages.verification import VerificationStage
-from doe.study import Study
+from doe.studies.profile import Profile
+from doe.studies.study import Study
 from solver import Registry, instance_of
 
 OWN: tuple[Stage, ...] = (

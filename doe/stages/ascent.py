@@ -7,16 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from doe.ascent import AscentFactor, AscentPath, Bracket, Region, ascent_path, bracket, region_around
-from doe.pilot import Noise
-from doe.power import smallest_effect
-from doe.profile import Profile
+from doe.analysis.pilot import Noise
+from doe.analysis.power import smallest_effect
+from doe.analysis.screening import SIGNIFICANT
+from doe.analysis.steepest_ascent import AscentFactor, AscentPath, Bracket, Region, ascent_path, bracket, region_around
 from doe.record import Record
 from doe.runs import FloatArray, Run, Runner, Setting, responses
-from doe.screening import SIGNIFICANT
 from doe.stages.screening import ScreeningResult
 from doe.stages.stage import Chain, Stage, ended
-from doe.study import Factor, Study
+from doe.studies.profile import Profile
+from doe.studies.study import Factor, Study
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from doe.pilot import Noise, replicate_noise
-from doe.power import smallest_effect
-from doe.profile import Profile
+from doe.analysis.pilot import Noise, replicate_noise
+from doe.analysis.power import smallest_effect
 from doe.record import Record
 from doe.runs import FloatArray, Run, Runner, Setting, no_pile_shares, responses
 from doe.stages.stage import Chain, Stage, ended
-from doe.study import Study
+from doe.studies.profile import Profile
+from doe.studies.study import Study
 from doe.target import observed_text
 
 

@@ -9,15 +9,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from doe.analysis.screening import Screening, Selected, analyse_screening, select_factors
 from doe.designs import ChosenDesign
 from doe.errors import StatisticsError
-from doe.factors import MIN_BODIES, bodies_touched
-from doe.profile import Profile
 from doe.record import Record
 from doe.runs import FloatArray, Run, Runner, Setting, no_pile_shares, responses
-from doe.screening import Screening, Selected, analyse_screening, select_factors
 from doe.stages.stage import Chain, Stage, ended
-from doe.study import CALIBRATED, Factor, Study
+from doe.studies.factors import MIN_BODIES, bodies_touched
+from doe.studies.profile import Profile
+from doe.studies.study import CALIBRATED, Factor, Study
 from doe.target import observed_text
 
 

@@ -13,13 +13,13 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from doe.errors import StudyFileError
-from doe.profile import Profile
 from doe.record import Record
 from doe.runs import Run, Runner, Setting
-from doe.study import Study
+from doe.studies.profile import Profile
+from doe.studies.study import Study
 
 if TYPE_CHECKING:
-    from doe.study_result import StageResult, Stages
+    from doe.studies.study_result import StageResult, Stages
 
 Bias = dict[str, tuple[tuple[float, float], ...]]
 """Estimator → its error [°] on piles of known angle, (mean, standard error) for each way to fill a cone with bodies."""

@@ -7,18 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from doe.ascent import Region
-from doe.canonical import Canonical, canonical_analysis
-from doe.compromise import Compromise, find_compromise
-from doe.optimum import Optimum, find_optimum
-from doe.power import smallest_effect
-from doe.profile import Profile
+from doe.analysis.canonical import Canonical, canonical_analysis
+from doe.analysis.optimum import Compromise, Optimum, find_compromise, find_optimum
+from doe.analysis.power import smallest_effect
+from doe.analysis.steepest_ascent import Region
+from doe.analysis.surface import Surface, fit_surface
+from doe.analysis.surface_anova import SurfaceAnova, analyse_surface
 from doe.record import Record
 from doe.runs import FloatArray, Run, Runner, Setting, no_pile_shares, responses
 from doe.stages.stage import Chain, Stage, ended
-from doe.study import CALIBRATED, Factor, Study
-from doe.surface import Surface, fit_surface
-from doe.surface_anova import SurfaceAnova, analyse_surface
+from doe.studies.profile import Profile
+from doe.studies.study import CALIBRATED, Factor, Study
 
 
 @dataclass(frozen=True, kw_only=True)

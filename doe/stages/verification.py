@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from doe.power import smallest_effect
-from doe.profile import Profile
+from doe.analysis.power import smallest_effect
+from doe.analysis.verification import Verification, verify
 from doe.record import Record
 from doe.runs import Run, Runner, Setting, no_pile_shares, responses
 from doe.stages.stage import Chain, Stage, ended
-from doe.study import Study
+from doe.studies.profile import Profile
+from doe.studies.study import Study
 from doe.target import Target, observed_text
-from doe.verification import Verification, verify
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,9 +20,8 @@ from doe.measurement import Condition, Measurement, load_measurement
 from doe.measurement.features import SCALARS, SCAN
 from doe.validation.laboratory import Laboratory, Sample
 from doe.validation.scanner import Scanner
-from doe.validation.schedule import Case
 from doe.validation.sets import NONE, OUT_OF_REACH, Row
-from doe.validation.truth import REPLICATES, ROOT, Strengths, Truth, truth_of
+from doe.validation.truth import REPLICATES, ROOT, Case, Strengths, Truth, truth_of
 from doe.validation.work_place import Order, WorkPlace, complete
 
 TRIES = 3

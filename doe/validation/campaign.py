@@ -23,9 +23,8 @@ from doe.validation.limit import limit_study
 from doe.validation.outside import AMPLITUDE, DEVELOPMENT, possible
 from doe.validation.reference import ROOT as REFERENCE_ROOT
 from doe.validation.reference import extended_to, kept
-from doe.validation.schedule import Case, cases
 from doe.validation.sets import Row, append_rows, read_rows
-from doe.validation.truth import Strengths, strengths_of
+from doe.validation.truth import Case, Strengths, cases, strengths_of
 from doe.validation.work_place import OutOfTimeError, WorkPlace
 from solver import EFFECTS, PHYSICS
 

@@ -28,7 +28,7 @@ import tomli_w
 
 from doe.errors import MeasurementError
 from doe.measurement import Measurement, load_measurement
-from doe.study_table import Table, entries, names, only, section
+from doe.studies.study_table import Table, entries, names, only, section
 from doe.validation.scanner import Scanner, ScannerRanges, write_scan
 from solver import ParameterError, all_names, asset_path, parse_quantity, read_toml
 

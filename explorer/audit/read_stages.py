@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from doe.analysis.surface import term_names
 from doe.audit.study import (
     AnovaLine,
     Ascent,
@@ -20,7 +21,6 @@ from doe.audit.study import (
 )
 from doe.audit.surface_refit import source_name
 from doe.errors import AuditError
-from doe.surface import term_names
 from explorer.audit.entries import Entries
 from explorer.audit.tables import Table, read_table
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from doe.audit import Printed, PublishedStudy
-from doe.audit.formula import names_in
+from doe.audit.restitution_formula import names_in
 from doe.audit.study import Derived, DropTest, Measured, Quote, Target, Total
 from doe.errors import AuditError
 from explorer.audit.entries import Entries, read_entries

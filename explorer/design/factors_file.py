@@ -22,11 +22,11 @@ from typing import Any
 
 import numpy as np
 
-from doe.ascent import Region
+from doe.analysis.steepest_ascent import Region
 from doe.designs import factor_letters
 from doe.errors import StudyFileError
 from doe.record import Record
-from doe.study_table import entries, number, only, required, whole
+from doe.studies.study_table import entries, number, only, required, whole
 from explorer.errors import CommandError
 
 NAME = re.compile(r"[^\W\d][\w-]{0,59}")

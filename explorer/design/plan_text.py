@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from doe.analysis.models import Order, bearable, highest_order, terms_of
-from doe.analysis.precision import TermPrecision, precision
+from doe.analysis.power import TermPrecision, precision
 from doe.designs import factor_letters
 from doe.record import plain
 from explorer.design.factors_file import FactorsFile, region_of

@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 from doe.analysis.analyse import DesignAnalysis
 from doe.analysis.contrasts import Curvature
+from doe.analysis.screening import Screening
 from doe.record import Document, Record
-from doe.screening_result import Screening
 from doe.stages.surface import OptimumResult
-from doe.study import Factor
+from doe.studies.study import Factor
 from explorer.report.figures.model import FittedTarget
 
 Array = npt.NDArray[np.float64]

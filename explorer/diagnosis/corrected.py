@@ -15,7 +15,7 @@ from doe.declared.model import effect_values
 from doe.diagnose.diagnosis import Diagnosis, complete_rows
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.summaries import summary_names
-from doe.study import CALIBRATED
+from doe.studies.study import CALIBRATED
 from explorer.scene.text import material_toml
 from solver import EFFECTS, Scene, observable_names, parameters, value, with_values
 

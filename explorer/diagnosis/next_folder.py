@@ -29,7 +29,7 @@ from doe.measurement.long_form import COLUMNS, MOST_BYTES
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.parameter_table import read_parameters
 from doe.record import plain
-from doe.study_table import Table, entries, section
+from doe.studies.study_table import Table, entries, section
 from doe.table_file import read_table, read_text
 from explorer.errors import CommandError
 from explorer.files.whole_file import write_whole

@@ -26,8 +26,8 @@ from doe.diagnose.result import (
 )
 from doe.holdout import OVERALL, HoldoutError
 from doe.measurement.measurement import Role
+from doe.measurement.residual_map import ResidualMap
 from doe.record import Document, Record
-from doe.residual_map import ResidualMap
 
 FloatArray = npt.NDArray[np.float64]
 Kind = Literal["no_missing_effect", "effect", "effects", "ambiguous", "unexplained"]

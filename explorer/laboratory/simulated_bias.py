@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from doe.laboratory.bias import STRAINS, BiasTable, compression_ratio
-from doe.laboratory.drop_flight import flight, tangential_share
+from doe.laboratory.contact import flight, tangential_share
 from explorer.errors import CommandError
 from explorer.laboratory.twin import bench_scene
 from solver import Scene, with_values

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from doe.study_result import StudyResult
+from doe.studies.study_result import StudyResult
 from explorer.files.whole_file import write_whole
 from explorer.report.html import page
 from explorer.report.markdown import document

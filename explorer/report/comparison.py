@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from doe.study_result import StudyResult
+from doe.studies.study_result import StudyResult
 from explorer.report.content import Table
 from explorer.report.identified import settings
 from explorer.report.units_for_people import (

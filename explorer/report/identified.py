@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from doe.optimum import Optimum
+from doe.analysis.optimum import Optimum
 from doe.stages.surface import OptimumResult
 from explorer.report.units_for_people import (
     MISSING,

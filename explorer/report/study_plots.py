@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from functools import partial
 from itertools import combinations
 
-from doe.screening_result import ErrorSource
+from doe.analysis.screening import ErrorSource
 from doe.stages.screening import ScreeningResult
 from doe.stages.surface import OptimumResult
-from doe.study_result import AnyStudy
+from doe.studies.study_result import AnyStudy
 from explorer.report.content import Spec
 from explorer.report.figures.effects import all_effects, errors_at_hand, half_normal, pareto_against
 from explorer.report.figures.main_effects import main_effects

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from doe.study import load_study, with_profile
-from doe.study_result import StudyResult
+from doe.studies.study import load_study, with_profile
+from doe.studies.study_result import StudyResult
 from explorer.errors import CommandError
 from explorer.report.identified import settings
 from solver import ParameterError, Scene, with_values

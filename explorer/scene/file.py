@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from doe.study import load_study
+from doe.studies.study import load_study
 from solver import ParameterError, Scene, is_material, load_material, read_toml, with_set_up
 from solver.assets import AssetKind, AssetNotFoundError, asset_path, shipped_assets
 from solver.rigs import BENCH_RIGS, RIGS

@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from doe.economy import ALPHA, ECONOMIES, MARGIN, POWER, EconomyTest, compare, pours_needed, rows_of
 from doe.runner import PourRunner
 from doe.store import Store, default_store
-from doe.study import load_study, with_profile
+from doe.studies.economy import ALPHA, ECONOMIES, MARGIN, POWER, EconomyTest, compare, pours_needed, rows_of
+from doe.studies.study import load_study, with_profile
 from explorer.errors import CommandError
 from explorer.files.run_folder import json_text
 from explorer.files.whole_file import write_whole
@@ -35,7 +35,7 @@ def compare_economy(
     study_name, profile_name
         A shipped study or a study file, and the profile that gives shapes and mass.
     change
-        Name of the economy (``doe.economy.ECONOMIES``).
+        Name of the economy (``doe.studies.economy.ECONOMIES``).
     pours
         Of each kind at each of the three settings.
     store, out

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from doe.study import Study, study_from
+from doe.studies.study import Study, study_from
 from explorer.errors import CommandError
 from explorer.scene.text import toml_key, toml_value
 from solver import ParameterError, asset_path, read_toml

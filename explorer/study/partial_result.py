@@ -1,4 +1,4 @@
-"""``partial.json``: what a study that still runs has found so far (`doe.study_result.PartialStudy`).
+"""``partial.json``: what a study that still runs has found so far (`doe.studies.study_result.PartialStudy`).
 
 Stages that have ended are there as in ``result.json``; ``partial`` names the stage that runs, whose own key, if there,
 holds its analysis of the runs so far, and ``line`` says it in words. The file is gone once ``result.json`` is written.
@@ -11,7 +11,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
-from doe.study_result import PartialStudy, StageResult, StudyDescription
+from doe.studies.study_result import PartialStudy, StageResult, StudyDescription
 from explorer.files.whole_file import write_whole
 from explorer.study.process import PARTIAL
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from doe.study import TRIES, load_study, with_profile
+from doe.studies.study import TRIES, load_study, with_profile
 from explorer.background.command_process import PROGRAM, BackgroundError, CommandProcess, CommandStatus
 from explorer.background.output_folders import finished, new_folder, newest_unfinished
 from explorer.background.progress import given_up

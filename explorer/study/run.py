@@ -10,15 +10,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from doe.campaign import Campaign, run_campaign
-from doe.partial import PartialStages
-from doe.profile import Profile
 from doe.runner import PourRunner
 from doe.runs import Run
 from doe.stages import planned_runs
 from doe.store import Store, default_store
-from doe.study import TRIES, Study, load_study, with_profile
-from doe.study_result import PouredBody, RunCounts, StudyDescription, StudyResult, Timing
+from doe.studies.campaign import Campaign, PartialStages, run_campaign
+from doe.studies.profile import Profile
+from doe.studies.study import TRIES, Study, load_study, with_profile
+from doe.studies.study_result import PouredBody, RunCounts, StudyDescription, StudyResult, Timing
 from explorer.background.progress import PROGRESS, RunProgress, told_of_pauses
 from explorer.errors import CommandError
 from explorer.files.run_result import versions

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from doe.runs import Run
-from doe.study import Values, load_study, with_profile
-from doe.study_result import AnyStudy
+from doe.studies.study import Values, load_study, with_profile
+from doe.studies.study_result import AnyStudy
 from explorer.errors import CommandError
 from solver import Scene, pour_key, with_values
 

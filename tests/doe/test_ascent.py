@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from doe.ascent import AscentFactor, ascent_path, bracket, region_around
+from doe.analysis.steepest_ascent import AscentFactor, ascent_path, bracket, region_around
 from doe.errors import StatisticsError
 
 FACTORS = (

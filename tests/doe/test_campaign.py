@@ -6,15 +6,15 @@ import json
 import numpy as np
 import pytest
 
-from doe.campaign import run_campaign
+from doe.analysis.power import smallest_effect, smallest_main_effect
 from doe.designs import DESIGNS, ChosenDesign, DesignOptions
 from doe.errors import StudyStopped
-from doe.power import smallest_effect, smallest_main_effect
-from doe.profile import Profile
 from doe.stages import planned_runs
 from doe.stages.pilot import pilot
-from doe.study import load_study
-from doe.study_result import OWN_STAGES, RunCounts
+from doe.studies.campaign import run_campaign
+from doe.studies.profile import Profile
+from doe.studies.study import load_study
+from doe.studies.study_result import OWN_STAGES, RunCounts
 from doe.target import Target
 from tests.doe.formula_runner import FormulaRunner
 

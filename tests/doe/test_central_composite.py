@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from doe.analysis.surface import second_order_terms
 from doe.designs import central_composite
 from doe.errors import StatisticsError
-from doe.surface import second_order_terms
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from doe.analysis.analyse import analyse_design
-from doe.ascent import Region
+from doe.analysis.steepest_ascent import Region
 from doe.designs import DESIGNS, DesignOptions, definitive_screening, factor_letters
 from doe.designs.definitive_screening import ORDERS, conference_matrix
 from doe.errors import StatisticsError

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from doe.analysis.surface import second_order_terms
 from doe.designs import box_behnken, fold_over, interaction_aliases, plackett_burman
 from doe.designs.plackett_burman import interaction_overlap, smallest_size
 from doe.errors import StatisticsError
-from doe.surface import second_order_terms
 
 # Rows 1, 10, 19 and 28 as R's FrF2 prints them: [A B C], [C A B], [B C A], all minus.
 PRINTED_ROWS_28 = {

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from doe.economy import COMPARED, ECONOMIES, compare, judged, pours_needed, rows_of, settings_of
 from doe.runs import Run
-from doe.study import load_study
+from doe.studies.economy import COMPARED, ECONOMIES, compare, judged, pours_needed, rows_of, settings_of
+from doe.studies.study import load_study
 from solver import value, with_values
 from solver.scenes.time_step import time_step
 

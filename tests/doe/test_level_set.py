@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import optimize
 
-from doe.level_set import extremes, nearest_points
-from doe.surface import second_order_terms
+from doe.analysis.level_set import extremes, nearest_points
+from doe.analysis.surface import second_order_terms
 
 ONES = np.ones(3)
 

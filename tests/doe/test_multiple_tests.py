@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 from statsmodels.stats.multitest import multipletests
 
-from doe.multiple_tests import holm, lenth
+from doe.analysis.screening import holm, lenth
 
 
 @pytest.mark.parametrize("tests", [1, 2, 24, 27])

@@ -5,11 +5,11 @@ import json
 import numpy as np
 import pytest
 
-from doe.ascent import Region
+from doe.analysis.optimum import compatible_share, find_optimum, solution_range
+from doe.analysis.steepest_ascent import Region
+from doe.analysis.surface import fit_surface, second_order_terms
 from doe.designs import box_behnken
 from doe.errors import StatisticsError
-from doe.optimum import compatible_share, find_optimum, solution_range
-from doe.surface import fit_surface, second_order_terms
 
 REGION = Region(("G", "mu", "e"), np.array([50.0, 0.6, 0.6]), np.array([10.0, 0.1, 0.05]), ())
 DESIGN = box_behnken(3, centre=5)

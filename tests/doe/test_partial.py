@@ -4,10 +4,9 @@ import dataclasses
 
 import pytest
 
-from doe.campaign import run_campaign
 from doe.errors import StatisticsError
-from doe.partial import LEAST_INTERVAL, KnownRuns, PartialStages
 from doe.runs import Setting
+from doe.studies.campaign import LEAST_INTERVAL, KnownRuns, PartialStages, run_campaign
 from tests.doe.formula_runner import FormulaRunner
 from tests.explorer.reported_studies import BIAS, PROFILE, STUDY, planted
 
@@ -44,7 +43,7 @@ def followed(request):
     """[(stage, partial result)] of a study, and its result."""
     seen = []
     patch = pytest.MonkeyPatch()
-    patch.setattr("doe.partial.SHARE", 1.0)
+    patch.setattr("doe.studies.campaign.SHARE", 1.0)
     follower = PartialStages(lambda stage, result: seen.append((stage, result)), clock=Clock())
     result = run_campaign(STUDY, PROFILE, Followed(follower, sigma=2.0, jam=0.05), BIAS, on_begin=follower.begin).stages
     patch.undo()

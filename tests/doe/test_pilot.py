@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from doe.analysis.pilot import equal_variance, replicate_noise, resolution
 from doe.errors import StatisticsError
-from doe.pilot import equal_variance, replicate_noise, resolution
 
 GENERATOR = np.random.default_rng(11)
 CENTRE = GENERATOR.normal(24.0, 5.0, 20)

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from statsmodels.stats.power import TTestIndPower
 
-from doe import power
+from doe.analysis import power
 from doe.designs import box_behnken
 from doe.errors import StatisticsError
 

@@ -10,9 +10,9 @@ import statsmodels.formula.api as smf
 from scipy import stats
 from statsmodels.stats.anova import anova_lm
 
+from doe.analysis.screening import FALLBACK, SIGNIFICANT, analyse_screening, select_factors
 from doe.designs import plackett_burman
 from doe.errors import StatisticsError
-from doe.screening import FALLBACK, SIGNIFICANT, analyse_screening, select_factors
 
 DESIGN = plackett_burman(28)
 FACTORS = [f"X{i}" for i in range(1, 25)]

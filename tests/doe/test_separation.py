@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from statsmodels.stats.meta_analysis import effectsize_smd
 
+from doe.analysis.separation import choose_estimator, d_prime
 from doe.errors import StatisticsError
-from doe.separation import choose_estimator, d_prime
 
 
 def pilot(noise, shift=2.0, runs=30, seed=0):

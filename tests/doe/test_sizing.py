@@ -4,10 +4,10 @@ import dataclasses
 
 import pytest
 
-from doe.power import smallest_difference, smallest_effect, smallest_main_effect
-from doe.profile import Profile
-from doe.stages.sizing import sized
-from doe.study import load_study
+from doe.analysis.power import smallest_difference, smallest_effect, smallest_main_effect
+from doe.stages.pilot import sized
+from doe.studies.profile import Profile
+from doe.studies.study import load_study
 
 STUDY = load_study("sunflower_extract")
 WANTED = Profile("full", resolution_deg=1.0, max_replicates=1000)

@@ -8,12 +8,12 @@ import tomllib
 import numpy as np
 import pytest
 
-from doe.campaign import run_campaign
+from doe.analysis.power import main_effect_efficiency, smallest_main_effect
 from doe.errors import StudyFileError
-from doe.power import main_effect_efficiency, smallest_main_effect
-from doe.profile import Profile
 from doe.stages import planned_runs
-from doe.study import load_study, study_from, with_profile
+from doe.studies.campaign import run_campaign
+from doe.studies.profile import Profile
+from doe.studies.study import load_study, study_from, with_profile
 from solver import ParameterError, asset_path
 from tests.doe.formula_runner import FormulaRunner
 
@@ -87,7 +87,7 @@ def test_each_surface_that_bears_a_second_order_model_reaches_the_target(surface
 
 
 def test_the_result_says_which_designs_were_run():
-    from doe.study_result import StudyDescription
+    from doe.studies.study_result import StudyDescription
 
     study = study_with(screening={"design": "definitive-screening"}, surface={"design": "central-composite"})
     said = StudyDescription.of(study, PROFILE)

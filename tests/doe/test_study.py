@@ -6,8 +6,8 @@ import tomllib
 import pytest
 
 from doe.errors import StudyFileError
-from doe.factors import bodies_touched
-from doe.study import load_study, study_from, with_profile
+from doe.studies.factors import bodies_touched
+from doe.studies.study import load_study, study_from, with_profile
 from solver import ParameterError, asset_path, value
 
 PATH = asset_path("studies", "sunflower_extract")

@@ -7,7 +7,7 @@ import pytest
 
 from doe.errors import StudyFileError
 from doe.runs import Run
-from doe.study import study_from, with_profile
+from doe.studies.study import study_from, with_profile
 from solver import ParameterError, pour_key, value
 from tests.doe.test_study import PATH, TABLE
 

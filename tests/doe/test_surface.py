@@ -11,12 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from statsmodels.stats.anova import anova_lm
 
-from doe.ascent import Region
-from doe.canonical import canonical_analysis
+from doe.analysis.canonical import canonical_analysis
+from doe.analysis.steepest_ascent import Region
+from doe.analysis.surface import fit_surface, second_order_terms
+from doe.analysis.surface_anova import analyse_surface
 from doe.designs import box_behnken
 from doe.errors import StatisticsError
-from doe.surface import fit_surface, second_order_terms
-from doe.surface_anova import analyse_surface
 
 REGION = Region(("A", "B", "D"), np.array([58.34, 0.62, 0.608]), np.array([6.08, 0.05, 0.036]), ())
 DESIGN = box_behnken(3, centre=5)

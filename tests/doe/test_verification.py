@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from scipy import stats
 from statsmodels.stats.weightstats import CompareMeans, DescrStatsW
 
+from doe.analysis.t_tests import Sample, equivalence_test, one_sample_test, pooled_test, welch_test
+from doe.analysis.verification import relative_error_percent, sd_from_pooled_p, sd_from_welch_p, verify
 from doe.errors import StatisticsError
-from doe.t_tests import Sample, equivalence_test, one_sample_test, pooled_test, welch_test
-from doe.verification import relative_error_percent, sd_from_pooled_p, sd_from_welch_p, verify
 
 # Processes 2022, 10, 185, Table 10: simulated angles of repose in degrees.
 PAPER_RUNS = (25.96, 25.31, 23.47)

@@ -24,7 +24,7 @@ from doe.diagnose.result import Level, Offered, Suggestion
 from doe.diagnose.verdict import verdict_of
 from doe.measurement.features import SCALARS, SCAN
 from doe.measurement.measurement import Condition, MeasuredParameter, Measurement, Observation
-from doe.residual_map import ResidualMap, height_difference
+from doe.measurement.residual_map import ResidualMap, height_difference
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.diagnosis.run import DiagnoseOrder, result_of
 from solver import EFFECTS, load_material, with_values

@@ -7,10 +7,10 @@ import dataclasses
 import json
 import re
 
-from doe.campaign import run_campaign
-from doe.profile import Profile
-from doe.study import load_study
-from doe.study_result import study_from
+from doe.studies.campaign import run_campaign
+from doe.studies.profile import Profile
+from doe.studies.study import load_study
+from doe.studies.study_result import study_from
 from explorer.report import report_markdown
 from explorer.study.run import result_of
 from tests.doe.formula_runner import FormulaRunner

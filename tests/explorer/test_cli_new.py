@@ -6,7 +6,7 @@ import tomllib
 import pytest
 import trimesh
 
-from doe.study import load_study
+from doe.studies.study import load_study
 from explorer.scene.file import load_scene
 from explorer.scene.starter_files import study_text
 from solver import value

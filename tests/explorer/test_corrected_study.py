@@ -2,7 +2,7 @@
 
 import pytest
 
-from doe.study import load_study, with_profile
+from doe.studies.study import load_study, with_profile
 from explorer.diagnosis.corrected import corrected_toml, study_toml
 from solver import EFFECTS, value
 from tests.explorer.diagnosed import CASES, diagnosed

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from doe.ascent import Region
-from doe.surface import fit_surface
+from doe.analysis.steepest_ascent import Region
+from doe.analysis.surface import fit_surface
 from explorer.design.analysis import AnalyseOrder, run_analyse
 from solver.assets import asset_path
 from tests.doe.analysis.natural_units import fitted_in_natural_units, natural_errors, quadratic

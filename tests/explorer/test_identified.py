@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from doe.campaign import run_campaign
+from doe.studies.campaign import run_campaign
 from explorer.design.analysis import AnalyseOrder, run_analyse
 from explorer.laboratory.answers import analysis_answer
 from explorer.report import report_html, report_markdown

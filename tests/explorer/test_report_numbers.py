@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from doe.analysis.screening import analyse_screening
+from doe.analysis.t_tests import Sample
 from doe.designs import factorial
 from doe.runs import sample_of
-from doe.screening import analyse_screening
-from doe.t_tests import Sample
 from explorer.report.units_for_people import (
     code,
     number,

@@ -5,7 +5,7 @@ import tomllib
 
 import pytest
 
-from doe.study import load_study
+from doe.studies.study import load_study
 from explorer.study.edit import StudyEdits, edited_study, listed_edits, study_toml
 from solver import asset_path
 from solver.assets import shipped_assets

@@ -9,9 +9,8 @@ import plotly.graph_objects as go
 import pytest
 from scipy import stats
 
-from doe.campaign import run_campaign
-from doe.partial import PartialStages
-from doe.study_result import StudyDescription
+from doe.studies.campaign import PartialStages, run_campaign
+from doe.studies.study_result import StudyDescription
 from explorer.report.diagnosis_plots import diagnosis_plots
 from explorer.report.figures.effects import all_effects, errors_at_hand, pareto_against
 from explorer.report.figures.main_effects import main_effects
@@ -209,7 +208,7 @@ def test_residual_quantiles_are_those_of_t(fitted):
 
 
 def test_a_study_that_still_runs_has_plots_of_what_it_has(tmp_path, monkeypatch):
-    monkeypatch.setattr("doe.partial.SHARE", 1.0)
+    monkeypatch.setattr("doe.studies.campaign.SHARE", 1.0)
     partial = PartialResult(tmp_path, StudyDescription.of(STUDY, PROFILE))
     versions = []
 

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from doe.study import load_study
+from doe.studies.study import load_study
 from explorer.background.command_process import BackgroundError, CommandStatus, advanced
 from explorer.background.progress import ProgressEvent, StageProgress, failures, given_up, with_event
 from explorer.background.waiting_line import MOST_WAITING

@@ -6,7 +6,7 @@ import json
 import pytest
 
 from doe.runner import TRIES
-from doe.study_result import OWN_STAGES
+from doe.studies.study_result import OWN_STAGES
 from explorer.study import run as study_run
 from solver import asset_path
 from tests.doe.formula_runner import FormulaRunner

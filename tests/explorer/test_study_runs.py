@@ -4,10 +4,10 @@ import dataclasses
 
 import pytest
 
-from doe.campaign import run_campaign
 from doe.runs import Setting
-from doe.study import load_study, with_profile
-from doe.study_result import PartialStudy, StudyResult
+from doe.studies.campaign import run_campaign
+from doe.studies.study import load_study, with_profile
+from doe.studies.study_result import PartialStudy, StudyResult
 from explorer.study.runs import scene_of, settings_of, stages_with_runs
 from solver import pour_key, with_values
 from tests.doe.formula_runner import FormulaRunner

@@ -7,7 +7,7 @@ import plotly.io
 import pytest
 
 from doe.stages import planned_runs
-from doe.study import load_study
+from doe.studies.study import load_study
 from explorer.background.command_process import CommandStatus
 from explorer.background.progress import StageProgress, TriedRun
 from explorer.report.plot import Plot

@@ -22,9 +22,8 @@ from doe.store import Store
 from doe.validation.answers import Answers
 from doe.validation.campaign import CampaignOrder, measured_strengths
 from doe.validation.laboratory import TREFOILS, Sample, read_laboratory
-from doe.validation.schedule import Case
 from doe.validation.sets import append_rows, read_rows
-from doe.validation.truth import REPLICATES, Truth, drawn_theta
+from doe.validation.truth import REPLICATES, Case, Truth, drawn_theta
 from doe.validation.work_place import WorkPlace
 from explorer.export.deck_of_scene import deck_of
 from explorer.export.liggghts import INPUT, write_liggghts

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from doe.errors import StudyFileError
-from doe.profile import Profile
 from doe.runs import Runner, Setting, responses
 from doe.stages.stage import Chain, FurtherResult, Stage, ended
-from doe.study import Study
+from doe.studies.profile import Profile
+from doe.studies.study import Study
 
 
 class Repeatability(Stage):

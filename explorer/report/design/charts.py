@@ -9,8 +9,7 @@ import numpy as np
 from scipy import stats
 
 from doe.analysis.analyse import Model
-from doe.analysis.box_cox import BoxCox
-from doe.analysis.diagnostics import Diagnostics
+from doe.analysis.model_adequacy import BoxCox, Diagnostics
 from explorer.design.result import DesignResult
 from explorer.report.content import Spec
 from explorer.report.figures.style import (

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from doe.analysis.contrasts import Curvature
-from doe.screening_result import Effect
+from doe.analysis.screening import Effect
 from explorer.design.result import DesignResult, DrawnEffects
 from explorer.report.content import Block, Bullets, Facts, Figure, Section, Table, Text
 from explorer.report.figures.effects import half_normal, pareto

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from doe.analysis.analyse import DesignAnalysis, Model
-from doe.analysis.box_cox import BoxCox
-from doe.analysis.diagnostics import Diagnostics
+from doe.analysis.model_adequacy import BoxCox, Diagnostics
 from explorer.design.result import DesignResult, SheetFactor
 from explorer.report.content import Block, Bullets, Facts, Figure, Folded, Section, Table, Text
 from explorer.report.design.charts import box_cox_profile, single_runs

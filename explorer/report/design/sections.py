@@ -8,9 +8,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from doe.screening_result import Screening
-from doe.surface_anova import SurfaceAnova
-from doe.t_tests import Sample
+from doe.analysis.screening import Screening
+from doe.analysis.surface_anova import SurfaceAnova
+from doe.analysis.t_tests import Sample
 from explorer.design.result import DesignResult
 from explorer.report.content import Block, Caution, Code, Facts, Section, Table, Text
 from explorer.report.design.effects import effects

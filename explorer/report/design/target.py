@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from doe.analysis.ridge import RidgePath
-from doe.canonical import Canonical
+from doe.analysis.canonical import Canonical, RidgePath
 from doe.stages.surface import OptimumResult
 from explorer.design.result import DesignResult
 from explorer.report.content import Block, Facts, Figure, Section, Table, Text

@@ -10,7 +10,7 @@ from scipy import stats
 
 from doe.diagnose.result import NO_EFFECT, UNEXPLAINED, Residual
 from doe.measurement.measurement import Role
-from doe.residual_map import ResidualMap
+from doe.measurement.residual_map import ResidualMap
 from explorer.diagnosis.result import DiagnosisResult, PileProfiles
 from explorer.report.content import Spec
 from explorer.report.diagnosis.wording import feature_label, spelled

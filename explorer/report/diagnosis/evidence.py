@@ -9,7 +9,7 @@ import numpy as np
 from doe.diagnose.result import BASE, EffectRow
 from doe.holdout import OVERALL
 from doe.measurement.measurement import Role
-from doe.residual_map import ResidualMap
+from doe.measurement.residual_map import ResidualMap
 from explorer.diagnosis.result import DiagnosisResult, ErrorRow, PileProfiles
 from explorer.report.content import Block, Caution, Figure, Folded, Section, Table, Text
 from explorer.report.diagnosis.charts import bands, drawn_residuals, error_chart, map_chart, pile_chart, residual_chart

@@ -7,9 +7,9 @@ from typing import Protocol
 
 from scipy import stats
 
-from doe.screening_result import Effect, ErrorSource, Screening
+from doe.analysis.screening import Effect, ErrorSource, Screening
 from doe.stages.screening import ScreeningResult
-from doe.study import Factor
+from doe.studies.study import Factor
 from explorer.report.content import Spec
 from explorer.report.figures.style import (
     ASSUMPTION,

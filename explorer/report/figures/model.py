@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from doe.analysis.surface import Surface
+from doe.analysis.surface_anova import SurfaceAnova
 from doe.stages.surface import OptimumResult, SurfaceResult
-from doe.study import Factor
-from doe.study_result import AnyStudy
-from doe.surface import Surface
-from doe.surface_anova import SurfaceAnova
+from doe.studies.study import Factor
+from doe.studies.study_result import AnyStudy
 from doe.target import Target
 from explorer.report.identified import BY_RULE, all_identified
 

@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from doe.study import Factor
+from doe.studies.study import Factor
 from explorer.report.content import Spec
 from explorer.report.figures.model import Array, FittedTarget
 from explorer.report.figures.style import (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from doe.study_result import StudyResult
+from doe.studies.study_result import StudyResult
 from explorer.report.content import Section
 from explorer.report.sections.ascent import ascent
 from explorer.report.sections.assumptions import assumptions, scan

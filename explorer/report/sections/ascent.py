@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from doe.runs import valid_values
 from doe.stages.ascent import AscentResult
-from doe.study_result import StudyResult
+from doe.studies.study_result import StudyResult
 from explorer.report.content import Block, Bullets, Figure, Section, Table, Text
 from explorer.report.figures.walks import ascent_path
 from explorer.report.units_for_people import (

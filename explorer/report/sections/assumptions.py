@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from doe.study_result import StudyResult
+from doe.studies.study_result import StudyResult
 from explorer.report.content import Block, Bullets, Figure, Folded, Section, Table, Text
 from explorer.report.figures.walks import scan as scan_chart
 from explorer.report.sections.screening import effect_table, not_testable, row_table

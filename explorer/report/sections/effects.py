@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from doe.factors import MIN_BODIES
-from doe.study_result import StudyResult
+from doe.studies.factors import MIN_BODIES
+from doe.studies.study_result import StudyResult
 from explorer.report.content import Block, Figure, Section, Text
 from explorer.report.figures.effects import all_effects
 from explorer.report.sections.overview import assumption_statement

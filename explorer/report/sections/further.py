@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from doe.stages import STAGES
-from doe.study_result import StudyResult
+from doe.studies.study_result import StudyResult
 from explorer.report.content import Block, Bullets, Facts, Section, Text
 from explorer.report.units_for_people import number
 

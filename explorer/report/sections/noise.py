@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from doe.pilot import BIAS_LIMIT_DEG
-from doe.separation import EstimatorChoice, Separation
-from doe.stages.pilot import PilotResult
-from doe.stages.sizing import StageSize
-from doe.study_result import StudyResult
+from doe.analysis.pilot import BIAS_LIMIT_DEG
+from doe.analysis.separation import EstimatorChoice, Separation
+from doe.stages.pilot import PilotResult, StageSize
+from doe.studies.study_result import StudyResult
 from explorer.report.content import Block, Bullets, Figure, Section, Table, Text
 from explorer.report.figures.noise import noise_of_estimators
 from explorer.report.units_for_people import (

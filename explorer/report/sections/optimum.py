@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from doe.compromise import Compromise
+from doe.analysis.optimum import Compromise
 from doe.stages.surface import OptimumResult
-from doe.study_result import StudyResult
+from doe.studies.study_result import StudyResult
 from explorer.report.content import Block, Figure, Section, Table, Text
 from explorer.report.figures.model import fitted_targets
 from explorer.report.figures.optimum import cloud, ranges

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from doe.screening_result import SIGNIFICANT
+from doe.analysis.screening import SIGNIFICANT
+from doe.analysis.verification import Verification
 from doe.stages.screening import ScreeningResult
-from doe.study_result import StudyResult, valid_runs
+from doe.studies.study_result import StudyResult, valid_runs
 from doe.target import Target
-from doe.verification import Verification
 from explorer.report.content import Block, Caution, Facts, Section, Table
 from explorer.report.identified import settings
 from explorer.report.units_for_people import (

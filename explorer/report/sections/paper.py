@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import csv
 
-from doe.study_result import StudyResult
-from doe.t_tests import Sample
+from doe.analysis.t_tests import Sample
+from doe.studies.study_result import StudyResult
 from explorer.report.content import Section, Table, Text
 from explorer.report.identified import GIVES_TARGET, settings
 from explorer.report.units_for_people import (

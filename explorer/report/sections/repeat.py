@@ -6,8 +6,8 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
-from doe.study import TRIES
-from doe.study_result import PouredBody, StudyDescription, StudyResult
+from doe.studies.study import TRIES
+from doe.studies.study_result import PouredBody, StudyDescription, StudyResult
 from explorer.report.content import Block, Code, Section, Table, Text
 from explorer.report.units_for_people import MISSING, duration, enumeration, fixed, number, percent
 from solver.assets import shipped_assets

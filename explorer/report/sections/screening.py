@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from doe.factors import MIN_BODIES
+from doe.analysis.screening import Adjustment, ErrorSource
 from doe.runs import sample_of
-from doe.screening_result import Adjustment, ErrorSource
 from doe.stages.screening import ScreeningResult
-from doe.study_result import StudyResult
+from doe.studies.factors import MIN_BODIES
+from doe.studies.study_result import StudyResult
 from explorer.report.content import Block, Bullets, Facts, Figure, Folded, Section, Table, Text
 from explorer.report.figures.effects import half_normal, pareto
 from explorer.report.units_for_people import (

@@ -7,13 +7,13 @@ from itertools import combinations
 
 import numpy as np
 
-from doe.canonical import Canonical
+from doe.analysis.canonical import Canonical
+from doe.analysis.surface import Surface
+from doe.analysis.surface_anova import SurfaceAnova
 from doe.runs import sample_of
 from doe.stages.surface import SurfaceResult
-from doe.study import Factor
-from doe.study_result import StudyResult
-from doe.surface import Surface
-from doe.surface_anova import SurfaceAnova
+from doe.studies.study import Factor
+from doe.studies.study_result import StudyResult
 from explorer.report.content import Block, Bullets, Facts, Figure, Folded, Section, Table, Text
 from explorer.report.figures.model import FittedTarget, fitted_targets
 from explorer.report.figures.surface import contours, fit

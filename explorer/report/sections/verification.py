@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
+from doe.analysis.t_tests import Sample
+from doe.analysis.verification import Verification
 from doe.stages.verification import VerificationResult
-from doe.study_result import StudyResult
-from doe.t_tests import Sample
+from doe.studies.study_result import StudyResult
 from doe.target import Target
-from doe.verification import Verification
 from explorer.report.content import Block, Figure, Section, Table, Text
 from explorer.report.figures.verification import verification as verification_chart
 from explorer.report.units_for_people import (

@@ -9,7 +9,7 @@ from typing import Any
 import viser
 
 from doe.record import RecordError
-from doe.study_result import AnyStudy, StudyResult
+from doe.studies.study_result import AnyStudy, StudyResult
 from explorer.background.result_file import ResultFile
 from explorer.report.comparison import comparison
 from explorer.report.content import Table

@@ -7,7 +7,7 @@ from typing import Any
 
 import viser
 
-from doe.study import Factor, Study
+from doe.studies.study import Factor, Study
 from explorer.report.units_for_people import (
     number,
     observable_label,

@@ -8,7 +8,7 @@ from typing import Any
 
 import viser
 
-from doe.study_result import AnyStudy
+from doe.studies.study_result import AnyStudy
 from explorer.report.content import Spec
 from explorer.report.figures.model import FittedTarget, fitted_targets
 from explorer.report.figures.profiler import prediction, profiler

@@ -7,7 +7,7 @@ from typing import Any
 import viser
 
 from doe.runs import Run
-from doe.study_result import AnyStudy
+from doe.studies.study_result import AnyStudy
 from explorer.errors import CommandError
 from explorer.report.units_for_people import observable_label, observed, parameter_label, parameter_value
 from explorer.session import Session

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from doe.record import RecordError
 from doe.stages import planned_runs
-from doe.study import Study, load_study
-from doe.study_result import AnyStudy, PartialStudy, study_from
+from doe.studies.study import Study, load_study
+from doe.studies.study_result import AnyStudy, PartialStudy, study_from
 from explorer.background.result_file import ResultFile
 from explorer.report.study_plots import study_plots
 from explorer.session import Session

@@ -4,11 +4,11 @@ import numpy as np
 import pandas as pd
 import statsmodels.formula.api as smf
 
-from doe.surface import natural_coefficients
+from doe.analysis.surface import natural_coefficients
 
 
 def quadratic(names):
-    """The full second-order formula in the order of `doe.surface`."""
+    """The full second-order formula in the order of `doe.analysis.surface`."""
     pairs = [f"{a}:{b}" for i, a in enumerate(names) for b in names[i + 1 :]]
     return "y ~ " + " + ".join([*names, *pairs, *(f"I({name}**2)" for name in names)])
 

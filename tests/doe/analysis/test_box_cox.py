@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from doe.analysis.box_cox import POWERS, box_cox, residual_sums
+from doe.analysis.model_adequacy import POWERS, box_cox, residual_sums
+from doe.analysis.surface import fit_surface
 from doe.designs import box_behnken, factorial
-from doe.surface import fit_surface
 from tests.doe.analysis.textbook import region
 
 

@@ -5,10 +5,10 @@ import pandas as pd
 import pytest
 import statsmodels.formula.api as smf
 
-from doe.analysis.diagnostics import diagnose_fit
+from doe.analysis.model_adequacy import diagnose_fit
+from doe.analysis.surface import fit_surface
+from doe.analysis.surface_anova import analyse_surface
 from doe.designs import box_behnken
-from doe.surface import fit_surface
-from doe.surface_anova import analyse_surface
 from tests.doe.analysis.textbook import YIELD, YIELD_POINTS, YIELD_REGION, region
 
 

@@ -9,11 +9,11 @@ import statsmodels.formula.api as smf
 from statsmodels.stats.anova import anova_lm
 
 from doe.analysis.models import fit_summary, hierarchical, highest_order, terms_of
-from doe.bootstrap import bootstrap_coefficients
+from doe.analysis.optimum import bootstrap_coefficients
+from doe.analysis.surface import fit_surface
+from doe.analysis.surface_anova import analyse_surface
 from doe.designs import box_behnken, factorial
 from doe.errors import StatisticsError
-from doe.surface import fit_surface
-from doe.surface_anova import analyse_surface
 from tests.doe.analysis.textbook import FILTRATION, FILTRATION_RATE, YIELD, YIELD_POINTS, YIELD_REGION, region
 
 REGION = region("ACD")

@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 import statsmodels.formula.api as smf
 
-from doe.ascent import Region
-from doe.surface import fit_surface
-from doe.surface_anova import analyse_surface
+from doe.analysis.steepest_ascent import Region
+from doe.analysis.surface import fit_surface
+from doe.analysis.surface_anova import analyse_surface
 from tests.doe.analysis.natural_units import fitted_in_natural_units, natural_errors, quadratic
 from tests.doe.analysis.textbook import FILTRATION, FILTRATION_RATE, YIELD, YIELD_POINTS, YIELD_REGION, region
 

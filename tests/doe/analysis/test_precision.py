@@ -7,10 +7,9 @@ import pytest
 from scipy import stats
 
 from doe.analysis.models import terms_of
-from doe.analysis.precision import precision
+from doe.analysis.power import precision, smallest_effect, t_test_power
 from doe.designs import box_behnken, factorial, plackett_burman
 from doe.errors import StatisticsError
-from doe.power import smallest_effect, t_test_power
 
 
 def test_main_effect_of_a_two_level_design_has_its_closed_form():

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from doe.analysis.ridge import highest_on_sphere, ridge_analysis
-from doe.surface import fit_surface
+from doe.analysis.canonical import highest_on_sphere, ridge_analysis
+from doe.analysis.surface import fit_surface
 from tests.doe.analysis.textbook import YIELD, YIELD_POINTS, YIELD_REGION
 
 ANGLES = np.linspace(0, 2 * np.pi, 20001)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from doe.ascent import Region
+from doe.analysis.steepest_ascent import Region
 from doe.designs import factorial
 
 

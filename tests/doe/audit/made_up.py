@@ -8,7 +8,10 @@ import math
 import numpy as np
 from scipy import stats
 
-from doe.ascent import Region
+from doe.analysis.level_set import nearest_points
+from doe.analysis.steepest_ascent import Region
+from doe.analysis.surface import fit_surface, term_names
+from doe.analysis.surface_anova import analyse_surface
 from doe.audit.printed import printed
 from doe.audit.study import (
     AnovaLine,
@@ -29,9 +32,6 @@ from doe.audit.study import (
     Verified,
 )
 from doe.designs import box_behnken, plackett_burman
-from doe.level_set import nearest_points
-from doe.surface import fit_surface, term_names
-from doe.surface_anova import analyse_surface
 
 NAMES = tuple(f"F{k}" for k in range(1, 9))
 LOW = np.array([10.0, 0.2, 0.3, 1.0, 2.0, 3.0, 4.0, 5.0])

@@ -5,10 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from doe.audit.drop_test import flight
-from doe.audit.formula import evaluated, names_in
-from doe.audit.printed import printed
-from doe.audit.rounding import most_agreed, rounding_slack
+from doe.audit.printed import most_agreed, printed, rounding_slack
+from doe.audit.restitution_formula import evaluated, flight, names_in
 from doe.audit.surface_refit import source_name
 from doe.errors import AuditError
 

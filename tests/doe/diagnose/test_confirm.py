@@ -11,7 +11,7 @@ from doe.diagnose.confirm import Confirmed, confirming, residual_maps
 from doe.diagnose.result import Model
 from doe.measurement import load_measurement
 from doe.measurement.piles import PileSurface
-from doe.residual_map import LEAST_ERROR, height_difference
+from doe.measurement.residual_map import LEAST_ERROR, height_difference
 from solver import Spheres
 from solver.assets import measurement_folder
 

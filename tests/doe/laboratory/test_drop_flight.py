@@ -12,8 +12,8 @@ from doe.laboratory.bias import (
     drop_bias,
     shear_ratio,
 )
-from doe.laboratory.drop_flight import GRIPPING, flight, restitution_of_flight, tangential_share
-from doe.laboratory.table import LaboratoryError
+from doe.laboratory.contact import GRIPPING, flight, restitution_of_flight, tangential_share
+from doe.laboratory.tables import LaboratoryError
 
 
 def test_a_horizontal_rebound_gives_the_restitution():

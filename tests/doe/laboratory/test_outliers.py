@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from doe.laboratory.outliers import critical_deviate, deviates, most_outliers, outliers
+from doe.laboratory.replicates import critical_deviate, deviates, most_outliers, outliers
 
 ROSNER = [
     -0.25, 0.68, 0.94, 1.15, 1.20, 1.26, 1.26, 1.34, 1.38, 1.43, 1.49, 1.49, 1.55, 1.56, 1.58, 1.65, 1.69, 1.70, 1.76,

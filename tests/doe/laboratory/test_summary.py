@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from doe.errors import StatisticsError
-from doe.laboratory.summary import summarise
+from doe.laboratory.replicates import summarise
 
 VALUES = [0.52, 0.57, 0.55, 0.61, 0.49, 0.58, 0.60, 0.56, 0.54, 0.68]
 

@@ -4,8 +4,7 @@ import math
 
 import pytest
 
-from doe.laboratory.columns import DROP, FORCE_DISPLACEMENT, INCLINED_PLANE
-from doe.laboratory.table import LaboratoryError, read_table
+from doe.laboratory.tables import DROP, FORCE_DISPLACEMENT, INCLINED_PLANE, LaboratoryError, read_table
 from tests.doe.laboratory.readings import assert_one_line, written
 
 PLANE = "a,b,replicate,angle_deg\n"

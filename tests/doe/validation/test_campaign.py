@@ -19,8 +19,7 @@ from doe.validation.campaign import CampaignOrder, run_campaign
 from doe.validation.laboratory import read_laboratory
 from doe.validation.limit import Kind, Reached
 from doe.validation.ruler import Strength
-from doe.validation.schedule import Case
-from doe.validation.truth import strengths_of, truth_of
+from doe.validation.truth import Case, strengths_of, truth_of
 from doe.validation.work_place import WorkPlace
 from tests.doe.validation.disguise import disguise
 from tests.doe.validation.small_model import small_laboratory

@@ -18,8 +18,7 @@ from doe.validation.answers import Answers
 from doe.validation.laboratory import TREFOILS, read_laboratory
 from doe.validation.outside import AMPLITUDE, possible
 from doe.validation.scanner import Scanner
-from doe.validation.schedule import Case
-from doe.validation.truth import REPLICATES, Truth
+from doe.validation.truth import REPLICATES, Case, Truth
 from doe.validation.work_place import WorkPlace
 from solver import AssetNotFoundError
 from tests.doe.validation.small_model import small_laboratory

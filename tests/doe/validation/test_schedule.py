@@ -4,7 +4,7 @@ import math
 from collections import Counter
 
 from doe.validation.outside import AMPLITUDE
-from doe.validation.schedule import STRENGTHS, WIDE_STRENGTHS, cases
+from doe.validation.truth import STRENGTHS, WIDE_STRENGTHS, cases
 
 FULL = 370
 

@@ -8,8 +8,7 @@ import pytest
 from doe.declared.model import Condition, Declared, Effect, Parameter
 from doe.validation.limit import Kind, Reached
 from doe.validation.ruler import Strength
-from doe.validation.schedule import Case
-from doe.validation.truth import strengths_of, truth_of
+from doe.validation.truth import Case, strengths_of, truth_of
 
 DECLARED = Declared(
     (Parameter("friction", 0.4, 0.7, 0.5, 0.05), Parameter("restitution", 0.2, 0.8)),

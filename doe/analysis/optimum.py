@@ -1,0 +1,347 @@
+"""Optimum: of all settings that give the target, the one nearest to the measured parameters, and how sure it
+is.
+
+The settings with model = target form a surface in the cube, so one target cannot fix several factors. The
+chosen point minimises sum ((x_i - reference_i)/scale_i)^2 on that surface. Reported beside it: the bootstrap
+interval of the point (the target's own standard error included), the range that each factor can take on the
+surface (its width), and the share of the cube whose predicted mean is compatible with the target at 95 %.
+The interval is that of the rule's choice: it says what is known of a factor only where the factor is identified.
+Source: Davison and Hinkley 1997 (bootstrap); Myers, Montgomery and Anderson-Cook 2016, ch. 6-7.
+
+Bootstrap refits of a surface: the same model fitted to many resampled copies of the runs, in one solve.
+
+Source: Davison and Hinkley 1997, Bootstrap Methods and their Application, ch. 6.
+
+Several targets at once: the setting whose predicted responses miss them least, in units of what is known.
+
+    J(x) = Σ_t w_t (ŷ_t(x) − T_t)² / s_t²
+
+with s_t² = sd_t²/n_t + (standard error of the model at the centre)², so that a target counts by how well it is
+known on both sides; ties (a valley of equal J) are broken by the distance to the measured parameters. Weighted least
+squares on response surfaces; compare Derringer & Suich 1980, which needs desirability limits that nobody measured.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+from scipy.optimize import minimize
+
+from doe.analysis.level_set import REFINEMENTS, crossings, extremes, nearest_points
+from doe.analysis.surface import Surface, fitted_coefficients, second_order_terms
+from doe.analysis.surface_anova import analyse_surface
+from doe.errors import StatisticsError
+from doe.record import Record
+from doe.target import Target
+
+FloatArray = npt.NDArray[np.float64]
+
+Resampling = Literal["replicates within points", "residuals"]
+
+
+def bootstrap_coefficients(surface: Surface, refits: int, seed: int) -> tuple[FloatArray, Resampling]:
+    """Return coefficients of `refits` resampled fits, shape (refits, p), and what was resampled.
+
+    With two or more runs at every distinct point the replicates are drawn within their point; deviations from
+    the point's mean are scaled by sqrt(n/(n - 1)), because n values underestimate their variance by that
+    factor. Otherwise residuals are drawn over all runs, scaled by 1/sqrt(1 - leverage) and centred.
+    """
+    generator = np.random.default_rng(seed)
+    if np.bincount(surface.point_of_run).min() >= 2:
+        resampled, method = _within_points(surface, refits, generator), "replicates within points"
+    else:
+        resampled, method = _residuals(surface, refits, generator), "residuals"
+    coefficients = np.zeros((refits, surface.coefficients.size))
+    model = second_order_terms(surface.points)[:, surface.included]
+    coefficients[:, surface.included] = fitted_coefficients(model, resampled).T
+    return coefficients, method  # type: ignore[return-value]
+
+
+def _within_points(surface: Surface, refits: int, generator: np.random.Generator) -> FloatArray:
+    """Return resampled responses, shape (runs, refits)."""
+    resampled = np.empty((surface.observed.size, refits))
+    for point in range(int(surface.point_of_run.max()) + 1):
+        runs = np.flatnonzero(surface.point_of_run == point)
+        mean = surface.observed[runs].mean()
+        deviations = (surface.observed[runs] - mean) * np.sqrt(runs.size / (runs.size - 1))
+        resampled[runs] = mean + generator.choice(deviations, size=(runs.size, refits))
+    return resampled
+
+
+def _residuals(surface: Surface, refits: int, generator: np.random.Generator) -> FloatArray:
+    """Return resampled responses, shape (runs, refits); runs of leverage one carry no residual."""
+    free = surface.leverage < 1 - 1e-9
+    scaled = (surface.observed - surface.predicted)[free] / np.sqrt(1 - surface.leverage[free])
+    draws = generator.choice(scaled - scaled.mean(), size=(surface.observed.size, refits))
+    return np.asarray(surface.predicted[:, None] + draws)
+
+
+WIDTH_LINES = 81
+
+WIDTH_LINES_4 = 31
+
+CLOUD_REFINEMENTS_4 = 9
+
+"""The same for four factors and more, whose lines stand on a grid of three dimensions and more, and the refinements of
+a refit's point there, to about 1e-3 half-widths.
+"""
+
+SHARE_LEVELS = 21
+
+
+@dataclass(frozen=True)
+class Optimum(Record):
+    """The chosen setting. Arrays of shape (factors,) in natural units unless named coded.
+
+    predicted with its 95 % confidence interval is in the unit of the response, as are the reachable values.
+    point_low, point_high: 95 % bootstrap interval of the chosen point; bootstrap_points: shape (refits,
+    factors). share_reached: share of refits in which the target is reachable. solution_low, solution_high:
+    range of each factor on the surface model = target; solution_share: that range as a share of the cube.
+    compatible_share: share of the cube whose mean differs from the target by no more than its 95 % margin.
+    """
+
+    names: tuple[str, ...]
+    target: float
+    target_standard_error: float
+    reached: bool
+    point_coded: FloatArray
+    point: FloatArray
+    predicted: float
+    predicted_low: float
+    predicted_high: float
+    reachable_low: float
+    reachable_low_at: FloatArray
+    reachable_high: float
+    reachable_high_at: FloatArray
+    reference: FloatArray
+    scale: FloatArray
+    distance: float
+    point_low: FloatArray
+    point_high: FloatArray
+    bootstrap_points: FloatArray
+    resampling: Resampling
+    share_reached: float
+    solution_low: FloatArray
+    solution_high: FloatArray
+    solution_share: FloatArray
+    unidentified: tuple[str, ...]
+    compatible_share: float
+    better_than_noise: bool
+    statement: str
+
+
+def find_optimum(
+    surface: Surface,
+    target: float,
+    reference: npt.ArrayLike,
+    scale: npt.ArrayLike | None = None,
+    refits: int = 1000,
+    seed: int = 0,
+    unidentified_share: float = 0.5,
+    target_standard_error: float = 0.0,
+) -> Optimum:
+    """Return the point of {model = target} nearest to the reference, with its uncertainty.
+
+    reference, scale: natural units, shape (factors,); by default the scale is the half-width of the region,
+    so that distance is measured in coded units. A factor counts as unidentified when it can take at least
+    `unidentified_share` of its range while the model stays at the target. When the target cannot be reached,
+    the point is where the model comes nearest to it. target_standard_error: of the measured mean, unit of the
+    response; every refit draws its own target from it.
+
+    Raises StatisticsError for wrong shapes, a scale that is not positive or refits < 500.
+    """
+    region, k = surface.region, len(surface.names)
+    natural_reference = _vector("reference", reference, k)
+    natural_scale = region.half_width.copy() if scale is None else _vector("scale", scale, k)
+    if not (natural_scale > 0).all():
+        raise StatisticsError(f"scale = {natural_scale.tolist()} must be positive")
+    if refits < 500:
+        raise StatisticsError(f"refits = {refits}; a 95 % interval needs at least 500")
+    coded_reference, coded_scale = region.coded(natural_reference), natural_scale / region.half_width
+
+    fitted = surface.coefficients[None, :]
+    points, reachable = nearest_points(fitted, target, coded_reference, coded_scale)
+    point, reached = points[0], bool(reachable[0])
+    resampled, resampling = bootstrap_coefficients(surface, refits, seed)
+    # A stream of its own: the refits stay the same whether or not the target is uncertain.
+    drawn = target + target_standard_error * np.random.default_rng([seed, 1]).standard_normal(refits)
+    refinements = REFINEMENTS if k < 4 else CLOUD_REFINEMENTS_4
+    cloud, cloud_reached = nearest_points(resampled, drawn, coded_reference, coded_scale, refinements)
+    low, high = np.percentile(cloud, [2.5, 97.5], axis=0)
+    bounds = extremes(fitted, k)
+    solution_low, solution_high = solution_range(surface, target)
+    share = np.nan_to_num((solution_high - solution_low) / 2)
+    unidentified = tuple(name for name, part in zip(surface.names, share, strict=True) if part >= unidentified_share)
+    interval_low, interval_high = surface.confidence_interval(point)
+    better = analyse_surface(surface).better_than_noise
+    predicted = float(surface.predict(point))
+    return Optimum(
+        names=surface.names,
+        target=target,
+        target_standard_error=target_standard_error,
+        reached=reached,
+        point_coded=point,
+        point=region.natural(point),
+        predicted=predicted,
+        predicted_low=float(interval_low),
+        predicted_high=float(interval_high),
+        reachable_low=float(bounds.low[0]),
+        reachable_low_at=region.natural(bounds.low_at[0]),
+        reachable_high=float(bounds.high[0]),
+        reachable_high_at=region.natural(bounds.high_at[0]),
+        reference=natural_reference,
+        scale=natural_scale,
+        distance=float(np.sqrt((((point - coded_reference) / coded_scale) ** 2).sum())),
+        point_low=region.natural(low),
+        point_high=region.natural(high),
+        bootstrap_points=region.natural(cloud),
+        resampling=resampling,
+        share_reached=float(cloud_reached.mean()),
+        solution_low=region.natural(solution_low),
+        solution_high=region.natural(solution_high),
+        solution_share=share,
+        unidentified=unidentified,
+        compatible_share=compatible_share(surface, target, target_standard_error),
+        better_than_noise=better,
+        statement=_statement(
+            surface.names,
+            target,
+            reached,
+            predicted,
+            region.natural(point),
+            unidentified,
+            (region.natural(solution_low), region.natural(solution_high)),
+            better,
+        ),
+    )
+
+
+def solution_range(surface: Surface, target: float) -> tuple[FloatArray, FloatArray]:
+    """Return the least and greatest coded value of each factor on {model = target}, each of shape (factors,).
+
+    Sampled by axis-parallel lines 2/80 apart (2/30 from four factors on); NaN where the cube holds no such point.
+    """
+    k = len(surface.names)
+    lines = WIDTH_LINES if k < 4 else WIDTH_LINES_4
+    points, valid = crossings(surface.coefficients[None, :], target, np.zeros((1, k)), 1.0, lines)
+    found = points[0][valid[0]]
+    if not len(found):
+        return np.full(k, np.nan), np.full(k, np.nan)
+    return found.min(axis=0), found.max(axis=0)
+
+
+def compatible_share(surface: Surface, target: float, target_standard_error: float = 0.0, level: float = 0.95) -> float:
+    """Return the share of the cube where |model - target| <= t(level) standard errors, on a 21^k grid of cells.
+
+    The standard error is that of the difference: sqrt(se(model)^2 + target_standard_error^2), with the degrees of
+    freedom of the surface.
+    """
+    k = len(surface.names)
+    middles = (np.arange(SHARE_LEVELS) + 0.5) * 2 / SHARE_LEVELS - 1
+    grid = np.array(list(product(middles, repeat=k)))
+    error = np.hypot(surface.standard_error(grid), target_standard_error)
+    margin = stats.t.ppf((1 + level) / 2, surface.df_residual) * error
+    return float((np.abs(surface.predict(grid) - target) <= margin).mean())
+
+
+def _statement(
+    names: tuple[str, ...],
+    target: float,
+    reached: bool,
+    predicted: float,
+    point: FloatArray,
+    unidentified: tuple[str, ...],
+    solution: tuple[FloatArray, FloatArray],
+    better_than_noise: bool,
+) -> str:
+    """Return the result in one or two sentences."""
+    place = ", ".join(f"{name} = {value:.4g}" for name, value in zip(names, point, strict=True))
+    if reached and unidentified:
+        ranges = ", ".join(
+            f"{name} in {low:.4g} … {high:.4g}"
+            for name, low, high in zip(names, *solution, strict=True)
+            if name in unidentified
+        )
+        text = f"The target {target:.4g} does not identify {', '.join(unidentified)}: the model gives it with {ranges}"
+        text += " (not in every combination). " if len(unidentified) > 1 else ". "
+        text += f"Chosen by rule, nearest to the reference among the settings that give the target: {place}."
+    elif reached:
+        text = f"The model gives {target:.4g} at {place}, the solution nearest to the reference."
+    else:
+        text = f"The model does not reach {target:.4g} in the region; "
+        text += f"its nearest value is {predicted:.4g} at {place}."
+    if not better_than_noise:
+        text += " The surface is not better than noise, so this point is not a calibration."
+    return text
+
+
+def _vector(name: str, values: npt.ArrayLike, k: int) -> FloatArray:
+    vector = np.asarray(values, dtype=np.float64)
+    if vector.shape != (k,) or not np.isfinite(vector).all():
+        raise StatisticsError(f"{name} = {vector.tolist()} must hold {k} finite numbers")
+    return vector
+
+
+TIE = 1e-3
+
+"""Weight of the squared coded distance to the reference: decides only where the misfit does not."""
+
+
+@dataclass(frozen=True)
+class Compromise(Record):
+    """The chosen point (natural and coded), the predictions there, and each target's share of the misfit.
+
+    ``misfit`` is J without the tie-breaker; ``standardised`` the signed (ŷ − T)/s per target.
+    """
+
+    point: FloatArray
+    point_coded: FloatArray
+    predicted: FloatArray
+    standardised: FloatArray
+    misfit: float
+    statement: str
+
+
+def find_compromise(models: Sequence[Surface], targets: Sequence[Target], reference: npt.ArrayLike) -> Compromise:
+    """Minimise J over the cube from the 27 points of a 3-level grid (deterministic; L-BFGS-B)."""
+    region = models[0].region
+    k = len(region.names)
+    home = region.coded(np.asarray(reference, dtype=float))
+    centre = np.zeros((1, k))
+    spread = np.array(
+        [math.hypot(t.standard_error, float(m.standard_error(centre)[0])) for m, t in zip(models, targets, strict=True)]
+    )
+    weight = np.array([t.weight for t in targets])
+    goal = np.array([t.mean for t in targets])
+
+    def residuals(x: FloatArray) -> FloatArray:
+        predicted = np.array([float(m.predict(x[None])[0]) for m in models])
+        return (predicted - goal) / spread
+
+    def cost(x: FloatArray) -> float:
+        return float(weight @ residuals(x) ** 2 + TIE * ((x - home) ** 2).sum())
+
+    starts = [np.array(x, dtype=float) for x in product((-0.9, 0.0, 0.9), repeat=k)]
+    best = min((minimize(cost, x, bounds=[(-1.0, 1.0)] * k) for x in starts), key=lambda found: found.fun)
+    missed = residuals(best.x)
+    misfit = float(weight @ missed**2)
+    worst = int(np.argmax(np.abs(missed)))
+    statement = f"The targets are missed by at most {abs(missed[worst]):.1f} standard errors (target {worst + 1})."
+    if abs(missed[worst]) > 2.0:
+        statement += " They contradict each other within this model and region."
+    statement += " The interval and the width given beside it describe the first target alone."
+    return Compromise(
+        point=region.natural(best.x),
+        point_coded=np.asarray(best.x),
+        predicted=missed * spread + goal,
+        standardised=missed,
+        misfit=misfit,
+        statement=statement,
+    )

@@ -1,0 +1,261 @@
+"""What a t test can see: its power, the smallest effect it resolves and the replicates it needs.
+
+Notation: sigma = standard deviation of one run; SE = standard error of the effect under test; an effect delta
+is tested by t = estimate/SE against Student's t, and under delta that t is noncentral with shift delta/SE.
+Source: Cohen 1988, Statistical Power Analysis, ch. 2; computed by statsmodels.
+
+What a design can see before it is run: the smallest effect per kind of term, at a given scatter of one run.
+
+Notation as in `doe.analysis.power`. The change of the response is counted from low to high for a factor and for an interaction
+(2 b), from the centre to the ends for a square (b). SE = sigma sqrt([(X'X)^-1]_jj), times two for 2 b.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+from scipy import optimize
+
+from doe.analysis.surface import included_terms, second_order_terms, term_names, with_intercept
+from doe.errors import StatisticsError
+from doe.record import Record
+
+FloatArray = npt.NDArray[np.float64]
+
+MAX_REPLICATES = 100_000
+
+
+def t_test_power(effect: float, standard_error: float, df: float, alpha: float = 0.05) -> float:
+    """Return the chance that a two-sided t test at level `alpha` rejects when the true effect is `effect`.
+
+    `effect` and `standard_error` share one unit; `df` are the degrees of freedom of the error estimate.
+    """
+    from statsmodels.stats.power import ttest_power
+
+    shift = abs(effect) / standard_error
+    beyond, opposite = (ttest_power(shift, 1, alpha / 2, df, alternative=side) for side in ("larger", "smaller"))
+    # The far tail is NaN once it underflows; it is then zero to double precision.
+    return float(min(1.0, beyond + (opposite if np.isfinite(opposite) else 0.0)))
+
+
+def smallest_effect(standard_error: float, df: float, alpha: float = 0.05, power: float = 0.8) -> float:
+    """Return the effect that a two-sided t test detects with chance `power`, in the unit of `standard_error`.
+
+    NaN without degrees of freedom; zero when the standard error is zero.
+    """
+    if df < 1 or not math.isfinite(standard_error):
+        return math.nan
+    return standard_error * _smallest_shift(df, alpha, power) if standard_error > 0 else 0.0
+
+
+@lru_cache(maxsize=4096)
+def _smallest_shift(df: float, alpha: float, power: float) -> float:
+    """Return the effect in standard errors; the same few are asked for again and again."""
+
+    def shortfall(shift: float) -> float:
+        return t_test_power(shift, 1.0, df, alpha) - power
+
+    upper = 2.0
+    while shortfall(upper) < 0:
+        upper *= 2
+    return float(optimize.brentq(shortfall, 0.0, upper))
+
+
+def smallest_difference(sigma: float, replicates: int, alpha: float = 0.05, power: float = 0.8) -> float:
+    """Return the difference of two means of `replicates` runs each that a pooled t test resolves. Unit of
+    `sigma`.
+    """
+    return smallest_effect(sigma * math.sqrt(2 / replicates), 2 * replicates - 2, alpha, power)
+
+
+def smallest_main_effect(
+    sigma: float,
+    replicates: int,
+    rows: int = 28,
+    alpha: float = 0.05,
+    power: float = 0.8,
+    comparisons: int = 1,
+    efficiency: float = 1.0,
+) -> float:
+    """Return the main effect, the change from low to high, that a design of `rows` x `replicates` runs resolves.
+
+    SE = 2 sigma/sqrt(efficiency x rows x replicates), see `main_effect_efficiency`; the error has
+    rows x (replicates - 1) degrees of freedom (pure error), so the answer is NaN for one replicate. `comparisons`
+    divides alpha (Bonferroni).
+    """
+    standard_error = 2 * sigma / math.sqrt(efficiency * rows * replicates)
+    return smallest_effect(standard_error, rows * (replicates - 1), alpha / comparisons, power)
+
+
+def main_effect_efficiency(design: FloatArray) -> float:
+    """Return the information on the worst known main effect of a design as a share of that in as many rows at ±1.
+
+    design: coded points, shape (rows, factors). Var(2 b_j) = 4 sigma²/(efficiency x rows) at worst; 1 for orthogonal
+    two-level designs, below it where rows stand in the middle or factors are correlated. Raises StatisticsError where
+    the rows cannot tell the factors apart.
+    """
+    model = with_intercept(design)
+    if np.linalg.matrix_rank(model) < model.shape[1]:
+        raise StatisticsError(f"{len(design)} rows cannot tell {design.shape[1]} factors and the mean apart")
+    worst = float(np.diag(np.linalg.inv(model.T @ model))[1:].max())
+    # Rounding of the inverse is no loss: orthogonal designs have 1 exactly.
+    return round(1.0 / (len(design) * worst), 12)
+
+
+def smallest_linear_effect(
+    sigma: float, replicates: int, design: FloatArray, alpha: float = 0.05, power: float = 0.8
+) -> float:
+    """Return the change from low to high of one factor, 2 b_i, that a second-order model of `design` resolves.
+
+    design: coded points, shape (points, factors), each run `replicates` times. SE = 2 sigma sqrt(v/replicates)
+    with v the entry of (X'X)^-1 that belongs to a linear term; the error is the residual of the model.
+    """
+    model = second_order_terms(design)
+    variance = float(np.linalg.inv(model.T @ model)[1, 1])
+    df = model.shape[0] * replicates - model.shape[1]
+    return smallest_effect(2 * sigma * math.sqrt(variance / replicates), df, alpha, power)
+
+
+def replicates_for_difference(effect: float, sigma: float, alpha: float = 0.05, power: float = 0.8) -> int:
+    """Return the least runs per group with which a two-sample comparison resolves `effect` (unit of `sigma`).
+
+    Raises StatisticsError unless effect > 0 and sigma > 0.
+    """
+    _require_positive(effect=effect, sigma=sigma)
+    return _least_replicates(
+        2, lambda n: t_test_power(effect, sigma * math.sqrt(2 / n), 2 * n - 2, alpha) >= power, effect, sigma
+    )
+
+
+def replicates_for_main_effect(
+    effect: float,
+    sigma: float,
+    rows: int = 28,
+    alpha: float = 0.05,
+    power: float = 0.8,
+    comparisons: int = 1,
+    efficiency: float = 1.0,
+) -> int:
+    """Return the least replicates per row (at least 2) with which a design resolves a main effect.
+
+    Arguments as in `smallest_main_effect`. Raises StatisticsError unless effect > 0 and sigma > 0.
+    """
+    _require_positive(effect=effect, sigma=sigma)
+
+    def enough(n: int) -> bool:
+        standard_error = 2 * sigma / math.sqrt(efficiency * rows * n)
+        return t_test_power(effect, standard_error, rows * (n - 1), alpha / comparisons) >= power
+
+    return _least_replicates(2, enough, effect, sigma)
+
+
+def replicates_for_linear_effect(
+    effect: float, sigma: float, design: FloatArray, alpha: float = 0.05, power: float = 0.8
+) -> int:
+    """Return the least replicates per point with which a second-order model resolves a change from low to high.
+
+    Arguments as in `smallest_linear_effect`. Raises StatisticsError unless effect > 0 and sigma > 0.
+    """
+    _require_positive(effect=effect, sigma=sigma)
+
+    def enough(n: int) -> bool:
+        return smallest_linear_effect(sigma, n, design, alpha, power) <= effect
+
+    return _least_replicates(1, enough, effect, sigma)
+
+
+def _least_replicates(least: int, enough: Callable[[int], bool], effect: float, sigma: float) -> int:
+    """Return the smallest n >= `least` with enough(n), by doubling and bisection (power grows with n)."""
+    upper = least
+    while not enough(upper):
+        upper *= 2
+        if upper > MAX_REPLICATES:
+            raise StatisticsError(
+                f"effect = {effect:g} at sigma = {sigma:g} needs more than {MAX_REPLICATES} replicates; "
+                "allowed is a larger effect"
+            )
+    lower = max(least, upper // 2)
+    while lower < upper:
+        middle = (lower + upper) // 2
+        lower, upper = (lower, middle) if enough(middle) else (middle + 1, upper)
+    return lower
+
+
+def _require_positive(**values: float) -> None:
+    for name, value in values.items():
+        if not (math.isfinite(value) and value > 0):
+            raise StatisticsError(f"{name} = {value} must be a positive number")
+
+
+@dataclass(frozen=True)
+class TermPrecision(Record):
+    """Worst term of a kind ("factor", "interaction", "square"); unit of sigma.
+
+    smallest: change that is seen with chance `power_wanted` at p < alpha; all: the same for all terms at once
+    (Bonferroni). power: chance to see `effect`; NaN without one. NaN where no degree of freedom is left for the error.
+    """
+
+    kind: str
+    terms: int
+    standard_error: float
+    df: int
+    smallest: float
+    smallest_of_all: float
+    effect: float
+    power: float
+
+
+def precision(
+    coded: FloatArray,
+    names: Sequence[str],
+    terms: Sequence[str],
+    sigma: float,
+    effect: float = math.nan,
+    alpha: float = 0.05,
+) -> tuple[TermPrecision, ...]:
+    """Return what runs at `coded`, shape (runs, factors), tell about each kind of the model's terms.
+
+    terms: as of `doe.analysis.surface.term_names`. sigma: standard deviation of one run, unit of the response.
+    Raises StatisticsError for a sigma or an effect that is not positive, or terms that the runs cannot separate.
+    """
+    for name, value in (("sigma", sigma), ("effect", effect)):
+        if not (value > 0 or (name == "effect" and math.isnan(value))) or math.isinf(value):
+            raise StatisticsError(f"{name} = {value:g} must be a positive number")
+    included = included_terms(names, terms)
+    model = second_order_terms(coded)[:, included]
+    if np.linalg.matrix_rank(model) < model.shape[1]:
+        raise StatisticsError(f"the {len(coded)} runs cannot separate the {model.shape[1]} terms of the model")
+    errors = sigma * np.sqrt(np.diag(np.linalg.inv(model.T @ model)))
+    df = model.shape[0] - model.shape[1]
+    kinds = [_kind(term) for term, is_in in zip(term_names(names), included, strict=True) if is_in]
+    found = []
+    for kind in ("factor", "interaction", "square"):
+        of_kind = [error for error, own in zip(errors, kinds, strict=True) if own == kind]
+        if not of_kind:
+            continue
+        error = float(max(of_kind)) * (1.0 if kind == "square" else 2.0)
+        known = df >= 1 and math.isfinite(effect)
+        found.append(
+            TermPrecision(
+                kind=kind,
+                terms=len(of_kind),
+                standard_error=error,
+                df=df,
+                smallest=smallest_effect(error, df, alpha),
+                smallest_of_all=smallest_effect(error, df, alpha / (len(kinds) - 1)),
+                effect=effect,
+                power=t_test_power(effect, error, df, alpha) if known else math.nan,
+            )
+        )
+    return tuple(found)
+
+
+def _kind(term: str) -> str:
+    if term == "intercept":
+        return term
+    return "square" if term.endswith("^2") else "interaction" if "*" in term else "factor"

@@ -1,0 +1,213 @@
+"""Analysis of variance of a second-order surface, with the fit statistics that published calibrations print.
+
+Sums of squares are partial (Type III): SS_j = b_j^2/[(X'X)^-1]_jj. Lack of fit compares the residual between
+distinct points with the replicates within them (pure error). PRESS = sum (e_i/(1 - h_i))^2 leaves out one run
+at a time; where a point has replicates this is optimistic, so `r_squared_predicted_by_row` leaves out a
+design row with all its replicates. Source: Myers, Montgomery and Anderson-Cook 2016, ch. 2 and 6; Allen 1974,
+Technometrics 16:125 (PRESS).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from doe.analysis.surface import Surface, least_squares, second_order_terms
+from doe.record import Record
+
+FloatArray = npt.NDArray[np.float64]
+
+FULL = 1 - 1e-9
+
+"""A leverage above this is one: the run is fitted exactly, and nothing can be said against it."""
+
+
+@dataclass(frozen=True)
+class AnovaRow(Record):
+    """One source of variation; f and p are NaN where it is tested against nothing."""
+
+    source: str
+    sum_of_squares: float
+    df: int
+    mean_square: float
+    f: float
+    p: float
+
+
+@dataclass(frozen=True)
+class SurfaceAnova(Record):
+    """ANOVA table and fit statistics of a surface.
+
+    rows: model, every term, residual, lack of fit, pure error, total. sigma = sqrt(MSE), unit of the
+    response. studentized_residuals: external, shape (runs,). better_than_noise: model p < 0.05 and predicted
+    R^2 > 0.
+    """
+
+    rows: tuple[AnovaRow, ...]
+    mean: float
+    sigma: float
+    cv_percent: float
+    r_squared: float
+    r_squared_adjusted: float
+    r_squared_predicted: float
+    r_squared_predicted_by_row: float
+    press: float
+    adequate_precision: float
+    coefficient_standard_errors: FloatArray
+    studentized_residuals: FloatArray
+    better_than_noise: bool
+    notes: tuple[str, ...]
+
+    def row(self, source: str) -> AnovaRow:
+        """Return the row named `source`; KeyError if there is none."""
+        for row in self.rows:
+            if row.source == source:
+                return row
+        raise KeyError(source)
+
+
+def analyse_surface(surface: Surface) -> SurfaceAnova:
+    """Return the ANOVA and fit statistics of a fitted surface.
+
+    A response without variation gives NaN for every ratio, and a note.
+    """
+    model = second_order_terms(surface.points)[:, surface.included]
+    found = least_squares(model, surface.observed)
+    residuals = surface.observed - surface.predicted
+    n, p = model.shape
+    mean = float(surface.observed.mean())
+    residual_ss = float(found.ssr)
+    total_ss = _total_sum_of_squares(surface.observed)
+    model_ss = max(0.0, total_ss - residual_ss)
+    mse = surface.mse if total_ss > 0 else 0.0
+    model_row = _tested("model", model_ss, p - 1, mse, surface.df_residual)
+    chosen = np.flatnonzero(surface.included)[1:]
+    term_ss = found.params[1:] ** 2 / np.diag(found.normalized_cov_params)[1:]
+    term_rows = [
+        _tested(surface.terms[k], float(ss) if total_ss > 0 else 0.0, 1, mse, surface.df_residual)
+        for k, ss in zip(chosen, term_ss, strict=True)
+    ]
+    influence = found.get_influence()
+    # A run that is indispensable to the fit cannot be predicted from the others.
+    press = math.inf if (surface.leverage > FULL).any() else float((influence.resid_press**2).sum())
+    predicted_r2 = _ratio(total_ss - press, total_ss)
+    rows = (
+        model_row,
+        *term_rows,
+        AnovaRow("residual", residual_ss, surface.df_residual, mse, math.nan, math.nan),
+        *_lack_of_fit(surface, residual_ss),
+        AnovaRow("total", total_ss, n - 1, total_ss / (n - 1), math.nan, math.nan),
+    )
+    better = bool(model_row.p < 0.05 and predicted_r2 > 0)
+    return SurfaceAnova(
+        rows=rows,
+        mean=mean,
+        sigma=math.sqrt(mse),
+        cv_percent=_ratio(100 * math.sqrt(mse), abs(mean)),
+        r_squared=_ratio(model_ss, total_ss),
+        r_squared_adjusted=1 - _ratio(mse * (n - 1), total_ss),
+        r_squared_predicted=predicted_r2,
+        r_squared_predicted_by_row=1 - _ratio(_press_by_row(surface, residuals), total_ss),
+        press=press,
+        adequate_precision=_ratio(float(np.ptp(surface.predicted)), math.sqrt(p * mse / n)),
+        coefficient_standard_errors=np.sqrt(mse * np.diag(surface.information_inverse)),
+        studentized_residuals=_externally_studentized(influence, mse, surface.df_residual),
+        better_than_noise=better,
+        notes=_notes(rows, total_ss, predicted_r2, better, bool(surface.included.all())),
+    )
+
+
+def _total_sum_of_squares(observed: FloatArray) -> float:
+    """Return the sum of squares about the mean, exactly zero when values differ by rounding only."""
+    dust = 8 * np.finfo(np.float64).eps * float(np.abs(observed).max())
+    return 0.0 if np.ptp(observed) <= dust else float(((observed - observed.mean()) ** 2).sum())
+
+
+def _ratio(numerator: float, denominator: float) -> float:
+    return numerator / denominator if denominator > 0 else math.nan
+
+
+def _tested(source: str, sum_of_squares: float, df: int, error_ms: float, error_df: int) -> AnovaRow:
+    """Return a row tested by F against an error mean square; NaN when that error is zero."""
+    f = _ratio(sum_of_squares / df, error_ms)
+    return AnovaRow(source, sum_of_squares, df, sum_of_squares / df, f, float(stats.f.sf(f, df, error_df)))
+
+
+def _lack_of_fit(surface: Surface, residual_ss: float) -> tuple[AnovaRow, ...]:
+    """Return the rows "lack_of_fit" and "pure_error" as far as they have degrees of freedom.
+
+    By hand: in exact replicates what is left of them by rounding must not become an error.
+    """
+    counts = np.bincount(surface.point_of_run)
+    means = np.bincount(surface.point_of_run, weights=surface.observed) / counts
+    within = surface.observed - means[surface.point_of_run]
+    within[np.abs(within) <= 8 * np.finfo(np.float64).eps * np.abs(surface.observed)] = 0.0
+    pure_ss, pure_df = float(within @ within), int(surface.observed.size - counts.size)
+    lack_ss, lack_df = max(0.0, residual_ss - pure_ss), int(counts.size - surface.included.sum())
+    rows = []
+    if lack_df > 0 and pure_df > 0:
+        rows.append(_tested("lack_of_fit", lack_ss, lack_df, pure_ss / pure_df, pure_df))
+    if pure_df > 0:
+        rows.append(AnovaRow("pure_error", pure_ss, pure_df, pure_ss / pure_df, math.nan, math.nan))
+    return tuple(rows)
+
+
+def _press_by_row(surface: Surface, residuals: FloatArray) -> float:
+    """Return the sum of squared errors when each row of the design is predicted from all others.
+
+    With H the hat matrix of the runs of a row, their left-out residuals are (I - H)^-1 e. Infinite when a row
+    is indispensable to the fit.
+    """
+    model = second_order_terms(surface.points)
+    total = 0.0
+    for row in np.unique(surface.row_of_run):
+        runs = surface.row_of_run == row
+        kept = np.eye(int(runs.sum())) - model[runs] @ surface.information_inverse @ model[runs].T
+        if np.linalg.matrix_rank(kept, tol=1e-9) < kept.shape[0]:
+            return math.inf
+        left_out = np.linalg.solve(kept, residuals[runs])
+        total += float(left_out @ left_out)
+    return total
+
+
+def _externally_studentized(influence: Any, mse: float, df: int) -> FloatArray:
+    """Return r_i sqrt((df - 1)/(df - r_i^2)), the residuals by an error that is estimated without run i.
+
+    The same as statsmodels' `resid_studentized_external`, which fits the model once per run. NaN where that is not
+    defined.
+    """
+    if mse == 0 or df < 2:
+        return np.full(influence.nobs, np.nan)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        internal = influence.resid_studentized_internal
+        return np.asarray(internal * np.sqrt((df - 1) / (df - internal**2)))
+
+
+def _notes(
+    rows: tuple[AnovaRow, ...], total_ss: float, predicted_r2: float, better_than_noise: bool, is_quadratic: bool
+) -> tuple[str, ...]:
+    """Return what a reader of the table must know, as sentences."""
+    by_source = {row.source: row for row in rows}
+    notes = []
+    if total_ss == 0:
+        return ("The response is the same in every run; there is nothing to fit.",)
+    if not better_than_noise:
+        notes.append(
+            f"The surface is not better than noise (model p = {by_source['model'].p:.3g}, predicted R² = "
+            f"{predicted_r2:.3g}); nothing may be read from its shape."
+        )
+    if "pure_error" not in by_source:
+        notes.append("No point has two valid runs; lack of fit cannot be tested.")
+    elif by_source["pure_error"].sum_of_squares == 0:
+        notes.append("All replicates agree exactly (was the seed varied?); lack of fit cannot be tested.")
+    elif "lack_of_fit" in by_source and by_source["lack_of_fit"].p < 0.05:
+        form = "quadratic" if is_quadratic else "of the form of this model"
+        notes.append(
+            f"Lack of fit is significant (p = {by_source['lack_of_fit'].p:.3g}); the true surface is not {form}."
+        )
+    return tuple(notes)

@@ -1,0 +1,140 @@
+"""The whole chain: pilot → screening → assumptions → scan → ascent → surface → optimum → verification, and whatever
+stages other packages add to it.
+
+What a stage would find if it ended now: its own analysis, over the runs that have ended so far.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from doe.errors import StatisticsError, StudyStopped
+from doe.runs import Run, Runner, Setting
+from doe.stages import stages_of
+from doe.stages.stage import Bias, Chain
+from doe.studies.profile import Profile
+from doe.studies.study import Study
+from doe.studies.study_result import AllStages, StageResult, Stages
+
+Analysis = Callable[[Runner], StageResult | None]
+
+"""A stage as a function of who makes its runs."""
+
+OnPartial = Callable[[str, StageResult], None]
+
+"""Called with (stage, its result so far)."""
+
+LEAST_INTERVAL = 3.0
+
+"""Seconds between two partial results."""
+
+SHARE = 0.02
+
+"""Largest share of the time that the analyses may take."""
+
+
+class KnownRuns:
+    """A runner that makes no run: it answers with those that have ended."""
+
+    def __init__(self, runs: Sequence[Run]) -> None:
+        self._runs = sorted(runs, key=lambda run: (run.replicate, run.attempt))
+
+    def run(self, stage: str, settings: Sequence[Setting]) -> list[list[Run]]:
+        """See :class:`doe.runs.Runner`; the runs of a setting are those with its label."""
+        return [[run for run in self._runs if run.label == setting.label] for setting in settings]
+
+
+class PartialStages:
+    """Follows a campaign: after a run, the result of its stage so far, as soon as one can be computed."""
+
+    def __init__(self, on_partial: OnPartial, clock: Callable[[], float] = time.perf_counter) -> None:
+        self._on_partial, self._clock = on_partial, clock
+        self._stage = ""
+        self._analysis: Analysis | None = None
+        self._runs: list[Run] = []
+        self._due = 0.0
+
+    def begin(self, stage: str, analysis: Analysis) -> None:
+        """A stage begins; ``analysis`` gives its result from any runner."""
+        self._stage, self._analysis, self._runs = stage, analysis, []
+
+    def add(self, stage: str, run: Run) -> None:
+        """A run of ``stage`` has ended."""
+        if stage != self._stage or self._analysis is None:
+            return
+        self._runs.append(run)
+        began = self._clock()
+        # Runs from the store come all at once; the next one that is really made finds them all.
+        if run.reused or began < self._due:
+            return
+        try:
+            result = self._analysis(KnownRuns(self._runs))
+        except StatisticsError:  # too few runs to say anything yet
+            result = None
+        if result is not None:
+            self._on_partial(stage, result)
+        now = self._clock()
+        self._due = now + max(LEAST_INTERVAL if result is not None else 0.0, (now - began) / SHARE)
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """A chain that ran to its end: the result of every stage, and the seconds that each took."""
+
+    stages: AllStages
+    seconds: dict[str, float]
+
+
+def run_campaign(
+    study: Study,
+    profile: Profile,
+    runner: Runner,
+    estimator_bias: Bias,
+    on_stage: Callable[[str, str], None] = lambda stage, line: None,
+    on_begin: Callable[[str, Analysis], None] = lambda stage, analysis: None,
+    on_result: Callable[[str, StageResult | None], None] = lambda stage, result: None,
+) -> Campaign:
+    """Run every stage; ``on_stage`` is called with (stage, one line of what it found) as each ends.
+
+    ``on_begin`` is called with (stage, its analysis as a function of a runner) before a stage, ``on_result`` with
+    (stage, its result or None) after it.
+
+    Raises StudyStopped where what the runs of a stage gave cannot be analysed.
+    """
+    seconds: dict[str, float] = {}
+    counted, found = CountingRunner(runner), Stages()
+    for stage in stages_of(study):
+        sized = profile if found.pilot is None else found.pilot.profile
+        work = partial(stage.run, Chain(study, sized, estimator_bias, found))
+        started = time.perf_counter()
+        on_begin(stage.name, work)
+        try:
+            result = work(counted)
+        except StatisticsError as error:
+            seen = ", ".join(f"{number} {outcome}" for outcome, number in counted.outcomes.items())
+            raise StudyStopped(stage.name, f"{error} (the last runs: {seen})", counted.runs) from error
+        seconds[stage.name] = time.perf_counter() - started
+        found = found.with_result(stage.name, result)
+        on_result(stage.name, result)
+        on_stage(stage.name, result.line if result is not None else "not declared in this study")
+    return Campaign(AllStages(**vars(found)), seconds)
+
+
+class CountingRunner:
+    """A runner that counts the runs that it was given, failed ones included."""
+
+    def __init__(self, runner: Runner) -> None:
+        self._runner, self.runs = runner, 0
+        self.outcomes: Counter[str] = Counter()
+        """Outcome → number of the stage that ran last."""
+
+    def run(self, stage: str, settings: Sequence[Setting]) -> list[list[Run]]:
+        """See :class:`doe.runs.Runner`."""
+        rows = self._runner.run(stage, settings)
+        self.runs += sum(len(runs) for runs in rows)
+        self.outcomes = Counter(run.outcome for runs in rows for run in runs)
+        return rows

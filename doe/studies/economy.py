@@ -1,0 +1,206 @@
+"""Whether cheaper settings of the numerical method give the same piles: equivalence tests against the full settings.
+
+Every economy is tested at the centre of a study and at the two corners of its ranges with the largest overlaps: the
+softest materials with the highest restitution, at the lowest and at the highest friction. At each, so many pours are
+made with and without the economy, all with seeds of their own (a pour is chaotic: the same seed would not make two of
+them alike). An observable is equivalent where both one-sided tests (TOST; Schuirmann 1987) keep its mean within
+``MARGIN`` standard deviations of one pour. The economy is accepted where all observables are, at all three settings,
+and where the share of valid pours has not changed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy import stats
+
+from doe.analysis.t_tests import Sample, equivalence_test, welch_test
+from doe.record import Record
+from doe.runs import Run, Runner, Setting, responses
+from doe.studies.study import Study
+from solver import Scene, observable_names, parameters, value, with_values
+
+MARGIN = 0.3
+
+"""Of a mean, in standard deviations of one pour with the full settings."""
+
+ALPHA, POWER = 0.05, 0.9
+
+COMPARED = (
+    "angle_of_repose_deg",
+    "angle_of_repose_cone_deg",
+    "apex_height_m",
+    "footprint_r50_m",
+    "bulk_density_kg_m3",
+    "discharge_time_s",
+)
+
+"""What has to stay: the slope read off the silhouette and off the surface, height, spread, packing and flow."""
+
+SHARE_ALPHA = 0.01
+
+"""Level at which the shares of valid pours count as different (Fisher's exact test)."""
+
+
+@dataclass(frozen=True)
+class Economy:
+    """A way to pour at less cost: what it multiplies in a scene."""
+
+    name: str
+    factors: Mapping[str, float]
+    """Last parts of parameter paths, or whole ones → factor on the value that the scene has."""
+    reason: str
+
+    def values(self, scene: Scene) -> dict[str, float]:
+        """The parameters of ``scene`` that it changes, with their new values in SI."""
+        return {
+            path: value(scene, path) * factor
+            for ending, factor in self.factors.items()
+            for path in parameters(scene)
+            if path == ending or path.endswith(f".{ending}")
+        }
+
+
+ECONOMIES: Mapping[str, Economy] = {
+    one.name: one
+    for one in (
+        Economy(
+            "larger_steps",
+            {"numerics.rayleigh_fraction": 1.5, "numerics.impact_fraction": 1.5},
+            "time steps half as large again",
+        ),
+        Economy("softer_grains", {"shear_modulus": 0.5}, "half the shear modulus: steps 1.4 times as large"),
+        Economy("shorter_rest", {"numerics.rest_time": 0.5}, "half the time of rest that ends a pour"),
+    )
+}
+
+
+@dataclass(frozen=True)
+class Compared(Record):
+    """One observable at one setting, with the economy and without."""
+
+    setting: str
+    observable: str
+    full: Sample
+    economical: Sample
+    margin: float
+    """In the observable's unit."""
+    low: float
+    high: float
+    """Interval of the difference of the means (economical less full) at the level 1 − 2 α."""
+    p: float
+    equivalent: bool
+
+
+@dataclass(frozen=True)
+class Shares(Record):
+    """Valid pours at one setting."""
+
+    setting: str
+    full: tuple[int, int]
+    """Valid pours, pours."""
+    economical: tuple[int, int]
+    p: float
+    """Of Fisher's exact test."""
+
+
+@dataclass(frozen=True)
+class EconomyTest(Record):
+    """What came out for one economy."""
+
+    economy: str
+    pours: int
+    """Of each kind at each setting."""
+    compared: tuple[Compared, ...]
+    shares: tuple[Shares, ...]
+    cost: float
+    """Wall time of an economical pour over that of a full one, mean over the settings."""
+    accepted: bool
+
+
+def pours_needed(margin: float = MARGIN, alpha: float = ALPHA, power: float = POWER) -> int:
+    """Pours of each kind for ``power`` where the means are equal: n = 2 (z₁₋α + z₍₁₊power₎/₂)² / margin².
+
+    ``margin`` is in standard deviations of one pour. Source: Julious 2004, Stat. Med. 23:1921, eq. 23.
+    """
+    quantiles = stats.norm.ppf(1.0 - alpha) + stats.norm.ppf(0.5 * (1.0 + power))
+    return math.ceil(2.0 * float(quantiles) ** 2 / margin**2)
+
+
+def settings_of(study: Study) -> dict[str, dict[str, float | str]]:
+    """Centre and the two corners of ``study``: name → what is changed against its scene."""
+    corners: dict[str, dict[str, float | str]] = {"centre": {}, "soft, least friction": {}, "soft, most friction": {}}
+    ends = {"shear_modulus": ("low", "low"), "restitution": ("high", "high"), "static_friction": ("low", "high")}
+    for factor in study.factors:
+        ending = factor.path.rsplit(".", 1)[-1]
+        if ending in ends:
+            for name, end in zip(tuple(corners)[1:], ends[ending], strict=True):
+                corners[name][factor.path] = getattr(factor, end)
+    return corners
+
+
+def rows_of(study: Study, economy: Economy, pours: int) -> list[Setting]:
+    """Each setting without and with ``economy``, in turns."""
+    rows = []
+    for name, values in settings_of(study).items():
+        # A corner may set what the economy scales.
+        cheap = economy.values(with_values(study.scene, values))
+        rows += [Setting(name, values, pours), Setting(f"{name}, {economy.name}", {**values, **cheap}, pours)]
+    return rows
+
+
+def compare(
+    study: Study, economy: Economy, runner: Runner, pours: int, told: Callable[[EconomyTest], None] | None = None
+) -> EconomyTest:
+    """Pour and compare; ``told`` is called with what is known after every tenth of the pours."""
+    stage = f"economy {economy.name}"
+    found = None
+    for count in sorted({max(2, round(pours * part / 10)) for part in range(1, 11)}):
+        rows = runner.run(stage, rows_of(study, economy, count))
+        found = judged(study, economy, rows, count)
+        if told is not None:
+            told(found)
+    assert found is not None
+    return found
+
+
+def judged(study: Study, economy: Economy, rows: Sequence[Sequence[Run]], pours: int) -> EconomyTest:
+    """The comparison of what has been poured; ``rows`` as :func:`rows_of` has them."""
+    names = list(settings_of(study))
+    asked = [one for one in COMPARED if one in observable_names(study.scene)]
+    compared: list[Compared] = []
+    shares: list[Shares] = []
+    costs = []
+    for k, name in enumerate(names):
+        full, cheap = rows[2 * k], rows[2 * k + 1]
+        compared += list(_observables(name, asked, full, cheap))
+        counts = [(sum(run.valid for run in runs), len(runs)) for runs in (full, cheap)]
+        table = [[valid, total - valid] for valid, total in counts]
+        shares.append(Shares(name, counts[0], counts[1], float(stats.fisher_exact(table)[1])))
+        costs.append(float(np.mean([r.wall_s for r in cheap]) / np.mean([r.wall_s for r in full])))
+    accepted = all(one.equivalent for one in compared) and all(one.p >= SHARE_ALPHA for one in shares)
+    return EconomyTest(economy.name, pours, tuple(compared), tuple(shares), float(np.mean(costs)), accepted)
+
+
+def _observables(
+    name: str, observables: Sequence[str], full: Sequence[Run], cheap: Sequence[Run]
+) -> Iterator[Compared]:
+    for observable in observables:
+        one, two = (_values(runs, observable) for runs in (full, cheap))
+        base, other = (Sample.of(x) if len(x) else Sample(math.nan, math.nan, 0) for x in (one, two))
+        margin = MARGIN * base.sd
+        # What cannot be tested (hardly a valid pour, or no scatter) is not shown to be alike.
+        if min(base.n, other.n) < 2 or not margin > 0.0:
+            yield Compared(name, observable, base, other, margin, math.nan, math.nan, math.nan, False)
+        else:
+            test = equivalence_test(welch_test(other, base), margin, ALPHA)
+            yield Compared(name, observable, base, other, margin, test.low, test.high, test.p, test.equivalent)
+
+
+def _values(runs: Sequence[Run], observable: str) -> npt.NDArray[np.float64]:
+    values = responses([runs], observable).ravel()
+    return values[~np.isnan(values)]

@@ -1,0 +1,53 @@
+"""What a factor means for a scene: levels within the declared ranges, and how many bodies it touches."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from solver import ParameterError, Scene, body_counts, canonical, parameters, with_values
+
+MIN_BODIES = 5
+
+"""A factor that touches fewer bodies than this cannot be tested: its effect is that of a handful of places."""
+
+
+def checked_levels(scene: Scene, entry: dict[str, Any]) -> tuple[str, float | str, float | str, float | str]:
+    """(path, low, high, reference) of a study's entry, in SI; each level is tried on the scene."""
+    path = canonical(scene, str(entry["path"]))
+    parameter = parameters(scene)[path]
+    low, high, reference = (parameter.check(entry[key]) for key in ("low", "high", "reference"))
+    if isinstance(low, float) and isinstance(high, float) and isinstance(reference, float):
+        if not low < high:
+            raise ParameterError(f"{entry['name']} ({path}): low {low:g} is not below high {high:g}")
+        if not low <= reference <= high:
+            raise ParameterError(f"{entry['name']} ({path}): reference {reference:g} is outside {low:g} … {high:g}")
+    elif low == high:
+        raise ParameterError(f"{entry['name']} ({path}): low and high are both {low!r}; two different names are needed")
+    for level in (low, high):
+        with_values(scene, {path: level})
+    return path, low, high, reference
+
+
+def bodies_touched(scene: Scene, path: str) -> float:
+    """Number of bodies whose contacts a parameter rules; infinite for the rig, the insertion and the numerics.
+
+    For a pair it is the smaller number of the two partners (the wall counts as infinitely many). A dimension of a
+    body touches the bodies of that component; the resolution of the shapes and a mass fraction, which moves all the
+    others, touch every body.
+    """
+    number = list(zip(scene.bodies, body_counts(scene), strict=True))
+
+    def of_end(name: str) -> float:
+        of_wall = name == scene.rig.wall
+        return math.inf if of_wall else sum(n for body, n in number if name in (body.name, body.material))
+
+    kind, *names = canonical(scene, path).split(".")
+    if kind == "material":
+        return math.inf if names[0] == scene.rig.wall else sum(n for body, n in number if body.material == names[0])
+    if kind == "pair":
+        return min(of_end(names[0]), of_end(names[1]))
+    if kind == "body":
+        one_component = len(names) == 2 and names[1] != "mass_fraction"
+        return sum(n for body, n in number if not one_component or body.name == names[0])
+    return math.inf

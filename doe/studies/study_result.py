@@ -1,0 +1,253 @@
+"""What a study found, stage by stage: the content of ``result.json``, and of ``partial.json`` while it still runs."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, ClassVar, Self
+
+from doe.record import Document, Record
+from doe.runs import Run, Setting
+from doe.stages.ascent import AscentResult
+from doe.stages.pilot import PilotResult
+from doe.stages.scan import ScanResult
+from doe.stages.screening import ScreeningResult
+from doe.stages.stage import FurtherResult
+from doe.stages.surface import OptimumResult, SurfaceResult
+from doe.stages.verification import VerificationResult
+from doe.studies.profile import Profile
+from doe.studies.study import TRIES, Factor, Study, Values
+from doe.target import Target
+from solver import ClumpFit, Outcome
+
+StageResult = (
+    PilotResult
+    | ScreeningResult
+    | ScanResult
+    | AscentResult
+    | SurfaceResult
+    | OptimumResult
+    | VerificationResult
+    | FurtherResult
+)
+
+USUAL_DESIGNS = {"screening": "Plackett–Burman", "assumptions": "Plackett–Burman", "surface": "Box–Behnken"}
+
+"""Stage → title of its design, where a result says none: those of versions in which there was no choice."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyDescription(Record):
+    """What was asked.
+
+    ``contact``: the contact law and its conventions; ``tries``: seeds for one replicate; ``designs``: stage → title of
+    its design.
+    """
+
+    name: str
+    title: str
+    file: str
+    profile: Profile
+    targets: tuple[Target, ...]
+    factors: tuple[Factor, ...]
+    assumptions: tuple[Factor, ...]
+    assumed: tuple[str, ...]
+    contact: dict[str, str] = field(default_factory=dict)
+    changes: dict[str, Values]
+    seed: int | None = None
+    tries: int = TRIES
+    designs: dict[str, str] = field(default_factory=lambda: dict(USUAL_DESIGNS))
+
+    @staticmethod
+    def of(study: Study, profile: Profile, tries: int = TRIES) -> StudyDescription:
+        """Return the description of a study that is run with ``profile``."""
+        return StudyDescription(
+            name=study.name,
+            title=study.scene.title,
+            file=str(study.file),
+            profile=profile,
+            targets=study.targets,
+            factors=study.factors,
+            assumptions=study.assumptions,
+            assumed=tuple(study.scene.assumed),
+            contact=study.scene.contact.stated,
+            changes=study.changes,
+            seed=study.seed,
+            tries=tries,
+            designs={
+                "screening": study.screening_design.design.title,
+                "assumptions": study.assumption_design.design.title,
+                "surface": study.surface_design.design.title,
+            },
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stages(Record):
+    """The result of every stage, in running order; None of one that has not ended, or that the study does not have."""
+
+    pilot: PilotResult | None = None
+    screening: ScreeningResult | None = None
+    assumptions: ScreeningResult | None = None
+    scan: ScanResult | None = None
+    ascent: AscentResult | None = None
+    surface: SurfaceResult | None = None
+    optimum: OptimumResult | None = None
+    verification: VerificationResult | None = None
+    further: dict[str, FurtherResult] = field(default_factory=dict)
+    """Those of other packages, by name."""
+
+    def result_of(self, stage: str) -> StageResult | None:
+        """Return the result of a stage by its name."""
+        found: StageResult | None = getattr(self, stage) if stage in OWN_STAGES else self.further.get(stage)
+        return found
+
+    def with_result(self, stage: str, result: StageResult | None) -> Self:
+        """Return these results with that of one more stage."""
+        if isinstance(result, FurtherResult):
+            return replace(self, further=self.further | {stage: result})
+        changes: dict[str, Any] = {stage: result} if stage in OWN_STAGES else {}
+        return replace(self, **changes)
+
+    def stage_names(self) -> tuple[str, ...]:
+        """Return the names of the stages that these results are for."""
+        return (*OWN_STAGES, *self.further)
+
+    def runs_of(self, stage: str) -> tuple[tuple[Run, ...], ...]:
+        """Return the runs of each setting of a stage, failed ones included; empty where it made none."""
+        found = self.result_of(stage)
+        if found is None or isinstance(found, OptimumResult):
+            return ()
+        return (found.runs,) if isinstance(found, VerificationResult) else found.runs
+
+    def settings_of(self, stage: str) -> tuple[Setting, ...]:
+        """Return the settings of a stage, in the order of ``runs_of``; empty also of results of older versions."""
+        found = self.result_of(stage)
+        return () if found is None or isinstance(found, OptimumResult) else found.settings
+
+    def all_runs(self) -> Iterator[tuple[str, Run]]:
+        """Return (stage, run) of every run, failed ones included."""
+        return ((stage, run) for stage in self.stage_names() for runs in self.runs_of(stage) for run in runs)
+
+
+OWN_STAGES = tuple(one.name for one in fields(Stages) if one.name != "further")
+
+"""The stages of this package, in running order."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class AllStages(Stages):
+    """The same of a study that has ended."""
+
+    pilot: PilotResult
+    screening: ScreeningResult
+    ascent: AscentResult
+    surface: SurfaceResult
+    optimum: OptimumResult
+    verification: VerificationResult
+
+
+@dataclass(frozen=True, kw_only=True)
+class Described(Document):
+    """A file of results that says what was asked."""
+
+    SCHEMA: ClassVar[int] = 1
+    NAME: ClassVar[str] = "result of a study"
+
+    study: StudyDescription
+
+
+@dataclass(frozen=True, kw_only=True)
+class PartialStudy(Stages, Described):
+    """What a study that runs has found so far: ``partial`` is the stage that runs, ``line`` its analysis in words."""
+
+    partial: str | None = None
+    line: str = ""
+
+
+@dataclass(frozen=True)
+class ListedRun(Record):
+    """One run of a study, as all of them are listed."""
+
+    stage: str
+    label: str
+    seed: int
+    outcome: str
+    key: str
+
+
+@dataclass(frozen=True)
+class RunCounts(Record):
+    """Number of runs, in all and by outcome and stage, and all of them by name."""
+
+    total: int
+    valid: int
+    by_outcome: dict[str, int]
+    by_stage: dict[str, int]
+    list: tuple[ListedRun, ...]
+
+    @staticmethod
+    def of(stages: Stages) -> RunCounts:
+        """Return the counts over all stages."""
+        runs = list(stages.all_runs())
+        return RunCounts(
+            total=len(runs),
+            valid=sum(run.valid for _, run in runs),
+            by_outcome=dict(Counter(run.outcome for _, run in runs)),
+            by_stage=dict(Counter(stage for stage, _ in runs)),
+            list=tuple(ListedRun(stage, run.label, run.seed, run.outcome, run.key) for stage, run in runs),
+        )
+
+    def outcomes(self) -> Mapping[str, Counter[str]]:
+        """Return stage → outcome → number of runs, stages in running order."""
+        found: dict[str, Counter[str]] = {}
+        for run in self.list:
+            found.setdefault(run.stage, Counter())[run.outcome] += 1
+        return found
+
+
+@dataclass(frozen=True)
+class Timing(Record):
+    """Seconds in all and by stage; ``reused_runs`` were found in the store."""
+
+    total_s: float
+    stage_s: dict[str, float]
+    runs_per_minute: float
+    reused_runs: int = 0
+
+
+@dataclass(frozen=True)
+class PouredBody(Record):
+    """A body of the mixture: its mass [kg], and how well its member spheres stand for its solid."""
+
+    body: str
+    mass: float
+    spheres: str
+    fit: ClumpFit
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyResult(AllStages, Described):
+    """Everything that a finished study found: the content of ``result.json``."""
+
+    runs: RunCounts
+    timing: Timing
+    versions: dict[str, str | None]
+    shapes: tuple[PouredBody, ...]
+
+
+AnyStudy = PartialStudy | StudyResult
+
+
+def study_from(content: Mapping[str, Any]) -> AnyStudy:
+    """Return the result that a file holds, of a finished study or of one that runs.
+
+    Raises VersionError for that of another version, RecordError for anything else.
+    """
+    return StudyResult.from_dict(content) if "runs" in content else PartialStudy.from_dict(content)
+
+
+def valid_runs(outcomes: Mapping[str, int]) -> int:
+    """Return the number of valid runs among counted outcomes."""
+    return sum(number for outcome, number in outcomes.items() if Outcome(outcome).valid)
