@@ -15,8 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from explorer.export import bed as peer_bed
-from explorer.export.deck import Deck
-from explorer.export.deck_of_scene import deck_of
+from explorer.export.deck import Deck, deck_of
 from explorer.export.liggghts import write_liggghts
 from explorer.export.run import PeerRun, PeerTimeout, run_liggghts, run_yade
 from explorer.export.yade import write_yade

@@ -116,7 +116,7 @@ def test_an_observable_is_read_named_and_a_target_of_studies(site, tmp_path):
 import json
 import tomllib
 from doe.studies.study import study_from
-from explorer.report.units_for_people import observable_label
+from explorer.units import observable_label
 from solver import asset_path, named
 path = asset_path("studies", "sunflower_extract")
 table = tomllib.loads(path.read_text())

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from explorer.design.kinds import ModelOrder
+from explorer.design.factors_file import ModelOrder
 
 
 def analyse(
@@ -23,7 +23,7 @@ def analyse(
 ) -> None:
     """Effects, model, analysis of variance, diagnostics, canonical analysis, and the settings that give a target."""
     from explorer.design.analysis import AnalyseOrder, run_analyse
-    from explorer.design.analysis_text import analysis_text
+    from explorer.design.text import analysis_text
     from explorer.errors import CommandError
     from explorer.files.run_folder import json_text
 

@@ -24,8 +24,7 @@ def audit(
     """
     from doe.audit import audit_study
     from explorer.audit.read_study import read_study, shipped_study
-    from explorer.audit.report import write_audit
-    from explorer.audit.sentences import audit_text
+    from explorer.audit.report import audit_text, write_audit
     from explorer.files.run_folder import appearing, json_text
 
     found = audit_study(read_study(shipped_study() if folder is None else folder))

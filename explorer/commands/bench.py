@@ -44,8 +44,8 @@ def bench(
 
     from explorer.benchmark import BEDS, CASES, PEERS, USUAL_BEDS, Options
     from explorer.errors import CommandError
+    from explorer.files.output_file import write_whole
     from explorer.files.run_folder import json_text
-    from explorer.files.whole_file import write_whole
     from explorer.tables.benchmark import fallen, machine, markdown, result_of, table_text
 
     for name in only:

@@ -8,7 +8,7 @@ from pathlib import Path
 import typer
 
 from explorer.commands.listing import Listing
-from explorer.design.kinds import Alpha
+from explorer.design.factors_file import Alpha
 
 
 class Designs(Listing):
@@ -48,12 +48,11 @@ def design(
 ) -> None:
     """Write the runs of a design; says what is confused with what, and which effects it will be able to see."""
     from explorer.design.factors_file import read_factors
-    from explorer.design.plan import PlanOrder, make_plan
-    from explorer.design.plan_text import plan_result, plan_text
-    from explorer.design.sheet import sheet_text
+    from explorer.design.plan import PlanOrder, make_plan, sheet_text
+    from explorer.design.text import plan_result, plan_text
     from explorer.errors import CommandError
+    from explorer.files.output_file import write_whole
     from explorer.files.run_folder import json_text
-    from explorer.files.whole_file import write_whole
     from solver.assets import asset_path
 
     if out.exists():

@@ -48,8 +48,7 @@ def export(
     from explorer.export import EXPORTS
     from explorer.export.target import ExportOrder
     from explorer.files.run_folder import appearing
-    from explorer.scene.calibrated import calibrated_scene, is_calibration
-    from explorer.scene.file import load_scene, with_settings
+    from explorer.scene.file import calibrated_scene, is_calibration, load_scene, with_settings
     from solver import value
 
     if to not in EXPORTS:

@@ -43,7 +43,7 @@ def new(
     if kind == Kind.STUDY and (like is not None or part):
         raise CommandError("--like, --part: belong to `new material`")
     if like is not None or part:
-        from explorer.laboratory.new_material import write_measured_material
+        from explorer.laboratory.part import write_measured_material
 
         written = [write_measured_material(out, name, like, part)]
     else:

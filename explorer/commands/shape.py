@@ -28,7 +28,7 @@ def shape(
 
     Prints how far they are from it by their number, and saves the body.
     """
-    from explorer.shape.run import ShapeOrder, run_shape
+    from explorer.shape import ShapeOrder, run_shape
     from solver import parse_quantity
 
     order = ShapeOrder(

@@ -49,8 +49,8 @@ def verify(
         return
     from explorer.export.impacts import liggghts_engine
     from explorer.export.run import installed
+    from explorer.files.output_file import write_whole
     from explorer.files.run_folder import json_text
-    from explorer.files.whole_file import write_whole
     from explorer.tables.verification import peers_text, result_of, summary_text, table_text
     from solver.verification import BY_ANY_ENGINE, FAMILIES, OURS_BY_DISPLACEMENT, verify_engine
     from solver.verification import verify as rows_of

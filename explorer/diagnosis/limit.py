@@ -22,8 +22,8 @@ from doe.validation.limit import RISK, RISKS, LimitStudy, confused, limit_study
 from doe.validation.reference import ROOT, Reference, extended_to, kept
 from doe.validation.replay import BASE_POURS, NULLS, Replayed, Teaching, Truth, replay
 from doe.validation.ruler import Strength
+from explorer.files.output_file import write_whole
 from explorer.files.run_folder import json_text
-from explorer.files.whole_file import write_whole
 from explorer.tables.text_table import text_table
 from solver import EFFECTS, PHYSICS, Crew
 

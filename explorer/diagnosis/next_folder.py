@@ -32,10 +32,10 @@ from doe.record import plain
 from doe.studies.study_table import Table, entries, section
 from doe.table_file import read_table, read_text
 from explorer.errors import CommandError
-from explorer.files.whole_file import write_whole
+from explorer.files.output_file import write_whole
 from explorer.report.diagnosis.wording import spelled
-from explorer.report.units_for_people import code, enumeration, number, parameter_label, parameter_value, percent
 from explorer.scene.text import toml_key, toml_value
+from explorer.units import code, enumeration, number, parameter_label, parameter_value, percent
 from solver import EFFECTS, Scene, named, parameters, parse_quantity, pour_rig, read_toml, value
 from solver.rigs.surface import Pose, Revolved
 

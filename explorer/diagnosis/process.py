@@ -1,6 +1,6 @@
 """Diagnoses in the background: the command line's ``diagnose``, run by `explorer.background.command_process`.
 
-One runs at a time; others wait (`explorer.background.waiting_line`).
+One runs at a time; others wait (`explorer.background.command_process`).
 """
 
 from __future__ import annotations
@@ -12,9 +12,8 @@ from typing import Protocol
 
 from doe.diagnose.budget import scaled_budget
 from doe.measurement.load import load_measurement
-from explorer.background.command_process import PROGRAM, BackgroundError, CommandProcess, CommandStatus
-from explorer.background.output_folders import finished, new_folder, newest_unfinished
-from explorer.background.waiting_line import WaitingLine
+from explorer.background.command_process import PROGRAM, BackgroundError, CommandProcess, CommandStatus, WaitingLine
+from explorer.background.output_folder import finished, new_folder, newest_unfinished
 from explorer.diagnosis.result import DiagnosisResult
 from solver import EFFECTS
 from solver.assets import measurement_folder

@@ -46,8 +46,8 @@ from explorer.diagnosis.result import (
     Rule,
 )
 from explorer.errors import CommandError
+from explorer.files.output_file import write_whole
 from explorer.files.run_result import versions
-from explorer.files.whole_file import write_whole
 from explorer.report.diagnosis import write_diagnosis_report
 from solver import EFFECTS, Crew
 

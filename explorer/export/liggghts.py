@@ -26,11 +26,9 @@ import numpy as np
 import numpy.typing as npt
 
 from explorer.errors import CommandError
-from explorer.export.deck import Clump, Deck, write_deck
-from explorer.export.deck_of_scene import DeckTarget
+from explorer.export.deck import Clump, Deck, DeckTarget, write_deck, write_stl
 from explorer.export.frames import FINAL, TRAJECTORY
 from explorer.export.readme import write_readme
-from explorer.export.triangles import write_stl
 from solver.effects.rolling_resistance import RollingResistance
 from solver.laws import HertzMindlin, LinearSpringDashpot
 from solver.laws.restitution import normal_damping

@@ -18,10 +18,8 @@ from pathlib import Path
 import numpy as np
 
 from explorer.errors import CommandError
-from explorer.export.deck import Deck, write_deck
-from explorer.export.deck_of_scene import DeckTarget
+from explorer.export.deck import Deck, DeckTarget, write_deck, write_stl
 from explorer.export.readme import write_readme
-from explorer.export.triangles import write_stl
 from solver.laws import HertzMindlin
 from solver.laws.hertz_mindlin import tangential_damping
 from solver.laws.restitution import normal_damping

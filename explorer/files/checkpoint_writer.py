@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from explorer.files.whole_file import write_whole_bytes
+from explorer.files.output_file import write_whole_bytes
 from solver.pours.checkpoint import checkpoint_bytes, checkpoint_of
 from solver.pours.pour import Pour
 

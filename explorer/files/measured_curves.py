@@ -1,10 +1,22 @@
-"""What was measured as curves in the picture of a pile: silhouettes of scans, height profiles, free surfaces."""
+"""What was measured as curves in the picture of a pile: silhouettes of scans, height profiles, free surfaces.
+
+One measured file as a curve in the picture of a pile: a scan (.npz), the points of an outline (.csv), a photograph.
+
+.npz   xyz (n, 3) [m], radius (n,) [m]: spheres of the bodies on the plate, as in a measured data set
+.csv   a line u_m,z_m, then one point per line: to the right and above the plate [m]; # starts a comment;
+       cells and numbers as `doe.table_file` reads them
+.jpg   (.jpeg, .png) a photograph along the plate, read like `explorer measure` does; it needs the length of a pixel
+"""
 
 from __future__ import annotations
 
+import io
+import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 
 import numpy as np
 import numpy.typing as npt
@@ -12,12 +24,16 @@ import numpy.typing as npt
 from doe.measurement.load import load_measurement
 from doe.measurement.measurement import Condition
 from doe.measurement.piles import pile_files, read_pile
+from doe.table_file import CellTable, csv_table, decoded
 from explorer.errors import CommandError
 from solver.assets import measurement_folder
 from solver.observables.repose import AZIMUTHS_DEG, Flanks, outline
+from solver.photograph import PhotographError, Refusal, open_picture, read_photograph
+from solver.pours.record import Spheres
 from solver.rigs.rotating_drum import RotatingDrum
 
 Array = npt.NDArray[np.float64]
+
 NO_FLANKS: Flanks = (None, None)
 
 
@@ -72,3 +88,113 @@ def _observed(condition: Condition) -> Iterator[MeasuredCurve]:
             yield MeasuredCurve(f"{condition.name}: mean height profile", *both)
         elif name == "surface_profile_m" and isinstance(condition.scene.rig, RotatingDrum):
             yield MeasuredCurve(f"{condition.name}: free surface", place, height + condition.scene.rig.radius)
+
+
+PICTURES = (".jpg", ".jpeg", ".png")
+
+SUFFIXES = (".npz", ".csv", *PICTURES)
+
+MOST_BYTES = 50_000_000
+
+MOST_SPHERES, MOST_POINTS = 1_000_000, 100_000
+
+FARTHEST = 2.0
+
+"""No coordinate of a pile is further from the axis than this [m]: the image of a silhouette has pixels of 0.25 mm."""
+
+COLUMNS = ["u_m", "z_m"]
+
+
+def measured_file(name: str, content: bytes, pixel: float | None = None) -> MeasuredCurve:
+    """The curve in the file ``content`` that is called ``name``; CommandError in one line for a bad file.
+
+    ``pixel``: length [m] of a pixel of a photograph.
+    """
+    if not 0 < len(content) <= MOST_BYTES:
+        raise CommandError(f"{name[:80]}: {len(content)} bytes; allowed: up to {MOST_BYTES}")
+    readers = {".npz": _scan, ".csv": _points} | dict.fromkeys(PICTURES, partial(_photograph, pixel=pixel))
+    read = readers.get(Path(name).suffix.lower())
+    if read is None:
+        raise CommandError(f"{name[:80]}: allowed are files ending in {', '.join(SUFFIXES)}")
+    try:
+        return read(name[:80], content)
+    except CommandError as error:
+        raise CommandError(f"{name[:80]}: {error}") from None
+
+
+def _photograph(name: str, content: bytes, pixel: float | None) -> MeasuredCurve:
+    if pixel is None:
+        raise CommandError("a photograph needs its scale: give the millimetres per pixel, then upload it again")
+    with NamedTemporaryFile(suffix=Path(name).suffix) as file:
+        file.write(content)
+        file.flush()
+        try:
+            seen = read_photograph(open_picture(Path(file.name)), pixel)
+        except PhotographError as error:
+            raise CommandError(str(error).replace(f"{file.name}: ", "")) from None
+    if isinstance(seen, Refusal):
+        raise CommandError(f"{seen.reason}: {seen.detail}")
+    angle = seen.angles.mean.value_deg
+    return MeasuredCurve(f"{name}: {angle:.1f}°", seen.outline.u, seen.outline.top, seen.outline.flanks)
+
+
+def _scan(name: str, content: bytes) -> MeasuredCurve:
+    seen = outline(scanned_spheres(content), AZIMUTHS_DEG[0])
+    return MeasuredCurve(name, seen.u, seen.top, seen.flanks)
+
+
+def scanned_spheres(content: bytes) -> Spheres:
+    """The spheres in an .npz file ``content``, all as one body; CommandError in one line for a bad one."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            size = sum(member.file_size for member in archive.infolist())
+        if size > MOST_BYTES:
+            raise CommandError(f"{size} bytes unpacked; allowed: up to {MOST_BYTES}")
+        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+            centre, radius = (np.asarray(arrays[key], dtype=np.float64) for key in ("xyz", "radius"))
+    except KeyError:
+        raise CommandError("allowed are the arrays xyz and radius; one of them is missing") from None
+    except (OSError, EOFError, zipfile.BadZipFile, NotImplementedError) as error:
+        raise CommandError(f"cannot be read as .npz: {' '.join(str(error).split())[:120]}") from None
+    except ValueError as error:
+        if isinstance(error, CommandError):
+            raise
+        raise CommandError("cannot be read as plain arrays of numbers") from None
+    if radius.ndim != 1 or centre.shape != (len(radius), 3) or not 1 <= len(radius) <= MOST_SPHERES:
+        raise CommandError(f"xyz and radius have shapes {centre.shape} and {radius.shape}; allowed: (n, 3) and (n,)")
+    _check_places(centre, "xyz")
+    _check_places(radius, "radius")
+    if (radius <= 0.0).any():
+        raise CommandError("radius: one is not positive")
+    return Spheres(centre, radius, np.zeros(len(radius), dtype=np.int32))
+
+
+def _points(name: str, content: bytes) -> MeasuredCurve:
+    text = decoded(content)
+    if text is None:
+        raise CommandError("not a text file")
+    table = csv_table(text, lambda line, what: CommandError(f"line {line}: {what}"))
+    line, head = table.rows[0] if table.rows else (1, [])
+    if head != COLUMNS:
+        raise CommandError(f"line {line}: {','.join(head)[:40]!r}; allowed is a line u_m,z_m, and points below it")
+    points = np.array([_point(table, line, cells) for line, cells in table.rows[1:]])
+    if not 2 <= len(points) <= MOST_POINTS:
+        raise CommandError(f"{len(points)} points; allowed: 2 … {MOST_POINTS}")
+    _check_places(points, "u_m, z_m")
+    ordered = points[np.argsort(points[:, 0], kind="stable")]
+    return MeasuredCurve(name, ordered[:, 0], ordered[:, 1])
+
+
+def _point(table: CellTable, line: int, cells: list[str]) -> list[float]:
+    if len(cells) != len(COLUMNS):
+        raise CommandError(f"line {line}: {len(cells)} cells; allowed: 2, one each for u_m,z_m")
+    point = [table.number(cell) for cell in cells]
+    for column, cell, value in zip(COLUMNS, cells, point, strict=True):
+        if np.isnan(value):
+            raise CommandError(f"line {line}, column {column}: {cell[:40]!r}; allowed: a finite number in m")
+    return point
+
+
+def _check_places(numbers: Array, what: str) -> None:
+    if not (np.abs(numbers) <= FARTHEST).all():  # neither does NaN pass
+        raise CommandError(f"{what}: a number is not finite or beyond {FARTHEST:g} m")

@@ -1,41 +1,52 @@
 """What the laboratory's commands give on the page: the text of the terminal, the line that repeats it, charts, files.
 
 Each function does what the command of its name does, from files that are there. None of them knows the page.
+
+Answers that take the solver: bench tests run on it, a photograph beside a pour. Each is a command in a child.
+
+The page's own process never loads the solver, and what is shown is what the terminal prints.
 """
 
 from __future__ import annotations
 
 import io
+import json
 import shlex
+import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from PIL import Image
 
 from doe.audit import audit_study
 from explorer.audit.read_study import read_study, shipped_study
-from explorer.audit.report import audit_html
-from explorer.audit.sentences import audit_text
+from explorer.audit.report import audit_html, audit_text
+from explorer.background.printed import printed
 from explorer.design.analysis import AnalyseOrder, run_analyse
-from explorer.design.analysis_text import analysis_text
 from explorer.design.factors_file import read_factors
-from explorer.design.plan import PlanOrder, make_plan
-from explorer.design.plan_text import plan_text
-from explorer.design.sheet import sheet_text
+from explorer.design.plan import PlanOrder, make_plan, sheet_text
+from explorer.design.text import analysis_text, plan_text
+from explorer.files.kept_scene import kept_scene
+from explorer.files.run_folder import json_text
 from explorer.laboratory.part import part_table
 from explorer.laboratory.run import LabOrder, analysed, part_file
+from explorer.photograph.annotated import sheet
 from explorer.photograph.order import measure_order
-from explorer.photograph.panels import sheet
 from explorer.photograph.run import outline_text, run_measure
 from explorer.report.design import design_html
 from explorer.report.design.plots import design_plots
-from explorer.report.figures.force_displacement import curve_charts
-from explorer.report.plot import Plot, Plots
+from explorer.report.figures.bench import bench_charts, curve_charts
+from explorer.report.study_charts import Plot, Plots
+from explorer.scene.source import command_line, rig_source
+from explorer.tables.bench_test import bench_text
 from explorer.tables.laboratory import lab_text
 from explorer.tables.photograph import measure_text, refusal_lines
+from solver import Scene, with_values
 from solver.assets import asset_path
 from solver.photograph import open_picture
 
@@ -140,3 +151,40 @@ def audit_answer(folder: Path | None) -> Answer:
     found = audit_study(read_study(folder or shipped_study()))
     words = ["explorer", "audit", *([str(folder)] if folder else [])]
     return Answer(audit_text(found), shlex.join(words), {}, {"audit.html": audit_html(found).encode()})
+
+
+ON_THE_SOLVER = "What the solver's own instrument read in the course of the test."
+
+PLOT = "beside.png"
+
+
+def twin_answer(order: LabOrder) -> Answer:
+    """`explorer lab --simulate` and `--bias`: beside the readings' answer, what the test gives on the solver."""
+    words = lab_words(order)
+    said = printed(words)
+    return replace(bench_answer(order), text=said, command=shlex.join(["explorer", *words]))
+
+
+def rig_answer(scene: Scene, rig: str, values: Mapping[str, float | str], seed: int, folder: Path) -> Answer:
+    """`explorer simulate RIG`: a bench test of one body of ``scene``; its parameters are kept as a file in ``folder``.
+
+    ``values``: path → value (SI) of the rig's own parameters. Raises ParameterError before anything is run.
+    """
+    source = rig_source(rig, str(kept_scene(scene, folder)))
+    line = command_line(source, with_values(source.scene, dict(values)), seed)
+    data: dict[str, Any] = json.loads(printed([*shlex.split(line)[1:], "--json"]))
+    plots: Plots = {title: Plot(partial(dict, spec), ON_THE_SOLVER) for title, spec in bench_charts(data).items()}
+    files = {f"{rig}.json": f"{json_text(data)}\n".encode()}
+    return Answer(bench_text(data), line, plots, files)
+
+
+def compared_answer(photo: str, ruler: Ruler, scene: Scene, folder: Path) -> Answer:
+    """`explorer measure --from-simulation`: the photograph, and beside it a pour of ``scene`` read by the same fit."""
+    words = [*measure_words(photo, ruler), "--from-simulation", str(kept_scene(scene, folder))]
+    with tempfile.TemporaryDirectory() as apart:
+        drawn = Path(apart) / PLOT
+        said = printed([*words, "--plot", str(drawn)])
+        content = drawn.read_bytes()
+        with Image.open(drawn) as picture:
+            pixels = np.asarray(picture.convert("RGB"), dtype=np.uint8)
+    return Answer(said, shlex.join(["explorer", *words]), {}, {PLOT: content}, pixels)

@@ -7,6 +7,10 @@ format = 1
 
 `explorer new material NAME --like MATERIAL --part FILE` lays parts over a material; by hand, the tables can be copied
 into a material file as they are, ``[measured]`` included.
+
+A material of one's own from another one and the parts that a laboratory measured.
+
+A pour's material with what a bench test gave, as a material file of its own.
 """
 
 from __future__ import annotations
@@ -14,21 +18,32 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import math
+import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from doe.laboratory import Derived, Estimate, LabResult
 from doe.laboratory.result import CONDITIONS
-from explorer.scene.text import toml_key, toml_value
-from solver import ParameterError, Scene, read_toml, with_values
+from explorer.errors import CommandError
+from explorer.files.uploads import kept_file
+from explorer.scene.source import SceneSource, material_source
+from explorer.scene.starter_files import material_text, new_path
+from explorer.scene.text import material_toml, toml_key, toml_value
+from solver import ParameterError, Scene, asset_path, load_material, read_toml, with_values
+from solver.scenes.material_file import scene_from
 from solver.toml_table import as_table, list_at, refuse_unknown
 
 KEYS = ("format", "materials", "pair", "body", "measured")
+
 SIZES = ("size_distribution", "size_spread")
+
 SCATTER = "log_normal"
+
 """Distribution of a measured spread, which acts only with one; as of measured diameters in a material file."""
+
 ELASTIC = ("youngs_modulus", "shear_modulus", "poisson_ratio")
+
 Table = dict[str, Any]
 
 
@@ -206,3 +221,51 @@ def _tables(keys: tuple[str, ...], table: Mapping[str, Any]) -> list[str]:
 
 def _entries(entries: Mapping[str, Any]) -> list[str]:
     return [f"{toml_key(key)} = {toml_value(value)}" for key, value in entries.items()]
+
+
+STARTER = "the starter material"
+
+
+def write_measured_material(folder: Path, name: str, like: str | None, parts: Sequence[Path]) -> Path:
+    """Write ``NAME.toml``: ``like`` (name or file; None: the starter material) with ``parts``, of two the later.
+
+    Raises CommandError where it exists already or a part does not fit.
+    """
+    path = new_path(folder, name)
+    scene, measured = _base(path, like)
+    for part in parts:
+        table = read_part(part)
+        try:
+            scene = with_part(scene, table)
+        except ParameterError as error:
+            raise CommandError(f"{part}: does not fit {like or STARTER}: {error}") from None
+        measured = merged(measured, table.get("measured", {}))
+    names = ", ".join(part.name for part in parts) or "nothing"
+    heading = f"{path.stem}: {like or STARTER}, with measured: {names}. SI; where numbers come from: [measured] below."
+    text = material_toml(scene, heading) + measured_text(measured)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("x", encoding="utf-8") as file:
+        file.write(text)
+    return path
+
+
+def _base(path: Path, like: str | None) -> tuple[Scene, dict[str, Any]]:
+    """The scene to start from, and what its file says was measured."""
+    if like is None:
+        return scene_from(tomllib.loads(material_text(path)), path), {}
+    return load_material(like), read_toml(asset_path("materials", like)).get("measured", {})
+
+
+def measured_source(present: Scene, result: LabResult, folder: Path) -> SceneSource:
+    """``present`` with the parameters of ``result``, kept in ``folder``; where each comes from stands in the file.
+
+    Raises CommandError where nothing in it is a parameter, and ParameterError where one does not fit the material.
+    """
+    part = part_table(result)
+    if not set(part) - {"format", "measured"}:
+        raise CommandError(f"{result.test}: gives no parameter of a material")
+    scene = with_part(present, part)
+    text = material_toml(scene, f"{present.title}, with {result.test} measured. SI; origins: [measured] below.")
+    text += measured_text(part.get("measured", {}))
+    path = kept_file(f"{present.title[:20]}-{result.test}.toml", text.encode(), folder, (".toml",))
+    return material_source(str(path))

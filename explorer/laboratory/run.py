@@ -11,7 +11,7 @@ from doe.laboratory import LabResult, analyse
 from doe.laboratory.analysis import analyse_composition, analyse_elastic
 from doe.laboratory.bias import BiasTable, bias_table
 from explorer.errors import CommandError
-from explorer.files.new_file import check_new_file
+from explorer.files.output_file import check_new_file
 from explorer.files.run_folder import json_text
 from explorer.laboratory.part import part_table, part_text, with_part
 from explorer.laboratory.twin_row import TwinRow, check_twin
@@ -67,7 +67,7 @@ def run_lab(order: LabOrder, say: Callable[[str], None]) -> bool:
 def _write(order: LabOrder, result: LabResult, part: dict[str, Any]) -> None:
     """The files that were asked for."""
     if order.figure:
-        from explorer.report.figures.force_displacement import write_curves
+        from explorer.report.figures.bench import write_curves
 
         write_curves(order.figure, result)
     if order.out:
@@ -134,6 +134,6 @@ def _bias(order: LabOrder, result: LabResult, scene: Scene | None) -> BiasTable 
         return None
     if scene is None or order.test == "shear":
         return bias_table(order.test)
-    from explorer.laboratory.simulated_bias import simulated_bias
+    from explorer.laboratory.twin import simulated_bias
 
     return simulated_bias(order.test, scene, result.derived[0].of)

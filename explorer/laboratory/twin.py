@@ -10,6 +10,8 @@ A round trip closes where what comes out is within ``CLOSES`` of what was put in
 Where the paper's formula is applied to the same simulated test (L/2H, Equation 1), what it misses by is shown and
 closes nothing. From the drop, the twin also finds the e with which a ball of the body's mass lands where the
 laboratory's bodies did.
+
+The paper's formulas applied to simulated bench tests, beside their closed forms (``doe/laboratory/bias.py``).
 """
 
 from __future__ import annotations
@@ -18,9 +20,12 @@ import dataclasses
 import math
 from collections.abc import Iterator
 
+import numpy as np
 from scipy.optimize import brentq
 
 from doe.laboratory import Derived, LabResult
+from doe.laboratory.bias import STRAINS, BiasTable, compression_ratio
+from doe.laboratory.contact import flight, tangential_share
 from explorer.errors import CommandError
 from explorer.laboratory.twin_row import CLOSES, RIGS, TwinRow
 from solver import Scene, with_rig, with_values
@@ -29,8 +34,11 @@ from solver.scenes.material import Material
 from solver.single_body import BenchResult, run_bench_test
 
 TILT_RATE = 5.0
+
 """Of the inclined plane [°/s]; the angle moves by less than a hundredth of a degree against the rig's own 1 °/s."""
+
 LOWEST, HIGHEST = 0.05, 1.0
+
 """Restitutions that the solver takes."""
 
 
@@ -145,3 +153,53 @@ def _closing(of: tuple[str, ...], name: str, unit: str, own: Derived | None, fou
     closes = quantity.error is not None and abs(quantity.error) <= CLOSES
     measured = None if own is None else own.summary.mean
     return TwinRow(of, name, unit, measured, quantity.reference, quantity.value, closes)
+
+
+FIRST_READING = 0.02
+
+"""The twin's squeezing is shown from this share of its largest strain on: before, few steps fell into a reading."""
+
+
+def simulated_bias(test: str, scene: Scene, of: tuple[str, ...]) -> BiasTable:
+    """What the formula of ``test`` gives on the solver for one component or pair; CommandError where none is built."""
+    if test == "drop":
+        return _drop(run_bench_test(bench_scene(scene, test, of)), "-".join(of))
+    if test == "compression":
+        bench = with_values(bench_scene(scene, test, of), {"rig.strain": STRAINS[-1]})
+        return _compression(run_bench_test(bench), scene, of)
+    raise CommandError(f"--bias --simulate: {test}; allowed: drop, compression")
+
+
+def _drop(found: BenchResult, name: str) -> BiasTable:
+    table = dict(found.table)
+    columns = (table[key] for key in ("static_friction", "restitution", "tracked", "paper_L_over_2H"))
+    rows = [
+        (mu, e, flight(e, tangential_share(e, mu)), paper, paper / e, tracked)
+        for mu, e, tracked, paper in zip(*columns, strict=True)
+    ]
+    return BiasTable(
+        title=f"{found.body} on {found.wall}: e = L/(2H) by closed form and simulated, {name} varied",
+        columns=("static_friction", "restitution", "L_over_2H", "simulated", "ratio", "tracked"),
+        rows=tuple(rows),
+        statement="the closed form is that of a rigid sphere; the contact's tangential springs make the difference",
+    )
+
+
+def _compression(found: BenchResult, scene: Scene, of: tuple[str, ...]) -> BiasTable:
+    series = {key: np.array(values) for key, values in found.series}
+    material = scene.material(next(b for b in scene.bodies if of[0] in (b.name, b.material)).material)
+    # The largest approach belongs to the largest strain: their ratio is the thickness, also of a last step too many.
+    strain = series["approach_m"] * (STRAINS[-1] / series["approach_m"][-1])
+    ratio = series["youngs_modulus_paper_equation_1_Pa"] / material.youngs_modulus
+    shown = [wanted for wanted in STRAINS if wanted >= FIRST_READING * STRAINS[-1]]
+    rows = [(wanted, compression_ratio(wanted, material.poisson_ratio), _at(wanted, strain, ratio)) for wanted in shown]
+    return BiasTable(
+        title=f"{found.body} between plates of {found.wall}: E by Equation (1) over the E of its material",
+        columns=("strain", "ratio", "simulated"),
+        rows=tuple(rows),
+        statement=f"ν = {material.poisson_ratio:g}; the closed form takes the plates as rigid",
+    )
+
+
+def _at(wanted: float, strain: np.ndarray, ratio: np.ndarray) -> float:
+    return float(np.interp(wanted, strain, ratio))

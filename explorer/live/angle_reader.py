@@ -1,16 +1,22 @@
 """The angle of repose of a pour that still moves: when to read it, and what was read last.
 
 A reading takes some 25 ms, for which the pour would stand still: while it runs, another process reads
-(``explorer/live/angle_process.py``). What stands still is read here, so that its angle is that of what is seen.
+(``explorer/live/angle_reader.py``). What stands still is read here, so that its angle is that of what is seen.
+
+The process that reads angles while the solver goes on: piles in, angles out, until the line is cut.
+
+The parent imports this file, so what reads is imported inside :func:`run` only.
 """
 
 from __future__ import annotations
 
 import math
+import signal
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 
+from explorer.priority import LIVE, give_way
 from solver.observables.observable import Value
 from solver.observables.pile import angle_of_repose, angle_of_repose_left, angle_of_repose_right
 from solver.observables.reading import PileReading
@@ -18,10 +24,15 @@ from solver.observables.repose import Outline
 from solver.pours.record import Pile
 
 LEAST_SHARE_BELOW = 0.25
+
 """Share of the poured mass that has to lie below the outlet: the first few bodies are no pile that has an angle."""
+
 SIMULATED_INTERVAL, WALL_INTERVAL = 0.1, 0.5
+
 """The angle is read anew after this long of simulated or of wall time [s], whichever comes first."""
+
 WALL_SHARE = 0.15
+
 """Largest share of the wall time that reading may take; a big pile is read less often."""
 
 ANGLES: Mapping[str, Callable[[PileReading], Value]] = {
@@ -123,3 +134,16 @@ class AngleReader:
     def _hang_up(self) -> None:
         """The other process has ended: everything is read here from now on."""
         self._line, self._unheard, self._forgotten, self._read_at = None, 0, 0, -math.inf
+
+
+def run(line: Connection) -> None:
+    """Main function of the process. It ends with the solver's process, whose end of the line closes with it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    give_way(LIVE)
+    from explorer.live.angle_reader import read_angles
+
+    try:
+        while True:
+            line.send(read_angles(line.recv()))
+    except (EOFError, OSError):
+        return

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from explorer.live.frames import MAX_BODIES
-from explorer.live.slots import SlotReader, SlotWriter, shared_slots
+from explorer.live.frames import MAX_BODIES, SlotReader, SlotWriter, shared_slots
 from solver.pours.contacts import Contacts, coordination_numbers, loads
 from solver.pours.record import Bodies
 

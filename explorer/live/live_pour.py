@@ -1,4 +1,7 @@
-"""One pour that obeys commands: the part of the solver process that owns Taichi's objects."""
+"""One pour that obeys commands: the part of the solver process that owns Taichi's objects.
+
+A pour alone in its batch: begun with everything compiled that it will need, and let run.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,8 @@ import time as clock
 from collections.abc import Callable, Mapping
 from functools import partial
 from multiprocessing.connection import Connection
+
+import numpy as np
 
 from explorer.live.angle_reader import AngleReader
 from explorer.live.history import History, Moment
@@ -27,24 +32,64 @@ from explorer.live.messages import (
     StepBack,
     Watch,
 )
-from explorer.live.pace import Pace
 from explorer.live.publisher import Publisher
-from explorer.live.single_pour import begun, endless, launch
+from explorer.live.throttle import Pace
 from explorer.outcomes import outcome_text
-from explorer.scene.changes import changes
+from explorer.scene.source import changes
 from solver.effects.columns import kernel_effects
 from solver.engine.world import Batch
 from solver.params import ParameterError
 from solver.pours.checkpoint import keep, put_back
+from solver.pours.pour import Pour
 from solver.pours.record import Outcome
-from solver.scenes.scene import with_values
+from solver.pours.run import capacity_for
+from solver.scenes.scene import Scene, with_values
 from solver.scenes.time_step import stability_limit
 
+
+def begun(scene: Scene, seed: int, announce: Callable[[str], None]) -> Pour:
+    """A pour of ``scene`` before its first launch but one step; ``announce`` is told what takes long."""
+    announce("fitting member spheres to the shapes")
+    for body in scene.bodies:
+        _ = body.clump  # fitted once per process and shape; the pour below takes it from the cache
+    announce("compiling the solver")
+    pour = Pour(Batch(capacity_for([scene], 1)), 0, endless(scene), seed)
+    _compile(pour)
+    return pour
+
+
+def endless(scene: Scene) -> Scene:
+    """``scene`` without the limit on simulated time: in the live view the person at the screen ends a pour."""
+    return dataclasses.replace(scene, numerics=dataclasses.replace(scene.numerics, max_time=math.inf))
+
+
+def launch(pour: Pour, steps: int) -> bool:
+    """Run ``steps``; True at a moment of decision, before which nobody asks for the world's summary."""
+    launched = np.array([steps], dtype=np.int32)
+    if not pour.decides_after(steps):
+        pour.batch.run(launched)
+        return pour.after(steps)
+    return pour.after(steps, pour.batch.advance(launched)[0])
+
+
+def _compile(pour: Pour) -> None:
+    """Compile every kernel now, those of a change of stiffness too, so that the first slider does not stall."""
+    launch(pour, pour.steps_due(1))
+    kinds = pour.batch.capacity.kinds
+    pour.batch.scale_springs(0, np.ones((kinds, kinds)))
+    pour.batch.measure(0)
+
+
 KEPT_EVERY = 0.02
+
 """Simulated time [s] between two moments that can be come back to at once; those between are run again."""
+
 STATUS_INTERVAL = 0.1
+
 """Wall time [s] between reports."""
+
 BEFORE_FIRST_SAMPLE = {"entered": 0.0, "discharged": 0.0, "kinetic": 0.0, "touching": 0.0}
+
 """Sums over all bodies while none has been sampled yet."""
 
 

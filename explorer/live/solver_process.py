@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 
-from explorer.live.angle_process import run as read_angles
+from explorer.live.angle_reader import run as read_angles
 from explorer.live.details import detail_reader, shared_details
 from explorer.live.frames import FrameReader, shared_block
 from explorer.live.messages import Close, Command, Report

@@ -7,14 +7,14 @@ from collections.abc import Iterator
 from itertools import count
 from pathlib import Path
 
-from explorer.files.new_file import check_new_file
+from explorer.files.output_file import check_new_file
 from explorer.live.frames import Frame
 from explorer.live.messages import SessionState, Status
 from explorer.logs.blueprint import motion_curves
 from explorer.logs.pour_log import PourLog
 from explorer.logs.recording import FRAME_INTERVAL, RecordedPour
 from explorer.outcomes import outcome_text
-from explorer.scene.changes import changes
+from explorer.scene.source import changes
 from solver.scenes.scene import Scene
 
 

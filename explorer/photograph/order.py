@@ -1,4 +1,7 @@
-"""What `explorer measure` was asked for, checked before any picture is opened."""
+"""What `explorer measure` was asked for, checked before any picture is opened.
+
+What `explorer measure` finds: a reading per picture, and the simulated piles beside them.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from explorer.errors import CommandError
-from explorer.files.new_file import check_new_file
+from explorer.files.output_file import check_new_file
+from explorer.photograph.simulated import SimulatedPiles
 from solver.assets import asset_path
+from solver.photograph import PhotographedPile, Refusal
 
 FARTHEST = 1e5
+
 """Largest coordinate that a picture may be asked about [px]."""
 
 
@@ -83,3 +89,21 @@ def _numbers(text: str, option: str, form: str) -> tuple[float, ...]:
     if len(numbers) != n or not all(abs(number) <= FARTHEST for number in numbers):
         raise CommandError(f"{option} {text}: allowed is {form}, in pixels of the picture")
     return numbers
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What came out, in the order of the pictures."""
+
+    readings: tuple[PhotographedPile | Refusal, ...]
+    simulated: SimulatedPiles | None
+
+    @property
+    def piles(self) -> tuple[PhotographedPile, ...]:
+        """Of the pictures that show one."""
+        return tuple(reading for reading in self.readings if isinstance(reading, PhotographedPile))
+
+    @property
+    def refusals(self) -> tuple[Refusal, ...]:
+        """Of the others."""
+        return tuple(reading for reading in self.readings if isinstance(reading, Refusal))

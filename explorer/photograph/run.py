@@ -5,10 +5,9 @@ from __future__ import annotations
 import io
 from math import dist
 
-from explorer.files.whole_file import write_whole, write_whole_bytes
-from explorer.photograph.measured import Measured
-from explorer.photograph.order import MeasureOrder
-from explorer.photograph.panels import sheet
+from explorer.files.output_file import write_whole, write_whole_bytes
+from explorer.photograph.annotated import sheet
+from explorer.photograph.order import Measured, MeasureOrder
 from explorer.photograph.simulated import simulated_piles
 from solver.photograph import (
     NotAPile,
@@ -41,7 +40,7 @@ def run_measure(order: MeasureOrder) -> Measured:
 
 
 def outline_text(pile: PhotographedPile) -> str:
-    """A measured outline as the page lays it over a simulated pile (`explorer/files/measured_file.py`)."""
+    """A measured outline as the page lays it over a simulated pile (`explorer/files/measured_curves.py`)."""
     rows = (f"{u:.6g},{z:.6g}\n" for u, z in zip(pile.outline.u, pile.outline.top, strict=True))
     return f"# {' '.join(pile.name.split())}\nu_m,z_m\n" + "".join(rows)
 

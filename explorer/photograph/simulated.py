@@ -77,7 +77,7 @@ def _spheres(source: str) -> list[Spheres]:
 
 
 def _read(path: Path) -> Spheres:
-    from explorer.files.measured_file import scanned_spheres
+    from explorer.files.measured_curves import scanned_spheres
 
     if not path.is_file():
         raise CommandError(f"--from-simulation: {path}: no such file")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from doe.studies.study_result import StudyResult
-from explorer.files.whole_file import write_whole
+from explorer.files.output_file import write_whole
 from explorer.report.html import page
 from explorer.report.markdown import document
 from explorer.report.sections import sections_of

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from doe.studies.study_result import StudyResult
 from explorer.report.content import Table
 from explorer.report.identified import settings
-from explorer.report.units_for_people import (
+from explorer.units import (
     MISSING,
     enumeration,
     fixed,

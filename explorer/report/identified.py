@@ -11,14 +11,7 @@ from dataclasses import dataclass
 
 from doe.analysis.optimum import Optimum
 from doe.stages.surface import OptimumResult
-from explorer.report.units_for_people import (
-    MISSING,
-    enumeration,
-    parameter_label,
-    parameter_range,
-    parameter_value,
-    percent,
-)
+from explorer.units import MISSING, enumeration, parameter_label, parameter_range, parameter_value, percent
 
 BY_RULE = "chosen by rule"
 GIVES_TARGET = "range that gives the target"

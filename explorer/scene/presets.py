@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any
 
 from explorer.errors import CommandError
-from explorer.files.whole_file import write_whole
-from explorer.scene.changes import Difference
+from explorer.files.output_file import write_whole
+from explorer.scene.source import Difference
 from solver.assets import asset_path, shipped_assets
 from solver.params import ParameterError
 from solver.scenes.scene import Scene, canonical, parameters

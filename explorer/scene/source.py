@@ -1,20 +1,61 @@
-"""Where a scene came from, and the command line that repeats what it has become since."""
+"""Where a scene came from, and the command line that repeats what it has become since.
+
+What differs between two scenes, as lines for a person.
+"""
 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from explorer.errors import CommandError
-from explorer.scene.changes import Difference, differences
 from explorer.scene.file import load_scene, material_scene, study_scene
-from explorer.screen_units import SCREEN_UNIT
+from explorer.units import SCREEN_UNIT, quantity
 from solver.params import UNITS, ParameterError, parse_quantity
-from solver.scenes.scene import Scene, with_rig
+from solver.scenes.scene import Scene, parameters, values, with_rig
 from solver.scenes.set_up import with_settings
 from solver.toml_table import read_toml
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A parameter that has two values, SI or the names of choices."""
+
+    path: str
+    before: float | str
+    now: float | str
+    unit: str
+    live: bool
+    """Whether a running pour takes a new value at once."""
+
+    def __str__(self) -> str:
+        """``path: before → now`` with the units of the screen."""
+        before, now = shown(self.before, self.unit), shown(self.now, self.unit)
+        if before == now:  # alike to the digits of the screen
+            before, now = str(self.before), f"{self.now} {'' if self.unit == '1' else self.unit}".strip()
+        return f"{self.path}: {before} → {now}"
+
+
+def differences(before: Scene, now: Scene) -> Iterator[Difference]:
+    """Parameters that both scenes have and that differ, in the order of ``now``."""
+    old = values(before)
+    declared = parameters(now)
+    for path, new in values(now).items():
+        if path in old and old[path] != new:
+            yield Difference(path, old[path], new, declared[path].unit, declared[path].live)
+
+
+def changes(before: Scene, now: Scene) -> Iterator[str]:
+    """Parameters that differ between two scenes of the same materials and bodies, with both values and their unit."""
+    return map(str, differences(before, now))
+
+
+def shown(number: float | str, unit: str) -> str:
+    """A value with the unit of the screen, or the name of a choice."""
+    return number if isinstance(number, str) else quantity(number, unit)
+
 
 PROGRAM = ("explorer", "simulate")
 

@@ -13,8 +13,8 @@ from doe.store import Store, default_store
 from doe.studies.economy import ALPHA, ECONOMIES, MARGIN, POWER, EconomyTest, compare, pours_needed, rows_of
 from doe.studies.study import load_study, with_profile
 from explorer.errors import CommandError
+from explorer.files.output_file import write_whole
 from explorer.files.run_folder import json_text
-from explorer.files.whole_file import write_whole
 from explorer.tables.text_table import text_table
 from solver import Crew
 

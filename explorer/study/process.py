@@ -1,7 +1,7 @@
 """Calibrations in the background: the command line's ``calibrate --headless``, run by
 `explorer.background.command_process`.
 
-One runs at a time; others wait (`explorer.background.waiting_line`).
+One runs at a time; others wait (`explorer.background.command_process`).
 """
 
 from __future__ import annotations
@@ -12,11 +12,10 @@ from pathlib import Path
 from typing import Protocol
 
 from doe.studies.study import TRIES, load_study, with_profile
-from explorer.background.command_process import PROGRAM, BackgroundError, CommandProcess, CommandStatus
-from explorer.background.output_folders import finished, new_folder, newest_unfinished
+from explorer.background.command_process import PROGRAM, BackgroundError, CommandProcess, CommandStatus, WaitingLine
+from explorer.background.output_folder import finished, new_folder, newest_unfinished
 from explorer.background.progress import given_up
-from explorer.background.waiting_line import WaitingLine
-from explorer.files.whole_file import write_whole
+from explorer.files.output_file import write_whole
 from explorer.study.edit import StudyEdits, edited_study
 
 ENDINGS = {0: "report", 3: "above the error limit; report"}

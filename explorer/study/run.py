@@ -1,12 +1,19 @@
-"""A calibration from its order to its files: the study is read, run, and written as result.json and reports."""
+"""A calibration from its order to its files: the study is read, run, and written as result.json and reports.
+
+``partial.json``: what a study that still runs has found so far (`doe.studies.study_result.PartialStudy`).
+
+Stages that have ended are there as in ``result.json``; ``partial`` names the stage that runs, whose own key, if there,
+holds its analysis of the runs so far, and ``line`` says it in words. The file is gone once ``result.json`` is written.
+"""
 
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,19 +24,53 @@ from doe.store import Store, default_store
 from doe.studies.campaign import Campaign, PartialStages, run_campaign
 from doe.studies.profile import Profile
 from doe.studies.study import TRIES, Study, load_study, with_profile
-from doe.studies.study_result import PouredBody, RunCounts, StudyDescription, StudyResult, Timing
+from doe.studies.study_result import (
+    PartialStudy,
+    PouredBody,
+    RunCounts,
+    StageResult,
+    StudyDescription,
+    StudyResult,
+    Timing,
+)
 from explorer.background.progress import PROGRESS, RunProgress, told_of_pauses
 from explorer.errors import CommandError
+from explorer.files.output_file import write_whole
 from explorer.files.run_result import versions
-from explorer.files.whole_file import write_whole
 from explorer.report import write_report
-from explorer.study.partial_result import PartialResult
+from explorer.study.process import PARTIAL
 from solver import Crew
 from solver.arch import chosen
 from solver.observables.made_up import estimator_bias
 
 if TYPE_CHECKING:
-    from explorer.logs.study_recorder import StudyRecorder
+    from explorer.logs.pour_recorder import StudyRecorder
+
+
+class PartialResult:
+    """The file in the output folder of one study."""
+
+    def __init__(self, folder: Path, study: StudyDescription) -> None:
+        self._file, self._found = folder / PARTIAL, PartialStudy(study=study)
+        self.remove()
+
+    def show(self, stage: str, result: StageResult) -> None:
+        """``result`` is what ``stage`` found so far."""
+        # A mean that no run has given yet is no finding.
+        line = "" if re.search(r"\bnan\b", result.line) else result.line
+        self._write(replace(self._found.with_result(stage, result), partial=stage, line=line))
+
+    def keep(self, stage: str, result: StageResult | None) -> None:
+        """``stage`` has ended with ``result``, None where the study has no such stage."""
+        self._found = self._found.with_result(stage, result)
+        self._write(self._found)
+
+    def remove(self) -> None:
+        """Take the file away."""
+        self._file.unlink(missing_ok=True)
+
+    def _write(self, content: PartialStudy) -> None:
+        write_whole(self._file, json.dumps(content.to_dict(), ensure_ascii=False, allow_nan=False) + "\n")
 
 
 @dataclass(frozen=True)
@@ -122,6 +163,6 @@ def result_of(study: Study, profile: Profile, found: Campaign, total_s: float, t
 
 def _recorder(folder: Path) -> StudyRecorder:
     # rerun takes a second to import; only those who record pay for it.
-    from explorer.logs.study_recorder import StudyRecorder
+    from explorer.logs.pour_recorder import StudyRecorder
 
     return StudyRecorder(folder)

@@ -2,14 +2,26 @@
 
 viser calls back on many threads. A callback only leaves an action here; the one thread that owns session and
 page carries it out, and shows the one line of whatever was refused, by us or by the machine.
+
+Buttons and keys that leave an action for the page's loop; what the program itself sets is no click.
+
+Work that takes seconds (reading scans, fitting spheres), off the page's loop: one thing at a time.
 """
 
 from __future__ import annotations
 
 import queue
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any, TypeVar
+
+import viser
+
+from explorer.errors import CommandError
 
 Action = Callable[[], None]
+
 Post = Callable[[Action], None]
 
 
@@ -38,3 +50,111 @@ class Actions:
                 notice = str(error)
             except OSError as error:  # a full disk, a folder that may not be written to
                 notice = f"{error.filename or 'file'}: {error.strerror or error}"
+
+
+ClientAction = Callable[[Any], None]
+
+"""Something that is done to one browser."""
+
+
+def button_group(gui: viser.GuiApi, title: str, acts: Mapping[str, Action], post: Post, hint: str | None = None) -> Any:
+    """A row of buttons named by the keys of ``acts``; a click posts the action. Returns viser's handle."""
+    buttons = gui.add_button_group(title, tuple(acts), hint=hint)
+
+    @buttons.on_click
+    def _(event: viser.GuiEvent[Any]) -> None:
+        # A browser may send any name.
+        if event.client_id is not None and event.target.value in acts:
+            post(acts[event.target.value])
+
+    return buttons
+
+
+def client_buttons(
+    gui: viser.GuiApi, title: str, acts: Mapping[str, ClientAction], post: Post, hint: str | None = None
+) -> None:
+    """A row of buttons named by the keys of ``acts``; a click posts the action with the browser that it came from."""
+    buttons = gui.add_button_group(title, tuple(acts), hint=hint)
+
+    @buttons.on_click
+    def _(event: viser.GuiEvent[Any]) -> None:
+        if event.client is not None and event.target.value in acts:
+            post(partial(acts[event.target.value], event.client))
+
+
+def add_client_key(gui: viser.GuiApi, label: str, key: Any, act: ClientAction, post: Post) -> None:
+    """A command with a key, which posts ``act`` with the browser in which it was pressed."""
+
+    def pressed(event: Any) -> None:
+        if event.client is not None:
+            post(partial(act, event.client))
+
+    gui.add_command(label, hotkey=key).on_trigger(pressed)
+
+
+def add_keys(gui: viser.GuiApi, acts: Mapping[str, Action], keys: Mapping[str, Any], post: Post) -> None:
+    """A command per entry of ``keys`` (label → key), which posts the action of that label; in viser's palette too."""
+    for label, key in keys.items():
+        gui.add_command(label, hotkey=key).on_trigger(_posting(acts[label], post))
+
+
+def on_upload(button: viser.GuiUploadButtonHandle, take: Callable[[str, bytes], None], post: Post) -> None:
+    """Post ``take`` (name, content) for every file that a browser sends by viser's upload ``button``."""
+
+    @button.on_upload
+    def _(event: viser.GuiEvent[Any]) -> None:
+        if event.client_id is not None:
+            sent = event.target.value
+            post(lambda: take(str(sent.name), bytes(sent.content)))
+
+
+def _posting(action: Action, post: Post) -> Any:
+    def pressed(event: object) -> None:
+        post(action)
+
+    return pressed
+
+
+Found = TypeVar("Found")
+
+
+class BackgroundWork:
+    """Runs one piece of work in a thread; what it found, or what was wrong, comes back as an action."""
+
+    def __init__(self, post: Post) -> None:
+        self._post, self._busy_with = post, ""
+
+    @property
+    def busy_with(self) -> str:
+        """What is being done, empty if nothing is."""
+        return self._busy_with
+
+    def start(self, what: str, work: Callable[[], Found], done: Callable[[Found], None]) -> None:
+        """Begin ``work``; ``done`` is called with its result by the page's loop. From that loop only.
+
+        Raises CommandError while something else is being done. ``work`` must neither touch the session nor the page.
+        """
+        if self._busy_with:
+            raise CommandError(f"{what}: wait until this is done: {self._busy_with}")
+        self._busy_with = what
+        threading.Thread(target=self._run, args=(what, work, done), daemon=True, name="explorer-background").start()
+
+    def _run(self, what: str, work: Callable[[], Found], done: Callable[[Found], None]) -> None:
+        try:
+            found = work()
+        except OSError as error:
+            line = f"{what}: {error.strerror or error}"
+            self._post(lambda: self._refuse(CommandError(line)))
+        except Exception as error:  # a refusal becomes the notice; a mistake of the program is raised in the loop
+            problem = error
+            self._post(lambda: self._refuse(problem))
+        else:
+            self._post(lambda: self._finish(done, found))
+
+    def _finish(self, done: Callable[[Found], None], found: Found) -> None:
+        self._busy_with = ""
+        done(found)
+
+    def _refuse(self, error: Exception) -> None:
+        self._busy_with = ""
+        raise error

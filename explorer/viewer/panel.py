@@ -17,8 +17,7 @@ from explorer.live.frames import Frame
 from explorer.live.messages import Event, Status
 from explorer.session import Session
 from explorer.study.process import StudyProcess
-from explorer.viewer.actions import Post
-from explorer.viewer.background_work import BackgroundWork
+from explorer.viewer.actions import BackgroundWork, Post
 from explorer.viewer.look.look_settings import LookSettings
 from explorer.viewer.output.recording_switch import RecordingSwitch
 from explorer.viewer.tour import Stop

@@ -9,10 +9,8 @@ import numpy as np
 
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, SessionState, Status
-from explorer.scene.changes import changes
-from explorer.scene.source import SceneSource
-from explorer.viewer.actions import Actions
-from explorer.viewer.background_work import BackgroundWork
+from explorer.scene.source import SceneSource, changes
+from explorer.viewer.actions import Actions, BackgroundWork
 from explorer.viewer.panel import PageContext
 from solver.scenes.scene import Scene, with_values
 

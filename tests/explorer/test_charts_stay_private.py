@@ -10,13 +10,13 @@ from doe.audit import audit_study
 from explorer.audit.read_study import read_study, shipped_study
 from explorer.audit.report import audit_html
 from explorer.design.analysis import AnalyseOrder, run_analyse
-from explorer.logs.static_replay import replay_page
+from explorer.logs.replay import replay_page
 from explorer.report import report_html
 from explorer.report.design import design_html
 from explorer.report.diagnosis import diagnosis_html
 from explorer.report.figures.style import CONFIG
-from explorer.report.study_plots import study_plots
-from explorer.viewer.study.plot_theme import Drawn
+from explorer.report.study_charts import study_plots
+from explorer.viewer.study.plot_view import Drawn
 from tests.explorer import diagnosed, reported_studies
 from tests.explorer.command_line import explorer
 from tests.test_architecture import PACKAGES, repository_sources
@@ -29,7 +29,7 @@ There are no exceptions: SVG and its XML namespaces come from plotly.js only, an
 """
 RENDERERS = {
     r"\bget_plotlyjs\(": ["explorer/report/html.py"],
-    r"\bPlotly\.(newPlot|react)\(": ["explorer/report/page_style.py"],
+    r"\bPlotly\.(newPlot|react)\(": ["explorer/report/html.py"],
     r"\badd_plotly\(": ["explorer/viewer/study/plot_view.py"],
     r"\bplotly\.(io|graph_objects|express)\b|\b(to|write)_html\(|\bwrite_image\(": [],
 }

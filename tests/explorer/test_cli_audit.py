@@ -9,10 +9,8 @@ import pytest
 
 from doe.audit import Printed, audit_study, printed
 from doe.audit.surface_refit import refit
-from explorer.audit.read_study import read_study
-from explorer.audit.report import audit_sections, write_audit
-from explorer.audit.sentences import audit_text
-from explorer.audit.tables import places, read_table
+from explorer.audit.read_study import places, read_study, read_table
+from explorer.audit.report import audit_sections, audit_text, write_audit
 from explorer.report.html import page
 from solver.assets import asset_path
 from tests.doe.audit.made_up import clean_study

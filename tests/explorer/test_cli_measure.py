@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from explorer.files.measured_file import measured_file
+from explorer.files.measured_curves import measured_file
 from solver.assets import measurement_folder, shipped_assets
 from solver.observables.silhouette import largest_part, silhouette
 from solver.pours.record import Spheres

@@ -9,7 +9,7 @@ import pytest
 import rerun as rr
 
 from explorer.logs import replay
-from explorer.logs.static_replay import RECORDING_NAME, replay_page
+from explorer.logs.replay import RECORDING_NAME, replay_page
 from tests.explorer.command_line import explorer, refused
 
 

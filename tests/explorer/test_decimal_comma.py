@@ -11,7 +11,7 @@ from doe.audit import audit_study
 from doe.laboratory import TESTS
 from explorer.audit.read_study import read_study
 from explorer.errors import CommandError
-from explorer.files.measured_file import measured_file
+from explorer.files.measured_curves import measured_file
 from solver.assets import asset_path, measurement_folder
 from tests.explorer.command_line import explorer, refused
 

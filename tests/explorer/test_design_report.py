@@ -9,10 +9,10 @@ import pytest
 
 from doe.designs import box_behnken, central_composite, factorial, latin_hypercube, plackett_burman
 from explorer.design.analysis import AnalyseOrder, analyse_runs
-from explorer.design.analysis_text import analysis_text
 from explorer.design.factors_file import Factor
+from explorer.design.filled_sheet import Runs
 from explorer.design.result import DesignResult
-from explorer.design.runs import Runs
+from explorer.design.text import analysis_text
 from explorer.report.content import Figure, Folded, Table
 from explorer.report.design import design_html, design_markdown
 from explorer.report.design.sections import sections_of

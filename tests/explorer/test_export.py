@@ -12,12 +12,10 @@ from scipy.integrate import solve_ivp
 from explorer.errors import CommandError
 from explorer.export import EXPORTS, names
 from explorer.export.bed import BED_WRITERS, Bed
-from explorer.export.deck import read_deck
-from explorer.export.deck_of_scene import DeckTarget, assembled, deck_of
+from explorer.export.deck import DeckTarget, assembled, deck_of, read_deck, revolved_triangles, write_stl
 from explorer.export.frames import Frame, motion, read_frames, rigid_fit
 from explorer.export.liggghts import unclamped_restitution, write_liggghts
 from explorer.export.target import ExportTarget
-from explorer.export.triangles import revolved_triangles, write_stl
 from explorer.scene.file import load_scene, with_settings
 from explorer.viewer.output.engine_export import programs_text
 from solver import run_pour, with_values

@@ -7,7 +7,7 @@ import pytest
 
 from explorer.errors import CommandError
 from explorer.export import EXPORTS
-from explorer.export.deck_of_scene import deck_of
+from explorer.export.deck import deck_of
 from explorer.export.readme import _differences
 from explorer.scene.file import load_scene
 from solver.effects import EFFECTS

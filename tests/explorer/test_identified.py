@@ -17,8 +17,8 @@ from explorer.report.design.plots import design_plots
 from explorer.report.figures.model import fitted_targets
 from explorer.report.figures.optimum import ranges
 from explorer.report.html import escaped
-from explorer.report.study_plots import study_plots
-from explorer.report.units_for_people import parameter_range, parameter_value
+from explorer.report.study_charts import study_plots
+from explorer.units import parameter_range, parameter_value
 from tests.explorer import reported_studies
 from tests.explorer.command_line import explorer
 from tests.explorer.reported_studies import typed

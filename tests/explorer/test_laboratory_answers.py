@@ -17,8 +17,7 @@ from explorer.laboratory.answers import (
     photograph_answer,
     sheet_answer,
 )
-from explorer.laboratory.measured_pour import measured_source
-from explorer.laboratory.part import read_part
+from explorer.laboratory.part import measured_source, read_part
 from explorer.laboratory.run import LabOrder, analysed
 from solver import ParameterError, load_material, value
 from solver.assets import asset_path

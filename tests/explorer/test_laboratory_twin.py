@@ -11,8 +11,7 @@ from doe.laboratory import analyse
 from doe.laboratory.linear_range import linear_range
 from explorer.errors import CommandError
 from explorer.laboratory.part import part_table, with_part
-from explorer.laboratory.simulated_bias import simulated_bias
-from explorer.laboratory.twin import bench_scene, restitution_that_lands, specimen, twins
+from explorer.laboratory.twin import bench_scene, restitution_that_lands, simulated_bias, specimen, twins
 from solver import load_material, with_values
 from solver.single_body import run_bench_test
 from tests.explorer.command_line import explorer, refused

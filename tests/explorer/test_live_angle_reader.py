@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from explorer.live import angle_process
+from explorer.live import angle_reader
 from explorer.live.angle_reader import (
     LEAST_SHARE_BELOW,
     SIMULATED_INTERVAL,
@@ -157,7 +157,7 @@ def test_without_the_other_process_everything_is_read_here(asked):
 def test_the_process_answers_until_its_line_is_cut():
     context = multiprocessing.get_context("spawn")
     near, far = context.Pipe()
-    process = context.Process(target=angle_process.run, args=(far,), daemon=True)
+    process = context.Process(target=angle_reader.run, args=(far,), daemon=True)
     process.start()
     far.close()
     reader = AngleReader(near, Clock())

@@ -1,6 +1,6 @@
 import pytest
 
-from explorer.live.pace import FRAME_WALL, LAUNCH_WALL, Pace
+from explorer.live.throttle import FRAME_WALL, LAUNCH_WALL, Pace
 
 
 def driven(speed, dt, cost, seconds):

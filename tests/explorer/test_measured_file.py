@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from explorer.errors import CommandError
-from explorer.files.measured_curves import measured_curves
-from explorer.files.measured_file import FARTHEST, measured_file
+from explorer.files.measured_curves import FARTHEST, measured_curves, measured_file
 from solver.assets import asset_path, measurement_folder
 
 SCAN = measurement_folder("trefoil_1") / "piles" / "fit_1.npz"

@@ -4,7 +4,7 @@ import pytest
 import trimesh
 
 from explorer.errors import CommandError
-from explorer.files.mesh_uploads import FEED_SHARE, funnel_source, shaped_source
+from explorer.files.uploads import FEED_SHARE, funnel_source, shaped_source
 from explorer.scene.file import load_scene
 from solver.assets import asset_path
 from solver.scenes.scene import with_values

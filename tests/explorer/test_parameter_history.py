@@ -3,8 +3,8 @@
 import pytest
 
 from explorer.errors import CommandError
-from explorer.parameter_history import MERGED, ParameterHistory, live_values
-from explorer.scene.changes import changes, differences
+from explorer.scene.source import changes, differences
+from explorer.viewer.pour.changes_panel import MERGED, ParameterHistory, live_values
 from solver import load_material, parameters, value, with_values
 from solver.scenes.scene import values
 

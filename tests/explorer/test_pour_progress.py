@@ -5,7 +5,7 @@ import json
 from doe.declared.pours import Ended
 from explorer.background.command_process import CommandStatus
 from explorer.background.progress import PourProgress, ProgressEvent, failures, with_event, with_run
-from explorer.viewer.study.stage_table import stages_markdown
+from explorer.viewer.study.process_view import stages_markdown
 from solver import Outcome
 
 

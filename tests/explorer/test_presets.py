@@ -3,8 +3,8 @@
 import pytest
 
 from explorer.errors import CommandError
-from explorer.scene.changes import differences
 from explorer.scene.presets import OWN_MARK, preset_names, preset_path, preset_values, read_preset, save_preset
+from explorer.scene.source import differences
 from solver import ParameterError, asset_path, load_material, parameters, with_values
 from solver.assets import shipped_assets
 from tests.explorer.beads import bead_scene

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from explorer.logs.motion import first_seen, mean_speeds, tells_who_is_who
 from explorer.logs.recording import Component, Instances, Recording, Shape
-from explorer.viewer.replay.recorded_frames import QUANTITIES, RecordedFrames
+from explorer.viewer.replay.recorded_frames import QUANTITIES, RecordedFrames, first_seen, mean_speeds, tells_who_is_who
 
 STEP, G = 0.02, 9.81
 SHAPE = Shape("bead", np.zeros((3, 3), np.float32), np.array([[0, 1, 2]], np.uint32), (1, 2, 3), 1.0)

@@ -9,15 +9,14 @@ import numpy as np
 import pytest
 
 from explorer.logs.pour_log import PourLog
-from explorer.logs.recording_reader import read_recording
+from explorer.logs.recording import read_recording
 from explorer.scene.file import load_scene
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.look import drawn_look
 from explorer.viewer.look.camera import view_of
 from explorer.viewer.look.look import COMPONENT
-from explorer.viewer.palette import VIRIDIS, linear, linear_all, mapped
-from explorer.viewer.replay.replay_nodes import highest
-from explorer.viewer.replay.replay_page import ReplayPage, columns, moment_html
+from explorer.viewer.replay.replay_page import ReplayPage, columns, highest, moment_html
+from explorer.viewer.style import VIRIDIS, linear, linear_all, mapped
 from tests.explorer.test_logs import poses
 
 

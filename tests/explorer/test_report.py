@@ -17,7 +17,7 @@ from explorer.report.content import Figure, Folded, Table
 from explorer.report.html import embedded
 from explorer.report.sections import sections_of
 from explorer.report.sections.surface import equation
-from explorer.report.units_for_people import p_value
+from explorer.units import p_value
 from solver import asset_path
 from tests.explorer.reported_studies import CASES, HOSTILE, result_of_case, table, typed, visible
 

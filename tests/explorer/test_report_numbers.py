@@ -12,15 +12,7 @@ from doe.analysis.screening import analyse_screening
 from doe.analysis.t_tests import Sample
 from doe.designs import factorial
 from doe.runs import sample_of
-from explorer.report.units_for_people import (
-    code,
-    number,
-    p_value,
-    parameter_label,
-    parameter_range,
-    parameter_value,
-    percent,
-)
+from explorer.units import code, number, p_value, parameter_label, parameter_range, parameter_value, percent
 
 
 def test_intervals_agree_with_scipy():

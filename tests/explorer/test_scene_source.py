@@ -10,9 +10,16 @@ from typer.testing import CliRunner
 import solver
 from explorer.cli import app
 from explorer.errors import CommandError
-from explorer.scene.changes import Difference
 from explorer.scene.file import study_path, with_settings
-from explorer.scene.source import SceneSource, command_line, material_source, rig_source, setting_text, study_source
+from explorer.scene.source import (
+    Difference,
+    SceneSource,
+    command_line,
+    material_source,
+    rig_source,
+    setting_text,
+    study_source,
+)
 from explorer.scene.text import material_toml
 from solver.rigs import RIGS
 from solver.scenes.scene import value, with_rig, with_values

@@ -10,12 +10,11 @@ import pytest
 
 from explorer.background.printed import printed
 from explorer.errors import CommandError
-from explorer.export.packed import packed_export
 from explorer.files.kept_scene import kept_scene
-from explorer.laboratory.answers import Ruler
+from explorer.laboratory.answers import Ruler, compared_answer, rig_answer, twin_answer
 from explorer.laboratory.run import LabOrder
-from explorer.laboratory.solver_answers import compared_answer, rig_answer, twin_answer
 from explorer.scene.file import load_scene
+from explorer.viewer.output.engine_export import packed_export
 from solver import load_material, with_values
 from tests.explorer.command_line import explorer
 
@@ -60,7 +59,7 @@ def test_a_rig_answers_what_the_command_line_prints(tmp_path):
 
 
 def test_a_rig_that_cannot_be_is_refused_before_anything_runs(tmp_path, monkeypatch):
-    monkeypatch.setattr("explorer.laboratory.solver_answers.printed", lambda words: pytest.fail(str(words)))
+    monkeypatch.setattr("explorer.laboratory.answers.printed", lambda words: pytest.fail(str(words)))
     with pytest.raises(ValueError, match="drop_height"):
         rig_answer(MATERIAL, "drop_plate_45", {"rig.drop_height": -1.0}, 1, tmp_path)
 
@@ -75,7 +74,7 @@ def test_curves_of_a_rig_become_charts(tmp_path, monkeypatch):
         "series": {"approach_m": [0.0, 1e-6, 2e-6], "force_N": [0.0, 1.0, None], "modulus_Pa": [None, 1.0, 2.0]},
         "table": {},
     }
-    monkeypatch.setattr("explorer.laboratory.solver_answers.printed", lambda words: json.dumps(data))
+    monkeypatch.setattr("explorer.laboratory.answers.printed", lambda words: json.dumps(data))
     answer = rig_answer(MATERIAL, "compression", {}, 1, tmp_path)
     assert list(answer.plots) == ["force_N over approach_m", "modulus_Pa over approach_m"]
     (curve,) = answer.plots["force_N over approach_m"].make()["data"]
@@ -86,7 +85,7 @@ def test_curves_of_a_rig_become_charts(tmp_path, monkeypatch):
 
 def test_a_twin_is_the_command_with_its_options(monkeypatch):
     asked = []
-    monkeypatch.setattr("explorer.laboratory.solver_answers.printed", lambda words: asked.append(words) or "closes")
+    monkeypatch.setattr("explorer.laboratory.answers.printed", lambda words: asked.append(words) or "closes")
     order = LabOrder("shear", "shear", compression="compression", material="mine.toml", simulate=True, bias=True)
     answer = twin_answer(order)
     words = "lab shear shear --compression compression --simulate --material mine.toml --bias"
@@ -110,7 +109,7 @@ def test_a_photograph_beside_a_pour_has_both_in_its_picture(tmp_path, monkeypatc
         Image.new("RGB", (30, 20), "red").save(words[words.index("--plot") + 1])
         return f"beside {words[words.index('--from-simulation') + 1]}"
 
-    monkeypatch.setattr("explorer.laboratory.solver_answers.printed", drawn)
+    monkeypatch.setattr("explorer.laboratory.answers.printed", drawn)
     answer = compared_answer("cone_25_30", Ruler(scale_mm=0.2), MATERIAL, tmp_path)
     kept = answer.text.removeprefix("beside ")
     assert load_scene(kept) == MATERIAL

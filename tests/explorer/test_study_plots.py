@@ -11,18 +11,16 @@ from scipy import stats
 
 from doe.studies.campaign import PartialStages, run_campaign
 from doe.studies.study_result import StudyDescription
-from explorer.report.diagnosis_plots import diagnosis_plots
-from explorer.report.figures.effects import all_effects, errors_at_hand, pareto_against
-from explorer.report.figures.main_effects import main_effects
+from explorer.report.diagnosis.charts import diagnosis_plots
+from explorer.report.figures.effects import all_effects, errors_at_hand, main_effects, pareto_against
 from explorer.report.figures.model import fitted_targets
 from explorer.report.figures.noise import noise_of_estimators
 from explorer.report.figures.profiler import prediction, profiler
 from explorer.report.figures.style import short_rows, stacked
-from explorer.report.figures.surface import residual_quantiles
-from explorer.report.figures.surface_3d import height_over, solutions
-from explorer.report.study_plots import study_plots
-from explorer.study.partial_result import PartialResult
+from explorer.report.figures.surface import height_over, residual_quantiles, solutions
+from explorer.report.study_charts import study_plots
 from explorer.study.process import PARTIAL
+from explorer.study.run import PartialResult
 from tests.doe.formula_runner import FormulaRunner
 from tests.explorer import diagnosed, reported_studies
 from tests.explorer.reported_studies import BIAS, PROFILE, STUDY, planted, typed

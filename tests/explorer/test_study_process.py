@@ -9,9 +9,8 @@ import time
 import pytest
 
 from doe.studies.study import load_study
-from explorer.background.command_process import BackgroundError, CommandStatus, advanced
+from explorer.background.command_process import MOST_WAITING, BackgroundError, CommandStatus, advanced
 from explorer.background.progress import ProgressEvent, StageProgress, failures, given_up, with_event
-from explorer.background.waiting_line import MOST_WAITING
 from explorer.priority import BACKGROUND
 from explorer.study.edit import StudyEdits
 from explorer.study.process import CalibrationProcess

@@ -6,7 +6,7 @@ from rerun.chunk import RrdReader
 from doe.runner import PourRunner
 from doe.runs import Setting
 from doe.store import Store
-from explorer.logs.study_recorder import StudyRecorder
+from explorer.logs.pour_recorder import StudyRecorder
 from solver import load_material, with_values
 from tests.explorer.command_line import TINY
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from explorer.viewer.replay.timeline import Timeline
+from explorer.viewer.replay.replay_page import Timeline
 
 TIMES = np.array([0.0, 0.02, 0.05, 0.10])
 

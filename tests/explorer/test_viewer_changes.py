@@ -5,8 +5,7 @@ from dataclasses import replace
 import pytest
 
 from explorer.errors import CommandError
-from explorer.scene.changes import differences
-from explorer.scene.source import material_source
+from explorer.scene.source import differences, material_source
 from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.panel import Now

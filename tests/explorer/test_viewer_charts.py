@@ -9,12 +9,13 @@ import pytest
 from explorer.live.messages import Event, SessionState
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.panel import Now
-from explorer.viewer.pour.chart import Chart, History
-from explorer.viewer.pour.marks import (
+from explorer.viewer.pour.chart import (
     LEGEND_INTERVAL,
     MOST_LETTERS,
     MOST_MARKS,
     NO_MARKS,
+    Chart,
+    History,
     Marks,
     change_label,
     change_times,

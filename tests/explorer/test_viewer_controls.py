@@ -5,7 +5,7 @@ import math
 import pytest
 
 from explorer.live.messages import SessionState, Status
-from explorer.screen_units import InputError, checked, quantity, screen_unit, title
+from explorer.units import InputError, checked, quantity, screen_unit, title
 from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.pour.live_controls import LiveControl, decade_mark, decades_around, mean_value

@@ -14,8 +14,8 @@ from explorer.viewer.laboratory.answer_view import answer_html
 from explorer.viewer.laboratory.audit_panel import AuditPanel
 from explorer.viewer.laboratory.bench_panel import BenchPanel
 from explorer.viewer.laboratory.design_panel import DesignPanel
+from explorer.viewer.laboratory.inputs import positive
 from explorer.viewer.laboratory.laboratory_panel import LaboratoryPanel
-from explorer.viewer.laboratory.numbers import positive
 from explorer.viewer.laboratory.photograph_panel import PhotographPanel
 from explorer.viewer.laboratory.rig_panel import RigPanel
 from explorer.viewer.panel import Now

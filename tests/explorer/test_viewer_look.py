@@ -9,18 +9,15 @@ import pytest
 
 from explorer.live.details import Details
 from explorer.live.frames import Frame
-from explorer.screen_units import InputError
+from explorer.units import InputError
 from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import guarded_server
-from explorer.viewer.look.colour_panel import ColourPanel
-from explorer.viewer.look.colouring import QUANTITIES, bar_html, body_colours, colour_range, nice_top
-from explorer.viewer.look.cut_panel import CutPanel
-from explorer.viewer.look.force_chains import ForceChains, chain_segments, chain_text
-from explorer.viewer.look.force_panel import ForcePanel
+from explorer.viewer.look.colours import QUANTITIES, ColourPanel, bar_html, body_colours, colour_range, nice_top
+from explorer.viewer.look.force_chains import ForceChains, ForcePanel, chain_segments, chain_text
 from explorer.viewer.look.look import COMPONENT, CUTS, NOTHING, Look, in_sight
-from explorer.viewer.look.look_settings import LookSettings
-from explorer.viewer.palette import SELECTED, VIRIDIS, linear, linear_all, mapped
+from explorer.viewer.look.look_settings import CutPanel, LookSettings
 from explorer.viewer.scene_nodes import SceneNodes, component_colour
+from explorer.viewer.style import SELECTED, VIRIDIS, linear, linear_all, mapped
 from tests.explorer.beads import bead_scene
 
 FRAME = Frame(

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from explorer.scene.source import material_source
-from explorer.screen_units import InputError
+from explorer.units import InputError
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.pour.live_panel import LivePanel
 from explorer.viewer.pour.pair_matrix import BOXES, PairMatrix, matrix_html, pair_parameters, triangle

@@ -7,8 +7,7 @@ import pytest
 
 from explorer.background.command_process import CommandStatus
 from explorer.live.messages import Event, SessionState, Status
-from explorer.viewer.orders import Orders
-from explorer.viewer.people import People
+from explorer.viewer.page import Orders, People
 from tests.explorer.beads import bead_scene
 
 STATUS = Status(SessionState.RUNNING, "", bead_scene(), seed=7, generation=1, speed=1.0, time=0.4)

@@ -12,13 +12,19 @@ from viser import UploadedFile
 from doe.measurement.load import load_measurement
 from explorer.errors import CommandError
 from explorer.files.measured_curves import MeasuredCurve, measured_curves
-from explorer.viewer.actions import Actions
-from explorer.viewer.background_work import BackgroundWork
+from explorer.viewer.actions import Actions, BackgroundWork
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.panel import Now
-from explorer.viewer.pour.outline_nodes import flank_segments, in_world, measured_segments
+from explorer.viewer.pour.outline_drawing import (
+    WAITING,
+    corners_of,
+    flank_segments,
+    in_world,
+    measured_segments,
+    outline_html,
+    outline_svg,
+)
 from explorer.viewer.pour.outline_panel import NONE, OWN, OutlinePanel
-from explorer.viewer.pour.outline_svg import WAITING, corners_of, outline_html, outline_svg
 from solver.assets import measurement_folder
 from solver.observables.reading import PileReading
 from tests.explorer.page_session import finished, page_context

@@ -10,8 +10,7 @@ import pytest
 
 from explorer.errors import CommandError
 from explorer.live.messages import SessionState
-from explorer.logs.recording import RecordedPour
-from explorer.logs.recording_reader import read_recording
+from explorer.logs.recording import RecordedPour, read_recording
 from explorer.scene.file import load_scene
 from explorer.scene.source import SceneSource, material_source
 from explorer.viewer.actions import Actions
@@ -19,8 +18,7 @@ from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.output.engine_export import EngineExport
 from explorer.viewer.output.output_panel import OutputPanel, command_html, picture
 from explorer.viewer.output.recording_panel import DOWNLOAD, START, STOP, RecordingPanel
-from explorer.viewer.output.recording_switch import HTML, RRD, session_recorder
-from explorer.viewer.output.scene_playback import BYTES_PER_BODY
+from explorer.viewer.output.recording_switch import BYTES_PER_BODY, HTML, RRD, session_recorder
 from explorer.viewer.panel import Now
 from tests.explorer.page_session import PageSession, finished, frame_of, page_context
 from tests.explorer.test_viewer_controls import event
@@ -262,7 +260,7 @@ def test_the_scene_as_a_web_page_holds_what_moved(server, bench):
 
 
 def test_a_web_page_that_is_full_is_ended_and_written(bench, monkeypatch):
-    monkeypatch.setattr("explorer.viewer.output.scene_playback.MOST_BYTES", 2.5 * BYTES_PER_BODY)
+    monkeypatch.setattr("explorer.viewer.output.recording_switch.MOST_BYTES", 2.5 * BYTES_PER_BODY)
     bench.switch._kind.value = HTML
     assert bench.record(START) == ""
     bench.take(2)

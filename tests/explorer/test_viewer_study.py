@@ -10,18 +10,17 @@ from doe.stages import planned_runs
 from doe.studies.study import load_study
 from explorer.background.command_process import CommandStatus
 from explorer.background.progress import StageProgress, TriedRun
-from explorer.report.plot import Plot
-from explorer.screen_units import InputError
+from explorer.report.study_charts import Plot
+from explorer.units import InputError
 from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.panel import Now
 from explorer.viewer.study.order_panel import number_on_screen
-from explorer.viewer.study.plot_theme import Drawn
-from explorer.viewer.study.plot_view import NOTHING, PlotView
+from explorer.viewer.study.plot_view import NOTHING, Drawn, PlotView
+from explorer.viewer.study.process_view import stages_markdown
 from explorer.viewer.study.profiler_panel import TITLE as PROFILER
-from explorer.viewer.study.stage_table import stages_markdown
 from explorer.viewer.study.study_panel import NONE, StudyPanel
-from explorer.viewer.theme import ThemeSwitch
+from explorer.viewer.style import ThemeSwitch
 from tests.explorer import reported_studies
 from tests.explorer.page_session import page_context
 from tests.explorer.study_panel_at_hand import (

@@ -9,8 +9,6 @@ import pytest
 from explorer.background.command_process import CommandStatus
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, SessionState, Status
-from explorer.viewer.body_nodes import component_poses
-from explorer.viewer.palette import BODY_COLOURS, linear
 from explorer.viewer.pour.chart import MOST_POINTS, History
 from explorer.viewer.pour.readout import (
     OUTCOME_WORDS,
@@ -23,7 +21,9 @@ from explorer.viewer.pour.readout import (
     recent,
     time_step_text,
 )
+from explorer.viewer.scene_nodes import component_poses
 from explorer.viewer.study.process_view import escaped, progress, time_left
+from explorer.viewer.style import BODY_COLOURS, linear
 from solver.observables.observable import Value
 from solver.pours.record import Outcome, Phase
 from tests.explorer.beads import bead_scene

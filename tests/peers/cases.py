@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from explorer.export import EXPORTS
-from explorer.export.deck_of_scene import assembled
+from explorer.export.deck import assembled
 from explorer.export.frames import TRAJECTORY, Motion, motion, read_frames
 from explorer.export.liggghts import INPUT
 from explorer.export.run import run_liggghts, run_yade

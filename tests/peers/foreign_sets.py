@@ -25,7 +25,7 @@ from doe.validation.laboratory import TREFOILS, Sample, read_laboratory
 from doe.validation.sets import append_rows, read_rows
 from doe.validation.truth import REPLICATES, Case, Truth, drawn_theta
 from doe.validation.work_place import WorkPlace
-from explorer.export.deck_of_scene import deck_of
+from explorer.export.deck import deck_of
 from explorer.export.liggghts import INPUT, write_liggghts
 from explorer.export.run import run_liggghts
 from solver import EFFECTS, Job, observe_scan, scanned_pile

@@ -6,7 +6,7 @@ import numpy as np
 from scipy import stats
 
 from explorer.export import EXPORTS
-from explorer.export.deck_of_scene import deck_of
+from explorer.export.deck import deck_of
 from explorer.export.frames import motion
 from explorer.export.run import run_liggghts, run_yade
 from explorer.scene.file import load_scene

@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from doe.measurement.load import load_measurement
-from explorer.export.deck_of_scene import deck_of
+from explorer.export.deck import deck_of
 from explorer.export.liggghts import write_liggghts
 from explorer.export.run import run_liggghts
 from solver import Crew, Job, observe_scan, scanned_pile, with_values

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from explorer.design.result import DesignResult
-from explorer.files.whole_file import write_whole
+from explorer.files.output_file import write_whole
 from explorer.report.design.sections import sections_of
 from explorer.report.html import page
 from explorer.report.markdown import document

@@ -32,9 +32,10 @@ from explorer.report.figures.style import (
     suffix,
     vertical_line,
 )
-from explorer.report.units_for_people import observable_title, parameter_label
+from explorer.units import observable_title, parameter_label
 
 COLOURS = (FACTOR, CHOSEN, ASSUMPTION)
+
 DASHES = ("solid", "dash", "dot")
 
 

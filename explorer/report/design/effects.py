@@ -10,9 +10,8 @@ from doe.analysis.contrasts import Curvature
 from doe.analysis.screening import Effect
 from explorer.design.result import DesignResult, DrawnEffects
 from explorer.report.content import Block, Bullets, Facts, Figure, Section, Table, Text
-from explorer.report.figures.effects import half_normal, pareto
-from explorer.report.figures.main_effects import main_effects
-from explorer.report.units_for_people import MISSING, fixed, number, observed, p_value, signed
+from explorer.report.figures.effects import half_normal, main_effects, pareto
+from explorer.units import MISSING, fixed, number, observed, p_value, signed
 
 MOST_DRAWN = 40
 """Contrasts in a chart; the table has all."""

@@ -11,10 +11,9 @@ from explorer.report.content import Block, Bullets, Facts, Figure, Folded, Secti
 from explorer.report.design.charts import box_cox_profile, single_runs
 from explorer.report.figures.model import FittedTarget
 from explorer.report.figures.profiler import profiler
-from explorer.report.figures.surface import contours, fit, residual_quantiles
-from explorer.report.figures.surface_3d import height_over
+from explorer.report.figures.surface import contours, fit, height_over, residual_quantiles
 from explorer.report.sections.surface import anova_table, equation
-from explorer.report.units_for_people import MISSING, enumeration, fixed, number, observed, p_value
+from explorer.units import MISSING, enumeration, fixed, number, observed, p_value
 
 MOST_PANELS = 3
 """Factors up to which every pair of them is drawn side by side."""

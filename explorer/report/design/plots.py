@@ -7,8 +7,7 @@ from functools import partial
 from explorer.design.result import DesignResult
 from explorer.report.design.charts import box_cox_profile, ridge, single_runs
 from explorer.report.figures.style import stacked
-from explorer.report.plot import Plot, Plots
-from explorer.report.study_plots import optimum_plots, surface_plots
+from explorer.report.study_charts import Plot, Plots, optimum_plots, surface_plots
 
 
 def design_plots(result: DesignResult) -> Plots:

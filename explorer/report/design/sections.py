@@ -17,15 +17,7 @@ from explorer.report.design.effects import effects
 from explorer.report.design.model import diagnostics, model, units_of_factors
 from explorer.report.design.target import shape, target
 from explorer.report.sections.surface import equation
-from explorer.report.units_for_people import (
-    MISSING,
-    enumeration,
-    fixed,
-    number,
-    observed,
-    parameter_label,
-    parameter_value,
-)
+from explorer.units import MISSING, enumeration, fixed, number, observed, parameter_label, parameter_value
 
 
 def sections_of(result: DesignResult) -> tuple[Section, ...]:

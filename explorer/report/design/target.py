@@ -10,17 +10,12 @@ from explorer.design.result import DesignResult
 from explorer.report.content import Block, Facts, Figure, Section, Table, Text
 from explorer.report.design.charts import ridge
 from explorer.report.figures.optimum import cloud, ranges
-from explorer.report.figures.surface_3d import solutions
+from explorer.report.figures.surface import solutions
 from explorer.report.identified import GIVES_TARGET, cloud_caution, rule, settings
-from explorer.report.units_for_people import (
-    enumeration,
-    number,
-    observed,
-    parameter_value,
-    percent,
-)
+from explorer.units import enumeration, number, observed, parameter_value, percent
 
 MOST_PANELS = 3
+
 """Factors up to which every pair of them has a panel."""
 
 

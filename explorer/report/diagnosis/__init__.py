@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from explorer.diagnosis.result import DiagnosisResult
-from explorer.files.whole_file import write_whole
+from explorer.files.output_file import write_whole
 from explorer.report.content import Section
 from explorer.report.diagnosis.answer import could_have_seen, in_short, rivals
 from explorer.report.diagnosis.evidence import effects, error, over_the_plate, parameters, pile, residuals

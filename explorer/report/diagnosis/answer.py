@@ -24,7 +24,7 @@ from explorer.report.diagnosis.wording import (
     size_text,
     spelled,
 )
-from explorer.report.units_for_people import MISSING, code, enumeration, fixed, p_value, percent, signed
+from explorer.units import MISSING, code, enumeration, fixed, p_value, percent, signed
 from solver.effects import EFFECTS
 
 FAR = 2.0

@@ -25,7 +25,7 @@ from explorer.report.diagnosis.wording import (
     simulated_range,
     spelled,
 )
-from explorer.report.units_for_people import (
+from explorer.units import (
     MISSING,
     code,
     fixed,

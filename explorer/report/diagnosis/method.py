@@ -16,15 +16,7 @@ from explorer.report.diagnosis.wording import (
     model_words,
     spelled,
 )
-from explorer.report.units_for_people import (
-    duration,
-    enumeration,
-    fixed,
-    number,
-    p_value,
-    parameter_label,
-    percent,
-)
+from explorer.units import duration, enumeration, fixed, number, p_value, parameter_label, percent
 
 OFFERS = {"scalars": "scalars", "profile": "scalars and height profiles", "scan": "scalars and scans of the surface"}
 

@@ -12,7 +12,7 @@ from itertools import pairwise
 from doe.diagnose.result import BASE, NO_EFFECT, UNEXPLAINED, Amplitude, EffectRow, Place
 from doe.holdout import OVERALL
 from explorer.diagnosis.result import DiagnosisResult
-from explorer.report.units_for_people import (
+from explorer.units import (
     MISSING,
     ReadingUnit,
     code,

@@ -22,7 +22,7 @@ from explorer.report.figures.style import (
     suffix,
     vertical_line,
 )
-from explorer.report.units_for_people import observable_label, unit_of_observable
+from explorer.units import observable_label, unit_of_observable
 
 
 def noise_of_estimators(pilot: PilotResult) -> Spec:

@@ -27,7 +27,7 @@ from explorer.report.figures.style import (
     suffix,
 )
 from explorer.report.identified import BY_RULE, GIVES_TARGET, is_identified
-from explorer.report.units_for_people import axis_title, parameter_label, parameter_range, unit_of_parameter
+from explorer.units import axis_title, parameter_label, parameter_range, unit_of_parameter
 
 
 def cloud(fitted: FittedTarget) -> Spec:

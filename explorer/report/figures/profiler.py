@@ -21,7 +21,7 @@ from explorer.report.figures.style import (
     points,
     suffix,
 )
-from explorer.report.units_for_people import axis_title, observable_title, unit_of_observable, unit_of_parameter
+from explorer.units import axis_title, observable_title, unit_of_observable, unit_of_parameter
 
 TRACE_POINTS = 31
 ROW_GAP = 0.13

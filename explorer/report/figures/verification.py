@@ -16,7 +16,7 @@ from explorer.report.figures.style import (
     horizontal_band,
     points,
 )
-from explorer.report.units_for_people import observable_title, unit_of_observable
+from explorer.units import observable_title, unit_of_observable
 
 MEASURED = 1.0
 SIMULATED = 2.0

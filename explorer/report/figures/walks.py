@@ -28,13 +28,7 @@ from explorer.report.figures.style import (
     note,
     points,
 )
-from explorer.report.units_for_people import (
-    observable_title,
-    parameter_label,
-    parameter_value,
-    unit_of_observable,
-    unit_of_parameter,
-)
+from explorer.units import observable_title, parameter_label, parameter_value, unit_of_observable, unit_of_parameter
 
 NORMAL_95 = 1.96
 FAINT = 0.45

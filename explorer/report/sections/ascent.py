@@ -7,13 +7,7 @@ from doe.stages.ascent import AscentResult
 from doe.studies.study_result import StudyResult
 from explorer.report.content import Block, Bullets, Figure, Section, Table, Text
 from explorer.report.figures.walks import ascent_path
-from explorer.report.units_for_people import (
-    fixed,
-    observable_label,
-    observed,
-    parameter_label,
-    parameter_value,
-)
+from explorer.units import fixed, observable_label, observed, parameter_label, parameter_value
 
 
 def ascent(result: StudyResult) -> Section:

@@ -6,7 +6,7 @@ from doe.studies.study_result import StudyResult
 from explorer.report.content import Block, Bullets, Figure, Folded, Section, Table, Text
 from explorer.report.figures.walks import scan as scan_chart
 from explorer.report.sections.screening import effect_table, not_testable, row_table
-from explorer.report.units_for_people import (
+from explorer.units import (
     MISSING,
     code,
     observable_label,

@@ -7,7 +7,7 @@ from doe.studies.study_result import StudyResult
 from explorer.report.content import Block, Figure, Section, Text
 from explorer.report.figures.effects import all_effects
 from explorer.report.sections.overview import assumption_statement
-from explorer.report.units_for_people import observable_label
+from explorer.units import observable_label
 
 
 def effects(result: StudyResult) -> Section:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from doe.stages import STAGES
 from doe.studies.study_result import StudyResult
 from explorer.report.content import Block, Bullets, Facts, Section, Text
-from explorer.report.units_for_people import number
+from explorer.units import number
 
 
 def further(result: StudyResult) -> tuple[Section, ...]:

@@ -11,16 +11,7 @@ from doe.stages.pilot import PilotResult, StageSize
 from doe.studies.study_result import StudyResult
 from explorer.report.content import Block, Bullets, Figure, Section, Table, Text
 from explorer.report.figures.noise import noise_of_estimators
-from explorer.report.units_for_people import (
-    MISSING,
-    fixed,
-    observable_label,
-    observed,
-    p_value,
-    percent,
-    signed,
-    unit_of_observable,
-)
+from explorer.units import MISSING, fixed, observable_label, observed, p_value, percent, signed, unit_of_observable
 
 
 def noise(result: StudyResult) -> Section:

@@ -9,7 +9,7 @@ from explorer.report.content import Block, Figure, Section, Table, Text
 from explorer.report.figures.model import fitted_targets
 from explorer.report.figures.optimum import cloud, ranges
 from explorer.report.identified import GIVES_TARGET, cloud_caution, is_identified, rule, settings
-from explorer.report.units_for_people import (
+from explorer.units import (
     enumeration,
     fixed,
     observable_label,

@@ -9,7 +9,7 @@ from doe.studies.study_result import StudyResult, valid_runs
 from doe.target import Target
 from explorer.report.content import Block, Caution, Facts, Section, Table
 from explorer.report.identified import settings
-from explorer.report.units_for_people import (
+from explorer.units import (
     code,
     duration,
     enumeration,

@@ -11,15 +11,7 @@ from doe.analysis.t_tests import Sample
 from doe.studies.study_result import StudyResult
 from explorer.report.content import Section, Table, Text
 from explorer.report.identified import GIVES_TARGET, settings
-from explorer.report.units_for_people import (
-    MISSING,
-    enumeration,
-    fixed,
-    observed,
-    p_value,
-    parameter_label,
-    parameter_value,
-)
+from explorer.units import MISSING, enumeration, fixed, observed, p_value, parameter_label, parameter_value
 from solver import asset_path
 
 STUDY = "sunflower_extract"

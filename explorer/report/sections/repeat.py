@@ -9,7 +9,7 @@ from pathlib import Path
 from doe.studies.study import TRIES
 from doe.studies.study_result import PouredBody, StudyDescription, StudyResult
 from explorer.report.content import Block, Code, Section, Table, Text
-from explorer.report.units_for_people import MISSING, duration, enumeration, fixed, number, percent
+from explorer.units import MISSING, duration, enumeration, fixed, number, percent
 from solver.assets import shipped_assets
 from solver.laws import CONTACT_LAWS, HertzMindlin
 

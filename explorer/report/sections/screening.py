@@ -9,7 +9,7 @@ from doe.studies.factors import MIN_BODIES
 from doe.studies.study_result import StudyResult
 from explorer.report.content import Block, Bullets, Facts, Figure, Folded, Section, Table, Text
 from explorer.report.figures.effects import half_normal, pareto
-from explorer.report.units_for_people import (
+from explorer.units import (
     MISSING,
     enumeration,
     fixed,

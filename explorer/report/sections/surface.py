@@ -17,7 +17,7 @@ from doe.studies.study_result import StudyResult
 from explorer.report.content import Block, Bullets, Facts, Figure, Folded, Section, Table, Text
 from explorer.report.figures.model import FittedTarget, fitted_targets
 from explorer.report.figures.surface import contours, fit
-from explorer.report.units_for_people import (
+from explorer.units import (
     fixed,
     number,
     observable_label,

@@ -11,15 +11,7 @@ from doe.studies.study_result import StudyResult
 from doe.target import Target
 from explorer.report.content import Block, Figure, Section, Table, Text
 from explorer.report.figures.verification import verification as verification_chart
-from explorer.report.units_for_people import (
-    MISSING,
-    fixed,
-    observable_label,
-    observed,
-    p_value,
-    percent,
-    unit_of_observable,
-)
+from explorer.units import MISSING, fixed, observable_label, observed, p_value, percent, unit_of_observable
 
 
 def verification(result: StudyResult) -> Section:

@@ -11,8 +11,8 @@ from explorer.errors import CommandError
 from explorer.laboratory.answers import Answer
 from explorer.viewer.actions import Post
 from explorer.viewer.output.send_file import send_file
-from explorer.viewer.small_text import small_html
 from explorer.viewer.study.plot_view import PlotView
+from explorer.viewer.style import small_html
 
 NO_CHARTS = "Charts come with an answer that has any."
 

@@ -6,7 +6,7 @@ from explorer.audit.entries import FILE
 from explorer.audit.read_study import read_study
 from explorer.files.uploads import unpacked_folder
 from explorer.laboratory.answers import audit_answer
-from explorer.viewer.buttons import on_upload
+from explorer.viewer.actions import on_upload
 from explorer.viewer.laboratory.answer_view import AnswerView
 from explorer.viewer.panel import LABORATORY, PageContext, Panel
 

@@ -8,13 +8,12 @@ from typing import Any
 import viser
 
 from doe.table_file import SUFFIXES
-from explorer.laboratory.answers import bench_answer
-from explorer.laboratory.measured_pour import measured_source
+from explorer.laboratory.answers import bench_answer, twin_answer
+from explorer.laboratory.part import measured_source
 from explorer.laboratory.run import LabOrder, analysed
-from explorer.laboratory.solver_answers import twin_answer
 from explorer.scene.source import SceneSource
 from explorer.viewer.laboratory.answer_view import AnswerView
-from explorer.viewer.laboratory.upload_slot import UploadSlot
+from explorer.viewer.laboratory.inputs import UploadSlot
 from explorer.viewer.panel import LABORATORY, PageContext, Panel
 from solver.assets import shipped_assets
 

@@ -8,8 +8,7 @@ from explorer.design.analysis import AnalyseOrder
 from explorer.design.plan import PlanOrder
 from explorer.laboratory.answers import analysis_answer, sheet_answer
 from explorer.viewer.laboratory.answer_view import AnswerView
-from explorer.viewer.laboratory.numbers import number_or_none, positive
-from explorer.viewer.laboratory.upload_slot import UploadSlot
+from explorer.viewer.laboratory.inputs import UploadSlot, number_or_none, positive
 from explorer.viewer.panel import LABORATORY, PageContext, Panel
 from solver.assets import shipped_assets
 

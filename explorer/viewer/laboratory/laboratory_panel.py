@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 
 from explorer.viewer.panel import LABORATORY, Now, PageContext, Panel
-from explorer.viewer.small_text import small_html
+from explorer.viewer.style import small_html
 from explorer.viewer.tour import Stop
 
 

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from explorer.files.measured_file import PICTURES
-from explorer.laboratory.answers import Answer, Ruler, photograph_answer
-from explorer.laboratory.solver_answers import compared_answer
+from explorer.files.measured_curves import PICTURES
+from explorer.laboratory.answers import Answer, Ruler, compared_answer, photograph_answer
 from explorer.viewer.laboratory.answer_view import AnswerView
-from explorer.viewer.laboratory.numbers import positive
-from explorer.viewer.laboratory.upload_slot import UploadSlot
+from explorer.viewer.laboratory.inputs import UploadSlot, positive
 from explorer.viewer.panel import LABORATORY, PageContext, Panel
 from solver.assets import shipped_assets
 

@@ -7,7 +7,7 @@ from typing import Any
 import viser
 
 from explorer.errors import CommandError
-from explorer.laboratory.solver_answers import rig_answer
+from explorer.laboratory.answers import rig_answer
 from explorer.viewer.laboratory.answer_view import AnswerView
 from explorer.viewer.panel import LABORATORY, Now, PageContext, Panel
 from explorer.viewer.pour.restart_panel import entered, parameter_input

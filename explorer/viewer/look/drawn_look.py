@@ -9,9 +9,9 @@ import numpy.typing as npt
 import viser
 
 from explorer.live.frames import Frame
-from explorer.viewer.body_nodes import BodyNodes
-from explorer.viewer.look.colouring import Numbered, Quantity, body_colours
+from explorer.viewer.look.colours import Numbered, Quantity, body_colours
 from explorer.viewer.look.look import Look
+from explorer.viewer.scene_nodes import BodyNodes
 from explorer.viewer.view import light
 
 GHOST = 0.22

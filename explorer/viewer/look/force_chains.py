@@ -1,4 +1,7 @@
-"""Force chains: lines from centre to centre through the contacts that press hardest."""
+"""Force chains: lines from centre to centre through the contacts that press hardest.
+
+Controls of the force chains.
+"""
 
 from __future__ import annotations
 
@@ -11,14 +14,22 @@ import viser
 
 from explorer.live.details import Details
 from explorer.live.frames import Frame
+from explorer.units import checked
+from explorer.viewer.actions import Post, add_keys
 from explorer.viewer.look.look import Look
-from explorer.viewer.palette import CHAINS
+from explorer.viewer.look.look_settings import LookSettings
+from explorer.viewer.style import CHAINS
 
 STRONGER = (1.0, 2.0, 4.0)
+
 """Where the classes begin, as multiples of the threshold."""
+
 THICKNESS = (6e-4, 1.2e-3, 2.4e-3)
+
 """Thickness of their lines [m]."""
+
 LEAST_SHARE = 1e-9
+
 """Contacts that do not press at all are no part of a chain, even with a threshold of 0 (share of the mean force)."""
 
 Segments = npt.NDArray[np.float32]
@@ -88,3 +99,41 @@ def chain_text(details: Details | None, look: Look) -> str:
         f"Lines: normal force from {1e3 * low:.3g} mN on; thicker from {2e3 * low:.3g} and {4e3 * low:.3g} mN. "
         f"{drawn} of {details.touching} contacts; their mean is {1e3 * details.mean_force:.3g} mN."
     )
+
+
+CHAINS_KEY, FORCE_CHAINS = "K", "Force chains"
+
+MOST_TIMES_MEAN = 5.0
+
+
+class ForcePanel:
+    """Changes ``settings``, and says what the lines mean."""
+
+    def __init__(self, server: viser.ViserServer, settings: LookSettings, post: Post) -> None:
+        self._settings, gui = settings, server.gui
+        with gui.add_folder("Forces"):
+            self._chains = gui.add_checkbox(
+                FORCE_CHAINS, False, hint=f"Lines through the contacts that press hardest. Key {CHAINS_KEY}."
+            )
+            self._threshold = gui.add_slider(
+                "From × mean force", 0.0, MOST_TIMES_MEAN, 0.1, 1.0, hint="Weakest contact that is drawn."
+            )
+            self._text = gui.add_markdown("")
+        settings.bind(self._chains, lambda look: look.chains, lambda sent: {"chains": sent is True})
+        settings.bind(
+            self._threshold,
+            lambda look: look.threshold,
+            lambda sent: {"threshold": checked(sent, 0.0, MOST_TIMES_MEAN, "threshold")},
+        )
+        add_keys(
+            gui,
+            {FORCE_CHAINS: lambda: settings.change(chains=not settings.look.chains)},
+            {FORCE_CHAINS: CHAINS_KEY},
+            post,
+        )
+
+    def show(self, details: Details | None) -> None:
+        """Say what the lines mean; call it inside ``server.atomic()``."""
+        lines = chain_text(details, self._settings.look)
+        if self._text.content != lines:
+            self._text.content = lines

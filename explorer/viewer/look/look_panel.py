@@ -10,20 +10,15 @@ import viser
 from explorer.live.details import Details
 from explorer.live.frames import Frame
 from explorer.scene.meshes import scene_height
-from explorer.screen_units import InputError
-from explorer.viewer.actions import Post
-from explorer.viewer.buttons import ClientAction, add_client_key, client_buttons
-from explorer.viewer.look.camera import go_along
-from explorer.viewer.look.camera_panel import CameraPanel
-from explorer.viewer.look.colour_panel import ColourPanel
-from explorer.viewer.look.colouring import QUANTITIES
-from explorer.viewer.look.cut_panel import CutPanel
+from explorer.units import InputError
+from explorer.viewer.actions import ClientAction, Post, add_client_key, client_buttons
+from explorer.viewer.look.camera import CameraPanel, go_along
+from explorer.viewer.look.colours import QUANTITIES, ColourPanel
 from explorer.viewer.look.drawn_look import DrawnLook
-from explorer.viewer.look.force_chains import ForceChains
-from explorer.viewer.look.force_panel import ForcePanel
-from explorer.viewer.look.inspector import body_html
+from explorer.viewer.look.force_chains import ForceChains, ForcePanel
+from explorer.viewer.look.inspector import body_html, nearest_hit
 from explorer.viewer.look.look import in_sight
-from explorer.viewer.look.picking import nearest_hit
+from explorer.viewer.look.look_settings import CutPanel
 from explorer.viewer.panel import LOOK, Now, PageContext, Panel
 from explorer.viewer.scene_nodes import SceneNodes
 from explorer.viewer.tour import Stop

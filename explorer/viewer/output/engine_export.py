@@ -1,19 +1,37 @@
-"""The pour for another program."""
+"""The pour for another program.
+
+What `explorer export` writes, in one file that a browser takes along.
+"""
 
 from __future__ import annotations
 
+import tempfile
 from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 import viser
 
+from explorer.background.printed import printed
 from explorer.errors import CommandError
 from explorer.export import OWN, names
-from explorer.export.packed import packed_export
+from explorer.files.exports import zipped
 from explorer.files.kept_scene import kept_scene
 from explorer.viewer.output.send_file import send_file
 from explorer.viewer.panel import TAKE_ALONG, PageContext, Panel
 from solver.plugins import origin
+
+
+def packed_export(scene: Path, program: str, seed: int) -> bytes:
+    """A .zip of the folder that ``explorer export scene DIR --to program --seed seed`` makes, in a process of its own.
+
+    Raises CommandError where that command refuses.
+    """
+    with tempfile.TemporaryDirectory() as apart:
+        folder = Path(apart) / f"{scene.stem}_{program}"
+        printed(["export", str(scene), str(folder), "--to", program, "--seed", str(seed)])
+        written = sorted(one for one in folder.rglob("*") if one.is_file())
+        return zipped({str(path.relative_to(apart)): path for path in written})
 
 
 class EngineExport(Panel):

@@ -10,7 +10,7 @@ from typing import Any
 
 import viser
 
-from explorer.screen_units import checked, screen_unit, title
+from explorer.units import checked, screen_unit, title
 from explorer.viewer.actions import Post
 from solver.params import Parameter
 from solver.scenes.scene import Scene, value

@@ -9,8 +9,8 @@ from typing import Any
 import viser
 
 from explorer.live.messages import Status
-from explorer.screen_units import quantity, title
 from explorer.session import Session
+from explorer.units import quantity, title
 from explorer.viewer.actions import Post
 from explorer.viewer.panel import POUR
 from explorer.viewer.pour.live_controls import LiveControl

@@ -9,13 +9,11 @@ from typing import Any
 
 import viser
 
-from explorer.files.measured_curves import MeasuredCurve, measured_curves
-from explorer.files.measured_file import SUFFIXES, measured_file
+from explorer.files.measured_curves import SUFFIXES, MeasuredCurve, measured_curves, measured_file
 from explorer.files.uploads import unpacked_measurement
-from explorer.viewer.buttons import on_upload
+from explorer.viewer.actions import on_upload
 from explorer.viewer.panel import POUR, Now, PageContext, Panel
-from explorer.viewer.pour.outline_nodes import OutlineNodes
-from explorer.viewer.pour.outline_svg import outline_html
+from explorer.viewer.pour.outline_drawing import OutlineNodes, outline_html
 from solver.assets import shipped_measurements
 from solver.observables.repose import Outline
 

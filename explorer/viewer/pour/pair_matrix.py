@@ -14,10 +14,10 @@ from typing import Any
 
 import viser
 
-from explorer.screen_units import InputError, checked, quantity, screen_unit, title
+from explorer.units import InputError, checked, quantity, screen_unit, title
 from explorer.viewer.actions import Post
 from explorer.viewer.pour.live_controls import HANDS_OFF, LINEAR_STEP, Apply, screen_range
-from explorer.viewer.small_text import small_html
+from explorer.viewer.style import small_html
 from solver.params import Parameter, declared
 from solver.scenes.material import Pair
 from solver.scenes.scene import Scene, value

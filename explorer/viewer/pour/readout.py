@@ -10,9 +10,9 @@ from itertools import groupby
 from explorer.live.angle_reader import LEAST_SHARE_BELOW
 from explorer.live.messages import Event, SessionState, Status
 from explorer.viewer.look.look import COMPONENT
-from explorer.viewer.palette import css
 from explorer.viewer.panel import POUR, Now, PageContext, Panel
 from explorer.viewer.scene_nodes import component_colour
+from explorer.viewer.style import css
 from solver.pours.record import Outcome, Phase
 from solver.scenes.scene import Scene
 

@@ -7,8 +7,8 @@ from typing import Any
 import viser
 
 from explorer.live.messages import Status
-from explorer.screen_units import checked, screen_unit, title
 from explorer.session import Session
+from explorer.units import checked, screen_unit, title
 from explorer.viewer.actions import Post
 from explorer.viewer.panel import POUR
 from explorer.viewer.pour.scene_bound import SceneBound

@@ -7,8 +7,8 @@ from typing import Any
 import viser
 
 from explorer.live.messages import SessionState
-from explorer.screen_units import checked
-from explorer.viewer.buttons import add_keys, button_group
+from explorer.units import checked
+from explorer.viewer.actions import add_keys, button_group
 from explorer.viewer.panel import POUR, PageContext, Panel
 from explorer.viewer.slider_hands import SliderHands
 from explorer.viewer.tour import Stop

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from explorer.errors import CommandError
-from explorer.files.mesh_uploads import funnel_source, shaped_source
+from explorer.files.uploads import funnel_source, shaped_source
 from explorer.scene.source import SceneSource, rig_source
-from explorer.viewer.buttons import on_upload
+from explorer.viewer.actions import on_upload
 from explorer.viewer.panel import POUR, Now, PageContext, Panel
-from explorer.viewer.small_text import small_html
+from explorer.viewer.style import small_html
 from solver.assets import shipped_assets
 from solver.rigs import RIGS
 from solver.scenes.scene import Scene, check

@@ -14,10 +14,10 @@ import numpy as np
 import viser
 
 from explorer.live.messages import SessionState, Status
-from explorer.scene.changes import changes
 from explorer.scene.meshes import scene_height
+from explorer.scene.source import changes
 from explorer.session import Session
-from explorer.viewer.buttons import button_group
+from explorer.viewer.actions import button_group
 from explorer.viewer.panel import POUR, Now, PageContext, Panel
 from explorer.viewer.pour.readout import OUTCOME_WORDS, STATE_WORDS, angle_of_repose_deg
 from explorer.viewer.scene_nodes import PLATE_RADIUS, SceneNodes

@@ -10,7 +10,7 @@ import viser
 
 from doe.record import RecordError
 from doe.studies.study_result import AnyStudy, StudyResult
-from explorer.background.result_file import ResultFile
+from explorer.background.output_folder import ResultFile
 from explorer.report.comparison import comparison
 from explorer.report.content import Table
 from explorer.viewer.actions import Post

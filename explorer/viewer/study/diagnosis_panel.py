@@ -1,34 +1,84 @@
-"""The diagnosis on the page: choose measured data, start, watch, pause, resume; the answer, its charts, others."""
+"""The diagnosis on the page: choose measured data, start, watch, pause, resume; the answer, its charts, others.
+
+Which effects a diagnosis asks about, and how many pours it may take for them.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Hashable
 
+import viser
+
+from doe.diagnose.budget import Budget
 from doe.record import RecordError
-from explorer.background.result_file import ResultFile
+from explorer.background.output_folder import ResultFile
 from explorer.diagnosis.process import RESULT, Question
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.files.uploads import kept_measurements
 from explorer.report.diagnosis.answer import verdict_sentence
-from explorer.report.diagnosis.charts import likely
+from explorer.report.diagnosis.charts import diagnosis_plots, likely
 from explorer.report.diagnosis.wording import chance, feature_label, feature_value, spelled
-from explorer.report.diagnosis_plots import diagnosis_plots
+from explorer.units import checked
 from explorer.viewer.panel import DIAGNOSE, SELDOM, Now, PageContext, Panel
-from explorer.viewer.study.candidates import Candidates
 from explorer.viewer.study.plot_view import PlotView
-from explorer.viewer.study.process_view import ProcessView, escaped, waiting_markdown
+from explorer.viewer.study.process_view import ProcessView, escaped, stages_markdown, waiting_markdown
 from explorer.viewer.study.result_chooser import ResultChooser
-from explorer.viewer.study.stage_table import stages_markdown
 from explorer.viewer.tour import Stop
+from solver import EFFECTS
 from solver.assets import shipped_measurements
 
+MOST = 100_000
+
+BY_ITSELF = (
+    f"As many pours as the program takes by itself: {Budget().base} of the declared model, {Budget().screening} of "
+    f"every direction of an effect, then {Budget().more} at a time of what stays in question."
+)
+
+
+class Candidates:
+    """A check box per effect, all set at first, and the number of pours; both are read when a diagnosis starts."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        gui = server.gui
+        gui.add_markdown(
+            "An effect that is not asked about can never be the answer, and another one may take its place: leave out "
+            "only what your set-up cannot have."
+        )
+        self._boxes = {
+            name: gui.add_checkbox(name.replace("_", " "), True, hint=f"What reveals it: {kind.lever}.")
+            for name, kind in EFFECTS.items()
+        }
+        self._pours = gui.add_number("Pours (0: by itself)", 0, min=0, max=MOST, step=10, hint=BY_ITSELF)
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The effects that are asked about, () for all. Raises ValueError where none is left."""
+        chosen = tuple(name for name, box in self._boxes.items() if box.value)
+        if not chosen:
+            raise ValueError("effects: none is chosen; without a candidate there is nothing to ask")
+        return () if len(chosen) == len(self._boxes) else chosen
+
+    @property
+    def budget(self) -> int | None:
+        """About so many pours before the first closer look; None: as many as the program takes by itself."""
+        pours = checked(self._pours.value, 0, MOST, "pours")
+        return round(pours) or None
+
+
 FIRST = "trefoil_2"
+
 """Chosen at first, where it is shipped: the data set of `make diagnose`."""
+
 OWN = "folder below"
+
 """Choice of the list that takes the folder in the text field."""
+
 ANSWERS = 5
+
 """Of the most probable ones, that stand beside the verdict."""
+
 PRESENT = "present or newest diagnosis"
+
 EMPTY = (
     "No charts yet: they come with the answer of a diagnosis. Choose measured data above and press *Start*, or add a "
     "folder with a finished diagnosis below."

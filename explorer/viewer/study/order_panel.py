@@ -8,15 +8,8 @@ from typing import Any
 import viser
 
 from doe.studies.study import Factor, Study
-from explorer.report.units_for_people import (
-    number,
-    observable_label,
-    parameter_label,
-    unit_of_observable,
-    unit_of_parameter,
-)
-from explorer.screen_units import checked
 from explorer.study.edit import RANGE_KEYS, StudyEdits, edited_study, listed_edits
+from explorer.units import checked, number, observable_label, parameter_label, unit_of_observable, unit_of_parameter
 from explorer.viewer.actions import Post
 from explorer.viewer.study.process_view import escaped
 from solver import parameters

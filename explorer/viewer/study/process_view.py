@@ -1,4 +1,7 @@
-"""Buttons, bar and text of a command that runs in the background; what stands in the text is the panel's own."""
+"""Buttons, bar and text of a command that runs in the background; what stands in the text is the panel's own.
+
+The stages of a command in the background as a table, and its runs without a pile, as markdown.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +11,8 @@ from collections.abc import Mapping, Sequence
 import viser
 
 from explorer.background.command_process import CommandStatus
-from explorer.viewer.actions import Action, Post
-from explorer.viewer.buttons import button_group
+from explorer.background.progress import Failure, StageProgress, failures
+from explorer.viewer.actions import Action, Post, button_group
 
 MARKDOWN_MARKS = re.compile(r"([\\`*_{}\[\]<>()#+!|~&])")
 
@@ -70,3 +73,74 @@ def waiting_markdown(waiting: Sequence[str]) -> str:
 def escaped(text: str) -> str:
     """``text`` as one line that markdown shows as it is."""
     return MARKDOWN_MARKS.sub(r"\\\1", " ".join(text.split()))
+
+
+FAILURES_SHOWN = 6
+
+DONE, AT_WORK, TO_COME = "done", "▶", "–"
+
+
+def stages_markdown(
+    status: CommandStatus, what: str, runs: str, notice: str = "", so_far: str = "", counted: str = ""
+) -> str:
+    """State, a row per stage, and failed runs; texts of the command are escaped.
+
+    Args:
+        status: how far it is.
+        what: what a run of the command is called, such as "study".
+        runs: heading of what is counted, such as "Runs".
+        notice: the page's own last message, such as a refused click.
+        so_far: what the stage at work would find if it ended now.
+        counted: what the numbers done and planned and the time left are of, where it is less than the whole.
+    """
+    state = STATE_WORDS.get(status.state, f"No {what} runs.")
+    if status.alive and status.planned:
+        part = f"{counted}: " if counted else ""
+        state += f" {part}{status.done} of {status.planned} {runs.lower()}, time left {time_left(status.eta_s)}."
+    if status.alive and not status.done and status.stage:
+        state += f" Now: {escaped(status.stage)}."
+    parts = [state]
+    parts += [escaped(text) for text in dict.fromkeys((notice, status.message)) if text]
+    if status.stages:
+        parts.append(_table(status, runs, so_far))
+    lost = failures(status.tried)
+    if lost:
+        parts.append(failures_markdown(lost))
+    return "\n\n".join(parts)
+
+
+def failures_markdown(lost: tuple[Failure, ...]) -> str:
+    """The newest runs that gave no pile, and what took their places."""
+    rows = "\n".join(
+        f"| {escaped(one.run.stage)} | {escaped(one.run.label)} | {_outcome(one)} | {one.run.seed} | {_next(one)} |"
+        for one in lost[:FAILURES_SHOWN]
+    )
+    head = f"**{len(lost)} without a valid result**" + (
+        f", the newest {FAILURES_SHOWN}:" if len(lost) > FAILURES_SHOWN else ":"
+    )
+    return f"{head}\n\n| Stage | Setting | Outcome | Seed | Next seed |\n|:--|:--|:--|--:|:--|\n{rows}"
+
+
+def _table(status: CommandStatus, runs: str, so_far: str) -> str:
+    rows = "\n".join(_row(stage, status, so_far) for stage in status.stages)
+    return f"| Stage | {runs} | | Found |\n|:--|--:|:-:|:--|\n{rows}"
+
+
+def _row(stage: StageProgress, status: CommandStatus, so_far: str) -> str:
+    over = stage.finding is not None or 0 < stage.planned <= stage.done
+    at_work = status.alive and not over and stage.name == status.stage
+    mark = DONE if over else AT_WORK if at_work else TO_COME
+    count = f"{stage.done} of {stage.planned}" if stage.planned else TO_COME
+    found = stage.finding or (f"so far: {so_far}" if at_work and so_far else "")
+    return f"| {escaped(stage.name)} | {count} | {mark} | {escaped(found)} |"
+
+
+def _outcome(one: Failure) -> str:
+    text = one.run.outcome.replace("_", " ")
+    return escaped(f"{text}: {one.run.message}" if one.run.message else text)
+
+
+def _next(one: Failure) -> str:
+    if one.replaced_by is None:
+        return "none"
+    return escaped(f"{one.replaced_by.seed}: {one.replaced_by.outcome.replace('_', ' ')}")

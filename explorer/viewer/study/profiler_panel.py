@@ -12,9 +12,10 @@ from doe.studies.study_result import AnyStudy
 from explorer.report.content import Spec
 from explorer.report.figures.model import FittedTarget, fitted_targets
 from explorer.report.figures.profiler import prediction, profiler
-from explorer.report.plot import Plot, Plots
-from explorer.report.units_for_people import (
+from explorer.report.study_charts import Plot, Plots
+from explorer.units import (
     axis_title,
+    checked,
     fixed,
     observable_label,
     observed,
@@ -22,7 +23,6 @@ from explorer.report.units_for_people import (
     unit_of_observable,
     unit_of_parameter,
 )
-from explorer.screen_units import checked
 from explorer.viewer.actions import Post
 from explorer.viewer.study.process_view import escaped
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import viser
 
-from explorer.background.result_file import checked_folder
+from explorer.background.output_folder import checked_folder
 from explorer.viewer.actions import Post
 
 MOST = 40

@@ -9,9 +9,9 @@ import viser
 from doe.runs import Run
 from doe.studies.study_result import AnyStudy
 from explorer.errors import CommandError
-from explorer.report.units_for_people import observable_label, observed, parameter_label, parameter_value
 from explorer.session import Session
 from explorer.study.runs import scene_of, settings_of, stages_with_runs
+from explorer.units import observable_label, observed, parameter_label, parameter_value
 from explorer.viewer.actions import Post
 from explorer.viewer.study.process_view import escaped
 

@@ -9,19 +9,18 @@ from doe.record import RecordError
 from doe.stages import planned_runs
 from doe.studies.study import Study, load_study
 from doe.studies.study_result import AnyStudy, PartialStudy, study_from
-from explorer.background.result_file import ResultFile
-from explorer.report.study_plots import study_plots
+from explorer.background.output_folder import ResultFile
+from explorer.report.study_charts import study_plots
 from explorer.session import Session
 from explorer.study.process import PARTIAL, RESULT
 from explorer.viewer.panel import CALIBRATE, SELDOM, Now, PageContext, Panel
 from explorer.viewer.study.comparison_panel import ComparisonPanel
 from explorer.viewer.study.order_panel import OrderPanel
 from explorer.viewer.study.plot_view import PlotView
-from explorer.viewer.study.process_view import ProcessView, escaped, waiting_markdown
+from explorer.viewer.study.process_view import ProcessView, escaped, stages_markdown, waiting_markdown
 from explorer.viewer.study.profiler_panel import ProfilerPanel
 from explorer.viewer.study.result_chooser import ResultChooser, title
 from explorer.viewer.study.run_chooser import RunChooser
-from explorer.viewer.study.stage_table import stages_markdown
 from explorer.viewer.tour import Stop
 from solver import Scene, canonical, parameters, with_values
 

@@ -1,0 +1,97 @@
+"""Names of the folders that commands in the background write into, and which of them hold a result.
+
+The JSON file that a command left in its output folder, read again only when it has changed.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from explorer.errors import CommandError
+
+STAMP = r"\d{8}-\d{6}(?:-\d+)?"
+
+"""Date, time and perhaps a number: the end of an output folder's name."""
+
+
+def new_folder(folder: Path, stem: str) -> Path:
+    """A name in ``folder``, which is made, that nobody has: ``<stem>-<date>-<time>``, with a number if need be."""
+    folder.mkdir(parents=True, exist_ok=True)
+    dated = f"{stem}-{time.strftime('%Y%m%d-%H%M%S')}"
+    names = [dated, *(f"{dated}-{k}" for k in range(2, 100))]
+    return next(folder / name for name in names if not (folder / name).exists())
+
+
+def finished(folder: Path, result: str) -> tuple[Path, ...]:
+    """Folders in ``folder`` that hold the file ``result``, newest first."""
+    found = [(file.stat().st_mtime, one) for one in folder.glob("*/") if (file := one / result).is_file()]
+    return tuple(one for _, one in sorted(found, reverse=True))
+
+
+def newest_unfinished(folder: Path, stems: Sequence[str], result: str) -> tuple[Path, str] | None:
+    """The newest of the folders ``<stem>-<date>-<time>`` that holds no file ``result``, and its stem."""
+    name = re.compile(rf"({'|'.join(map(re.escape, stems))})-({STAMP})")
+    named = [(match, one) for one in folder.glob("*/") if (match := name.fullmatch(one.name))]
+    stopped = [(match[2], match[1], one) for match, one in named if not (one / result).exists()]
+    if not stopped:
+        return None
+    _, stem, found = max(stopped)
+    return found, stem
+
+
+class ResultFile:
+    """The first of ``names`` that a folder holds."""
+
+    def __init__(self, *names: str) -> None:
+        self._names = names
+        self._stamp: tuple[Path, int, int] | None = None
+        self._content: dict[str, Any] | None = None
+
+    @property
+    def version(self) -> tuple[Path, int, int] | None:
+        """Changes whenever the content does; None where there is none."""
+        return self._stamp
+
+    def read(self, folder: Path | None) -> dict[str, Any] | None:
+        """The file's object; None where there is no folder, no file, or no whole object in it."""
+        found = None if folder is None else next((f for n in self._names if (f := folder / n).is_file()), None)
+        stamp = None
+        if found is not None:
+            try:
+                seen = found.stat()
+                stamp = (found, seen.st_mtime_ns, seen.st_size)
+                if stamp != self._stamp:
+                    self._content = _object(found)
+            except (OSError, ValueError):  # taken away or not JSON: as if it were not there
+                stamp = None
+        if stamp is None:
+            self._content = None
+        self._stamp = stamp
+        return self._content
+
+
+def checked_folder(text: str, name: str) -> Path:
+    """The folder that a person typed, which has to hold a readable file ``name``. Raises CommandError."""
+    if not text.strip():
+        raise CommandError(f"name a folder that holds {name}")
+    folder = Path(text.strip()).expanduser().absolute()
+    file = folder / name
+    if not file.is_file():
+        raise CommandError(f"{folder}: holds no {name}")
+    try:
+        _object(file)
+    except (OSError, ValueError) as error:
+        raise CommandError(f"{file}: cannot be read ({error})") from None
+    return folder
+
+
+def _object(file: Path) -> dict[str, Any]:
+    content = json.loads(file.read_text(encoding="utf-8"))
+    if not isinstance(content, dict):
+        raise ValueError("not a JSON object")
+    return content

@@ -1,0 +1,162 @@
+"""What `explorer design` says about a design: its size, aliases, and what it will be able to see.
+
+An analysed design for the terminal: the answer, then the tables behind it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from doe.analysis.models import Order, bearable, highest_order, terms_of
+from doe.analysis.power import TermPrecision, precision
+from doe.designs import factor_letters
+from doe.record import plain
+from explorer.design.factors_file import FactorsFile, region_of
+from explorer.design.plan import Plan
+from explorer.design.result import DesignResult
+from explorer.report.content import Facts, Table
+from explorer.report.design.effects import curvature, effect_table
+from explorer.report.design.model import diagnostics, fit_summary
+from explorer.report.design.sections import factor_table, in_short
+from explorer.report.design.target import settings_table, shape, target
+from explorer.report.sections.surface import anova_table
+from explorer.tables.text_table import text_table
+from explorer.units import enumeration, number
+
+
+def plan_result(plan: Plan, file: FactorsFile, sigma: float | None, effect: float | None) -> dict[str, Any]:
+    """A design as JSON types."""
+    return {
+        "design": plan.design.name,
+        "traits": list(plan.points.traits),
+        "generators": list(plan.points.generators),
+        "rows": len(plan.coded),
+        "replicates": plan.replicates,
+        "runs": len(plan.sequence),
+        "seed": plan.seed,
+        "factors": [
+            {"symbol": letter} | factor.to_dict()
+            for letter, factor in zip(factor_letters(len(file.factors)), file.factors, strict=True)
+        ],
+        "coded": plan.coded.tolist(),
+        "aliases": list(plan.points.aliases),
+        "model": planned_order(plan),
+        "power": plain(list(_power(plan, sigma, effect))),
+    }
+
+
+def plan_text(plan: Plan, file: FactorsFile, sigma: float | None, effect: float | None) -> str:
+    """A design in words and tables."""
+    letters = factor_letters(len(file.factors))
+    parts = [
+        f"{', '.join([plan.design.name, *plan.points.traits])}: {len(plan.coded)} rows × {plan.replicates} "
+        f"= {len(plan.sequence)} runs",
+        text_table(
+            ["", "factor", "low", "high", "unit"],
+            [
+                [letter, f.name, number(f.low, 6), number(f.high, 6), f.unit or "1"]
+                for letter, f in zip(letters, file.factors, strict=True)
+            ],
+        ),
+        *_beyond(plan, file),
+    ]
+    if plan.points.aliases:
+        lines = "\n".join(plan.points.aliases)
+        parts.append(f"aliases (what is on the left also holds what is on the right):\n{lines}")
+    return "\n\n".join([*parts, *plan.points.notes, _power_text(plan, sigma, effect)])
+
+
+def planned_order(plan: Plan) -> Order | None:
+    """The model that the runs will bear; None where they leave no error even for the linear one."""
+    letters = factor_letters(plan.coded.shape[1])
+    values = np.zeros((len(plan.coded), plan.replicates))
+    if plan.design.main_effects_only or not bearable(plan.coded, values, letters, terms_of(letters, "linear")):
+        return "linear" if bearable(plan.coded, values, letters, terms_of(letters, "linear")) else None
+    return highest_order(plan.coded, values, letters)
+
+
+def _power(plan: Plan, sigma: float | None, effect: float | None) -> tuple[TermPrecision, ...]:
+    order = planned_order(plan)
+    if order is None:
+        return ()
+    letters = factor_letters(plan.coded.shape[1])
+    runs = plan.coded[plan.sequence[:, 0]]
+    # Without a sigma everything is counted in it.
+    return precision(runs, letters, terms_of(letters, order), sigma or 1.0, effect or math.nan)
+
+
+def _power_text(plan: Plan, sigma: float | None, effect: float | None) -> str:
+    found = _power(plan, sigma, effect)
+    if not found:
+        return (
+            "As many effects as runs: nothing is left for the error. Effects can be held against Lenth's margin alone; "
+            "--replicates 2 or centre runs give an error."
+        )
+    unit = "the response's unit" if sigma else "units of σ, the standard deviation of one run"
+    header = ["change, low → high", "terms", "standard error", "seen with chance 0.8", "for all at once"]
+    rows = [
+        [
+            {"factor": "of a factor", "interaction": "of an interaction", "square": "curvature, centre → end"}[
+                one.kind
+            ],
+            str(one.terms),
+            *(_cell(value) for value in (one.standard_error, one.smallest, one.smallest_of_all)),
+            *([_cell(one.power)] if effect else []),
+        ]
+        for one in found
+    ]
+    table = text_table([*header, f"chance to see {number(effect)}"] if effect else header, rows)
+    return (
+        f"what the {planned_order(plan)} model will see at p < 0.05, in {unit} "
+        f"({found[0].df} degrees of freedom for the error):\n{table}"
+    )
+
+
+def _beyond(plan: Plan, file: FactorsFile) -> list[str]:
+    """A sentence about runs beyond low … high, which a laboratory may not be able to make."""
+    if np.abs(plan.coded).max() <= 1 + 1e-9:
+        return []
+    natural = region_of(file.factors).natural(plan.coded)
+    ends = [
+        f"{factor.name} {number(low, 6)} … {number(high, 6)}"
+        for factor, low, high in zip(file.factors, natural.min(axis=0), natural.max(axis=0), strict=True)
+    ]
+    return [f"The axial runs go beyond low … high: {enumeration(ends)}. --alpha inscribed keeps them within."]
+
+
+def _cell(value: float) -> str:
+    return number(value)
+
+
+def analysis_text(result: DesignResult) -> str:
+    """All tables of the report that fit a terminal, without the charts."""
+    parts = [_table(factor_table(result))]
+    found, effects = result.analysis, result.effects
+    if effects is not None:
+        parts.append(_table(effect_table(effects)))
+        if effects.curvature is not None:
+            parts.append(curvature(effects.curvature, effects.response))
+    if found.model is not None:
+        parts += [_table(fit_summary(found)), _table(anova_table(found.model.anova))]
+    told: set[str] = set()
+    for section in (in_short(result), diagnostics(result), shape(result), target(result)):
+        if section is not None:
+            facts = [pair for block in section.blocks if isinstance(block, Facts) for pair in block.pairs]
+            # The answer stands first and again under its own heading in a report; a terminal needs it once.
+            parts.append("\n".join(f"{what}: {words}" for what, words in facts if words not in told))
+            told |= {words for _, words in facts}
+    if result.optimum is not None:
+        settings = settings_table(result, result.optimum)
+        parts.append(f"{_table(settings)}\n{settings.caption}")
+    parts += [f"note: {note}" for note in found.notes]
+    if found.model is not None:
+        parts += [f"note: {note}" for note in found.model.anova.notes]
+    return "\n\n".join(part for part in parts if part)
+
+
+def _table(table: Table) -> str:
+    # Typographic minus signs are no numbers to a terminal's columns.
+    return text_table(table.header, [[cell.replace("−", "-").replace("–", "-") for cell in row] for row in table.rows])

@@ -1,0 +1,139 @@
+"""The charts that a study's result, or what there is of it so far, has something for.
+
+A chart that a person can choose by its title, drawn when it is chosen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from itertools import combinations
+
+from doe.analysis.screening import ErrorSource
+from doe.stages.screening import ScreeningResult
+from doe.stages.surface import OptimumResult
+from doe.studies.study_result import AnyStudy
+from explorer.report.content import Spec
+from explorer.report.figures.effects import all_effects, errors_at_hand, half_normal, main_effects, pareto_against
+from explorer.report.figures.model import FittedTarget, fitted_targets
+from explorer.report.figures.noise import noise_of_estimators
+from explorer.report.figures.optimum import cloud, ranges
+from explorer.report.figures.style import short_rows, stacked
+from explorer.report.figures.surface import contours, fit, height_over, residual_quantiles, solutions
+from explorer.report.figures.verification import verification
+from explorer.report.figures.walks import ascent_path, scan
+from explorer.report.identified import cloud_caution
+from explorer.units import observable_label
+
+
+@dataclass(frozen=True)
+class Plot:
+    """``make`` gives the chart, ``caption`` what its marks mean, ``aspect`` its height by its width."""
+
+    make: Callable[[], Spec | None]
+    caption: str
+    aspect: float = 0.85
+
+
+Plots = dict[str, Plot]
+
+"""Title → plot, in the order of the list to choose from."""
+
+Named = Iterator[tuple[str, Plot]]
+
+
+def study_plots(result: AnyStudy) -> Plots:
+    """Title → plot of every stage that is there, in the order of the stages."""
+    makers = (_pilot, _screening, _scan, _ascent, _surface, _optimum, _verification)
+    return {title: plot for plots in makers for title, plot in plots(result)}
+
+
+def _pilot(result: AnyStudy) -> Named:
+    pilot = result.pilot
+    if pilot is None:
+        return
+    caption = "Whiskers: 95 % intervals; bias: its range over the ways to fill a cone with bodies."
+    yield "Noise of the estimators", Plot(lambda: short_rows(stacked(noise_of_estimators(pilot))), caption, 1.7)
+
+
+def _screening(result: AnyStudy) -> Named:
+    part = result.screening
+    if part is None:
+        return
+    for error in errors_at_hand(part.analysis):
+        caption = "Dashed: limit for one factor (t, 95 %); solid: for all factors at once (Bonferroni). Grey: dummies."
+        yield f"Pareto of effects, by {error}", Plot(partial(_pareto, part, error), caption, 1.5)
+    if any(math.isfinite(effect.effect) for effect in part.analysis.effects):
+        caption = "Effects of pure noise lie on a line through zero; Lenth's margins, 95 %."
+        yield "Half-normal", Plot(partial(half_normal, part), caption)
+        yield "Main effects", Plot(partial(main_effects, part), "The largest ones; whiskers: 95 %; dotted: mean.", 1.1)
+        # The chart of all effects shows the assumptions beside them once they are there.
+        caption = "Low → high, each over its own range, 95 % intervals; hollow: too few bodies to be tested."
+        yield "Effects with intervals", Plot(lambda: short_rows(all_effects(part, result.assumptions)), caption, 1.6)
+
+
+def _scan(result: AnyStudy) -> Named:
+    if result.scan is not None:
+        caption = "Band: the target and its margin of equivalence."
+        yield "Scan of an assumption", Plot(partial(scan, result.scan, result.study.targets[0]), caption)
+
+
+def _ascent(result: AnyStudy) -> Named:
+    if result.ascent is not None:
+        caption = "Band: the target and its margin of equivalence; dotted: what the screening predicted."
+        yield "Ascent path", Plot(partial(ascent_path, result.ascent, result.study.targets[0]), caption)
+
+
+def _surface(result: AnyStudy) -> Named:
+    for fitted, of in zip(fitted_targets(result), _of_targets(result), strict=False):
+        yield from surface_plots(fitted, of)
+
+
+def surface_plots(fitted: FittedTarget, of: str = "") -> Named:
+    """Title → plot of a response surface; ``of`` ends the titles."""
+    names = [factor.name for factor in fitted.factors]
+    caption = "The others at the optimum, or the middle before there is one. Thick line: model = target."
+    yield f"Contours{of}", Plot(lambda: stacked(contours(fitted)), caption, 2.2)
+    for i, j in combinations(range(len(names)), 2):
+        caption = "Observed pours are drawn at their own height, whatever the other factor was."
+        title = f"Surface in 3-D, {names[i]} and {names[j]}{of}"
+        yield title, Plot(partial(height_over, fitted, (i, j)), caption, 0.95)
+    caption = "Points on the line: the model gives what was poured. Below: what is left, in its own spread."
+    yield f"Predicted and observed{of}", Plot(lambda: stacked(fit(fitted)), caption, 1.5)
+    caption = "Residuals of a right model with normal noise lie on the line."
+    yield f"Residual quantiles{of}", Plot(partial(residual_quantiles, fitted), caption)
+    if len(names) == 3:
+        caption = "Every setting on the green sheet gives the target: one angle cannot fix three factors."
+        yield f"Solution surface{of}", Plot(partial(solutions, fitted), caption, 0.95)
+
+
+def _optimum(result: AnyStudy) -> Named:
+    if result.optimum is not None:
+        yield from optimum_plots(fitted_targets(result)[0], result.optimum)
+
+
+def optimum_plots(fitted: FittedTarget, optimum: OptimumResult) -> Named:
+    """Title → plot of how well the optimum of a surface is known."""
+    caption = f"Each dot: the point chosen from one resampling. {cloud_caution(optimum)}".rstrip()
+    yield "Optimum and its refits", Plot(lambda: stacked(cloud(fitted)), caption, 2.0)
+    caption = "Shares of the screened ranges."
+    yield "Ranges of the optimum", Plot(lambda: short_rows(ranges(fitted)), caption, 0.9)
+
+
+def _verification(result: AnyStudy) -> Named:
+    if result.verification is not None:
+        for index, of in enumerate(_of_targets(result)):
+            caption = "Band: the margin of equivalence around the measured mean."
+            yield f"Verification{of}", Plot(partial(verification, result.verification, index), caption)
+
+
+def _pareto(screening: ScreeningResult, error: ErrorSource) -> Spec:
+    return short_rows(pareto_against(screening, [error]))
+
+
+def _of_targets(result: AnyStudy) -> list[str]:
+    """Ends of titles: the name of every target where there are several."""
+    targets = result.study.targets
+    return [""] if len(targets) == 1 else [f": {observable_label(target.observable)}" for target in targets]

@@ -1,0 +1,261 @@
+"""Units as a person reads them: a value in SI and its parameter → the number and unit on the screen, and back.
+
+Numbers, units and names as a person reads them: SI inside a result, MPa, mm, g/s and ° in a report.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+from solver import load_material, parameters
+from solver.observables import OBSERVABLES
+from solver.params import UNITS, Parameter
+
+SCREEN_UNIT = {"Pa": "MPa", "m": "mm", "kg": "g", "kg/s": "g/s"}
+
+"""What is shown instead of the SI unit."""
+
+DECIMALS = {"mm": 1, "g": 1, "g/s": 1}
+
+
+class InputError(ValueError):
+    """A number from the page that cannot be used; one line, fit for a user."""
+
+
+@dataclass(frozen=True)
+class ScreenUnit:
+    """Unit on the screen, and its size in SI."""
+
+    name: str
+    factor: float
+
+    def to_screen(self, value: float) -> float:
+        """SI → screen, to six digits: what a number box shows."""
+        return float(f"{value / self.factor:.6g}")
+
+    def to_si(self, number: float) -> float:
+        """Screen → SI."""
+        return number * self.factor
+
+
+def screen_unit(parameter: Parameter) -> ScreenUnit:
+    """Unit in which ``parameter`` is shown; empty for a plain number."""
+    name = SCREEN_UNIT.get(parameter.unit, "" if parameter.unit == "1" else parameter.unit)
+    return ScreenUnit(name, UNITS.get(parameter.unit, {}).get(name, 1.0))
+
+
+def title(parameter: Parameter) -> str:
+    """Name of a parameter for a label: last part of its path, with the unit on the screen."""
+    words = parameter.path.split(".")[-1].replace("_", " ").capitalize()
+    unit = screen_unit(parameter).name
+    return f"{words} [{unit}]" if unit else words
+
+
+def checked(number: object, low: float, high: float, name: str) -> float:
+    """A number that came from a browser, within ``low`` … ``high``.
+
+    viser checks nothing on the server: anything can arrive here. A number outside the range is taken as its
+    end; what is no finite number raises InputError.
+    """
+    if isinstance(number, bool) or not isinstance(number, (int, float)) or not math.isfinite(number):
+        raise InputError(f"{name}: {str(number)[:40]!r} is not a finite number")
+    return min(max(float(number), low), high)
+
+
+def quantity(value: float, unit: str) -> str:
+    """Short text of a value in SI with the unit of the screen, e.g. 0.03, "kg" → "30 g"."""
+    name = SCREEN_UNIT.get(unit, "" if unit == "1" else unit)
+    factor = UNITS.get(unit, {}).get(name, 1.0)
+    if not math.isfinite(value):
+        return "–"
+    return f"{value / factor:.4g} {name}".strip()
+
+
+MISSING = "–"
+
+"""What stands for a number that could not be computed."""
+
+SYMBOLS = {"deg": "°", "kg/m3": "kg/m³", "m/s2": "m/s²", "kJ/m3": "kJ/m³", "mJ/m2": "mJ/m²", "1": ""}
+
+READING_UNIT = SCREEN_UNIT | {"J/m3": "kJ/m3", "J/m2": "mJ/m2", "N/m": "mN/m"}
+
+"""What is written instead of the SI unit."""
+
+OWN = "own:"
+
+"""Beginning of the path of a quantity that no scene declares: "own:NAME [UNIT]", its values in that unit already."""
+
+
+@dataclass(frozen=True)
+class ReadingUnit:
+    """A unit for people: its symbol and its size in SI."""
+
+    symbol: str
+    size: float
+
+    def of(self, value: float) -> float:
+        """SI → this unit."""
+        return value / self.size
+
+    def attach(self, text: str) -> str:
+        """``text`` with the symbol behind it; a degree sign takes no blank."""
+        if text == MISSING or not self.symbol:
+            return text
+        return f"{text}{self.symbol}" if self.symbol == "°" else f"{text} {self.symbol}"
+
+
+@cache
+def parameter_units() -> dict[str, str]:
+    """Last part of a parameter's path → its SI unit, as the solver declares it."""
+    declared = parameters(load_material("sunflower_extract"))
+    return {path.rsplit(".", 1)[-1]: parameter.unit for path, parameter in declared.items()}
+
+
+def own_path(name: str, unit: str) -> str:
+    """Path of a quantity of someone's own, read in ``unit``; "" for a plain number."""
+    return f"{OWN}{name} [{unit}]"
+
+
+def unit_of_parameter(path: str) -> ReadingUnit:
+    """Unit in which the parameter ``path`` is read; without symbol for a plain number."""
+    if path.startswith(OWN):
+        return ReadingUnit(_own(path)[1], 1.0)
+    return reading_unit(parameter_units().get(path.rsplit(".", 1)[-1], "1"))
+
+
+def unit_of_observable(name: str) -> ReadingUnit:
+    """Unit in which the observable ``name`` is read."""
+    if name.startswith(OWN):
+        return ReadingUnit(_own(name)[1], 1.0)
+    return reading_unit(OBSERVABLES[name].unit if name in OBSERVABLES else "1")
+
+
+def parameter_value(path: str, value: float | str | None) -> str:
+    """A parameter's value with its unit, e.g. 5.63e7 → "56.3 MPa"; a named choice stays as it is."""
+    if isinstance(value, str):
+        return value
+    unit = unit_of_parameter(path)
+    return unit.attach(number(None if value is None else unit.of(value), 4))
+
+
+def parameter_range(path: str, low: float | str | None, high: float | str | None) -> str:
+    """Two values with one unit, e.g. "40.1 … 70.5 MPa"."""
+    if isinstance(low, str) or isinstance(high, str):
+        return f"{low} … {high}"
+    if low is None or high is None or not (math.isfinite(low) and math.isfinite(high)):
+        return MISSING
+    unit = unit_of_parameter(path)
+    return unit.attach(f"{number(unit.of(low), 4)} … {number(unit.of(high), 4)}")
+
+
+def observed(name: str, value: float | None) -> str:
+    """A value of an observable with its unit, e.g. "24.68°"."""
+    unit = unit_of_observable(name)
+    return unit.attach(fixed(None if value is None else unit.of(value)))
+
+
+def parameter_label(path: str) -> str:
+    """Words for a path, e.g. "pair.seed.seed.static_friction" → "static friction seed–seed"."""
+    if path.startswith(OWN):
+        return _own(path)[0]
+    kind, *names, last = path.split(".")
+    words = last.replace("_", " ")
+    if kind == "pair":
+        return f"{words} {'–'.join(name.replace('_', ' ') for name in names)}"
+    if kind in {"material", "body"} and names:
+        return f"{words} {names[0].replace('_', ' ')}"
+    return f"insertion {words}" if kind == "insertion" else words
+
+
+def axis_title(path: str, name: str) -> str:
+    """Title of an axis over the parameter ``path`` of the factor ``name``."""
+    unit = unit_of_parameter(path).symbol
+    return f"{name}: {parameter_label(path)}" + (f" [{unit}]" if unit else "")
+
+
+def observable_label(name: str) -> str:
+    """Words for an observable."""
+    if name.startswith(OWN):
+        return _own(name)[0]
+    known = OBSERVABLES.get(name)
+    return (known.label if known else "") or name.replace("_", " ")
+
+
+def observable_title(name: str) -> str:
+    """Title of an axis over an observable."""
+    unit = unit_of_observable(name).symbol
+    return observable_label(name) + (f" [{unit}]" if unit else "")
+
+
+def _own(path: str) -> tuple[str, str]:
+    """Words and unit of a quantity of someone's own."""
+    name, _, unit = path.removeprefix(OWN).rpartition(" [")
+    return name.replace("_", " "), unit.removesuffix("]")
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """``digits`` significant digits, without exponent between 1e-4 and 1e6."""
+    if value is None or not math.isfinite(value):
+        return MISSING
+    rounded = float(f"{value:.{digits}g}")
+    if rounded == 0 or 1e-4 <= abs(rounded) < 1e6:
+        decimals = 0 if rounded == 0 else max(0, digits - 1 - math.floor(math.log10(abs(rounded))))
+        text = f"{rounded:.{decimals}f}"
+        text = text.rstrip("0").rstrip(".") if "." in text else text
+    else:
+        text = f"{rounded:.{digits - 1}e}"
+    return text.replace("-", "−")
+
+
+def fixed(value: float | None, decimals: int = 2) -> str:
+    """A number with ``decimals`` places."""
+    if value is None or not math.isfinite(value):
+        return MISSING
+    return f"{value:.{decimals}f}".replace("-", "−")
+
+
+def signed(value: float | None, decimals: int = 2) -> str:
+    """A number with its sign and ``decimals`` places."""
+    if value is None or not math.isfinite(value):
+        return MISSING
+    return f"{value:+.{decimals}f}".replace("-", "−")
+
+
+def p_value(p: float | None) -> str:
+    """A probability with four places; smaller ones as "<0.0001"."""
+    if p is None or not math.isfinite(p):
+        return MISSING
+    return "<0.0001" if p < 1e-4 else f"{p:.4f}"
+
+
+def percent(share: float | None, decimals: int = 0) -> str:
+    """A share as a percentage."""
+    return MISSING if share is None or not math.isfinite(share) else f"{fixed(100 * share, decimals)} %"
+
+
+def duration(seconds: float | None) -> str:
+    """A duration in s below two minutes, else in min."""
+    if seconds is None or not math.isfinite(seconds):
+        return MISSING
+    return f"{number(seconds)} s" if seconds < 120 else f"{fixed(seconds / 60, 1)} min"
+
+
+def code(text: str) -> str:
+    """A code span; backticks inside would end it and become apostrophes."""
+    return "`" + text.replace("`", "'") + "`"
+
+
+def enumeration(items: Sequence[str]) -> str:
+    """ "a", "a and b", "a, b and c"; "none" for an empty list."""
+    if not items:
+        return "none"
+    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
+
+
+def reading_unit(si: str) -> ReadingUnit:
+    """Unit in which a number in the SI unit ``si`` is read."""
+    name = READING_UNIT.get(si, si)
+    return ReadingUnit(SYMBOLS.get(name, name), UNITS.get(si, {}).get(name, 1.0))

@@ -1,0 +1,79 @@
+"""A place for one file: a shipped example by name, or what a browser sent in its stead.
+
+Numbers that a person enters, or leaves out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import viser
+
+from explorer.errors import CommandError
+from explorer.files.uploads import kept_file
+from explorer.viewer.actions import Post, on_upload
+
+
+class UploadSlot:
+    """A list of examples, to which every upload is added and chosen. ``folder`` keeps what was sent."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        label: str,
+        examples: Sequence[str],
+        suffixes: Sequence[str],
+        folder: Path,
+        post: Post,
+        hint: str,
+    ) -> None:
+        self._suffixes, self._folder = tuple(suffixes), folder
+        self._sent: dict[str, Path] = {}
+        self._examples = tuple(examples)
+        self._choice = server.gui.add_dropdown(label, self._examples, hint=hint)
+        self.upload = server.gui.add_upload_button(
+            f"Upload: {label.lower()}", mime_type=",".join(suffixes), hint=f"A file ending in {', '.join(suffixes)}."
+        )
+
+        on_upload(self.upload, self._take, post)
+
+    @property
+    def chosen(self) -> str:
+        """The name of an example, or the path of a file that was sent."""
+        value = str(self._choice.value)
+        return str(self._sent.get(value, value))
+
+    def offer(self, examples: Sequence[str]) -> None:
+        """Other examples than before; the first is chosen unless a file that was sent is."""
+        self._examples = tuple(examples)
+        self._list(str(self._choice.value) if self._choice.value in self._sent else self._examples[0])
+
+    def _take(self, name: str, content: bytes) -> None:
+        path = kept_file(name, content, self._folder, self._suffixes)
+        self._sent[path.name] = path
+        self._list(path.name)
+
+    def _list(self, chosen: str) -> None:
+        self._choice.options = (*self._examples, *self._sent)
+        self._choice.value = chosen  # type: ignore[misc]
+
+
+def positive(entered: object) -> float | None:
+    """A number above zero; None for 0, which stands for none, and for what is no number."""
+    number = float(entered) if isinstance(entered, int | float) else math.nan
+    return number if math.isfinite(number) and number > 0.0 else None
+
+
+def number_or_none(text: str, what: str) -> float | None:
+    """A number that a person typed, None for nothing; CommandError for anything else."""
+    if not text.strip():
+        return None
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise CommandError(f"{what} {text.strip()[:40]!r}: allowed is a number, or nothing")
+    return number

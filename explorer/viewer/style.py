@@ -1,0 +1,146 @@
+"""Colours of the page. Those of bodies and of lines begin with Okabe & Ito (2008).
+
+Their seven are nearer to each other than one would like (two of them 16 in CIELAB for tritanopes), and two are too pale
+for lines on white. They are moved as little as it takes: any two are told apart with every common form of colour
+blindness, and lines are seen on a light and on a dark page (a test holds both).
+
+Text below a control: smaller than its label, and in line with it.
+
+Dark or light, for the page as a whole: viser's own parts, and the charts, which follow no theme by themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import viser
+
+from explorer.viewer.actions import Post
+
+Colour = tuple[int, int, int]
+
+BODY_COLOURS: tuple[Colour, ...] = (
+    (234, 151, 0),  # orange
+    (65, 197, 255),  # sky blue
+    (39, 154, 107),  # bluish green
+    (255, 245, 79),  # yellow
+    (197, 122, 170),  # reddish purple
+    (197, 83, 0),  # vermilion
+    (16, 91, 151),  # blue
+)
+
+GLASS: Colour = (190, 210, 225)
+
+RIM: Colour = (150, 170, 185)
+
+PLATE: Colour = (74, 82, 92)
+
+RING: Colour = (110, 122, 135)
+
+BRAND: Colour = (86, 150, 200)
+
+VIRIDIS: tuple[Colour, ...] = (
+    (68, 1, 84),
+    (72, 40, 120),
+    (62, 73, 137),
+    (49, 104, 142),
+    (38, 130, 142),
+    (31, 158, 137),
+    (53, 183, 121),
+    (110, 206, 88),
+    (181, 222, 43),
+    (253, 231, 37),
+)
+
+"""Ten even steps of viridis (van der Walt & Smith 2015): its lightness alone tells the order."""
+
+SELECTED: Colour = (255, 255, 255)
+
+CHAINS: tuple[Colour, ...] = ((150, 190, 230), (240, 228, 66), (213, 94, 0))
+
+"""Lines of weak, middling and strong contacts; their thickness tells them apart as well."""
+
+SRGB_GAMMA = 2.2
+
+FLANK: Colour = (220, 140, 2)
+
+MEASURED: Colour = (182, 119, 160)
+
+ANGLE_LINE = "rgb(220, 140, 2)"
+
+ANGLE_SPREAD_LINE = "rgba(220, 140, 2, 0.45)"
+
+ANGLE_SPREAD_BAND = "rgba(220, 140, 2, 0.18)"
+
+MASS_LINE = "rgb(46, 166, 234)"
+
+ENERGY_LINE = "rgb(182, 119, 160)"
+
+CONTACTS_LINE = "rgb(3, 120, 79)"
+
+MARK_LINE = "rgb(178, 66, 0)"
+
+AXIS_TEXT = "#9aa4ae"
+
+GRID_LINE = "rgba(160, 170, 180, 0.15)"
+
+
+def linear(colour: Colour) -> Colour:
+    """The colour as viser 1.1.1 wants it for batched meshes: it takes those numbers as linear light, not as sRGB."""
+    red, green, blue = (round(255.0 * (channel / 255.0) ** SRGB_GAMMA) for channel in colour)
+    return red, green, blue
+
+
+def css(colour: Colour) -> str:
+    """The colour as CSS writes it."""
+    return f"rgb({colour[0]}, {colour[1]}, {colour[2]})"
+
+
+def linear_all(colours: npt.NDArray[np.float64]) -> npt.NDArray[np.uint8]:
+    """:func:`linear` of many colours, shape (n, 3)."""
+    return np.rint(255.0 * (colours / 255.0) ** SRGB_GAMMA).astype(np.uint8)
+
+
+def mapped(share: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Colours of viridis (0 … 255, sRGB) for shares of a range, 0 … 1 (what is beyond has its end), shape (n, 3)."""
+    stops = np.linspace(0.0, 1.0, len(VIRIDIS))
+    channels = np.array(VIRIDIS, dtype=float).T
+    return np.column_stack([np.interp(share, stops, channel) for channel in channels])
+
+
+def small_html(contents: str) -> str:
+    """``contents`` (HTML) in the size and margin of such a text; long words are broken."""
+    return f"<div style='padding:0 0.75em; font-size:0.8em; overflow-wrap:anywhere'>{contents}</div>"
+
+
+DARK = True
+
+"""How the page begins."""
+
+
+def apply_theme(server: viser.ViserServer, dark: bool) -> None:
+    """Set viser's theme."""
+    server.gui.configure_theme(
+        dark_mode=dark, show_share_button=False, show_logo=False, brand_color=BRAND, control_width="large"
+    )
+
+
+class ThemeSwitch:
+    """A switch for all browsers; ``follow`` is called with True for dark."""
+
+    def __init__(self, server: viser.ViserServer, post: Post, follow: Callable[[bool], None]) -> None:
+        self._server, self._follow = server, follow
+        self._dark = server.gui.add_checkbox("Dark page", DARK, hint="Dark or light, charts included.")
+
+        @self._dark.on_update
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None:
+                post(self._switch)
+
+    def _switch(self) -> None:
+        dark = self._dark.value is True  # what a browser sent may be anything
+        apply_theme(self._server, dark)
+        self._follow(dark)
