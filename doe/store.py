@@ -1,8 +1,8 @@
 """The store: every pour that finished, kept raw in one SQLite file and found again by what was poured.
 
-A pour is kept once and for all under the key of what decides its bits (`solver.pours.pour_key`). What is read off it, its
-outcome, its observables and the summaries of a diagnosis, is kept beside it with the version of the readings, and read
-anew from the raw pour where that version has changed or a name is missing: a new observable costs no pour.
+A pour is kept once and for all under the key of what decides its bits (`solver.pours.pour_key`). What is read off it,
+its outcome, its observables and the summaries of a diagnosis, is kept beside it with the version of the readings, and
+read anew from the raw pour where that version has changed or a name is missing: a new observable costs no pour.
 
 A file belongs to one version of the physics. One of an older version stays readable; nothing is poured into it.
 """

@@ -35,7 +35,7 @@ from solver.pours.raw_pour import RawPourError, packed, unpacked
 from solver.pours.record import Bodies, Entries, Outcome, Phase, Pile, Record, Spheres, Trace
 from solver.rigs import RIGS
 from solver.scenes.body import Body, Members
-from solver.scenes.material_file import is_material, load_material
+from solver.scenes.material_file import is_material, load_material, with_set_up, with_settings
 from solver.scenes.scene import (
     Scene,
     body_counts,
@@ -47,7 +47,6 @@ from solver.scenes.scene import (
     with_rig,
     with_values,
 )
-from solver.scenes.set_up import with_set_up, with_settings
 from solver.shapes.clump_error import ClumpFit
 from solver.toml_table import read_toml
 from solver.version import PHYSICS

@@ -21,8 +21,8 @@ import numpy as np
 import numpy.typing as npt
 
 from solver import backend
-from solver.engine.layout import layout
 from solver.engine.state import Capacity
+from solver.engine.tables import layout
 from solver.engine.world import SUMMARY_COLUMNS, Batch
 from solver.pours.pour import Pour
 from solver.pours.record import Outcome

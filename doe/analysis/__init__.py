@@ -1,1 +1,1 @@
-"""What may be concluded from runs: effects, surfaces, optima, t tests and power. Statistics only: no solver, no files."""
+"""What may be concluded from runs: effects, surfaces, optima, t tests, power. Statistics only: no solver, no files."""

@@ -6,8 +6,8 @@ Source: Cohen 1988, Statistical Power Analysis, ch. 2; computed by statsmodels.
 
 What a design can see before it is run: the smallest effect per kind of term, at a given scatter of one run.
 
-Notation as in `doe.analysis.power`. The change of the response is counted from low to high for a factor and for an interaction
-(2 b), from the centre to the ends for a square (b). SE = sigma sqrt([(X'X)^-1]_jj), times two for 2 b.
+Notation as in `doe.analysis.power`. The change of the response is counted from low to high for a factor and for an
+interaction (2 b), from the centre to the ends for a square (b). SE = sigma sqrt([(X'X)^-1]_jj), times two for 2 b.
 """
 
 from __future__ import annotations

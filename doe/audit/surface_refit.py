@@ -96,7 +96,7 @@ def coefficient_slack(study: SurfaceStudy, equation: Equation, coded: FloatArray
 
 
 def source_name(text: str, factors: tuple[str, ...]) -> str:
-    """The source of a printed line as `doe.analysis.surface_anova` names it: "X1X2", "X1 × X2" → "X1*X2"; "X1²" → "X1^2"."""
+    """The source of a printed line as our own table names it: "X1X2", "X1 × X2" → "X1*X2"; "X1²" → "X1^2"."""
     plain = text.strip().replace("²", "^2")
     known = {name: name for name in term_names(factors)[1:]}
     for a, b in combinations(factors, 2):

@@ -26,8 +26,7 @@ from collections.abc import Callable
 
 from scipy.optimize import brentq
 
-from doe.laboratory.derive import derived, no_parameter, per_row
-from doe.laboratory.result import Derived
+from doe.laboratory.result import Derived, derived, no_parameter, per_row
 from doe.laboratory.tables import Row, Table
 
 GRAVITY = 9.81

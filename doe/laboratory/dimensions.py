@@ -19,8 +19,7 @@ from collections.abc import Callable
 
 from scipy import stats
 
-from doe.laboratory.derive import no_parameter, per_row
-from doe.laboratory.result import Derived, Estimate
+from doe.laboratory.result import Derived, Estimate, no_parameter, per_row
 from doe.laboratory.tables import Row, Table
 
 SHAPES = (

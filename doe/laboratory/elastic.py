@@ -16,9 +16,8 @@ import math
 from scipy import stats
 
 from doe.errors import StatisticsError
-from doe.laboratory.derive import derived
 from doe.laboratory.linear_range import FEWEST_POINTS, linear_range
-from doe.laboratory.result import CurveFit, Derived, Estimate
+from doe.laboratory.result import CurveFit, Derived, Estimate, derived
 from doe.laboratory.tables import Row, Table
 
 MODULI = {"compression": ("youngs_modulus", "E = (F/A)/(ΔL/T)"), "shear": ("shear_modulus", "G = (F/A)/(ΔL/T)")}

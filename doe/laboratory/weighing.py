@@ -14,8 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from doe.laboratory.derive import derived, no_parameter, per_row
-from doe.laboratory.result import Derived
+from doe.laboratory.result import Derived, derived, no_parameter, per_row
 from doe.laboratory.tables import LaboratoryError, Row, Table
 
 FRACTIONS = "the fractions of a sample add up to one, so that their errors hang together"

@@ -17,8 +17,10 @@ from dataclasses import dataclass, replace
 from doe.analysis.pilot import (
     BIAS_LIMIT_DEG,
     EqualVariance,
+    EstimatorChoice,
     Noise,
     Resolution,
+    choose_estimator,
     equal_variance,
     replicate_noise,
     resolution,
@@ -32,7 +34,6 @@ from doe.analysis.power import (
     smallest_linear_effect,
     smallest_main_effect,
 )
-from doe.analysis.separation import EstimatorChoice, choose_estimator
 from doe.designs import ChosenDesign
 from doe.errors import StatisticsError
 from doe.record import Record

@@ -3,33 +3,251 @@
 A set takes ``REPLICATES`` pours per condition and is judged twice, by its table of numbers alone and with its scans.
 The pours that teach belong to the declared model, so that sets share them through the store. Two processes with
 ``--shard 1/2`` and ``--shard 2/2`` work on one campaign.
+
+From cases to rows: truths are drawn, poured, judged with and without scans, and tried on what was held out.
 """
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
 
 from doe.declared.model import declare
-from doe.declared.pours import ModelPours
+from doe.declared.points import Point
+from doe.declared.pours import ModelPours, room_of
 from doe.diagnose.budget import Budget
-from doe.measurement.features import SCALARS, feature_set
+from doe.diagnose.diagnosis import concluded, errors_of, joined, pursued, suggested
+from doe.diagnose.menu import as_suggested
+from doe.diagnose.result import Suggestion
+from doe.diagnose.teaching import Teacher
+from doe.diagnose.verdict import verdict_of
+from doe.measurement import Condition, Measurement, load_measurement
+from doe.measurement.features import SCALARS, SCAN, feature_set
 from doe.store import Store, default_store
-from doe.validation.answers import Answers
-from doe.validation.laboratory import TREFOILS, Laboratory, read_laboratory
+from doe.validation.laboratory import TREFOILS, Laboratory, Sample, read_laboratory
 from doe.validation.limit import limit_study
 from doe.validation.outside import AMPLITUDE, DEVELOPMENT, possible
 from doe.validation.reference import ROOT as REFERENCE_ROOT
 from doe.validation.reference import extended_to, kept
-from doe.validation.sets import Row, append_rows, read_rows
-from doe.validation.truth import Case, Strengths, cases, strengths_of
-from doe.validation.work_place import OutOfTimeError, WorkPlace
+from doe.validation.scanner import Scanner
+from doe.validation.sets import NONE, OUT_OF_REACH, Row, append_rows, read_rows
+from doe.validation.truth import REPLICATES, ROOT, Case, Strengths, Truth, cases, strengths_of, truth_of
+from doe.validation.work_place import Order, OutOfTimeError, WorkPlace, complete
 from solver import EFFECTS, PHYSICS
 
+TRIES = 3
+
+"""Times that a laboratory pours ``REPLICATES`` more to replace pours that jammed."""
+
+OFFERS = (SCALARS, SCAN)
+
+"""Kinds of data by which every set is judged."""
+
+NAN = float("nan")
+
+Data = dict[str, list[Sample]]
+
+"""Pours per condition."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """The row of a data set, and what to measure next where the answer is ambiguous."""
+
+    row: Row
+    suggestion: Suggestion | None
+
+
+@dataclass(frozen=True, eq=False)
+class Answers:
+    """The laboratory, what its truths are made of, and where the work is done."""
+
+    laboratory: Laboratory
+    strengths: Strengths
+    place: WorkPlace
+    budget: Budget
+    follow_up: bool = True
+    """Whether an ambiguous answer is followed up."""
+
+    @property
+    def measurement(self) -> Measurement:
+        """The declared model."""
+        return self.laboratory.declared
+
+    def rows(self, case: Case) -> list[Row]:
+        """Rows of ``case``, one for each kind of data."""
+        began = time.monotonic()
+        truth = truth_of(case, self.strengths)
+        data = self.measured(truth, self.measurement.conditions)
+        if data is None:
+            return [self.out_of_reach(truth, offer) for offer in OFFERS]
+        poured = (time.monotonic() - began) / len(OFFERS)
+        rows = []
+        for offer in OFFERS:
+            began = time.monotonic()
+            rows.append(self.judged(truth, data, offer))
+            rows[-1] = replace(rows[-1], seconds=poured + time.monotonic() - began)
+        return rows
+
+    def judged(self, truth: Truth, data: Data, offer: str) -> Row:
+        """The row of a data set that is written to a folder and read like any other, with a follow-up if one is due."""
+        seed = (ROOT, *truth.case.seed)
+        rng = np.random.default_rng([*seed, 1])
+        scanner = Scanner.drawn(rng, self.laboratory.scanner) if offer == SCAN else None
+        with TemporaryDirectory() as folder:
+            self.laboratory.hand_out(Path(folder), data, scanner, seed)
+            measurement = load_measurement(Path(folder))
+            first = self.judged_data(measurement, truth, offer)
+            if first.suggestion is None:
+                return first.row
+            found = self.followed_up(truth, first.suggestion, scanner)
+            if found is None:
+                return first.row
+            last = self.judged_data(measurement, truth, offer, found)
+        return replace(
+            last.row,
+            first=first.row.verdict,
+            follow_up=first.suggestion.experiment.name,
+            pours=first.row.pours + last.row.pours,
+        )
+
+    def judged_data(
+        self, measurement: Measurement, truth: Truth, offer: str, follow_up: Measurement | None = None
+    ) -> Judged:
+        """The row of a data set, and what to measure next; of ``truth`` only the label gets into it."""
+        declared, say = self.strengths.declared, _silent
+        if follow_up is not None:
+            measurement = joined(measurement, follow_up)
+        fitted, held = self.model_pours(measurement.fit), self.model_pours(measurement.holdout)
+        teacher = Teacher(declared, measurement.fit, fitted, self.budget, say)
+        compared = pursued(teacher, measurement.fit, self.budget, say)
+        verdict = verdict_of(compared, declared, teacher.levels, teacher.pours, follow_up is not None)
+        conclusion, verdict = concluded(verdict, compared, declared, measurement.holdout, held, say)
+        found = compared.posterior
+        suggestion = None
+        if self.follow_up and follow_up is None:
+            menu = suggested(verdict, found, teacher, measurement.fit, self.model_pours)
+            suggestion = next(iter(menu.suggestions), None)
+        best, best_p = found.best
+        label = label_of(truth)
+        named = {frozenset(name.split("+")) for name in verdict.names}
+        right = verdict.kind.startswith("effect") and named == {frozenset(label.split("+"))}
+        errors = errors_of(measurement.holdout, "holdout", conclusion) if right else ()
+        before, after = (errors[-1].before / errors[-1].noise_floor, errors[-1].ratio) if errors else (NAN, NAN)
+        theta = declared.theta(truth.theta)
+        off = [found.fits[one].theta - theta for one in ("base", verdict.final)] if right else []
+        bias_before, bias_after = (float(np.sqrt((d**2).mean())) for d in off) if off else (NAN, NAN)
+        told = conclusion.held_out
+        row = Row(
+            laboratory=self.measurement.title,
+            root=truth.case.root,
+            number=truth.case.number,
+            kind=truth.case.kind,
+            label=label,
+            strength=truth.case.strength,
+            amplitude=amplitude_text(truth),
+            offer=offer,
+            verdict=verdict.kind,
+            first="",
+            follow_up="",
+            nothing=found.nothing,
+            outside=found.outside,
+            best=best,
+            best_p=best_p,
+            truth_p=found.effects.get(label, NAN),
+            evidence={name: fit.log_evidence for name, fit in found.fits.items() if "+" not in name or name == best}
+            | {"outside": found.log_outside},
+            fits={name: found.fits[name].p for name in dict.fromkeys(("base", best))},
+            held_out_p=told.p if told else NAN,
+            before=before,
+            after=after,
+            bias_before=bias_before,
+            bias_after=bias_after,
+            pours=fitted.run_now + held.run_now,
+            seconds=0.0,
+        )
+        return Judged(row, suggestion)
+
+    def followed_up(self, truth: Truth, asked: Suggestion, scanner: Scanner | None) -> Measurement | None:
+        """What the laboratory measures in the set-up that it is asked for; None where its pours keep breaking off."""
+        place = next(c for c, one in enumerate(self.measurement.conditions) if one.name == asked.condition)
+        condition = self.measurement.conditions[place]
+        changed = replace(as_suggested(condition, asked), name=condition.name)
+        data = self.measured(truth, [changed], f" next {asked.experiment.name}", asked.pours)
+        if data is None:
+            return None
+        with TemporaryDirectory() as folder:
+            # The table of a changed condition reads like that of the condition itself; only its set-up is another one.
+            self.laboratory.hand_out(Path(folder), data, scanner, (ROOT, *truth.case.seed, 2))
+            measurement = load_measurement(Path(folder))
+        (read,) = measurement.fit
+        return replace(measurement, conditions=(as_suggested(read, asked),))
+
+    def measured(
+        self, truth: Truth, conditions: Sequence[Condition], occasion: str = "", pours: int = REPLICATES
+    ) -> Data | None:
+        """A laboratory's ``pours`` in each condition; None where there is no such truth, or they keep breaking off.
+
+        ``occasion``: another one has other seeds.
+        """
+        if truth.missing:
+            return None
+        for attempt in range(TRIES):
+            numbers = range(pours * (attempt + 1))
+            orders = [order for c in conditions for order in self.orders(truth, c, numbers, occasion)]
+            samples = iter(self.place.pour(orders, room_of(conditions)))
+            data = {c.name: complete(next(samples) for _ in numbers)[:pours] for c in conditions}
+            if all(len(one) == pours for one in data.values()):
+                return data
+        return None
+
+    def orders(self, truth: Truth, condition: Condition, numbers: Sequence[int], occasion: str = "") -> list[Order]:
+        """Pours ``numbers`` of a laboratory in a condition; their seeds follow from root and number of the set."""
+        paths = [parameter.path for parameter in self.measurement.parameters]
+        laboratory = ModelPours([condition], paths, self.place.store, self.place.pours, root=ROOT)
+        name = f"set {truth.case.root}.{truth.case.number} {condition.name}{occasion}"
+        points = [Point(name, k, truth.theta, truth.effects) for k in numbers]
+        outside = truth.case.label if truth.case.kind == "outside" else ""
+        return [Order(laboratory.scene(p, 0), laboratory.seed(p, 0), condition, outside) for p in points]
+
+    def out_of_reach(self, truth: Truth, offer: str) -> Row:
+        """The row of a truth that cannot be, or whose pours keep breaking off."""
+        verdict = OUT_OF_REACH + (truth.missing or "pours break off")
+        case, title = truth.case, self.measurement.title
+        return Row(title, case.root, case.number, case.kind, label_of(truth), case.strength, amplitude_text(truth),
+                   offer, verdict, "", "", NAN, NAN, "", NAN, NAN, {}, {}, NAN, NAN, NAN, NAN, NAN, 0, 0.0)  # fmt: skip
+
+    def model_pours(self, conditions: Sequence[Condition], place: int | None = None) -> ModelPours:
+        """Pours of the declared model, as a diagnosis makes them."""
+        paths = [parameter.path for parameter in self.measurement.parameters]
+        clock = self.place.look_at_the_clock
+        return ModelPours(conditions, paths, self.place.store, self.place.pours, clock, place=place)
+
+
+def label_of(truth: Truth) -> str:
+    """The name that a right answer gives, that of the outside effect, or "none"."""
+    names = sorted(name for name, _ in truth.effects)
+    return "+".join(names) or truth.case.label or NONE
+
+
+def amplitude_text(truth: Truth) -> str:
+    """Amplitudes of the truth's effects, natural units."""
+    return " ".join(f"{name}={'/'.join(f'{x:.4g}' for x in a)}" for name, a in truth.effects)
+
+
+def _silent(line: str) -> None:
+    """Say nothing."""
+
+
 SETS = "sets.jsonl"
+
 ROUNDS = 4
+
 """Rounds of reference pours for a laboratory that has none: 48 pours of each effect, strengths to some 8 %."""
 
 Say = Callable[[str], None]

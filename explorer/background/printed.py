@@ -1,17 +1,26 @@
-"""What a command of the command line prints, for a page that waits for it in a thread: the solver runs beside it."""
+"""What a command of the command line prints, for a page that waits for it in a thread: the solver runs beside it.
+
+A scene of the page as a file that commands in other processes take.
+"""
 
 from __future__ import annotations
 
 import atexit
 import subprocess
 from collections.abc import Sequence
+from pathlib import Path
 
 from explorer.background.command_process import PROGRAM
 from explorer.errors import CommandError
+from explorer.files.uploads import kept_file
 from explorer.priority import BACKGROUND, lowered, session_gives_way
+from explorer.scene.text import material_toml
+from solver import Scene
 
 FAILURE = 1
+
 """Exit code of a command that has done its work and has no good news."""
+
 LONGEST_LINE = 300
 
 
@@ -37,3 +46,12 @@ def printed(arguments: Sequence[str], program: Sequence[str] = PROGRAM) -> str:
         return said.strip()
     lines = refused.strip().splitlines() or [f"{arguments[0]} ended with exit code {process.returncode}"]
     raise CommandError(lines[-1].removeprefix("error: ")[:LONGEST_LINE])
+
+
+TITLE_LETTERS = 20
+
+
+def kept_scene(scene: Scene, folder: Path) -> Path:
+    """``scene`` as a material file in ``folder``, under a name of its contents."""
+    text = material_toml(scene, f"{scene.title}, as it was poured on the page. SI.")
+    return kept_file(f"{scene.title[:TITLE_LETTERS]}.toml", text.encode(), folder, (".toml",))

@@ -39,8 +39,7 @@ def measure(
     Exit code 1 where a picture shows no pile that could be read; the line says why.
     """
     from explorer.files.run_folder import json_text
-    from explorer.photograph.order import measure_order
-    from explorer.photograph.run import run_measure
+    from explorer.photograph.run import measure_order, run_measure
     from explorer.tables.photograph import measure_result, measure_text, refusal_lines
 
     order = measure_order(photos, scale, reference_length, reference, baseline, plot, outline, from_simulation)

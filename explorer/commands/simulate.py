@@ -63,12 +63,10 @@ def simulate(
     from time import perf_counter
 
     from explorer.errors import CommandError
-    from explorer.files.checkpoint_writer import CheckpointWriter
-    from explorer.files.run_folder import appearing, json_text, write_run
+    from explorer.files.run_folder import CheckpointWriter, appearing, json_text, write_run
     from explorer.files.run_result import result_of
     from explorer.scene.file import load_scene, with_settings
-    from explorer.tables.bench_test import bench_data, bench_text, write_bench
-    from explorer.tables.pours import RunTable
+    from explorer.tables.pours import RunTable, bench_data, bench_text, write_bench
     from solver import Crew, Job, run_pours
     from solver.arch import chosen
     from solver.pours.checkpoint import read_checkpoint

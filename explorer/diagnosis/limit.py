@@ -18,10 +18,9 @@ from doe.measurement.features import OFFERS, feature_set
 from doe.record import plain
 from doe.store import Store, default_store
 from doe.validation.laboratory import read_laboratory
-from doe.validation.limit import RISK, RISKS, LimitStudy, confused, limit_study
+from doe.validation.limit import RISK, RISKS, LimitStudy, Strength, confused, limit_study
 from doe.validation.reference import ROOT, Reference, extended_to, kept
 from doe.validation.replay import BASE_POURS, NULLS, Replayed, Teaching, Truth, replay
-from doe.validation.ruler import Strength
 from explorer.files.output_file import write_whole
 from explorer.files.run_folder import json_text
 from explorer.tables.text_table import text_table

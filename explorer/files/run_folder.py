@@ -4,6 +4,8 @@ result.json            as in `explorer.files.run_result`
 parameters.toml        every parameter, SI
 trace_<seed>.csv       curves over time
 pile_<seed>.npz        xyz (n, 3) [m], radius (n,) [m], body (n,): the spheres on the plate
+
+Keeps a pour's newest checkpoint in a file, so that a run that is cut off can be gone on with.
 """
 
 from __future__ import annotations
@@ -21,7 +23,10 @@ from typing import Any
 import numpy as np
 
 from explorer.errors import CommandError
+from explorer.files.output_file import write_whole_bytes
 from solver import Record
+from solver.pours.checkpoint import checkpoint_bytes, checkpoint_of
+from solver.pours.pour import Pour
 
 TRACE_COLUMNS = {
     "time_s": "time",
@@ -37,6 +42,7 @@ TRACE_COLUMNS = {
     "taken_out_energy_J": "taken_out_energy",
     "supplied_energy_J": "supplied_energy",
 }
+
 """Columns of a trace file → curves of ``solver.Trace``; ``max_overlap`` is in radii of the sphere."""
 
 
@@ -108,3 +114,17 @@ def _umask() -> int:
     mask = os.umask(0)
     os.umask(mask)
     return mask
+
+
+class CheckpointWriter:
+    """Writes ``path`` at every ``interval`` [s] of simulated time; the file is always a whole one."""
+
+    def __init__(self, path: Path, interval: float) -> None:
+        self._path, self._interval = path, interval
+        self._written = 0.0
+
+    def sample(self, _: int, pour: Pour) -> None:
+        """To be called at the moments of decision of a pour."""
+        if pour.time >= self._written + self._interval:
+            self._written = pour.time
+            write_whole_bytes(self._path, checkpoint_bytes(checkpoint_of(pour)))

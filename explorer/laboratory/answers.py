@@ -26,26 +26,24 @@ from PIL import Image
 from doe.audit import audit_study
 from explorer.audit.read_study import read_study, shipped_study
 from explorer.audit.report import audit_html, audit_text
-from explorer.background.printed import printed
+from explorer.background.printed import kept_scene, printed
 from explorer.design.analysis import AnalyseOrder, run_analyse
 from explorer.design.factors_file import read_factors
 from explorer.design.plan import PlanOrder, make_plan, sheet_text
 from explorer.design.text import analysis_text, plan_text
-from explorer.files.kept_scene import kept_scene
 from explorer.files.run_folder import json_text
 from explorer.laboratory.part import part_table
 from explorer.laboratory.run import LabOrder, analysed, part_file
 from explorer.photograph.annotated import sheet
-from explorer.photograph.order import measure_order
-from explorer.photograph.run import outline_text, run_measure
+from explorer.photograph.run import measure_order, outline_text, run_measure
 from explorer.report.design import design_html
-from explorer.report.design.plots import design_plots
+from explorer.report.design.charts import design_plots
 from explorer.report.figures.bench import bench_charts, curve_charts
 from explorer.report.study_charts import Plot, Plots
 from explorer.scene.source import command_line, rig_source
-from explorer.tables.bench_test import bench_text
 from explorer.tables.laboratory import lab_text
 from explorer.tables.photograph import measure_text, refusal_lines
+from explorer.tables.pours import bench_text
 from solver import Scene, with_values
 from solver.assets import asset_path
 from solver.photograph import open_picture

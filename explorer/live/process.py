@@ -44,8 +44,7 @@ def run(commands: Any, reports: Connection, frames: Any, details: Any, reading: 
 def _work(commands: Any, reports: Connection, frames: Any, details: Any, reading: Connection) -> None:
     from explorer.live.details import DetailWriter
     from explorer.live.frames import FrameWriter
-    from explorer.live.live_pour import LivePour
-    from explorer.live.publisher import Publisher
+    from explorer.live.live_pour import LivePour, Publisher
     from solver import backend
 
     backend.init(threads=1)

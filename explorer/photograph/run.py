@@ -1,14 +1,23 @@
-"""`explorer measure`: read the pictures, find their scale, put a simulation beside them, write what was asked for."""
+"""`explorer measure`: read the pictures, find their scale, put a simulation beside them, write what was asked for.
+
+What `explorer measure` was asked for, checked before any picture is opened.
+
+What `explorer measure` finds: a reading per picture, and the simulated piles beside them.
+"""
 
 from __future__ import annotations
 
 import io
+import math
+from dataclasses import dataclass
 from math import dist
+from pathlib import Path
 
-from explorer.files.output_file import write_whole, write_whole_bytes
+from explorer.errors import CommandError
+from explorer.files.output_file import check_new_file, write_whole, write_whole_bytes
 from explorer.photograph.annotated import sheet
-from explorer.photograph.order import Measured, MeasureOrder
-from explorer.photograph.simulated import simulated_piles
+from explorer.photograph.simulated import SimulatedPiles, simulated_piles
+from solver.assets import asset_path
 from solver.photograph import (
     NotAPile,
     PhotographedPile,
@@ -18,6 +27,99 @@ from solver.photograph import (
     read_photograph,
     reference_pixels,
 )
+
+FARTHEST = 1e5
+
+"""Largest coordinate that a picture may be asked about [px]."""
+
+
+@dataclass(frozen=True)
+class MeasureOrder:
+    """Pictures and options. Lengths [m]."""
+
+    pictures: tuple[Path, ...]
+    metres_per_pixel: float | None
+    reference_length: float | None
+    reference_ends: tuple[float, float, float, float] | None
+    """x, y of one end and x, y of the other [px]; None: a bar in the picture."""
+    base_line: tuple[float, float] | None
+    """y [px] at the left and the right edge of the picture; None: found."""
+    plot: Path | None
+    outline: Path | None
+    simulation: str | None
+
+
+def measure_order(
+    photos: list[str],
+    scale_mm: float | None,
+    reference_mm: float | None,
+    reference: str | None,
+    baseline: str,
+    plot: Path | None,
+    outline: Path | None,
+    simulation: str | None,
+) -> MeasureOrder:
+    """The order of a command line; CommandError or AssetNotFoundError in one line."""
+    _positive(scale_mm, "--scale", "mm/px")
+    _positive(reference_mm, "--reference-length", "mm")
+    if scale_mm is not None and reference_mm is not None:
+        raise CommandError("--scale and --reference-length exclude each other")
+    if reference is not None and reference_mm is None:
+        raise CommandError("--reference: its length is missing; add --reference-length MM")
+    ends = None if reference is None else _numbers(reference, "--reference", "x0,y0,x1,y1")
+    if ends is not None and math.dist(ends[:2], ends[2:]) < 2.0:
+        raise CommandError(f"--reference {reference}: its ends are less than 2 px apart")
+    base = None if baseline == "auto" else _numbers(baseline, "--baseline", "auto or y0,y1")
+    if plot is not None:
+        check_new_file(plot, suffix=".png")
+    if outline is not None:
+        check_new_file(outline, suffix=".csv")
+        if len(photos) != 1 or (scale_mm is None and reference_mm is None):
+            raise CommandError("--outline: of one picture of known scale; add --scale or --reference-length")
+    return MeasureOrder(
+        pictures=tuple(asset_path("photographs", name) for name in photos),
+        metres_per_pixel=None if scale_mm is None else 1e-3 * scale_mm,
+        reference_length=None if reference_mm is None else 1e-3 * reference_mm,
+        reference_ends=None if ends is None else (ends[0], ends[1], ends[2], ends[3]),
+        base_line=None if base is None else (base[0], base[1]),
+        plot=plot,
+        outline=outline,
+        simulation=simulation,
+    )
+
+
+def _positive(number: float | None, option: str, unit: str) -> None:
+    if number is not None and not 0.0 < number < math.inf:
+        raise CommandError(f"{option} {number:g} {unit}: must be positive and finite")
+
+
+def _numbers(text: str, option: str, form: str) -> tuple[float, ...]:
+    n = form.rpartition(" ")[2].count(",") + 1
+    try:
+        numbers = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != n or not all(abs(number) <= FARTHEST for number in numbers):
+        raise CommandError(f"{option} {text}: allowed is {form}, in pixels of the picture")
+    return numbers
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What came out, in the order of the pictures."""
+
+    readings: tuple[PhotographedPile | Refusal, ...]
+    simulated: SimulatedPiles | None
+
+    @property
+    def piles(self) -> tuple[PhotographedPile, ...]:
+        """Of the pictures that show one."""
+        return tuple(reading for reading in self.readings if isinstance(reading, PhotographedPile))
+
+    @property
+    def refusals(self) -> tuple[Refusal, ...]:
+        """Of the others."""
+        return tuple(reading for reading in self.readings if isinstance(reading, Refusal))
 
 
 def run_measure(order: MeasureOrder) -> Measured:

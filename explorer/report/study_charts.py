@@ -22,8 +22,7 @@ from explorer.report.figures.noise import noise_of_estimators
 from explorer.report.figures.optimum import cloud, ranges
 from explorer.report.figures.style import short_rows, stacked
 from explorer.report.figures.surface import contours, fit, height_over, residual_quantiles, solutions
-from explorer.report.figures.verification import verification
-from explorer.report.figures.walks import ascent_path, scan
+from explorer.report.figures.walks import ascent_path, scan, verification
 from explorer.report.identified import cloud_caution
 from explorer.units import observable_label
 

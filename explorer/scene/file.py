@@ -1,8 +1,8 @@
 """From what a person names on the command line to a scene: a rig, a material or a study, and settings on top.
 
 A file with ``material`` but neither targets nor factors is a set-up: its tables ``[rig]``, ``[insertion]``,
-``[numerics]`` and ``[effect.<name>]`` lie over the material (``solver/scenes/set_up.py``), as they may in a material file
-itself. With targets or factors it is a study and is read as `explorer calibrate` does.
+``[numerics]`` and ``[effect.<name>]`` lie over the material (``solver/scenes/material_file.py``), as they may in a
+material file itself. With targets or factors it is a study and is read as `explorer calibrate` does.
 
 What a finished calibration found, as a scene: its study's set-up with the factors at the optimum.
 """
@@ -22,9 +22,9 @@ from explorer.report.identified import settings
 from solver import ParameterError, Scene, is_material, load_material, read_toml, with_set_up, with_values
 from solver.assets import AssetKind, AssetNotFoundError, asset_path, shipped_assets
 from solver.rigs import BENCH_RIGS, RIGS
+from solver.scenes.material_file import TABLES
+from solver.scenes.material_file import with_settings as with_values_and_rig
 from solver.scenes.scene import with_rig
-from solver.scenes.set_up import TABLES
-from solver.scenes.set_up import with_settings as with_values_and_rig
 from solver.shapes.solid import ShapeError
 
 DEFAULT_MATERIAL = "sunflower_extract"

@@ -7,6 +7,8 @@ A preset is a TOML file:
     about = "What it is for, in a sentence."
     [values]
     "pair.*.*.static_friction" = 0.0        # * stands for any one name; values in SI or with a unit
+
+Where the page keeps what a person made with it.
 """
 
 from __future__ import annotations
@@ -18,6 +20,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from platformdirs import user_data_path
+
 from explorer.errors import CommandError
 from explorer.files.output_file import write_whole
 from explorer.scene.source import Difference
@@ -27,9 +31,13 @@ from solver.scenes.scene import Scene, canonical, parameters
 from solver.toml_table import as_table, read_toml, refuse_unknown, table_at
 
 KEYS = ("format", "title", "about", "values")
+
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _-]{0,39}")
+
 OWN_MARK = " (own)"
+
 """Behind the name of a user's preset in a list."""
+
 MOST_BYTES = 100_000
 
 
@@ -118,3 +126,8 @@ def _matching(pattern: str, paths: Iterable[str]) -> list[str]:
 
 def _toml(value: float | str) -> str:
     return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else repr(float(value))
+
+
+def data_folder() -> Path:
+    """Folder of this user's studies, diagnoses, presets, uploads and recordings."""
+    return user_data_path("repose-explorer")

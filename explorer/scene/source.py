@@ -14,8 +14,8 @@ from explorer.errors import CommandError
 from explorer.scene.file import load_scene, material_scene, study_scene
 from explorer.units import SCREEN_UNIT, quantity
 from solver.params import UNITS, ParameterError, parse_quantity
+from solver.scenes.material_file import with_settings
 from solver.scenes.scene import Scene, parameters, values, with_rig
-from solver.scenes.set_up import with_settings
 from solver.toml_table import read_toml
 
 

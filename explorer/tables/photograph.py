@@ -14,7 +14,7 @@ from solver.photograph import PhotographedPile, Refusal
 from solver.photograph.reading_error import COVERAGE, Angle
 
 if TYPE_CHECKING:
-    from explorer.photograph.order import Measured
+    from explorer.photograph.run import Measured
     from explorer.photograph.simulated import SimulatedPiles
 
 Array = npt.NDArray[np.float64]

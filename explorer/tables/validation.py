@@ -4,8 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
-from doe.validation.rates import RISKS, Rate, Scores, Tempered, by_temperature, scores, targets
-from doe.validation.sets import Answer, Row
+from doe.validation.sets import RISKS, Answer, Rate, Row, Scores, Tempered, by_temperature, scores, targets
 from explorer.tables.text_table import text_table
 
 ANSWERS: tuple[Answer, ...] = ("nothing", "right", "undecided", "unexplained", "wrong")

@@ -6,17 +6,27 @@ page carries it out, and shows the one line of whatever was refused, by us or by
 Buttons and keys that leave an action for the page's loop; what the program itself sets is no click.
 
 Work that takes seconds (reading scans, fitting spheres), off the page's loop: one thing at a time.
+
+An even clock for the page's loop.
+
+Arrow keys that a slider takes for itself: the browser sends them as the page's command as well.
+
+viser keeps a command's key from acting in a text field, but a slider's thumb is none. A browser tells a slider's new
+value up to a tenth of a second after the key, so a command waits for that before it is carried out, or dropped.
 """
 
 from __future__ import annotations
 
+import math
 import queue
 import threading
+import time
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, TypeVar
 
 import viser
+from viser import _messages
 
 from explorer.errors import CommandError
 
@@ -158,3 +168,49 @@ class BackgroundWork:
     def _refuse(self, error: Exception) -> None:
         self._busy_with = ""
         raise error
+
+
+class FrameClock:
+    """Frames every ``interval`` [s], counted from when the last one was due: what waits too long does not add up."""
+
+    def __init__(self, interval: float) -> None:
+        self._interval, self._due = interval, time.monotonic()
+
+    def wait(self, stop: threading.Event) -> None:
+        """Wait until the next frame is due, or ``stop`` is set; not at all where it is due already."""
+        self._due = max(self._due + self._interval, time.monotonic())
+        stop.wait(self._due - time.monotonic())
+
+
+WAIT = 0.2
+
+"""How long an arrow key waits [s], and how near to it in time a slider's new value is the slider's own answer."""
+
+
+class SliderHands:
+    """Notes when a browser last moved a slider of ``server``."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._moved = -math.inf
+        server._websock_server.register_handler(_messages.GuiUpdateMessage, self._note)
+
+    def unless_on_a_slider(self, post: Post) -> Post:
+        """``post`` for arrow keys: a moment later, or not at all if a slider was moved about then."""
+
+        def later(action: Action) -> None:
+            pressed = time.monotonic()
+
+            def decide() -> None:
+                if abs(self._moved - pressed) > WAIT:
+                    post(action)
+
+            timer = threading.Timer(WAIT, decide)
+            timer.daemon = True
+            timer.start()
+
+        return later
+
+    def _note(self, client_id: int, message: Any) -> None:
+        value = message.updates.get("value")
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            self._moved = time.monotonic()

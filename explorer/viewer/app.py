@@ -10,8 +10,8 @@ from pathlib import Path
 from types import FrameType
 
 from explorer.diagnosis.process import DiagnoseProcess
-from explorer.files.user_data import data_folder
 from explorer.logs.recording import recorded_lines
+from explorer.scene.presets import data_folder
 from explorer.scene.source import SceneSource
 from explorer.session import Session
 from explorer.study.process import CalibrationProcess

@@ -25,12 +25,11 @@ from viser import _messages
 
 from explorer.background.command_process import CommandStatus
 from explorer.diagnosis.process import DiagnosisProcess
-from explorer.files.user_data import data_folder
 from explorer.live.messages import Event, Status
+from explorer.scene.presets import data_folder
 from explorer.session import Session
 from explorer.study.process import StudyProcess
-from explorer.viewer.actions import Actions
-from explorer.viewer.frame_clock import FrameClock
+from explorer.viewer.actions import Actions, FrameClock
 from explorer.viewer.output.recording_switch import Recorder
 from explorer.viewer.panel import OFTEN, SELDOM, TABS, Now, PageContext, Panel
 from explorer.viewer.panels import PANELS

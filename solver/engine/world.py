@@ -12,11 +12,10 @@ from solver.engine import moving_state, snapshot
 from solver.engine.kernels import contacts, modify, transfer
 from solver.engine.kernels.batch import advance, measure, take_out
 from solver.engine.kernels.neighbours import MOST
-from solver.engine.layout import Layout
 from solver.engine.moving_state import Moving
 from solver.engine.snapshot import Arrays
 from solver.engine.state import Capacity, State, state
-from solver.engine.wall_tables import WallTables, extent, wall_tables
+from solver.engine.tables import Layout, WallTables, extent, wall_tables
 from solver.laws import CONTACT_LAWS
 from solver.rigs.rig import Container
 from solver.scenes.body import Body

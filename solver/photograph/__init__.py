@@ -1,13 +1,12 @@
 """A photographed pile as one of ours: picture file → silhouette → the outline and flank lines of simulated piles.
 
-Beside `solver/observables/scan.py`, which does the same for a scanned pile, and below ``doe``, so that measured data sets and the
-command line read pictures by the same function. NumPy, SciPy and Pillow; no kernels.
+Beside `solver/observables/scan.py`, which does the same for a scanned pile, and below ``doe``, so that measured data
+sets and the command line read pictures by the same function. NumPy, SciPy and Pillow; no kernels.
 """
 
-from solver.photograph.picture import PhotographError, Picture, open_picture
+from solver.photograph.picture import NotAPile, PhotographError, Picture, Reason, Refusal, open_picture
 from solver.photograph.read import PhotographedPile, read_photograph
 from solver.photograph.reference_bar import reference_pixels
-from solver.photograph.refusal import NotAPile, Reason, Refusal
 
 __all__ = [
     "NotAPile",

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from solver.photograph.refusal import NotAPile, Reason
+from solver.photograph.picture import NotAPile, Reason
 
 Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.bool_]

@@ -10,7 +10,7 @@ from scipy import ndimage
 
 from solver.observables.repose import FlankLine
 from solver.photograph.base_line import BaseLine
-from solver.photograph.refusal import NotAPile, Reason
+from solver.photograph.picture import NotAPile, Reason
 
 Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.bool_]

@@ -16,7 +16,7 @@ from scipy import ndimage
 from solver.photograph import checks
 from solver.photograph.backdrop import Candidate, Illumination, candidates, illumination, stands_out
 from solver.photograph.base_line import BaseLine, check_tilt, rough_base_line
-from solver.photograph.refusal import NotAPile, Reason
+from solver.photograph.picture import NotAPile, Reason
 
 Array = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]

@@ -20,7 +20,7 @@ from solver.observables.repose import FLOOR, FlankLine, Outline
 from solver.observables.silhouette import largest_part
 from solver.photograph.backdrop import NORMAL
 from solver.photograph.base_line import BaseLine
-from solver.photograph.refusal import NotAPile, Reason
+from solver.photograph.picture import NotAPile, Reason
 
 Array = npt.NDArray[np.float64]
 

@@ -29,9 +29,8 @@ from solver.photograph.edge import (
     silhouettes,
     upright,
 )
-from solver.photograph.picture import Picture
+from solver.photograph.picture import NotAPile, Picture, Reason, Refusal
 from solver.photograph.reading_error import Angles, angles_of
-from solver.photograph.refusal import NotAPile, Reason, Refusal
 
 Array = npt.NDArray[np.float64]
 Bool = npt.NDArray[np.bool_]

@@ -16,8 +16,7 @@ from scipy import ndimage
 from solver.observables.silhouette import EIGHT_NEIGHBOURS
 from solver.photograph.backdrop import LEAST_CONTRAST, LEAST_SIGNAL, illumination, thresholds
 from solver.photograph.clearest import ROUGH, reduced_grey
-from solver.photograph.picture import Picture
-from solver.photograph.refusal import NotAPile, Reason
+from solver.photograph.picture import NotAPile, Picture, Reason
 
 Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.bool_]

@@ -1,7 +1,7 @@
 """A pour interrupted and gone on with: the same bits as one that was never interrupted.
 
-A checkpoint file (``.npz``) holds the world's arrays (``solver/engine/snapshot.py``) and what the pour has decided so far. It
-belongs to one scene, seed and version of the solver; for any other it is refused.
+A checkpoint file (``.npz``) holds the world's arrays (``solver/engine/snapshot.py``) and what the pour has decided so
+far. It belongs to one scene, seed and version of the solver; for any other it is refused.
 
 A pour brought back to an earlier moment of its own, in the same batch: from there it repeats the same bits.
 

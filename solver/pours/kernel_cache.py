@@ -1,9 +1,9 @@
 """Which kernels are compiled and kept, so that of several processes that want the same ones a single one compiles them.
 
-Places in the arrays are constants in the kernels. So every :class:`solver.engine.state.Capacity` has kernels of its own, and
-so has one that is allocated after another: a set of kernels belongs to a sequence of capacities. Taichi looks up what
-is kept when it starts, and does not see what another process compiles later. So a process that needs several asks here
-before it starts Taichi: it either is to compile them, or waits until the other has.
+Places in the arrays are constants in the kernels. So every :class:`solver.engine.state.Capacity` has kernels of its
+own, and so has one that is allocated after another: a set of kernels belongs to a sequence of capacities. Taichi looks
+up what is kept when it starts, and does not see what another process compiles later. So a process that needs several
+asks here before it starts Taichi: it either is to compile them, or waits until the other has.
 
 Every set has a file beside Taichi's own. It is locked while a process compiles, and no process leaves a lock behind;
 then it lists the kernels that were there. A file that is empty, or names a kernel that is gone, stands for nothing.

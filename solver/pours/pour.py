@@ -147,9 +147,9 @@ class Pour:
     def retune(self, scene: Scene) -> None:
         """Let the running pour follow the material of ``scene``; wakes it up if it had come to rest.
 
-        Friction and effects act at once; stiffness and damping are ramped (see ``solver/pours/parameter_ramp.py``). Only materials,
-        pairs and effects of contacts and bodies may differ from the present scene; anything else takes a new pour. For
-        effects the batch needs them compiled in (RuntimeError otherwise): see :meth:`move_to`.
+        Friction and effects act at once; stiffness and damping are ramped (see ``solver/pours/parameter_ramp.py``).
+        Only materials, pairs and effects of contacts and bodies may differ from the present scene; anything else takes
+        a new pour. For effects the batch needs them compiled in (RuntimeError otherwise): see :meth:`move_to`.
         """
         scene = actual(scene)
         target = law_table(scene)

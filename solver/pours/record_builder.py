@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from solver.engine.layout import Layout
+from solver.engine.tables import Layout
 from solver.observables.free_surface import column_places
 from solver.pours.record import Bodies, Entries, FreeSurface, Pile, Spheres, Trace
 from solver.pours.supply import Entry

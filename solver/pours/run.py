@@ -11,7 +11,7 @@ import numpy as np
 
 from solver import backend
 from solver.engine.state import Capacity
-from solver.engine.wall_tables import wall_tables
+from solver.engine.tables import wall_tables
 from solver.engine.world import Batch, compiled_in, wall_materials
 from solver.pours.checkpoint import Checkpoint, resumed
 from solver.pours.pour import Pour

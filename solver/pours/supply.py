@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from solver.engine.layout import layout
+from solver.engine.tables import layout
 from solver.pours.record import Spheres
 from solver.rigs.feed import Feed
 from solver.scenes import insertion

@@ -1,9 +1,9 @@
 """Worker processes that run pours side by side: one thread and one world each, so that none waits for another.
 
 In one process all worlds wait at the end of a launch for the slowest, and while Python feeds and samples one world the
-other cores rest: two threads of :func:`solver.pours.run.run_queue` do the work of 1.5, two workers that of 2. The bits are
-the same. Of workers that need kernels which nobody has compiled yet, one compiles them and the others wait. A worker
-ends with its pipe: at :meth:`Crew.close`, or when the process that made it is gone.
+other cores rest: two threads of :func:`solver.pours.run.run_queue` do the work of 1.5, two workers that of 2. The bits
+are the same. Of workers that need kernels which nobody has compiled yet, one compiles them and the others wait. A
+worker ends with its pipe: at :meth:`Crew.close`, or when the process that made it is gone.
 """
 
 from __future__ import annotations

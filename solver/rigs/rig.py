@@ -1,9 +1,9 @@
 """What the rest of the program asks of a rig. A new rig is one file with one frozen dataclass and one line in ``RIGS``,
 or an entry point ``rig.NAME`` of a package of one's own (``solver/plugins.py``).
 
-Bodies are poured into every rig in the same way (``solver/pours/pour.py``): the rig is filled, the fill settles, the rig acts
-(a gate opens, a cylinder is lifted, a drum begins to turn), and the run ends, at rest or after a given time. All of it
-is decided at the moments at which a pour is sampled, so that a seed repeats a run bit by bit.
+Bodies are poured into every rig in the same way (``solver/pours/pour.py``): the rig is filled, the fill settles, the
+rig acts (a gate opens, a cylinder is lifted, a drum begins to turn), and the run ends, at rest or after a given time.
+All of it is decided at the moments at which a pour is sampled, so that a seed repeats a run bit by bit.
 """
 
 from __future__ import annotations

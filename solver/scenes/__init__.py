@@ -1,1 +1,1 @@
-"""What is poured: bodies, materials, contacts and settings as declared, and the files they are read from. NumPy only."""
+"""What is declared of a pour: bodies, materials, contacts and settings, and their files. NumPy only."""

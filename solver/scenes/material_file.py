@@ -35,12 +35,18 @@ size = { quantiles = { p05 = 1.105e-3, p50 = 1.204e-3, p95 = … } }     spread 
 t is the slope of ln(quantile) over the quantile's normal deviate, by least squares: exact for log-normal sizes. Where
 both stand, mean and sd count. Only the *relative* spread is taken; the sizes lie about the declared dimensions.
 Source: moments and quantiles of the log-normal distribution, Johnson, Kotz & Balakrishnan 1994, ch. 14.
+
+Tables of a file that lie over a material: ``[rig]``, ``[insertion]``, ``[numerics]``, ``[contact]``, ``[effect.…]``.
+
+Keys are the last parts of parameter paths (``outlet_height`` in ``[rig]`` is ``rig.outlet_height``); ``name`` in
+``[rig]`` chooses the rig.
 """
 
 from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -54,12 +60,51 @@ from solver.rigs import Funnel
 from solver.scenes.body import SPHERES, Body, Members, body_parameters
 from solver.scenes.contact_model import ContactModel
 from solver.scenes.material import Material, Pair
-from solver.scenes.scene import Scene
-from solver.scenes.set_up import TABLES, with_set_up
+from solver.scenes.scene import Scene, with_rig, with_values
 from solver.scenes.sizes import SizeDistribution
 from solver.shapes.clump_error import ClumpFit
 from solver.shapes.solid import ShapeError, Solid
 from solver.toml_table import as_table, list_at, read_toml, refuse_unknown, table_at, vector
+
+TABLES = ("rig", "insertion", "numerics", "contact", "effect")
+
+MESH = "rig.mesh"
+
+"""Path of the parameter that names a file."""
+
+
+def with_set_up(scene: Scene, table: Mapping[str, Any], folder: Path | None = None) -> Scene:
+    """``scene`` with the set-up tables in ``table``, a parsed file whose other keys are of no concern here.
+
+    A relative path in it, such as the mesh of a rig, starts in ``folder``; None: the working directory.
+    """
+    values: dict[str, Any] = {}
+    for kind in TABLES:
+        entries = table.get(kind, {})
+        if not isinstance(entries, dict):
+            raise ParameterError(f"{kind}: a table is needed, not {entries!r}")
+        values |= dict(_by_path(kind, entries))
+    if folder is not None and (own := folder / Path(str(values.get(MESH, ""))).expanduser()).is_file():
+        values[MESH] = str(own)
+    return with_settings(scene, values)
+
+
+def _by_path(prefix: str, entries: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    for key, value in entries.items():
+        if isinstance(value, dict):
+            yield from _by_path(f"{prefix}.{key}", value)
+        else:
+            yield f"{prefix}.{key}", value
+
+
+def with_settings(scene: Scene, values: Mapping[str, Any]) -> Scene:
+    """``scene`` with parameters replaced by path (:func:`with_values`), ``rig.name`` before them."""
+    settings = dict(values)
+    name = settings.pop("rig.name", scene.rig.name)
+    if name != scene.rig.name:
+        scene = with_rig(scene, name if isinstance(name, str) else repr(name))
+    return with_values(scene, settings)
+
 
 QUANTILE = re.compile(r"p(\d{1,2}(?:\.\d+)?)")
 

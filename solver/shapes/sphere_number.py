@@ -7,8 +7,8 @@ The numbers 1, 2, 4, … up to the wanted one are gone through, since each also 
     cover     the largest inscribed spheres one after the other, each where it covers most that is not yet covered
     growth    the best of the number before, with spheres added under the surface points that lie furthest off
 
-All are refined by least squares (`solver.shapes.sphere_fit`), and the one of least deviation wins, measured both ways: from
-the solid's surface to that of the union and back, so that a sphere that closes the hole of a ring does not pay.
+All are refined by least squares (`solver.shapes.sphere_fit`), and the one of least deviation wins, measured both ways:
+from the solid's surface to that of the union and back, so that a sphere that closes the hole of a ring does not pay.
 """
 
 from __future__ import annotations

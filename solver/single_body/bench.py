@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from solver.engine.layout import layout
+from solver.engine.tables import layout
 from solver.engine.world import SUMMARY_COLUMNS, Batch, compiled_in
 from solver.rigs.rig import Rig
 from solver.scenes.body import Body, Members

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from solver.engine.layout import layout
 from solver.engine.state import Capacity
-from solver.engine.wall_tables import wall_tables
+from solver.engine.tables import layout, wall_tables
 from solver.engine.world import SUMMARY_COLUMNS, Batch, compiled_in
 from solver.rigs.rig import BareRig
 from solver.rigs.surface import Surface, horizontal

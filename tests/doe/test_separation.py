@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from statsmodels.stats.meta_analysis import effectsize_smd
 
-from doe.analysis.separation import choose_estimator, d_prime
+from doe.analysis.pilot import choose_estimator, d_prime
 from doe.errors import StatisticsError
 
 

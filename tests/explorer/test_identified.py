@@ -13,7 +13,7 @@ from explorer.report import report_html, report_markdown
 from explorer.report.comparison import comparison
 from explorer.report.content import Table
 from explorer.report.design import design_markdown
-from explorer.report.design.plots import design_plots
+from explorer.report.design.charts import design_plots
 from explorer.report.figures.model import fitted_targets
 from explorer.report.figures.optimum import ranges
 from explorer.report.html import escaped

@@ -87,9 +87,8 @@ def test_a_moment_replaces_one_of_the_same_time():
 @pytest.fixture
 def live(taichi):
     """A live pour of beads that stands still at its beginning, in this process."""
-    from explorer.live.live_pour import LivePour
+    from explorer.live.live_pour import LivePour, Publisher
     from explorer.live.messages import Pause
-    from explorer.live.publisher import Publisher
 
     block, reports = shared_block(multiprocessing.get_context("spawn")), []
     details = shared_details(multiprocessing.get_context("spawn"))

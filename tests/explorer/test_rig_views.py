@@ -14,7 +14,7 @@ from solver.assets import asset_path
 from solver.params import ParameterError
 from solver.rigs import BENCH_RIGS, RIGS
 from solver.scenes.insertion import rotation_matrix
-from solver.scenes.set_up import with_settings as with_rig_settings
+from solver.scenes.material_file import with_settings as with_rig_settings
 from tests.explorer.beads import bead_scene
 from tests.explorer.command_line import explorer, refused
 from tests.explorer.test_live_frames import bodies

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from explorer.viewer.slider_hands import WAIT, SliderHands
+from explorer.viewer.actions import WAIT, SliderHands
 from tests.explorer.background import wait_for
 
 

@@ -8,9 +8,8 @@ from io import BytesIO
 
 import pytest
 
-from explorer.background.printed import printed
+from explorer.background.printed import kept_scene, printed
 from explorer.errors import CommandError
-from explorer.files.kept_scene import kept_scene
 from explorer.laboratory.answers import Ruler, compared_answer, rig_answer, twin_answer
 from explorer.laboratory.run import LabOrder
 from explorer.scene.file import load_scene

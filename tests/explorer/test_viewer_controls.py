@@ -8,8 +8,17 @@ from explorer.live.messages import SessionState, Status
 from explorer.units import InputError, checked, quantity, screen_unit, title
 from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import guarded_server
-from explorer.viewer.pour.live_controls import LiveControl, decade_mark, decades_around, mean_value
-from explorer.viewer.pour.live_panel import echo_html, effect_targets, live_parameters, material_targets, pair_targets
+from explorer.viewer.pour.live_panel import (
+    LiveControl,
+    decade_mark,
+    decades_around,
+    echo_html,
+    effect_targets,
+    live_parameters,
+    material_targets,
+    mean_value,
+    pair_targets,
+)
 from explorer.viewer.pour.restart_panel import PATHS, SetUpInputs, entered, size_paths
 from solver import load_material, parameters, with_values
 from solver.rigs import RIGS

@@ -8,8 +8,7 @@ import pytest
 from explorer.scene.source import material_source
 from explorer.units import InputError
 from explorer.viewer.guarded_server import guarded_server
-from explorer.viewer.pour.live_panel import LivePanel
-from explorer.viewer.pour.pair_matrix import BOXES, PairMatrix, matrix_html, pair_parameters, triangle
+from explorer.viewer.pour.live_panel import BOXES, LivePanel, PairMatrix, matrix_html, pair_parameters, triangle
 from explorer.viewer.pour.restart_panel import RestartPanel
 from solver.params import declared
 from solver.scenes.material import Pair

@@ -19,8 +19,7 @@ import numpy as np
 
 from doe.diagnose.budget import Budget
 from doe.store import Store
-from doe.validation.answers import Answers
-from doe.validation.campaign import CampaignOrder, measured_strengths
+from doe.validation.campaign import Answers, CampaignOrder, measured_strengths
 from doe.validation.laboratory import TREFOILS, Sample, read_laboratory
 from doe.validation.sets import append_rows, read_rows
 from doe.validation.truth import REPLICATES, Case, Truth, drawn_theta

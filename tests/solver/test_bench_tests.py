@@ -8,8 +8,7 @@ import pytest
 
 from solver.params import ParameterError
 from solver.rigs import BENCH_RIGS
-from solver.scenes.material_file import load_material
-from solver.scenes.set_up import with_settings
+from solver.scenes.material_file import load_material, with_settings
 from solver.single_body import BENCH_TESTS, run_bench_test
 from solver.single_body.drop_plate_45 import Rebound, paper_estimate, restitution
 from tests.explorer.beads import GLASS, MASS, STEEL, bead_scene

@@ -6,8 +6,8 @@ import pytest
 from solver.params import ParameterError
 from solver.pours.record import Outcome
 from solver.pours.run import run_pour
+from solver.scenes.material_file import with_settings
 from solver.scenes.scene import with_values
-from solver.scenes.set_up import with_settings
 from tests.explorer.beads import bead_scene
 from tests.solver.rigs.test_rig_pours import BOX, CYLINDER
 from tests.solver.test_pour import COARSE

@@ -8,8 +8,8 @@ from scipy.optimize import minimize_scalar
 
 from solver.backend import ti
 from solver.engine.kernels.geometry import nearest_on_revolved
-from solver.engine.layout import layout
 from solver.engine.state import Vec3, Vec4
+from solver.engine.tables import layout
 from solver.engine.world import SUMMARY_COLUMNS, Batch
 from solver.pours.run import Job, run_pours
 from solver.scenes.insertion import rotation_matrix

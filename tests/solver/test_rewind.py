@@ -13,8 +13,8 @@ from solver.pours.checkpoint import keep, put_back
 from solver.pours.pour import Pour
 from solver.pours.record import Outcome
 from solver.pours.run import capacity_for
+from solver.scenes.material_file import with_settings
 from solver.scenes.scene import with_values
-from solver.scenes.set_up import with_settings
 from tests.solver.test_checkpoint import GATED, HEAP, same
 
 pytestmark = pytest.mark.usefixtures("taichi")

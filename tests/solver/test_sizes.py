@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from solver.engine.layout import layout, outline
+from solver.engine.tables import layout, outline
 from solver.params import ParameterError
 from solver.pours.record import Outcome
 from solver.pours.run import Job, run_pour, run_pours

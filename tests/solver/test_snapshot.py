@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver.engine.layout import layout
 from solver.engine.state import Capacity
+from solver.engine.tables import layout
 from solver.engine.world import Batch
 from solver.scenes.time_step import time_step
 from solver.single_body.laboratory import EARTH, RADIUS, ROOM, bench

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from solver.engine.layout import layout
+from solver.engine.tables import layout
 from solver.engine.world import Batch
 from solver.rigs.surface import horizontal
 from solver.scenes.insertion import rotation_matrix

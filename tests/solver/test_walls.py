@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from solver.engine.wall_tables import LEAVE, SEE_GUARD, mesh_wall
+from solver.engine.tables import LEAVE, SEE_GUARD, mesh_wall
 from solver.params import ParameterError
 from solver.rigs.rig import BareRig
 from solver.rigs.surface import Plane, Pose, Revolved, TriangleMesh, load_mesh, rectangle

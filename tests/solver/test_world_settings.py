@@ -7,7 +7,7 @@ import pytest
 
 from solver.engine.kernels.neighbours import MOST
 from solver.engine.kernels.transfer import SETTINGS
-from solver.engine.layout import layout
+from solver.engine.tables import layout
 from solver.engine.world import Batch
 from solver.rigs import Funnel
 from solver.single_body.laboratory import ROOM, bench

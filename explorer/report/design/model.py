@@ -9,8 +9,7 @@ from doe.analysis.model_adequacy import BoxCox, Diagnostics
 from explorer.design.result import DesignResult, SheetFactor
 from explorer.report.content import Block, Bullets, Facts, Figure, Folded, Section, Table, Text
 from explorer.report.design.charts import box_cox_profile, single_runs
-from explorer.report.figures.model import FittedTarget
-from explorer.report.figures.profiler import profiler
+from explorer.report.figures.model import FittedTarget, profiler
 from explorer.report.figures.surface import contours, fit, height_over, residual_quantiles
 from explorer.report.sections.surface import anova_table, equation
 from explorer.units import MISSING, enumeration, fixed, number, observed, p_value

@@ -82,7 +82,7 @@ LEAST_POINTS = 3
 
 
 def bench_charts(data: dict[str, Any]) -> dict[str, Spec]:
-    """Title → chart, from what `explorer.tables.bench_test.bench_data` gives."""
+    """Title → chart, from what `explorer.tables.pours.bench_data` gives."""
     columns = list(data["series"].items())
     if not columns or len(columns[0][1]) < LEAST_POINTS:
         return {}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from doe.analysis.separation import EstimatorChoice
+from doe.analysis.pilot import EstimatorChoice
 from doe.stages.pilot import PilotResult
 from explorer.report.content import Spec
 from explorer.report.figures.style import (

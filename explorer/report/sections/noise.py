@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from doe.analysis.pilot import BIAS_LIMIT_DEG
-from doe.analysis.separation import EstimatorChoice, Separation
+from doe.analysis.pilot import BIAS_LIMIT_DEG, EstimatorChoice, Separation
 from doe.stages.pilot import PilotResult, StageSize
 from doe.studies.study_result import StudyResult
 from explorer.report.content import Block, Bullets, Figure, Section, Table, Text

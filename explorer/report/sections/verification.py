@@ -10,7 +10,7 @@ from doe.stages.verification import VerificationResult
 from doe.studies.study_result import StudyResult
 from doe.target import Target
 from explorer.report.content import Block, Figure, Section, Table, Text
-from explorer.report.figures.verification import verification as verification_chart
+from explorer.report.figures.walks import verification as verification_chart
 from explorer.units import MISSING, fixed, observable_label, observed, p_value, percent, unit_of_observable
 
 

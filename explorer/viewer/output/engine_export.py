@@ -12,11 +12,10 @@ from typing import Any
 
 import viser
 
-from explorer.background.printed import printed
+from explorer.background.printed import kept_scene, printed
 from explorer.errors import CommandError
 from explorer.export import OWN, names
 from explorer.files.exports import zipped
-from explorer.files.kept_scene import kept_scene
 from explorer.viewer.output.send_file import send_file
 from explorer.viewer.panel import TAKE_ALONG, PageContext, Panel
 from solver.plugins import origin

@@ -8,9 +8,8 @@ import viser
 
 from explorer.live.messages import SessionState
 from explorer.units import checked
-from explorer.viewer.actions import add_keys, button_group
+from explorer.viewer.actions import SliderHands, add_keys, button_group
 from explorer.viewer.panel import POUR, PageContext, Panel
-from explorer.viewer.slider_hands import SliderHands
 from explorer.viewer.tour import Stop
 
 PLAY_PAUSE, BACK, STEP, RESTART = "Play / pause (space)", "◀ Back (←)", "Step ▶ (→)", "Restart (R)"

@@ -24,8 +24,7 @@ import viser.uplot
 from explorer.live.frames import Frame
 from explorer.logs.recording import Recording
 from explorer.units import checked
-from explorer.viewer.actions import Action, Actions, Post, add_keys, button_group
-from explorer.viewer.frame_clock import FrameClock
+from explorer.viewer.actions import Action, Actions, FrameClock, Post, SliderHands, add_keys, button_group
 from explorer.viewer.look.camera import CameraPanel
 from explorer.viewer.look.colours import ColourPanel
 from explorer.viewer.look.drawn_look import DrawnLook
@@ -35,7 +34,6 @@ from explorer.viewer.pour.chart import LEAST_TOP_DEG, axis
 from explorer.viewer.pour.run_panel import FASTEST, SLOWEST
 from explorer.viewer.replay.recorded_frames import Motion, RecordedFrames
 from explorer.viewer.scene_nodes import BodyNodes, Kind, drawn, seen_through
-from explorer.viewer.slider_hands import SliderHands
 from explorer.viewer.style import ANGLE_LINE, CONTACTS_LINE, DARK, ENERGY_LINE, MASS_LINE, ThemeSwitch, apply_theme
 from explorer.viewer.view import light, look_at_height
 

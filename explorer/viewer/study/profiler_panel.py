@@ -10,8 +10,7 @@ import viser
 
 from doe.studies.study_result import AnyStudy
 from explorer.report.content import Spec
-from explorer.report.figures.model import FittedTarget, fitted_targets
-from explorer.report.figures.profiler import prediction, profiler
+from explorer.report.figures.model import FittedTarget, fitted_targets, prediction, profiler
 from explorer.report.study_charts import Plot, Plots
 from explorer.units import (
     axis_title,

@@ -1,8 +1,8 @@
 """Walls: how they move, and how far a member sphere is from what it can touch of them.
 
-A triangle mesh acts through smooth patches (``solver/engine/wall_tables.py``): one contact per sphere and patch, at the nearest
-point of the patch, so a sphere that rolls from facet to facet keeps its spring and feels no edge. Where two patches
-meet in an edge, only one of them answers.
+A triangle mesh acts through smooth patches (``solver/engine/tables.py``): one contact per sphere and patch, at the
+nearest point of the patch, so a sphere that rolls from facet to facet keeps its spring and feels no edge. Where two
+patches meet in an edge, only one of them answers.
 """
 
 from solver.backend import ti

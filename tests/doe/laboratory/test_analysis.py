@@ -9,8 +9,8 @@ import pytest
 
 from doe.laboratory import TESTS, LaboratoryError, analyse
 from doe.laboratory.analysis import analyse_composition, analyse_elastic
-from doe.laboratory.derive import derived
 from doe.laboratory.elastic import poisson_ratio, poisson_ratios
+from doe.laboratory.result import derived
 from doe.laboratory.tables import Table
 from solver.assets import asset_path
 from tests.doe.laboratory.readings import assert_one_line, written

@@ -14,11 +14,9 @@ from doe.declared.model import Declared, declare
 from doe.diagnose.budget import Budget
 from doe.measurement import load_measurement
 from doe.store import Store
-from doe.validation.answers import Answers
-from doe.validation.campaign import CampaignOrder, run_campaign
+from doe.validation.campaign import Answers, CampaignOrder, run_campaign
 from doe.validation.laboratory import read_laboratory
-from doe.validation.limit import Kind, Reached
-from doe.validation.ruler import Strength
+from doe.validation.limit import Kind, Reached, Strength
 from doe.validation.truth import Case, strengths_of, truth_of
 from doe.validation.work_place import WorkPlace
 from tests.doe.validation.disguise import disguise

@@ -14,7 +14,7 @@ from doe.measurement import load_measurement
 from doe.measurement.condition_table import in_rig
 from doe.measurement.features import SCALARS, SCAN, features_of_data, offer_of
 from doe.store import Store
-from doe.validation.answers import Answers
+from doe.validation.campaign import Answers
 from doe.validation.laboratory import TREFOILS, read_laboratory
 from doe.validation.outside import AMPLITUDE, possible
 from doe.validation.scanner import Scanner

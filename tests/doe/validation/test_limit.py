@@ -16,13 +16,13 @@ from doe.validation.limit import (
     RISKS,
     Kind,
     Signatures,
+    Strength,
     alike,
     confused,
     limit_of,
     limit_study,
     nearest_correlation,
 )
-from doe.validation.ruler import Strength
 from tests.doe.validation.test_ruler import sample_of, unit
 
 SETS = 20_000

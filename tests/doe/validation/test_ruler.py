@@ -5,8 +5,8 @@ import pytest
 
 from doe.diagnose.emulator import shrunk_covariance
 from doe.errors import StatisticsError
+from doe.validation.limit import fold_shifts, metric_of, product, strength_of
 from doe.validation.reference import SIDE, Sample
-from doe.validation.ruler import fold_shifts, metric_of, product, strength_of
 
 D, POURS = 6, 96
 

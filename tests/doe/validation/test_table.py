@@ -10,8 +10,18 @@ from statsmodels.stats.proportion import proportion_confint
 
 from doe.diagnose.posterior import NOTHING, OUTSIDE, PAIRS
 from doe.diagnose.verdict import THRESHOLD
-from doe.validation.rates import LEAST_P, TEMPERATURES, by_temperature, scores, targets, wilson
-from doe.validation.sets import Row, answer_to, append_rows, read_rows
+from doe.validation.sets import (
+    LEAST_P,
+    TEMPERATURES,
+    Row,
+    answer_to,
+    append_rows,
+    by_temperature,
+    read_rows,
+    scores,
+    targets,
+    wilson,
+)
 from explorer.tables.validation import campaign_text
 
 NAN = math.nan

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from doe.declared.model import Condition, Declared, Effect, Parameter
-from doe.validation.limit import Kind, Reached
-from doe.validation.ruler import Strength
+from doe.validation.limit import Kind, Reached, Strength
 from doe.validation.truth import Case, strengths_of, truth_of
 
 DECLARED = Declared(

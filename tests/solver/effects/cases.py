@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from solver.effects import EFFECTS, Effect, body_effects, contact_effects
-from solver.engine.layout import layout
+from solver.engine.tables import layout
 from solver.engine.world import SUMMARY_COLUMNS, Batch
 from solver.rigs.surface import Plane, Pose
 from solver.scenes.body import Body, Members

@@ -5,8 +5,8 @@ import pytest
 
 from solver.backend import ti
 from solver.effects.air_drag import AIR_DENSITY, AIR_VISCOSITY, drag_coefficient, shape_factors, shown_area
-from solver.engine.layout import outline
 from solver.engine.state import Vec3
+from solver.engine.tables import outline
 from solver.scenes.body import Body, Members
 from solver.scenes.material import Material
 from solver.single_body.laboratory import EARTH, RADIUS, Laboratory, sphere

@@ -12,9 +12,8 @@ from solver.assets import asset_path
 from solver.effects import EFFECTS, SetUpEffect, Telltale, body_effects, contact_effects, set_up_effects
 from solver.effects.columns import COLUMNS, COUPLE, KEPT, MEMORY, effect_table, kernel_effects
 from solver.params import UNITS, ParameterError, declared
-from solver.scenes.material_file import load_material, scene_from
+from solver.scenes.material_file import load_material, scene_from, with_set_up
 from solver.scenes.scene import actual, parameters, value, with_values
-from solver.scenes.set_up import with_set_up
 from solver.toml_table import read_toml
 from tests.solver.effects.cases import FELT, felt, scene_with, with_effects
 

@@ -25,7 +25,7 @@ import trimesh
 
 from solver.assets import measurement_folder
 from solver.effects import EFFECTS, set_up_effects
-from solver.engine.layout import layout
+from solver.engine.tables import layout
 from solver.engine.world import SUMMARY_COLUMNS, Batch, compiled_in
 from solver.laws import CONTACT_LAWS, HertzMindlin
 from solver.pours.pour import Pour

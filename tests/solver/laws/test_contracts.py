@@ -8,7 +8,7 @@ import pytest
 
 from solver import pour_key
 from solver.effects import EFFECTS
-from solver.engine.layout import layout
+from solver.engine.tables import layout
 from solver.engine.world import Batch, compiled_in, law_table
 from solver.laws import CONTACT_LAWS, ContactLaw, HertzMindlin, LinearSpringDashpot
 from solver.params import ParameterError

@@ -9,9 +9,8 @@ from solver.pours.pour_key import pour_key
 from solver.pours.record import Outcome
 from solver.pours.run import run_pour
 from solver.rigs import Funnel, MeshFunnel
-from solver.scenes.material_file import load_material
+from solver.scenes.material_file import load_material, with_set_up, with_settings
 from solver.scenes.scene import parameters, with_values
-from solver.scenes.set_up import with_set_up, with_settings
 from tests.explorer.beads import bead_scene
 
 SECTIONS = 96

@@ -11,9 +11,8 @@ from solver.observables import observables_in, observe
 from solver.pours.pour import Pour
 from solver.pours.record import Outcome, Phase
 from solver.pours.run import Job, capacity_for, run_pours
-from solver.scenes.material_file import load_material
+from solver.scenes.material_file import load_material, with_settings
 from solver.scenes.scene import with_values
-from solver.scenes.set_up import with_settings
 from tests.explorer.beads import bead_scene
 
 pytestmark = pytest.mark.usefixtures("taichi")

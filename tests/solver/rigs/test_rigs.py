@@ -10,8 +10,8 @@ from solver.params import ParameterError
 from solver.rigs import BENCH_RIGS, RIGS
 from solver.rigs.feed import RoundFeed
 from solver.rigs.rig import Move, Switch
+from solver.scenes.material_file import with_set_up, with_settings
 from solver.scenes.scene import body_counts, parameters, pour_rig, poured_mass, with_rig, with_values
-from solver.scenes.set_up import with_set_up, with_settings
 from tests.explorer.beads import bead_scene
 
 ALL = {**RIGS, **BENCH_RIGS}
