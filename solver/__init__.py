@@ -48,7 +48,7 @@ from solver.scenes.scene import (
     with_values,
 )
 from solver.shapes.clump_error import ClumpFit
-from solver.toml_table import read_toml
+from solver.toml_file import read_toml
 from solver.version import PHYSICS
 
 if TYPE_CHECKING:

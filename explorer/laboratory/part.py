@@ -23,6 +23,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from solver.toml_table import as_table, list_at, refuse_unknown
+
 from doe.laboratory import Derived, Estimate, LabResult
 from doe.laboratory.result import CONDITIONS
 from explorer.errors import CommandError
@@ -32,7 +34,6 @@ from explorer.scene.starter_files import material_text, new_path
 from explorer.scene.text import material_toml, toml_key, toml_value
 from solver import ParameterError, Scene, asset_path, load_material, read_toml, with_values
 from solver.scenes.material_file import scene_from
-from solver.toml_table import as_table, list_at, refuse_unknown
 
 KEYS = ("format", "materials", "pair", "body", "measured")
 

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from platformdirs import user_data_path
+from solver.toml_table import as_table, read_toml, refuse_unknown, table_at
 
 from explorer.errors import CommandError
 from explorer.files.output_file import write_whole
@@ -28,7 +29,6 @@ from explorer.scene.source import Difference
 from solver.assets import asset_path, shipped_assets
 from solver.params import ParameterError
 from solver.scenes.scene import Scene, canonical, parameters
-from solver.toml_table import as_table, read_toml, refuse_unknown, table_at
 
 KEYS = ("format", "title", "about", "values")
 

@@ -16,7 +16,7 @@ from explorer.units import SCREEN_UNIT, quantity
 from solver.params import UNITS, ParameterError, parse_quantity
 from solver.scenes.material_file import with_settings
 from solver.scenes.scene import Scene, parameters, values, with_rig
-from solver.toml_table import read_toml
+from solver.toml_file import read_toml
 
 
 @dataclass(frozen=True)

@@ -1,45 +1,16 @@
-"""Material files: TOML → :class:`Scene` (schema below), with one clear line for whatever is wrong.
+"""Material files: TOML → :class:`Scene`, and set-up tables that lie over a material in other files.
 
-format = 1
-gravity = [0.0, 0.0, -9.81]
-contact_law = "hertz_mindlin"        the same as law in [contact]
-assumed = [paths of values that nobody measured]
-[materials.<name>]       density, and two of youngs_modulus, shear_modulus, poisson_ratio (SI or with a unit)
-[[body]]                 name, material, mass_fraction, shape, … (`solver.scenes.material_file`)
-[pair.<a>.<b>]           static_friction, restitution
-[rig] [insertion] [numerics] [contact] [effect.<name>]     optional: another rig than the default funnel, settings,
-                                 conventions of the contact law, effects that are switched on (see set_up.py)
+:class:`MaterialFile` and :class:`BodyTable` say what may stand where. Keys of a set-up table are the last parts of
+parameter paths (``outlet_height`` in ``[rig]`` is ``rig.outlet_height``); ``name`` in ``[rig]`` chooses the rig.
 
-One ``[[body]]`` of a material file → :class:`Body`.
-
-name, material, mass_fraction      which material (by default that of the body's name), its share of the mass
-size_distribution, size_spread     how the sizes scatter (`solver.scenes.sizes`)
-size                               instead of these two, measured diameters: { mean, sd } or { quantiles = { p05, … } }
-                                   become log-normal sizes about the declared one (`solver.scenes.material_file`)
-
-and one of
-
-shape, spheres                     a solid, { ellipsoid = […] } or { mesh = "grain.stl", unit = "mm" }, and how many
-                                   spheres stand for it: coarse, standard, fine or a number
-sphere_centres, sphere_radii, mass, inertia
-                                   the spheres themselves, SI; with density, mass and inertia follow the material's
-                                   density; with mesh and unit, that surface is drawn; fit keeps how well they follow it
-file                               a file with one such [[body]], as `explorer shape` writes it; keys that stand beside
-                                   ``file`` replace those in it
-
-Measured diameters of a component → spread of its sizes.
+Measured diameters of a component give the spread of its log-normal sizes about the declared one:
 
 size = { mean = 1.212e-3, sd = 0.139e-3 }                              spread = sd / mean
 size = { quantiles = { p05 = 1.105e-3, p50 = 1.204e-3, p95 = … } }     spread = √(exp t² − 1)
 
 t is the slope of ln(quantile) over the quantile's normal deviate, by least squares: exact for log-normal sizes. Where
-both stand, mean and sd count. Only the *relative* spread is taken; the sizes lie about the declared dimensions.
+both stand, mean and sd count. Only the *relative* spread is taken.
 Source: moments and quantiles of the log-normal distribution, Johnson, Kotz & Balakrishnan 1994, ch. 14.
-
-Tables of a file that lie over a material: ``[rig]``, ``[insertion]``, ``[numerics]``, ``[contact]``, ``[effect.…]``.
-
-Keys are the last parts of parameter paths (``outlet_height`` in ``[rig]`` is ``rig.outlet_height``); ``name`` in
-``[rig]`` chooses the rig.
 """
 
 from __future__ import annotations
@@ -49,28 +20,204 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import Field
 
 from solver.assets import asset_path
+from solver.effects import EFFECTS
 from solver.laws import CONTACT_LAWS, HertzMindlin
 from solver.params import ParameterError, declared, parse_quantity
-from solver.rigs import Funnel
+from solver.rigs import RIGS, Funnel
 from solver.scenes.body import SPHERES, Body, Members, body_parameters
 from solver.scenes.contact_model import ContactModel
+from solver.scenes.insertion import Insertion
 from solver.scenes.material import Material, Pair
+from solver.scenes.numerics import Numerics
 from solver.scenes.scene import Scene, with_rig, with_values
 from solver.scenes.sizes import SizeDistribution
 from solver.shapes.clump_error import ClumpFit
 from solver.shapes.solid import ShapeError, Solid
-from solver.toml_table import as_table, list_at, read_toml, refuse_unknown, table_at, vector
+from solver.toml_file import (
+    Like,
+    Names,
+    Number,
+    Quantity,
+    Rows,
+    Shaped,
+    TomlTable,
+    Value,
+    Vector,
+    checked,
+    one_of,
+    parameters_schema,
+    read_toml,
+)  # fmt: skip
 
-TABLES = ("rig", "insertion", "numerics", "contact", "effect")
-
+SET_UP = ("rig", "insertion", "numerics", "contact", "effect")
+"""Tables that may lie over a material in any file."""
 MESH = "rig.mesh"
-
 """Path of the parameter that names a file."""
+QUANTILE = re.compile(r"p(\d{1,2}(?:\.\d+)?)")
+SPHERES_BY_HAND = ("sphere_centres", "sphere_radii", "mass", "inertia", "density", "mesh", "unit", "fit")
+ELASTIC = ("youngs_modulus", "shear_modulus", "poisson_ratio")
+
+
+def _rig_schema() -> dict[str, Any]:
+    schema = parameters_schema(*RIGS.values())
+    schema["properties"]["name"] = {"enum": list(RIGS), "description": "which rig"}
+    return schema
+
+
+def _effects_schema() -> dict[str, Any]:
+    return {"type": "object", "properties": {name: parameters_schema(kind) for name, kind in EFFECTS.items()}}
+
+
+def _material_schema() -> dict[str, Any]:
+    schema = parameters_schema(Material)
+    young = {"type": ["number", "string"], "description": "Young's modulus [Pa], instead of one of the other two"}
+    schema["properties"]["youngs_modulus"] = young
+    return schema
+
+
+Settings = dict[str, Any]
+RigTable = Annotated[Settings, Shaped(_rig_schema)]
+InsertionTable = Annotated[Settings, Shaped(lambda: parameters_schema(Insertion))]
+NumericsTable = Annotated[Settings, Shaped(lambda: parameters_schema(Numerics))]
+ContactTable = Annotated[Settings, Shaped(lambda: parameters_schema(ContactModel))]
+EffectTables = Annotated[Settings, Shaped(_effects_schema)]
+
+
+class SizeTable(TomlTable):
+    """Measured diameters: mean and sd, or at least two quantiles."""
+
+    mean: Annotated[float, Quantity("m", above=0.0)] | None = None
+    sd: Annotated[float, Quantity("m", above=0.0)] | None = None
+    quantiles: dict[str, Annotated[float, Quantity("m", above=0.0)]] = Field(default_factory=dict)
+    """p05, p50, p95 …: diameter below which that percentage lies."""
+
+
+class FitTable(TomlTable):
+    """How well the member spheres follow the surface, as ``explorer shape`` found."""
+
+    volume_ratio: Annotated[float, Number()]
+    covered_ratio: Annotated[float, Number()]
+    surface_rms: Annotated[float, Number()]
+    surface_max: Annotated[float, Number()]
+    extent_errors: Annotated[tuple[float, float, float], Vector(3)]
+
+
+class BodyTable(TomlTable):
+    """One ``[[body]]``: a component of the mixture, by its solid, by its member spheres, or by a file of its own."""
+
+    name: str = ""
+    material: str | None = None
+    """By default that of the body's name."""
+    mass_fraction: Annotated[float, Quantity("1")] = 1.0
+    """Share of the mass, 0 … 1."""
+    size_distribution: Annotated[str, Value()] = "none"
+    """How the sizes scatter: none, uniform or log_normal."""
+    size_spread: Annotated[float | str, Value()] = 0.0
+    size: SizeTable | None = None
+    """Measured diameters, instead of distribution and spread."""
+    file: str | None = None
+    """A file with one such [[body]], as ``explorer shape`` writes it; keys that stand beside it count before its."""
+    shape: Settings | None = None
+    """The solid: { ellipsoid = […] }, cylinder, box, sphere, or { mesh = "grain.stl", unit = "mm" }."""
+    spheres: Annotated[int | str, Value()] = "standard"
+    """How many spheres stand for the solid: coarse, standard, fine or a number."""
+    sphere_centres: Annotated[tuple[tuple[float, float, float], ...], Rows(3, "m")] = ()
+    sphere_radii: Annotated[tuple[float, ...], Vector(unit="m", above=0.0)] = ()
+    mass: Annotated[float, Quantity("kg", above=0.0)] | None = None
+    """Of bodies by their spheres [kg]."""
+    inertia: Annotated[tuple[float, float, float], Vector(3, above=0.0)] | None = None
+    """Principal moments [kg m²]."""
+    density: Annotated[float, Quantity("kg/m3", above=0.0)] | None = None
+    """With it, mass and inertia follow the material's density."""
+    mesh: str | None = None
+    """Surface that is drawn for bodies by their spheres."""
+    unit: str | None = None
+    """In which the mesh is written."""
+    fit: FitTable | None = None
+
+
+class BodyFile(TomlTable):
+    """A file with one body."""
+
+    format: Literal[1]
+    body: list[Annotated[Settings, Like(BodyTable)]]
+
+
+class MaterialFile(TomlTable):
+    """A material file: what is poured, and into what."""
+
+    format: Literal[1]
+    title: str | None = None
+    name: str | None = None
+    materials: dict[str, Annotated[Settings, Shaped(_material_schema)]]
+    """Name → density, and two of youngs_modulus, shear_modulus, poisson_ratio."""
+    body: list[Annotated[Settings, Like(BodyTable)]]
+    pair: dict[str, dict[str, Annotated[Settings, Shaped(lambda: parameters_schema(Pair))]]]
+    """Of every two materials that can touch: static_friction, restitution."""
+    wall: str | None = None
+    """Material of funnel and plate; by default the one that no body is made of."""
+    gravity: Annotated[tuple[float, float, float], Vector(3, "m/s2")] = (0.0, 0.0, -9.81)
+    contact_law: str | None = None
+    """The same as law in [contact]."""
+    assumed: Annotated[tuple[str, ...], Names()] = ()
+    """Paths of values that nobody measured."""
+    measured: Settings = Field(default_factory=dict)
+    """Where measured values come from, as ``explorer lab`` writes it."""
+    rig: RigTable = Field(default_factory=dict)
+    insertion: InsertionTable = Field(default_factory=dict)
+    numerics: NumericsTable = Field(default_factory=dict)
+    contact: ContactTable = Field(default_factory=dict)
+    effect: EffectTables = Field(default_factory=dict)
+
+
+def load_material(name: str, relative_to: Path | None = None) -> Scene:
+    """Scene from a shipped material's name or a material file's path, in the funnel unless the file says else."""
+    path = asset_path("materials", name, relative_to=relative_to)
+    try:
+        return scene_from(read_toml(path), path)
+    except (ParameterError, ShapeError) as error:
+        text = str(error)
+        raise ParameterError(text if text.startswith(str(path)) else f"{path}: {text}") from None
+
+
+def is_material(table: dict[str, Any]) -> bool:
+    """Whether a parsed TOML file is a material: only those have materials or bodies."""
+    return "materials" in table or "body" in table
+
+
+def scene_from(table: dict[str, Any], path: Path) -> Scene:
+    """Scene from a parsed material file; its rig is the default funnel unless it has a table ``[rig]``."""
+    file = checked(MaterialFile, table)
+    law = one_of(file.contact_law or HertzMindlin.name, "contact_law", CONTACT_LAWS)
+    materials = tuple(_material(name, entry) for name, entry in file.materials.items())
+    bodies = tuple(_body(entry, materials, path) for entry in file.body)
+    if not bodies:
+        raise ParameterError("body: at least one [[body]] is needed")
+    total = sum(body.mass_fraction for body in bodies)
+    if not math.isclose(total, 1.0, abs_tol=1e-6):
+        raise ParameterError(f"body.*.mass_fraction: add up to {total:g}, not to 1")
+    if len({body.name for body in bodies}) < len(bodies):
+        raise ParameterError("body.name: two bodies share a name")
+    scene = Scene(
+        title=file.title or file.name or path.stem,
+        materials=materials,
+        bodies=bodies,
+        pairs=tuple(_pairs(file.pair)),
+        rig=Funnel(wall=_wall(file.wall, materials, bodies)),
+        contact=ContactModel(law=law),
+        gravity=file.gravity,
+        assumed=file.assumed,
+    )
+    scene = with_set_up(scene, table, path.parent)
+    if file.contact_law and scene.contact.law != law:
+        raise ParameterError(f"contact_law: {law!r} is not the {scene.contact.law!r} of contact.law")
+    return scene
 
 
 def with_set_up(scene: Scene, table: Mapping[str, Any], folder: Path | None = None) -> Scene:
@@ -79,7 +226,7 @@ def with_set_up(scene: Scene, table: Mapping[str, Any], folder: Path | None = No
     A relative path in it, such as the mesh of a rig, starts in ``folder``; None: the working directory.
     """
     values: dict[str, Any] = {}
-    for kind in TABLES:
+    for kind in SET_UP:
         entries = table.get(kind, {})
         if not isinstance(entries, dict):
             raise ParameterError(f"{kind}: a table is needed, not {entries!r}")
@@ -106,23 +253,157 @@ def with_settings(scene: Scene, values: Mapping[str, Any]) -> Scene:
     return with_values(scene, settings)
 
 
-QUANTILE = re.compile(r"p(\d{1,2}(?:\.\d+)?)")
+def _material(name: str, entry: Settings) -> Material:
+    where = f"materials.{name}"
+    known = declared(Material, where)
+    values: dict[str, float] = {}
+    for key, raw in entry.items():
+        if key == "youngs_modulus":
+            values[key] = parse_quantity(raw, "Pa", f"{where}.{key}")
+        elif f"{where}.{key}" in known:
+            values[key] = float(known[f"{where}.{key}"].check(raw))
+        else:
+            raise ParameterError(
+                f"{where}.{key}: unknown key; allowed: density, youngs_modulus, shear_modulus, poisson_ratio"
+            )
+    elastic = [key for key in ELASTIC if key in values]
+    if len(elastic) != 2:
+        raise ParameterError(f"{where}: needs exactly two of {', '.join(ELASTIC)}; has {', '.join(elastic) or 'none'}")
+    young = values.pop("youngs_modulus", None)
+    if young is not None and "shear_modulus" in values:
+        ratio = young / (2.0 * values["shear_modulus"]) - 1.0
+        values["poisson_ratio"] = float(known[f"{where}.poisson_ratio"].check(ratio))
+    elif young is not None:
+        shear = young / (2.0 * (1.0 + values["poisson_ratio"]))
+        values["shear_modulus"] = float(known[f"{where}.shear_modulus"].check(shear))
+    return Material(name=name, **values)
 
 
-def measured_spread(table: dict[str, Any], where: str) -> float:
+def _pairs(table: dict[str, dict[str, Settings]]) -> list[Pair]:
+    pairs: list[Pair] = []
+    for a, partners in table.items():
+        for b, entry in partners.items():
+            where = f"pair.{a}.{b}"
+            known = declared(Pair, where)
+            values = {}
+            for key, raw in entry.items():
+                if f"{where}.{key}" not in known:
+                    raise ParameterError(f"{where}.{key}: unknown key; allowed: static_friction, restitution")
+                values[key] = float(known[f"{where}.{key}"].check(raw))
+            missing = {"static_friction", "restitution"} - set(values)
+            if missing:
+                raise ParameterError(f"{where}: {sorted(missing)[0]} is missing")
+            if any(pair.joins(a, b) for pair in pairs):
+                raise ParameterError(f"{where}: this pair stands twice")
+            pairs.append(Pair(a, b, **values))
+    return pairs
+
+
+def _wall(given: str | None, materials: tuple[Material, ...], bodies: tuple[Body, ...]) -> str:
+    """Material of funnel and plate: ``wall``, or the one material that no body is made of."""
+    names = [material.name for material in materials]
+    free = [name for name in names if name not in {body.material for body in bodies}]
+    wall = given if given is not None or len(free) != 1 else free[0]
+    if wall not in names:
+        raise ParameterError(f"wall: {wall!r} names no material for funnel and plate; known: {', '.join(names)}")
+    return str(wall)
+
+
+def _body(entry: Settings, materials: tuple[Material, ...], path: Path) -> Body:
+    """The body that a table declares; ``path`` is the file that it stands in, for files that it names."""
+    entry, path = _taken_in(entry, path)
+    where = f"body.{entry.get('name', '')}"
+    table = checked(BodyTable, entry, where)
+    if not table.name or "." in table.name:
+        raise ParameterError(f"body.name: {table.name!r} must be a non-empty name without a dot")
+    by_spheres = bool(table.sphere_centres)
+    foreign = table.model_fields_set & set(("shape", "spheres") if by_spheres else SPHERES_BY_HAND)
+    if foreign:
+        kind = "by their spheres" if by_spheres else "by their solid"
+        raise ParameterError(f"{where}.{min(foreign)}: unknown key for bodies {kind}")
+    names = {material.name: material for material in materials}
+    material = names[one_of(table.material or table.name, f"{where}.material", names)]
+    if not 0.0 <= table.mass_fraction <= 1.0:
+        raise ParameterError(f"{where}.mass_fraction: {table.mass_fraction:g} is outside 0 … 1")
+    spheres = str(SPHERES.check(table.spheres))
+    shape = _members(table, where, path) if by_spheres else _solid(table, where, path)
+    body = Body(table.name, material.name, table.mass_fraction, shape, material.density, spheres)
+    return replace(body, sizes=_sizes(table, body))
+
+
+def _taken_in(entry: Settings, path: Path) -> tuple[Settings, Path]:
+    """The table with those of its body file below it, and the file that paths in it are relative to."""
+    if "file" not in entry:
+        return entry, path
+    own = path.parent / str(entry["file"])
+    file = checked(BodyFile, read_toml(own), f"{own}: ")
+    if len(file.body) != 1 or "file" in file.body[0]:
+        raise ParameterError(f"{own}: a body file holds format = 1 and one [[body]] without `file`")
+    for key in entry:
+        if key in (*SPHERES_BY_HAND, "shape", "spheres"):
+            raise ParameterError(f"body with file = {entry['file']!r}: {key}: unknown key beside a file")
+    return {**file.body[0], **{key: value for key, value in entry.items() if key != "file"}}, own
+
+
+def _sizes(table: BodyTable, body: Body) -> SizeDistribution:
+    known, where = body_parameters(body), f"body.{body.name}"
+    given = table.model_fields_set
+    if table.size is not None:
+        if given & {"size_distribution", "size_spread"}:
+            raise ParameterError(
+                f"{where}.size: stands beside size_distribution or size_spread; allowed: one of the two"
+            )
+        spread = measured_spread(table.size, f"{where}.size")
+        return SizeDistribution("log_normal", float(known[f"{where}.size_spread"].check(spread)))
+    kind = str(known[f"{where}.size_distribution"].check(table.size_distribution))
+    spread = float(known[f"{where}.size_spread"].check(table.size_spread))
+    if spread > 0.0 and "size_distribution" not in given:
+        raise ParameterError(f"{where}.size_spread: needs size_distribution beside it (uniform or log_normal)")
+    return SizeDistribution(kind, spread)
+
+
+def _solid(table: BodyTable, where: str, path: Path) -> Solid:
+    if table.shape is None:
+        raise ParameterError(f"{where}.shape: missing; a solid, or sphere_centres and what belongs to them")
+    return Solid.from_toml(table.shape, f"{where}.shape", path.parent)
+
+
+def _members(table: BodyTable, where: str, path: Path) -> Members:
+    if len(table.sphere_radii) != len(table.sphere_centres):
+        raise ParameterError(
+            f"{where}.sphere_radii: {len(table.sphere_radii)} radii for {len(table.sphere_centres)} sphere_centres"
+        )
+    if table.mass is None or table.inertia is None:
+        raise ParameterError(f"{where}.{'mass' if table.mass is None else 'inertia'}: missing")
+    drawn = None
+    if table.mesh is not None:
+        surface = {"mesh": table.mesh} | ({} if table.unit is None else {"unit": table.unit})
+        drawn = Solid.from_toml(surface, where, path.parent)
+    fit = None
+    if table.fit is not None:
+        numbers = table.fit.model_dump()
+        fit = ClumpFit(n_spheres=len(table.sphere_radii), smallest_radius=min(table.sphere_radii), **numbers)
+    return Members(table.sphere_centres, table.sphere_radii, table.mass, table.inertia, table.density, drawn, fit)
+
+
+def measured_spread(table: SizeTable, where: str) -> float:
     """Standard deviation over mean of the linear size; ``where`` names the table in messages."""
-    refuse_unknown(table, ("mean", "sd", "quantiles"), f"{where}.")
-    if ("mean" in table) != ("sd" in table):
+    if (table.mean is None) != (table.sd is None):
         raise ParameterError(f"{where}: mean and sd are needed together")
-    quantiles = as_table(table.get("quantiles", {}), f"{where}.quantiles")
-    numbers = {
-        percent: _length(value, f"{where}.quantiles.p{percent}") for percent, value in _percents(quantiles, where)
-    }
-    if "mean" in table:
-        return _length(table["sd"], f"{where}.sd") / _length(table["mean"], f"{where}.mean")
-    if len(numbers) < 2:
+    percents = {_percent(name, where): diameter for name, diameter in table.quantiles.items()}
+    if table.mean is not None and table.sd is not None:
+        return table.sd / table.mean
+    if len(percents) < 2:
         raise ParameterError(f"{where}: mean and sd, or at least two quantiles (p05, p50, p95), are needed")
-    return quantile_spread(numbers)
+    return quantile_spread(percents)
+
+
+def _percent(name: str, where: str) -> float:
+    match = QUANTILE.fullmatch(name)
+    percent = float(match[1]) if match else 0.0
+    if not 0.0 < percent < 100.0:
+        raise ParameterError(f"{where}.quantiles.{name}: not a quantile; allowed: p01 … p99")
+    return percent
 
 
 def quantile_spread(quantiles: dict[float, float]) -> float:
@@ -134,238 +415,3 @@ def quantile_spread(quantiles: dict[float, float]) -> float:
     offset = deviate - deviate.mean()
     t = float(offset @ log_size / (offset @ offset))
     return math.sqrt(math.expm1(t**2))
-
-
-def _percents(quantiles: dict[str, Any], where: str) -> list[tuple[float, Any]]:
-    found = []
-    for name, value in quantiles.items():
-        match = QUANTILE.fullmatch(name)
-        percent = float(match[1]) if match else 0.0
-        if not 0.0 < percent < 100.0:
-            raise ParameterError(f"{where}.quantiles.{name}: not a quantile; allowed: p01 … p99")
-        found.append((percent, value))
-    return found
-
-
-def _length(value: Any, where: str) -> float:
-    number = parse_quantity(value, "m", where)
-    if number <= 0.0:
-        raise ParameterError(f"{where}: {number:g} m; allowed: more than 0 m")
-    return number
-
-
-COMMON = ("name", "material", "mass_fraction", "size_distribution", "size_spread", "size", "file")
-
-SOLID = ("shape", "spheres")
-
-DECLARED = ("sphere_centres", "sphere_radii", "mass", "inertia", "density", "mesh", "unit", "fit")
-
-FIT_NUMBERS = ("volume_ratio", "covered_ratio", "surface_rms", "surface_max")
-
-
-def read_body(entry: Any, materials: tuple[Material, ...], path: Path) -> Body:
-    """The body that a table declares; ``path`` is the file that it stands in, for files that it names."""
-    entry, path = _taken_in(as_table(entry, "body"), path)
-    name = str(entry.get("name", ""))
-    where = f"body.{name}"
-    if not name or "." in name:
-        raise ParameterError(f"body.name: {name!r} must be a non-empty name without a dot")
-    refuse_unknown(entry, COMMON + (DECLARED if "sphere_centres" in entry else SOLID), f"{where}.")
-    names = {material.name: material for material in materials}
-    material = names.get(str(entry.get("material", name)))
-    if material is None:
-        raise ParameterError(f"{where}.material: {entry.get('material', name)!r} is not one of {', '.join(names)}")
-    fraction = parse_quantity(entry.get("mass_fraction", 1.0), "1", f"{where}.mass_fraction")
-    if not 0.0 <= fraction <= 1.0:
-        raise ParameterError(f"{where}.mass_fraction: {fraction:g} is outside 0 … 1")
-    spheres = str(SPHERES.check(entry.get("spheres", "standard")))
-    shape = _members(entry, where, path) if "sphere_centres" in entry else _solid(entry, where, path)
-    body = Body(name, material.name, fraction, shape, material.density, spheres)
-    return replace(body, sizes=_sizes(entry, body))
-
-
-def _taken_in(entry: dict[str, Any], path: Path) -> tuple[dict[str, Any], Path]:
-    """The table with those of its body file below it, and the file that paths in it are relative to."""
-    if "file" not in entry:
-        return entry, path
-    own = path.parent / str(entry["file"])
-    table = read_toml(own)
-    bodies = list_at(table, "body")
-    if table.get("format") != 1 or len(bodies) != 1 or "file" in as_table(bodies[0], "body"):
-        raise ParameterError(f"{own}: a body file holds format = 1 and one [[body]] without `file`")
-    refuse_unknown(entry, COMMON, f"body with file = {entry['file']!r}: ")
-    return {**bodies[0], **{key: value for key, value in entry.items() if key != "file"}}, own
-
-
-def _sizes(entry: dict[str, Any], body: Body) -> SizeDistribution:
-    known, where = body_parameters(body), f"body.{body.name}"
-    if "size" in entry:
-        if "size_distribution" in entry or "size_spread" in entry:
-            raise ParameterError(
-                f"{where}.size: stands beside size_distribution or size_spread; allowed: one of the two"
-            )
-        spread = measured_spread(as_table(entry["size"], f"{where}.size"), f"{where}.size")
-        return SizeDistribution("log_normal", float(known[f"{where}.size_spread"].check(spread)))
-    kind = str(known[f"{where}.size_distribution"].check(entry.get("size_distribution", "none")))
-    spread = float(known[f"{where}.size_spread"].check(entry.get("size_spread", 0.0)))
-    if spread > 0.0 and "size_distribution" not in entry:
-        raise ParameterError(f"{where}.size_spread: needs size_distribution beside it (uniform or log_normal)")
-    return SizeDistribution(kind, spread)
-
-
-def _solid(entry: dict[str, Any], where: str, path: Path) -> Solid:
-    return Solid.from_toml(as_table(entry.get("shape"), f"{where}.shape"), f"{where}.shape", path.parent)
-
-
-def _members(entry: dict[str, Any], where: str, path: Path) -> Members:
-    centres = tuple(vector(row, f"{where}.sphere_centres") for row in list_at(entry, "sphere_centres"))
-    radii = tuple(parse_quantity(r, "m", f"{where}.sphere_radii") for r in list_at(entry, "sphere_radii"))
-    mass = parse_quantity(entry.get("mass", 0.0), "kg", f"{where}.mass")
-    inertia = vector(entry.get("inertia", ()), f"{where}.inertia")
-    density = parse_quantity(entry["density"], "kg/m3", f"{where}.density") if "density" in entry else None
-    if len(radii) != len(centres) or not centres:
-        raise ParameterError(f"{where}.sphere_radii: {len(radii)} radii for {len(centres)} sphere_centres")
-    if min(radii) <= 0.0 or mass <= 0.0 or min(inertia) <= 0.0 or (density is not None and density <= 0.0):
-        raise ParameterError(f"{where}: sphere_radii, mass, inertia and density must be positive")
-    drawn = None
-    if "mesh" in entry:
-        table: dict[str, Any] = {key: entry[key] for key in ("mesh", "unit") if key in entry}
-        drawn = Solid.from_toml(table, where, path.parent)
-    return Members(centres, radii, mass, inertia, density, drawn, _fit(entry, where, radii))
-
-
-def _fit(entry: dict[str, Any], where: str, radii: tuple[float, ...]) -> ClumpFit | None:
-    if "fit" not in entry:
-        return None
-    table = as_table(entry["fit"], f"{where}.fit")
-    refuse_unknown(table, (*FIT_NUMBERS, "extent_errors"), f"{where}.fit.")
-    numbers = {key: parse_quantity(table.get(key, ""), "1", f"{where}.fit.{key}") for key in FIT_NUMBERS}
-    errors = vector(table.get("extent_errors"), f"{where}.fit.extent_errors")
-    return ClumpFit(n_spheres=len(radii), extent_errors=errors, smallest_radius=min(radii), **numbers)
-
-
-WALL = "rigid_sieve_plate"
-
-KNOWN = {
-    "format",
-    "title",
-    "name",
-    "gravity",
-    "contact_law",
-    "assumed",
-    "materials",
-    "body",
-    "pair",
-    "measured",
-    "wall",
-    *TABLES,
-}
-
-
-def load_material(name: str, relative_to: Path | None = None) -> Scene:
-    """Scene from a shipped material's name or a material file's path, in the funnel unless the file says else."""
-    path = asset_path("materials", name, relative_to=relative_to)
-    try:
-        return scene_from(read_toml(path), path)
-    except (ParameterError, ShapeError) as error:
-        text = str(error)
-        raise ParameterError(text if text.startswith(str(path)) else f"{path}: {text}") from None
-
-
-def is_material(table: dict[str, Any]) -> bool:
-    """Whether a parsed TOML file is a material: only those have materials or bodies."""
-    return "materials" in table or "body" in table
-
-
-def scene_from(table: dict[str, Any], path: Path) -> Scene:
-    """Scene from a parsed material file; its rig is the default funnel unless it has a table ``[rig]``."""
-    unknown = sorted(set(table) - KNOWN)
-    if unknown:
-        raise ParameterError(f"unknown key {unknown[0]!r}; allowed: {', '.join(sorted(KNOWN))}")
-    if table.get("format") != 1:
-        raise ParameterError(f"format: {table.get('format')!r} is not 1")
-    law = str(table.get("contact_law", HertzMindlin.name))
-    if law not in CONTACT_LAWS:
-        raise ParameterError(f"contact_law: {law!r} is not one of {', '.join(CONTACT_LAWS)}")
-    materials = tuple(_material(name, entry) for name, entry in table_at(table, "materials").items())
-    bodies = tuple(read_body(entry, materials, path) for entry in list_at(table, "body"))
-    if not bodies:
-        raise ParameterError("body: at least one [[body]] is needed")
-    total = sum(body.mass_fraction for body in bodies)
-    if not math.isclose(total, 1.0, abs_tol=1e-6):
-        raise ParameterError(f"body.*.mass_fraction: add up to {total:g}, not to 1")
-    if len({body.name for body in bodies}) < len(bodies):
-        raise ParameterError("body.name: two bodies share a name")
-    scene = Scene(
-        title=str(table.get("title", table.get("name", path.stem))),
-        materials=materials,
-        bodies=bodies,
-        pairs=tuple(_pairs(table_at(table, "pair"))),
-        rig=Funnel(wall=_wall(table, materials, bodies)),
-        contact=ContactModel(law=law),
-        gravity=vector(table.get("gravity", (0.0, 0.0, -9.81)), "gravity"),
-        assumed=tuple(str(name) for name in list_at(table, "assumed")),
-    )
-    scene = with_set_up(scene, table, path.parent)
-    if "contact_law" in table and scene.contact.law != law:
-        raise ParameterError(f"contact_law: {law!r} is not the {scene.contact.law!r} of contact.law")
-    return scene
-
-
-def _wall(table: dict[str, Any], materials: tuple[Material, ...], bodies: tuple[Body, ...]) -> str:
-    """Material of funnel and plate: ``wall``, or the one material that no body is made of."""
-    names = [material.name for material in materials]
-    free = [name for name in names if name not in {body.material for body in bodies}]
-    wall = table.get("wall", free[0] if len(free) == 1 else None)
-    if wall not in names:
-        raise ParameterError(f"wall: {wall!r} names no material for funnel and plate; known: {', '.join(names)}")
-    return str(wall)
-
-
-def _material(name: str, entry: Any) -> Material:
-    where = f"materials.{name}"
-    known = declared(Material, where)
-    values: dict[str, float] = {}
-    for key, raw in as_table(entry, where).items():
-        if key == "youngs_modulus":
-            values[key] = parse_quantity(raw, "Pa", f"{where}.{key}")
-        elif f"{where}.{key}" in known:
-            values[key] = float(known[f"{where}.{key}"].check(raw))
-        else:
-            raise ParameterError(
-                f"{where}.{key}: unknown key; allowed: density, youngs_modulus, shear_modulus, poisson_ratio"
-            )
-    elastic = [key for key in ("youngs_modulus", "shear_modulus", "poisson_ratio") if key in values]
-    if len(elastic) != 2:
-        raise ParameterError(
-            f"{where}: needs exactly two of youngs_modulus, shear_modulus, poisson_ratio; "
-            f"has {', '.join(elastic) or 'none'}"
-        )
-    young = values.pop("youngs_modulus", None)
-    if young is not None and "shear_modulus" in values:
-        ratio = young / (2.0 * values["shear_modulus"]) - 1.0
-        values["poisson_ratio"] = float(known[f"{where}.poisson_ratio"].check(ratio))
-    elif young is not None:
-        shear = young / (2.0 * (1.0 + values["poisson_ratio"]))
-        values["shear_modulus"] = float(known[f"{where}.shear_modulus"].check(shear))
-    return Material(name=name, **values)
-
-
-def _pairs(table: dict[str, Any]) -> list[Pair]:
-    pairs: list[Pair] = []
-    for a, partners in table.items():
-        for b, entry in as_table(partners, f"pair.{a}").items():
-            where = f"pair.{a}.{b}"
-            known = declared(Pair, where)
-            values = {}
-            for key, raw in as_table(entry, where).items():
-                if f"{where}.{key}" not in known:
-                    raise ParameterError(f"{where}.{key}: unknown key; allowed: static_friction, restitution")
-                values[key] = float(known[f"{where}.{key}"].check(raw))
-            missing = {"static_friction", "restitution"} - set(values)
-            if missing:
-                raise ParameterError(f"{where}: {sorted(missing)[0]} is missing")
-            if any(pair.joins(a, b) for pair in pairs):
-                raise ParameterError(f"{where}: this pair stands twice")
-            pairs.append(Pair(a, b, **values))
-    return pairs

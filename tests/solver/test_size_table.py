@@ -7,7 +7,8 @@ import pytest
 from scipy.special import ndtri
 
 from solver.params import ParameterError
-from solver.scenes.material_file import measured_spread, quantile_spread
+from solver.scenes.material_file import SizeTable, measured_spread, quantile_spread
+from solver.toml_file import checked
 
 
 @pytest.mark.parametrize("t", [0.01, 0.1, 0.4])
@@ -27,7 +28,7 @@ def test_draws_have_that_spread():
 
 def test_mean_and_sd_come_before_quantiles():
     table = {"mean": "1.212mm", "sd": 0.139e-3, "quantiles": {"p05": 1.105e-3, "p95": 1.391e-3}}
-    assert measured_spread(table, "size") == pytest.approx(0.139 / 1.212, rel=1e-12)
+    assert measured_spread(checked(SizeTable, table, "size"), "size") == pytest.approx(0.139 / 1.212, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -36,7 +37,7 @@ def test_mean_and_sd_come_before_quantiles():
         ({}, "size: mean and sd, or at least two quantiles"),
         ({"quantiles": {"p50": 1e-3}}, "at least two quantiles"),
         ({"mean": 1e-3}, "size: mean and sd are needed together"),
-        ({"mean": 1e-3, "sd": -1e-4}, "size.sd: -0.0001 m; allowed: more than 0 m"),
+        ({"mean": 1e-3, "sd": -1e-4}, "size.sd: -0.0001 m must be positive"),
         ({"quantiles": {"q05": 1e-3, "p95": 2e-3}}, "size.quantiles.q05: not a quantile; allowed: p01 … p99"),
         ({"quantiles": {"p00": 1e-3, "p95": 2e-3}}, "size.quantiles.p00: not a quantile"),
         ({"median": 1e-3}, "size.median: unknown key; allowed: mean, sd, quantiles"),
@@ -44,5 +45,5 @@ def test_mean_and_sd_come_before_quantiles():
 )
 def test_what_is_refused(table, words):
     with pytest.raises(ParameterError) as error:
-        measured_spread(table, "size")
+        measured_spread(checked(SizeTable, table, "size"), "size")
     assert words in str(error.value)

@@ -14,7 +14,7 @@ from solver.effects.columns import COLUMNS, COUPLE, KEPT, MEMORY, effect_table, 
 from solver.params import UNITS, ParameterError, declared
 from solver.scenes.material_file import load_material, scene_from, with_set_up
 from solver.scenes.scene import actual, parameters, value, with_values
-from solver.toml_table import read_toml
+from solver.toml_file import read_toml
 from tests.solver.effects.cases import FELT, felt, scene_with, with_effects
 
 SCENE = load_material("sunflower_extract")
