@@ -94,25 +94,27 @@ def _line(error: ErrorDetails, kind: type, table: object, where: str) -> str:
     if says.startswith("missing"):
         name = inside.get("name") if isinstance(inside, Mapping) else None
         about = _about(kind, keys)
-        return f"{at}: missing" + (f" in {name}" if name else "") + (f"; {about}" if about else "")
+        return f"{at}: missing" + (f" in {name}" if name else "") + (f"; needed: {about}" if about else "")
     if says in UNKNOWN_KEY:
         return f"{at}: unknown key; allowed: {', '.join(_keys_at(kind, keys[:-1]))}"
     if says == "value_error":
         return f"{at}: {error['ctx']['error']}"
     if says == "literal_error":
-        expected = str(error["ctx"]["expected"]).replace("'", "").replace(" or ", ", ")
-        return f"{at}: {value!r} is not {'one of ' if ', ' in expected else ''}{expected}"
-    wanted = {
-        "list_type": f"tables [[{at}]] are needed",
-        "string_type": "a text is needed",
-        "bool_type": "true or false is needed",
+        return f"{at}: {value!r}; allowed: {str(error['ctx']['expected']).replace(' or ', ', ').replace(chr(39), '')}"
+    allowed = {
+        "list_type": f"a list of tables [[{at}]]",
+        "string_type": "a text",
+        "string_too_long": f"a text of up to {error.get('ctx', {}).get('max_length')} characters",
+        "bool_type": "true or false",
+        "bool_parsing": "true or false",
     }
-    return f"{at}: {wanted.get(says, 'a table is needed')}, not {value!r}"
+    return f"{at}: {value!r}; allowed: {allowed.get(says, 'a table')}"
 
 
 def _about(kind: type, keys: list[int | str]) -> str | None:
     fields = getattr(kind, "model_fields", {})
-    return fields[keys[0]].description if len(keys) == 1 and keys[0] in fields else None
+    about = fields[keys[0]].description if len(keys) == 1 and keys[0] in fields else None
+    return about and (about[0].lower() + about[1:]).rstrip(".")
 
 
 def _keys_at(kind: type, keys: list[int | str]) -> Collection[str]:
@@ -128,7 +130,7 @@ def _keys_at(kind: type, keys: list[int | str]) -> Collection[str]:
 
 def _target(here: dict[str, Any], schema: dict[str, Any]) -> dict[str, Any]:
     """``here`` with a reference or an optional table followed."""
-    here = next((one for one in here.get("anyOf", ()) if one.get("type") != "null"), here)
+    here = next((one for one in here.get("anyOf", ()) if "$ref" in one), here)
     return schema["$defs"][here["$ref"].rsplit("/", 1)[-1]] if "$ref" in here else here
 
 
@@ -203,12 +205,12 @@ class Whole(_Form):
 
 
 @dataclass(frozen=True)
-class Value(_Form):
+class Scalar(_Form):
     """A number, a text with a unit or a name, for the parameter that it belongs to to check."""
 
     def check(self, value: Any) -> int | float | str:  # noqa: D102
         if isinstance(value, bool) or not isinstance(value, int | float | str):
-            raise ValueError(f"{value!r} is neither a number nor a text")
+            raise ValueError(f"{value!r}; allowed: a number or a text")
         return value
 
     def schema(self) -> dict[str, Any]:  # noqa: D102
@@ -221,7 +223,7 @@ class Names(_Form):
 
     def check(self, value: Any) -> tuple[str, ...]:  # noqa: D102
         if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
-            raise ValueError(f"a list of names is needed, not {value!r}")
+            raise ValueError(f"{value!r}; allowed: a list of names")
         for name in value:
             if value.count(name) > 1:
                 raise ValueError(f"{name!r} stands twice")
@@ -241,7 +243,7 @@ class Vector(_Form):
 
     def check(self, value: Any) -> tuple[float, ...]:  # noqa: D102
         if not isinstance(value, list | tuple) or (self.size is not None and len(value) != self.size):
-            raise ValueError(f"{self.size or 'a list of'} numbers are needed, not {value!r}")
+            raise ValueError(f"{value!r}; allowed: a list of {'' if self.size is None else f'{self.size} '}numbers")
         return tuple(Quantity(self.unit, above=self.above).check(part) for part in value)
 
     def schema(self) -> dict[str, Any]:  # noqa: D102
@@ -258,7 +260,7 @@ class Rows(_Form):
 
     def check(self, value: Any) -> tuple[tuple[float, ...], ...]:  # noqa: D102
         if not isinstance(value, list | tuple):
-            raise ValueError(f"a list is needed, not {value!r}")
+            raise ValueError(f"{value!r}; allowed: a list of lists of {self.columns} numbers")
         return tuple(Vector(self.columns, self.unit).check(row) for row in value)
 
     def schema(self) -> dict[str, Any]:  # noqa: D102
@@ -306,8 +308,7 @@ def one_of(value: str, where: str, allowed: Collection[str]) -> str:
 
 def _bounded(number: float, least: float, above: float, unit: str = "") -> float:
     if number < least:
-        raise ValueError(f"{number:g}{unit} is below {least:g}")
+        raise ValueError(f"{number:g}{unit} is below {least:g}{unit}")
     if not number > above:
-        wanted = "must be positive" if above == 0.0 else f"is not above {above:g}"
-        raise ValueError(f"{number:g}{unit} {wanted}")
+        raise ValueError(f"{number:g}{unit}; allowed: more than {above:g}{unit}")
     return number

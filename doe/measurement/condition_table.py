@@ -1,15 +1,4 @@
-"""A ``[[condition]]`` → the scene that repeats it.
-
-name, role, rig, data              role: fit (calibrated against) or holdout (only predicted)
-images                             photographs of its piles (`photographs`)
-mean_of                            every value of the table is the mean of so many pours (1 where it is not stated)
-material                           another declared base model than the data set's, with the same pairs in [parameters]
-turned                             true: the rig stood turned by 180° on its bench, and so did all that is read off it
-[condition.rig_parameters]         last parts of the rig's parameter paths
-[condition.insertion]              protocol, rate, region_radius, region_z, velocity, batch_interval, duration;
-                                   region = "cylinder", orientation = "random": the only ones there are
-[condition.domain]                 half_width
-[condition.scan]                   what the files of its scans do not say (`scans`)
+"""A ``[[condition]]`` of ``measurement.toml`` (:class:`ConditionTable`) → the scene that repeats it.
 
 The feed of a rig begins at its opening, so region_z must begin there. ``duration`` is the time from the first body to
 the reading; the run is read then, at rest or not. ``batch_interval`` becomes the interval at which a run decides. A
@@ -20,54 +9,93 @@ trefoil_1 is 177.5 ± 1.8 ms, simulated so 177.6 ± 1.2 ms, and 197.5 ms with ba
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, StrictBool
 
 from doe.errors import MeasurementError
-from doe.measurement.measurement import MeasuredParameter
-from doe.studies.study_table import Table, number, one_of, only, section
+from doe.measurement.measurement import MeasuredParameter, Role
+from doe.measurement.photographs import PhotographTable
+from doe.measurement.scans import ScanSettings
 from solver import (
     EFFECTS,
+    Quantity,
+    RigTable,
+    Scalar,
     Scene,
+    TomlTable,
+    Vector,
+    Whole,
     canonical,
     parameters,
-    parse_quantity,
     pour_rig,
     value,
     with_rig,
     with_settings,
     with_values,
-)
+)  # fmt: skip
 
-KEYS = (
-    "name",
-    "role",
-    "rig",
-    "data",
-    "rig_parameters",
-    "insertion",
-    "domain",
-    "duration",
-    "images",
-    "mean_of",
-    "scan",
-    "turned",
-    "material",
-)
-INSERTION = (
-    "protocol",
-    "rate",
-    "region",
-    "region_radius",
-    "region_z",
-    "batch_interval",
-    "velocity",
-    "orientation",
-    "duration",
-)
 AS_THEY_ARE = ("protocol", "rate", "region_radius")
 """Keys of ``[condition.insertion]`` with the names of ours."""
 FEED_SLACK = 1e-4
 """By how much [m] region_z may begin beside the feed opening."""
+
+
+class FeedTable(TomlTable):
+    """``[condition.insertion]``: how the bodies were fed."""
+
+    protocol: Annotated[str, Scalar()] | None = None
+    rate: Annotated[float | str, Scalar()] | None = None
+    region: Literal["cylinder"] = "cylinder"
+    region_radius: Annotated[float | str, Scalar()] | None = None
+    region_z: Annotated[tuple[float, float], Vector(2, "m")] | None = None
+    """From … to; it begins at the rig's feed opening."""
+    batch_interval: Annotated[float | str, Scalar()] | None = None
+    """Time between two batches; becomes the interval at which a run decides."""
+    velocity: Annotated[tuple[float, float, float], Vector(3, "m/s")] | None = None
+    """Straight down: [0, 0, −v]."""
+    orientation: Literal["random"] = "random"
+    duration: Annotated[float, Quantity("s", above=0.0)] | None = None
+    """Time from the first body to the reading; here or in the condition."""
+
+
+class DomainTable(TomlTable):
+    """``[condition.domain]``: the plate."""
+
+    half_width: Annotated[float | str, Scalar()]
+
+
+def _image(given: object) -> object:
+    if not isinstance(given, str | dict):
+        raise ValueError(f"{given!r}; allowed: a file name or a table")
+    return {"file": given} if isinstance(given, str) else given
+
+
+class ConditionTable(TomlTable):
+    """A ``[[condition]]``: the set-up in which piles were poured, and the files of what was measured."""
+
+    name: str
+    role: Role
+    """Calibrated against (fit), or only predicted (holdout)."""
+    rig: str
+    data: str
+    """The table of its measurements."""
+    material: str | None = None
+    """Another declared base model than the data set's, with the same pairs in [parameters]."""
+    rig_parameters: RigTable = Field(default_factory=dict)
+    insertion: FeedTable = FeedTable()
+    domain: DomainTable | None = None
+    duration: Annotated[float, Quantity("s", above=0.0)] | None = None
+    """Time from the first body to the reading; the run is read then, at rest or not."""
+    images: list[Annotated[PhotographTable, BeforeValidator(_image, json_schema_input_type=str | PhotographTable)]] = (
+        Field(default_factory=list)
+    )
+    """Photographs of its piles, by file name or as tables."""
+    mean_of: Annotated[int, Whole(1)] = 1
+    """Every value of the table is the mean of so many pours."""
+    scan: ScanSettings = ScanSettings()
+    turned: StrictBool = False
+    """The rig stood turned by 180° on its bench, and so did all that is read off it."""
 
 
 def in_rig(base: Scene, name: str) -> Scene:
@@ -77,13 +105,12 @@ def in_rig(base: Scene, name: str) -> Scene:
     return scene
 
 
-def condition_scene(base: Scene, entry: Table, measured: Sequence[MeasuredParameter]) -> Scene:
+def condition_scene(base: Scene, entry: ConditionTable, measured: Sequence[MeasuredParameter]) -> Scene:
     """The scene of a condition: ``base`` with its rig and insertion, and what was ``measured`` within its range."""
-    bare = in_rig(base, str(entry["rig"]))
-    settings = {f"rig.{key}": value for key, value in section(entry, "rig_parameters").items()}
-    if half_width := section(entry, "domain"):
-        only(half_width, ("half_width",), "domain")
-        settings["rig.domain_half_width"] = half_width["half_width"]
+    bare = in_rig(base, entry.rig)
+    settings: dict[str, Any] = {f"rig.{key}": value for key, value in entry.rig_parameters.items()}
+    if entry.domain is not None:
+        settings["rig.domain_half_width"] = entry.domain.half_width
     own = {canonical(bare, path) for path in settings}
     known = parameters(bare)
     for parameter in measured:
@@ -93,18 +120,9 @@ def condition_scene(base: Scene, entry: Table, measured: Sequence[MeasuredParame
             )
         if parameter.path in known:
             settings[parameter.path] = _start(parameter, float(value(bare, parameter.path)))
-    insertion = section(entry, "insertion")
-    scene = with_settings(bare, settings | _insertion(insertion) | _duration(entry, insertion, bare))
-    _check_feed(scene, insertion)
-    return turned(scene) if is_turned(entry) else scene
-
-
-def is_turned(entry: Table) -> bool:
-    """Whether the rig of a condition stood turned by 180° on its bench."""
-    given = entry.get("turned", False)
-    if not isinstance(given, bool):
-        raise MeasurementError(f"turned: {given!r}; allowed: true or false")
-    return given
+    scene = with_settings(bare, settings | _insertion(entry.insertion) | _duration(entry, bare))
+    _check_feed(scene, entry.insertion)
+    return turned(scene) if entry.turned else scene
 
 
 def turned(scene: Scene) -> Scene:
@@ -122,49 +140,36 @@ def _start(parameter: MeasuredParameter, declared: float) -> float:
     return declared if inside else 0.5 * (parameter.low + parameter.high)
 
 
-def _insertion(table: Table) -> dict[str, Any]:
-    only(table, INSERTION, "insertion")
-    one_of(table.get("region", "cylinder"), "insertion.region", ("cylinder",))
-    one_of(table.get("orientation", "random"), "insertion.orientation", ("random",))
-    settings = {f"insertion.{key}": table[key] for key in AS_THEY_ARE if key in table}
-    if "region_z" in table:
-        low, high = _numbers(table["region_z"], "insertion.region_z", 2)
-        settings["insertion.region_height"] = high - low
-    if "velocity" in table:
-        x, y, z = _numbers(table["velocity"], "insertion.velocity", 3)
+def _insertion(table: FeedTable) -> dict[str, Any]:
+    settings = {f"insertion.{key}": given for key in AS_THEY_ARE if (given := getattr(table, key)) is not None}
+    if table.region_z is not None:
+        settings["insertion.region_height"] = table.region_z[1] - table.region_z[0]
+    if table.velocity is not None:
+        x, y, z = table.velocity
         if (x, y) != (0.0, 0.0) or z > 0.0:
-            raise MeasurementError(f"insertion.velocity: {table['velocity']}; allowed: straight down, [0, 0, −v]")
+            raise MeasurementError(f"insertion.velocity: {[x, y, z]}; allowed: straight down, [0, 0, −v]")
         settings["insertion.drop_speed"] = -z
-    if "batch_interval" in table:
-        settings["numerics.sample_interval"] = settings["insertion.lead"] = table["batch_interval"]
+    if table.batch_interval is not None:
+        settings["numerics.sample_interval"] = settings["insertion.lead"] = table.batch_interval
     return settings
 
 
-def _duration(entry: Table, insertion: Table, scene: Scene) -> dict[str, Any]:
+def _duration(entry: ConditionTable, scene: Scene) -> dict[str, Any]:
     """``duration`` stands with the insertion or in the condition itself; a run may take at least as long."""
-    stated = [table["duration"] for table in (entry, insertion) if "duration" in table]
+    stated = [duration for duration in (entry.duration, entry.insertion.duration) if duration is not None]
     if len(stated) > 1:
         raise MeasurementError("duration: stands in the condition and in its insertion; allowed: once")
     if not stated:
         return {}
-    duration = parse_quantity(stated[0], "s", "duration")
-    if duration <= 0.0:
-        raise MeasurementError(f"duration: {duration:g} s; allowed: more than 0 s")
-    most = max(float(value(scene, "numerics.max_time")), duration)
-    return {"numerics.duration": duration, "numerics.max_time": most}
+    most = max(float(value(scene, "numerics.max_time")), stated[0])
+    return {"numerics.duration": stated[0], "numerics.max_time": most}
 
 
-def _check_feed(scene: Scene, insertion: Table) -> None:
-    if "region_z" not in insertion:
+def _check_feed(scene: Scene, insertion: FeedTable) -> None:
+    if insertion.region_z is None:
         return
-    floor, low = pour_rig(scene).feed().floor, float(insertion["region_z"][0])
+    floor, low = pour_rig(scene).feed().floor, insertion.region_z[0]
     if abs(low - floor) > FEED_SLACK:
         raise MeasurementError(
             f"insertion.region_z: begins at {low:g} m; allowed: {floor:g} m, the feed opening of the {scene.rig.name}"
         )
-
-
-def _numbers(given: Any, where: str, n: int) -> tuple[float, ...]:
-    if not isinstance(given, list) or len(given) != n:
-        raise MeasurementError(f"{where}: {given!r}; allowed: a list of {n} numbers")
-    return tuple(number(one, where) for one in given)

@@ -1,35 +1,55 @@
-"""``measurement.toml`` and the files beside it → :class:`Measurement`, with one clear line for whatever is wrong.
-
-format = 1
-title, source                free text, never interpreted
-material = "material.toml"   the declared base model, or a shipped material
-[parameters]                 what calibration may move (`parameter_table`)
-[uncertainty]                observable → standard deviation of one value, where replicates cannot give it
-[[condition]]                set-up and table (`condition_table`, `long_form`); its `material`: another declared one
-piles/, scans/               scanned piles (`piles`) and scanned surfaces (`scans`) of the replicates
-"""
+"""``measurement.toml`` and the files beside it → :class:`Measurement`, with one clear line for whatever is wrong."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
 
 from doe.errors import MeasurementError, StudyFileError
-from doe.measurement.condition_table import KEYS as CONDITION_KEYS
-from doe.measurement.condition_table import condition_scene, in_rig, is_turned
-from doe.measurement.measurement import Condition, CrossCheck, MeasuredParameter, Measurement, Role
+from doe.measurement.condition_table import ConditionTable, condition_scene, in_rig
+from doe.measurement.measurement import Condition, CrossCheck, MeasuredParameter, Measurement
 from doe.measurement.observations import read_observations
-from doe.measurement.parameter_table import narrowed, read_parameters
-from doe.measurement.photographs import photograph_entries, photograph_values
+from doe.measurement.parameter_table import ParameterTable, narrowed, read_parameters
+from doe.measurement.photographs import photograph_values
 from doe.measurement.piles import pile_files, pile_surfaces
-from doe.measurement.scans import UpperSurface, read_scans, scan_files, scan_settings
-from doe.studies.study_table import Table, entries, one_of, only, required, section, whole
-from solver import AssetNotFoundError, ParameterError, Scene, all_names, load_material, named, parse_quantity, read_toml
+from doe.measurement.scans import UpperSurface, read_scans, scan_files
+from solver import (
+    AssetNotFoundError,
+    Like,
+    ParameterError,
+    Scalar,
+    Scene,
+    Settings,
+    TomlTable,
+    all_names,
+    checked,
+    load_material,
+    named,
+    parse_quantity,
+    read_toml,
+)  # fmt: skip
 
 FILE = "measurement.toml"
-KEYS = ("format", "title", "source", "material", "parameters", "uncertainty", "condition")
-ROLES: tuple[Role, ...] = ("fit", "holdout")
+
+
+class MeasurementFile(TomlTable):
+    """``measurement.toml``; scanned piles (``piles/``) and scanned surfaces (``scans/``) lie beside it."""
+
+    format: Literal[1]
+    title: str = ""
+    source: Any = None
+    """Free text, never interpreted."""
+    material: str
+    """The declared base model: a material file or a shipped material."""
+    parameters: dict[str, ParameterTable] = Field(default_factory=dict)
+    """What calibration may move."""
+    uncertainty: dict[str, Annotated[float | str, Scalar()]] = Field(default_factory=dict)
+    """Observable → standard deviation of one value, where replicates cannot give it."""
+    condition: list[Annotated[Settings, Like(ConditionTable)]] = Field(default_factory=list)
 
 
 def load_measurement(folder: Path) -> Measurement:
@@ -45,35 +65,31 @@ def load_measurement(folder: Path) -> Measurement:
         return _read(folder, read_toml(path))
 
 
-def _read(folder: Path, table: Table) -> Measurement:
-    only(table, KEYS, "")
-    if table.get("format") != 1:
-        raise MeasurementError(f"format: {table.get('format')!r}; allowed: 1")
-    base = _material(table, folder)
-    given = _condition_entries(table)
+def _read(folder: Path, table: Settings) -> Measurement:
+    file = checked(MeasurementFile, table)
+    base = load_material(file.material, relative_to=folder)
+    given = _condition_entries(file.condition)
     declared, bare = [], []
     for entry in given:
-        with _within(entry):
-            declared.append(_material(entry, folder) if "material" in entry else base)
-            bare.append(in_rig(declared[-1], str(entry["rig"])))
-    measured, notes = read_parameters(section(table, "parameters"), bare)
-    uncertainty = _uncertainty(section(table, "uncertainty"))
-    names = [str(entry["name"]) for entry in given]
+        with _within(entry.name):
+            declared.append(base if entry.material is None else load_material(entry.material, relative_to=folder))
+            bare.append(in_rig(declared[-1], entry.rig))
+    measured, notes = read_parameters(file.parameters, bare)
+    uncertainty = _uncertainty(file.uncertainty)
+    names = [entry.name for entry in given]
     piles, strangers = pile_files(folder, names)
     scans, unknown = scan_files(folder, names)
     conditions: list[Condition] = []
     checks: list[CrossCheck] = []
     ignored = [f"{path.parent.name}/{path.name}: of no condition" for path in (*strangers, *unknown)]
     for entry, material in zip(given, declared, strict=True):
-        name = str(entry["name"])
-        with _within(entry):
+        name = entry.name
+        with _within(name):
             scene = condition_scene(material, entry, measured)
-            mean_of = whole(entry.get("mean_of", 1), "mean_of", 1)
-            photographed, unread = photograph_values(folder, photograph_entries(entry.get("images", [])))
-            settings = scan_settings(section(entry, "scan"))
-        surfaces: dict[int, UpperSurface] = {**pile_surfaces(piles[name]), **read_scans(scans[name], settings)}
-        replicates, observations, checked, unused = read_observations(
-            name, folder / str(entry["data"]), piles[name], photographed, scene, uncertainty
+            photographed, unread = photograph_values(folder, entry.images)
+        surfaces: dict[int, UpperSurface] = {**pile_surfaces(piles[name]), **read_scans(scans[name], entry.scan)}
+        replicates, observations, crossed, unused = read_observations(
+            name, folder / entry.data, piles[name], photographed, scene, uncertainty
         )
         if max(surfaces, default=0) > replicates:
             last = max(surfaces)
@@ -81,15 +97,15 @@ def _read(folder: Path, table: Table) -> Measurement:
                 f"{scans[name][last]}: replicate {last}; allowed: 1 to {replicates}, as in the table"
             )
         conditions.append(
-            Condition(name, entry["role"], scene, replicates, observations, mean_of, surfaces, is_turned(entry))
+            Condition(name, entry.role, scene, replicates, observations, entry.mean_of, surfaces, entry.turned)
         )
-        checks += checked
+        checks += crossed
         ignored += unused
         ignored += [f"condition {name}: images: {line}" for line in unread]
     suited = tuple(narrowed(parameter, [condition.scene for condition in conditions]) for parameter in measured)
     return Measurement(
         folder=folder,
-        title=str(table.get("title", "")),
+        title=file.title,
         scene=base,
         parameters=suited,
         conditions=tuple(conditions),
@@ -99,31 +115,19 @@ def _read(folder: Path, table: Table) -> Measurement:
     )
 
 
-def _material(table: Table, folder: Path) -> Scene:
-    """The declared model that ``table`` names."""
-    name = table.get("material")
-    if not isinstance(name, str):
-        raise MeasurementError(f"material: {name!r}; allowed: a material file or a shipped material")
-    return load_material(name, relative_to=folder)
-
-
-def _condition_entries(table: Table) -> list[Table]:
-    given = entries(table, "condition")
-    names = set()
-    for entry in given:
-        required(entry, ("name", "role", "rig", "data"), "condition")
-        with _within(entry):
-            only(entry, CONDITION_KEYS, "")
-            one_of(entry["role"], "role", ROLES)
-        if str(entry["name"]) in names:
-            raise MeasurementError(f"condition.name: {entry['name']!r} stands twice; allowed: each name once")
-        names.add(str(entry["name"]))
-    if not any(entry["role"] == "fit" for entry in given):
+def _condition_entries(tables: Sequence[Settings]) -> list[ConditionTable]:
+    given: list[ConditionTable] = []
+    for table in tables:
+        with _within(table.get("name")):
+            given.append(checked(ConditionTable, table))
+        if given[-1].name in (entry.name for entry in given[:-1]):
+            raise MeasurementError(f"condition.name: {given[-1].name!r} stands twice; allowed: each name once")
+    if not any(entry.role == "fit" for entry in given):
         raise MeasurementError(f"condition.role: none of {len(given)} conditions is fit; allowed: at least one fit")
     return given
 
 
-def _uncertainty(table: Table) -> dict[str, float]:
+def _uncertainty(table: Mapping[str, float | str]) -> dict[str, float]:
     found = {}
     for name, value in table.items():
         known = named(name)
@@ -152,12 +156,12 @@ def _assumed(base: Scene, measured: Sequence[MeasuredParameter]) -> Iterator[str
 
 
 @contextmanager
-def _within(entry: Table) -> Iterator[None]:
+def _within(name: str | None) -> Iterator[None]:
     """Put the condition in front of an error about it."""
     try:
         yield
     except (ParameterError, StudyFileError, MeasurementError, AssetNotFoundError) as error:
-        raise MeasurementError(f"condition {entry['name']!r}: {error}") from None
+        raise MeasurementError(f"condition {name!r}: {error}" if name else f"condition: {error}") from None
 
 
 @contextmanager

@@ -12,31 +12,50 @@ a range that some condition's scene refuses is moved inward to the last value th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Annotated
 
 from doe.errors import MeasurementError
 from doe.measurement.measurement import MeasuredParameter
-from doe.studies.study_table import Table, only, section
-from solver import Parameter, ParameterError, Scene, canonical, parameters, parse_quantity, value, with_values
+from solver import (
+    Parameter,
+    ParameterError,
+    Scalar,
+    Scene,
+    TomlTable,
+    canonical,
+    parameters,
+    parse_quantity,
+    value,
+    with_values,
+)
 
 RANGE_SDS = 3.0
 
 """Half width of a range that is not stated, in standard deviations."""
 
-KEYS = ("mean", "sd", "low", "high")
+
+class ParameterTable(TomlTable):
+    """``[parameters."path"]``: what calibration may move, by its range, its measured mean and standard deviation."""
+
+    mean: Annotated[float | str, Scalar()] | None = None
+    sd: Annotated[float | str, Scalar()] | None = None
+    low: Annotated[float | str, Scalar()] | None = None
+    high: Annotated[float | str, Scalar()] | None = None
 
 
-def read_parameters(table: Table, scenes: Sequence[Scene]) -> tuple[tuple[MeasuredParameter, ...], tuple[str, ...]]:
+def read_parameters(
+    table: Mapping[str, ParameterTable], scenes: Sequence[Scene]
+) -> tuple[tuple[MeasuredParameter, ...], tuple[str, ...]]:
     """Parameters of the table, each known in one of ``scenes`` at least, and notes on what was clipped."""
     found: dict[str, MeasuredParameter] = {}
     notes: list[str] = []
-    for path in table:
+    for path, entry in table.items():
         parameter = _declared(path, scenes)
         if parameter.path in found:
             raise MeasurementError(f"parameters.{path}: stands twice; allowed: each parameter once")
-        found[parameter.path] = _measured(parameter, section(table, path), notes)
+        found[parameter.path] = _measured(parameter, entry, notes)
     return tuple(found.values()), tuple(notes)
 
 
@@ -50,12 +69,13 @@ def _declared(path: str, scenes: Sequence[Scene]) -> Parameter:
     raise MeasurementError(f"parameters.{refusal}")
 
 
-def _measured(parameter: Parameter, entry: Table, notes: list[str]) -> MeasuredParameter:
+def _measured(parameter: Parameter, entry: ParameterTable, notes: list[str]) -> MeasuredParameter:
     where = f"parameters.{parameter.path}"
     if not parameter.is_number:
         raise MeasurementError(f"{where}: has named values; allowed: parameters that are numbers")
-    only(entry, KEYS, where)
-    mean, sd, low, high = (_number(entry.get(key), parameter, f"{where}.{key}") for key in KEYS)
+    mean, sd, low, high = (
+        None if given is None else parse_quantity(given, parameter.unit, f"{where}.{key}") for key, given in entry
+    )
     if sd is not None and (mean is None or sd <= 0.0):
         raise MeasurementError(f"{where}.sd: {sd:g}; allowed: more than 0, beside a mean")
     if (low is None or high is None) and (mean is None or sd is None):
@@ -76,10 +96,6 @@ def _measured(parameter: Parameter, entry: Table, notes: list[str]) -> MeasuredP
     if mean is not None and not kept[0] <= mean <= kept[1]:
         raise MeasurementError(f"{where}.mean: {mean:g} is outside {kept[0]:g} … {kept[1]:g}")
     return MeasuredParameter(parameter.path, *kept, mean, sd, parameter.unit)
-
-
-def _number(value: Any, parameter: Parameter, where: str) -> float | None:
-    return None if value is None else parse_quantity(value, parameter.unit, where)
 
 
 BISECTIONS = 30

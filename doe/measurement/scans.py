@@ -5,17 +5,7 @@
     .npz                height (n, m), x (n,), y (m,); NaN where nothing was seen
     .tif .tiff          16 bit, a column per x and a row per y from +y down; 0 where nothing was seen
 
-``[condition.scan]`` of ``measurement.toml`` says what the files do not:
-
-    unit = "mm"         of a surface and of points; metres where it is not stated
-    pixel = "0.5mm"     of an image: edge of a pixel
-    step = "0.01mm"     of an image: height of one count
-    plate = [a, b, c]   the plate z = a + b x + c y, in metres; found from the bare plate in the scan where not stated
-    axis = [x, y]       the rig's axis in the scan's coordinates, in metres; without it the centre of the volume stands
-                        for it, and nothing that depends on the axis (where the pile leans to) is read
-    axis_error = "1mm"  standard deviation of each coordinate of the axis; ``AXIS_ERROR`` where not stated
-    grid = "0.5mm"      resolution; the spacing of the points where not stated
-    noise = "0.1mm"     standard deviation of one height, where it is known
+``[condition.scan]`` of ``measurement.toml`` says what the files do not (:class:`ScanSettings`).
 
 Only the upper surface is used: in cells as wide as the scan's resolution, the mean of what lies within ``SHELL`` cells
 of the highest point.
@@ -27,19 +17,18 @@ import zipfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Annotated, Any, ClassVar, Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import ConfigDict
 from scipy.spatial import cKDTree
 
 from doe.errors import MeasurementError
-from doe.studies.study_table import Table, number, only
-from solver import HeightMap, ParameterError, parse_quantity
+from solver import TABLE, HeightMap, ParameterError, Quantity, Vector
 
 Array = npt.NDArray[np.float64]
 
-KEYS = ("unit", "pixel", "step", "plate", "axis", "axis_error", "grid", "noise")
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 SURFACES, POINTS, ARRAYS, IMAGES = (".ply", ".stl"), (".xyz", ".txt", ".csv"), (".npz",), (".tif", ".tiff")
 AXIS_ERROR = 1.5e-3
@@ -58,16 +47,27 @@ ROUNDS = 30
 
 @dataclass(frozen=True)
 class ScanSettings:
-    """What ``[condition.scan]`` says, SI."""
+    """What ``[condition.scan]`` says of the scans of a condition; lengths in metres, or with a unit."""
 
-    unit: float = 1.0
-    pixel: float | None = None
-    step: float | None = None
-    plate: tuple[float, float, float] | None = None
-    axis: tuple[float, float] | None = None
-    axis_error: float = AXIS_ERROR
-    grid: float | None = None
-    noise: float | None = None
+    __pydantic_config__: ClassVar[ConfigDict] = TABLE
+
+    unit: Literal["m", "cm", "mm", "um"] = "m"
+    """Of a surface and of points."""
+    pixel: Annotated[float, Quantity("m", above=0.0)] | None = None
+    """Of an image: edge of a pixel."""
+    step: Annotated[float, Quantity("m", above=0.0)] | None = None
+    """Of an image: height of one count."""
+    plate: Annotated[tuple[float, float, float], Vector(3)] | None = None
+    """The plate z = a + b x + c y, in metres; found from the bare plate in the scan where not stated."""
+    axis: Annotated[tuple[float, float], Vector(2)] | None = None
+    """The rig's axis in the scan's coordinates, in metres; without it the centre of the volume stands for it, and
+    nothing that depends on the axis (where the pile leans to) is read."""
+    axis_error: Annotated[float, Quantity("m", above=0.0)] = AXIS_ERROR
+    """Standard deviation of each coordinate of the axis."""
+    grid: Annotated[float, Quantity("m", above=0.0)] | None = None
+    """Resolution; the spacing of the points where not stated."""
+    noise: Annotated[float, Quantity("m", above=0.0)] | None = None
+    """Standard deviation of one height, where it is known."""
 
 
 class UpperSurface(Protocol):
@@ -123,42 +123,6 @@ class Scan:
         height[count > 0] = total[count > 0] / count[count > 0]
         axis = (np.arange(n) + 0.5 - n / 2) * pixel
         return HeightMap(height.reshape(n, n), np.hypot(axis[:, None], axis[None, :]), pixel)
-
-
-def scan_settings(table: Table) -> ScanSettings:
-    """Settings from ``[condition.scan]``; raises StudyFileError or ParameterError naming the key."""
-    only(table, KEYS, "scan")
-    unit = table.get("unit", "m")
-    if unit not in UNITS:
-        raise MeasurementError(f"scan.unit: {unit!r}; allowed: {', '.join(UNITS)}")
-
-    def length(key: str) -> float | None:
-        if key not in table:
-            return None
-        value = parse_quantity(table[key], "m", f"scan.{key}")
-        if not value > 0.0:
-            raise MeasurementError(f"scan.{key}: {value:g} m; allowed: more than 0")
-        return value
-
-    def numbers(key: str, n: int) -> tuple[float, ...] | None:
-        if key not in table:
-            return None
-        given = table[key]
-        if not isinstance(given, list) or len(given) != n:
-            raise MeasurementError(f"scan.{key}: {given!r}; allowed: a list of {n} numbers")
-        return tuple(number(one, f"scan.{key}") for one in given)
-
-    plate, axis = numbers("plate", 3), numbers("axis", 2)
-    return ScanSettings(
-        unit=UNITS[unit],
-        pixel=length("pixel"),
-        step=length("step"),
-        plate=None if plate is None else (plate[0], plate[1], plate[2]),
-        axis=None if axis is None else (axis[0], axis[1]),
-        axis_error=length("axis_error") or AXIS_ERROR,
-        grid=length("grid"),
-        noise=length("noise"),
-    )
 
 
 def scan_files(folder: Path, conditions: Iterable[str]) -> tuple[dict[str, dict[int, Path]], tuple[Path, ...]]:
@@ -254,9 +218,9 @@ def _points(path: Path, settings: ScanSettings) -> tuple[Array, float | None]:
     suffix = path.suffix.lower()
     if suffix in SURFACES:
         surface, resolution = _of_surface(path)
-        return surface * settings.unit, resolution * settings.unit
+        return surface * UNITS[settings.unit], resolution * UNITS[settings.unit]
     if suffix in POINTS:
-        return _of_table(path) * settings.unit, None
+        return _of_table(path) * UNITS[settings.unit], None
     if suffix in ARRAYS:
         return _of_arrays(path)
     return _of_image(path, settings)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Sequence
 
 from solver import ParameterError, Scene, body_counts, canonical, parameters, with_values
 
@@ -12,18 +12,20 @@ MIN_BODIES = 5
 """A factor that touches fewer bodies than this cannot be tested: its effect is that of a handful of places."""
 
 
-def checked_levels(scene: Scene, entry: dict[str, Any]) -> tuple[str, float | str, float | str, float | str]:
-    """(path, low, high, reference) of a study's entry, in SI; each level is tried on the scene."""
-    path = canonical(scene, str(entry["path"]))
+def checked_levels(
+    scene: Scene, name: str, path: str, levels: Sequence[float | str]
+) -> tuple[str, float | str, float | str, float | str]:
+    """(canonical path, low, high, reference [SI]) of the factor ``name``; each level is tried on the scene."""
+    path = canonical(scene, path)
     parameter = parameters(scene)[path]
-    low, high, reference = (parameter.check(entry[key]) for key in ("low", "high", "reference"))
+    low, high, reference = (parameter.check(level) for level in levels)
     if isinstance(low, float) and isinstance(high, float) and isinstance(reference, float):
         if not low < high:
-            raise ParameterError(f"{entry['name']} ({path}): low {low:g} is not below high {high:g}")
+            raise ParameterError(f"{name} ({path}): low {low:g} is not below high {high:g}")
         if not low <= reference <= high:
-            raise ParameterError(f"{entry['name']} ({path}): reference {reference:g} is outside {low:g} … {high:g}")
+            raise ParameterError(f"{name} ({path}): reference {reference:g} is outside {low:g} … {high:g}")
     elif low == high:
-        raise ParameterError(f"{entry['name']} ({path}): low and high are both {low!r}; two different names are needed")
+        raise ParameterError(f"{name} ({path}): low and high are both {low!r}; two different names are needed")
     for level in (low, high):
         with_values(scene, {path: level})
     return path, low, high, reference

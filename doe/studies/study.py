@@ -1,22 +1,7 @@
-"""A study: what is varied, against which measurement, with how many runs. Read from a TOML file.
+"""A study: what is varied, against which measurement, with how many runs. Read from a TOML file (:class:`StudyFile`).
 
-format = 1
-material = "name or file"      fallback = ["X4", …]
-dummies = 3                    columns of a Plackett–Burman table that stay free of factors, at least
-[screening]  [assumptions]  [surface]      design = "NAME" (doe/designs) of the stage, and its options: runs, centre,
-                               fold, generators, fraction, alpha, seed; Plackett–Burman of 28 and of 12 runs and
-                               Box–Behnken with 5 centre runs if not given
-estimators = [observables]     candidates for the screening's response; those of the targets always belong to them
-[rig] name and dimensions      [insertion] …      [numerics] …      [effect.NAME] what is switched on
-[[target]]      observable, mean, n, sd, weight, margin
-[[factor]]      name, path, low, high, reference        screened, then calibrated; numbers
-[[assumption]]  the same keys, or named levels           screened beside them: what nobody published
-[[change]]      name, values = { path = value }          declared changes for the choice of the estimator
-[scan]          path, values                             one assumption in steps
-[profile.NAME]  spheres, mass and the numbers of runs
-[stage.NAME]    a stage of another package, with what it takes (doe/stages/stage.py)
-
-The design of a stage, from its table in a study file: ``design = "NAME"`` and the options of that family.
+The designs of the stages are Plackett–Burman of 28 and of 12 runs and Box–Behnken with 5 centre runs, unless
+``[screening]``, ``[assumptions]`` or ``[surface]`` names another one of ``doe/designs``.
 """
 
 from __future__ import annotations
@@ -24,34 +9,45 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field, StrictBool
 
 from doe.analysis.surface import second_order_terms, term_names, with_intercept
-from doe.designs import ALPHAS, DESIGNS, BoxBehnken, ChosenDesign, DesignOptions, PlackettBurman, Points
+from doe.designs import DESIGNS, BoxBehnken, ChosenDesign, DesignOptions, PlackettBurman, Points
+from doe.designs.design import Alpha
 from doe.errors import StatisticsError, StudyFileError
 from doe.record import Record
 from doe.studies.factors import MIN_BODIES, bodies_touched, checked_levels
-from doe.studies.profile import Profile, profile_from
-from doe.studies.study_table import Table, entries, names, one_of, only, required, section, whole
-from doe.target import Target, is_angle, target_from
+from doe.studies.profile import NAME, Profile
+from doe.target import Target, is_angle
 from solver import (
     OBSERVABLES,
+    EffectTables,
+    InsertionTable,
+    Names,
+    NumericsTable,
     ParameterError,
+    RigTable,
+    Scalar,
     Scene,
+    Settings,
+    TomlTable,
+    Whole,
     asset_path,
     canonical,
+    checked,
     is_material,
     load_material,
     observable_names,
+    one_of,
     parameters,
-    parse_quantity,
     plugged_in,
     read_toml,
     with_set_up,
     with_values,
-)
+)  # fmt: skip
 
 DUMMIES = 3
 
@@ -69,9 +65,9 @@ SURFACE = ChosenDesign(BoxBehnken(), replace(IN_STUDIES, centre=5))
 
 
 def main_effect_design(
-    table: Table, key: str, whose: str, usual: ChosenDesign, factors: Sequence[Factor], dummies: int | None
+    table: DesignTable, key: str, whose: str, usual: ChosenDesign, factors: Sequence[Factor], dummies: int | None
 ) -> ChosenDesign:
-    """The design of a stage that looks at main effects, read from ``table[key]`` and checked with its factors.
+    """The design of a stage that looks at main effects, read from its table and checked with its factors.
 
     ``whose``: key of the factors in the file. ``dummies``: columns that have to stay free in a design that is made for
     main effects alone; None: three. Raises StudyFileError.
@@ -101,7 +97,7 @@ def main_effect_design(
     return chosen
 
 
-def second_order_design(table: Table, key: str, usual: ChosenDesign, factors: int) -> ChosenDesign:
+def second_order_design(table: DesignTable, key: str, usual: ChosenDesign, factors: int) -> ChosenDesign:
     """The design of a stage that fits a full second-order model; raises StudyFileError where it cannot."""
     chosen = _chosen(table, key, usual)
     name = chosen.design.name
@@ -119,27 +115,14 @@ def second_order_design(table: Table, key: str, usual: ChosenDesign, factors: in
     return chosen
 
 
-def _chosen(table: Table, key: str, usual: ChosenDesign) -> ChosenDesign:
-    entry = section(table, key)
-    design = DESIGNS[one_of(entry.get("design", usual.design.name), f"{key}.design", DESIGNS)]
-    only(entry, {"design", "seed", *design.options}, key)
+def _chosen(table: DesignTable, key: str, usual: ChosenDesign) -> ChosenDesign:
+    design = DESIGNS[one_of(table.design or usual.design.name, f"{key}.design", DESIGNS)]
+    values = table.model_dump(exclude={"design"}, exclude_unset=True)
+    for name in values:
+        if name not in (allowed := ("seed", *design.options)):
+            raise StudyFileError(f"{key}.{name}: unknown key; allowed: {', '.join(sorted(('design', *allowed)))}")
     options = usual.options if design.name == usual.design.name else IN_STUDIES
-    values = {name: _option(f"{key}.{name}", name, entry[name]) for name in entry if name != "design"}
     return ChosenDesign(design, replace(options, **values))
-
-
-def _option(where: str, name: str, value: Any) -> Any:
-    if name == "alpha":
-        return one_of(value, where, ALPHAS)
-    if name == "fold":
-        if not isinstance(value, bool):
-            raise StudyFileError(f"{where}: {value!r} is neither true nor false")
-        return value
-    if name == "generators":
-        if not isinstance(value, list) or not all(isinstance(one, str) for one in value):
-            raise StudyFileError(f'{where}: a list such as ["D=ABC"] is needed, not {value!r}')
-        return tuple(value)
-    return whole(value, where, least=0)
 
 
 def _require_inside(points: Points, key: str, name: str) -> None:
@@ -200,15 +183,83 @@ class Study:
     screening_design: ChosenDesign = SCREENING
     assumption_design: ChosenDesign = ASSUMPTIONS
     surface_design: ChosenDesign = SURFACE
-    further: dict[str, Table] = field(default_factory=dict)
+    further: dict[str, Settings] = field(default_factory=dict)
     """Stage of another package → its table."""
 
 
-KEYS = {
-    "format", "title", "material", "dummies", "fallback", "rig", "insertion", "target", "factor", "assumption",
-    "change", "scan", "profile", "estimators", "seed", "numerics", "effect", "screening", "assumptions", "surface",
-    "stage",
-}  # fmt: skip
+class LevelsTable(TomlTable):
+    """A ``[[factor]]`` or ``[[assumption]]``."""
+
+    name: str
+    path: str
+    """Of the parameter that is varied."""
+    low: Annotated[float | str, Scalar()]
+    high: Annotated[float | str, Scalar()]
+    reference: Annotated[float | str, Scalar()]
+    """The measured value, within low … high."""
+
+
+class ChangeTable(TomlTable):
+    """A ``[[change]]``: parameters that are declared otherwise, for the choice of the estimator."""
+
+    name: str
+    values: Settings
+    """Path → value."""
+
+
+class ScanTable(TomlTable):
+    """One assumption in steps."""
+
+    path: str
+    values: list[Annotated[float | str, Scalar()]]
+
+
+class DesignTable(TomlTable):
+    """The design of a stage and its options."""
+
+    design: str | None = None
+    runs: Annotated[int, Whole(0)] | None = None
+    centre: Annotated[int, Whole(0)] | None = None
+    fold: StrictBool = False
+    generators: Annotated[tuple[str, ...], Names()] = ()
+    fraction: Annotated[int, Whole(0)] = 0
+    alpha: Alpha = "face-centred"
+    seed: Annotated[int, Whole(0)] = 1
+
+
+class StudyFile(TomlTable):
+    """A study file."""
+
+    format: Literal[1]
+    title: str = ""
+    material: str
+    """A shipped material or the path of a material file."""
+    rig: RigTable = Field(default_factory=dict)
+    insertion: InsertionTable = Field(default_factory=dict)
+    numerics: NumericsTable = Field(default_factory=dict)
+    effect: EffectTables = Field(default_factory=dict)
+    target: list[Target] = Field(default_factory=list)
+    """What was measured."""
+    factor: list[LevelsTable] = Field(default_factory=list)
+    """Screened, then calibrated; numbers."""
+    assumption: list[LevelsTable] = Field(default_factory=list)
+    """Screened beside the factors: what nobody published; numbers or named levels."""
+    fallback: Annotated[tuple[str, ...], Names()] = ()
+    """Factors that are calibrated where the screening finds too few, the first ones first."""
+    dummies: Annotated[int, Whole(1)] | None = None
+    """Columns of a Plackett–Burman table that stay free of factors, at least; 3 where nothing is said."""
+    estimators: Annotated[tuple[str, ...], Names()] | None = None
+    """Candidates for the screening's response; the observables of the targets always belong to them."""
+    seed: Annotated[int, Whole(0)] = 1
+    screening: DesignTable = DesignTable()
+    assumptions: DesignTable = DesignTable()
+    surface: DesignTable = DesignTable()
+    change: list[ChangeTable] = Field(default_factory=list)
+    scan: ScanTable | None = None
+    profile: dict[str, Profile] = Field(default_factory=dict)
+    """Name → shapes, mass and numbers of runs."""
+    stage: dict[str, Settings] = Field(default_factory=dict)
+    """Stages of other packages (``doe/stages/stage.py``), each with what it takes."""
 
 
 def load_study(name: str) -> Study:
@@ -264,80 +315,76 @@ def _refuse_without_error(study: Study, profile: Profile) -> None:
         )
 
 
-def study_from(table: Table, path: Path) -> Study:
+def study_from(table: Settings, path: Path) -> Study:
     """Study from a parsed file. Raises ParameterError or StudyFileError."""
     if is_material(table):
         raise StudyFileError(
             f'{path} is a material, not a study; a study names it (material = "{path.name}"), and '
             f"`explorer new study {path.stem}` writes one"
         )
-    only(table, KEYS, "")
-    if table.get("format") != 1:
-        raise StudyFileError(f"format: {table.get('format')!r} is not 1")
-    if "material" not in table:
-        raise ParameterError("material: a shipped material or the path of a material file is needed")
-    scene = with_set_up(load_material(str(table["material"]), relative_to=path.parent), table, path.parent)
-    factors = tuple(_factor(scene, entry) for entry in entries(table, "factor"))
+    file = checked(StudyFile, table)
+    scene = with_set_up(load_material(file.material, relative_to=path.parent), table, path.parent)
+    factors = tuple(_factor(scene, entry) for entry in file.factor)
     scene = with_values(scene, {factor.path: factor.reference for factor in factors})
-    dummies = whole(table["dummies"], "dummies", least=1) if "dummies" in table else None
     if len(factors) < CALIBRATED:
         raise StudyFileError(f"factor: {len(factors)} factors; at least {CALIBRATED} are needed")
-    screening = main_effect_design(table, "screening", "factor", SCREENING, factors, dummies)
-    assumptions = tuple(_levels(scene, entry, "assumption") for entry in entries(table, "assumption"))
+    screening = main_effect_design(file.screening, "screening", "factor", SCREENING, factors, file.dummies)
+    assumptions = tuple(_levels(scene, entry) for entry in file.assumption)
     _refuse_twins([*factors, *assumptions])
-    assumed = main_effect_design(table, "assumptions", "assumption", ASSUMPTIONS, assumptions, None)
-    fallback = names(table.get("fallback", []), "fallback", [factor.name for factor in factors])
-    if len(fallback) < CALIBRATED:
-        raise StudyFileError(f"fallback: {len(fallback)} factors; at least {CALIBRATED} are needed")
-    if not entries(table, "target"):
+    assumed = main_effect_design(file.assumptions, "assumptions", "assumption", ASSUMPTIONS, assumptions, None)
+    for name in file.fallback:
+        one_of(name, "fallback", [factor.name for factor in factors])
+    if len(file.fallback) < CALIBRATED:
+        raise StudyFileError(f"fallback: {len(file.fallback)} factors; at least {CALIBRATED} are needed")
+    if not file.target:
         raise StudyFileError("target: at least one [[target]] is needed")
-    targets = tuple(target_from(entry, observable_names(scene)) for entry in entries(table, "target"))
-    scan_path, scan_values = _scan(scene, section(table, "scan"))
-    wanted = section(table, "profile")
-    profiles = {name: _profile(scene, name, section(wanted, name)) for name in wanted}
     given = observable_names(scene)
-    unasked = [name for name in given if OBSERVABLES[name].estimator]
-    estimators = names(table.get("estimators", unasked), "estimators", given)
+    for target in file.target:
+        one_of(target.observable, "target.observable", given)
+    unasked = tuple(name for name in given if OBSERVABLES[name].estimator)
+    estimators = unasked if file.estimators is None else file.estimators
+    for name in estimators:
+        one_of(name, "estimators", given)
+    scan_path, scan_values = _scan(scene, file.scan)
+    profiles = {name: _profile(scene, name, profile) for name, profile in file.profile.items()}
     return Study(
         name=path.stem,
         file=path,
         scene=scene,
-        targets=targets,
+        targets=tuple(file.target),
         factors=factors,
         assumptions=assumptions,
-        changes=_changes(scene, entries(table, "change")),
+        changes=_changes(scene, file.change),
         scan_path=scan_path,
         scan_values=scan_values,
-        fallback=fallback,
+        fallback=file.fallback,
         profiles=profiles or {"standard": Profile("standard")},
-        estimators=tuple(dict.fromkeys([*(target.observable for target in targets), *estimators])),
-        seed=whole(table.get("seed", 1), "seed", least=0),
+        estimators=tuple(dict.fromkeys([*(target.observable for target in file.target), *estimators])),
+        seed=file.seed,
         screening_design=screening,
         assumption_design=assumed,
-        surface_design=second_order_design(table, "surface", SURFACE, CALIBRATED),
-        further=_further(section(table, "stage")),
+        surface_design=second_order_design(file.surface, "surface", SURFACE, CALIBRATED),
+        further=_further(file.stage),
     )
 
 
-def _further(tables: Table) -> dict[str, Table]:
+def _further(tables: dict[str, Settings]) -> dict[str, Settings]:
     """Tables of stages of other packages; what is in one is for its stage to check."""
     known = plugged_in("stage")
     for name in tables:
         if name not in known:
             allowed = f"allowed: {', '.join(known)}" if known else "no installed package has one"
             raise StudyFileError(f"stage.{name}: no such stage; {allowed}")
-    return {name: section(tables, name) for name in tables}
+    return tables
 
 
-def _levels(scene: Scene, entry: Table, where: str) -> Factor:
-    only(entry, set(Factor.__dataclass_fields__), where)
-    required(entry, ("name", "path", "low", "high", "reference"), where)
-    return Factor(str(entry["name"]), *checked_levels(scene, entry))
+def _levels(scene: Scene, entry: LevelsTable) -> Factor:
+    return Factor(entry.name, *checked_levels(scene, entry.name, entry.path, (entry.low, entry.high, entry.reference)))
 
 
-def _factor(scene: Scene, entry: Table) -> Factor:
+def _factor(scene: Scene, entry: LevelsTable) -> Factor:
     """A factor; it may have to be varied continuously, which named levels cannot."""
-    factor = _levels(scene, entry, "factor")
+    factor = _levels(scene, entry)
     if isinstance(factor.low, str):
         raise StudyFileError(
             f"factor.path: {factor.path} of {factor.name} has named levels, which only an [[assumption]] may have; "
@@ -356,40 +403,36 @@ def _refuse_twins(factors: list[Factor]) -> None:
             seen.add(value)
 
 
-def _scan(scene: Scene, scan: Table) -> tuple[str | None, tuple[float, ...]]:
+def _scan(scene: Scene, scan: ScanTable | None) -> tuple[str | None, tuple[float, ...]]:
     """(path, values [SI]) of the scan; (None, ()) without one."""
-    if not scan:
+    if scan is None:
         return None, ()
-    only(scan, {"path", "values"}, "scan")
-    for key in ("path", "values"):
-        if not scan.get(key):
-            raise StudyFileError(f"scan.{key}: missing; a scan needs a path and values")
-    path = canonical(scene, str(scan["path"]))
-    if not parameters(scene)[path].is_number or not isinstance(scan["values"], list):
-        raise StudyFileError(f"scan: {path} over {scan['values']!r}; a list of numbers is needed")
-    values = tuple(float(parameters(scene)[path].check(value)) for value in scan["values"])
+    path = canonical(scene, scan.path)
+    parameter = parameters(scene)[path]
+    if not parameter.is_number or not scan.values:
+        raise StudyFileError(f"scan.values: {path} over {scan.values!r}; a list of numbers is needed")
+    values = tuple(float(parameter.check(value)) for value in scan.values)
     for value in values:
         with_values(scene, {path: value})
     return path, values
 
 
-def _changes(scene: Scene, changes: list[Table]) -> dict[str, Values]:
+def _changes(scene: Scene, changes: list[ChangeTable]) -> dict[str, Values]:
     found: dict[str, Values] = {}
     for entry in changes:
-        only(entry, {"name", "values"}, "change")
-        required(entry, ("name", "values"), "change")
-        if str(entry["name"]) in found:
-            raise StudyFileError(f"change.name: {entry['name']!r} stands twice")
-        values = section(entry, "values")
-        if not values:
-            raise StudyFileError(f"change.values: {entry['name']!r} changes nothing; a path and its value are needed")
-        with_values(scene, values)
-        found[str(entry["name"])] = dict(values)
+        if entry.name in found:
+            raise StudyFileError(f"change.name: {entry.name!r} stands twice")
+        if not entry.values:
+            raise StudyFileError(f"change.values: {entry.name!r} changes nothing; a path and its value are needed")
+        with_values(scene, entry.values)
+        found[entry.name] = dict(entry.values)
     return found
 
 
-def _profile(scene: Scene, name: str, entry: Table) -> Profile:
-    resolutions = parameters(scene)["body.spheres"].choices
-    spheres = one_of(entry.get("spheres", "standard"), f"profile.{name}.spheres", resolutions)
-    mass = parse_quantity(entry.get("mass", 0.03), "kg", f"profile.{name}.mass")
-    return profile_from(name, entry, spheres, mass)
+def _profile(scene: Scene, name: str, profile: Profile) -> Profile:
+    if not NAME.fullmatch(name):
+        raise StudyFileError(f"profile: {name!r} is no name; allowed: 1 to 60 characters, no / and no \\")
+    if profile.name:
+        raise StudyFileError(f"profile.{name}.name: unknown key; the name stands in [profile.{name}]")
+    one_of(profile.spheres, f"profile.{name}.spheres", parameters(scene)["body.spheres"].choices)
+    return replace(profile, name=name)

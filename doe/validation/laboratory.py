@@ -1,26 +1,18 @@
 """A made-up laboratory: what it declares, and the folder of data that it hands out.
 
-Its file is written as ``measurement.toml`` (``doe/measurement/load.py``), without data, and with one table more:
-
-    [laboratory]
-    readings = ["angle_of_repose_deg", …]   numbers that it reads off every pour
-    reference = "reference.npz"             pours that tell how strong an effect is, as `explorer limit` writes them:
-                                            beside the file, or shipped; without it the campaign makes them first
-    [laboratory.scanner]                    ranges that a set's scanner is drawn from (`scanner.py`), each optional
-    grid = ["0.5mm", "1mm"]
-    noise = ["0.05mm", "0.3mm"]
-    axis_off = ["1mm", "2mm"]
-
-Beside the table of numbers it hands out scans of its piles, made by a scanner of its own.
+Its file is written as ``measurement.toml`` (``doe/measurement/load.py``), without data, and with one table more,
+``[laboratory]`` (:class:`LaboratoryTable`). Beside the table of numbers it hands out scans of its piles, made by a
+scanner of its own.
 """
 
+import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -28,15 +20,25 @@ import tomli_w
 
 from doe.errors import MeasurementError
 from doe.measurement import Measurement, load_measurement
-from doe.studies.study_table import Table, entries, names, only, section
 from doe.validation.scanner import Scanner, ScannerRanges, write_scan
-from solver import ParameterError, all_names, asset_path, parse_quantity, read_toml
+from solver import Names, ParameterError, Settings, TomlTable, all_names, asset_path, checked, one_of, read_toml
 
 Array = npt.NDArray[np.float64]
 
 TREFOILS = Path(__file__).parent / "laboratories/trefoils/laboratory.toml"
 """The shipped one."""
-KEYS = ("readings", "reference", "scanner")
+
+
+class LaboratoryTable(TomlTable):
+    """``[laboratory]``: what is read off every pour, and by what."""
+
+    readings: Annotated[tuple[str, ...], Names()]
+    """Numbers that it reads off every pour."""
+    reference: str | None = None
+    """Pours that tell how strong an effect is, as ``explorer limit`` writes them: beside the file, or shipped; without
+    it the campaign makes them first."""
+    scanner: ScannerRanges = ScannerRanges()
+
 
 Reading = Mapping[str, float]
 """Observable → value of one pour; NaN where it cannot be read."""
@@ -70,7 +72,7 @@ class Laboratory:
     """
 
     path: Path
-    table: Table
+    table: Settings
     readings: tuple[str, ...]
     scanner: ScannerRanges
     reference: Path | None
@@ -82,7 +84,7 @@ class Laboratory:
         with TemporaryDirectory() as folder:
             try:
                 self.write(
-                    Path(folder), {str(one.get("name")): placeholders for one in entries(self.table, "condition")}
+                    Path(folder), {str(one.get("name")): placeholders for one in self.table.get("condition", [])}
                 )
                 return load_measurement(Path(folder))
             except MeasurementError as error:
@@ -90,13 +92,13 @@ class Laboratory:
                 text = str(error).replace(str(Path(folder) / "measurement.toml"), str(self.path))
                 raise MeasurementError(text) from None
 
-    def write(self, folder: Path, measured: Mapping[str, Sequence[Reading]], scan: Table | None = None) -> None:
+    def write(self, folder: Path, measured: Mapping[str, Sequence[Reading]], scan: Settings | None = None) -> None:
         """Write a data set into an existing ``folder``.
 
         ``measured``: condition → readings of its pours. ``scan``: what stands in every condition of its scans.
         """
         conditions: list[dict[str, Any]] = []
-        for entry in entries(self.table, "condition"):
+        for entry in self.table.get("condition", []):
             if (name := str(entry.get("name"))) in measured:
                 conditions.append({**entry, "data": f"{name}.csv"} | ({"scan": scan} if scan else {}))
         table = {**self.table, "material": str(self._material()), "condition": conditions}
@@ -139,45 +141,27 @@ def read_laboratory(path: Path) -> Laboratory:
         raise MeasurementError(f"{path}: no such file")
     try:
         table = read_toml(path)
-        own = section(table, "laboratory")
-        only(own, KEYS, "laboratory")
-        if "readings" not in own:
-            raise MeasurementError(f"laboratory.readings: missing; allowed: some of {', '.join(all_names())}")
-        readings = names(own["readings"], "laboratory.readings", all_names())
-        for entry in entries(table, "condition"):
+        own = checked(LaboratoryTable, table.get("laboratory", {}), "laboratory")
+        for name in own.readings:
+            one_of(name, "laboratory.readings", all_names())
+        for entry in table.get("condition", []):
             if "data" in entry:
                 raise MeasurementError(
                     f"condition.data: {entry['data']!r}; a laboratory has no data before it is asked for some"
                 )
-        scanner = _ranges(section(own, "scanner"))
-        reference = _reference(own.get("reference"), path.parent)
+        _check_ranges(own.scanner)
+        reference = None if own.reference is None else asset_path("validation", own.reference, relative_to=path.parent)
     except (MeasurementError, ParameterError, ValueError) as error:
         text = str(error)
         raise MeasurementError(text if text.startswith(str(path)) else f"{path}: {text}") from None
     return Laboratory(
-        path, {key: value for key, value in table.items() if key != "laboratory"}, readings, scanner, reference
+        path, {key: value for key, value in table.items() if key != "laboratory"}, own.readings, own.scanner, reference
     )
 
 
-def _reference(name: object, folder: Path) -> Path | None:
-    return None if name is None else asset_path("validation", str(name), relative_to=folder)
-
-
-def _ranges(table: Table) -> ScannerRanges:
-    only(table, ("grid", "noise", "axis_off"), "laboratory.scanner")
-    usual = ScannerRanges()
-    found: dict[str, tuple[float, ...]] = {}
-    for key in ("grid", "noise", "axis_off"):
-        given = table.get(key)
-        if given is None:
-            found[key] = getattr(usual, key)
-            continue
-        where = f"laboratory.scanner.{key}"
-        if not isinstance(given, list) or not given or (key != "grid" and len(given) != 2):
-            allowed = "a list of resolutions" if key == "grid" else "[least, most]"
-            raise MeasurementError(f"{where}: {given!r}; allowed: {allowed}")
-        values = tuple(parse_quantity(one, "m", where) for one in given)
-        if min(values) < 0.0 or (key == "grid" and min(values) == 0.0) or list(values) != sorted(values):
-            raise MeasurementError(f"{where}: {given!r}; allowed: lengths from the smallest to the largest")
-        found[key] = values
-    return ScannerRanges(found["grid"], *(((one[0], one[1])) for one in (found["noise"], found["axis_off"])))
+def _check_ranges(ranges: ScannerRanges) -> None:
+    for key, values in dataclasses.asdict(ranges).items():
+        if not values or min(values) < 0.0 or (key == "grid" and min(values) == 0.0) or list(values) != sorted(values):
+            raise MeasurementError(
+                f"laboratory.scanner.{key}: {list(values)}; allowed: lengths from the smallest to the largest"
+            )

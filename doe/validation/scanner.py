@@ -11,10 +11,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import ConfigDict
+
+from solver import TABLE, Vector
 
 Array = npt.NDArray[np.float64]
 
@@ -30,21 +33,16 @@ FARTHEST = 0.15
 
 @dataclass(frozen=True)
 class ScannerRanges:
-    """What scanners may be [m].
+    """What scanners may be: ``[laboratory.scanner]``, lengths in metres or with a unit."""
 
-    Attributes
-    ----------
-    grid
-        Resolutions that one may buy.
-    noise
-        Range of the standard deviation of a height.
-    axis_off
-        Range of what the axis is off, in any direction.
-    """
+    __pydantic_config__: ClassVar[ConfigDict] = TABLE
 
-    grid: tuple[float, ...] = (0.5e-3, 0.75e-3, 1.0e-3, 1.5e-3, 2.0e-3)
-    noise: tuple[float, float] = (0.05e-3, 0.3e-3)
-    axis_off: tuple[float, float] = (1.0e-3, 2.0e-3)
+    grid: Annotated[tuple[float, ...], Vector(unit="m")] = (0.5e-3, 0.75e-3, 1.0e-3, 1.5e-3, 2.0e-3)
+    """Resolutions that one may buy."""
+    noise: Annotated[tuple[float, float], Vector(2, "m")] = (0.05e-3, 0.3e-3)
+    """Range of the standard deviation of a height."""
+    axis_off: Annotated[tuple[float, float], Vector(2, "m")] = (1.0e-3, 2.0e-3)
+    """Range of what the axis is off, in any direction."""
 
 
 @dataclass(frozen=True)

@@ -1,36 +1,23 @@
-"""The factors file of a design, TOML.
-
-title = "…"                       what is studied
-responses = ["strength_MPa"]      columns to fill in (one called "response" if not given)
-replicates, centre, seed, first_seed    defaults of the options of `explorer design`
-
-[[factor]]
-name = "temperature"              letters, digits, _ and -
-low, high                         the range; in the design −1 and +1
-unit = "°C"                       shown, never converted
-reference                         the measured or present value, near which a solution is looked for; by default the
-                                  middle
-
-Names that the command line offers: axial points, orders of the model.
-"""
+"""The factors file of a design (:class:`FactorsTable`), and names that the command line offers beside it."""
 
 from __future__ import annotations
 
+import math
 import re
-import tomllib
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from doe.analysis.steepest_ascent import Region
 from doe.designs import factor_letters
 from doe.errors import StudyFileError
 from doe.record import Record
-from doe.studies.study_table import entries, number, only, required, whole
 from explorer.errors import CommandError
+from solver import Like, Names, Number, ParameterError, Settings, TomlTable, Whole, checked, read_toml
 
 NAME = re.compile(r"[^\W\d][\w-]{0,59}")
 
@@ -42,9 +29,33 @@ RESERVED = ("row", "replicate", "run", "seed")
 
 MOST_FACTORS = 47
 
-TOP_KEYS = ("title", "responses", "replicates", "centre", "seed", "first_seed", "factor")
 
-FACTOR_KEYS = ("name", "low", "high", "unit", "reference")
+class FactorTable(TomlTable):
+    """A ``[[factor]]``."""
+
+    name: str
+    """Letters, digits, _ and -."""
+    low: Annotated[float, Number()]
+    high: Annotated[float, Number()]
+    """In the design low is −1 and high +1."""
+    unit: str = ""
+    """Shown, never converted."""
+    reference: Annotated[float, Number()] | None = None
+    """The measured or present value, near which a solution is looked for; by default the middle."""
+
+
+class FactorsTable(TomlTable):
+    """The file."""
+
+    title: str = Field("", max_length=200)
+    """What is studied."""
+    responses: Annotated[tuple[str, ...], Names()] = ("response",)
+    """Columns to fill in."""
+    replicates: Annotated[int, Whole(1)] | None = None
+    centre: Annotated[int, Whole(0)] | None = None
+    seed: Annotated[int, Whole(0)] | None = None
+    first_seed: Annotated[int, Whole(0)] | None = None
+    factor: list[Annotated[Settings, Like(FactorTable)]] = Field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -85,34 +96,34 @@ def region_of(factors: tuple[Factor, ...]) -> Region:
 def read_factors(path: Path) -> FactorsFile:
     """Read a factors file; raises CommandError with one line: file, key, value, what is allowed."""
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except UnicodeDecodeError:
-        raise CommandError(f"{path}: is not a text file in UTF-8") from None
-    except tomllib.TOMLDecodeError as error:
-        raise CommandError(f"{path}: not TOML: {error}") from None
+        table = read_toml(path)
+    except ParameterError as error:
+        raise CommandError(str(error)) from None
     try:
-        return _checked(table)
-    except StudyFileError as error:
+        return _factors_file(checked(FactorsTable, table))
+    except (ParameterError, StudyFileError) as error:
         raise CommandError(f"{path}: {error}") from None
 
 
-def make_factor(name: Any, low: Any, high: Any, unit: Any, reference: Any, where: str) -> Factor:
+def make_factor(name: str, low: float, high: float, unit: str, reference: float | None, where: str) -> Factor:
     """A checked factor; raises StudyFileError."""
     checked_name(name, f"{where}.name")
-    if not isinstance(unit, str) or (unit and not UNIT.fullmatch(unit)):
+    if unit and not UNIT.fullmatch(unit):
         raise StudyFileError(f"{where}.unit: {unit!r}; allowed: up to 20 characters without | , ; [ ] or quotes")
-    least, most = number(low, f"{where}.low"), number(high, f"{where}.high")
-    if not least < most:
-        raise StudyFileError(f"{where}.high: {most:g} is not above low {least:g} ({name})")
-    if not np.isfinite(most - least):
-        raise StudyFileError(f"{where}: the range {least:g} … {most:g} of {name} is too wide to be a number")
-    middle = least + (most - least) / 2 if reference is None else number(reference, f"{where}.reference")
-    return Factor(name, least, most, "" if unit == "1" else unit, middle)
+    for key, value in (("low", low), ("high", high), ("reference", reference)):
+        if value is not None and not math.isfinite(value):
+            raise StudyFileError(f"{where}.{key}: {value!r} is not a number")
+    if not low < high:
+        raise StudyFileError(f"{where}.high: {high:g} is not above low {low:g} ({name})")
+    if not math.isfinite(high - low):
+        raise StudyFileError(f"{where}: the range {low:g} … {high:g} of {name} is too wide to be a number")
+    middle = low + (high - low) / 2 if reference is None else reference
+    return Factor(name, low, high, "" if unit == "1" else unit, middle)
 
 
-def checked_name(name: Any, where: str) -> str:
+def checked_name(name: str, where: str) -> str:
     """A name that can head a column; raises StudyFileError."""
-    if not isinstance(name, str) or not NAME.fullmatch(name):
+    if not NAME.fullmatch(name):
         raise StudyFileError(
             f"{where}: {name!r}; allowed: up to 60 letters, digits, _ and -, beginning with a letter or _"
         )
@@ -129,33 +140,20 @@ def no_repeats(factors: tuple[Factor, ...], responses: tuple[str, ...]) -> None:
             raise StudyFileError(f"name {name!r} stands twice; allowed: each column once")
 
 
-def _checked(table: dict[str, Any]) -> FactorsFile:
-    only(table, TOP_KEYS, "")
-    title = table.get("title", "")
-    if not isinstance(title, str) or len(title) > 200:
-        raise StudyFileError(f"title: {title!r}; allowed: a text of up to 200 characters")
-    found = entries(table, "factor")
-    if not 1 <= len(found) <= MOST_FACTORS:
-        raise StudyFileError(f"[[factor]]: {len(found)} of them; allowed: 1 to {MOST_FACTORS}")
-    factors = tuple(_factor(entry, k + 1) for k, entry in enumerate(found))
-    given = table.get("responses", ["response"])
-    if not isinstance(given, list) or not given:
-        raise StudyFileError(f"responses: {given!r}; allowed: a list of names")
-    responses = tuple(checked_name(name, "responses") for name in given)
+def _factors_file(table: FactorsTable) -> FactorsFile:
+    if not 1 <= len(table.factor) <= MOST_FACTORS:
+        raise StudyFileError(f"[[factor]]: {len(table.factor)} of them; allowed: 1 to {MOST_FACTORS}")
+    entries = [checked(FactorTable, entry, f"factor[{k}]") for k, entry in enumerate(table.factor, start=1)]
+    factors = tuple(
+        make_factor(one.name, one.low, one.high, one.unit, one.reference, f"factor[{k}]")
+        for k, one in enumerate(entries, start=1)
+    )
+    if not table.responses:
+        raise StudyFileError("responses: []; allowed: a list of names")
+    responses = tuple(checked_name(name, "responses") for name in table.responses)
     no_repeats(factors, responses)
-    optional = {
-        key: whole(table[key], key, least)
-        for key, least in (("replicates", 1), ("centre", 0), ("seed", 0), ("first_seed", 0))
-        if key in table
-    }
-    return FactorsFile(" ".join(title.split()), factors, responses, **optional)
-
-
-def _factor(entry: dict[str, Any], position: int) -> Factor:
-    where = f"factor[{position}]"
-    only(entry, FACTOR_KEYS, where)
-    required(entry, ("name", "low", "high"), where)
-    return make_factor(entry["name"], entry["low"], entry["high"], entry.get("unit", ""), entry.get("reference"), where)
+    title = " ".join(table.title.split())
+    return FactorsFile(title, factors, responses, table.replicates, table.centre, table.seed, table.first_seed)
 
 
 class Alpha(StrEnum):

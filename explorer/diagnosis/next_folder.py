@@ -24,19 +24,18 @@ from doe.diagnose.next_experiment import SURE
 from doe.diagnose.result import BASE, Suggestion
 from doe.errors import MeasurementError
 from doe.measurement.condition_table import AS_THEY_ARE, FEED_SLACK
-from doe.measurement.load import FILE, load_measurement
+from doe.measurement.load import FILE, MeasurementFile, load_measurement
 from doe.measurement.long_form import COLUMNS, MOST_BYTES
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.parameter_table import read_parameters
 from doe.record import plain
-from doe.studies.study_table import Table, entries, section
 from doe.table_file import read_table, read_text
 from explorer.errors import CommandError
 from explorer.files.output_file import write_whole
 from explorer.report.diagnosis.wording import spelled
 from explorer.scene.text import toml_key, toml_value
 from explorer.units import code, enumeration, number, parameter_label, parameter_value, percent
-from solver import EFFECTS, Scene, named, parameters, parse_quantity, pour_rig, read_toml, value
+from solver import EFFECTS, Scene, Settings, checked, named, parameters, parse_quantity, pour_rig, read_toml, value
 from solver.rigs.surface import Pose, Revolved
 
 ORDER, SCHEMA = "follow_up.json", 1
@@ -79,7 +78,7 @@ def write_next(folder: Path, source: Path, measurement: Measurement, suggestion:
         raise CommandError(f"{folder}: is not empty; allowed: a folder that is new or empty")
     table = read_toml(source / FILE)
     condition = next(one for one in measurement.conditions if one.name == suggestion.condition)
-    given = next(one for one in entries(table, "condition") if one["name"] == condition.name)
+    given = next(one for one in table["condition"] if one["name"] == condition.name)
     name, change = _free_name(suggestion, measurement), suggestion.experiment.name
     changed = as_suggested(condition, suggestion).scene
     entry = _changed_entry(given, name, measurement, suggestion, changed)
@@ -157,13 +156,13 @@ def _free_name(suggestion: Suggestion, measurement: Measurement) -> str:
 
 
 def _changed_entry(
-    given: Table, name: str, measurement: Measurement, suggestion: Suggestion, changed: Scene
+    given: Settings, name: str, measurement: Measurement, suggestion: Suggestion, changed: Scene
 ) -> dict[str, Any]:
     entry = {key: item for key, item in given.items() if key not in DROPPED}
     entry |= {"name": name, "role": "fit", "data": f"{name}.csv"}
     if suggestion.turned:
         entry["turned"] = not entry.get("turned", False)
-    rig, insertion = dict(section(given, "rig_parameters")), dict(section(given, "insertion"))
+    rig, insertion = dict(given.get("rig_parameters", {})), dict(given.get("insertion", {}))
     calibrated = {parameter.path for parameter in measurement.parameters}
     for path, new in suggestion.values.items():
         kind, _, key = path.partition(".")
@@ -202,11 +201,13 @@ def _neighbours(x: float) -> tuple[float, float, float]:
     return x, math.nextafter(x, -math.inf), math.nextafter(x, math.inf)
 
 
-def _parameters(table: Table, measurement: Measurement) -> dict[str, Any]:
+def _parameters(table: Settings, measurement: Measurement) -> dict[str, Any]:
     """As stated, but for a range that another condition's rig has narrowed: read alone it would stay wide, and a
     diagnosis takes no follow-up of other parameters."""
-    stated = section(table, "parameters")
-    read, _ = read_parameters(stated, [condition.scene for condition in measurement.conditions])
+    stated = table.get("parameters", {})
+    read, _ = read_parameters(
+        checked(MeasurementFile, table).parameters, [condition.scene for condition in measurement.conditions]
+    )
     rows = zip(stated.items(), read, measurement.parameters, strict=True)
     return {
         path: entry if before == after else {**entry, "low": after.low, "high": after.high}
@@ -214,9 +215,9 @@ def _parameters(table: Table, measurement: Measurement) -> dict[str, Any]:
     }
 
 
-def _uncertainty(table: Table, condition: Condition) -> dict[str, Any]:
+def _uncertainty(table: Settings, condition: Condition) -> dict[str, Any]:
     """As stated; that of a mean of n pours becomes that of one pour, √n times as much."""
-    stated = section(table, "uncertainty")
+    stated = table.get("uncertainty", {})
     if condition.mean_of == 1:
         return stated
     known = {name: found for name in stated if (found := named(name))}
@@ -250,14 +251,14 @@ def _copy_toml(path: Path, to: Path) -> None:
     write_whole(to, text)
 
 
-def _named_files(table: Table) -> Iterator[tuple[str, bool]]:
+def _named_files(table: Settings) -> Iterator[tuple[str, bool]]:
     """Files that a material or body file names, and whether each is a body file."""
-    for body in entries(table, "body"):
+    for body in table.get("body", []):
         shape = body.get("shape")
         for holder, key in ((body, "file"), (body, "mesh"), (shape, "mesh")):
             if isinstance(holder, dict) and key in holder:
                 yield str(holder[key]), key == "file"
-    if "mesh" in section(table, "rig"):
+    if "mesh" in table.get("rig", {}):
         yield str(table["rig"]["mesh"]), False
 
 

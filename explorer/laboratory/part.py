@@ -1,9 +1,4 @@
-"""Part of a material: measured parameters with where they come from, as `explorer lab --out` writes it.
-
-format = 1
-[materials.<name>]  [pair.<a>.<b>]  [[body]] name and mass_fraction, or size_distribution and size_spread
-                             as in a material file; only what was measured
-[measured.….<parameter>]     value, unit, n, sd, low_95, high_95, formula, source, sha256: the same number's origin
+"""Part of a material (:class:`PartFile`): measured parameters with their origin, as `explorer lab --out` writes it.
 
 `explorer new material NAME --like MATERIAL --part FILE` lays parts over a material; by hand, the tables can be copied
 into a material file as they are, ``[measured]`` included.
@@ -21,9 +16,9 @@ import math
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from solver.toml_table import as_table, list_at, refuse_unknown
+from pydantic import Field
 
 from doe.laboratory import Derived, Estimate, LabResult
 from doe.laboratory.result import CONDITIONS
@@ -34,8 +29,7 @@ from explorer.scene.starter_files import material_text, new_path
 from explorer.scene.text import material_toml, toml_key, toml_value
 from solver import ParameterError, Scene, asset_path, load_material, read_toml, with_values
 from solver.scenes.material_file import scene_from
-
-KEYS = ("format", "materials", "pair", "body", "measured")
+from solver.toml_file import Number, Scalar, TomlTable, checked
 
 SIZES = ("size_distribution", "size_spread")
 
@@ -46,6 +40,27 @@ SCATTER = "log_normal"
 ELASTIC = ("youngs_modulus", "shear_modulus", "poisson_ratio")
 
 Table = dict[str, Any]
+
+
+class PartBody(TomlTable):
+    """What is measured of a body."""
+
+    name: str
+    mass_fraction: Annotated[float, Number(least=0.0)] | None = None
+    size_distribution: str | None = None
+    size_spread: Annotated[float | str, Scalar()] | None = None
+
+
+class PartFile(TomlTable):
+    """A part: tables as in a material file, with only what was measured."""
+
+    format: Literal[1]
+    materials: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    pair: dict[str, dict[str, dict[str, Any]]] = Field(default_factory=dict)
+    body: list[PartBody] = Field(default_factory=list)
+    """Names, each with a mass_fraction, or with size_distribution and size_spread."""
+    measured: dict[str, Any] = Field(default_factory=dict)
+    """The origin of the same numbers: value, unit, n, sd, low_95, high_95, formula, source, sha256."""
 
 
 def part_table(result: LabResult) -> Table:
@@ -82,25 +97,27 @@ def measured_text(measured: Mapping[str, Any]) -> str:
 def read_part(path: Path) -> Table:
     """The tables of a part; ParameterError in one line for a bad one."""
     table = read_toml(path)
-    refuse_unknown(table, KEYS, f"{path}: ")
-    if table.get("format") != 1:
-        raise ParameterError(f"{path}: format: {table.get('format')!r} is not 1")
+    try:
+        checked(PartFile, table)
+    except ParameterError as error:
+        raise ParameterError(f"{path}: {error}") from None
     return table
 
 
 def with_part(scene: Scene, table: Table) -> Scene:
     """``scene`` with the parameters of a part; they are no longer assumed. ParameterError where they do not fit."""
+    part = checked(PartFile, table)
     settings: dict[str, Any] = {}
     struck: set[str] = set()
-    for name, entry in as_table(table.get("materials", {}), "materials").items():
-        settings |= _of_material(scene, name, as_table(entry, f"materials.{name}"))
+    for name, entry in part.materials.items():
+        settings |= _of_material(scene, name, entry)
         struck |= {f"materials.{name}.{key}" for key in entry}
-    for a, partners in as_table(table.get("pair", {}), "pair").items():
-        for b, entry in as_table(partners, f"pair.{a}").items():
-            for key, value in as_table(entry, f"pair.{a}.{b}").items():
+    for a, partners in part.pair.items():
+        for b, entry in partners.items():
+            for key, value in entry.items():
                 settings[f"pair.{a}.{b}.{key}"] = value
                 struck |= {f"pair.{a}.{b}.{key}", f"pair.{b}.{a}.{key}"}
-    of_bodies = _of_bodies(list_at(table, "body"))
+    of_bodies = _of_bodies(part.body)
     fractions = {path.split(".")[1]: value for path, value in of_bodies.items() if path.endswith(".mass_fraction")}
     settings |= {path: value for path, value in of_bodies.items() if not path.endswith(".mass_fraction")}
     struck |= set(of_bodies)
@@ -138,18 +155,16 @@ def _number(value: Any, where: str) -> float:
     return float(value)
 
 
-def _of_bodies(bodies: list[Any]) -> dict[str, Any]:
+def _of_bodies(bodies: Sequence[PartBody]) -> dict[str, Any]:
     """Parameter path → value of everything that is said of bodies."""
     found: dict[str, Any] = {}
-    for entry in bodies:
-        body = as_table(entry, "body")
-        refuse_unknown(body, ("name", "mass_fraction", *SIZES), "body.")
-        name, fraction = body.get("name"), body.get("mass_fraction")
-        if not isinstance(name, str) or len(body) == 1:
-            raise ParameterError(f"body: {body}; allowed: a name, and a mass_fraction or {' and '.join(SIZES)}")
-        if "mass_fraction" in body and (not isinstance(fraction, int | float) or not 0.0 <= fraction <= 1.0):
-            raise ParameterError(f"body: {body}; allowed: a name and a mass_fraction of 0 … 1")
-        found |= {f"body.{name}.{key}": value for key, value in body.items() if key != "name"}
+    for body in bodies:
+        said = body.model_dump(exclude={"name"}, exclude_unset=True)
+        if not said:
+            raise ParameterError(f"body: {body.name}; allowed: a mass_fraction, or {' and '.join(SIZES)} beside a name")
+        if body.mass_fraction is not None and body.mass_fraction > 1.0:
+            raise ParameterError(f"body: {body.name}: mass_fraction {body.mass_fraction:g}; allowed: 0 … 1")
+        found |= {f"body.{body.name}.{key}": value for key, value in said.items()}
     return found
 
 

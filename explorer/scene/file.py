@@ -22,7 +22,7 @@ from explorer.report.identified import settings
 from solver import ParameterError, Scene, is_material, load_material, read_toml, with_set_up, with_values
 from solver.assets import AssetKind, AssetNotFoundError, asset_path, shipped_assets
 from solver.rigs import BENCH_RIGS, RIGS
-from solver.scenes.material_file import TABLES
+from solver.scenes.material_file import SET_UP
 from solver.scenes.material_file import with_settings as with_values_and_rig
 from solver.scenes.scene import with_rig
 from solver.shapes.solid import ShapeError
@@ -35,7 +35,7 @@ SHIPPED: tuple[AssetKind, ...] = ("materials", "studies", "benchmarks")
 
 """Where a shipped name is looked for, in this order."""
 
-SET_UP_KEYS = ("format", "title", "material", *TABLES)
+SET_UP_KEYS = ("format", "title", "material", *SET_UP)
 
 SOURCES = (*RIGS, *BENCH_RIGS)
 

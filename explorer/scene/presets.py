@@ -1,15 +1,4 @@
-"""Named sets of parameter values: shipped ones, and those that a user has saved.
-
-A preset is a TOML file:
-
-    format = 1
-    title = "Frictionless"
-    about = "What it is for, in a sentence."
-    [values]
-    "pair.*.*.static_friction" = 0.0        # * stands for any one name; values in SI or with a unit
-
-Where the page keeps what a person made with it.
-"""
+"""Named sets of parameter values (:class:`PresetFile`): shipped ones, and those that a user has saved."""
 
 from __future__ import annotations
 
@@ -18,10 +7,9 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from platformdirs import user_data_path
-from solver.toml_table import as_table, read_toml, refuse_unknown, table_at
 
 from explorer.errors import CommandError
 from explorer.files.output_file import write_whole
@@ -29,8 +17,7 @@ from explorer.scene.source import Difference
 from solver.assets import asset_path, shipped_assets
 from solver.params import ParameterError
 from solver.scenes.scene import Scene, canonical, parameters
-
-KEYS = ("format", "title", "about", "values")
+from solver.toml_file import TomlTable, checked, read_toml
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _-]{0,39}")
 
@@ -39,6 +26,17 @@ OWN_MARK = " (own)"
 """Behind the name of a user's preset in a list."""
 
 MOST_BYTES = 100_000
+
+
+class PresetFile(TomlTable):
+    """A preset as a TOML file."""
+
+    format: Literal[1]
+    title: str | None = None
+    about: str = ""
+    """What it is for, in a sentence."""
+    values: dict[str, Any]
+    """Path → value in SI or with a unit, such as "pair.*.*.static_friction" = 0.0, where * is any one name."""
 
 
 @dataclass(frozen=True)
@@ -70,12 +68,10 @@ def read_preset(path: Path) -> Preset:
         raise ParameterError(f"{path}: {path.stat().st_size} bytes; allowed: up to {MOST_BYTES}")
     table = read_toml(path)
     try:
-        refuse_unknown(table, KEYS, "")
-        if table.get("format") != 1:
-            raise ParameterError(f"format: {table.get('format')!r} is not 1")
-        return Preset(str(table.get("title", path.stem)), str(table.get("about", "")), _flat(table_at(table, "values")))
+        file = checked(PresetFile, table)
     except ParameterError as error:
         raise ParameterError(f"{path}: {error}") from None
+    return Preset(file.title or path.stem, file.about, _flat(file.values))
 
 
 def preset_values(preset: Preset, scene: Scene) -> dict[str, float | str]:
@@ -113,7 +109,7 @@ def save_preset(name: str, folder: Path, changed: Iterable[Difference]) -> Path:
 def _flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     """Entries by path, whether a path is one quoted key or tables within tables."""
     found: dict[str, Any] = {}
-    for key, entry in as_table(table, prefix or "values").items():
+    for key, entry in table.items():
         path = f"{prefix}{key}"
         found |= _flat(entry, f"{path}.") if isinstance(entry, dict) else {path: entry}
     return found

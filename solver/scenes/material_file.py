@@ -45,9 +45,9 @@ from solver.toml_file import (
     Number,
     Quantity,
     Rows,
+    Scalar,
     Shaped,
     TomlTable,
-    Value,
     Vector,
     checked,
     one_of,
@@ -116,16 +116,16 @@ class BodyTable(TomlTable):
     """By default that of the body's name."""
     mass_fraction: Annotated[float, Quantity("1")] = 1.0
     """Share of the mass, 0 … 1."""
-    size_distribution: Annotated[str, Value()] = "none"
+    size_distribution: Annotated[str, Scalar()] = "none"
     """How the sizes scatter: none, uniform or log_normal."""
-    size_spread: Annotated[float | str, Value()] = 0.0
+    size_spread: Annotated[float | str, Scalar()] = 0.0
     size: SizeTable | None = None
     """Measured diameters, instead of distribution and spread."""
     file: str | None = None
     """A file with one such [[body]], as ``explorer shape`` writes it; keys that stand beside it count before its."""
     shape: Settings | None = None
     """The solid: { ellipsoid = […] }, cylinder, box, sphere, or { mesh = "grain.stl", unit = "mm" }."""
-    spheres: Annotated[int | str, Value()] = "standard"
+    spheres: Annotated[int | str, Scalar()] = "standard"
     """How many spheres stand for the solid: coarse, standard, fine or a number."""
     sphere_centres: Annotated[tuple[tuple[float, float, float], ...], Rows(3, "m")] = ()
     sphere_radii: Annotated[tuple[float, ...], Vector(unit="m", above=0.0)] = ()

@@ -108,7 +108,7 @@ def test_the_result_says_which_designs_were_run():
         ({"screening": {"design": "taguchi"}}, r"screening\.design: 'taguchi' is not one of plackett-burman, def"),
         ({"screening": {"runs": 24}}, r"24 in the plackett-burman design of \[screening\]: runs 24: has 23 columns"),
         ({"screening": {"runs": "28"}}, r"screening\.runs: '28' is not a whole number"),
-        ({"screening": {"fold": 1}}, r"screening\.fold: 1 is neither true nor false"),
+        ({"screening": {"fold": 1}}, r"screening\.fold: 1; allowed: true or false"),
         ({"screening": {"design": "lhs", "fold": True}}, r"screening\.fold: unknown key; allowed: design, runs, seed"),
         ({"screening": {"design": "lhs", "runs": 20}}, "lhs cannot tell the main effects of 24 factors apart"),
         ({"assumptions": {"runs": 8}}, "6 assumptions with 3 dummies; allowed: up to 4 in a 8-run"),
@@ -120,12 +120,12 @@ def test_the_result_says_which_designs_were_run():
         ({"surface": {"design": "definitive-screening"}}, r"the 9 rows of definitive-screening cannot tell apart"),
         (
             {"surface": {"design": "factorial", "generators": "C=AB"}},
-            r'surface\.generators: a list such as \["D=ABC"\]',
+            r"surface\.generators: .*; allowed: a list of names",
         ),
     ],
 )
 def test_a_design_that_cannot_do_is_refused_with_its_key(tables, message):
-    with pytest.raises(StudyFileError, match=message):
+    with pytest.raises((ParameterError, StudyFileError), match=message):
         study_with(**tables)
 
 

@@ -250,7 +250,7 @@ def test_a_response_that_would_be_markup_is_refused(tmp_path):
         ('responses = ["strength", "slump"]', 'responses = ["time"]', "'time' stands twice"),
         ('title = "Cement"', "title = 3", "title: 3"),
         ('title = "Cement"', "replicates = 0", "replicates: 0 is not a whole number of at least 1"),
-        ('title = "Cement"', "[[factor", "not TOML"),
+        ('title = "Cement"', "[[factor", "Expected"),
     ],
 )
 def test_a_bad_factors_file_gets_one_line_with_its_key(tmp_path, old, new, message):

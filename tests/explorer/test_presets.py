@@ -63,10 +63,10 @@ def test_only_listed_presets_are_read(name, tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("format = 2\n[values]\n", "format: 2 is not 1"),
-        ("format = 1\n", r"\[values\] is missing"),
+        ("format = 2\n[values]\n", "format: 2; allowed: 1"),
+        ("format = 1\n", r"values: missing; needed: path → value"),
         ("format = 1\nvalue = 3\n[values]\n", "value: unknown key"),
-        ("format = 1\nvalues = 3\n", "values: a table is needed"),
+        ("format = 1\nvalues = 3\n", "values: 3; allowed: a table"),
         ("format = 1\n[values\n", "preset.toml"),
     ],
 )

@@ -55,7 +55,7 @@ def test_nothing_changed_is_no_edit():
         (StudyEdits({"X4": {"low": 60e6}}), r"changed study: X4 .*: reference 5.63e\+07 is outside 6e\+07"),
         (StudyEdits({"X7": {"high": -1.0}}), r"changed study: pair.seed.seed.static_friction.*-1"),
         (StudyEdits({"X99": {"high": 1.0}}), r"factor 'X99' is not in the study; allowed: X1, X2"),
-        (StudyEdits({}, {"margin": 0.0}), r"changed study: target.margin: 0 must be positive"),
+        (StudyEdits({}, {"margin": 0.0}), r"changed study: target.margin: 0; allowed: more than 0"),
         (StudyEdits({}, {"n": 1}), r"changed study: target.n: 1"),
     ],
 )

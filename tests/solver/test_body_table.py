@@ -107,7 +107,7 @@ def test_the_drawn_mesh_and_the_fit_come_with_the_file(tmp_path):
         (declared(size_distribution="uniform", size_spread=0.7), r"size_spread: 0\.7 is outside 0 … 0\.5"),
         (declared(size_spread=0.1), "needs size_distribution"),
         (declared(sphere="x"), r"body\.plate\.sphere: unknown key; allowed: name,"),
-        (declared(density=-1.0), "must be positive"),
+        (declared(density=-1.0), "density: -1 kg/m3; allowed: more than 0"),
         (declared(fit={"rms": 1.0}), r"fit\.rms: unknown key"),
         (declared(mesh="box.step"), "files ending in"),
         ({"shape": {"box": [1e-2, 1e-2, 5e-3]}, "speres": "fine"}, r"body\.plate\.speres: unknown key"),

@@ -12,10 +12,9 @@ from doe.measurement.scans import (
     found_plate,
     read_scan,
     scan_files,
-    scan_settings,
     spacing,
 )
-from solver import Frame, coarsened, surface_features, without_holes
+from solver import Frame, ParameterError, checked, coarsened, surface_features, without_holes
 
 FRAME = Frame(radius=0.03, thickness=0.006)
 GRID, NOISE = 0.5e-3, 0.02e-3
@@ -72,7 +71,7 @@ def test_points_and_surfaces_give_the_cone(tmp_path, name):
     """Volume within 1 % (pixels, noise), the axis as stated, the tilted plate found: 0.1 mm over the scan."""
     path = tmp_path / name
     write(path, points(TILT), 1e-3)
-    scan = read_scan(path, ScanSettings(unit=1e-3, axis=AXIS))
+    scan = read_scan(path, ScanSettings(unit="mm", axis=AXIS))
     volume, x, y = volume_and_skew(scan)
     assert volume == pytest.approx(CONE_VOLUME, rel=0.01)
     assert abs(x) < 0.2e-3
@@ -135,8 +134,12 @@ def test_only_the_upper_surface_counts():
 
 
 def test_settings_are_read_with_their_units():
-    found = scan_settings({"unit": "mm", "pixel": "0.5mm", "axis": AXIS_TABLE, "plate": [0.0, 0, 0], "noise": "0.1mm"})
-    assert found.unit == 1e-3
+    found = checked(
+        ScanSettings,
+        {"unit": "mm", "pixel": "0.5mm", "axis": AXIS_TABLE, "plate": [0.0, 0, 0], "noise": "0.1mm"},
+        "scan",
+    )
+    assert found.unit == "mm"
     assert found.pixel == pytest.approx(0.5e-3)
     assert found.axis == AXIS
     assert found.plate == (0.0, 0.0, 0.0)
@@ -151,8 +154,8 @@ def test_settings_are_read_with_their_units():
     ],
 )
 def test_settings_that_cannot_be_are_refused(table, line):
-    with pytest.raises(MeasurementError, match=line):
-        scan_settings(table)
+    with pytest.raises(ParameterError, match=line):
+        checked(ScanSettings, table, "scan")
 
 
 def test_files_belong_to_conditions_and_replicates(tmp_path):

@@ -69,7 +69,7 @@ WRONG = (
     ('role = "holdout"', 'role = "holdout"\ndata = "a.csv"', "condition.data: 'a.csv'"),
     ('rig = "funnel"', 'rig = "hopper"', "hopper"),
     ("[parameters]", '[laboratory.scanner]\nnoise = ["1mm"]\n[parameters]', "laboratory.scanner.noise: ['1mm']"),
-    ("[parameters]", '[laboratory.scanner]\ngrid = ["0mm"]\n[parameters]', "laboratory.scanner.grid: ['0mm']"),
+    ("[parameters]", '[laboratory.scanner]\ngrid = ["0mm"]\n[parameters]', "laboratory.scanner.grid: [0.0]; allowed"),
 )
 
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from doe.measurement.scans import read_scan, scan_settings
+from doe.measurement.scans import ScanSettings, read_scan
 from doe.validation.scanner import Scanner, ScannerRanges, tops, write_scan
+from solver import checked
 
 BALL = (np.array([[0.004, -0.002, 0.01]]), np.array([0.01]))
 STRAIGHT_DOWN = np.pi / 2 - 1e-6
@@ -62,7 +63,7 @@ def test_scanners_differ_within_what_may_be_bought():
 def test_its_file_is_read_like_anybodys_and_its_axis_is_off(tmp_path):
     used = scanner(axis_x=1.5e-3, axis_y=-1.0e-3)
     write_scan(tmp_path / "low_1.npz", used.scan(*BALL, np.random.default_rng(1)))
-    settings = scan_settings(used.table())
+    settings = checked(ScanSettings, used.table(), "scan")
     scan = read_scan(tmp_path / "low_1.npz", settings)
     assert scan.on_axis
     assert scan.grid == pytest.approx(1e-3)
