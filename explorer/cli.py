@@ -28,6 +28,7 @@ from explorer.commands import (
     parameters,
     replay,
     runs,
+    schema,
     serve,
     shape,
     simulate,
@@ -123,6 +124,7 @@ app.command()(analyse.analyse)
 app.command()(runs.runs)
 app.command()(parameters.parameters)
 app.command()(new.new)
+app.command(cls=schema.Files)(schema.schema)
 app.command()(shape.shape)
 app.command()(lab.lab)
 app.command()(audit.audit)

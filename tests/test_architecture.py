@@ -428,7 +428,7 @@ def test_every_declared_dependency_is_used():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     extras = [name for extra, names in project["optional-dependencies"].items() if extra != "test" for name in names]
     declared = {re.match(r"[\w-]+", line)[0] for line in (*project["dependencies"], *extras)}
-    modules = {"pillow": "PIL", "rerun-sdk": "rerun", "tomli-w": "tomli_w"}
+    modules = {"pillow": "PIL", "rerun-sdk": "rerun"}
     used = {found.top for source in repository_sources(*PACKAGES) for found in imports(source)}
     # pandas loads it by its name.
     used |= {"openpyxl"} if 'engine="openpyxl"' in (ROOT / "doe/table_file.py").read_text() else set()

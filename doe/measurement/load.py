@@ -37,7 +37,7 @@ FILE = "measurement.toml"
 
 
 class MeasurementFile(TomlTable):
-    """``measurement.toml``; scanned piles (``piles/``) and scanned surfaces (``scans/``) lie beside it."""
+    """measurement.toml of a measured data set; piles/ and scans/ lie beside it."""
 
     format: Literal[1]
     title: str = ""

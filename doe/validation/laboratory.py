@@ -16,7 +16,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
-import tomli_w
+import tomlkit
 
 from doe.errors import MeasurementError
 from doe.measurement import Measurement, load_measurement
@@ -102,7 +102,7 @@ class Laboratory:
             if (name := str(entry.get("name"))) in measured:
                 conditions.append({**entry, "data": f"{name}.csv"} | ({"scan": scan} if scan else {}))
         table = {**self.table, "material": str(self._material()), "condition": conditions}
-        (folder / "measurement.toml").write_text(tomli_w.dumps(table), encoding="utf-8")
+        (folder / "measurement.toml").write_text(tomlkit.dumps(table), encoding="utf-8")
         for name, readings in measured.items():
             lines = ["replicate,observable,x,value"]
             for replicate, reading in enumerate(readings, start=1):

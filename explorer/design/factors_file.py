@@ -1,11 +1,10 @@
-"""The factors file of a design (:class:`FactorsTable`), and names that the command line offers beside it."""
+"""The factors file of a design (:class:`FactorsTable`): what is varied, in which units, and what is measured."""
 
 from __future__ import annotations
 
 import math
 import re
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -45,7 +44,7 @@ class FactorTable(TomlTable):
 
 
 class FactorsTable(TomlTable):
-    """The file."""
+    """A factors file of `explorer design`."""
 
     title: str = Field("", max_length=200)
     """What is studied."""
@@ -154,19 +153,3 @@ def _factors_file(table: FactorsTable) -> FactorsFile:
     no_repeats(factors, responses)
     title = " ".join(table.title.split())
     return FactorsFile(title, factors, responses, table.replicates, table.centre, table.seed, table.first_seed)
-
-
-class Alpha(StrEnum):
-    """Where the axial points of a central composite design stand."""
-
-    ROTATABLE = "rotatable"
-    FACE_CENTRED = "face-centred"
-    INSCRIBED = "inscribed"
-
-
-class ModelOrder(StrEnum):
-    """Orders of the polynomial."""
-
-    LINEAR = "linear"
-    INTERACTIONS = "interactions"
-    QUADRATIC = "quadratic"

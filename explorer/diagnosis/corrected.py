@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import tomli_w
+import tomlkit
 
 from doe.declared.model import effect_values
 from doe.diagnose.diagnosis import Diagnosis, complete_rows
@@ -70,7 +70,7 @@ def study_toml(measurement: Measurement, diagnosis: Diagnosis, material: str) ->
     }
     return (
         f"# {named} beside the declared parameters, calibrated against condition {condition.name}. SI.\n"
-        "# before_mean: what the declared model gave, calibrated without it, by fresh pours.\n" + tomli_w.dumps(table)
+        "# before_mean: what the declared model gave, calibrated without it, by fresh pours.\n" + tomlkit.dumps(table)
     )
 
 

@@ -1,21 +1,20 @@
 """A study with other ranges and another target: the study's file, changed, as a file of its own.
 
 What is changed is given by the names of factors and, for the first target, by its keys; everything else stays as it is
-in the file. The result is read back by the loader of every study before anything is started.
+in the file, comments included. The result is read back by the loader of every study before anything is started.
 """
 
 from __future__ import annotations
 
-import copy
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import tomlkit
+
 from doe.studies.study import Study, study_from
 from explorer.errors import CommandError
-from explorer.scene.text import toml_key, toml_value
 from solver import ParameterError, asset_path, read_toml
 from solver.assets import shipped_assets
 
@@ -38,45 +37,29 @@ class StudyEdits:
 
 def edited_study(file: Path, edits: StudyEdits) -> tuple[str, Study]:
     """Text of the changed study and the study that it gives. Raises a ValueError with one line."""
-    text = study_toml(edited_table(read_toml(file), edits, file.parent), _heading(file, edits))
+    read_toml(file)  # refuses in one line what is no TOML
+    document = tomlkit.parse(file.read_text(encoding="utf-8-sig"))
+    _edit(document, edits, file.parent)
+    text = _heading(file, edits) + tomlkit.dumps(document)
     try:
-        return text, study_from(tomllib.loads(text), file)
+        return text, study_from(tomlkit.parse(text).unwrap(), file)
     except ValueError as error:
         raise CommandError(f"changed study: {error}") from None
 
 
-def edited_table(table: Mapping[str, Any], edits: StudyEdits, folder: Path) -> dict[str, Any]:
-    """``table`` of a study file in ``folder`` with the changes; a material's own file is named by its full path."""
-    changed = copy.deepcopy(dict(table))
-    entries = {str(entry.get("name")): entry for entry in changed.get("factor", [])}
+def _edit(document: tomlkit.TOMLDocument, edits: StudyEdits, folder: Path) -> None:
+    """Change a study that stands in ``folder``; a material's own file is named by its full path."""
+    entries: dict[str, Any] = {str(entry.get("name")): entry for entry in document.get("factor", [])}
     for name, values in edits.factors.items():
         if name not in entries:
             raise ParameterError(f"factor {name!r} is not in the study; allowed: {', '.join(entries)}")
         entries[name].update({key: values[key] for key in RANGE_KEYS if key in values})
-    if edits.target and changed.get("target"):
-        target = changed["target"][0]
-        target.update({key: edits.target[key] for key in TARGET_KEYS if key in edits.target})
-        if "n" in edits.target:
-            target["n"] = int(edits.target["n"])
-    own = asset_path("materials", str(changed["material"]), relative_to=folder)
+    if edits.target and document.get("target"):
+        whole = {"n": int(edits.target["n"])} if "n" in edits.target else {}
+        document["target"][0].update({key: edits.target[key] for key in TARGET_KEYS if key in edits.target} | whole)
+    own = asset_path("materials", str(document["material"]), relative_to=folder)
     if own.stem not in shipped_assets("materials") or own != asset_path("materials", own.stem):
-        changed["material"] = str(own.absolute())
-    return changed
-
-
-def study_toml(table: Mapping[str, Any], heading: str = "") -> str:
-    """A study's table as TOML: plain keys, then its tables, then its lists of tables."""
-    parts = ["".join(f"# {line}\n" for line in heading.splitlines())]
-    parts.append(_lines({key: value for key, value in table.items() if not _is_table(value)}))
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            nested = {name: entry for name, entry in value.items() if isinstance(entry, Mapping)}
-            own = {name: entry for name, entry in value.items() if name not in nested}
-            parts += [f"[{toml_key(key)}]\n{_lines(own)}"] if own or not nested else []
-            parts += [f"[{toml_key(key)}.{toml_key(name)}]\n{_lines(entry)}" for name, entry in nested.items()]
-        elif _is_table(value):
-            parts += [f"[[{toml_key(key)}]]\n{_lines(entry)}" for entry in value]
-    return "\n".join(part for part in parts if part)
+        document["material"] = str(own.absolute())
 
 
 def listed_edits(study: Study, edits: StudyEdits) -> list[tuple[str, str, float | str | None, float]]:
@@ -93,13 +76,4 @@ def listed_edits(study: Study, edits: StudyEdits) -> list[tuple[str, str, float 
 
 def _heading(file: Path, edits: StudyEdits) -> str:
     changed = [*(name for name, values in edits.factors.items() if values), *(["target"] if edits.target else [])]
-    return f"{file.name}, changed on the page: {', '.join(changed)}. SI unless a unit is written."
-
-
-def _is_table(value: Any) -> bool:
-    listed = isinstance(value, list) and value and all(isinstance(entry, Mapping) for entry in value)
-    return bool(isinstance(value, Mapping) or listed)
-
-
-def _lines(entries: Mapping[str, Any]) -> str:
-    return "".join(f"{toml_key(key)} = {toml_value(entry)}\n" for key, entry in entries.items())
+    return f"# {file.name}, changed on the page: {', '.join(changed)}. SI unless a unit is written.\n\n"

@@ -87,10 +87,10 @@ STUDY = 'format = 1\nmaterial = "sunflower_extract"\n'
         (STUDY + "[rig]\nmass = -0.03\n", ["rig.mass", "1e-05 … 10 kg"]),
         (STUDY + "[insertion]\nrate = [1, 2]\n", ["insertion.rate"]),
         (STUDY + "rig = 3\n", ["rig", "table"]),
-        ("format = 1\n[materials.grain]\ndensity = 1.0\n", ["materials.grain", "two of"]),
+        ("format = 1\n[materials.grain]\ndensity = 1.0\n", ["body: missing"]),
         (STUDY + "[rigg]\nmass = 0.03\n", ["rigg", "unknown key", "rig"]),
         (STUDY + "[numerics]\nskin = '1kg'\n", ["numerics.skin", "mm"]),
-        (STUDY + "dummies = 3\n[[target]]\nmean = 3\n", ["factor"]),
+        (STUDY + "dummies = 3\n[[target]]\nmean = 3\n", ["target.observable: missing"]),
     ],
 )
 def test_simulate_names_the_file_that_is_wrong(text, words, tmp_path):

@@ -1,0 +1,61 @@
+"""``explorer schema``: what a file may hold, as JSON Schema for an editor."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from importlib import import_module
+from pathlib import Path
+
+import typer
+
+from explorer.commands.listing import Listing
+
+KINDS = {
+    "material": ("solver.scenes.material_file", "MaterialFile"),
+    "body": ("solver.scenes.material_file", "BodyFile"),
+    "study": ("doe.studies.study", "StudyFile"),
+    "measurement": ("doe.measurement.load", "MeasurementFile"),
+    "factors": ("explorer.design.factors_file", "FactorsTable"),
+    "part": ("explorer.laboratory.part", "PartFile"),
+    "preset": ("explorer.scene.presets", "PresetFile"),
+}
+"""Kind of file → where its table is declared. Read when one is asked for: help loads no solver."""
+
+
+class Files(Listing):
+    """Lists the kinds of files."""
+
+    heading = "Files"
+
+    def listed(self) -> Iterable[tuple[str, str]]:
+        """Each with what it is."""
+        return ((name, str(_table(name).__doc__).splitlines()[0]) for name in KINDS)
+
+
+def schema(
+    kind: str = typer.Argument(metavar="KIND", help="One of the files below."),
+    out: Path | None = typer.Option(None, metavar="FILE", help="Write it here instead of printing it."),
+) -> None:
+    """Write the JSON Schema of a TOML file.
+
+    An editor with a TOML language server (taplo, Even Better TOML) completes and checks keys by it where the file
+    begins with the line: #:schema FILE
+    """
+    from explorer.errors import CommandError
+    from explorer.files.output_file import write_whole
+    from solver import json_schema
+
+    if kind not in KINDS:
+        raise CommandError(f"schema: {kind!r}; allowed: {', '.join(KINDS)}")
+    text = json.dumps(json_schema(_table(kind)), ensure_ascii=False, indent=1) + "\n"
+    if out is None:
+        typer.echo(text, nl=False)
+    else:
+        write_whole(out, text)
+
+
+def _table(kind: str) -> type:
+    module, name = KINDS[kind]
+    table: type = getattr(import_module(module), name)
+    return table
