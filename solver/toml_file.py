@@ -137,19 +137,19 @@ def _target(here: dict[str, Any], schema: dict[str, Any]) -> dict[str, Any]:
 class _Form:
     """A form of values, put beside a type by ``Annotated``."""
 
-    def check(self, value: Any) -> Any:
+    def _check(self, value: Any) -> Any:
         """``value`` as it is kept; ValueError says what is wrong with it."""
         raise NotImplementedError
 
-    def schema(self) -> dict[str, Any]:
+    def _schema(self) -> dict[str, Any]:
         """JSON Schema of what is written in the file."""
         raise NotImplementedError
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return no_info_plain_validator_function(self.check)
+        return no_info_plain_validator_function(self._check)
 
     def __get_pydantic_json_schema__(self, core: Any, handler: Any) -> dict[str, Any]:
-        return self.schema()
+        return self._schema()
 
 
 @dataclass(frozen=True)
@@ -159,14 +159,13 @@ class Number(_Form):
     least: float = -math.inf
     above: float = -math.inf
 
-    def check(self, value: Any) -> float:  # noqa: D102
+    def _check(self, value: Any) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             raise ValueError(f"{value!r} is not a number")
         return _bounded(float(value), self.least, self.above)
 
-    def schema(self) -> dict[str, Any]:  # noqa: D102
-        low = {"minimum": self.least} if self.least > -math.inf else {}
-        return {"type": "number", **low, **({"exclusiveMinimum": self.above} if self.above > -math.inf else {})}
+    def _schema(self) -> dict[str, Any]:
+        return {"type": "number", **_bounds_schema(self.least, self.above)}
 
 
 @dataclass(frozen=True)
@@ -177,16 +176,17 @@ class Quantity(_Form):
     least: float = -math.inf
     above: float = -math.inf
 
-    def check(self, value: Any) -> float:  # noqa: D102
+    def _check(self, value: Any) -> float:
         try:
             number = parse_quantity(value, self.unit, "")
         except ParameterError as error:
             raise ValueError(str(error).removeprefix(": ")) from None
         return _bounded(number, self.least, self.above, "" if self.unit == "1" else f" {self.unit}")
 
-    def schema(self) -> dict[str, Any]:  # noqa: D102
+    def _schema(self) -> dict[str, Any]:
         units = ", ".join(name for name in UNITS.get(self.unit, {self.unit: 1.0}) if name)
-        return {"type": ["number", "string"], "description": f"SI, or with a unit: {units}"}
+        form = {"type": ["number", "string"], **_bounds_schema(self.least, self.above)}
+        return form | ({"description": f"SI, or with a unit: {units}"} if units else {})
 
 
 @dataclass(frozen=True)
@@ -195,12 +195,12 @@ class Whole(_Form):
 
     least: int
 
-    def check(self, value: Any) -> int:  # noqa: D102
+    def _check(self, value: Any) -> int:
         if isinstance(value, bool) or not isinstance(value, int) or value < self.least:
             raise ValueError(f"{value!r} is not a whole number of at least {self.least}")
         return value
 
-    def schema(self) -> dict[str, Any]:  # noqa: D102
+    def _schema(self) -> dict[str, Any]:
         return {"type": "integer", "minimum": self.least}
 
 
@@ -208,12 +208,12 @@ class Whole(_Form):
 class Scalar(_Form):
     """A number, a text with a unit or a name, for the parameter that it belongs to to check."""
 
-    def check(self, value: Any) -> int | float | str:  # noqa: D102
+    def _check(self, value: Any) -> int | float | str:
         if isinstance(value, bool) or not isinstance(value, int | float | str):
             raise ValueError(f"{value!r}; allowed: a number or a text")
         return value
 
-    def schema(self) -> dict[str, Any]:  # noqa: D102
+    def _schema(self) -> dict[str, Any]:
         return {"type": ["number", "string"]}
 
 
@@ -221,7 +221,7 @@ class Scalar(_Form):
 class Names(_Form):
     """A list of texts, none twice."""
 
-    def check(self, value: Any) -> tuple[str, ...]:  # noqa: D102
+    def _check(self, value: Any) -> tuple[str, ...]:
         if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
             raise ValueError(f"{value!r}; allowed: a list of names")
         for name in value:
@@ -229,7 +229,7 @@ class Names(_Form):
                 raise ValueError(f"{name!r} stands twice")
         return tuple(value)
 
-    def schema(self) -> dict[str, Any]:  # noqa: D102
+    def _schema(self) -> dict[str, Any]:
         return {"type": "array", "items": {"type": "string"}, "uniqueItems": True}
 
 
@@ -241,14 +241,14 @@ class Vector(_Form):
     unit: str = "1"
     above: float = -math.inf
 
-    def check(self, value: Any) -> tuple[float, ...]:  # noqa: D102
+    def _check(self, value: Any) -> tuple[float, ...]:
         if not isinstance(value, list | tuple) or (self.size is not None and len(value) != self.size):
             raise ValueError(f"{value!r}; allowed: a list of {'' if self.size is None else f'{self.size} '}numbers")
-        return tuple(Quantity(self.unit, above=self.above).check(part) for part in value)
+        return tuple(Quantity(self.unit, above=self.above)._check(part) for part in value)
 
-    def schema(self) -> dict[str, Any]:  # noqa: D102
+    def _schema(self) -> dict[str, Any]:
         length = {"minItems": self.size, "maxItems": self.size} if self.size is not None else {}
-        return {"type": "array", "items": Quantity(self.unit).schema(), **length}
+        return {"type": "array", "items": Quantity(self.unit)._schema(), **length}
 
 
 @dataclass(frozen=True)
@@ -258,13 +258,13 @@ class Rows(_Form):
     columns: int
     unit: str = "1"
 
-    def check(self, value: Any) -> tuple[tuple[float, ...], ...]:  # noqa: D102
+    def _check(self, value: Any) -> tuple[tuple[float, ...], ...]:
         if not isinstance(value, list | tuple):
             raise ValueError(f"{value!r}; allowed: a list of lists of {self.columns} numbers")
-        return tuple(Vector(self.columns, self.unit).check(row) for row in value)
+        return tuple(Vector(self.columns, self.unit)._check(row) for row in value)
 
-    def schema(self) -> dict[str, Any]:  # noqa: D102
-        return {"type": "array", "items": Vector(self.columns, self.unit).schema()}
+    def _schema(self) -> dict[str, Any]:
+        return {"type": "array", "items": Vector(self.columns, self.unit)._schema()}
 
 
 @dataclass(frozen=True)
@@ -312,3 +312,8 @@ def _bounded(number: float, least: float, above: float, unit: str = "") -> float
     if not number > above:
         raise ValueError(f"{number:g}{unit}; allowed: more than {above:g}{unit}")
     return number
+
+
+def _bounds_schema(least: float, above: float) -> dict[str, float]:
+    low = {"minimum": least} if least > -math.inf else {}
+    return low | ({"exclusiveMinimum": above} if above > -math.inf else {})

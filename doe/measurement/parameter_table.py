@@ -32,7 +32,6 @@ from solver import (
 )
 
 RANGE_SDS = 3.0
-
 """Half width of a range that is not stated, in standard deviations."""
 
 
@@ -99,7 +98,6 @@ def _measured(parameter: Parameter, entry: ParameterTable, notes: list[str]) -> 
 
 
 BISECTIONS = 30
-
 """A billionth of the range."""
 
 

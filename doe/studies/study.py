@@ -50,11 +50,9 @@ from solver import (
 )  # fmt: skip
 
 DUMMIES = 3
-
 """Columns of a table for main effects alone that stay free of factors, where the file says nothing."""
 
 IN_STUDIES = DesignOptions(alpha="face-centred")
-
 """Options where a study says nothing: the axial points stay in the region that is searched."""
 
 SCREENING = ChosenDesign(PlackettBurman(), replace(IN_STUDIES, runs=28))
@@ -136,11 +134,9 @@ def _require_inside(points: Points, key: str, name: str) -> None:
 
 
 CALIBRATED = 3
-
 """Factors that go on from the screening to the ascent and the response surface."""
 
 TRIES = 3
-
 """Seeds that are tried for one replicate; a run that jammed or broke is kept with its outcome and replaced."""
 
 Values = dict[str, float | str]

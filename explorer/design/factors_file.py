@@ -23,7 +23,6 @@ NAME = re.compile(r"[^\W\d][\w-]{0,59}")
 UNIT = re.compile(r"[^\s=@|,;\[\]\"'`<>][^|,;\[\]\"`<>\n]{0,19}")
 
 RESERVED = ("row", "replicate", "run", "seed")
-
 """Columns of the sheet that are not factors."""
 
 MOST_FACTORS = 47

@@ -34,7 +34,6 @@ from solver.toml_file import Number, Scalar, TomlTable, checked
 SIZES = ("size_distribution", "size_spread")
 
 SCATTER = "log_normal"
-
 """Distribution of a measured spread, which acts only with one; as of measured diameters in a material file."""
 
 ELASTIC = ("youngs_modulus", "shear_modulus", "poisson_ratio")
