@@ -1,15 +1,12 @@
-"""Speed of the solver on declared cases. Every case runs in a process of its own, on the threads it is given.
+"""Speed of the solver on declared cases, each in a process of its own, on the threads that it is given.
 
-What a benchmark case tells about one engine.
-
-Beds of equal spheres at rest under gravity: the case in which every sphere has contacts at every step.
-
-A small bed is settled in a box, then copied side by side to the wanted number, so that beds of 10³ and 10⁵ spheres
-have the same height and the same contacts per sphere. The spheres are numbered at random: in the order of their places
-neighbours would lie side by side in memory, as they do in no bed that was poured.
+A bed holds equal spheres at rest under gravity: the case in which every sphere has contacts at every step. A small bed
+is settled in a box, then copied side by side to the wanted number, so that beds of 10³ and 10⁵ spheres have the same
+height and the same contacts per sphere. The spheres are numbered at random: in the order of their places neighbours
+would lie side by side in memory, as they do in no bed that was poured.
 Spheres: d 5 mm, ρ 2500 kg/m³, G 10 MPa, ν 0.25, μ 0.5, e 0.5.
 
-Pours against the clock: one world step by step, and many worlds on several cores.
+Pours run against the clock: one world step by step, and many worlds on several cores.
 """
 
 import time
@@ -35,6 +32,22 @@ from solver.scenes.material import Material, Pair
 from solver.scenes.numerics import Numerics
 from solver.scenes.scene import Scene, with_values
 from solver.scenes.time_step import time_step
+
+__all__ = ["Bed", "Measurement", "measure_batch", "measure_bed", "measure_pour", "shuffled", "wide_bed"]
+
+Array = npt.NDArray[np.float64]
+
+RADIUS = 2.5e-3
+SKIN = 0.2e-3
+TILE = (10, 10, 10)
+"""Spheres of the small bed along x, y and z before it settles."""
+SPACING = 2.06 * RADIUS
+SETTLING_TIME = 0.25
+"""Simulated time [s] for the small bed to come to rest."""
+RELAXING_TIME = 0.04
+"""The same for a bed put together of copies."""
+WARM_UP = {"numerics.max_time": 0.1}
+"""A run as short as the declared range allows compiles every kernel."""
 
 
 @dataclass(frozen=True)
@@ -71,27 +84,6 @@ class Measurement:
         return 1e9 / self.steps_per_s / self.mean_contacts if self.mean_contacts > 0.0 else float("nan")
 
 
-Array = npt.NDArray[np.float64]
-
-RADIUS = 2.5e-3
-
-SKIN = 0.2e-3
-
-TILE = (10, 10, 10)
-
-"""Spheres of the small bed along x, y and z before it settles."""
-
-SPACING = 2.06 * RADIUS
-
-SETTLING_TIME = 0.25
-
-"""Simulated time [s] for the small bed to come to rest."""
-
-RELAXING_TIME = 0.04
-
-"""The same for a bed put together of copies."""
-
-
 @dataclass(frozen=True)
 class Box(BareRig):
     """An open box: floor z = 0 and four walls, ``width`` × ``depth`` [m]."""
@@ -122,95 +114,6 @@ class Bed:
     velocities: Array
 
 
-def bed_scene(box: Box) -> Scene:
-    """The scene of a bed; no body sleeps, so that the figures are those of a bed that moves."""
-    mass = 4.0 / 3.0 * np.pi * RADIUS**3 * 2500.0
-    sphere = Members(((0.0, 0.0, 0.0),), (RADIUS,), mass, (0.4 * mass * RADIUS**2,) * 3)
-    material = Material("glass", density=2500.0, shear_modulus=1e7, poisson_ratio=0.25)
-    wall = Material("wall", density=2500.0, shear_modulus=1e7, poisson_ratio=0.25)
-    return Scene(
-        title="packed bed",
-        materials=(material, wall),
-        bodies=(Body("sphere", "glass", 1.0, sphere, 2500.0),),
-        pairs=(Pair("glass", "glass", 0.5, 0.5), Pair("glass", "wall", 0.5, 0.5)),
-        rig=box,
-        numerics=Numerics(rayleigh_fraction=0.2, skin=SKIN, sleep_speed=0.0),
-    )
-
-
-def load_bed(bed: Bed) -> tuple[Batch, float]:
-    """A batch of one world that holds ``bed``, and its time step [s]."""
-    n = len(bed.centres)
-    batch = Batch(Capacity(worlds=1, bodies=n, members=n, contacts=8 * n, kinds=2))
-    scene = bed_scene(bed.box)
-    dt = time_step(scene)
-    batch.load(0, scene, layout(scene, np.zeros(n, dtype=np.int32)), dt, [True] * 5)
-    upright, still = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)
-    for b in range(n):
-        batch.enter(0, b, bed.centres[b], upright, bed.velocities[b], still)
-    return batch, dt
-
-
-def settled(bed: Bed, duration: float) -> Bed:
-    """``bed`` after ``duration`` [s]."""
-    batch, dt = load_bed(bed)
-    batch.advance(np.array([round(duration / dt)], dtype=np.int32))
-    state = batch.bodies(0, len(bed.centres))
-    return Bed(bed.box, state[:, 0:3], state[:, 7:10])
-
-
-def small_bed(seed: int = 1) -> Bed:
-    """The small bed at rest: a loose lattice with random speeds, dropped into its box."""
-    rng = np.random.default_rng(seed)
-    lattice = np.stack(np.meshgrid(*(np.arange(n) for n in TILE), indexing="ij"), axis=-1).reshape(-1, 3)
-    box = Box(TILE[0] * SPACING, TILE[1] * SPACING)
-    centres = (lattice + 0.5) * SPACING
-    speeds = np.asarray(rng.normal(0.0, 0.1, centres.shape), dtype=float)
-    return settled(Bed(box, np.asarray(centres, dtype=float), speeds), SETTLING_TIME)
-
-
-def wide_bed(tiles: tuple[int, int], copies: tuple[int, int] = (1, 1), seed: int = 1) -> Bed:
-    """``tiles`` of the small bed side by side, relaxed for a moment; then ``copies`` of that; numbered at random.
-
-    Parameters
-    ----------
-    tiles
-        Small beds along x and y.
-    copies
-        Wide beds along x and y; with a tenth as many seams per sphere they are relaxed for a tenth of the time.
-    seed
-        Of the small bed's speeds and of the numbering.
-
-    Returns
-    -------
-    The bed; the same order for every engine that is given it.
-    """
-    backend.init(threads=1)
-    bed = settled(side_by_side(small_bed(seed), tiles), RELAXING_TIME)
-    if copies != (1, 1):
-        bed = settled(side_by_side(bed, copies), RELAXING_TIME / 10.0)
-    return shuffled(bed, seed)
-
-
-def side_by_side(bed: Bed, copies: tuple[int, int]) -> Bed:
-    """``copies`` of ``bed`` along x and y without the walls between them, at rest."""
-    width, depth = bed.box.width, bed.box.depth
-    shift = np.array([(i * width, j * depth, 0.0) for i in range(copies[0]) for j in range(copies[1])])
-    centres = (shift[:, None, :] + bed.centres[None]).reshape(-1, 3)
-    return Bed(Box(copies[0] * width, copies[1] * depth), centres, np.zeros_like(centres))
-
-
-def shuffled(bed: Bed, seed: int) -> Bed:
-    """``bed`` with its spheres numbered at random."""
-    order = np.random.default_rng(seed).permutation(len(bed.centres))
-    return Bed(bed.box, bed.centres[order], bed.velocities[order])
-
-
-def summary_of(batch: Batch) -> dict[str, float]:
-    """Summary of the one world by name."""
-    return dict(zip(SUMMARY_COLUMNS, batch.measure(0)[0].tolist(), strict=True))
-
-
 def measure_bed(bed: Bed, steps: int) -> Measurement:
     """``steps`` of ``bed`` on one thread."""
     backend.init(threads=1)
@@ -221,16 +124,6 @@ def measure_bed(bed: Bed, steps: int) -> Measurement:
     wall = time.perf_counter() - begin
     n, contacts = len(bed.centres), summary_of(batch)["touching"]
     return Measurement(bed_name(n), "ours, nothing sleeps", n, n, steps, wall, steps * dt, contacts, contacts)
-
-
-def bed_name(n: int) -> str:
-    """Name of the case with ``n`` spheres."""
-    return f"bed of {n} spheres"
-
-
-WARM_UP = {"numerics.max_time": 0.1}
-
-"""A run as short as the declared range allows compiles every kernel."""
 
 
 def measure_pour(
@@ -293,6 +186,100 @@ def measure_batch(case: str, scene: Scene, seeds: Sequence[int], workers: int) -
     return Measurement(case, name, bodies, spheres, steps, wall, simulated, float("nan"), float("nan"))
 
 
+def wide_bed(tiles: tuple[int, int], copies: tuple[int, int] = (1, 1), seed: int = 1) -> Bed:
+    """``tiles`` of the small bed side by side, relaxed for a moment; then ``copies`` of that; numbered at random.
+
+    Parameters
+    ----------
+    tiles
+        Small beds along x and y.
+    copies
+        Wide beds along x and y; with a tenth as many seams per sphere they are relaxed for a tenth of the time.
+    seed
+        Of the small bed's speeds and of the numbering.
+
+    Returns
+    -------
+    The bed; the same order for every engine that is given it.
+    """
+    backend.init(threads=1)
+    bed = settled(side_by_side(small_bed(seed), tiles), RELAXING_TIME)
+    if copies != (1, 1):
+        bed = settled(side_by_side(bed, copies), RELAXING_TIME / 10.0)
+    return shuffled(bed, seed)
+
+
+def small_bed(seed: int = 1) -> Bed:
+    """The small bed at rest: a loose lattice with random speeds, dropped into its box."""
+    rng = np.random.default_rng(seed)
+    lattice = np.stack(np.meshgrid(*(np.arange(n) for n in TILE), indexing="ij"), axis=-1).reshape(-1, 3)
+    box = Box(TILE[0] * SPACING, TILE[1] * SPACING)
+    centres = (lattice + 0.5) * SPACING
+    speeds = np.asarray(rng.normal(0.0, 0.1, centres.shape), dtype=float)
+    return settled(Bed(box, np.asarray(centres, dtype=float), speeds), SETTLING_TIME)
+
+
+def side_by_side(bed: Bed, copies: tuple[int, int]) -> Bed:
+    """``copies`` of ``bed`` along x and y without the walls between them, at rest."""
+    width, depth = bed.box.width, bed.box.depth
+    shift = np.array([(i * width, j * depth, 0.0) for i in range(copies[0]) for j in range(copies[1])])
+    centres = (shift[:, None, :] + bed.centres[None]).reshape(-1, 3)
+    return Bed(Box(copies[0] * width, copies[1] * depth), centres, np.zeros_like(centres))
+
+
+def shuffled(bed: Bed, seed: int) -> Bed:
+    """``bed`` with its spheres numbered at random."""
+    order = np.random.default_rng(seed).permutation(len(bed.centres))
+    return Bed(bed.box, bed.centres[order], bed.velocities[order])
+
+
+def settled(bed: Bed, duration: float) -> Bed:
+    """``bed`` after ``duration`` [s]."""
+    batch, dt = load_bed(bed)
+    batch.advance(np.array([round(duration / dt)], dtype=np.int32))
+    state = batch.bodies(0, len(bed.centres))
+    return Bed(bed.box, state[:, 0:3], state[:, 7:10])
+
+
+def bed_scene(box: Box) -> Scene:
+    """The scene of a bed; no body sleeps, so that the figures are those of a bed that moves."""
+    mass = 4.0 / 3.0 * np.pi * RADIUS**3 * 2500.0
+    sphere = Members(((0.0, 0.0, 0.0),), (RADIUS,), mass, (0.4 * mass * RADIUS**2,) * 3)
+    material = Material("glass", density=2500.0, shear_modulus=1e7, poisson_ratio=0.25)
+    wall = Material("wall", density=2500.0, shear_modulus=1e7, poisson_ratio=0.25)
+    return Scene(
+        title="packed bed",
+        materials=(material, wall),
+        bodies=(Body("sphere", "glass", 1.0, sphere, 2500.0),),
+        pairs=(Pair("glass", "glass", 0.5, 0.5), Pair("glass", "wall", 0.5, 0.5)),
+        rig=box,
+        numerics=Numerics(rayleigh_fraction=0.2, skin=SKIN, sleep_speed=0.0),
+    )
+
+
+def load_bed(bed: Bed) -> tuple[Batch, float]:
+    """A batch of one world that holds ``bed``, and its time step [s]."""
+    n = len(bed.centres)
+    batch = Batch(Capacity(worlds=1, bodies=n, members=n, contacts=8 * n, kinds=2))
+    scene = bed_scene(bed.box)
+    dt = time_step(scene)
+    batch.load(0, scene, layout(scene, np.zeros(n, dtype=np.int32)), dt, [True] * 5)
+    upright, still = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)
+    for b in range(n):
+        batch.enter(0, b, bed.centres[b], upright, bed.velocities[b], still)
+    return batch, dt
+
+
+def summary_of(batch: Batch) -> dict[str, float]:
+    """Summary of the one world by name."""
+    return dict(zip(SUMMARY_COLUMNS, batch.measure(0)[0].tolist(), strict=True))
+
+
+def bed_name(n: int) -> str:
+    """Name of the case with ``n`` spheres."""
+    return f"bed of {n} spheres"
+
+
 def _drive(batch: Batch, pour: Pour) -> list[float]:
     """Run ``pour`` to its end; touching contacts at its moments of decision."""
     touching = SUMMARY_COLUMNS.index("touching")
@@ -302,6 +289,3 @@ def _drive(batch: Batch, pour: Pour) -> list[float]:
         contacts.append(float(row[touching]))
         pour.after(steps, row)
     return contacts
-
-
-__all__ = ["Bed", "Measurement", "measure_batch", "measure_bed", "measure_pour", "shuffled", "wide_bed"]

@@ -1,6 +1,7 @@
 """Surfaces that rigs are made of: planes, straight lines turned about an axis, and triangle meshes, in any pose.
 
-Quaternions that turn a surface's local z axis into a direction of the world, and planes that face one.
+A pose turns a surface's local z axis into a direction of the world; ``FACING_…`` are the quaternions (wxyz) of planes
+that face along an axis.
 """
 
 from __future__ import annotations
@@ -15,6 +16,15 @@ import numpy as np
 from solver.params import ParameterError
 
 Point = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+HALF = math.sqrt(0.5)
+FACING_PLUS_Y: Quaternion = (HALF, -HALF, 0.0, 0.0)
+"""A quarter turn about −x: local z becomes +y."""
+FACING_MINUS_Y: Quaternion = (HALF, HALF, 0.0, 0.0)
+"""A quarter turn about +x: local z becomes −y."""
+FACING_DOWN: Quaternion = (0.0, 1.0, 0.0, 0.0)
+"""Half a turn about x: local z becomes −z."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +79,11 @@ def horizontal(height: float, material: str) -> Plane:
     return Plane(material, Pose((0.0, 0.0, height)))
 
 
+def turned_plane(origin: Point, quaternion: Quaternion, material: str) -> Plane:
+    """A plane through ``origin`` [m] whose side with bodies is the turned local +z."""
+    return Plane(material, Pose(origin, quaternion))
+
+
 def rectangle(corner: Point, edge_a: Point, edge_b: Point, material: str) -> TriangleMesh:
     """The parallelogram at ``corner`` that ``edge_a`` and ``edge_b`` [m] span, as two triangles."""
     start, a, b = (np.array(x, dtype=float) for x in (corner, edge_a, edge_b))
@@ -98,27 +113,3 @@ def load_mesh(path: Path, material: str, metres_per_unit: float, pose: Pose = Po
     vertices = tuple((float(x), float(y), float(z)) for x, y, z in mesh.vertices * metres_per_unit)
     faces = tuple((int(a), int(b), int(c)) for a, b, c in mesh.faces)
     return TriangleMesh(vertices, faces, material, pose)
-
-
-Vector = tuple[float, float, float]
-
-Quaternion = tuple[float, float, float, float]
-
-HALF = math.sqrt(0.5)
-
-FACING_PLUS_Y: Quaternion = (HALF, -HALF, 0.0, 0.0)
-
-"""A quarter turn about −x: local z becomes +y."""
-
-FACING_MINUS_Y: Quaternion = (HALF, HALF, 0.0, 0.0)
-
-"""A quarter turn about +x: local z becomes −y."""
-
-FACING_DOWN: Quaternion = (0.0, 1.0, 0.0, 0.0)
-
-"""Half a turn about x: local z becomes −z."""
-
-
-def turned_plane(origin: Vector, quaternion: Quaternion, material: str) -> Plane:
-    """A plane through ``origin`` [m] whose side with bodies is the turned local +z."""
-    return Plane(material, Pose(origin, quaternion))

@@ -5,17 +5,17 @@ gravity = [0.0, 0.0, -9.81]
 contact_law = "hertz_mindlin"        the same as law in [contact]
 assumed = [paths of values that nobody measured]
 [materials.<name>]       density, and two of youngs_modulus, shear_modulus, poisson_ratio (SI or with a unit)
-[[body]]                 name, material, mass_fraction, shape, … (`solver.scenes.material_file`)
+[[body]]                 name, material, mass_fraction, shape, … (below)
 [pair.<a>.<b>]           static_friction, restitution
 [rig] [insertion] [numerics] [contact] [effect.<name>]     optional: another rig than the default funnel, settings,
-                                 conventions of the contact law, effects that are switched on (see set_up.py)
+                                 conventions of the contact law, effects that are switched on
 
-One ``[[body]]`` of a material file → :class:`Body`.
+**A component**, one ``[[body]]`` → :class:`Body`:
 
 name, material, mass_fraction      which material (by default that of the body's name), its share of the mass
 size_distribution, size_spread     how the sizes scatter (`solver.scenes.sizes`)
 size                               instead of these two, measured diameters: { mean, sd } or { quantiles = { p05, … } }
-                                   become log-normal sizes about the declared one (`solver.scenes.material_file`)
+                                   become log-normal sizes about the declared one (below)
 
 and one of
 
@@ -27,7 +27,7 @@ sphere_centres, sphere_radii, mass, inertia
 file                               a file with one such [[body]], as `explorer shape` writes it; keys that stand beside
                                    ``file`` replace those in it
 
-Measured diameters of a component → spread of its sizes.
+**Measured diameters** → spread of the sizes:
 
 size = { mean = 1.212e-3, sd = 0.139e-3 }                              spread = sd / mean
 size = { quantiles = { p05 = 1.105e-3, p50 = 1.204e-3, p95 = … } }     spread = √(exp t² − 1)
@@ -36,10 +36,9 @@ t is the slope of ln(quantile) over the quantile's normal deviate, by least squa
 both stand, mean and sd count. Only the *relative* spread is taken; the sizes lie about the declared dimensions.
 Source: moments and quantiles of the log-normal distribution, Johnson, Kotz & Balakrishnan 1994, ch. 14.
 
-Tables of a file that lie over a material: ``[rig]``, ``[insertion]``, ``[numerics]``, ``[contact]``, ``[effect.…]``.
-
-Keys are the last parts of parameter paths (``outlet_height`` in ``[rig]`` is ``rig.outlet_height``); ``name`` in
-``[rig]`` chooses the rig.
+**Settings**, the tables ``[rig]``, ``[insertion]``, ``[numerics]``, ``[contact]`` and ``[effect.…]`` of this file or of
+one that lies over a material: keys are the last parts of parameter paths (``outlet_height`` in ``[rig]`` is
+``rig.outlet_height``); ``name`` in ``[rig]`` chooses the rig.
 """
 
 from __future__ import annotations
