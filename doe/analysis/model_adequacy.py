@@ -93,7 +93,6 @@ def _where(found: npt.NDArray[np.bool_]) -> tuple[int, ...]:
 
 
 POWERS = np.round(np.linspace(-3.0, 3.0, 121), 10)
-
 NAMED = {-2.0: "1/y²", -1.0: "1/y", -0.5: "1/√y", 0.0: "ln y", 0.5: "√y", 1.0: "none", 2.0: "y²"}
 
 

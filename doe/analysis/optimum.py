@@ -42,7 +42,6 @@ from doe.record import Record
 from doe.target import Target
 
 FloatArray = npt.NDArray[np.float64]
-
 Resampling = Literal["replicates within points", "residuals"]
 
 
@@ -84,15 +83,11 @@ def _residuals(surface: Surface, refits: int, generator: np.random.Generator) ->
 
 
 WIDTH_LINES = 81
-
 WIDTH_LINES_4 = 31
-
 CLOUD_REFINEMENTS_4 = 9
-
 """The same for four factors and more, whose lines stand on a grid of three dimensions and more, and the refinements of
 a refit's point there, to about 1e-3 half-widths.
 """
-
 SHARE_LEVELS = 21
 
 
@@ -290,7 +285,6 @@ def _vector(name: str, values: npt.ArrayLike, k: int) -> FloatArray:
 
 
 TIE = 1e-3
-
 """Weight of the squared coded distance to the reference: decides only where the misfit does not."""
 
 

@@ -31,7 +31,6 @@ from doe.record import Record
 FloatArray = npt.NDArray[np.float64]
 
 BIAS_LIMIT_DEG = 5.0
-
 """An estimator that misses the angle of made-up piles by more, however they are filled, is not taken."""
 
 
@@ -121,7 +120,6 @@ def _valid(name: str, values: npt.ArrayLike) -> FloatArray:
 
 
 CLEARLY = 0.95
-
 """Share of the bootstrap samples in which another estimator must beat the default to replace it."""
 
 

@@ -76,11 +76,9 @@ def holm(p_values: FloatArray) -> FloatArray:
 
 
 Adjustment = Literal["none", "holm"]
-
 ErrorSource = Literal["replicates", "dummies"]
 
 SIGNIFICANT = "significant"
-
 FALLBACK = "fallback: not significant"
 
 

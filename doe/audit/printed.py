@@ -25,13 +25,9 @@ from doe.errors import AuditError
 from doe.record import Record
 
 NUMBER = re.compile(r"([<>]?)\s*([+-]?(?:\d+\.?\d*|\.\d+))(?:[eE]([+-]?\d{1,3}))?")
-
 SMALLEST, LARGEST = 1e-30, 1e30
-
 """Sizes that physical quantities have in any unit; squares of sums of them stay finite."""
-
 DUST = 1e-9
-
 """Relative rounding of the recomputation itself, far below any print."""
 
 
@@ -94,7 +90,6 @@ def printed_or_none(text: str) -> Printed | None:
 
 
 FloatArray = npt.NDArray[np.float64]
-
 Computation = Callable[[FloatArray], FloatArray]
 
 

@@ -26,7 +26,6 @@ from doe.audit.study import DropTest
 from doe.errors import AuditError
 
 LONGEST = 200
-
 FUNCTIONS: dict[str, Callable[[float], float]] = {
     "sqrt": math.sqrt,
     "sin": math.sin,
@@ -39,7 +38,6 @@ FUNCTIONS: dict[str, Callable[[float], float]] = {
     "exp": math.exp,
     "abs": abs,
 }
-
 OPERATIONS: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: lambda a, b: a + b,
     ast.Sub: lambda a, b: a - b,
@@ -112,15 +110,10 @@ def _allowed() -> str:
 
 
 GRAVITY = 9.81
-
 """[m/s²]."""
-
 TANGENTIAL = {"frictionless plate": 1.0, "solid sphere that rolls off": 5.0 / 7.0}
-
 """What k may be, in words; a body that sticks is between."""
-
 TOLERANCE = 0.01
-
 """A formula that misses e by less than this, relative, gives it back: the scatter of such tests is larger."""
 
 

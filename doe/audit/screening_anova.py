@@ -28,7 +28,6 @@ from doe.designs import plackett_burman
 from doe.errors import StatisticsError
 
 FloatArray = npt.NDArray[np.float64]
-
 ADDS_UP = "sums of squares add up"
 
 
@@ -177,7 +176,6 @@ def _standard_design(runs: int, factors: int) -> FloatArray | None:
 SIGNIFICANCE = "significance"
 
 ALPHA = 0.05
-
 Interval = tuple[float, float]
 
 

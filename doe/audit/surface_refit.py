@@ -29,7 +29,6 @@ from doe.audit.printed import Printed, common_half, halves_of, rounding_slack, v
 from doe.audit.study import Ascent, Equation, Optimum, SurfaceStudy, Target, Verified
 
 FloatArray = npt.NDArray[np.float64]
-
 COLUMNS: dict[str, tuple[str, Callable[[AnovaRow], float]]] = {
     "sum_of_squares": ("sum of squares", lambda row: row.sum_of_squares),
     "df": ("degrees of freedom", lambda row: float(row.df)),
@@ -37,7 +36,6 @@ COLUMNS: dict[str, tuple[str, Callable[[AnovaRow], float]]] = {
     "f": ("F", lambda row: row.f),
     "p": ("p", lambda row: row.p),
 }
-
 STATISTICS: dict[str, tuple[str, Callable[[SurfaceAnova], float]]] = {
     "r_squared": ("R²", lambda anova: anova.r_squared),
     "r_squared_adjusted": ("adjusted R²", lambda anova: anova.r_squared_adjusted),
@@ -46,7 +44,6 @@ STATISTICS: dict[str, tuple[str, Callable[[SurfaceAnova], float]]] = {
     "adequate_precision": ("adequate precision", lambda anova: anova.adequate_precision),
     "sigma": ("residual standard deviation", lambda anova: anova.sigma),
 }
-
 """Key of a study file → words, and the same number of a refit."""
 
 
@@ -253,9 +250,7 @@ def _with_slack(study: SurfaceStudy, compute: Callable[[FloatArray], FloatArray]
 PREDICTION = "prediction at the claimed optimum"
 
 ON = 1e-6
-
 """Coded distance within which a setting is on a corner or on a run."""
-
 LEVEL = 0.95
 
 

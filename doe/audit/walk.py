@@ -23,9 +23,7 @@ from doe.audit.printed import values_of
 from doe.audit.study import Ascent, DesignSteps, Screening, SurfaceStudy
 
 FloatArray = npt.NDArray[np.float64]
-
 CLOSE = 0.01
-
 """Coded levels that differ by less are the same: half a percent of a range, the rounding of printed settings."""
 
 

@@ -30,9 +30,7 @@ from doe.laboratory.result import Derived, derived, no_parameter, per_row
 from doe.laboratory.tables import Row, Table
 
 GRAVITY = 9.81
-
 GRIPPING = 5.0 / 7.0
-
 """Share of the tangential velocity that a solid sphere keeps when it leaves without slip."""
 
 

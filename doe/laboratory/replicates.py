@@ -27,13 +27,9 @@ from doe.errors import StatisticsError
 from doe.record import Record
 
 ENOUGH_FOR_SEVERAL = 15
-
 LARGEST_SHARE = 0.2
-
 """Of the values, that may be outliers where there are enough to look for several."""
-
 NEGLIGIBLE = 1e-12
-
 """Spread relative to the largest value that is rounding."""
 
 

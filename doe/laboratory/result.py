@@ -14,7 +14,6 @@ from doe.laboratory.tables import Row, Table
 from doe.record import Record
 
 CONDITIONS = ("drop_height",)
-
 """Names of what is carried along for the twins, and no result."""
 
 

@@ -20,17 +20,11 @@ from pathlib import Path
 from doe.table_file import read_table as read_cells
 
 LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
-
 AREA = {"m2": 1.0, "cm2": 1e-4, "mm2": 1e-6}
-
 FORCE = {"N": 1.0, "kN": 1e3, "mN": 1e-3}
-
 MASS = {"kg": 1.0, "g": 1e-3, "mg": 1e-6}
-
 ANGLE = {"deg": math.pi / 180.0, "rad": 1.0}
-
 SPEED = {"m_s": 1.0, "cm_s": 1e-2, "mm_s": 1e-3}
-
 DENSITY = {"kg_m3": 1.0, "g_cm3": 1e3}
 
 
@@ -87,7 +81,6 @@ class Layout:
 
 
 COMPONENT = ("component",)
-
 PAIR = ("a", "b")
 
 FORCE_DISPLACEMENT = Layout(
@@ -100,9 +93,7 @@ FORCE_DISPLACEMENT = Layout(
     ),
     curves=True,
 )
-
 INCLINED_PLANE = Layout(PAIR, (Column("angle", ANGLE, low=0.0, high=math.pi / 2.0, zero=True),))
-
 DROP = Layout(
     PAIR,
     (
@@ -112,12 +103,10 @@ DROP = Layout(
         Column("v_z", SPEED, needed=False),
     ),
 )
-
 MOISTURE = Layout(
     COMPONENT,
     (positive("mass_before", MASS), positive("mass_after", MASS), positive("mass_container", MASS, needed=False)),
 )
-
 IMMERSION = Layout(
     COMPONENT,
     (
@@ -128,9 +117,7 @@ IMMERSION = Layout(
         positive("mass_soaked", MASS, needed=False),
     ),
 )
-
 COMPOSITION = Layout(COMPONENT, (Column("mass", MASS, low=0.0, zero=True),))
-
 DIMENSIONS = Layout(
     COMPONENT,
     (
@@ -141,11 +128,8 @@ DIMENSIONS = Layout(
 )
 
 MOST_BYTES = 50_000_000
-
 NAME = re.compile(r"[A-Za-z0-9_-]{1,60}")
-
 """What a component may be called: its name becomes part of a parameter's path."""
-
 REPLICATE, NOTE = "replicate", "note"
 
 

@@ -26,17 +26,12 @@ from doe.measurement.piles import pile_values, read_piles
 from solver import Record, Scene, named, observe_named, slope_angle_deg
 
 Array = npt.NDArray[np.float64]
-
 Readings = dict[str, float | Array]
 
 PROFILE = "surface_profile_m"
-
 CORE = 10.0e-3
-
 """Half width [m] within which, ends excluded, ``slope_core_deg`` is taken."""
-
 SLOPES = {"slope_deg": np.inf, "slope_core_deg": float(np.nextafter(CORE, 0.0))}
-
 """Slopes of the profile: name → largest |x| [m] of the places that count."""
 
 
@@ -66,7 +61,6 @@ def slope_of_profile(name: str, x: Array, height: Array) -> float:
 
 
 Values = dict[str, tuple[Array | None, Array]]
-
 Origin = Literal["table", "piles", "photographs", "profile"]
 
 

@@ -21,19 +21,13 @@ from doe.studies.study import Study
 from doe.studies.study_result import AllStages, StageResult, Stages
 
 Analysis = Callable[[Runner], StageResult | None]
-
 """A stage as a function of who makes its runs."""
-
 OnPartial = Callable[[str, StageResult], None]
-
 """Called with (stage, its result so far)."""
 
 LEAST_INTERVAL = 3.0
-
 """Seconds between two partial results."""
-
 SHARE = 0.02
-
 """Largest share of the time that the analyses may take."""
 
 

@@ -25,11 +25,8 @@ from doe.studies.study import Study
 from solver import Scene, observable_names, parameters, value, with_values
 
 MARGIN = 0.3
-
 """Of a mean, in standard deviations of one pour with the full settings."""
-
 ALPHA, POWER = 0.05, 0.9
-
 COMPARED = (
     "angle_of_repose_deg",
     "angle_of_repose_cone_deg",
@@ -38,11 +35,8 @@ COMPARED = (
     "bulk_density_kg_m3",
     "discharge_time_s",
 )
-
 """What has to stay: the slope read off the silhouette and off the surface, height, spread, packing and flow."""
-
 SHARE_ALPHA = 0.01
-
 """Level at which the shares of valid pours count as different (Fisher's exact test)."""
 
 

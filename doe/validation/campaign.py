@@ -41,17 +41,12 @@ from doe.validation.work_place import Order, OutOfTimeError, WorkPlace, complete
 from solver import EFFECTS, PHYSICS
 
 TRIES = 3
-
 """Times that a laboratory pours ``REPLICATES`` more to replace pours that jammed."""
-
 OFFERS = (SCALARS, SCAN)
-
 """Kinds of data by which every set is judged."""
-
 NAN = float("nan")
 
 Data = dict[str, list[Sample]]
-
 """Pours per condition."""
 
 
@@ -245,9 +240,7 @@ def _silent(line: str) -> None:
 
 
 SETS = "sets.jsonl"
-
 ROUNDS = 4
-
 """Rounds of reference pours for a laboratory that has none: 48 pours of each effect, strengths to some 8 %."""
 
 Say = Callable[[str], None]

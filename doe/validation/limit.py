@@ -47,7 +47,6 @@ from doe.record import Record
 from doe.validation.reference import SIDE, Sample
 
 FloatArray = npt.NDArray[np.float64]
-
 FOLDS = 8
 
 
@@ -174,35 +173,20 @@ def _size(sample: Sample) -> int:
 
 
 LEAST, MOST = 1.5, 20.0
-
 """Range of an amplitude's prior, in standard errors on the ruler (scalars, six pours)."""
-
 NODES = 24
-
 """Amplitudes over which the evidence is summed."""
-
 NOTHING = 0.5
-
 """Prior that nothing is missing; effects share the rest alike."""
-
 RISKS = (0.003, 0.01, 0.03, 0.1)
-
 """Shares of wrong names among the sets of a strength at which a coverage is stated."""
-
 RISK = 0.03
-
 """The one of them at which an effect's own share is stated."""
-
 SETS = 4000
-
 """Made-up data sets of each effect and strength."""
-
 STRENGTHS = (4.0, 6.0, 10.0)
-
 """Strengths [σ] for which limits are stated."""
-
 CLASS = 0.95
-
 """Cosine of two signatures above which data cannot tell the effects apart."""
 
 

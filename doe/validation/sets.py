@@ -31,11 +31,8 @@ from doe.record import Record
 Answer = Literal["right", "undecided", "wrong", "unexplained", "nothing", "out of reach"]
 
 OUT_OF_REACH = "out of reach: "
-
 """Start of the verdict on a truth that cannot be, followed by the reason."""
-
 NONE = "none"
-
 """Label of a set in which nothing is missing."""
 
 
@@ -188,9 +185,7 @@ def _row(cells: dict[str, Any]) -> Row:
 
 
 LEVEL = 0.95
-
 HOLDOUT_GOOD = 1.25
-
 """Holdout error ÷ noise floor that a set with a right name should not exceed."""
 
 
@@ -240,19 +235,12 @@ def wilson(hits: int, sets: int, level: float = LEVEL) -> tuple[float, float]:
 
 
 RISKS = (0.0, 0.01, 0.025)
-
 """Shares of sets with a library effect that get a wrong name at most, of the risk–coverage curve; 0.025 is 4 of 160."""
-
 BINS = (0.0, 0.5, 0.7, 0.9, 0.99, 1.0)
-
 """Ends of the probabilities of the reliability diagram."""
-
 LEAST_P = 1e-6
-
 """Of the truth, as the logarithmic loss counts it."""
-
 TEMPERATURES = (0.4, 0.55, 0.7, 0.85, 1.0, 1.3)
-
 """By which the evidence of kept rows is weighed again."""
 
 

@@ -20,19 +20,12 @@ from doe.validation.limit import Reached
 Kind = Literal["null", "effect", "pair", "outside"]
 
 STRENGTHS = (6.0, 10.0)
-
 """[σ] of single effects."""
-
 WIDE_STRENGTHS = (4.0, 6.0, 8.0, 10.0, 15.0, 25.0, 40.0)
-
 """[σ] of those of a development campaign, so that its rule has met whatever comes."""
-
 PAIR_STRENGTHS = (6.0, 10.0)
-
 """Range [σ] of each of two."""
-
 ROUND = {"null": 15, "effect": 12, "pair": 4, "outside": 6}
-
 """Sets of each kind in a round; ten rounds are a test: 150, 60 of each strength, 40 and 60."""
 
 
@@ -76,21 +69,13 @@ def cases(root: int, number: int, outside: Sequence[str], wide: bool = False) ->
 
 
 REPLICATES = 6
-
 ROOT = 1
-
 """Root of the seeds of the laboratories' pours; that of the diagnosis's pours is 0."""
-
 DISTINCT = 0.9
-
 """Cosine of their signatures up to which two effects are made a pair: two that look alike are one to any data."""
-
 POWERS = (0.7, 2.0)
-
 """Range of p: of two strengths with errors it may come out at anything."""
-
 SEEN = 2.0
-
 """Standard errors that a strength is above zero, or nobody knows its amplitude."""
 
 

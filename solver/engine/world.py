@@ -22,7 +22,6 @@ from solver.scenes.body import Body
 from solver.scenes.scene import Scene
 
 Array = npt.NDArray[np.float64]
-
 Ints = npt.NDArray[np.int32]
 
 SUMMARY_COLUMNS = (
@@ -45,7 +44,6 @@ SUMMARY_COLUMNS = (
     "wall_work",
     "taken_out",
 )
-
 """Columns of a summary, SI; what they mean stands in ``state.SUMMARY`` and ``state.WORLD``."""
 
 

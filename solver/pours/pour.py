@@ -41,7 +41,6 @@ from solver.scenes.scene import Scene, actual, pour_rig
 from solver.scenes.time_step import time_step
 
 SETTLE_LIMIT = 1.0
-
 """``fill_then_open``: the rig acts this long [s] after the last body entered even if the fill still moves."""
 
 Summary = dict[str, float]

@@ -33,9 +33,7 @@ if TYPE_CHECKING:
     from solver.pours.run import Job
 
 MOMENTS = 3
-
 """Moments of decision of a pour after which its kernels are compiled."""
-
 GONE = "a worker process has ended before its work was done"
 
 

@@ -17,9 +17,7 @@ from solver.laws import CONTACT_LAWS, HertzMindlin
 from solver.params import param
 
 CLUMP_RULES = ("body_mass", "local_mass", "local_mass_shared")
-
 TANGENTIAL_LAWS = ("mindlin_rescale", "mindlin")
-
 TANGENTIAL_DASHPOTS = ("capped", "uncapped")
 
 

@@ -23,17 +23,11 @@ from solver.shapes.sphere_fit import Orbits, Target, orbits_of, refine, start_la
 from solver.shapes.sphere_union import Array, distance_to_union, open_points, squared_distances
 
 SURFACE_POINTS, INTERIOR_POINTS = 2000, 30_000
-
 START_POINTS = 6000
-
 MOST_IN_ROWS, LAYOUTS = 32, 4
-
 STEPS = 60
-
 SCORE_POINTS = 200
-
 LEAST_RADIUS = 0.5
-
 """Smallest member sphere relative to the largest inside the solid; it sets the time step."""
 
 

@@ -28,21 +28,13 @@ from solver.single_body.bench import UPRIGHT, Bench, BenchResult, Quantity, ball
 Array = npt.NDArray[np.float64]
 
 NORMAL = np.array([1.0, 0.0, 1.0]) / math.sqrt(2.0)
-
 BEFORE_IMPACT = 1e-3
-
 """From this long [s] before the impact on, the body is watched closely."""
-
 GIVEN_UP = 1.0
-
 """A body that is not clear of the plate, whichever way it turns, this long [s] after the impact is given up."""
-
 MOMENT_STEPS = 5
-
 RESTITUTIONS = (0.2, 0.35, 0.5, 0.65, 0.8)
-
 FRICTIONS = (0.0, 0.1, 0.3, 0.6)
-
 """What the bias of the paper's estimate is shown over."""
 
 

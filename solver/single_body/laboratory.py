@@ -25,31 +25,20 @@ from solver.scenes.scene import Scene, actual
 from solver.scenes.time_step import time_step
 
 Array = npt.NDArray[np.float64]
-
 Triple = Sequence[float] | Array
 
 GRAIN = Material("grain", density=2500.0, shear_modulus=1e7, poisson_ratio=0.25)
-
 WALL = Material("wall", density=7800.0, shear_modulus=8e10, poisson_ratio=0.3)
-
 FREE = (0.0, 0.0, 0.0)
-
 EARTH = (0.0, 0.0, -9.81)
-
 PLATE = horizontal(0.0, "wall")
-
 """z = 0, bodies above it."""
-
 RADIUS = 5e-3
-
 """Of the grain that :func:`sphere` makes unless told otherwise [m]."""
-
 AT_REST = np.zeros(3)
-
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
 ROOM = Capacity(worlds=1, bodies=128, members=1024, contacts=8192, kinds=64).rounded()
-
 """One size for all laboratories without a mesh, so that the kernels are compiled once. Only the newest is alive."""
 
 
