@@ -1,7 +1,4 @@
-"""What the analysis of a bench test returns: plain records.
-
-From rows to a derived quantity: one value per replicate, summed up.
-"""
+"""What the analysis of a bench test returns: plain records, and from rows one value per replicate, summed up."""
 
 from __future__ import annotations
 

@@ -15,8 +15,6 @@ estimators = [observables]     candidates for the screening's response; those of
 [scan]          path, values                             one assumption in steps
 [profile.NAME]  spheres, mass and the numbers of runs
 [stage.NAME]    a stage of another package, with what it takes (doe/stages/stage.py)
-
-The design of a stage, from its table in a study file: ``design = "NAME"`` and the options of that family.
 """
 
 from __future__ import annotations
