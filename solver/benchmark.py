@@ -19,21 +19,21 @@ import numpy.typing as npt
 
 from solver import backend
 from solver.engine.state import Capacity
-from solver.engine.tables import layout
+from solver.engine.tables import body_tables
 from solver.engine.world import SUMMARY_COLUMNS, Batch
 from solver.pours.pour import Pour
 from solver.pours.record import Outcome
 from solver.pours.run import Job, capacity_for
-from solver.pours.worker_pool import Crew
+from solver.pours.worker_pool import WorkerPool
 from solver.rigs.rig import BareRig
-from solver.rigs.surface import Plane, Pose, Surface, horizontal
+from solver.rigs.surface import Plane, Surface, SurfacePose, horizontal
 from solver.scenes.body import Body, Members
 from solver.scenes.material import Material, Pair
 from solver.scenes.numerics import Numerics
 from solver.scenes.scene import Scene, with_values
 from solver.scenes.time_step import time_step
 
-__all__ = ["Bed", "Measurement", "measure_batch", "measure_bed", "measure_pour", "shuffled", "wide_bed"]
+__all__ = ["Bed", "BenchmarkResult", "measure_batch", "measure_bed", "measure_pour", "shuffled", "wide_bed"]
 
 Array = npt.NDArray[np.float64]
 
@@ -51,7 +51,7 @@ WARM_UP = {"numerics.max_time": 0.1}
 
 
 @dataclass(frozen=True)
-class Measurement:
+class BenchmarkResult:
     """One engine on one case. Contacts are those that touch at the end; rates are over the stepping loop."""
 
     case: str
@@ -98,10 +98,10 @@ class Box(BareRig):
         half = float(np.sqrt(0.5))
         return (
             horizontal(0.0, self.wall),
-            Plane(self.wall, Pose((0.0, 0.0, 0.0), (half, 0.0, half, 0.0))),
-            Plane(self.wall, Pose((self.width, 0.0, 0.0), (half, 0.0, -half, 0.0))),
-            Plane(self.wall, Pose((0.0, 0.0, 0.0), (half, -half, 0.0, 0.0))),
-            Plane(self.wall, Pose((0.0, self.depth, 0.0), (half, half, 0.0, 0.0))),
+            Plane(self.wall, SurfacePose((0.0, 0.0, 0.0), (half, 0.0, half, 0.0))),
+            Plane(self.wall, SurfacePose((self.width, 0.0, 0.0), (half, 0.0, -half, 0.0))),
+            Plane(self.wall, SurfacePose((0.0, 0.0, 0.0), (half, -half, 0.0, 0.0))),
+            Plane(self.wall, SurfacePose((0.0, self.depth, 0.0), (half, half, 0.0, 0.0))),
         )
 
 
@@ -114,7 +114,7 @@ class Bed:
     velocities: Array
 
 
-def measure_bed(bed: Bed, steps: int) -> Measurement:
+def measure_bed(bed: Bed, steps: int) -> BenchmarkResult:
     """``steps`` of ``bed`` on one thread."""
     backend.init(threads=1)
     batch, dt = load_bed(bed)
@@ -123,12 +123,12 @@ def measure_bed(bed: Bed, steps: int) -> Measurement:
     batch.advance(np.array([steps], dtype=np.int32))
     wall = time.perf_counter() - begin
     n, contacts = len(bed.centres), summary_of(batch)["touching"]
-    return Measurement(bed_name(n), "ours, nothing sleeps", n, n, steps, wall, steps * dt, contacts, contacts)
+    return BenchmarkResult(bed_name(n), "ours, nothing sleeps", n, n, steps, wall, steps * dt, contacts, contacts)
 
 
 def measure_pour(
     case: str, scene: Scene, seed: int, duration: float | None, sleeping: bool, times: int = 1
-) -> Measurement:
+) -> BenchmarkResult:
     """One pour on one thread, ``times`` over; steps, wall time and simulated time are those of all together.
 
     Parameters
@@ -168,22 +168,22 @@ def measure_pour(
         steps, simulated = steps + pour.steps, simulated + pour.time
     spheres = sum(len(scene.bodies[k].clump.radii) for k in pour.supply.order)
     name, touching = "ours" if sleeping else "ours, nothing sleeps", float(np.mean(contacts))
-    return Measurement(case, name, len(pour.supply.order), spheres, steps, wall, simulated, contacts[-1], touching)
+    return BenchmarkResult(case, name, len(pour.supply.order), spheres, steps, wall, simulated, contacts[-1], touching)
 
 
-def measure_batch(case: str, scene: Scene, seeds: Sequence[int], workers: int) -> Measurement:
-    """Pours of ``seeds`` to rest by a crew of ``workers``, as studies run them; steps are those of all together."""
-    with Crew(workers) as crew:
-        list(crew.run_queue(deque(Job(with_values(scene, WARM_UP), seed) for seed in seeds), [scene]))
+def measure_batch(case: str, scene: Scene, seeds: Sequence[int], workers: int) -> BenchmarkResult:
+    """Pours of ``seeds`` to rest by a pool of ``workers``, as studies run them; steps are those of all together."""
+    with WorkerPool(workers) as pool:
+        list(pool.run_queue(deque(Job(with_values(scene, WARM_UP), seed) for seed in seeds), [scene]))
         begin = time.perf_counter()
-        records = [record for _, record in crew.run_queue(deque(Job(scene, seed) for seed in seeds), [scene])]
+        records = [record for _, record in pool.run_queue(deque(Job(scene, seed) for seed in seeds), [scene])]
         wall = time.perf_counter() - begin
     steps = sum(record.steps for record in records)
     bodies = max(len(record.bodies.mass) for record in records)
     spheres = max(len(record.spheres.radius) for record in records)
     simulated = sum(record.steps * record.dt for record in records)
     name = f"{len(seeds)} pours, {workers} worker{'s' if workers > 1 else ''}"
-    return Measurement(case, name, bodies, spheres, steps, wall, simulated, float("nan"), float("nan"))
+    return BenchmarkResult(case, name, bodies, spheres, steps, wall, simulated, float("nan"), float("nan"))
 
 
 def wide_bed(tiles: tuple[int, int], copies: tuple[int, int] = (1, 1), seed: int = 1) -> Bed:
@@ -263,7 +263,7 @@ def load_bed(bed: Bed) -> tuple[Batch, float]:
     batch = Batch(Capacity(worlds=1, bodies=n, members=n, contacts=8 * n, kinds=2))
     scene = bed_scene(bed.box)
     dt = time_step(scene)
-    batch.load(0, scene, layout(scene, np.zeros(n, dtype=np.int32)), dt, [True] * 5)
+    batch.load(0, scene, body_tables(scene, np.zeros(n, dtype=np.int32)), dt, [True] * 5)
     upright, still = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)
     for b in range(n):
         batch.enter(0, b, bed.centres[b], upright, bed.velocities[b], still)

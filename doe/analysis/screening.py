@@ -52,7 +52,7 @@ class EffectTest(Record):
 
 
 @dataclass(frozen=True)
-class Effect(Record):
+class FactorEffect(Record):
     """One column of the design: effect in the unit of the response, partial sum of squares, share of the
     total.
     """
@@ -110,7 +110,7 @@ class Screening(Record):
     sentences.
     """
 
-    effects: tuple[Effect, ...]
+    effects: tuple[FactorEffect, ...]
     mean: float
     rows: int
     missing_rows: tuple[int, ...]
@@ -137,24 +137,24 @@ class Screening(Record):
         """Return the estimate of an error; None where the design gives none."""
         return self.pure_error if source == "replicates" else self.dummy_error
 
-    def half_width(self, effect: Effect) -> float:
+    def half_width(self, effect: FactorEffect) -> float:
         """Return half the 95 % interval of `effect`: t limit × its standard error, NaN where it was not tested."""
         error, test = self.deciding_error, self.deciding_test(effect)
         return math.nan if error is None or test is None else error.t_limit * test.standard_error
 
-    def factor_effects(self) -> tuple[Effect, ...]:
+    def factor_effects(self) -> tuple[FactorEffect, ...]:
         """Return the effects of the factors that could be estimated, by falling size."""
         known = [effect for effect in self.effects if not effect.is_dummy and math.isfinite(effect.effect)]
         return tuple(sorted(known, key=lambda effect: -abs(effect.effect)))
 
-    def deciding_test(self, effect: Effect) -> EffectTest | None:
+    def deciding_test(self, effect: FactorEffect) -> EffectTest | None:
         """Return the test of `effect` against the error that decides."""
         return effect.by_replicates if self.pure_error is not None else effect.by_dummies
 
-    def ranked(self) -> tuple[Effect, ...]:
+    def ranked(self) -> tuple[FactorEffect, ...]:
         """Return the factors (no dummies) by falling |t|; without any error, by falling |effect|."""
 
-        def size(effect: Effect) -> float:
+        def size(effect: FactorEffect) -> float:
             test = self.deciding_test(effect)
             value = abs(effect.effect) if test is None else abs(test.t)
             return value if math.isfinite(value) else (math.inf if value > 0 else -1.0)
@@ -236,7 +236,7 @@ def analyse_screening(
 
     return Screening(
         effects=tuple(
-            Effect(
+            FactorEffect(
                 name=name,
                 is_dummy=bool(is_dummy[j]),
                 effect=float(effects[j]),

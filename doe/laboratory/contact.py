@@ -26,7 +26,7 @@ from collections.abc import Callable
 from scipy.optimize import brentq
 
 from doe.laboratory.result import Derived, derived, no_parameter, per_row
-from doe.laboratory.tables import Row, Table
+from doe.laboratory.tables import Reading, Table
 
 GRAVITY = 9.81
 GRIPPING = 5.0 / 7.0
@@ -72,12 +72,12 @@ def restitution(table: Table) -> tuple[tuple[Derived, ...], tuple[str, ...]]:
     return tuple(found), notes
 
 
-def paper_estimate(row: Row) -> float:
+def paper_estimate(row: Reading) -> float:
     """L/(2H)."""
     return row.values["distance"] / (2.0 * row.values["drop_height"])
 
 
-def tracked_rebound(row: Row) -> float:
+def tracked_rebound(row: Reading) -> float:
     """(v_x + v_z)/√(2gH)."""
     return (row.values["v_x"] + row.values["v_z"]) / math.sqrt(2.0 * GRAVITY * row.values["drop_height"])
 
@@ -105,7 +105,7 @@ def _each(
     name: str,
     of: tuple[str, ...],
     formula: str,
-    rows: tuple[Row, ...],
+    rows: tuple[Reading, ...],
     values: list[float],
     notes: tuple[str, ...] = (),
 ) -> Derived:
@@ -117,7 +117,7 @@ def _path(quantity: str) -> Callable[..., str]:
     return lambda a, b: f"pair.{a}.{b}.{quantity}"
 
 
-def _check(table: Table, row: Row) -> None:
+def _check(table: Table, row: Reading) -> None:
     """One of the two measurements must be there, and a rebound must be slower than the fall."""
     speeds = [name for name in ("v_x", "v_z") if name in row.values]
     if len(speeds) == 1:

@@ -34,7 +34,7 @@ NEGLIGIBLE = 1e-12
 
 
 @dataclass(frozen=True)
-class Summary(Record):
+class ReplicateSummary(Record):
     """Statistics of ``n`` replicates, unit of the values; NaN where n is too small or nothing spreads.
 
     low, high: 95 % interval of the mean by Student's t. outliers: indices, the farthest first; mean_without: the mean
@@ -56,7 +56,7 @@ class Summary(Record):
     mean_without: float
 
 
-def summarise(values: npt.ArrayLike, level: float = 0.95) -> Summary:
+def summarise(values: npt.ArrayLike, level: float = 0.95) -> ReplicateSummary:
     """The summary of replicates; StatisticsError without any or with one that is not finite."""
     array = np.asarray(values, dtype=np.float64)
     if array.ndim != 1 or array.size == 0 or not np.isfinite(array).all():
@@ -69,7 +69,7 @@ def summarise(values: npt.ArrayLike, level: float = 0.95) -> Summary:
     w, p = map(float, stats.shapiro(array)) if spreads else (math.nan, math.nan)
     found = outliers(array)
     kept = np.delete(array, list(found))
-    return Summary(
+    return ReplicateSummary(
         n=n,
         mean=mean,
         sd=sd,

@@ -87,7 +87,7 @@ COMPOSITION = Layout(COMPONENT, (Column("mass", MASS, low=0.0, zero=True),))
 
 
 @dataclass(frozen=True)
-class Row:
+class Reading:
     """One reading: its row in the file, whose it is, and the numbers by column (SI)."""
 
     line: int
@@ -101,17 +101,17 @@ class Table:
     """All readings of a file, in its order."""
 
     file: str
-    rows: tuple[Row, ...]
+    rows: tuple[Reading, ...]
 
-    def groups(self) -> dict[tuple[str, ...], tuple[Row, ...]]:
+    def groups(self) -> dict[tuple[str, ...], tuple[Reading, ...]]:
         """Rows by whose they are; a pair means the same in either order."""
-        found: dict[tuple[str, ...], list[Row]] = {}
+        found: dict[tuple[str, ...], list[Reading]] = {}
         for row in self.rows:
             turned = row.of[::-1]
             found.setdefault(turned if turned in found else row.of, []).append(row)
         return {of: tuple(rows) for of, rows in found.items()}
 
-    def wrong(self, row: Row, column: str, text: str) -> LaboratoryError:
+    def wrong(self, row: Reading, column: str, text: str) -> LaboratoryError:
         """An error about one cell."""
         return LaboratoryError(f"{self.file}, row {row.line}, column {column}: {text}")
 
@@ -233,7 +233,7 @@ def _row(
     columns: dict[str, Column],
     layout: Layout,
     number: Callable[[str], float],
-) -> Row:
+) -> Reading:
     for key in (*layout.keys, REPLICATE):
         if not NAME.fullmatch(cells[key]):
             raise LaboratoryError(f"{where}, column {key}: {cells[key]!r}; allowed: letters, digits, _ and -")
@@ -242,7 +242,7 @@ def _row(
         for name, column in columns.items()
         if cells[name] or not column.blank
     }
-    return Row(line, tuple(cells[key] for key in layout.keys), cells[REPLICATE], values)
+    return Reading(line, tuple(cells[key] for key in layout.keys), cells[REPLICATE], values)
 
 
 def _value(where: str, name: str, text: str, column: Column, number: Callable[[str], float]) -> float:

@@ -20,26 +20,26 @@ from doe.declared.model import declare
 from doe.declared.points import Point
 from doe.declared.pours import ModelPours, room_of
 from doe.diagnose.budget import Budget
+from doe.diagnose.candidate_experiments import as_suggested
 from doe.diagnose.diagnosis import concluded, errors_of, joined, pursued, suggested
-from doe.diagnose.menu import as_suggested
 from doe.diagnose.result import Suggestion
-from doe.diagnose.teaching import Teacher
+from doe.diagnose.training_pours import TrainingPours
 from doe.diagnose.verdict import verdict_of
 from doe.measurement import Condition, Measurement, load_measurement
 from doe.measurement.features import SCALARS, SCAN, feature_set
 from doe.store import Store, default_store
-from doe.validation.laboratory import TREFOILS, Laboratory, Sample, read_laboratory
+from doe.validation.laboratory import TREFOILS, Laboratory, LaboratoryPour, read_laboratory
 from doe.validation.limit import limit_study
 from doe.validation.outside import AMPLITUDE, DEVELOPMENT, possible
 from doe.validation.reference import ROOT as REFERENCE_ROOT
 from doe.validation.reference import extended_to, kept
 from doe.validation.scanner import Scanner
-from doe.validation.sets import NONE, OUT_OF_REACH, Row, append_rows, read_rows
+from doe.validation.sets import NONE, OUT_OF_REACH, SetRow, append_rows, read_rows
 from doe.validation.truth import REPLICATES, ROOT, Case, Strengths, Truth, cases, strengths_of, truth_of
-from doe.validation.work_place import Order, OutOfTimeError, WorkPlace, complete
+from doe.validation.work_place import OutOfTimeError, PourOrder, WorkPlace, complete
 from solver import EFFECTS, PHYSICS
 
-Data = dict[str, list[Sample]]
+Data = dict[str, list[LaboratoryPour]]
 """Pours per condition."""
 Say = Callable[[str], None]
 
@@ -89,11 +89,11 @@ class CampaignOrder:
 class Judged:
     """The row of a data set, and what to measure next where the answer is ambiguous."""
 
-    row: Row
+    row: SetRow
     suggestion: Suggestion | None
 
 
-def run_campaign(order: CampaignOrder, say: Say) -> list[Row]:
+def run_campaign(order: CampaignOrder, say: Say) -> list[SetRow]:
     """Answer the data sets that ``sets.jsonl`` does not hold yet, until all are there or the time is over."""
     order.out.mkdir(parents=True, exist_ok=True)
     path, laboratory = order.out / SETS, read_laboratory(order.laboratory)
@@ -158,7 +158,7 @@ class Answers:
         """The declared model."""
         return self.laboratory.declared
 
-    def rows(self, case: Case) -> list[Row]:
+    def rows(self, case: Case) -> list[SetRow]:
         """Rows of ``case``, one for each kind of data."""
         began = time.monotonic()
         truth = truth_of(case, self.strengths)
@@ -173,7 +173,7 @@ class Answers:
             rows[-1] = replace(rows[-1], seconds=poured + time.monotonic() - began)
         return rows
 
-    def judged(self, truth: Truth, data: Data, offer: str) -> Row:
+    def judged(self, truth: Truth, data: Data, offer: str) -> SetRow:
         """The row of a data set that is written to a folder and read like any other, with a follow-up if one is due."""
         seed = (ROOT, *truth.case.seed)
         rng = np.random.default_rng([*seed, 1])
@@ -203,15 +203,15 @@ class Answers:
         if follow_up is not None:
             measurement = joined(measurement, follow_up)
         fitted, held = self.model_pours(measurement.fit), self.model_pours(measurement.holdout)
-        teacher = Teacher(declared, measurement.fit, fitted, self.budget, say)
-        compared = pursued(teacher, measurement.fit, self.budget, say)
-        verdict = verdict_of(compared, declared, teacher.levels, teacher.pours, follow_up is not None)
+        training = TrainingPours(declared, measurement.fit, fitted, self.budget, say)
+        compared = pursued(training, measurement.fit, self.budget, say)
+        verdict = verdict_of(compared, declared, training.levels, training.pours, follow_up is not None)
         conclusion, verdict = concluded(verdict, compared, declared, measurement.holdout, held, say)
         found = compared.posterior
         suggestion = None
         if self.follow_up and follow_up is None:
-            menu = suggested(verdict, found, teacher, measurement.fit, self.model_pours)
-            suggestion = next(iter(menu.suggestions), None)
+            candidates = suggested(verdict, found, training, measurement.fit, self.model_pours)
+            suggestion = next(iter(candidates.suggestions), None)
         best, best_p = found.best
         label = label_of(truth)
         named = {frozenset(name.split("+")) for name in verdict.names}
@@ -222,7 +222,7 @@ class Answers:
         off = [found.fits[one].theta - theta for one in ("base", verdict.final)] if right else []
         bias_before, bias_after = (float(np.sqrt((d**2).mean())) for d in off) if off else (NAN, NAN)
         told = conclusion.held_out
-        row = Row(
+        row = SetRow(
             laboratory=self.measurement.title,
             root=truth.case.root,
             number=truth.case.number,
@@ -285,20 +285,20 @@ class Answers:
                 return data
         return None
 
-    def orders(self, truth: Truth, condition: Condition, numbers: Sequence[int], occasion: str = "") -> list[Order]:
+    def orders(self, truth: Truth, condition: Condition, numbers: Sequence[int], occasion: str = "") -> list[PourOrder]:
         """Pours ``numbers`` of a laboratory in a condition; their seeds follow from root and number of the set."""
         paths = [parameter.path for parameter in self.measurement.parameters]
         laboratory = ModelPours([condition], paths, self.place.store, self.place.pours, root=ROOT)
         name = f"set {truth.case.root}.{truth.case.number} {condition.name}{occasion}"
         points = [Point(name, k, truth.theta, truth.effects) for k in numbers]
         outside = truth.case.label if truth.case.kind == "outside" else ""
-        return [Order(laboratory.scene(p, 0), laboratory.seed(p, 0), condition, outside) for p in points]
+        return [PourOrder(laboratory.scene(p, 0), laboratory.seed(p, 0), condition, outside) for p in points]
 
-    def out_of_reach(self, truth: Truth, offer: str) -> Row:
+    def out_of_reach(self, truth: Truth, offer: str) -> SetRow:
         """The row of a truth that cannot be, or whose pours keep breaking off."""
         verdict = OUT_OF_REACH + (truth.missing or "pours break off")
         case, title = truth.case, self.measurement.title
-        return Row(title, case.root, case.number, case.kind, label_of(truth), case.strength, amplitude_text(truth),
+        return SetRow(title, case.root, case.number, case.kind, label_of(truth), case.strength, amplitude_text(truth),
                    offer, verdict, "", "", NAN, NAN, "", NAN, NAN, {}, {}, NAN, NAN, NAN, NAN, NAN, 0, 0.0)  # fmt: skip
 
     def model_pours(self, conditions: Sequence[Condition], place: int | None = None) -> ModelPours:

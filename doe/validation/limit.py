@@ -42,7 +42,7 @@ from doe.diagnose.levels import REPLICATES
 from doe.diagnose.result import Level
 from doe.errors import StatisticsError
 from doe.record import Record
-from doe.validation.reference import SIDE, Sample
+from doe.validation.reference import SIDE, ReferencePours
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -89,7 +89,7 @@ class Strength(Record):
 
 
 @dataclass(frozen=True)
-class Kind(Record):
+class DataKind(Record):
     """One direction of an effect. ``two_sided``: its mirror image is possible as well."""
 
     effect: str
@@ -133,7 +133,7 @@ class Reached(Record):
         Strength by kind of data, six pours.
     """
 
-    kind: Kind
+    kind: DataKind
     amplitude: tuple[float, ...]
     ruler: Strength
     weak: Strength | None
@@ -151,7 +151,7 @@ class Confusable(Record):
 
 
 @dataclass(frozen=True)
-class Row(Record):
+class LimitRow(Record):
     """The limit for one kind of data, so many pours in each condition, and one strength."""
 
     data: str
@@ -178,7 +178,7 @@ class LimitStudy(Record):
     pours: Mapping[str, int]
     reached: tuple[Reached, ...]
     confusable: tuple[Confusable, ...]
-    rows: tuple[Row, ...]
+    rows: tuple[LimitRow, ...]
 
 
 @dataclass(frozen=True)
@@ -207,7 +207,7 @@ class Limit(Record):
 
 
 def limit_study(
-    sample: Sample, levels: Sequence[Level], offered: Mapping[str, Sequence[int]], seed: int = 0
+    sample: ReferencePours, levels: Sequence[Level], offered: Mapping[str, Sequence[int]], seed: int = 0
 ) -> LimitStudy:
     """The limit of every kind of data.
 
@@ -227,7 +227,7 @@ def limit_study(
     Strengths, the pairs that are most alike, and for each kind of data what can be named at each of ``STRENGTHS``,
     with the data's pours and with as many again.
     """
-    kinds = [Kind(one.direction.effect, one.direction.name, len(one.direction.full) == 2) for one in levels]
+    kinds = [DataKind(one.direction.effect, one.direction.name, len(one.direction.full) == 2) for one in levels]
     names = [f"{one.name} strong" for one in kinds]
     samples = {data: sample.first(numbers).varying() for data, numbers in offered.items()}
     scalars = next(iter(samples.values()))
@@ -244,7 +244,7 @@ def limit_study(
                 by_data[data] = found.strength
                 confusable += _most_alike(data, kinds, found)
             rng = np.random.default_rng(seed)
-            rows += [Row(data, replicates, limit_of(found, kinds, strength, rng)) for strength in STRENGTHS]
+            rows += [LimitRow(data, replicates, limit_of(found, kinds, strength, rng)) for strength in STRENGTHS]
     reached = tuple(
         Reached(kind, level.direction.at(level.share), ruler[k], weak[k], {d: by_data[d][k] for d in by_data})
         for k, (kind, level) in enumerate(zip(kinds, levels, strict=True))
@@ -254,7 +254,7 @@ def limit_study(
 
 
 def limit_of(
-    found: Signatures, kinds: Sequence[Kind], strength: float, rng: np.random.Generator, sets: int = SETS
+    found: Signatures, kinds: Sequence[DataKind], strength: float, rng: np.random.Generator, sets: int = SETS
 ) -> Limit:
     """The limit for effects that are ``strength`` σ strong on the ruler.
 
@@ -301,7 +301,9 @@ def limit_of(
     )
 
 
-def signatures_of(sample: Sample, names: Sequence[str], ruler: Sequence[Strength], replicates: int) -> Signatures:
+def signatures_of(
+    sample: ReferencePours, names: Sequence[str], ruler: Sequence[Strength], replicates: int
+) -> Signatures:
     """Strengths and cosines of the reference amplitudes ``names`` in the features of ``sample``.
 
     ``ruler``: their strengths on the ruler. ``replicates``: pours of a data set in each condition.
@@ -314,7 +316,7 @@ def signatures_of(sample: Sample, names: Sequence[str], ruler: Sequence[Strength
     return Signatures(tuple(names), tuple(ruler), strengths, nearest_correlation(gram / np.outer(size, size)))
 
 
-def metric_of(sample: Sample, replicates: int = REPLICATES) -> Metric:
+def metric_of(sample: ReferencePours, replicates: int = REPLICATES) -> Metric:
     """The metric of data sets of ``replicates`` pours per condition.
 
     Parameters
@@ -353,7 +355,7 @@ def metric_of(sample: Sample, replicates: int = REPLICATES) -> Metric:
     return Metric(np.linalg.inv(factor) / scale, freedom)
 
 
-def strength_of(sample: Sample, name: str, metric: Metric) -> Strength:
+def strength_of(sample: ReferencePours, name: str, metric: Metric) -> Strength:
     """Length of the shift by ``name``, zero where its square comes out negative, with its standard error."""
     shifts = fold_shifts(sample, name, metric)
     folds = len(shifts)
@@ -366,7 +368,7 @@ def strength_of(sample: Sample, name: str, metric: Metric) -> Strength:
     return Strength(value, float(np.hypot(error, value / np.sqrt(2.0 * metric.freedom))))
 
 
-def fold_shifts(sample: Sample, name: str, metric: Metric, folds: int = FOLDS) -> FloatArray:
+def fold_shifts(sample: ReferencePours, name: str, metric: Metric, folds: int = FOLDS) -> FloatArray:
     """Whitened shifts of ``name`` off the base model in each of the folds, (folds, D).
 
     Raises StatisticsError where a fold would be empty.
@@ -415,7 +417,7 @@ def nearest_correlation(cosines: FloatArray) -> FloatArray:
     return np.asarray(symmetric, dtype=np.float64)
 
 
-def _residuals(sample: Sample, condition: int) -> tuple[FloatArray, int]:
+def _residuals(sample: ReferencePours, condition: int) -> tuple[FloatArray, int]:
     """Deviations from the mean of their kind, of base pours and of those with a parameter moved, and the kinds."""
     kinds = ["base", *(f"{name} {side}" for name in sample.parameters for side in "-+")]
     groups = [sample.pours[kind][condition] for kind in kinds]
@@ -426,7 +428,7 @@ def _residuals(sample: Sample, condition: int) -> tuple[FloatArray, int]:
     return np.concatenate(scaled), len(scaled)
 
 
-def _slope(sample: Sample, parameter: str) -> FloatArray:
+def _slope(sample: ReferencePours, parameter: str) -> FloatArray:
     """What ``parameter`` does per standard deviation of its measurement, (D,)."""
     low, high = sample.pours[f"{parameter} -"], sample.pours[f"{parameter} +"]
     return np.concatenate([(b.mean(axis=0) - a.mean(axis=0)) / (2.0 * SIDE) for a, b in zip(low, high, strict=True)])
@@ -437,11 +439,11 @@ def _fold_means(pours: FloatArray, folds: int) -> FloatArray:
     return np.stack([pours[f::folds].mean(axis=0) for f in range(folds)])
 
 
-def _size(sample: Sample) -> int:
+def _size(sample: ReferencePours) -> int:
     return sum(block.shape[1] for block in sample.pours["base"])
 
 
-def _most_alike(data: str, kinds: Sequence[Kind], found: Signatures) -> list[Confusable]:
+def _most_alike(data: str, kinds: Sequence[DataKind], found: Signatures) -> list[Confusable]:
     """Pairs of clear signatures of different effects, the most alike first."""
     clear = [k for k, one in enumerate(found.ruler) if one.value > 2.0 * one.error]
     pairs = [

@@ -49,7 +49,7 @@ TEMPERATURES = (0.4, 0.55, 0.7, 0.85, 1.0, 1.3)
 
 
 @dataclass(frozen=True)
-class Row(Record):
+class SetRow(Record):
     """One data set, judged by data of one kind.
 
     Attributes
@@ -175,7 +175,7 @@ class Rate:
 
 
 @dataclass(frozen=True)
-class Target:
+class CampaignTarget:
     """What is aimed at, what came out, and whether that is met (None without a set to tell)."""
 
     name: str
@@ -253,7 +253,7 @@ def answer_to(verdict: str, label: str) -> Answer:
     return "undecided" if truth in names or left in rest.split(",") else "wrong"
 
 
-def read_rows(path: Path) -> list[Row]:
+def read_rows(path: Path) -> list[SetRow]:
     """Rows in ``path``, in order of numbers and kinds of data; none where there is no such file."""
     if not path.is_file():
         return []
@@ -261,14 +261,14 @@ def read_rows(path: Path) -> list[Row]:
     return sorted(rows, key=lambda row: (row.laboratory, row.root, row.number, row.offer))
 
 
-def append_rows(path: Path, rows: Sequence[Row]) -> None:
+def append_rows(path: Path, rows: Sequence[SetRow]) -> None:
     """Add ``rows`` to the file, in one write, so that processes that share it do not mix lines."""
     text = "".join(json.dumps(_rounded(row.to_dict()), ensure_ascii=False) + "\n" for row in rows)
     with path.open("a", encoding="utf-8") as file:
         file.write(text)
 
 
-def scores(rows: Sequence[Row]) -> Scores:
+def scores(rows: Sequence[SetRow]) -> Scores:
     """Scores of judged sets of one kind of data."""
     library = [row for row in rows if row.kind in ("effect", "pair")]
     tops = [_top(row) for row in rows]
@@ -291,7 +291,7 @@ def scores(rows: Sequence[Row]) -> Scores:
     )
 
 
-def by_temperature(rows: Sequence[Row]) -> tuple[Tempered, ...]:
+def by_temperature(rows: Sequence[SetRow]) -> tuple[Tempered, ...]:
     """Judged sets of one kind of data at each of ``TEMPERATURES``, pairs of effects left out of truths and answers."""
     some = [row for row in rows if "outside" in row.evidence and row.kind != "pair"]
     found = []
@@ -314,7 +314,7 @@ def by_temperature(rows: Sequence[Row]) -> tuple[Tempered, ...]:
     return tuple(found)
 
 
-def targets(rows: Sequence[Row], offer: str) -> list[Target]:
+def targets(rows: Sequence[SetRow], offer: str) -> list[CampaignTarget]:
     """The targets for data of the kind ``offer``, from judged sets; shares are those of the counts asked of a test."""
     own = [row for row in rows if row.offer == offer]
     effects = [row for row in own if row.kind == "effect"]
@@ -333,7 +333,7 @@ def targets(rows: Sequence[Row], offer: str) -> list[Target]:
         _target("right name at 10 σ", _rate(strong, _right), (57 if scans else 54) / 60, at_most=False),
         _target("outside effects called unexplained", _rate(outside, _unexplained), 48 / 60, at_most=False),
         _target("outside effects blamed on the library", _rate(outside, lambda row: row.named), 6 / 60, at_most=True),
-        Target(
+        CampaignTarget(
             "holdout error ÷ noise floor, right names",
             "median ≤ 1.1",
             f"{median:.2f} over {len(after)} sets" if after else "no set",
@@ -360,15 +360,15 @@ def _rounded(value: Any) -> Any:
     return {key: _rounded(one) for key, one in value.items()} if isinstance(value, dict) else value
 
 
-def _row(cells: dict[str, Any]) -> Row:
-    floats = {field.name for field in fields(Row) if field.type is float}
+def _row(cells: dict[str, Any]) -> SetRow:
+    floats = {field.name for field in fields(SetRow) if field.type is float}
     # A number that an older file does not have was not taken.
     values: dict[str, Any] = dict.fromkeys(floats, math.nan)
     values |= {key: math.nan if value is None and key in floats else value for key, value in cells.items()}
-    return Row(**values)
+    return SetRow(**values)
 
 
-def _probabilities(row: Row, temperature: float) -> dict[str, float]:
+def _probabilities(row: SetRow, temperature: float) -> dict[str, float]:
     """Of "base", "outside" and every single effect."""
     singles = [name for name in row.evidence if name not in ("base", "outside") and "+" not in name]
     priors = priors_of(singles)
@@ -376,18 +376,18 @@ def _probabilities(row: Row, temperature: float) -> dict[str, float]:
     return dict(zip(priors, np.exp(logs - logsumexp(logs)).tolist(), strict=True))
 
 
-def _truth(row: Row) -> str:
+def _truth(row: SetRow) -> str:
     return {"null": "base", "outside": "outside"}.get(row.kind, row.label)
 
 
-def _top(row: Row) -> tuple[float, bool]:
+def _top(row: SetRow) -> tuple[float, bool]:
     """Probability of the most probable answer, and whether it is true."""
     answers = {"base": row.nothing, "outside": row.outside, row.best: row.best_p}
     best = max(answers, key=lambda name: answers[name])
     return answers[best], best == _truth(row)
 
 
-def _covered(rows: Sequence[Row], risk: float) -> int:
+def _covered(rows: Sequence[SetRow], risk: float) -> int:
     """Right names at the lowest threshold at which at most a share ``risk`` of ``rows`` get a wrong one."""
     most, right, wrong, covered = risk * len(rows), 0, 0, 0
     for row in sorted(rows, key=lambda row: -row.best_p):
@@ -398,22 +398,22 @@ def _covered(rows: Sequence[Row], risk: float) -> int:
     return covered
 
 
-def _target(name: str, rate: Rate, aim: float, at_most: bool) -> Target:
+def _target(name: str, rate: Rate, aim: float, at_most: bool) -> CampaignTarget:
     met = (rate.share <= aim if at_most else rate.share >= aim) if rate.sets else None
-    return Target(name, f"{'≤' if at_most else '≥'} {100 * aim:.3g} %", str(rate), met)
+    return CampaignTarget(name, f"{'≤' if at_most else '≥'} {100 * aim:.3g} %", str(rate), met)
 
 
-def _rate(rows: Sequence[Row], hit: Callable[[Row], bool]) -> Rate:
+def _rate(rows: Sequence[SetRow], hit: Callable[[SetRow], bool]) -> Rate:
     return Rate(sum(map(hit, rows)), len(rows))
 
 
-def _right(row: Row) -> bool:
+def _right(row: SetRow) -> bool:
     return row.answer == "right"
 
 
-def _wrong(row: Row) -> bool:
+def _wrong(row: SetRow) -> bool:
     return row.answer == "wrong"
 
 
-def _unexplained(row: Row) -> bool:
+def _unexplained(row: SetRow) -> bool:
     return row.answer == "unexplained"

@@ -128,7 +128,7 @@ PAIR = {
     "normal": Vec3,  # at a lead: sum of δ n [m]
     "point": Vec3,  # at a lead: sum of δ times the contact's place relative to the first body's centre [m²]
 }
-"""Per entry of the contact list where contacts of a pair share (``clump_rules.py``), shape (worlds, contacts)."""
+"""Per entry of the contact list where contacts of a pair share (``narrowphase.py``), shape (worlds, contacts)."""
 
 WALL = {
     "origin": Vec3,  # pose: local frame → world [m]

@@ -42,7 +42,7 @@ PLANE, REVOLVED, PATCH = 0, 1, 2
 
 
 @dataclass(frozen=True)
-class Layout:
+class BodyTables:
     """Bodies of one world in order of entry, as the arrays want them (n bodies, m member spheres)."""
 
     numbers: Array
@@ -108,7 +108,7 @@ class MeshWall:
     """Triangles of the cells."""
 
 
-def layout(scene: Scene, order: Ints, scale: Array | None = None) -> Layout:
+def body_tables(scene: Scene, order: Ints, scale: Array | None = None) -> BodyTables:
     """Arrange bodies of the components in ``order`` (index into ``scene.bodies``, in order of entry).
 
     ``scale`` (n,) is the linear size s of each body, by default 1: spheres and reach go with s, mass with s³, inertia
@@ -128,7 +128,7 @@ def layout(scene: Scene, order: Ints, scale: Array | None = None) -> Layout:
     spheres *= np.repeat(scale, sizes)[:, None]
     owner = np.repeat(np.arange(len(order), dtype=np.int32), sizes)[:, None]
     places = np.column_stack([first, sizes, order]).astype(np.int32)
-    return Layout(numbers, places, np.ascontiguousarray(spheres), np.ascontiguousarray(owner), scale)
+    return BodyTables(numbers, places, np.ascontiguousarray(spheres), np.ascontiguousarray(owner), scale)
 
 
 def outline(body: Body) -> tuple[float, ...]:

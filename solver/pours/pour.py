@@ -143,7 +143,7 @@ class Pour:
         self._sample(dict(zip(SUMMARY_COLUMNS, row.tolist(), strict=True)))
         return True
 
-    def retune(self, scene: Scene) -> None:
+    def ramp_to(self, scene: Scene) -> None:
         """Let the running pour follow the material of ``scene``; wakes it up if it had come to rest.
 
         Friction and effects act at once; stiffness and damping are ramped (see ``solver/pours/parameter_ramp.py``).

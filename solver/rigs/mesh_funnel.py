@@ -20,7 +20,7 @@ from solver.params import ParameterError, param
 from solver.rigs.feed import RoundFeed
 from solver.rigs.outlet import RoundOutlet
 from solver.rigs.rig import DISCHARGE, PILE, Action, Container, PourRig, Switch
-from solver.rigs.surface import Pose, Revolved, Surface, TriangleMesh, horizontal, load_mesh
+from solver.rigs.surface import Revolved, Surface, SurfacePose, TriangleMesh, horizontal, load_mesh
 from solver.shapes.mesh_file import LENGTH_UNITS, SUFFIXES
 
 if TYPE_CHECKING:
@@ -78,7 +78,9 @@ class MeshFunnel(PourRig):
     def surfaces(self) -> tuple[Surface, ...]:
         """Plate, mesh and gate, in the order of ``surface_names``."""
         placed = self.placed
-        raised = TriangleMesh(placed.mesh.vertices, placed.mesh.faces, self.wall, Pose((0.0, 0.0, self.outlet_height)))
+        raised = TriangleMesh(
+            placed.mesh.vertices, placed.mesh.faces, self.wall, SurfacePose((0.0, 0.0, self.outlet_height))
+        )
         gate = Revolved(0.0, self.outlet_height, placed.outlet.farthest, self.outlet_height, self.wall)
         return horizontal(0.0, self.wall), raised, gate
 

@@ -28,7 +28,7 @@ FACING_DOWN: Quaternion = (0.0, 1.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
-class Pose:
+class SurfacePose:
     """Where a surface is: its local frame's origin [m] and orientation (unit quaternion wxyz) in the world."""
 
     origin: Point = (0.0, 0.0, 0.0)
@@ -40,7 +40,7 @@ class Plane:
     """The local plane z = 0; bodies are on the side of +z."""
 
     material: str
-    pose: Pose = Pose()
+    pose: SurfacePose = SurfacePose()
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Revolved:
     r1: float
     z1: float
     material: str
-    pose: Pose = Pose()
+    pose: SurfacePose = SurfacePose()
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class TriangleMesh:
     vertices: tuple[Point, ...]
     faces: tuple[tuple[int, int, int], ...]
     material: str
-    pose: Pose = Pose()
+    pose: SurfacePose = SurfacePose()
 
 
 Surface = Plane | Revolved | TriangleMesh
@@ -76,12 +76,12 @@ Surface = Plane | Revolved | TriangleMesh
 
 def horizontal(height: float, material: str) -> Plane:
     """The plane z = ``height`` [m]."""
-    return Plane(material, Pose((0.0, 0.0, height)))
+    return Plane(material, SurfacePose((0.0, 0.0, height)))
 
 
 def turned_plane(origin: Point, quaternion: Quaternion, material: str) -> Plane:
     """A plane through ``origin`` [m] whose side with bodies is the turned local +z."""
-    return Plane(material, Pose(origin, quaternion))
+    return Plane(material, SurfacePose(origin, quaternion))
 
 
 def rectangle(corner: Point, edge_a: Point, edge_b: Point, material: str) -> TriangleMesh:
@@ -92,7 +92,7 @@ def rectangle(corner: Point, edge_a: Point, edge_b: Point, material: str) -> Tri
     return TriangleMesh(vertices, ((0, 1, 2), (0, 2, 3)), material)
 
 
-def load_mesh(path: Path, material: str, metres_per_unit: float, pose: Pose = Pose()) -> TriangleMesh:
+def load_mesh(path: Path, material: str, metres_per_unit: float, pose: SurfacePose = SurfacePose()) -> TriangleMesh:
     """A wall from a file that trimesh reads (STL, OBJ, PLY, GLB); parts of a scene are joined, equal vertices merged.
 
     Raises ParameterError for a file that cannot be read, and for one without a triangle of positive area.

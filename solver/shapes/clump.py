@@ -26,7 +26,7 @@ from solver.assets import shipped_fits
 from solver.shapes.clump_error import ClumpFit, extent_errors, measured_fit
 from solver.shapes.solid import ShapeError, Solid, file_stamp, mass_properties, surface_mesh
 from solver.shapes.solid_points import interior_points, surface_points
-from solver.shapes.sphere_fit import Orbits, Target, not_facing, refine, start_layouts, without_idle
+from solver.shapes.sphere_fit import FitTarget, Orbits, not_facing, refine, start_layouts, without_idle
 from solver.shapes.sphere_number import LEAST_RADIUS, doubling, fitted
 from solver.shapes.sphere_union import squared_distances
 from solver.version import FITTING
@@ -259,10 +259,10 @@ def _new_fit(solid: Solid, spheres: str) -> tuple[Array, Array, ClumpFit]:
     return centres, radii, measured_fit(solid, centres, radii)
 
 
-def _target(solid: Solid) -> Target:
+def _target(solid: Solid) -> FitTarget:
     symmetric = solid.kind != "mesh"
     surface, normals = surface_points(solid, FIT_POINTS_SYMMETRIC if symmetric else FIT_POINTS)
-    return Target(
+    return FitTarget(
         np.abs(surface) if symmetric else surface,
         np.abs(normals) if symmetric else normals,
         interior_points(solid, INTERIOR_POINTS),
@@ -283,7 +283,7 @@ def _so_many_spheres(solid: Solid, number: int) -> tuple[Array, Array]:
     return list(fitted(solid, doubling(number)))[-1]
 
 
-def _fewest_spheres(target: Target, demand: Demand, diameter: float) -> Orbits:
+def _fewest_spheres(target: FitTarget, demand: Demand, diameter: float) -> Orbits:
     floor = demand.least_radius * target.inscribed_radius
     limit = demand.rms * diameter
     best_score, best, next_count = np.inf, None, 1
@@ -303,7 +303,7 @@ def _fewest_spheres(target: Target, demand: Demand, diameter: float) -> Orbits:
     return best
 
 
-def _score(orbits: Orbits, target: Target) -> float:
+def _score(orbits: Orbits, target: FitTarget) -> float:
     """RMS gap [m], raised by outer dimensions beyond their limit so that such clumps come last."""
     centres, radii = orbits.spheres()
     distance = np.sqrt(squared_distances(target.surface, centres))

@@ -34,7 +34,7 @@ MOST_PER_COUNT = 14
 
 
 @dataclass(frozen=True, eq=False)
-class Target:
+class FitTarget:
     """What the spheres should follow. Lengths in m.
 
     Args:
@@ -104,7 +104,7 @@ def orbits_of(centres: Array, radii: Array, symmetric: bool) -> Orbits:
     return Orbits(points, radii, free, np.array([o for o, _ in images]), np.array([s for _, s in images]))
 
 
-def start_layouts(target: Target, most: int, least_radius: float) -> dict[int, list[Orbits]]:
+def start_layouts(target: FitTarget, most: int, least_radius: float) -> dict[int, list[Orbits]]:
     """Starting layouts by number of spheres, up to `most`.
 
     Rows run along x, side by side along y, in layers along z.
@@ -144,7 +144,7 @@ def start_layouts(target: Target, most: int, least_radius: float) -> dict[int, l
     return {count: tried for count, tried in layouts.items() if tried}
 
 
-def refine(orbits: Orbits, target: Target, least_radius: float, steps: int) -> Orbits:
+def refine(orbits: Orbits, target: FitTarget, least_radius: float, steps: int) -> Orbits:
     """Orbits after at most `steps` damped Gauss–Newton steps; radii stay >= least_radius [m]."""
     model = _Residuals(orbits, target)
     x = model.pack(orbits)
@@ -171,7 +171,7 @@ def refine(orbits: Orbits, target: Target, least_radius: float, steps: int) -> O
     return model.unpack(x)
 
 
-def without_idle(orbits: Orbits, target: Target) -> Orbits:
+def without_idle(orbits: Orbits, target: FitTarget) -> Orbits:
     """Orbits without those of which no sphere is nearest to any surface point."""
     centres, radii = orbits.spheres()
     distance = np.sqrt(squared_distances(target.surface, centres))
@@ -206,7 +206,7 @@ class _Residuals:
     do not hang on the number of cores.
     """
 
-    def __init__(self, orbits: Orbits, target: Target) -> None:
+    def __init__(self, orbits: Orbits, target: FitTarget) -> None:
         self.orbits, self.unit = orbits, target.inscribed_radius
         self.surface = target.surface / self.unit
         self.bounds = target.bounds / self.unit
@@ -301,7 +301,7 @@ class _Row:
         return np.stack([x, np.full(count, self.y), np.full(count, self.z)], axis=1)
 
 
-def _rows(target: Target, n_layers: int, n_rows: int) -> list[_Row]:
+def _rows(target: FitTarget, n_layers: int, n_rows: int) -> list[_Row]:
     inset = target.inscribed_radius
     low, high = target.bounds
     heights = _spread(low[2], high[2], n_layers, inset)

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from solver.engine.tables import layout
+from solver.engine.tables import body_tables
 from solver.engine.world import SUMMARY_COLUMNS, Batch, compiled_in
 from solver.rigs.rig import Rig
 from solver.scenes.body import Body, Members
 from solver.scenes.scene import Scene
 from solver.scenes.time_step import time_step
-from solver.single_body.laboratory import ROOM
+from solver.single_body.free_world import ROOM
 
 Array = npt.NDArray[np.float64]
 
@@ -74,7 +74,7 @@ class Bench:
         self.dt = time_step(self.scene)
         self.batch = Batch(dataclasses.replace(ROOM, **compiled_in([self.scene])))
         order = np.zeros(1, dtype=np.int32)
-        self.batch.load(0, self.scene, layout(self.scene, order), self.dt, (True,) * len(rig.surfaces()))
+        self.batch.load(0, self.scene, body_tables(self.scene, order), self.dt, (True,) * len(rig.surfaces()))
 
     def put(self, position: Array, quaternion: Array = UPRIGHT) -> None:
         """Place the specimen at rest: centre of mass [m] and orientation wxyz."""

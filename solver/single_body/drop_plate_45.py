@@ -39,7 +39,7 @@ FRICTIONS = (0.0, 0.1, 0.3, 0.6)
 
 
 @dataclass(frozen=True)
-class Rebound:
+class PlateRebound:
     """Velocity of the centre of mass after the impact [m/s]; NaN for a body that stays on the plate."""
 
     v_x: float
@@ -78,12 +78,12 @@ def measure(scene: Scene, seed: int) -> BenchResult:
     )
 
 
-def restitution(rebound: Rebound, gravity: float, height: float) -> float:
+def restitution(rebound: PlateRebound, gravity: float, height: float) -> float:
     """e = (v_x + v_z)/√(2gH)."""
     return (rebound.v_x + rebound.v_z) / math.sqrt(2.0 * gravity * height)
 
 
-def paper_estimate(rebound: Rebound, gravity: float, height: float) -> float:
+def paper_estimate(rebound: PlateRebound, gravity: float, height: float) -> float:
     """L/(2H), L = v_x (v_z + √(v_z² + 2gH))/g."""
     flight = (rebound.v_z + math.sqrt(rebound.v_z**2 + 2.0 * gravity * height)) / gravity
     return rebound.v_x * flight / (2.0 * height)
@@ -104,7 +104,7 @@ def paper_bias(scene: Scene) -> tuple[tuple[str, tuple[float, ...]], ...]:
     return tuple((name, tuple(row[k] for row in rows)) for k, name in enumerate(names))
 
 
-def drop(scene: Scene, specimen: Body, quaternion: Array) -> Rebound:
+def drop(scene: Scene, specimen: Body, quaternion: Array) -> PlateRebound:
     """Let ``specimen`` fall on the plate so that it first touches after falling ``drop_height``."""
     rig = cast(DropPlate45, scene.rig)
     bench = Bench(scene, rig, specimen)
@@ -127,8 +127,8 @@ def drop(scene: Scene, specimen: Body, quaternion: Array) -> Rebound:
         if flight < math.inf and float(state[0:3] @ NORMAL) > clump.bounding_radius:
             v = state[7:10]
             # Gravity acts during the contact, too: taken as an impact in its middle.
-            return Rebound(float(v[0]), float(v[2]) + gravity * (flight + 0.5 * contact))
-    return Rebound(math.nan, math.nan)
+            return PlateRebound(float(v[0]), float(v[2]) + gravity * (flight + 0.5 * contact))
+    return PlateRebound(math.nan, math.nan)
 
 
 def _with_pair(scene: Scene, body: Body, pair: Pair) -> Scene:

@@ -10,7 +10,7 @@ from solver.params import ParameterError
 from solver.rigs import BENCH_RIGS
 from solver.scenes.material_file import load_material, with_settings
 from solver.single_body import BENCH_TESTS, run_bench_test
-from solver.single_body.drop_plate_45 import Rebound, paper_estimate, restitution
+from solver.single_body.drop_plate_45 import PlateRebound, paper_estimate, restitution
 from tests.explorer.beads import GLASS, MASS, STEEL, bead_scene
 from tests.explorer.beads import RADIUS as BEAD
 
@@ -78,11 +78,11 @@ def test_the_paper_s_estimate_by_hand():
     gravity, height = 9.81, 0.2
     speed = math.sqrt(2.0 * gravity * height)
     # horizontal rebound with e: v_x = e V; then L = v_x √(2H/g) and L/2H = e exactly
-    level = Rebound(0.6 * speed, 0.0)
+    level = PlateRebound(0.6 * speed, 0.0)
     assert paper_estimate(level, gravity, height) == pytest.approx(0.6)
     assert restitution(level, gravity, height) == pytest.approx(0.6)
     # a gripping sphere at e = 0.5: v_x, v_z = (0.5 ± 5/7)/2 V → L/2H = v_x (v_z + √(v_z² + 1)), 0.546
-    gripping = Rebound((0.5 + 5 / 7) / 2 * speed, (0.5 - 5 / 7) / 2 * speed)
+    gripping = PlateRebound((0.5 + 5 / 7) / 2 * speed, (0.5 - 5 / 7) / 2 * speed)
     assert restitution(gripping, gravity, height) == pytest.approx(0.5)
     assert paper_estimate(gripping, gravity, height) == pytest.approx(0.546, abs=5e-4)
 

@@ -15,7 +15,7 @@ from solver.engine.kernels.neighbours import AHEAD, LEAST, MOST
 from solver.scenes.body import Body, Members
 from solver.scenes.insertion import random_quaternion, rotation_matrix
 from solver.scenes.material import Pair
-from solver.single_body.laboratory import GRAIN, ROOM, WALL, Laboratory, scene_of
+from solver.single_body.free_world import GRAIN, ROOM, WALL, FreeWorld, scene_of
 
 pytestmark = pytest.mark.usefixtures("taichi")
 
@@ -48,7 +48,7 @@ def cloud(seed, sizes, members, spread, origin, skin, couples=False):
     )
     scene = scene_of(bodies, (GRAIN, WALL), PAIRS)
     scene = dataclasses.replace(scene, numerics=dataclasses.replace(scene.numerics, skin=skin))
-    lab = Laboratory(scene, range(len(bodies)), dt=DT, plate=False)
+    lab = FreeWorld(scene, range(len(bodies)), dt=DT, plate=False)
     places = origin + generator.uniform(-0.5, 0.5, (len(bodies), 3)) * spread
     if couples:
         places[1::2] = places[::2] + np.array(sizes)[::2, None] * generator.uniform(-0.5, 0.5, (len(bodies) // 2, 3))
@@ -141,7 +141,7 @@ def test_no_contact_is_missed_while_bodies_of_different_sizes_fly_into_each_othe
         Body(f"b{k}", "grain", 1.0 / 27, random_clump(generator, size, 4), GRAIN.density)
         for k, size in enumerate(sizes)
     )
-    lab = Laboratory(scene_of(bodies, (GRAIN, WALL), PAIRS), range(27), dt=2e-6, plate=False)
+    lab = FreeWorld(scene_of(bodies, (GRAIN, WALL), PAIRS), range(27), dt=2e-6, plate=False)
     places = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3) * 0.045
     for b, place in enumerate(places):
         lab.put(b, place + far, velocity=-20.0 * place, spin=generator.normal(size=3) * 50.0)

@@ -57,7 +57,7 @@ def test_a_change_of_stiffness_goes_on_where_it_was():
 
     def retuned():
         pour = drive(Pour(batch, 0, HEAP, 5), until=0.3)
-        pour.retune(stiffer)
+        pour.ramp_to(stiffer)
         return drive(pour, until=0.31)
 
     whole = drive(retuned()).record()

@@ -12,7 +12,7 @@ import trimesh
 
 from solver.shapes.clump import Clump, _fit_spheres, explicit_clump, fit_clump
 from solver.shapes.solid import ShapeError, Solid, mass_properties, surface_mesh
-from solver.shapes.sphere_fit import Target, _Residuals, orbits_of
+from solver.shapes.sphere_fit import FitTarget, _Residuals, orbits_of
 from solver.shapes.sphere_union import distance_to_union, union_volume
 
 SEED = Solid("ellipsoid", (27.92e-3, 11.18e-3, 6.11e-3))
@@ -215,7 +215,7 @@ def test_gradient_of_the_residuals_is_that_of_finite_differences(symmetric):
     normals = rng.normal(size=(300, 3))
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     surface = normals * [2.0, 1.0, 0.8]
-    target = Target(
+    target = FitTarget(
         np.abs(surface) if symmetric else surface,
         np.abs(normals) if symmetric else normals,
         rng.uniform(-0.5, 0.5, (50, 3)),

@@ -17,7 +17,7 @@ from solver.scenes.body import Body, Members
 from solver.scenes.insertion import rotation_matrix
 from solver.scenes.material_file import load_material
 from solver.scenes.scene import with_values
-from solver.single_body.laboratory import EARTH, GRAIN, Laboratory, bench
+from solver.single_body.free_world import EARTH, GRAIN, FreeWorld, grain_on_plate
 from tests.solver.pour_digests import HEAP, digest
 
 pytestmark = pytest.mark.usefixtures("taichi")
@@ -51,7 +51,9 @@ def ruled(scene, **choices):
 
 def tip_restitution(rule, tilt_deg, restitution=0.5):
     """Speed of the contact point away from the plate over that towards it, of a seed tilted about its middle axis."""
-    lab = Laboratory(ruled(bench(seed_of_nine(), friction=0.0, restitution=restitution), clump_rule=rule), 1, dt=DT)
+    lab = FreeWorld(
+        ruled(grain_on_plate(seed_of_nine(), friction=0.0, restitution=restitution), clump_rule=rule), 1, dt=DT
+    )
     half = math.radians(tilt_deg) / 2
     turn = np.array([math.cos(half), 0.0, math.sin(half), 0.0])
     centres = SEED.centres @ rotation_matrix(turn).T
@@ -84,7 +86,7 @@ def test_a_contact_alone_shares_with_nobody():
 def landing(rule, restitution=0.5, tilt_deg=0.0):
     """Restitution of the flat body, tilted by ``tilt_deg``, and its deepest overlap [m]."""
     body = flat_body()
-    lab = Laboratory(ruled(bench(body, friction=0.0, restitution=restitution), clump_rule=rule), 1, dt=DT)
+    lab = FreeWorld(ruled(grain_on_plate(body, friction=0.0, restitution=restitution), clump_rule=rule), 1, dt=DT)
     half = math.radians(tilt_deg) / 2
     turn = (math.cos(half), math.sin(half), 0.0, 0.0)
     edge = 8e-3 * math.sin(math.radians(tilt_deg))
@@ -99,8 +101,8 @@ def test_a_flat_body_lands_as_one_contact():
     assert shared[9] / SPEED == pytest.approx(0.5, abs=0.002)
     assert shared[10:13] == pytest.approx(0.0, abs=1e-6)
     # The depth is that of one sphere with the mass of the body.
-    alone = Laboratory(
-        bench(Body("grain", "grain", 1.0, one_sphere(flat_body().clump.mass), GRAIN.density), 0.0), 1, dt=DT
+    alone = FreeWorld(
+        grain_on_plate(Body("grain", "grain", 1.0, one_sphere(flat_body().clump.mass), GRAIN.density), 0.0), 1, dt=DT
     )
     alone.put(0, (0.0, 0.0, 2e-3 + 1e-6), velocity=(0.0, 0.0, -SPEED))
     alone.run_apart(80_000, 20)
@@ -129,7 +131,7 @@ def test_a_landing_askew_makes_no_energy(tilt):
 
 @pytest.mark.parametrize("rule", ["local_mass", "local_mass_shared"])
 def test_a_body_at_rest_weighs_what_it_weighs(rule):
-    lab = Laboratory(ruled(bench(flat_body(), gravity=EARTH), clump_rule=rule), 1)
+    lab = FreeWorld(ruled(grain_on_plate(flat_body(), gravity=EARTH), clump_rule=rule), 1)
     lab.put(0, (0.0, 0.0, 2e-3))
     lab.run(20_000)
     force = lab.batch.surface_state(0)[0, 13:16]

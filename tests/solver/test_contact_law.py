@@ -10,7 +10,7 @@ from solver.laws.hertz_mindlin import tangential_damping
 from solver.laws.law import tangential_force
 from solver.laws.restitution import normal_damping
 from solver.scenes.material import effective_shear_modulus, effective_youngs_modulus
-from solver.single_body.laboratory import GRAIN, RADIUS, Laboratory, bench
+from solver.single_body.free_world import GRAIN, RADIUS, FreeWorld, grain_on_plate
 
 pytestmark = pytest.mark.usefixtures("taichi")
 
@@ -19,7 +19,7 @@ TOUCH = RADIUS + 1e-6
 
 @pytest.mark.parametrize("e", [0.2, 0.5, 0.9])
 def test_restitution_between_two_moving_bodies(e):
-    lab = Laboratory(bench(restitution=e, friction=0.0), 2, plate=False)
+    lab = FreeWorld(grain_on_plate(restitution=e, friction=0.0), 2, plate=False)
     lab.put(0, (0, 0, TOUCH), velocity=(0.3, 0, -1.0))
     lab.put(1, (0, 0, -TOUCH), velocity=(0.3, 0, 0.5))
     lab.run(int(5e-3 / lab.dt))

@@ -15,10 +15,10 @@ from solver.engine.world import Batch
 from solver.pours.pour import Pour
 from solver.pours.record import Outcome
 from solver.pours.run import Job, capacity_for, run_pour, run_pours
-from solver.rigs.surface import Pose, Revolved, rectangle
+from solver.rigs.surface import Revolved, SurfacePose, rectangle
 from solver.scenes.body import Body, Members
 from solver.scenes.scene import with_values
-from solver.single_body.laboratory import EARTH, GRAIN, RADIUS, Bench, Laboratory, bench
+from solver.single_body.free_world import EARTH, GRAIN, RADIUS, FreeWorld, GivenSurfaces, grain_on_plate
 from tests.solver.test_pour import QUICK
 
 pytestmark = pytest.mark.usefixtures("taichi")
@@ -137,7 +137,7 @@ def pin(reach=3e-3, radius=4e-3):
     return Body("grain", "grain", 1.0, members, GRAIN.density)
 
 
-LYING = Pose((0.0, 0.0, 0.0), (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0))
+LYING = SurfacePose((0.0, 0.0, 0.0), (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0))
 """Local z along world −y."""
 WIDE, HALF = 0.035, 0.02
 """Radius and half the length of a drum [m]."""
@@ -154,9 +154,9 @@ DRUM = (
 @pytest.fixture(scope="module")
 def drum(taichi):
     """24 pins in a drum that rests, turns at 8 rad/s, stops, turns back at 3 rad/s and stops: (samples, put in)."""
-    scene = bench(pin(), friction=0.5, restitution=0.5, gravity=EARTH)
+    scene = grain_on_plate(pin(), friction=0.5, restitution=0.5, gravity=EARTH)
     awake = dataclasses.replace(scene.numerics, sleep_speed=5e-4)
-    lab = Laboratory(dataclasses.replace(scene, rig=Bench(DRUM), numerics=awake), 24, fraction=0.3)
+    lab = FreeWorld(dataclasses.replace(scene, rig=GivenSurfaces(DRUM), numerics=awake), 24, fraction=0.3)
     generator, put_in = np.random.default_rng(1), 0.0
     places = [(x, y, z) for y in (-1, 0, 1) for x in (-1, 0, 1) for z in (-1, 0, 1)]
     for b in range(24):
@@ -195,7 +195,7 @@ def impact(taichi):
     Velocities stand half a step before the positions, which shifts kinetic against elastic energy by ½ F v dt while the
     contact is open: 3 % at a twentieth of the Rayleigh time, 0.6 % at the hundredth that is used.
     """
-    lab = Laboratory(bench(friction=1.0, restitution=0.7), 1, fraction=0.01)
+    lab = FreeWorld(grain_on_plate(friction=1.0, restitution=0.7), 1, fraction=0.01)
     velocity = np.array([0.5, 0.0, -1.0])
     lab.put(0, (0.0, 0.0, RADIUS + 1e-5), velocity=velocity)
     rows = [lab.run(1)]

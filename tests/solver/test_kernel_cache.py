@@ -169,7 +169,7 @@ def test_where_nothing_is_kept_nobody_waits(folder, monkeypatch, variable, value
 
 
 def test_warm_rooms_are_found(folder):
-    """Alike ones are compiled once; what a crew needs afterwards is there."""
+    """Alike ones are compiled once; what a pool needs afterwards is there."""
     scene = with_values(load_material("sunflower_extract"), {"body.spheres": "coarse", "rig.mass": "1g"})
     heavier = with_values(scene, {"rig.mass": "2g"})
     first = dict(warm_up([[scene], [heavier]]))

@@ -8,13 +8,13 @@ import pytest
 from solver.scenes.body import Body, Members
 from solver.scenes.insertion import rotation_matrix
 from solver.scenes.material_file import load_material
-from solver.single_body.laboratory import EARTH, GRAIN, RADIUS, UPRIGHT, Laboratory, bench
+from solver.single_body.free_world import EARTH, GRAIN, RADIUS, UPRIGHT, FreeWorld, grain_on_plate
 
 pytestmark = pytest.mark.usefixtures("taichi")
 
 
 def test_free_flight_is_a_parabola():
-    lab = Laboratory(bench(gravity=EARTH), 1, plate=False, dt=1e-5)
+    lab = FreeWorld(grain_on_plate(gravity=EARTH), 1, plate=False, dt=1e-5)
     lab.put(0, (0, 0, 1.0), velocity=(1.0, -2.0, 3.0))
     steps = 10_000
     lab.run(steps)
@@ -25,7 +25,7 @@ def test_free_flight_is_a_parabola():
 
 
 def test_elastic_frictionless_cloud_keeps_its_energy():
-    lab = Laboratory(bench(friction=0.0, restitution=1.0, gravity=EARTH), 8)
+    lab = FreeWorld(grain_on_plate(friction=0.0, restitution=1.0, gravity=EARTH), 8)
     rng = np.random.default_rng(5)
     grid = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (2, 5)]
     for b, place in enumerate(grid):
@@ -46,7 +46,7 @@ def test_eccentric_impact_of_a_dumbbell(lean):
     half, mass, inertia = 0.02, 4e-3, 6e-7
     ends = Members(((-half, 0.0, 0.0), (half, 0.0, 0.0)), (RADIUS,) * 2, mass, (1e-7, inertia, inertia))
     dumbbell = Body("grain", "grain", 1.0, ends, GRAIN.density)
-    lab = Laboratory(bench(dumbbell, friction=0.0, restitution=1.0), 1, fraction=0.02)
+    lab = FreeWorld(grain_on_plate(dumbbell, friction=0.0, restitution=1.0), 1, fraction=0.02)
     turn = np.array([np.cos(lean / 2), 0.0, np.sin(lean / 2), 0.0])  # about y: the end at +x points down
     arm = half * np.cos(lean)
     height = RADIUS + half * np.sin(lean) + 1e-6
@@ -70,7 +70,7 @@ def seed_drop(upright):
     """e_out of a seed of the shipped material that falls on its tip or on its flat side."""
     seed = load_material("sunflower_extract").bodies[0]
     body = dataclasses.replace(seed, name="grain", material="grain")
-    lab = Laboratory(bench(body, friction=0.0, restitution=0.58), 1, fraction=0.05)
+    lab = FreeWorld(grain_on_plate(body, friction=0.0, restitution=0.58), 1, fraction=0.05)
     turn = np.array([np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0]) if upright else UPRIGHT
     extent = (body.clump.centres @ rotation_matrix(turn).T)[:, 2] - body.clump.radii
     lab.put(0, (0, 0, -extent.min() + 1e-6), velocity=(0, 0, -1.0), quaternion=turn)

@@ -9,13 +9,13 @@ from scipy.optimize import minimize_scalar
 from solver.backend import ti
 from solver.engine.kernels.geometry import nearest_on_revolved
 from solver.engine.state import Vec3, Vec4
-from solver.engine.tables import layout
+from solver.engine.tables import body_tables
 from solver.engine.world import SUMMARY_COLUMNS, Batch
 from solver.pours.run import Job, run_pours
 from solver.scenes.insertion import rotation_matrix
 from solver.scenes.material_file import load_material
 from solver.scenes.scene import with_values
-from solver.single_body.laboratory import RADIUS, ROOM, UPRIGHT, Laboratory, bench
+from solver.single_body.free_world import RADIUS, ROOM, UPRIGHT, FreeWorld, grain_on_plate
 
 pytestmark = pytest.mark.usefixtures("taichi")
 
@@ -98,10 +98,10 @@ def test_skin_changes_no_bit():
 
 def test_a_list_that_does_not_fit_is_built_with_narrow_margins():
     """A crowd that flies as one: nobody comes nearer, and yet every margin is wide."""
-    lab = Laboratory(bench(), 1, plate=False)
+    lab = FreeWorld(grain_on_plate(), 1, plate=False)
     crowd = 2.3 * RADIUS * np.stack(np.meshgrid(*[np.arange(4.0)] * 3), axis=-1).reshape(-1, 3)
     batch = Batch(dataclasses.replace(ROOM, contacts=100))
-    batch.load(0, lab.scene, layout(lab.scene, np.zeros(len(crowd), dtype=np.int32)), lab.dt, [False])
+    batch.load(0, lab.scene, body_tables(lab.scene, np.zeros(len(crowd), dtype=np.int32)), lab.dt, [False])
     for b, place in enumerate(crowd):
         batch.enter(0, b, place, UPRIGHT, np.array([3.0, 0.0, 0.0]), np.zeros(3))
     row = dict(zip(SUMMARY_COLUMNS, batch.advance(np.array([200], dtype=np.int32))[0], strict=True))

@@ -205,7 +205,7 @@ def test_four_times_the_stiffness_at_rest_moves_the_apex_by_less_than_a_body():
     apex, dt, time = apex_of(pour), pour.dt, pour.time
     stored = pour.batch.measure(0)[0, SUMMARY_COLUMNS.index("elastic")]
     components = ("seed", "plate", "petiole")
-    pour.retune(
+    pour.ramp_to(
         with_values(heap, {f"material.{m}.shear_modulus": 4 * heap.material(m).shear_modulus for m in components})
     )
     assert pour.dt < dt  # recomputed before the first stiffer step
@@ -228,7 +228,7 @@ def test_friction_that_vanishes_lets_a_resting_pile_flow():
     pour = drive(heap, 12)
     before, time = pour.bodies().position.copy(), pour.time
     assert pour.outcome == Outcome.AT_REST
-    pour.retune(with_values(heap, {f"pair.{p.a}.{p.b}.static_friction": 0.0 for p in heap.pairs}))
+    pour.ramp_to(with_values(heap, {f"pair.{p.a}.{p.b}.static_friction": 0.0 for p in heap.pairs}))
     while pour.time < time + 0.2:
         n = pour.steps_due()
         pour.after(n, pour.batch.advance(np.array([n], dtype=np.int32))[0])

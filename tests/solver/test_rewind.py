@@ -45,7 +45,7 @@ def test_what_follows_is_the_same_twice(scene, at):
 def test_a_moment_within_a_change_of_stiffness_repeats_whatever_the_launches():
     stiffer = with_values(HEAP, {"material.seed.shear_modulus": 2 * HEAP.material("seed").shear_modulus})
     pour = drive(Pour(Batch(capacity_for([HEAP], 1)), 0, HEAP, 5), until=0.3)
-    pour.retune(stiffer)
+    pour.ramp_to(stiffer)
     for _ in range(3):
         steps = pour.steps_due(11)
         pour.after(steps, pour.batch.advance(np.array([steps], dtype=np.int32))[0])
@@ -62,7 +62,7 @@ def test_going_back_past_a_change_brings_the_old_parameters_back():
     first = drive(pour, until=0.5).record()
     put_back(pour, kept)
     slippery = with_values(HEAP, {"pair.seed.seed.static_friction": 0.0, "pair.seed.plate.static_friction": 0.0})
-    pour.retune(slippery)
+    pour.ramp_to(slippery)
     other = drive(pour, until=0.5).record()
     assert not np.array_equal(other.bodies.position, first.bodies.position)
     put_back(pour, kept)
@@ -77,7 +77,7 @@ def test_a_moment_from_before_effects_were_compiled_in():
     first = drive(pour, until=0.4).record()
     put_back(pour, kept)
     pour.move_to(Batch(dataclasses.replace(pour.batch.capacity, effects=True)))
-    pour.retune(with_values(HEAP, {"effect.rolling_resistance.rolling_friction": 0.3}))
+    pour.ramp_to(with_values(HEAP, {"effect.rolling_resistance.rolling_friction": 0.3}))
     rolling = drive(pour, until=0.4)
     assert not np.array_equal(rolling.record().bodies.position, first.bodies.position)
     later = keep(rolling)

@@ -19,16 +19,16 @@ from solver.observables import observe
 from solver.pours.record import Outcome
 from solver.pours.run import Job, run_pours
 from solver.rigs import Funnel
-from solver.rigs.surface import Pose, Revolved, TriangleMesh
+from solver.rigs.surface import Revolved, SurfacePose, TriangleMesh
 from solver.scenes.scene import with_values
-from solver.single_body.laboratory import EARTH, RADIUS, Bench, Laboratory, bench
+from solver.single_body.free_world import EARTH, RADIUS, FreeWorld, GivenSurfaces, grain_on_plate
 from tests.solver.test_pour import QUICK
 
 pytestmark = pytest.mark.usefixtures("taichi")
 
 ROUND = 0.05
 """Radius of the cylinder, and about that of the path on the cone [m]."""
-LYING = Pose((0.0, 0.0, 0.0), (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0))
+LYING = SurfacePose((0.0, 0.0, 0.0), (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0))
 """Local z along world −y."""
 FACETS = (128, 256, 512)
 
@@ -82,9 +82,12 @@ LOOKS = 250
 
 def rolled(way, wall):
     """Places, speeds and energies per mass [m²/s²] along ``way`` on the wall of that index."""
-    scene = bench(friction=0.3, restitution=0.2, gravity=EARTH)
-    lab = Laboratory(
-        dataclasses.replace(scene, rig=Bench(WALLS)), 1, active=[k == wall for k in range(len(WALLS))], fraction=0.1
+    scene = grain_on_plate(friction=0.3, restitution=0.2, gravity=EARTH)
+    lab = FreeWorld(
+        dataclasses.replace(scene, rig=GivenSurfaces(WALLS)),
+        1,
+        active=[k == wall for k in range(len(WALLS))],
+        fraction=0.1,
     )
     lab.put(0, way.start, velocity=way.velocity)
     rows = []

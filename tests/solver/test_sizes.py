@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
-from solver.engine.tables import layout, outline
+from solver.engine.tables import body_tables, outline
 from solver.params import ParameterError
 from solver.pours.record import Outcome
 from solver.pours.run import Job, run_pour, run_pours
@@ -47,7 +47,7 @@ def drawn(scene, seed):
     """Order of the components, and mass and scale of every body, as a pour of ``seed`` has them."""
     order = shuffled_components(counts(scene.bodies, scene.rig.mass), np.random.default_rng(seed))
     scale = drawn_sizes([body.sizes for body in scene.bodies], order, seed)
-    return order, layout(scene, order, scale).numbers[:, 0], scale
+    return order, body_tables(scene, order, scale).numbers[:, 0], scale
 
 
 @pytest.mark.parametrize("spread", [0.01, 0.1, 0.3, 0.5])
@@ -178,7 +178,7 @@ def test_a_body_of_another_size_is_the_solid_of_that_size():
     assert ours.radii == pytest.approx(fitted.radii, rel=1e-7)
     assert ours.bounding_radius == pytest.approx(fitted.bounding_radius, rel=1e-7)
     assert ours.fit.surface_rms == pytest.approx(fitted.fit.surface_rms, rel=1e-6)
-    tables = layout(COARSE, np.zeros(2, dtype=np.int32), np.array([1.0, 2.0]))
+    tables = body_tables(COARSE, np.zeros(2, dtype=np.int32), np.array([1.0, 2.0]))
     seed = COARSE.bodies[0].clump
     *lengths, sphericity = outline(COARSE.bodies[0])
     dynamics = [8 * seed.mass, *(32 * seed.inertia), 2 * seed.bounding_radius]

@@ -12,11 +12,11 @@ from solver.engine.kernels.sleep import BALANCE, WAKE
 from solver.engine.world import SUMMARY_COLUMNS, Batch, law_table
 from solver.pours.pour import Pour
 from solver.pours.run import capacity_for
-from solver.rigs.surface import Pose, Revolved, horizontal
+from solver.rigs.surface import Revolved, SurfacePose, horizontal
 from solver.scenes.body import Body, Members
 from solver.scenes.insertion import rotation_matrix
 from solver.scenes.scene import with_values
-from solver.single_body.laboratory import EARTH, PLATE, RADIUS, Bench, Laboratory, bench
+from solver.single_body.free_world import EARTH, PLATE, RADIUS, FreeWorld, GivenSurfaces, grain_on_plate
 from tests.solver.test_pour import QUICK
 
 pytestmark = pytest.mark.usefixtures("taichi")
@@ -134,10 +134,10 @@ def test_the_fill_sleeps_on_the_gate_and_falls_when_it_opens():
 
 def bedroom(n, *surfaces, friction=0.5, restitution=0.5):
     """A laboratory in which bodies sleep, at a step of 5 µs: one that is pushed awake moves from the next step on."""
-    scene = bench(friction=friction, restitution=restitution, gravity=EARTH)
+    scene = grain_on_plate(friction=friction, restitution=restitution, gravity=EARTH)
     numerics = dataclasses.replace(scene.numerics, sleep_speed=5e-4)
-    scene = dataclasses.replace(scene, rig=Bench((PLATE, *surfaces)), numerics=numerics)
-    return Laboratory(scene, n, fraction=0.02)
+    scene = dataclasses.replace(scene, rig=GivenSurfaces((PLATE, *surfaces)), numerics=numerics)
+    return FreeWorld(scene, n, fraction=0.02)
 
 
 def asleep(lab):
@@ -146,7 +146,7 @@ def asleep(lab):
 
 def tube(x):
     """A vertical tube and two beads in it, asleep in zigzag: the lower one touches the wall at +x, the upper at −x."""
-    lab = bedroom(2, Revolved(TIGHT, 0.0, TIGHT, 0.1, "wall", Pose((x, 0.0, 0.0))))
+    lab = bedroom(2, Revolved(TIGHT, 0.0, TIGHT, 0.1, "wall", SurfacePose((x, 0.0, 0.0))))
     aside = TIGHT - RADIUS
     lift = np.sqrt((2.0 * RADIUS) ** 2 - (2.0 * aside) ** 2)
     lab.put(0, (x + aside, 0.0, RADIUS))
@@ -249,11 +249,11 @@ def test_a_bead_bounces_off_a_sleeper_as_off_one_that_is_awake():
 def test_a_body_on_a_slow_wall_goes_along():
     """It is slower than what may sleep, and would stand still in space while the wall moves on under it."""
     flat = Members(((-4e-3, -4e-3, 0.0), (4e-3, -4e-3, 0.0), (0.0, 4e-3, 0.0)), (2e-3,) * 3, 2e-3, (5e-8, 5e-8, 9e-8))
-    scene = bench(Body("grain", "grain", 1.0, flat, 2500.0), gravity=EARTH)
+    scene = grain_on_plate(Body("grain", "grain", 1.0, flat, 2500.0), gravity=EARTH)
     went = []
     for sleep_speed in (0.0, scene.numerics.rest_speed):
         numerics = dataclasses.replace(scene.numerics, sleep_speed=sleep_speed)
-        lab = Laboratory(dataclasses.replace(scene, numerics=numerics), 1)
+        lab = FreeWorld(dataclasses.replace(scene, numerics=numerics), 1)
         lab.put(0, (0.0, 0.0, 2e-3))
         lab.run(int(0.2 / lab.dt))
         assert lab.run(1)["asleep"] == (sleep_speed > 0.0)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from solver.engine.state import Capacity
-from solver.engine.tables import layout
+from solver.engine.tables import body_tables
 from solver.engine.world import Batch
 from solver.scenes.time_step import time_step
-from solver.single_body.laboratory import EARTH, RADIUS, ROOM, bench
+from solver.single_body.free_world import EARTH, RADIUS, ROOM, grain_on_plate
 
 pytestmark = pytest.mark.usefixtures("taichi")
 
@@ -19,9 +19,9 @@ STEPS = 3000
 
 def crowd(worlds, w, bodies=ROOM.bodies):
     """A heap of beads that fall on each other, in world ``w``."""
-    scene = bench(gravity=EARTH, friction=0.5)
+    scene = grain_on_plate(gravity=EARTH, friction=0.5)
     batch = Batch(replace(ROOM, worlds=worlds, bodies=bodies))
-    batch.load(w, scene, layout(scene, np.zeros(N, dtype=np.int32)), time_step(scene), (True,))
+    batch.load(w, scene, body_tables(scene, np.zeros(N, dtype=np.int32)), time_step(scene), (True,))
     return batch
 
 

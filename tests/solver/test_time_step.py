@@ -5,14 +5,14 @@ import dataclasses
 import numpy as np
 import pytest
 
-from solver.engine.tables import layout
+from solver.engine.tables import body_tables
 from solver.engine.world import Batch
 from solver.rigs.surface import horizontal
 from solver.scenes.insertion import rotation_matrix
 from solver.scenes.material_file import load_material
 from solver.scenes.scene import with_values
 from solver.scenes.time_step import rayleigh_time, stability_limit, time_step
-from solver.single_body.laboratory import FREE, ROOM, Bench, Laboratory, bench
+from solver.single_body.free_world import FREE, ROOM, FreeWorld, GivenSurfaces, grain_on_plate
 
 SCENE = with_values(load_material("sunflower_extract"), {"body.spheres": "coarse"})
 HALF = float(np.sqrt(0.5))
@@ -30,10 +30,10 @@ def test_the_limit_is_the_step_without_its_safety():
 @pytest.mark.parametrize(("share", "stable"), [(0.5, True), (4.0, False)])
 def test_an_impact_gains_energy_only_beyond_the_limit(taichi, share, stable):
     """At 2 m/s, the speed that the limit of a body is taken at."""
-    scene = bench(gravity=(0.0, 0.0, -9.81), friction=0.0)
+    scene = grain_on_plate(gravity=(0.0, 0.0, -9.81), friction=0.0)
     batch = Batch(ROOM)
     dt = share * stability_limit(scene)
-    batch.load(0, scene, layout(scene, np.zeros(1, dtype=np.int32)), dt, (True,))
+    batch.load(0, scene, body_tables(scene, np.zeros(1, dtype=np.int32)), dt, (True,))
     radius = float(scene.bodies[0].clump.radii[0])
     start = np.array([0.0, 0.0, radius + 1e-6])
     batch.enter(0, 0, start, np.array([1.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, -2.0]), np.zeros(3))
@@ -47,12 +47,12 @@ def test_an_impact_gains_energy_only_beyond_the_limit(taichi, share, stable):
 def test_a_flat_landing_hardly_depends_on_the_time_step(kind, taichi):
     """All member spheres of a side at once at 2 m/s: stiffness and damping of up to 38 contacts in parallel."""
     material = load_material("sunflower_extract")
-    plate = Bench((horizontal(0.0, material.rig.wall),), wall=material.rig.wall)
+    plate = GivenSurfaces((horizontal(0.0, material.rig.wall),), wall=material.rig.wall)
     awake = dataclasses.replace(material.numerics, sleep_speed=0.0)
     scene = dataclasses.replace(material, rig=plate, gravity=FREE, numerics=awake)
     found = []
     for dt in (time_step(material), time_step(material) / 8.0):
-        lab, clump = Laboratory(scene, [kind], dt=dt), scene.bodies[kind].clump
+        lab, clump = FreeWorld(scene, [kind], dt=dt), scene.bodies[kind].clump
         turn = FLAT[int(np.argmin(np.ptp(clump.centres, axis=0)))]
         lowest = ((clump.centres @ rotation_matrix(np.array(turn)).T)[:, 2] - clump.radii).min()
         lab.put(0, (0.0, 0.0, 1e-6 - lowest), velocity=(0.0, 0.0, -2.0), quaternion=turn)

@@ -9,9 +9,9 @@ import trimesh
 from solver.engine.tables import LEAVE, SEE_GUARD, mesh_wall
 from solver.params import ParameterError
 from solver.rigs.rig import BareRig
-from solver.rigs.surface import Plane, Pose, Revolved, TriangleMesh, load_mesh, rectangle
+from solver.rigs.surface import Plane, Revolved, SurfacePose, TriangleMesh, load_mesh, rectangle
 from solver.scenes.insertion import rotation_matrix
-from solver.single_body.laboratory import EARTH, FREE, RADIUS, Laboratory, bench, sphere
+from solver.single_body.free_world import EARTH, FREE, RADIUS, FreeWorld, grain_on_plate, sphere
 
 pytestmark = pytest.mark.usefixtures("taichi")
 
@@ -29,9 +29,9 @@ class Walls(BareRig):
 
 
 def room(*surfaces, n=1, gravity=EARTH, friction=0.3, restitution=0.5, body=None, fraction=0.1):
-    scene = bench(body=body, friction=friction, restitution=restitution, gravity=gravity)
+    scene = grain_on_plate(body=body, friction=friction, restitution=restitution, gravity=gravity)
     scene = dataclasses.replace(scene, rig=Walls(tuple(surfaces)))
-    return Laboratory(scene, n, fraction=fraction, active=[True] * len(surfaces))
+    return FreeWorld(scene, n, fraction=fraction, active=[True] * len(surfaces))
 
 
 def as_mesh(mesh, material="wall"):
@@ -57,7 +57,7 @@ def sheet(size, n, seed=0):
 
 
 PLATE = Plane("wall")
-TILT = Pose((0.01, -0.02, 0.03), tuple(np.array([0.9, 0.2, -0.1, 0.3]) / np.linalg.norm([0.9, 0.2, -0.1, 0.3])))
+TILT = SurfacePose((0.01, -0.02, 0.03), tuple(np.array([0.9, 0.2, -0.1, 0.3]) / np.linalg.norm([0.9, 0.2, -0.1, 0.3])))
 
 
 def rolled(surface, steps=18_000):
@@ -96,7 +96,7 @@ def test_patches_do_not_depend_on_the_winding():
     assert mesh_wall(as_mesh(other)).patch.max() == 5
 
 
-@pytest.mark.parametrize("pose", [Pose(), TILT])
+@pytest.mark.parametrize("pose", [SurfacePose(), TILT])
 def test_a_plane_and_a_cone_in_any_pose_push_as_at_home(pose):
     """Turning walls, gravity and the body together turns the motion."""
     turn = rotation_matrix(np.array(pose.quaternion))

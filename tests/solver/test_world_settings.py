@@ -7,10 +7,10 @@ import pytest
 
 from solver.engine.kernels.neighbours import MOST
 from solver.engine.kernels.transfer import SETTINGS
-from solver.engine.tables import layout
+from solver.engine.tables import body_tables
 from solver.engine.world import Batch
 from solver.rigs import Funnel
-from solver.single_body.laboratory import ROOM, bench
+from solver.single_body.free_world import ROOM, grain_on_plate
 
 pytestmark = pytest.mark.usefixtures("taichi")
 
@@ -21,13 +21,13 @@ GRAVITY = (0.5, -1.5, -9.0)
 
 
 def test_every_setting_arrives_in_its_own_field():
-    scene = bench(gravity=GRAVITY)
+    scene = grain_on_plate(gravity=GRAVITY)
     scene = replace(
         scene,
         rig=Funnel(outlet_height=0.07, inlet_diameter=0.13, domain_half_width=0.31, wall="wall"),
         numerics=replace(scene.numerics, skin=1.5e-4, sleep_speed=2.5e-4, sleep_time=0.0125),
     )
-    bodies = layout(scene, np.zeros(3, dtype=np.int32))
+    bodies = body_tables(scene, np.zeros(3, dtype=np.int32))
     batch = Batch(ROOM)
     batch.load(0, scene, bodies, DT, (True,) * len(scene.rig.surfaces()))
     world = {name.removeprefix("world."): values for name, values in batch.take(0).items() if name.startswith("world.")}
@@ -54,9 +54,9 @@ def test_every_setting_arrives_in_its_own_field():
 
 @pytest.mark.parametrize("name", CONVENTIONS)
 def test_a_convention_of_the_contact_law_arrives_in_its_own_field(name):
-    scene = bench()
+    scene = grain_on_plate()
     scene = replace(scene, contact=replace(scene.contact, **{name: CONVENTIONS[name]}))
     batch = Batch(ROOM)
-    batch.load(0, scene, layout(scene, np.zeros(1, dtype=np.int32)), DT, (True,))
+    batch.load(0, scene, body_tables(scene, np.zeros(1, dtype=np.int32)), DT, (True,))
     world = batch.take(0)
     assert {one: int(world[f"world.{one}"]) for one in CONVENTIONS} == {one: int(one == name) for one in CONVENTIONS}

@@ -103,7 +103,7 @@ def respond(s: ti.template(), w, k, n, overlap, velocity, omega, mass, part, sti
 
     ``velocity`` is that of a relative to its partner at the contact, ``omega`` the relative angular velocity (only
     effects ask for it). A torque comes from effects alone; it acts on both bodies, in opposite directions.
-    ``mass`` [kg] is what the dashpots damp, ``part`` the contact's share in its pair (``clump_rules.py``).
+    ``mass`` [kg] is what the dashpots damp, ``part`` the contact's share in its pair (``narrowphase.py``).
 
     If ``still``, nothing moves in the entry and no step passes: what it keeps stays as it is, and no energy goes. Such
     an entry is evaluated whenever the list is built, so anything else would let the list's length act on the motion.

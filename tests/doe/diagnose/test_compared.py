@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from doe.diagnose.compared import BIAS_ERROR, Instrument, Measured, weighed
+from doe.diagnose.compared_features import BIAS_ERROR, Instrument, MeasuredFeatures, weighed
 from doe.diagnose.emulator import Lessons, Way
 from doe.errors import StatisticsError
 
@@ -23,7 +23,7 @@ def lessons(rng, conditions=1, number=40):
 
 
 def data(values, name="low", **more):
-    return Measured(name, "scan", NAMES, values, np.zeros(D), scalars=1, **more)
+    return MeasuredFeatures(name, "scan", NAMES, values, np.zeros(D), scalars=1, **more)
 
 
 def test_what_is_not_there_or_never_varies_is_left_out():
@@ -96,6 +96,6 @@ def test_a_scanner_s_bias_is_taken_off_and_doubted():
 def test_a_stated_error_widens_its_own_number():
     rng = np.random.default_rng(4)
     values = rng.standard_normal((6, D)) + np.array([0.0, 2.0, 0.0, 0.0])
-    stated = Measured("low", "scalars", NAMES, values, np.array([0.0, 2.0, 0.0, 0.0]), scalars=D)
+    stated = MeasuredFeatures("low", "scalars", NAMES, values, np.array([0.0, 2.0, 0.0, 0.0]), scalars=D)
     certain, doubtful = (weighed(lessons(np.random.default_rng(0)), WAYS, [one]) for one in (data(values), stated))
     assert doubtful.posterior.fits["base"].p > 5.0 * certain.posterior.fits["base"].p

@@ -6,7 +6,7 @@ import pytest
 from doe.diagnose.emulator import shrunk_covariance
 from doe.errors import StatisticsError
 from doe.validation.limit import fold_shifts, metric_of, product, strength_of
-from doe.validation.reference import SIDE, Sample
+from doe.validation.reference import SIDE, ReferencePours
 
 D, POURS = 6, 96
 
@@ -22,7 +22,7 @@ def sample_of(rng, shifts, pours=POURS, sensitivity=None, scale=1.0):
     kinds = {"base": blocks(nothing, 2 * pours)}
     kinds |= {name: blocks(shift, pours) for name, shift in shifts.items()}
     kinds |= {"friction -": blocks(-SIDE * slope, pours), "friction +": blocks(SIDE * slope, pours)}
-    return Sample(kinds, ("friction",))
+    return ReferencePours(kinds, ("friction",))
 
 
 def unit(*places):
@@ -108,4 +108,4 @@ def test_too_few_pours_are_refused():
 def test_a_feature_that_never_varies_is_left_out():
     rng = np.random.default_rng(0)
     blocks = {name: (np.column_stack([rng.standard_normal(9), np.full(9, 3.0)]),) for name in ("base", "push")}
-    assert [block.shape[1] for block in Sample(blocks, ()).varying().pours["push"]] == [1]
+    assert [block.shape[1] for block in ReferencePours(blocks, ()).varying().pours["push"]] == [1]

@@ -13,7 +13,7 @@ from doe.diagnose.verdict import THRESHOLD
 from doe.validation.sets import (
     LEAST_P,
     TEMPERATURES,
-    Row,
+    SetRow,
     answer_to,
     append_rows,
     by_temperature,
@@ -28,7 +28,7 @@ NAN = math.nan
 
 
 def row(number, kind, label, verdict, strength=NAN, after=NAN, offer="scan"):
-    return Row(
+    return SetRow(
         "blind", 5, number, kind, label, strength, "", offer, verdict, "", "", 0.1, 0.1, "a", 0.8, NAN,
         {"base": 0.0}, {"base": 0.5}, NAN, 2.0 * after, after, NAN, NAN, 12, 1.5,
     )  # fmt: skip

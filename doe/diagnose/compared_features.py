@@ -33,7 +33,7 @@ CONSTANT = 1e-9
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredFeatures:
     """Features that a condition's data offer: names, replicates (r, d) and the stated error of each, (d,).
 
     ``scalars``: how many of them are not read off a surface. ``sight``: what the scans were seen through;
@@ -56,14 +56,14 @@ class Measured:
         return np.asarray(block[np.isfinite(block).all(axis=1)], dtype=np.float64)
 
 
-def measured(condition: Condition, offer: str | None = None) -> Measured:
+def measured(condition: Condition, offer: str | None = None) -> MeasuredFeatures:
     """What ``condition`` offers, or the part of it that data of the kind ``offer`` would have."""
     names, values = feature_set(condition), features_of_data(condition)
     most = names.offered(offer_of(condition)) if offer is None else min(names.offered(offer), values.shape[1])
     stated = np.zeros(most)
     stated[: len(names.scalars)] = np.nan_to_num(summary_uncertainties(condition))
     found = offer_of(condition) if offer is None else offer
-    return Measured(
+    return MeasuredFeatures(
         condition=condition.name,
         offer=found,
         names=names.names[:most],
@@ -127,7 +127,7 @@ class Instrument:
 def weighed(
     lessons: Lessons,
     ways: Sequence[Way],
-    conditions: Sequence[Measured],
+    conditions: Sequence[MeasuredFeatures],
     instruments: Sequence[Instrument] = (),
 ) -> Compared:
     """Weigh all models by the data of the fitted ``conditions``, freed from the bias of their ``instruments``.
@@ -168,7 +168,7 @@ def usable(lessons: Lessons, offered: Sequence[npt.NDArray[np.int64]]) -> tuple[
     return _complete(lessons.only(columns)), columns
 
 
-def _there(condition: Measured) -> npt.NDArray[np.int64]:
+def _there(condition: MeasuredFeatures) -> npt.NDArray[np.int64]:
     """Features that the data of a condition give."""
     number = len(condition.values)
     return np.flatnonzero(np.isfinite(condition.values).sum(axis=0) >= max(min(2, number), number / 2))
@@ -200,7 +200,7 @@ def _varies(lessons: Lessons, c: int) -> npt.NDArray[np.bool_]:
 
 
 def _scatter(
-    emulator: Emulator, blocks: Sequence[FloatArray], weights: FloatArray, conditions: Sequence[Measured]
+    emulator: Emulator, blocks: Sequence[FloatArray], weights: FloatArray, conditions: Sequence[MeasuredFeatures]
 ) -> float:
     """r: variance of the replicates over that of pours, 1 at least, and at most known to be more than the noise of Σ.
 
@@ -221,14 +221,14 @@ def _scatter(
     return max(1.0, square / expected) if expected > 0.0 else 1.0
 
 
-def _freed(condition: Measured, instrument: Instrument) -> Measured:
+def _freed(condition: MeasuredFeatures, instrument: Instrument) -> MeasuredFeatures:
     return replace(condition, values=condition.values - instrument.bias[: condition.values.shape[1]])
 
 
 def _loadings(
     emulator: Emulator,
     blocks: Sequence[FloatArray],
-    conditions: Sequence[Measured],
+    conditions: Sequence[MeasuredFeatures],
     columns: Sequence[npt.NDArray[np.int64]],
     instruments: Sequence[Instrument],
 ) -> FloatArray:

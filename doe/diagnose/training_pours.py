@@ -16,9 +16,9 @@ import numpy.typing as npt
 
 from doe.declared.model import Declared, possible
 from doe.declared.points import AS_IT_IS, Direction, Point, View, base_points, directions_of, effect_points
-from doe.declared.pours import ModelPours, Pour, Search
+from doe.declared.pours import ModelPours, PointPour, Search
 from doe.diagnose.budget import Budget
-from doe.diagnose.compared import Instrument, Measured
+from doe.diagnose.compared_features import Instrument, MeasuredFeatures
 from doe.diagnose.emulator import Lessons, Way
 from doe.diagnose.levels import STRONG, Trials, level_of, taught_shifts
 from doe.diagnose.posterior import LEAST, Posterior
@@ -62,7 +62,7 @@ class Probe:
     multiple: float
 
 
-class Teacher:
+class TrainingPours:
     """Pours what teaches the models of a declared scene in the set-ups of ``conditions``.
 
     ``declared`` holds the first of these, or all: amplitudes are found by what they do in them, so that a condition
@@ -78,7 +78,7 @@ class Teacher:
         self._pours, self._budget, self._say = pours, budget, say
         self._acting: dict[Point, tuple[int, float]] = {}
         """Way and multiple of every point that was poured."""
-        self._rows: dict[Point, list[Pour]] = {}
+        self._rows: dict[Point, list[PointPour]] = {}
         self._tried: list[tuple[Direction, float, list[Point]]] = []
         self._directions = [one for effect in declared.effects for one in directions_of(effect)]
         self._turned = all(_turns(condition.scene) for condition in conditions)
@@ -168,7 +168,7 @@ class Teacher:
         probes = [Probe(point, *self._acting[point]) for point in self._rows]
         return self.told(probes, list(self._rows.values()))
 
-    def instruments(self, conditions: Sequence[Measured]) -> list[Instrument]:
+    def instruments(self, conditions: Sequence[MeasuredFeatures]) -> list[Instrument]:
         """By condition what its scanner does to the base model's pours; empty where every sight and axis is perfect."""
         if all(one.sight == PERFECT and one.axis_error == 0.0 for one in conditions):
             return []
@@ -206,7 +206,7 @@ class Teacher:
         """``number`` pours of the base model, as they teach it."""
         return [Probe(point, -1, 0.0) for point in base_points(self._declared, number)]
 
-    def told(self, probes: Sequence[Probe], rows: Sequence[Sequence[Pour]]) -> Lessons:
+    def told(self, probes: Sequence[Probe], rows: Sequence[Sequence[PointPour]]) -> Lessons:
         """What pours of ``probes``, one per condition each, teach; NaN where one broke off or could not be read."""
         blocks = []
         for pours in zip(*rows, strict=True):
@@ -322,7 +322,7 @@ class Teacher:
         effect = self._directions[way].effect
         return [number for number, one in enumerate(self._directions) if one.effect == effect]
 
-    def _keep(self, points: Sequence[Point], rows: Sequence[list[Pour]], way: int, multiple: float) -> None:
+    def _keep(self, points: Sequence[Point], rows: Sequence[list[PointPour]], way: int, multiple: float) -> None:
         for point, row in zip(points, rows, strict=True):
             self._rows[point], self._acting[point] = row, (way, multiple)
 

@@ -1,9 +1,9 @@
 """What to measure next: the feasible changes of the rig, each poured with every answer that is left.
 
-The pours are those that teach the models (``teaching.py``), made in the changed rig, so that data sets of one declared
-model share them, and those of the chosen set-up serve again when its data are weighed. In each set-up a regression of
-its own says what every answer predicts at its best fit, in all features that the data offer; what fit, regression and
-the axis of a scan leave open is in the covariance.
+The pours are those that teach the models (``training_pours.py``), made in the changed rig, so that data sets of one
+declared model share them, and those of the chosen set-up serve again when its data are weighed. In each set-up a
+regression of its own says what every answer predicts at its best fit, in all features that the data offer; what fit,
+regression and the axis of a scan leave open is in the covariance.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ import numpy.typing as npt
 
 from doe.declared.points import AS_IT_IS
 from doe.declared.pours import ModelPours
-from doe.diagnose.compared import usable
+from doe.diagnose.compared_features import usable
 from doe.diagnose.emulator import Emulator, Lessons, emulated, planar_weights
-from doe.diagnose.next_experiment import MenuItem, Prediction, rank_experiments
+from doe.diagnose.next_experiment import CandidateExperiment, Prediction, rank_experiments
 from doe.diagnose.posterior import Posterior
 from doe.diagnose.result import Suggestion
-from doe.diagnose.teaching import Teacher, acting
+from doe.diagnose.training_pours import TrainingPours, acting
 from doe.errors import StatisticsError
 from doe.measurement.condition_table import turned as turned_scene
 from doe.measurement.features import feature_set, offer_of
@@ -35,7 +35,7 @@ FloatArray = npt.NDArray[np.float64]
 PoursIn = Callable[[Sequence[Condition]], ModelPours]
 
 BASE_POURS, POURS = 12, 4
-"""Pours of the base model, and of every direction of an effect that is left, in each set-up of the menu."""
+"""Pours of the base model, and of every direction of an effect that is left, in each set-up of the candidates."""
 PLANNED = (6, 12, 24)
 """Pours that may be asked of the laboratory."""
 LIKELY = 0.8
@@ -82,7 +82,7 @@ CHANGES = (
 
 
 @dataclass(frozen=True)
-class Menu:
+class CandidateExperiments:
     """Set-ups in order, and how many pours had to be run for them."""
 
     suggestions: tuple[Suggestion, ...]
@@ -90,42 +90,42 @@ class Menu:
 
 
 def next_experiment(
-    teacher: Teacher, found: Posterior, weights: Mapping[str, float], condition: Condition, pours_in: PoursIn
-) -> Menu:
-    """The menu for telling answers apart, the most discriminating set-up first.
+    training: TrainingPours, found: Posterior, weights: Mapping[str, float], condition: Condition, pours_in: PoursIn
+) -> CandidateExperiments:
+    """The candidates for telling answers apart, the most discriminating set-up first.
 
     Parameters
     ----------
-    teacher, found
+    training, found
         What taught the models, and the posterior that leaves them.
     weights
-        Probability of every answer that is left, "base" for nothing missing; empty menu with fewer than two.
+        Probability of every answer that is left, "base" for nothing missing; no candidates with fewer than two.
     condition
         The fitted condition that is changed.
     pours_in
         The pours of the declared model in set-ups.
     """
     if len(weights) < 2:
-        return Menu((), 0)
-    directed = {way.effect for way in teacher.ways if way.angle is not None}
+        return CandidateExperiments((), 0)
+    directed = {way.effect for way in training.ways if way.angle is not None}
     turned = any(name in directed for label in weights for name in label.split("+"))
     changes = {change.named(turned): values for change, values in feasible(condition.scene)}
     set_ups = [changed(condition, name, values, turned) for name, values in changes.items()]
     # What is measured there is weighed by all effects.
-    set_ups = [one for one in set_ups if teacher.possible_in(one.scene)]
+    set_ups = [one for one in set_ups if training.possible_in(one.scene)]
     model = pours_in(set_ups)
-    probes = teacher.base(BASE_POURS) + teacher.probes(found, tuple(weights), POURS)
+    probes = training.base(BASE_POURS) + training.probes(found, tuple(weights), POURS)
     # All set-ups at once, so that no core waits for the last pour of one of them; what is only looked at after that.
     plain = dict.fromkeys(probe.point.seen(AS_IT_IS) for probe in probes)
     model.run("what to measure next", list(plain))
     rows = model.run("what to measure next", [probe.point for probe in probes])
     items = []
     for c, set_up in enumerate(set_ups):
-        lessons = teacher.told(probes, [[row[c]] for row in rows])
+        lessons = training.told(probes, [[row[c]] for row in rows])
         with suppress(StatisticsError):  # a set-up that jams tells nothing
-            items.append(_item(teacher, found, tuple(weights), lessons, model, c, set_up))
+            items.append(_item(training, found, tuple(weights), lessons, model, c, set_up))
     if not items:
-        return Menu((), model.run_now)
+        return CandidateExperiments((), model.run_now)
     asked = dict.fromkeys(name for label in weights if label != "base" for name in label.split("+"))
     levers = tuple(f"{name}: {EFFECTS[name].lever}" for name in asked)
     for planned in PLANNED:
@@ -135,18 +135,18 @@ def next_experiment(
     suggestions = [
         Suggestion(one, changes[one.name], condition.name, tuple(weights), levers, planned, turned) for one in ranked
     ]
-    return Menu(tuple(suggestions), model.run_now)
+    return CandidateExperiments(tuple(suggestions), model.run_now)
 
 
 def _item(
-    teacher: Teacher,
+    training: TrainingPours,
     found: Posterior,
     labels: Sequence[str],
     lessons: Lessons,
     pours: ModelPours,
     c: int,
     set_up: Condition,
-) -> MenuItem:
+) -> CandidateExperiment:
     """What every answer predicts in a set-up, whitened by a regression of its own.
 
     Raises StatisticsError where an answer has too few pours that ended.
@@ -155,17 +155,17 @@ def _item(
     taught, (columns,) = usable(lessons, [np.arange(offered)])
     used = sorted(set(taught.way[taught.way >= 0].tolist()))
     if missing := set(lessons.way.tolist()) - {-1, *used}:
-        raise StatisticsError(f"{teacher.ways[missing.pop()].name}: no pour of it ended")
+        raise StatisticsError(f"{training.ways[missing.pop()].name}: no pour of it ended")
     taught = replace(taught, way=np.array([used.index(way) if way >= 0 else -1 for way in taught.way]))
-    emulator = emulated(taught, [teacher.ways[way] for way in used])
+    emulator = emulated(taught, [training.ways[way] for way in used])
     # The axis of a scan is off in the new pours as well.
     shared = np.zeros((len(columns), 0))
     axis_error = max((one.axis_error for one in set_up.surfaces.values()), default=0.0)
     if axis_error > 0.0:
-        axis = teacher.axis_in(pours, c, len(feature_set(set_up).scalars), axis_error)[:, columns]
+        axis = training.axis_in(pours, c, len(feature_set(set_up).scalars), axis_error)[:, columns]
         slope = emulator.squashes[0].slope(emulator.squashes[0].centre)
         shared = emulator.whitening @ (axis * slope).T
-    expected = {label: emulator.at(_rows(emulator, teacher, found, label)) for label in labels}
+    expected = {label: emulator.at(_rows(emulator, training, found, label)) for label in labels}
     # How well a regression of few pours knows an answer is no property of it that would give it away.
     noise = np.mean([variance[0] for _, variance in expected.values()], axis=0) + emulator.slope_variance
     predictions, slopes = {}, emulator.slopes
@@ -175,21 +175,21 @@ def _item(
         covariance = np.diag(noise) + slopes @ fit.theta_covariance @ slopes.T
         covariance += loose.T @ loose + shared @ shared.T
         predictions[label] = Prediction(mean + slopes @ fit.theta, covariance)
-    return MenuItem(set_up.name, predictions, np.eye(len(columns)))
+    return CandidateExperiment(set_up.name, predictions, np.eye(len(columns)))
 
 
-def _rows(emulator: Emulator, teacher: Teacher, found: Posterior, label: str) -> FloatArray:
+def _rows(emulator: Emulator, training: TrainingPours, found: Posterior, label: str) -> FloatArray:
     """Rows of the regression: at the best fit of ``label``, and with each amplitude a standard deviation beside it."""
     base, here = emulator.row(), emulator.row()
     beside = []
     number = {way.name: k for k, way in enumerate(emulator.ways)}
-    for way, amplitude in acting(found, label, teacher.ways):
-        effect = teacher.ways[way].effect
-        size = math.hypot(*teacher.ways[way].unit)
+    for way, amplitude in acting(found, label, training.ways):
+        effect = training.ways[way].effect
+        size = math.hypot(*training.ways[way].unit)
         own = [one for one in found.fits[label].amplitudes if one.effect == effect]
         spread = [(one.high - one.low) / INTERVAL / size for one in own]
         if len(own) == 1:
-            acts = {number[teacher.ways[way].name]: 1.0}
+            acts = {number[training.ways[way].name]: 1.0}
             first, *others = (
                 emulator.weighted_row([(acts, a)]) - base for a in (amplitude, amplitude + min(spread[0], amplitude))
             )

@@ -13,7 +13,7 @@ import pytest
 
 from solver import load_material, with_values
 from solver.pours.run import Job, run_pours
-from solver.pours.worker_pool import Crew, Rooms, deaf_to_interrupts
+from solver.pours.worker_pool import Rooms, WorkerPool, deaf_to_interrupts
 
 HEAP = with_values(
     load_material("sunflower_extract"), {"rig.mass": 0.003, "body.spheres": "coarse", "numerics.max_time": 0.4}
@@ -21,14 +21,14 @@ HEAP = with_values(
 
 
 @pytest.fixture(scope="module")
-def crew():
-    with Crew(2) as workers:
+def pool():
+    with WorkerPool(2) as workers:
         yield workers
 
 
-def test_same_bits_as_in_one_process(taichi, crew):
+def test_same_bits_as_in_one_process(taichi, pool):
     jobs = [Job(HEAP, seed, tag=seed) for seed in range(3)]
-    apart = {job.tag: record for job, record in crew.run_queue(deque(jobs), [HEAP])}
+    apart = {job.tag: record for job, record in pool.run_queue(deque(jobs), [HEAP])}
     here = dict(run_pours(jobs, worlds=2))
     assert sorted(apart) == [0, 1, 2]
     for seed, record in here.items():
@@ -36,37 +36,37 @@ def test_same_bits_as_in_one_process(taichi, crew):
         assert apart[seed].outcome == record.outcome
 
 
-def test_jobs_may_be_added_while_it_runs(crew):
+def test_jobs_may_be_added_while_it_runs(pool):
     queue = deque([Job(HEAP, 1, tag=0)])
     seen = []
-    for job, _ in crew.run_queue(queue, [HEAP]):
+    for job, _ in pool.run_queue(queue, [HEAP]):
         seen.append(job.tag)
         if job.tag < 2:
             queue.append(Job(HEAP, 2, tag=job.tag + 1))
     assert seen == [0, 1, 2]
 
 
-def test_a_workers_error_arrives_with_its_text(crew):
+def test_a_workers_error_arrives_with_its_text(pool):
     queue = deque([Job(with_values(HEAP, {"rig.mass": 0.2}), 1)])
     with pytest.raises(RuntimeError, match="a pour broke off"):
-        list(crew.run_queue(queue, [HEAP]))
+        list(pool.run_queue(queue, [HEAP]))
 
 
 def test_a_worker_that_is_killed_is_named():
-    with Crew(1) as crew:
-        pours = crew.run_queue(deque([Job(HEAP, 1), Job(HEAP, 2)]), [HEAP])
+    with WorkerPool(1) as pool:
+        pours = pool.run_queue(deque([Job(HEAP, 1), Job(HEAP, 2)]), [HEAP])
         next(pours)
-        ((process, _),) = crew._processes
+        ((process, _),) = pool._processes
         os.kill(process.pid, signal.SIGKILL)
         with pytest.raises(RuntimeError, match="a worker process has ended"):
             list(pours)
 
 
 def test_nothing_is_left_after_close():
-    crew = Crew(1)
-    list(crew.run_queue(deque([Job(HEAP, 1)]), [HEAP]))
-    ((process, _),) = crew._processes
-    crew.close()
+    pool = WorkerPool(1)
+    list(pool.run_queue(deque([Job(HEAP, 1)]), [HEAP]))
+    ((process, _),) = pool._processes
+    pool.close()
     assert process.exitcode == 0
 
 
@@ -86,7 +86,7 @@ def test_a_process_is_deaf_to_interrupts_from_its_first_moment():
 
 def test_so_is_the_first_one_of_a_program():
     """With it multiprocessing starts its resource tracker, and lets Ctrl-C through again."""
-    name = "tests.solver.test_crew"
+    name = "tests.solver.test_worker_pool"
     code = f"from {name} import test_a_process_is_deaf_to_interrupts_from_its_first_moment as t; t()"
     subprocess.run([sys.executable, "-c", code], check=True, cwd=Path(__file__).parents[2])
 

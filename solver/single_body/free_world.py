@@ -1,4 +1,4 @@
-"""A laboratory: single bodies and contacts, placed by hand, with no pour and no rig in the way.
+"""A free world: single bodies and contacts, placed by hand, with no pour and no rig in the way.
 
 Tests and the verification build a scene here, put bodies where they want them, run steps and read the state. One world;
 bodies that stand far apart do not meet, so many cases share it.
@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from solver.engine.state import Capacity
-from solver.engine.tables import layout, wall_tables
+from solver.engine.tables import body_tables, wall_tables
 from solver.engine.world import SUMMARY_COLUMNS, Batch, compiled_in
 from solver.rigs.rig import BareRig
 from solver.rigs.surface import Surface, horizontal
@@ -39,12 +39,12 @@ AT_REST = np.zeros(3)
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
 ROOM = Capacity(worlds=1, bodies=128, members=1024, contacts=8192, kinds=64).rounded()
-"""One size for all laboratories without a mesh, so that the kernels are compiled once. Only the newest is alive."""
+"""One size for all free worlds without a mesh, so that the kernels are compiled once. Only the newest is alive."""
 
 
 @dataclass(frozen=True)
-class Bench(BareRig):
-    """The rig of a laboratory: the surfaces it is given and nothing else."""
+class GivenSurfaces(BareRig):
+    """The rig of a free world: the surfaces it is given and nothing else."""
 
     fixed: tuple[Surface, ...]
     wall: str = WALL.name
@@ -70,12 +70,12 @@ def scene_of(
     surfaces: Sequence[Surface] = (PLATE,),
     gravity: tuple[float, float, float] = FREE,
 ) -> Scene:
-    """A scene whose rig is a :class:`Bench` with ``surfaces`` of the material "wall"; no body falls asleep in it."""
-    rig, awake = Bench(tuple(surfaces)), Numerics(sleep_speed=0.0)
+    """A scene whose rig is ``surfaces`` of the material "wall" and no more; no body falls asleep in it."""
+    rig, awake = GivenSurfaces(tuple(surfaces)), Numerics(sleep_speed=0.0)
     return Scene("laboratory", tuple(materials), tuple(bodies), tuple(pairs), rig, numerics=awake, gravity=gravity)
 
 
-def bench(
+def grain_on_plate(
     body: Body | None = None,
     friction: float = 0.3,
     restitution: float = 0.5,
@@ -93,8 +93,8 @@ def bench(
     return scene_of((body or sphere(),), (grain, wall), pairs, gravity=gravity)
 
 
-class Laboratory:
-    """Bodies of a scene, put where they are wanted; the next laboratory takes the arrays over and ends this one.
+class FreeWorld:
+    """Bodies of a scene, put where they are wanted; the next free world takes the arrays over and ends this one.
 
     ``kinds`` says which of the scene's bodies each of them is: a number of bodies of the first kind, or one index per
     body. The time step [s] is ``dt``, or by the rule of ``time_step.py`` with ``fraction`` of the Rayleigh time.
@@ -117,7 +117,7 @@ class Laboratory:
         self.dt = dt or time_step(self.scene)
         surfaces = self.scene.rig.surfaces()
         self.batch = Batch(dataclasses.replace(room_for(surfaces), **compiled_in([self.scene])))
-        self.batch.load(0, self.scene, layout(self.scene, order), self.dt, active or [plate] * len(surfaces))
+        self.batch.load(0, self.scene, body_tables(self.scene, order), self.dt, active or [plate] * len(surfaces))
 
     def put(
         self, b: int, position: Triple, velocity: Triple = AT_REST, spin: Triple = AT_REST, quaternion: Triple = UPRIGHT
