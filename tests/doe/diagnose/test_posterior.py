@@ -25,7 +25,7 @@ from doe.diagnose.posterior import BEYOND, FITS, NOTHING, OUTSIDE, PAIRS, SPREAD
 from doe.errors import StatisticsError
 from doe.validation.limit import RISKS, DataKind
 from doe.validation.replay import NULLS, PlantedTruth, Teaching, replay
-from tests.doe.validation.test_ruler import D, sample_of, unit
+from tests.doe.validation.test_limit_ruler import D, sample_of, unit
 
 SIZE = 2 * D
 UNSQUASHED = Squash(np.zeros(D), np.full(D, 1e9))

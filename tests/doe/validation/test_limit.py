@@ -23,7 +23,7 @@ from doe.validation.limit import (
     limit_study,
     nearest_correlation,
 )
-from tests.doe.validation.test_ruler import sample_of, unit
+from tests.doe.validation.test_limit_ruler import sample_of, unit
 
 SETS = 20_000
 

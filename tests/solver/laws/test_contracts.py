@@ -23,8 +23,8 @@ from solver.verification.impacts import Impact, rebounds
 from tests.solver.effects.cases import FELT, IN_KERNELS, felt, scene_with, tumble, with_effects
 from tests.solver.effects.test_contracts import momenta
 from tests.solver.pour_digests import digest
-from tests.solver.test_material_file import mutated
-from tests.solver.test_pour import QUICK
+from tests.solver.pours.test_pour import QUICK
+from tests.solver.scenes.test_material_file import mutated
 
 pytestmark = pytest.mark.usefixtures("taichi")
 

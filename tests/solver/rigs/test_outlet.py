@@ -13,7 +13,7 @@ from solver.pours.run import capacity_for
 from solver.rigs.outlet import RoundOutlet, Slot, obstruction
 from solver.scenes.body import Members
 from solver.scenes.scene import with_values
-from tests.solver.test_pour import COARSE
+from tests.solver.pours.test_pour import COARSE
 
 HEIGHT, HALF = 0.065, 0.015
 ROUND, SLOT = RoundOutlet(HALF), Slot(HALF)

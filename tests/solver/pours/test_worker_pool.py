@@ -86,9 +86,9 @@ def test_a_process_is_deaf_to_interrupts_from_its_first_moment():
 
 def test_so_is_the_first_one_of_a_program():
     """With it multiprocessing starts its resource tracker, and lets Ctrl-C through again."""
-    name = "tests.solver.test_worker_pool"
+    name = "tests.solver.pours.test_worker_pool"
     code = f"from {name} import test_a_process_is_deaf_to_interrupts_from_its_first_moment as t; t()"
-    subprocess.run([sys.executable, "-c", code], check=True, cwd=Path(__file__).parents[2])
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=Path(__file__).parents[3])
 
 
 def test_a_scene_without_effects_in_the_kernels_has_a_room_without_them(taichi):

@@ -15,7 +15,7 @@ from solver.pours.record import Outcome
 from solver.pours.run import capacity_for
 from solver.scenes.material_file import with_settings
 from solver.scenes.scene import with_values
-from tests.solver.test_checkpoint import GATED, HEAP, same
+from tests.solver.pours.test_checkpoint import GATED, HEAP, same
 
 pytestmark = pytest.mark.usefixtures("taichi")
 

@@ -22,7 +22,7 @@ from tests.solver.effects.cases import FELT
 
 SCENE = load_material("sunflower_extract")
 KEY = pour_key(SCENE, 1)
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 def test_equal_scenes_have_equal_keys():
@@ -116,9 +116,7 @@ def test_docstrings_and_comments_of_the_solver_do_not_count(tmp_path):
     for path in files:
         text = path.read_text(encoding="utf-8")
         path.write_text(text.replace('"""', '"""Reworded. ', 1) + "# a comment\n", encoding="utf-8")
-    program = (
-        "import solver; print(solver.__file__, solver.pours.pour_key(solver.load_material('sunflower_extract'), 1))"
-    )
+    program = "import solver; print(solver.__file__, solver.pour_key(solver.load_material('sunflower_extract'), 1))"
     out = subprocess.run(
         [sys.executable, "-c", program], cwd=tmp_path, env={"PYTHONPATH": str(tmp_path)}, capture_output=True, text=True
     )

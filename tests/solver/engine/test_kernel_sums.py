@@ -7,7 +7,7 @@ import pytest
 
 import solver
 
-KERNELS = sorted((Path(solver.__file__).parent / "kernels").glob("*.py"))
+KERNELS = sorted((Path(solver.__file__).parent / "engine/kernels").glob("*.py"))
 
 
 def atomic_lines(source: str) -> list[int]:

@@ -22,7 +22,7 @@ from solver.rigs import Funnel
 from solver.rigs.surface import Revolved, SurfacePose, TriangleMesh
 from solver.scenes.scene import with_values
 from solver.single_body.free_world import EARTH, RADIUS, FreeWorld, GivenSurfaces, grain_on_plate
-from tests.solver.test_pour import QUICK
+from tests.solver.pours.test_pour import QUICK
 
 pytestmark = pytest.mark.usefixtures("taichi")
 

@@ -9,8 +9,8 @@ from solver.pours.run import run_pour
 from solver.scenes.material_file import with_settings
 from solver.scenes.scene import with_values
 from tests.explorer.beads import bead_scene
+from tests.solver.pours.test_pour import COARSE
 from tests.solver.rigs.test_rig_pours import BOX, CYLINDER
-from tests.solver.test_pour import COARSE
 
 pytestmark = pytest.mark.usefixtures("taichi")
 

@@ -9,7 +9,7 @@ from doe.errors import StudyFileError
 from doe.runs import Run
 from doe.studies.study import study_from, with_profile
 from solver import ParameterError, pour_key, value
-from tests.doe.test_study import PATH, TABLE
+from tests.doe.studies.test_study import PATH, TABLE
 
 
 def study_in(rig, observable="dynamic_angle_deg", **insertion):

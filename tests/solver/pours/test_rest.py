@@ -17,7 +17,7 @@ from solver.pours.record_builder import lying, pile_of
 from solver.pours.run import Job, capacity_for, run_pours
 from solver.scenes.material_file import load_material
 from solver.scenes.scene import with_values
-from tests.solver.test_pour import QUICK, apex_of
+from tests.solver.pours.test_pour import QUICK, apex_of
 
 pytestmark = [pytest.mark.usefixtures("taichi"), pytest.mark.slow]
 

@@ -64,7 +64,7 @@ def test_one_thread_or_two(alone):
     """Three worlds at a time that two threads share, here, and one thread by itself in another process."""
     assert ti.lang.impl.current_cfg().cpu_max_num_threads == 2
     command = [sys.executable, "-m", "tests.solver.pour_digests", "1"]
-    other = subprocess.run(command, cwd=Path(__file__).parents[2], capture_output=True, text=True, check=True)
+    other = subprocess.run(command, cwd=Path(__file__).parents[3], capture_output=True, text=True, check=True)
     here = digests(2)
     assert json.loads(other.stdout) == here
     assert here[JOBS.index(Job(SHUT, 2))] == alone

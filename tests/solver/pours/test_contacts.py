@@ -7,8 +7,8 @@ from solver.engine.world import Batch
 from solver.pours.contacts import Contacts, coordination_numbers, loads
 from solver.pours.pour import Pour
 from solver.pours.run import capacity_for
-from tests.solver.test_checkpoint import HEAP
-from tests.solver.test_rewind import drive
+from tests.solver.pours.test_checkpoint import HEAP
+from tests.solver.pours.test_rewind import drive
 
 G = 9.81
 

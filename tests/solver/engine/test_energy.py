@@ -19,7 +19,7 @@ from solver.rigs.surface import Revolved, SurfacePose, rectangle
 from solver.scenes.body import Body, Members
 from solver.scenes.scene import with_values
 from solver.single_body.free_world import EARTH, GRAIN, RADIUS, FreeWorld, GivenSurfaces, grain_on_plate
-from tests.solver.test_pour import QUICK
+from tests.solver.pours.test_pour import QUICK
 
 pytestmark = pytest.mark.usefixtures("taichi")
 
