@@ -75,7 +75,7 @@ class PourRunner:
     """Runs settings as pours and keeps every run in the store.
 
     ``tries`` seeds are tried for one replicate. Pours run in this process, where ``observer`` can watch them, or as
-    ``pours`` says (``solver.Crew.run_queue``).
+    ``pours`` says (``solver.WorkerPool.run_queue``).
     """
 
     def __init__(

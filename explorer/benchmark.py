@@ -23,7 +23,7 @@ from explorer.scene.file import load_scene
 from solver.benchmark import (
     RADIUS,
     Bed,
-    Measurement,
+    BenchmarkResult,
     bed_name,
     bed_scene,
     measure_batch,
@@ -76,10 +76,10 @@ class Options:
 class Result:
     """All rounds of one engine on one case."""
 
-    rounds: tuple[Measurement, ...]
+    rounds: tuple[BenchmarkResult, ...]
 
     @property
-    def median(self) -> Measurement:
+    def median(self) -> BenchmarkResult:
         """The first round with the median wall time of all."""
         return dataclasses.replace(self.rounds[0], wall_s=statistics.median(one.wall_s for one in self.rounds))
 
@@ -89,15 +89,15 @@ class Result:
         return [one.steps_per_s / two.steps_per_s for one, two in both if not (one.timed_out or two.timed_out)]
 
 
-def results(measurements: Sequence[Measurement]) -> list[Result]:
+def results(measurements: Sequence[BenchmarkResult]) -> list[Result]:
     """Measurements of the same case and engine together, in order of their first."""
-    found: dict[tuple[str, str], list[Measurement]] = {}
+    found: dict[tuple[str, str], list[BenchmarkResult]] = {}
     for one in measurements:
         found.setdefault((one.case, one.engine), []).append(one)
     return [Result(tuple(rounds)) for rounds in found.values()]
 
 
-def short_cases(options: Options) -> Iterator[Measurement]:
+def short_cases(options: Options) -> Iterator[BenchmarkResult]:
     """The beginning of the seed pour: what says within a minute whether a ratio has fallen."""
     scene = load_scene(POUR)
     deck: Deck = apart(_deck, scene, SHORT)
@@ -105,21 +105,21 @@ def short_cases(options: Options) -> Iterator[Measurement]:
     yield from _in_turn(options, [_our_pour(case, scene, deck, SHORT, True, OFTEN), *_peer_pours(case, deck, options)])
 
 
-def pour_cases(options: Options) -> Iterator[Measurement]:
+def pour_cases(options: Options) -> Iterator[BenchmarkResult]:
     """The seed pour: ours to rest, ours and the peers' for the same simulated time at the same time step."""
     scene, time_s = load_scene(POUR), options.duration
     deck: Deck = apart(_deck, scene, time_s)
     case = f"pour, {time_s:g} s"
     ours = [_our_pour(case, scene, deck, time_s, sleeping) for sleeping in (True, False)]
 
-    def to_rest() -> Measurement:
-        found: Measurement = apart(measure_pour, TO_REST, scene, SEED, None, True)
+    def to_rest() -> BenchmarkResult:
+        found: BenchmarkResult = apart(measure_pour, TO_REST, scene, SEED, None, True)
         return found
 
     yield from _in_turn(options, [to_rest, *ours, *_peer_pours(case, deck, options)])
 
 
-def bed_cases(options: Options) -> Iterator[Measurement]:
+def bed_cases(options: Options) -> Iterator[BenchmarkResult]:
     """Packed beds at rest, numbered at random, where every sphere has contacts at every step; ours without sleep."""
     for n in options.beds:
         bed = apart(wide_bed, *BEDS[n])
@@ -131,7 +131,7 @@ def bed_cases(options: Options) -> Iterator[Measurement]:
         yield from _in_turn(options, runs)
 
 
-def batch_cases(options: Options) -> Iterator[Measurement]:
+def batch_cases(options: Options) -> Iterator[BenchmarkResult]:
     """The same pours by one worker and by two."""
     scene = load_scene(POUR)
     seeds = list(range(1, BATCH_POURS + 1))
@@ -139,7 +139,7 @@ def batch_cases(options: Options) -> Iterator[Measurement]:
         yield measure_batch("batch of pours", scene, seeds, workers)
 
 
-CASES: dict[str, Callable[[Options], Iterator[Measurement]]] = {
+CASES: dict[str, Callable[[Options], Iterator[BenchmarkResult]]] = {
     "short": short_cases,
     "pour": pour_cases,
     "bed": bed_cases,
@@ -147,7 +147,7 @@ CASES: dict[str, Callable[[Options], Iterator[Measurement]]] = {
 }
 PEERS = ("liggghts", "yade")
 
-Run = Callable[[], Measurement]
+Run = Callable[[], BenchmarkResult]
 
 
 def apart(function: Callable[..., Any], *arguments: Any) -> Any:
@@ -157,7 +157,7 @@ def apart(function: Callable[..., Any], *arguments: Any) -> Any:
         return pool.submit(function, *arguments).result()
 
 
-def growth(measurements: Sequence[Measurement], engine: str = "ours") -> float:
+def growth(measurements: Sequence[BenchmarkResult], engine: str = "ours") -> float:
     """Exponent of wall time per step over the number of spheres, between an engine's smallest and largest bed.
 
     Parameters
@@ -182,7 +182,7 @@ def growth(measurements: Sequence[Measurement], engine: str = "ours") -> float:
     return math.log(first.steps_per_s / last.steps_per_s) / math.log(last.spheres / first.spheres)
 
 
-def _in_turn(options: Options, runs: Sequence[Run]) -> Iterator[Measurement]:
+def _in_turn(options: Options, runs: Sequence[Run]) -> Iterator[BenchmarkResult]:
     """One run of each, then the next round; one that timed out has no further round."""
     left, done, rounds = list(runs), 0, options.rounds
     while done < rounds:
@@ -200,16 +200,16 @@ def _in_turn(options: Options, runs: Sequence[Run]) -> Iterator[Measurement]:
 def _our_pour(case: str, scene: Any, deck: Deck, duration: float, sleeping: bool, times: int = 1) -> Run:
     bodies, spheres = _size(deck)
 
-    def run() -> Measurement:
-        found: Measurement = apart(measure_pour, case, scene, SEED, duration, sleeping, times)
+    def run() -> BenchmarkResult:
+        found: BenchmarkResult = apart(measure_pour, case, scene, SEED, duration, sleeping, times)
         return dataclasses.replace(found, bodies=bodies, spheres=spheres)
 
     return run
 
 
 def _our_bed(bed: Bed, steps: int) -> Run:
-    def run() -> Measurement:
-        found: Measurement = apart(measure_bed, bed, steps)
+    def run() -> BenchmarkResult:
+        found: BenchmarkResult = apart(measure_bed, bed, steps)
         return found
 
     return run
@@ -237,15 +237,15 @@ def _peer_run(
 ) -> Run:
     """What writes ``what`` and has it run by ``engine`` for ``limit`` [s] at most; ``size``: bodies, spheres."""
 
-    def run() -> Measurement:
+    def run() -> BenchmarkResult:
         with tempfile.TemporaryDirectory() as folder:
             write(Path(folder), what)
             try:
                 done = _run_peer(engine, Path(folder), None if math.isinf(limit) else limit)
             except PeerTimeout:
-                return Measurement(case, engine, *size, 0, limit, 0.0, math.nan, math.nan, timed_out=True)
+                return BenchmarkResult(case, engine, *size, 0, limit, 0.0, math.nan, math.nan, timed_out=True)
         name, simulated = f"{done.engine} {done.version}", done.steps * dt
-        return Measurement(case, name, *size, done.steps, done.wall_s, simulated, math.nan, math.nan)
+        return BenchmarkResult(case, name, *size, done.steps, done.wall_s, simulated, math.nan, math.nan)
 
     return run
 

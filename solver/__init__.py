@@ -80,11 +80,11 @@ if TYPE_CHECKING:
     from solver.photograph import PhotographedPile, PhotographError, open_picture, read_photograph
     from solver.pours.pour import Pour
     from solver.pours.run import Job, capacity_for, run_pour, run_pours, run_queue
-    from solver.pours.worker_pool import Crew, begin_worker, warm_up
+    from solver.pours.worker_pool import WorkerPool, begin_worker, warm_up
 
 _LATE = {
     "Batch": "solver.engine.world",
-    "Crew": "solver.pours.worker_pool",
+    "WorkerPool": "solver.pours.worker_pool",
     "Job": "solver.pours.run",
     "PhotographError": "solver.photograph",
     "PhotographedPile": "solver.photograph",
@@ -123,7 +123,6 @@ __all__ = [
     "Bodies",
     "Body",
     "ClumpFit",
-    "Crew",
     "EffectTables",
     "Entries",
     "Frame",
@@ -161,6 +160,7 @@ __all__ = [
     "Value",
     "Vector",
     "Whole",
+    "WorkerPool",
     "all_names",
     "asset_path",
     "begin_worker",

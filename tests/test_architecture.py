@@ -41,8 +41,8 @@ DOE_PARTS_THAT_MAY_USE_THE_SOLVER = {
     "doe/measurement/": "a condition is a scene, and data and runs are read by the same functions",
     "doe/validation/": "laboratories that pour what the diagnosis is then asked about",
     "doe/declared/": "turns what is declared, and a point of a plan, into simulated worlds",
-    "doe/diagnose/teaching.py": "asks a rig for its symmetries",
-    "doe/diagnose/menu.py": "set-ups that a rig can do",
+    "doe/diagnose/training_pours.py": "asks a rig for its symmetries",
+    "doe/diagnose/candidate_experiments.py": "set-ups that a rig can do",
 }
 
 # In the order of the data: each file of the diagnosis may import from those before it.
@@ -50,14 +50,14 @@ DIAGNOSIS_FILES = (
     "result",
     "emulator",
     "posterior",
-    "compared",
+    "compared_features",
     "levels",
     "budget",
-    "teaching",
+    "training_pours",
     "verdict",
     "confirm",
     "next_experiment",
-    "menu",
+    "candidate_experiments",
     "diagnosis",
 )
 # What a laboratory may not take of the diagnosis: the features, the noise model and the emulator that it is read with.

@@ -243,7 +243,7 @@ import dataclasses
 import json
 from solver import backend
 from solver.scenes.contact_model import ContactModel
-from solver.single_body.laboratory import RADIUS, Laboratory, bench
+from solver.single_body.free_world import RADIUS, Laboratory, bench
 backend.init(threads=1)
 lasted = []
 for name in ("linear_spring_dashpot", "soft_springs"):

@@ -33,7 +33,7 @@ REFITS = 1000
 
 
 @dataclass(frozen=True)
-class Model(Record):
+class FittedModel(Record):
     """A fitted polynomial and what it says. canonical: only with all squares."""
 
     surface: Surface
@@ -62,13 +62,13 @@ class DesignAnalysis(Record):
 
     fits: tuple[OrderFit, ...]
     effects: Effects | None
-    model: Model | None
+    model: FittedModel | None
     optimum: Optimum | None
     notes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
-class Target(Record):
+class ResponseTarget(Record):
     """What the response should be, the standard error of that value, and the setting to stay near (natural, (k,))."""
 
     value: float
@@ -82,7 +82,7 @@ def analyse_design(
     region: Region,
     order: Order | None = None,
     terms: Sequence[str] = (),
-    target: Target | None = None,
+    target: ResponseTarget | None = None,
 ) -> DesignAnalysis:
     """Analyse one response.
 
@@ -135,11 +135,11 @@ def _terms(
     return terms_of(names, highest_order(coded, responses, names))
 
 
-def _model(surface: Surface, names: Sequence[str]) -> Model:
+def _model(surface: Surface, names: Sequence[str]) -> FittedModel:
     anova = analyse_surface(surface)
     squares = surface.included[len(term_names(names)) - len(names) :]
     highest, lowest = ridge_analysis(surface)
-    return Model(
+    return FittedModel(
         surface=surface,
         anova=anova,
         diagnostics=diagnose_fit(surface, anova),

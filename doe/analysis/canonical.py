@@ -1,9 +1,9 @@
-"""Canonical analysis: where a second-order surface is stationary and how it curves there.
+"""Where a second-order surface is stationary, how it curves there, and where it is best within a distance.
 
+Canonical analysis: the stationary point, and the curvatures along the principal axes.
 Source: Box and Wilson 1951; Myers, Montgomery and Anderson-Cook 2016, Response Surface Methodology, ch. 6.
 
 Ridge analysis: the best reachable response on spheres of growing radius about the centre of the region.
-
 On |x| = R the extremes of y = b0 + b'x + x'Bx solve (B - mu I) x = -b/2 (Lagrange); mu above the largest eigenvalue
 of B gives the maximum, below the smallest the minimum, and |x(mu)| falls as mu leaves the spectrum.
 Source: Hoerl 1959, Chem. Eng. Progress 55:69; Draper 1963, Technometrics 5:469.
@@ -23,6 +23,8 @@ from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
 
+STEPS = 11
+
 
 @dataclass(frozen=True)
 class Canonical(Record):
@@ -39,6 +41,20 @@ class Canonical(Record):
     eigenvalues: FloatArray
     eigenvectors: FloatArray
     kind: str
+
+
+@dataclass(frozen=True)
+class RidgePath(Record):
+    """The path of one extreme: radius (steps,) in coded units; coded, natural (steps, k); predicted with its standard
+    error (steps,). kind: "maximum" or "minimum".
+    """
+
+    kind: str
+    radius: FloatArray
+    coded: FloatArray
+    natural: FloatArray
+    predicted: FloatArray
+    standard_error: FloatArray
 
 
 def canonical_analysis(surface: Surface, flat_share: float = 1e-9) -> Canonical:
@@ -65,23 +81,6 @@ def canonical_analysis(surface: Surface, flat_share: float = 1e-9) -> Canonical:
         eigenvectors,
         kind,
     )
-
-
-STEPS = 11
-
-
-@dataclass(frozen=True)
-class RidgePath(Record):
-    """The path of one extreme: radius (steps,) in coded units; coded, natural (steps, k); predicted with its standard
-    error (steps,). kind: "maximum" or "minimum".
-    """
-
-    kind: str
-    radius: FloatArray
-    coded: FloatArray
-    natural: FloatArray
-    predicted: FloatArray
-    standard_error: FloatArray
 
 
 def ridge_analysis(surface: Surface, furthest: float | None = None) -> tuple[RidgePath, RidgePath]:

@@ -18,21 +18,14 @@ import numpy.typing as npt
 from doe.analysis.surface import quadratic_form, second_order_terms
 
 FloatArray = npt.NDArray[np.float64]
-
 BoolArray = npt.NDArray[np.bool_]
 
 COARSE_LINES = 15
-
 COARSE_LINES_4 = 9
-
 """The same for four factors and more, whose lines stand on a grid of three dimensions and more."""
-
 FINE_LINES = 7
-
 REFINEMENTS = 19
-
 BLOCK = 5_000_000
-
 """Coordinates that are held at once; more models are worked off in blocks."""
 
 

@@ -1,11 +1,11 @@
-"""Is a fitted model at odds with single runs? Leverage, studentised residuals, Cook's distance, DFFITS.
+"""Is a fitted model at odds with single runs, and would it fit another power of the response better?
 
+Single runs: leverage, studentised residuals, Cook's distance, DFFITS.
 h_i leverage, e_i residual, s^2 = MSE, p terms: internal r_i = e_i/(s sqrt(1 - h_i)); external t_i the same with s
 estimated without run i; Cook's D_i = r_i^2 h_i/((1 - h_i) p); DFFITS_i = t_i sqrt(h_i/(1 - h_i)).
 Source: Cook 1977, Technometrics 19:15; Belsley, Kuh and Welsch 1980, Regression Diagnostics, ch. 2.
 
-Which power of the response does the model fit best? The Box–Cox profile.
-
+Power of the response: the Box–Cox profile.
 z_i = (y_i^L - 1)/(L g^(L - 1)) with g the geometric mean (g ln y_i for L = 0) makes the residual sums of squares of all
 powers comparable. The interval holds every L with SS(L) <= SS(best) (1 + t^2/df), t of the level and of the model's
 residual degrees of freedom, which for few runs is wider than that of the likelihood.
@@ -26,6 +26,9 @@ from doe.analysis.surface_anova import FULL, SurfaceAnova
 from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
+
+POWERS = np.round(np.linspace(-3.0, 3.0, 121), 10)
+NAMED = {-2.0: "1/y²", -1.0: "1/y", -0.5: "1/√y", 0.0: "ln y", 0.5: "√y", 1.0: "none", 2.0: "y²"}
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,25 @@ class Diagnostics(Record):
     leveraged: tuple[int, ...]
     influential: tuple[int, ...]
     shapiro_p: float
+
+
+@dataclass(frozen=True)
+class BoxCox(Record):
+    """Profile over `powers`, shape (powers,): ln SS(L), and its limit for the interval. best with its 95 % interval
+    [low, high], both cut to the grid.
+
+    suggestion: "none" where the interval holds 1; else the named power of `NAMED` inside it that is nearest to the
+    best, or the best itself. note: why there is no profile; "" where there is one.
+    """
+
+    powers: FloatArray
+    log_sum_of_squares: FloatArray
+    limit: float
+    best: float
+    low: float
+    high: float
+    suggestion: str
+    note: str
 
 
 def diagnose_fit(surface: Surface, anova: SurfaceAnova) -> Diagnostics:
@@ -88,34 +110,6 @@ def diagnose_fit(surface: Surface, anova: SurfaceAnova) -> Diagnostics:
     )
 
 
-def _where(found: npt.NDArray[np.bool_]) -> tuple[int, ...]:
-    return tuple(int(k) for k in np.flatnonzero(found))
-
-
-POWERS = np.round(np.linspace(-3.0, 3.0, 121), 10)
-
-NAMED = {-2.0: "1/y²", -1.0: "1/y", -0.5: "1/√y", 0.0: "ln y", 0.5: "√y", 1.0: "none", 2.0: "y²"}
-
-
-@dataclass(frozen=True)
-class BoxCox(Record):
-    """Profile over `powers`, shape (powers,): ln SS(L), and its limit for the interval. best with its 95 % interval
-    [low, high], both cut to the grid.
-
-    suggestion: "none" where the interval holds 1; else the named power of `NAMED` inside it that is nearest to the
-    best, or the best itself. note: why there is no profile; "" where there is one.
-    """
-
-    powers: FloatArray
-    log_sum_of_squares: FloatArray
-    limit: float
-    best: float
-    low: float
-    high: float
-    suggestion: str
-    note: str
-
-
 def box_cox(surface: Surface, level: float = 0.95) -> BoxCox:
     """Return the profile of the model's own terms. There is none for a response that is not above zero everywhere,
     that does not vary, or that the model fits exactly.
@@ -142,6 +136,10 @@ def residual_sums(model: FloatArray, y: FloatArray, powers: FloatArray) -> Float
     transformed = np.stack([np.log(scaled_y) if abs(p) < 1e-9 else (scaled_y**p - 1) / p for p in powers], axis=1)
     fitted = model @ np.linalg.lstsq(model, transformed, rcond=None)[0]
     return np.asarray(((transformed - fitted) ** 2).sum(axis=0))
+
+
+def _where(found: npt.NDArray[np.bool_]) -> tuple[int, ...]:
+    return tuple(int(k) for k in np.flatnonzero(found))
 
 
 def _vertex(x: FloatArray, y: FloatArray) -> float:

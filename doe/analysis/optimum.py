@@ -1,18 +1,15 @@
-"""Optimum: of all settings that give the target, the one nearest to the measured parameters, and how sure it
-is.
+"""Optimum: of all settings that give the target, the one nearest to the measured parameters, and how sure it is.
 
 The settings with model = target form a surface in the cube, so one target cannot fix several factors. The
 chosen point minimises sum ((x_i - reference_i)/scale_i)^2 on that surface. Reported beside it: the bootstrap
 interval of the point (the target's own standard error included), the range that each factor can take on the
 surface (its width), and the share of the cube whose predicted mean is compatible with the target at 95 %.
 The interval is that of the rule's choice: it says what is known of a factor only where the factor is identified.
-Source: Davison and Hinkley 1997 (bootstrap); Myers, Montgomery and Anderson-Cook 2016, ch. 6-7.
+The bootstrap fits the same model to many resampled copies of the runs, in one solve.
+Source: Davison and Hinkley 1997, Bootstrap Methods and their Application, ch. 6; Myers, Montgomery and Anderson-Cook
+2016, ch. 6-7.
 
-Bootstrap refits of a surface: the same model fitted to many resampled copies of the runs, in one solve.
-
-Source: Davison and Hinkley 1997, Bootstrap Methods and their Application, ch. 6.
-
-Several targets at once: the setting whose predicted responses miss them least, in units of what is known.
+Of several targets the setting is taken whose predicted responses miss them least, in units of what is known:
 
     J(x) = Σ_t w_t (ŷ_t(x) − T_t)² / s_t²
 
@@ -42,58 +39,17 @@ from doe.record import Record
 from doe.target import Target
 
 FloatArray = npt.NDArray[np.float64]
-
 Resampling = Literal["replicates within points", "residuals"]
 
-
-def bootstrap_coefficients(surface: Surface, refits: int, seed: int) -> tuple[FloatArray, Resampling]:
-    """Return coefficients of `refits` resampled fits, shape (refits, p), and what was resampled.
-
-    With two or more runs at every distinct point the replicates are drawn within their point; deviations from
-    the point's mean are scaled by sqrt(n/(n - 1)), because n values underestimate their variance by that
-    factor. Otherwise residuals are drawn over all runs, scaled by 1/sqrt(1 - leverage) and centred.
-    """
-    generator = np.random.default_rng(seed)
-    if np.bincount(surface.point_of_run).min() >= 2:
-        resampled, method = _within_points(surface, refits, generator), "replicates within points"
-    else:
-        resampled, method = _residuals(surface, refits, generator), "residuals"
-    coefficients = np.zeros((refits, surface.coefficients.size))
-    model = second_order_terms(surface.points)[:, surface.included]
-    coefficients[:, surface.included] = fitted_coefficients(model, resampled).T
-    return coefficients, method  # type: ignore[return-value]
-
-
-def _within_points(surface: Surface, refits: int, generator: np.random.Generator) -> FloatArray:
-    """Return resampled responses, shape (runs, refits)."""
-    resampled = np.empty((surface.observed.size, refits))
-    for point in range(int(surface.point_of_run.max()) + 1):
-        runs = np.flatnonzero(surface.point_of_run == point)
-        mean = surface.observed[runs].mean()
-        deviations = (surface.observed[runs] - mean) * np.sqrt(runs.size / (runs.size - 1))
-        resampled[runs] = mean + generator.choice(deviations, size=(runs.size, refits))
-    return resampled
-
-
-def _residuals(surface: Surface, refits: int, generator: np.random.Generator) -> FloatArray:
-    """Return resampled responses, shape (runs, refits); runs of leverage one carry no residual."""
-    free = surface.leverage < 1 - 1e-9
-    scaled = (surface.observed - surface.predicted)[free] / np.sqrt(1 - surface.leverage[free])
-    draws = generator.choice(scaled - scaled.mean(), size=(surface.observed.size, refits))
-    return np.asarray(surface.predicted[:, None] + draws)
-
-
 WIDTH_LINES = 81
-
 WIDTH_LINES_4 = 31
-
 CLOUD_REFINEMENTS_4 = 9
-
 """The same for four factors and more, whose lines stand on a grid of three dimensions and more, and the refinements of
 a refit's point there, to about 1e-3 half-widths.
 """
-
 SHARE_LEVELS = 21
+TIE = 1e-3
+"""Weight of the squared coded distance to the reference: decides only where the misfit does not."""
 
 
 @dataclass(frozen=True)
@@ -134,6 +90,21 @@ class Optimum(Record):
     unidentified: tuple[str, ...]
     compatible_share: float
     better_than_noise: bool
+    statement: str
+
+
+@dataclass(frozen=True)
+class Compromise(Record):
+    """The chosen point (natural and coded), the predictions there, and each target's share of the misfit.
+
+    ``misfit`` is J without the tie-breaker; ``standardised`` the signed (ŷ − T)/s per target.
+    """
+
+    point: FloatArray
+    point_coded: FloatArray
+    predicted: FloatArray
+    standardised: FloatArray
+    misfit: float
     statement: str
 
 
@@ -223,6 +194,44 @@ def find_optimum(
     )
 
 
+def find_compromise(models: Sequence[Surface], targets: Sequence[Target], reference: npt.ArrayLike) -> Compromise:
+    """Minimise J over the cube from the 27 points of a 3-level grid (deterministic; L-BFGS-B)."""
+    region = models[0].region
+    k = len(region.names)
+    home = region.coded(np.asarray(reference, dtype=float))
+    centre = np.zeros((1, k))
+    spread = np.array(
+        [math.hypot(t.standard_error, float(m.standard_error(centre)[0])) for m, t in zip(models, targets, strict=True)]
+    )
+    weight = np.array([t.weight for t in targets])
+    goal = np.array([t.mean for t in targets])
+
+    def residuals(x: FloatArray) -> FloatArray:
+        predicted = np.array([float(m.predict(x[None])[0]) for m in models])
+        return (predicted - goal) / spread
+
+    def cost(x: FloatArray) -> float:
+        return float(weight @ residuals(x) ** 2 + TIE * ((x - home) ** 2).sum())
+
+    starts = [np.array(x, dtype=float) for x in product((-0.9, 0.0, 0.9), repeat=k)]
+    best = min((minimize(cost, x, bounds=[(-1.0, 1.0)] * k) for x in starts), key=lambda found: found.fun)
+    missed = residuals(best.x)
+    misfit = float(weight @ missed**2)
+    worst = int(np.argmax(np.abs(missed)))
+    statement = f"The targets are missed by at most {abs(missed[worst]):.1f} standard errors (target {worst + 1})."
+    if abs(missed[worst]) > 2.0:
+        statement += " They contradict each other within this model and region."
+    statement += " The interval and the width given beside it describe the first target alone."
+    return Compromise(
+        point=region.natural(best.x),
+        point_coded=np.asarray(best.x),
+        predicted=missed * spread + goal,
+        standardised=missed,
+        misfit=misfit,
+        statement=statement,
+    )
+
+
 def solution_range(surface: Surface, target: float) -> tuple[FloatArray, FloatArray]:
     """Return the least and greatest coded value of each factor on {model = target}, each of shape (factors,).
 
@@ -249,6 +258,24 @@ def compatible_share(surface: Surface, target: float, target_standard_error: flo
     error = np.hypot(surface.standard_error(grid), target_standard_error)
     margin = stats.t.ppf((1 + level) / 2, surface.df_residual) * error
     return float((np.abs(surface.predict(grid) - target) <= margin).mean())
+
+
+def bootstrap_coefficients(surface: Surface, refits: int, seed: int) -> tuple[FloatArray, Resampling]:
+    """Return coefficients of `refits` resampled fits, shape (refits, p), and what was resampled.
+
+    With two or more runs at every distinct point the replicates are drawn within their point; deviations from
+    the point's mean are scaled by sqrt(n/(n - 1)), because n values underestimate their variance by that
+    factor. Otherwise residuals are drawn over all runs, scaled by 1/sqrt(1 - leverage) and centred.
+    """
+    generator = np.random.default_rng(seed)
+    if np.bincount(surface.point_of_run).min() >= 2:
+        resampled, method = _within_points(surface, refits, generator), "replicates within points"
+    else:
+        resampled, method = _residuals(surface, refits, generator), "residuals"
+    coefficients = np.zeros((refits, surface.coefficients.size))
+    model = second_order_terms(surface.points)[:, surface.included]
+    coefficients[:, surface.included] = fitted_coefficients(model, resampled).T
+    return coefficients, method  # type: ignore[return-value]
 
 
 def _statement(
@@ -289,59 +316,20 @@ def _vector(name: str, values: npt.ArrayLike, k: int) -> FloatArray:
     return vector
 
 
-TIE = 1e-3
-
-"""Weight of the squared coded distance to the reference: decides only where the misfit does not."""
-
-
-@dataclass(frozen=True)
-class Compromise(Record):
-    """The chosen point (natural and coded), the predictions there, and each target's share of the misfit.
-
-    ``misfit`` is J without the tie-breaker; ``standardised`` the signed (ŷ − T)/s per target.
-    """
-
-    point: FloatArray
-    point_coded: FloatArray
-    predicted: FloatArray
-    standardised: FloatArray
-    misfit: float
-    statement: str
+def _within_points(surface: Surface, refits: int, generator: np.random.Generator) -> FloatArray:
+    """Return resampled responses, shape (runs, refits)."""
+    resampled = np.empty((surface.observed.size, refits))
+    for point in range(int(surface.point_of_run.max()) + 1):
+        runs = np.flatnonzero(surface.point_of_run == point)
+        mean = surface.observed[runs].mean()
+        deviations = (surface.observed[runs] - mean) * np.sqrt(runs.size / (runs.size - 1))
+        resampled[runs] = mean + generator.choice(deviations, size=(runs.size, refits))
+    return resampled
 
 
-def find_compromise(models: Sequence[Surface], targets: Sequence[Target], reference: npt.ArrayLike) -> Compromise:
-    """Minimise J over the cube from the 27 points of a 3-level grid (deterministic; L-BFGS-B)."""
-    region = models[0].region
-    k = len(region.names)
-    home = region.coded(np.asarray(reference, dtype=float))
-    centre = np.zeros((1, k))
-    spread = np.array(
-        [math.hypot(t.standard_error, float(m.standard_error(centre)[0])) for m, t in zip(models, targets, strict=True)]
-    )
-    weight = np.array([t.weight for t in targets])
-    goal = np.array([t.mean for t in targets])
-
-    def residuals(x: FloatArray) -> FloatArray:
-        predicted = np.array([float(m.predict(x[None])[0]) for m in models])
-        return (predicted - goal) / spread
-
-    def cost(x: FloatArray) -> float:
-        return float(weight @ residuals(x) ** 2 + TIE * ((x - home) ** 2).sum())
-
-    starts = [np.array(x, dtype=float) for x in product((-0.9, 0.0, 0.9), repeat=k)]
-    best = min((minimize(cost, x, bounds=[(-1.0, 1.0)] * k) for x in starts), key=lambda found: found.fun)
-    missed = residuals(best.x)
-    misfit = float(weight @ missed**2)
-    worst = int(np.argmax(np.abs(missed)))
-    statement = f"The targets are missed by at most {abs(missed[worst]):.1f} standard errors (target {worst + 1})."
-    if abs(missed[worst]) > 2.0:
-        statement += " They contradict each other within this model and region."
-    statement += " The interval and the width given beside it describe the first target alone."
-    return Compromise(
-        point=region.natural(best.x),
-        point_coded=np.asarray(best.x),
-        predicted=missed * spread + goal,
-        standardised=missed,
-        misfit=misfit,
-        statement=statement,
-    )
+def _residuals(surface: Surface, refits: int, generator: np.random.Generator) -> FloatArray:
+    """Return resampled responses, shape (runs, refits); runs of leverage one carry no residual."""
+    free = surface.leverage < 1 - 1e-9
+    scaled = (surface.observed - surface.predicted)[free] / np.sqrt(1 - surface.leverage[free])
+    draws = generator.choice(scaled - scaled.mean(), size=(surface.observed.size, refits))
+    return np.asarray(surface.predicted[:, None] + draws)

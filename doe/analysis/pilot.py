@@ -1,12 +1,10 @@
-"""Pilot: how noisy is one run, and how many replicates does a study need to see what it wants to see?
+"""Pilot: how noisy is one run, which observable shows a change best, and how many replicates does a study need?
 
 sigma is the standard deviation over seeds at one setting; its interval follows from (n - 1) s^2/sigma^2 ~
 chi^2(n - 1). The spread at different settings is compared by Brown and Forsythe's test. Source: Brown and
 Forsythe 1974, J. Am. Stat. Assoc. 69:364; power as in `doe.analysis.power`.
 
-d': by how many replicate standard deviations a declared change shifts an observable, and which one shows
-it best.
-
+d' says by how many replicate standard deviations a declared change shifts an observable:
 d' = (mean(changed) - mean(centre))/s, with s the pooled standard deviation of both groups (Cohen's d). It keeps its
 sign, so that the interval of a change that does nothing includes zero; estimators are compared by the mean of |d'|
 over the changes. Intervals resample whole runs, and the same runs for all estimators, because one pile is read by every
@@ -31,8 +29,9 @@ from doe.record import Record
 FloatArray = npt.NDArray[np.float64]
 
 BIAS_LIMIT_DEG = 5.0
-
 """An estimator that misses the angle of made-up piles by more, however they are filled, is not taken."""
+CLEARLY = 0.95
+"""Share of the bootstrap samples in which another estimator must beat the default to replace it."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +74,42 @@ class Resolution(Record):
     main_effect_bonferroni: float
 
 
+@dataclass(frozen=True)
+class Separation(Record):
+    """Signed d' of one estimator for one declared change, with its 95 % bootstrap interval; shift in the unit of the
+    estimator.
+    """
+
+    estimator: str
+    change: str
+    shift: float
+    sigma: float
+    d_prime: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class EstimatorChoice(Record):
+    """The estimator that the screening reads: the default, unless another one clearly separates the changes better.
+
+    best: the one of the largest mean |d'| of those admitted. share_better: share of bootstrap samples in which `best`
+    beats `default` (1 where the default is excluded, 0 where it is the best itself). mean_d_prime: mean of |d'| per
+    estimator over all changes, in the order of `estimators`. excluded: those whose bias on piles of known angle
+    exceeds the limit however the piles are made.
+    """
+
+    chosen: str
+    default: str
+    best: str
+    share_better: float
+    estimators: tuple[str, ...]
+    mean_d_prime: tuple[float, ...]
+    excluded: tuple[str, ...]
+    separations: tuple[Separation, ...]
+    statement: str
+
+
 def replicate_noise(values: npt.ArrayLike, level: float = 0.95) -> Noise:
     """Return sigma = sd of the values and its interval sqrt((n - 1) s^2/chi^2 quantile).
 
@@ -110,55 +145,6 @@ def resolution(sigma: float, replicates: int, rows: int = 28, factors: int = 24,
         smallest_main_effect(sigma, replicates, rows, efficiency=efficiency),
         smallest_main_effect(sigma, replicates, rows, comparisons=factors, efficiency=efficiency),
     )
-
-
-def _valid(name: str, values: npt.ArrayLike) -> FloatArray:
-    array = np.asarray(values, dtype=np.float64).ravel()
-    array = array[~np.isnan(array)]
-    if array.size < 2:
-        raise StatisticsError(f"{name} holds {array.size} valid run(s); at least 2 are needed")
-    return array
-
-
-CLEARLY = 0.95
-
-"""Share of the bootstrap samples in which another estimator must beat the default to replace it."""
-
-
-@dataclass(frozen=True)
-class Separation(Record):
-    """Signed d' of one estimator for one declared change, with its 95 % bootstrap interval; shift in the unit of the
-    estimator.
-    """
-
-    estimator: str
-    change: str
-    shift: float
-    sigma: float
-    d_prime: float
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
-class EstimatorChoice(Record):
-    """The estimator that the screening reads: the default, unless another one clearly separates the changes better.
-
-    best: the one of the largest mean |d'| of those admitted. share_better: share of bootstrap samples in which `best`
-    beats `default` (1 where the default is excluded, 0 where it is the best itself). mean_d_prime: mean of |d'| per
-    estimator over all changes, in the order of `estimators`. excluded: those whose bias on piles of known angle
-    exceeds the limit however the piles are made.
-    """
-
-    chosen: str
-    default: str
-    best: str
-    share_better: float
-    estimators: tuple[str, ...]
-    mean_d_prime: tuple[float, ...]
-    excluded: tuple[str, ...]
-    separations: tuple[Separation, ...]
-    statement: str
 
 
 def d_prime(centre: FloatArray, changed: FloatArray) -> FloatArray:
@@ -230,6 +216,14 @@ def choose_estimator(
         separations=separations,
         statement=_statement(default, estimators[best], share, bool(admitted[own])),
     )
+
+
+def _valid(name: str, values: npt.ArrayLike) -> FloatArray:
+    array = np.asarray(values, dtype=np.float64).ravel()
+    array = array[~np.isnan(array)]
+    if array.size < 2:
+        raise StatisticsError(f"{name} holds {array.size} valid run(s); at least 2 are needed")
+    return array
 
 
 def _statement(default: str, best: str, share: float, admitted: bool) -> str:

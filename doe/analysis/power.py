@@ -1,13 +1,11 @@
-"""What a t test can see: its power, the smallest effect it resolves and the replicates it needs.
+"""What a design can see before it is run: power, the smallest effect that is resolved, and the replicates it needs.
 
 Notation: sigma = standard deviation of one run; SE = standard error of the effect under test; an effect delta
 is tested by t = estimate/SE against Student's t, and under delta that t is noncentral with shift delta/SE.
 Source: Cohen 1988, Statistical Power Analysis, ch. 2; computed by statsmodels.
 
-What a design can see before it is run: the smallest effect per kind of term, at a given scatter of one run.
-
-Notation as in `doe.analysis.power`. The change of the response is counted from low to high for a factor and for an
-interaction (2 b), from the centre to the ends for a square (b). SE = sigma sqrt([(X'X)^-1]_jj), times two for 2 b.
+The change of the response is counted from low to high for a factor and for an interaction (2 b), from the centre to the
+ends for a square (b). Its SE in a design is sigma sqrt([(X'X)^-1]_jj), times two for 2 b.
 """
 
 from __future__ import annotations
@@ -28,6 +26,69 @@ from doe.record import Record
 FloatArray = npt.NDArray[np.float64]
 
 MAX_REPLICATES = 100_000
+
+
+@dataclass(frozen=True)
+class TermPrecision(Record):
+    """Worst term of a kind ("factor", "interaction", "square"); unit of sigma.
+
+    smallest: change that is seen with chance `power_wanted` at p < alpha; all: the same for all terms at once
+    (Bonferroni). power: chance to see `effect`; NaN without one. NaN where no degree of freedom is left for the error.
+    """
+
+    kind: str
+    terms: int
+    standard_error: float
+    df: int
+    smallest: float
+    smallest_of_all: float
+    effect: float
+    power: float
+
+
+def precision(
+    coded: FloatArray,
+    names: Sequence[str],
+    terms: Sequence[str],
+    sigma: float,
+    effect: float = math.nan,
+    alpha: float = 0.05,
+) -> tuple[TermPrecision, ...]:
+    """Return what runs at `coded`, shape (runs, factors), tell about each kind of the model's terms.
+
+    terms: as of `doe.analysis.surface.term_names`. sigma: standard deviation of one run, unit of the response.
+    Raises StatisticsError for a sigma or an effect that is not positive, or terms that the runs cannot separate.
+    """
+    for name, value in (("sigma", sigma), ("effect", effect)):
+        if not (value > 0 or (name == "effect" and math.isnan(value))) or math.isinf(value):
+            raise StatisticsError(f"{name} = {value:g} must be a positive number")
+    included = included_terms(names, terms)
+    model = second_order_terms(coded)[:, included]
+    if np.linalg.matrix_rank(model) < model.shape[1]:
+        raise StatisticsError(f"the {len(coded)} runs cannot separate the {model.shape[1]} terms of the model")
+    errors = sigma * np.sqrt(np.diag(np.linalg.inv(model.T @ model)))
+    df = model.shape[0] - model.shape[1]
+    kinds = [_kind(term) for term, is_in in zip(term_names(names), included, strict=True) if is_in]
+    found = []
+    for kind in ("factor", "interaction", "square"):
+        of_kind = [error for error, own in zip(errors, kinds, strict=True) if own == kind]
+        if not of_kind:
+            continue
+        error = float(max(of_kind)) * (1.0 if kind == "square" else 2.0)
+        known = df >= 1 and math.isfinite(effect)
+        found.append(
+            TermPrecision(
+                kind=kind,
+                terms=len(of_kind),
+                standard_error=error,
+                df=df,
+                smallest=smallest_effect(error, df, alpha),
+                smallest_of_all=smallest_effect(error, df, alpha / (len(kinds) - 1)),
+                effect=effect,
+                power=t_test_power(effect, error, df, alpha) if known else math.nan,
+            )
+        )
+    return tuple(found)
 
 
 def t_test_power(effect: float, standard_error: float, df: float, alpha: float = 0.05) -> float:
@@ -51,19 +112,6 @@ def smallest_effect(standard_error: float, df: float, alpha: float = 0.05, power
     if df < 1 or not math.isfinite(standard_error):
         return math.nan
     return standard_error * _smallest_shift(df, alpha, power) if standard_error > 0 else 0.0
-
-
-@lru_cache(maxsize=4096)
-def _smallest_shift(df: float, alpha: float, power: float) -> float:
-    """Return the effect in standard errors; the same few are asked for again and again."""
-
-    def shortfall(shift: float) -> float:
-        return t_test_power(shift, 1.0, df, alpha) - power
-
-    upper = 2.0
-    while shortfall(upper) < 0:
-        upper *= 2
-    return float(optimize.brentq(shortfall, 0.0, upper))
 
 
 def smallest_difference(sigma: float, replicates: int, alpha: float = 0.05, power: float = 0.8) -> float:
@@ -169,6 +217,19 @@ def replicates_for_linear_effect(
     return _least_replicates(1, enough, effect, sigma)
 
 
+@lru_cache(maxsize=4096)
+def _smallest_shift(df: float, alpha: float, power: float) -> float:
+    """Return the effect in standard errors; the same few are asked for again and again."""
+
+    def shortfall(shift: float) -> float:
+        return t_test_power(shift, 1.0, df, alpha) - power
+
+    upper = 2.0
+    while shortfall(upper) < 0:
+        upper *= 2
+    return float(optimize.brentq(shortfall, 0.0, upper))
+
+
 def _least_replicates(least: int, enough: Callable[[int], bool], effect: float, sigma: float) -> int:
     """Return the smallest n >= `least` with enough(n), by doubling and bisection (power grows with n)."""
     upper = least
@@ -190,69 +251,6 @@ def _require_positive(**values: float) -> None:
     for name, value in values.items():
         if not (math.isfinite(value) and value > 0):
             raise StatisticsError(f"{name} = {value} must be a positive number")
-
-
-@dataclass(frozen=True)
-class TermPrecision(Record):
-    """Worst term of a kind ("factor", "interaction", "square"); unit of sigma.
-
-    smallest: change that is seen with chance `power_wanted` at p < alpha; all: the same for all terms at once
-    (Bonferroni). power: chance to see `effect`; NaN without one. NaN where no degree of freedom is left for the error.
-    """
-
-    kind: str
-    terms: int
-    standard_error: float
-    df: int
-    smallest: float
-    smallest_of_all: float
-    effect: float
-    power: float
-
-
-def precision(
-    coded: FloatArray,
-    names: Sequence[str],
-    terms: Sequence[str],
-    sigma: float,
-    effect: float = math.nan,
-    alpha: float = 0.05,
-) -> tuple[TermPrecision, ...]:
-    """Return what runs at `coded`, shape (runs, factors), tell about each kind of the model's terms.
-
-    terms: as of `doe.analysis.surface.term_names`. sigma: standard deviation of one run, unit of the response.
-    Raises StatisticsError for a sigma or an effect that is not positive, or terms that the runs cannot separate.
-    """
-    for name, value in (("sigma", sigma), ("effect", effect)):
-        if not (value > 0 or (name == "effect" and math.isnan(value))) or math.isinf(value):
-            raise StatisticsError(f"{name} = {value:g} must be a positive number")
-    included = included_terms(names, terms)
-    model = second_order_terms(coded)[:, included]
-    if np.linalg.matrix_rank(model) < model.shape[1]:
-        raise StatisticsError(f"the {len(coded)} runs cannot separate the {model.shape[1]} terms of the model")
-    errors = sigma * np.sqrt(np.diag(np.linalg.inv(model.T @ model)))
-    df = model.shape[0] - model.shape[1]
-    kinds = [_kind(term) for term, is_in in zip(term_names(names), included, strict=True) if is_in]
-    found = []
-    for kind in ("factor", "interaction", "square"):
-        of_kind = [error for error, own in zip(errors, kinds, strict=True) if own == kind]
-        if not of_kind:
-            continue
-        error = float(max(of_kind)) * (1.0 if kind == "square" else 2.0)
-        known = df >= 1 and math.isfinite(effect)
-        found.append(
-            TermPrecision(
-                kind=kind,
-                terms=len(of_kind),
-                standard_error=error,
-                df=df,
-                smallest=smallest_effect(error, df, alpha),
-                smallest_of_all=smallest_effect(error, df, alpha / (len(kinds) - 1)),
-                effect=effect,
-                power=t_test_power(effect, error, df, alpha) if known else math.nan,
-            )
-        )
-    return tuple(found)
 
 
 def _kind(term: str) -> str:

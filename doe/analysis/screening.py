@@ -6,11 +6,8 @@ missing row. Sums of squares are partial (Type III) on the scale of row means: S
 
 Two errors: (a) what the factors leave unexplained, that is the dummy columns (Plackett and Burman 1946), with
 few degrees of freedom and inflated by aliased interactions; (b) the replicates of each row (pure error).
-Lenth's pseudo standard error (Lenth 1989, Technometrics 31:469) is given as a third view.
-
-What a screening found: effects, their tests against two errors, and what each error can see.
-
-Many effects at once: Holm's correction of p values and Lenth's error for designs without replicates.
+Lenth's pseudo standard error (Lenth 1989, Technometrics 31:469), for designs without replicates, is given as a third
+view. Many effects are judged at once, so p values are corrected by Holm's step-down method.
 """
 
 from __future__ import annotations
@@ -30,57 +27,13 @@ from doe.analysis.surface import least_squares, with_intercept
 from doe.errors import StatisticsError
 from doe.record import Record
 
+__all__ = ["FALLBACK", "SIGNIFICANT", "Screening", "Selected", "analyse_screening", "select_factors"]
+
 FloatArray = npt.NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Lenth(Record):
-    """Lenth's pseudo standard error with its individual and simultaneous 95 % margins, unit of the
-    response.
-    """
-
-    pseudo_standard_error: float
-    df: float
-    margin: float
-    simultaneous_margin: float
-
-
-def lenth(effects: FloatArray, alpha: float = 0.05) -> Lenth:
-    """Return Lenth's pseudo standard error of m effects, shape (m,): PSE = 1.5 median{|c| : |c| < 2.5 s0}.
-
-    s0 = 1.5 median|c|; df = m/3; margin = t(1 - alpha/2, df) PSE; the simultaneous margin uses
-    (1 + (1 - alpha)^(1/m))/2 instead of 1 - alpha/2. Source: Lenth 1989.
-    """
-    sizes = np.abs(effects)
-    first = 1.5 * float(np.median(sizes))
-    kept = sizes[sizes < 2.5 * first]
-    error = 1.5 * float(np.median(kept)) if kept.size else 0.0
-    df = sizes.size / 3
-    simultaneous = (1 + (1 - alpha) ** (1 / sizes.size)) / 2
-    return Lenth(error, df, float(stats.t.ppf(1 - alpha / 2, df)) * error, float(stats.t.ppf(simultaneous, df)) * error)
-
-
-def holm(p_values: FloatArray) -> FloatArray:
-    """Return step-down adjusted p values (Holm 1979, Scand. J. Stat. 6:65), shape of the input; NaN stays
-    NaN.
-    """
-    # The same numbers as statsmodels' multipletests, which collects garbage at every call: 0.2 s each, several times
-    # for every look at a study that runs.
-    adjusted = np.full(p_values.shape, np.nan)
-    order = [int(i) for i in np.argsort(p_values) if not np.isnan(p_values[i])]
-    running = 0.0
-    for rank, i in enumerate(order):
-        running = max(running, min(1.0, (len(order) - rank) * float(p_values[i])))
-        adjusted[i] = running
-    return adjusted
-
-
 Adjustment = Literal["none", "holm"]
-
 ErrorSource = Literal["replicates", "dummies"]
 
 SIGNIFICANT = "significant"
-
 FALLBACK = "fallback: not significant"
 
 
@@ -99,7 +52,7 @@ class EffectTest(Record):
 
 
 @dataclass(frozen=True)
-class Effect(Record):
+class FactorEffect(Record):
     """One column of the design: effect in the unit of the response, partial sum of squares, share of the
     total.
     """
@@ -140,12 +93,24 @@ class ErrorEstimate(Record):
 
 
 @dataclass(frozen=True)
+class Lenth(Record):
+    """Lenth's pseudo standard error with its individual and simultaneous 95 % margins, unit of the
+    response.
+    """
+
+    pseudo_standard_error: float
+    df: float
+    margin: float
+    simultaneous_margin: float
+
+
+@dataclass(frozen=True)
 class Screening(Record):
     """Effects of a two-level design. `missing_rows` are row indices without a valid run; `notes` are
     sentences.
     """
 
-    effects: tuple[Effect, ...]
+    effects: tuple[FactorEffect, ...]
     mean: float
     rows: int
     missing_rows: tuple[int, ...]
@@ -172,24 +137,24 @@ class Screening(Record):
         """Return the estimate of an error; None where the design gives none."""
         return self.pure_error if source == "replicates" else self.dummy_error
 
-    def half_width(self, effect: Effect) -> float:
+    def half_width(self, effect: FactorEffect) -> float:
         """Return half the 95 % interval of `effect`: t limit × its standard error, NaN where it was not tested."""
         error, test = self.deciding_error, self.deciding_test(effect)
         return math.nan if error is None or test is None else error.t_limit * test.standard_error
 
-    def factor_effects(self) -> tuple[Effect, ...]:
+    def factor_effects(self) -> tuple[FactorEffect, ...]:
         """Return the effects of the factors that could be estimated, by falling size."""
         known = [effect for effect in self.effects if not effect.is_dummy and math.isfinite(effect.effect)]
         return tuple(sorted(known, key=lambda effect: -abs(effect.effect)))
 
-    def deciding_test(self, effect: Effect) -> EffectTest | None:
+    def deciding_test(self, effect: FactorEffect) -> EffectTest | None:
         """Return the test of `effect` against the error that decides."""
         return effect.by_replicates if self.pure_error is not None else effect.by_dummies
 
-    def ranked(self) -> tuple[Effect, ...]:
+    def ranked(self) -> tuple[FactorEffect, ...]:
         """Return the factors (no dummies) by falling |t|; without any error, by falling |effect|."""
 
-        def size(effect: Effect) -> float:
+        def size(effect: FactorEffect) -> float:
             test = self.deciding_test(effect)
             value = abs(effect.effect) if test is None else abs(test.t)
             return value if math.isfinite(value) else (math.inf if value > 0 else -1.0)
@@ -218,9 +183,6 @@ class Selected(Record):
 
     name: str
     reason: str
-
-
-__all__ = ["FALLBACK", "SIGNIFICANT", "Screening", "Selected", "analyse_screening", "select_factors"]
 
 
 def analyse_screening(
@@ -274,7 +236,7 @@ def analyse_screening(
 
     return Screening(
         effects=tuple(
-            Effect(
+            FactorEffect(
                 name=name,
                 is_dummy=bool(is_dummy[j]),
                 effect=float(effects[j]),
@@ -327,61 +289,6 @@ def select_factors(
             "; name more factors in the fallback list"
         )
     return tuple(chosen[:n])
-
-
-def _notes(
-    valid: npt.NDArray[np.bool_],
-    dummy_error: ErrorEstimate | None,
-    pure_error: ErrorEstimate | None,
-    pure_sigma: float,
-    total: float,
-    unexplained_p: float,
-) -> tuple[str, ...]:
-    """Return what a reader of the effects must know, as sentences."""
-    notes = []
-    if not valid.all():
-        rows = ", ".join(str(row + 1) for row in np.flatnonzero(~valid))
-        df = 0 if dummy_error is None else dummy_error.df
-        notes.append(
-            f"Rows {rows} (counted from 1) have no valid run; the factors are fitted by least squares to the "
-            f"other {int(valid.sum())} rows, which leaves {df} degrees of freedom between rows and no dummy "
-            "effects."
-        )
-    if pure_error is None:
-        notes.append("No row has two valid runs; significance rests on the dummy columns alone.")
-    elif pure_sigma == 0:
-        notes.append("All replicates of each row agree exactly (was the seed varied?); no effect can be tested.")
-    if total == 0:
-        notes.append("The response is the same in every row; no effect can be tested.")
-    if unexplained_p < 0.05:
-        notes.append(
-            f"The dummy columns hold more than replicate noise (p = {unexplained_p:.3g}): interactions leak "
-            "into the main effects."
-        )
-    return tuple(notes)
-
-
-def _require_consistent(design: npt.NDArray[np.number[Any]], names: Sequence[str], dummies: Sequence[str]) -> None:
-    if design.ndim != 2 or not (np.abs(design) <= 1).all():
-        raise StatisticsError("design must be a matrix (rows, columns) of levels from -1 to +1")
-    if len(names) != design.shape[1] or len(set(names)) != len(names):
-        raise StatisticsError(f"names has {len(names)} entries; allowed are {design.shape[1]} different names")
-    for name in dummies:
-        if name not in names:
-            raise StatisticsError(f"dummies names '{name}', which is no column of the design")
-    if len(set(dummies)) == len(names):
-        raise StatisticsError("dummies names every column; at least one column must carry a factor")
-
-
-def _require_estimable(levels: FloatArray, valid: npt.NDArray[np.bool_]) -> None:
-    """Refuse rows that cannot tell the factors apart; levels: the valid rows and factor columns."""
-    model = with_intercept(levels)
-    if np.linalg.matrix_rank(model) < model.shape[1]:
-        missing = ", ".join(str(row + 1) for row in np.flatnonzero(~valid)) or "none missing"
-        raise StatisticsError(
-            f"responses: without rows {missing} (counted from 1) the {model.shape[0]} others cannot separate "
-            f"{levels.shape[1]} factors and the mean; rerun one, or declare an untestable factor a dummy"
-        )
 
 
 def error_of_dummies(
@@ -447,6 +354,36 @@ def effect_tests(
     ]
 
 
+def holm(p_values: FloatArray) -> FloatArray:
+    """Return step-down adjusted p values (Holm 1979, Scand. J. Stat. 6:65), shape of the input; NaN stays
+    NaN.
+    """
+    # The same numbers as statsmodels' multipletests, which collects garbage at every call: 0.2 s each, several times
+    # for every look at a study that runs.
+    adjusted = np.full(p_values.shape, np.nan)
+    order = [int(i) for i in np.argsort(p_values) if not np.isnan(p_values[i])]
+    running = 0.0
+    for rank, i in enumerate(order):
+        running = max(running, min(1.0, (len(order) - rank) * float(p_values[i])))
+        adjusted[i] = running
+    return adjusted
+
+
+def lenth(effects: FloatArray, alpha: float = 0.05) -> Lenth:
+    """Return Lenth's pseudo standard error of m effects, shape (m,): PSE = 1.5 median{|c| : |c| < 2.5 s0}.
+
+    s0 = 1.5 median|c|; df = m/3; margin = t(1 - alpha/2, df) PSE; the simultaneous margin uses
+    (1 + (1 - alpha)^(1/m))/2 instead of 1 - alpha/2. Source: Lenth 1989.
+    """
+    sizes = np.abs(effects)
+    first = 1.5 * float(np.median(sizes))
+    kept = sizes[sizes < 2.5 * first]
+    error = 1.5 * float(np.median(kept)) if kept.size else 0.0
+    df = sizes.size / 3
+    simultaneous = (1 + (1 - alpha) ** (1 / sizes.size)) / 2
+    return Lenth(error, df, float(stats.t.ppf(1 - alpha / 2, df)) * error, float(stats.t.ppf(simultaneous, df)) * error)
+
+
 def unexplained_by_factors(
     levels: FloatArray, means: FloatArray, counts: FloatArray, sigma: float, df_pure: int
 ) -> tuple[float, float]:
@@ -459,3 +396,58 @@ def unexplained_by_factors(
         return math.nan, math.nan
     f = float(least_squares(model, means, counts).mse_resid) / sigma**2
     return f, float(stats.f.sf(f, df, df_pure))
+
+
+def _notes(
+    valid: npt.NDArray[np.bool_],
+    dummy_error: ErrorEstimate | None,
+    pure_error: ErrorEstimate | None,
+    pure_sigma: float,
+    total: float,
+    unexplained_p: float,
+) -> tuple[str, ...]:
+    """Return what a reader of the effects must know, as sentences."""
+    notes = []
+    if not valid.all():
+        rows = ", ".join(str(row + 1) for row in np.flatnonzero(~valid))
+        df = 0 if dummy_error is None else dummy_error.df
+        notes.append(
+            f"Rows {rows} (counted from 1) have no valid run; the factors are fitted by least squares to the "
+            f"other {int(valid.sum())} rows, which leaves {df} degrees of freedom between rows and no dummy "
+            "effects."
+        )
+    if pure_error is None:
+        notes.append("No row has two valid runs; significance rests on the dummy columns alone.")
+    elif pure_sigma == 0:
+        notes.append("All replicates of each row agree exactly (was the seed varied?); no effect can be tested.")
+    if total == 0:
+        notes.append("The response is the same in every row; no effect can be tested.")
+    if unexplained_p < 0.05:
+        notes.append(
+            f"The dummy columns hold more than replicate noise (p = {unexplained_p:.3g}): interactions leak "
+            "into the main effects."
+        )
+    return tuple(notes)
+
+
+def _require_consistent(design: npt.NDArray[np.number[Any]], names: Sequence[str], dummies: Sequence[str]) -> None:
+    if design.ndim != 2 or not (np.abs(design) <= 1).all():
+        raise StatisticsError("design must be a matrix (rows, columns) of levels from -1 to +1")
+    if len(names) != design.shape[1] or len(set(names)) != len(names):
+        raise StatisticsError(f"names has {len(names)} entries; allowed are {design.shape[1]} different names")
+    for name in dummies:
+        if name not in names:
+            raise StatisticsError(f"dummies names '{name}', which is no column of the design")
+    if len(set(dummies)) == len(names):
+        raise StatisticsError("dummies names every column; at least one column must carry a factor")
+
+
+def _require_estimable(levels: FloatArray, valid: npt.NDArray[np.bool_]) -> None:
+    """Refuse rows that cannot tell the factors apart; levels: the valid rows and factor columns."""
+    model = with_intercept(levels)
+    if np.linalg.matrix_rank(model) < model.shape[1]:
+        missing = ", ".join(str(row + 1) for row in np.flatnonzero(~valid)) or "none missing"
+        raise StatisticsError(
+            f"responses: without rows {missing} (counted from 1) the {model.shape[0]} others cannot separate "
+            f"{levels.shape[1]} factors and the mean; rerun one, or declare an untestable factor a dummy"
+        )

@@ -24,9 +24,7 @@ from doe.errors import StatisticsError
 from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
-
 IntArray = npt.NDArray[np.int64]
-
 BoolArray = npt.NDArray[np.bool_]
 
 

@@ -21,9 +21,7 @@ from doe.analysis.surface import Surface, least_squares, second_order_terms
 from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
-
 FULL = 1 - 1e-9
-
 """A leverage above this is one: the run is fitted exactly, and nothing can be said against it."""
 
 

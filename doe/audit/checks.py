@@ -1,6 +1,6 @@
 """All checks over a published study, each where the parts that it needs are there.
 
-Checks that need one line of arithmetic: derived columns, means of replicates, totals, values quoted twice.
+Those that need one line of arithmetic stand here: derived columns, means of replicates, totals, values quoted twice.
 """
 
 from __future__ import annotations
@@ -22,6 +22,14 @@ from doe.audit.walk import check_levels, check_walk
 from doe.errors import StatisticsError
 
 FloatArray = npt.NDArray[np.float64]
+
+
+def audit_study(study: PublishedStudy) -> Audit:
+    """Recompute everything that can be recomputed; findings in the order of a study's own stages."""
+    findings = [finding for check in CHECKS for finding in _caught(check, study)]
+    figures = tuple(one for one in findings if isinstance(one, Figure))
+    remarks = tuple(one for one in findings if isinstance(one, Remark))
+    return Audit(study.title, study.source, figures, remarks)
 
 
 def check_derived(derived: Derived) -> Iterator[Finding]:
@@ -110,13 +118,6 @@ def check_quote(quote: Quote) -> Figure:
     return replace(found, how=how + _elsewhere(quote)) if found.status == "differs" else found
 
 
-def _elsewhere(quote: Quote) -> str:
-    """What the table prints with the number that the text gives to something else."""
-    if not quote.elsewhere:
-        return ""
-    return f"; it prints {quote.value.text} as {' and as '.join(quote.elsewhere)}"
-
-
 def check_quotes_among_themselves(quotes: tuple[Quote, ...]) -> Iterator[Figure]:
     """Values that the same text gives differently for one quantity which no table settles."""
     by_quantity: dict[tuple[str, str], list[Quote]] = {}
@@ -132,18 +133,17 @@ def check_quotes_among_themselves(quotes: tuple[Quote, ...]) -> Iterator[Figure]
                 )
 
 
+def _elsewhere(quote: Quote) -> str:
+    """What the table prints with the number that the text gives to something else."""
+    if not quote.elsewhere:
+        return ""
+    return f"; it prints {quote.value.text} as {' and as '.join(quote.elsewhere)}"
+
+
 def _finer(quote: Quote) -> float:
     """How far rounding of the table lets the two prints be apart: only where it prints fewer digits than the quote."""
     assert quote.original is not None
     return quote.original.half if quote.original.half > quote.value.half else 0.0
-
-
-def audit_study(study: PublishedStudy) -> Audit:
-    """Recompute everything that can be recomputed; findings in the order of a study's own stages."""
-    findings = [finding for check in CHECKS for finding in _caught(check, study)]
-    figures = tuple(one for one in findings if isinstance(one, Figure))
-    remarks = tuple(one for one in findings if isinstance(one, Remark))
-    return Audit(study.title, study.source, figures, remarks)
 
 
 def _caught(check: Callable[[PublishedStudy], Iterator[Finding]], study: PublishedStudy) -> Iterator[Finding]:

@@ -2,11 +2,10 @@
 
 "24.68" stands for 24.675 … 24.685, so its half unit is 0.005; "346" for 345.5 … 346.5; "<0.0001" for anything below.
 
-What rounding of printed inputs can do to what is computed from them.
-
-An input that is printed to ± h is anywhere in that interval. To first order the result moves by g_i = f(x + h_i) − f(x)
-for input i. Two bounds hold: the sum of |g_i|, always, and √(3 Σ g_i²), three standard deviations of a sum of
-independent uniform errors (variance h²/3 each). The smaller one is taken.
+What is computed from printed inputs carries the slack of their rounding. An input that is printed to ± h is anywhere in
+that interval; to first order the result moves by g_i = f(x + h_i) − f(x) for input i. Two bounds hold: the sum of
+|g_i|, always, and √(3 Σ g_i²), three standard deviations of a sum of independent uniform errors (variance h²/3 each).
+The smaller one is taken.
 """
 
 from __future__ import annotations
@@ -24,14 +23,13 @@ import numpy.typing as npt
 from doe.errors import AuditError
 from doe.record import Record
 
+FloatArray = npt.NDArray[np.float64]
+Computation = Callable[[FloatArray], FloatArray]
+
 NUMBER = re.compile(r"([<>]?)\s*([+-]?(?:\d+\.?\d*|\.\d+))(?:[eE]([+-]?\d{1,3}))?")
-
 SMALLEST, LARGEST = 1e-30, 1e30
-
 """Sizes that physical quantities have in any unit; squares of sums of them stay finite."""
-
 DUST = 1e-9
-
 """Relative rounding of the recomputation itself, far below any print."""
 
 
@@ -91,11 +89,6 @@ def printed_or_none(text: str) -> Printed | None:
         return printed(text)
     except AuditError:
         return None
-
-
-FloatArray = npt.NDArray[np.float64]
-
-Computation = Callable[[FloatArray], FloatArray]
 
 
 def values_of(prints: Sequence[Printed]) -> FloatArray:

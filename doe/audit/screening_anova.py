@@ -1,14 +1,13 @@
-"""The printed analysis of variance of a two-level screening, checked without and with its design.
+"""The printed analysis of variance of a two-level screening, checked without and with its design, and what it names.
 
 Without the design: F_j = SS_j/MSE for one and the same MSE, p_j = P(F(1, df_error) > F_j), and the total sum of squares
 of the runs is Σ SS_j + df_error · MSE for an orthogonal design whose dummy columns are the error. With the design:
 SS_j = (Σ x_j y)²/N. Source: Plackett and Burman 1946, Biometrika 33:305.
 
-Which factors a screening calls significant: those it names have p below its level, all others above theirs.
-
-Both are held against the p that is printed and against the p of F, P(F(1, df_error) > F), with F as printed or, where
-it is not, SS over the mean square that the factors leave of the runs. A factor counts against the study only if the
-whole interval that its rounded figures allow lies on the wrong side.
+Factors that are named significant have p below the study's level, all others above it. Both are held against the p that
+is printed and against the p of F, P(F(1, df_error) > F), with F as printed or, where it is not, SS over the mean square
+that the factors leave of the runs. A factor counts against the study only if the whole interval that its rounded
+figures allow lies on the wrong side.
 """
 
 from __future__ import annotations
@@ -28,8 +27,11 @@ from doe.designs import plackett_burman
 from doe.errors import StatisticsError
 
 FloatArray = npt.NDArray[np.float64]
+Interval = tuple[float, float]
 
 ADDS_UP = "sums of squares add up"
+SIGNIFICANCE = "significance"
+ALPHA = 0.05
 
 
 def check_screening(screening: Screening) -> Iterator[Finding]:
@@ -42,6 +44,24 @@ def check_screening(screening: Screening) -> Iterator[Finding]:
     if screening.f and screening.p:
         yield from _p_values(screening)
     yield from _sums(screening)
+
+
+def check_significance(screening: Screening) -> Iterator[Finding]:
+    """The factors named against p < level, all others against p > their level, and what Holm's correction leaves."""
+    if screening.significant is None:
+        return
+    tested = _tested(screening)
+    named = [one for one in tested if one.name in screening.significant]
+    others = [one for one in tested if one.name not in screening.significant]
+    if named:
+        quantity = f"factors named: p < {screening.level:g}"
+        yield _claim(screening, named, quantity, ", ".join(screening.significant), _above(screening.level))
+    if others:
+        level = screening.level_of_others
+        quantity = f"factors not named: p > {level:g}"
+        yield _claim(screening, others[::-1], quantity, f"the other {len(others)}", _below(level))
+    if screening.p:
+        yield from _lost_to_holm(screening)
 
 
 def implied_mse(sums: Sequence[Printed], f: Sequence[Printed]) -> tuple[float, float]:
@@ -61,6 +81,16 @@ def implied_mse(sums: Sequence[Printed], f: Sequence[Printed]) -> tuple[float, f
     if not np.isfinite(high) or high <= 0:
         raise StatisticsError("F is too small in every line to say what the error mean square was")
     return low, high
+
+
+def total_of_runs(screening: Screening) -> tuple[float, float]:
+    """Σ (y − mean)² and what rounding of the runs does to it."""
+
+    def total(y: FloatArray) -> FloatArray:
+        return np.array([((y - y.mean()) ** 2).sum()])
+
+    runs = values_of(screening.responses)
+    return float(total(runs)[0]), float(rounding_slack(total, runs, common_half(screening.responses))[0])
 
 
 def _f_values(screening: Screening, low: float, high: float) -> Iterator[Finding]:
@@ -91,16 +121,6 @@ def _total(screening: Screening) -> Iterator[Finding]:
         value, slack = total_of_runs(screening)
         how = f"Σ (y − mean)² of the {len(screening.responses)} runs of {screening.where_runs}"
         yield compared(ADDS_UP, screening.where_anova, "total sum of squares", screening.total, value, how, slack)
-
-
-def total_of_runs(screening: Screening) -> tuple[float, float]:
-    """Σ (y − mean)² and what rounding of the runs does to it."""
-
-    def total(y: FloatArray) -> FloatArray:
-        return np.array([((y - y.mean()) ** 2).sum()])
-
-    runs = values_of(screening.responses)
-    return float(total(runs)[0]), float(rounding_slack(total, runs, common_half(screening.responses))[0])
 
 
 def _adding_up(screening: Screening, low: float, high: float) -> Iterator[Finding]:
@@ -174,13 +194,6 @@ def _standard_design(runs: int, factors: int) -> FloatArray | None:
         return None
 
 
-SIGNIFICANCE = "significance"
-
-ALPHA = 0.05
-
-Interval = tuple[float, float]
-
-
 @dataclass(frozen=True)
 class _Tested:
     """A factor with its p as printed and the interval of the p that its F gives, None where there is none."""
@@ -206,24 +219,6 @@ class _Tested:
         words = [] if self.printed is None else [f"{self.printed.text} as printed"]
         words += [] if self.of_f is None else [f"{short(0.5 * sum(self.of_f), 3)} from F"]
         return f"{self.name} {', '.join(words)}"
-
-
-def check_significance(screening: Screening) -> Iterator[Finding]:
-    """The factors named against p < level, all others against p > their level, and what Holm's correction leaves."""
-    if screening.significant is None:
-        return
-    tested = _tested(screening)
-    named = [one for one in tested if one.name in screening.significant]
-    others = [one for one in tested if one.name not in screening.significant]
-    if named:
-        quantity = f"factors named: p < {screening.level:g}"
-        yield _claim(screening, named, quantity, ", ".join(screening.significant), _above(screening.level))
-    if others:
-        level = screening.level_of_others
-        quantity = f"factors not named: p > {level:g}"
-        yield _claim(screening, others[::-1], quantity, f"the other {len(others)}", _below(level))
-    if screening.p:
-        yield from _lost_to_holm(screening)
 
 
 def _claim(

@@ -3,8 +3,7 @@
 Every refitted number carries the slack that the rounding of the printed responses gives it. The printed equation is
 also put to work: rounded coefficients of large natural values can miss the design's own runs.
 
-The setting that a study claims to give the target, held against the model that it was read from.
-
+The setting that a study claims to give the target is held against the model that it was read from.
 Prediction: the model refitted from the printed runs, and the equation as printed, at the claimed setting.
 Extrapolation: distance from the centre in coded units against the design's farthest run, and leverage
 x'(X'X)⁻¹x against the largest of the runs (Myers, Montgomery and Anderson-Cook 2016, ch. 2: hidden extrapolation).
@@ -37,7 +36,6 @@ COLUMNS: dict[str, tuple[str, Callable[[AnovaRow], float]]] = {
     "f": ("F", lambda row: row.f),
     "p": ("p", lambda row: row.p),
 }
-
 STATISTICS: dict[str, tuple[str, Callable[[SurfaceAnova], float]]] = {
     "r_squared": ("R²", lambda anova: anova.r_squared),
     "r_squared_adjusted": ("adjusted R²", lambda anova: anova.r_squared_adjusted),
@@ -46,18 +44,11 @@ STATISTICS: dict[str, tuple[str, Callable[[SurfaceAnova], float]]] = {
     "adequate_precision": ("adequate precision", lambda anova: anova.adequate_precision),
     "sigma": ("residual standard deviation", lambda anova: anova.sigma),
 }
-
 """Key of a study file → words, and the same number of a refit."""
-
-
-def refit(study: SurfaceStudy, responses: FloatArray | None = None) -> Surface:
-    """The full second-order model fitted to the printed runs, or to others on the same design.
-
-    Raises StatisticsError where the runs cannot separate its terms.
-    """
-    region = Region(study.factors, 0.5 * (study.low + study.high), 0.5 * (study.high - study.low), ())
-    values = values_of(study.responses) if responses is None else responses
-    return fit_surface(study.coded, values[:, None], region)
+PREDICTION = "prediction at the claimed optimum"
+ON = 1e-6
+"""Coded distance within which a setting is on a corner or on a run."""
+LEVEL = 0.95
 
 
 def check_surface(study: SurfaceStudy) -> Iterator[Finding]:
@@ -70,9 +61,44 @@ def check_surface(study: SurfaceStudy) -> Iterator[Finding]:
         yield from _own_runs(study, study.equation)
 
 
-def _analysed(study: SurfaceStudy, responses: FloatArray | None = None) -> SurfaceAnova:
-    """The analysis of variance of a refit; what a run that nothing can replace leaves undefined is NaN or infinite."""
-    return analyse_surface(refit(study, responses))
+def check_optimum(optimum: Optimum, study: SurfaceStudy, target: Target) -> Iterator[Finding]:
+    """Prediction at the claimed optimum, and whether it lies where the design had runs."""
+    surface = refit(study)
+    point = surface.region.coded(values_of(optimum.values))
+    printed = optimum.predicted or target.mean
+    yield _by_refit(optimum, study, surface, point, printed)
+    if study.equation is not None:
+        yield _by_equation(optimum, study, study.equation, point, printed, float(np.sqrt(surface.mse)))
+    yield from _extrapolation(optimum, surface, point)
+    yield from _where_the_target_is(optimum, surface, point, target)
+
+
+def check_runs_against_model(
+    study: SurfaceStudy, ascent: Ascent | None, optimum: Optimum | None, verified: Verified | None
+) -> Iterator[Finding]:
+    """Runs outside the design, at settings that the model covers, against its prediction intervals."""
+    surface = refit(study)
+    if ascent is not None and set(study.screened) <= set(ascent.factors):
+        order = [ascent.factors.index(name) for name in study.screened]
+        for step, setting, response in zip(ascent.steps, ascent.settings, ascent.responses, strict=True):
+            point = surface.region.coded(setting[order])
+            if (np.abs(point) <= 1 + ON).all():
+                yield from _run_off_the_model(surface, point, response.value, 1, ascent.where, f"step {step}")
+    if optimum is not None and verified is not None:
+        point = surface.region.coded(values_of(optimum.values))
+        values = values_of(verified.responses)
+        words = f"the mean of {values.size} runs at the claimed optimum"
+        yield from _run_off_the_model(surface, point, float(values.mean()), values.size, verified.where, words)
+
+
+def refit(study: SurfaceStudy, responses: FloatArray | None = None) -> Surface:
+    """The full second-order model fitted to the printed runs, or to others on the same design.
+
+    Raises StatisticsError where the runs cannot separate its terms.
+    """
+    region = Region(study.factors, 0.5 * (study.low + study.high), 0.5 * (study.high - study.low), ())
+    values = values_of(study.responses) if responses is None else responses
+    return fit_surface(study.coded, values[:, None], region)
 
 
 def equation_terms(equation: Equation, factors: tuple[str, ...]) -> FloatArray:
@@ -104,6 +130,11 @@ def source_name(text: str, factors: tuple[str, ...]) -> str:
     known |= {f"{name}*{name}": f"{name}^2" for name in factors}
     words = plain.lower().replace(" ", "_").replace("-", "_")
     return known.get(plain, {"sum": "total", "cor_total": "total", "error": "pure_error"}.get(words, words))
+
+
+def _analysed(study: SurfaceStudy, responses: FloatArray | None = None) -> SurfaceAnova:
+    """The analysis of variance of a refit; what a run that nothing can replace leaves undefined is NaN or infinite."""
+    return analyse_surface(refit(study, responses))
 
 
 def _anova(study: SurfaceStudy) -> Iterator[Finding]:
@@ -248,45 +279,6 @@ def _weights(study: SurfaceStudy, equation: Equation, coded: FloatArray) -> dict
 def _with_slack(study: SurfaceStudy, compute: Callable[[FloatArray], FloatArray]) -> tuple[FloatArray, FloatArray]:
     values = values_of(study.responses)
     return compute(values), rounding_slack(compute, values, common_half(study.responses))
-
-
-PREDICTION = "prediction at the claimed optimum"
-
-ON = 1e-6
-
-"""Coded distance within which a setting is on a corner or on a run."""
-
-LEVEL = 0.95
-
-
-def check_optimum(optimum: Optimum, study: SurfaceStudy, target: Target) -> Iterator[Finding]:
-    """Prediction at the claimed optimum, and whether it lies where the design had runs."""
-    surface = refit(study)
-    point = surface.region.coded(values_of(optimum.values))
-    printed = optimum.predicted or target.mean
-    yield _by_refit(optimum, study, surface, point, printed)
-    if study.equation is not None:
-        yield _by_equation(optimum, study, study.equation, point, printed, float(np.sqrt(surface.mse)))
-    yield from _extrapolation(optimum, surface, point)
-    yield from _where_the_target_is(optimum, surface, point, target)
-
-
-def check_runs_against_model(
-    study: SurfaceStudy, ascent: Ascent | None, optimum: Optimum | None, verified: Verified | None
-) -> Iterator[Finding]:
-    """Runs outside the design, at settings that the model covers, against its prediction intervals."""
-    surface = refit(study)
-    if ascent is not None and set(study.screened) <= set(ascent.factors):
-        order = [ascent.factors.index(name) for name in study.screened]
-        for step, setting, response in zip(ascent.steps, ascent.settings, ascent.responses, strict=True):
-            point = surface.region.coded(setting[order])
-            if (np.abs(point) <= 1 + ON).all():
-                yield from _run_off_the_model(surface, point, response.value, 1, ascent.where, f"step {step}")
-    if optimum is not None and verified is not None:
-        point = surface.region.coded(values_of(optimum.values))
-        values = values_of(verified.responses)
-        words = f"the mean of {values.size} runs at the claimed optimum"
-        yield from _run_off_the_model(surface, point, float(values.mean()), values.size, verified.where, words)
 
 
 def _by_refit(optimum: Optimum, study: SurfaceStudy, surface: Surface, point: FloatArray, printed: Printed) -> Figure:

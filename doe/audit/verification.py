@@ -1,12 +1,10 @@
-"""Relative errors against the stated target, and what an error that does not fit was computed with instead.
+"""What a study prints of its fresh runs: relative errors against the target, a t test, and what so few runs can show.
 
 error = 100 |response − target|/target. Errors of several runs imply a target each: t = y/(1 ± error/100); where most
 of them agree on one that is not the stated one, that is what they were computed against.
 
-The t test that a study prints for its fresh runs, and what so few runs can show at all.
-
-With the standard deviation of the measurement the printed p is recomputed, by Student's and by Welch's test. Without
-it the test cannot be repeated, but the standard deviation that the printed p implies can be told.
+With the standard deviation of the measurement the printed p of the t test is recomputed, by Student's and by Welch's
+test. Without it the test cannot be repeated, but the standard deviation that the printed p implies can be told.
 """
 
 from __future__ import annotations
@@ -28,6 +26,8 @@ from doe.errors import StatisticsError
 FloatArray = npt.NDArray[np.float64]
 
 RELATIVE_ERROR = "relative error against the stated target"
+T_TEST = "two-sample t test"
+TESTS = {"Student's": pooled_test, "Welch's": welch_test}
 
 
 def check_ascent_errors(ascent: Ascent, target: Target) -> Iterator[Finding]:
@@ -60,6 +60,38 @@ def check_ascent_errors(ascent: Ascent, target: Target) -> Iterator[Finding]:
         yield _best(ascent, target)
 
 
+def check_verification_error(verified: Verified, target: Target) -> Iterator[Finding]:
+    """Mean and relative error of fresh runs; an error that does not fit is held against other denominators."""
+    values = values_of(verified.responses)
+    halves = common_half(verified.responses)
+    slack = float(rounding_slack(lambda x: np.array([x.mean()]), values, halves)[0])
+    mean = float(values.mean())
+    if verified.mean is not None:
+        how = f"mean of {values.size} runs"
+        yield compared("mean of replicates", verified.where, "mean response", verified.mean, mean, how, slack)
+    if verified.relative_error_percent is not None:
+        yield _verified_error(verified, verified.relative_error_percent, target, mean, slack)
+
+
+def check_verification_test(verified: Verified, target: Target) -> Iterator[Finding]:
+    """The printed p of the two-sample test, and the standard error of the mean beside the relative error."""
+    runs = values_of(verified.responses)
+    if verified.p_two_sample is not None:
+        yield _p(verified, verified.p_two_sample, target)
+    sample = Sample.of(runs)
+    if sample.n < 2:
+        return
+    error = 100 * sample.sd / math.sqrt(sample.n) / abs(target.mean.value)
+    found = relative_error_percent(sample.mean, target.mean.value)
+    if found < error:
+        yield Remark(
+            "what the runs can show",
+            verified.where,
+            f"The mean of {sample.n} runs has a standard error of {error:.1f} % (SD {sample.sd:.2f}); a relative error "
+            f"of {found:.2f} % lies below it and is no evidence of agreement.",
+        )
+
+
 def implied_target(responses: tuple[Printed, ...], errors: tuple[Printed, ...], stated: Printed) -> Printed | None:
     """The target that most of at least three errors were computed against, if it is not the stated one; else None."""
     halves = common_half(responses)
@@ -78,19 +110,6 @@ def implied_target(responses: tuple[Printed, ...], errors: tuple[Printed, ...], 
             text = f"{rounded:.{decimals}f}"
             return Printed(text, rounded, 0.5 * 10.0**-decimals)
     return Printed(f"{middle:.6g}", middle, 0.5 * (high - low))
-
-
-def check_verification_error(verified: Verified, target: Target) -> Iterator[Finding]:
-    """Mean and relative error of fresh runs; an error that does not fit is held against other denominators."""
-    values = values_of(verified.responses)
-    halves = common_half(verified.responses)
-    slack = float(rounding_slack(lambda x: np.array([x.mean()]), values, halves)[0])
-    mean = float(values.mean())
-    if verified.mean is not None:
-        how = f"mean of {values.size} runs"
-        yield compared("mean of replicates", verified.where, "mean response", verified.mean, mean, how, slack)
-    if verified.relative_error_percent is not None:
-        yield _verified_error(verified, verified.relative_error_percent, target, mean, slack)
 
 
 def _verified_error(verified: Verified, error: Printed, target: Target, mean: float, slack: float) -> Figure:
@@ -149,30 +168,6 @@ def _targets(response: float, half: float, error: Printed) -> tuple[tuple[float,
 
 def _one_digit_off(one: str, other: str) -> bool:
     return len(one) == len(other) and sum(a != b for a, b in zip(one, other, strict=True)) == 1
-
-
-T_TEST = "two-sample t test"
-
-TESTS = {"Student's": pooled_test, "Welch's": welch_test}
-
-
-def check_verification_test(verified: Verified, target: Target) -> Iterator[Finding]:
-    """The printed p of the two-sample test, and the standard error of the mean beside the relative error."""
-    runs = values_of(verified.responses)
-    if verified.p_two_sample is not None:
-        yield _p(verified, verified.p_two_sample, target)
-    sample = Sample.of(runs)
-    if sample.n < 2:
-        return
-    error = 100 * sample.sd / math.sqrt(sample.n) / abs(target.mean.value)
-    found = relative_error_percent(sample.mean, target.mean.value)
-    if found < error:
-        yield Remark(
-            "what the runs can show",
-            verified.where,
-            f"The mean of {sample.n} runs has a standard error of {error:.1f} % (SD {sample.sd:.2f}); a relative error "
-            f"of {found:.2f} % lies below it and is no evidence of agreement.",
-        )
 
 
 def _p(verified: Verified, p: Printed, target: Target) -> Figure:

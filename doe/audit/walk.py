@@ -1,14 +1,12 @@
-"""Whether a walk said to be a steepest ascent is one.
+"""Whether a walk said to be a steepest ascent is one, and whether the response-surface design that follows lies on it.
 
 Steepest ascent moves the factors in proportion to their effects. A walk whose coded levels are the same for every
 factor is the diagonal of the box instead: an even grid through the screened ranges, on which "best" means "the k-th
 step of the grid".
 
-Whether a response-surface design lies on the walk that it came from.
-
-Its centre is held against the step called best, its levels −1 and +1 against the steps of the walk. Where the text says
-which steps they are, that is a figure; where it does not, a level that is no step is a remark. Where the walk lowers a
-factor, the later step is its level −1.
+The centre of the design is held against the step called best, its levels −1 and +1 against the steps of the walk. Where
+the text says which steps they are, that is a figure; where it does not, a level that is no step is a remark. Where the
+walk lowers a factor, the later step is its level −1.
 """
 
 from __future__ import annotations
@@ -25,8 +23,8 @@ from doe.audit.study import Ascent, DesignSteps, Screening, SurfaceStudy
 FloatArray = npt.NDArray[np.float64]
 
 CLOSE = 0.01
-
 """Coded levels that differ by less are the same: half a percent of a range, the rounding of printed settings."""
+LEVELS_ON_WALK = "levels of the design on the walk"
 
 
 def check_walk(ascent: Ascent, screening: Screening) -> Iterator[Finding]:
@@ -49,6 +47,23 @@ def check_walk(ascent: Ascent, screening: Screening) -> Iterator[Finding]:
             f"used for {', '.join(ascent.factors)}, all factors at once; along the steepest ascent, shares of their "
             f"ranges would be {wanted}.{best}",
         )
+
+
+def check_levels(study: SurfaceStudy, ascent: Ascent) -> Iterator[Finding]:
+    """The stated steps, the centre against the best step, and levels that are no steps."""
+    where = f"{ascent.where} and {study.where_runs}"
+    still = [name for name, old in zip(study.factors, study.screened, strict=True) if old not in ascent.factors]
+    if still:
+        if study.steps is not None:
+            yield unchecked(LEVELS_ON_WALK, where, "levels −1, 0 and +1", f"the walk does not move {', '.join(still)}")
+        return
+    walk = ascent.settings[:, [ascent.factors.index(name) for name in study.screened]]
+    if study.steps is not None:
+        yield from _stated(study, ascent, study.steps, walk, where)
+    else:
+        yield from _off_the_walk(study, walk, where)
+    if ascent.best is not None:
+        yield from _centre(study, ascent, walk, where)
 
 
 def _coded(ascent: Ascent, ranges: dict[str, tuple[float, float]]) -> FloatArray:
@@ -74,26 +89,6 @@ def _effects(ascent: Ascent, screening: Screening) -> FloatArray:
 
 def _position(ascent: Ascent) -> int:
     return ascent.steps.index(str(ascent.best)) + 1
-
-
-LEVELS_ON_WALK = "levels of the design on the walk"
-
-
-def check_levels(study: SurfaceStudy, ascent: Ascent) -> Iterator[Finding]:
-    """The stated steps, the centre against the best step, and levels that are no steps."""
-    where = f"{ascent.where} and {study.where_runs}"
-    still = [name for name, old in zip(study.factors, study.screened, strict=True) if old not in ascent.factors]
-    if still:
-        if study.steps is not None:
-            yield unchecked(LEVELS_ON_WALK, where, "levels −1, 0 and +1", f"the walk does not move {', '.join(still)}")
-        return
-    walk = ascent.settings[:, [ascent.factors.index(name) for name in study.screened]]
-    if study.steps is not None:
-        yield from _stated(study, ascent, study.steps, walk, where)
-    else:
-        yield from _off_the_walk(study, walk, where)
-    if ascent.best is not None:
-        yield from _centre(study, ascent, walk, where)
 
 
 def _stated(study: SurfaceStudy, ascent: Ascent, steps: DesignSteps, walk: FloatArray, where: str) -> Iterator[Figure]:

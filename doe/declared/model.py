@@ -28,7 +28,7 @@ DRAWN_IN = 0.8
 
 
 @dataclass(frozen=True)
-class Parameter(Record):
+class CalibratedParameter(Record):
     """A calibrated parameter, natural units: range of measurement, and mean ± sd where it was measured independently.
 
     Raises StatisticsError unless low < high, and sd > 0 where there is a mean.
@@ -72,7 +72,7 @@ class Parameter(Record):
 
 
 @dataclass(frozen=True)
-class Effect(Record):
+class CandidateEffect(Record):
     """A candidate effect with one or two amplitudes, each within [low, high] around or above zero (off).
 
     Raises StatisticsError for another number of amplitudes or a range without zero.
@@ -95,7 +95,7 @@ class Effect(Record):
 
 
 @dataclass(frozen=True)
-class Condition(Record):
+class DeclaredCondition(Record):
     """A set-up and the names of the summaries read from each of its pours."""
 
     name: str
@@ -106,9 +106,9 @@ class Condition(Record):
 class Declared(Record):
     """The declared model: calibrated parameters, candidate effects and conditions with their summaries."""
 
-    parameters: tuple[Parameter, ...]
-    effects: tuple[Effect, ...]
-    conditions: tuple[Condition, ...]
+    parameters: tuple[CalibratedParameter, ...]
+    effects: tuple[CandidateEffect, ...]
+    conditions: tuple[DeclaredCondition, ...]
 
     def natural(self, theta: Sequence[float] | FloatArray) -> tuple[float, ...]:
         """Parameters in natural units, of ``theta`` (k,) deviations off their middles."""
@@ -129,11 +129,11 @@ def declare(measurement: Measurement, effects: Sequence[str]) -> Declared:
     return Declared(
         tuple(box_of(p) for p in measurement.parameters),
         tuple(widest(name, scenes) for name in effects),
-        tuple(Condition(c.name, summary_names(c)) for c in measurement.fit),
+        tuple(DeclaredCondition(c.name, summary_names(c)) for c in measurement.fit),
     )
 
 
-def widest(name: str, scenes: Sequence[Scene]) -> Effect:
+def widest(name: str, scenes: Sequence[Scene]) -> CandidateEffect:
     """The effect from end to end of what the literature supports, drawn in until every scene can be set up with it."""
     kind, known = EFFECTS[name], parameters(scenes[0])
     ends = [known[f"effect.{name}.{field}"] for field in kind.amplitudes]
@@ -141,7 +141,7 @@ def widest(name: str, scenes: Sequence[Scene]) -> Effect:
     high = tuple(min(end.high, kind.strongest) for end in ends)
     while not all(possible(scene, name, bounds) for scene in scenes for bounds in (low, high)):
         low, high = tuple(DRAWN_IN * x for x in low), tuple(DRAWN_IN * x for x in high)
-    return Effect(name, low, high)
+    return CandidateEffect(name, low, high)
 
 
 def effect_values(effect: str, amplitude: Sequence[float], turned: bool = False) -> dict[str, float]:
@@ -160,13 +160,13 @@ def possible(scene: Scene, name: str, amplitude: tuple[float, ...]) -> bool:
     return True
 
 
-def box_of(measured: MeasuredParameter) -> Parameter:
+def box_of(measured: MeasuredParameter) -> CalibratedParameter:
     """The range over which a parameter is simulated: as stated, and within ``BOX`` standard deviations of its mean.
 
     Farther off nobody who trusts the measurement would look.
     """
     if measured.mean is None or measured.sd is None:
-        return Parameter(measured.path, measured.low, measured.high)
+        return CalibratedParameter(measured.path, measured.low, measured.high)
     low = max(measured.low, measured.mean - BOX * measured.sd)
     high = min(measured.high, measured.mean + BOX * measured.sd)
-    return Parameter(measured.path, low, high, measured.mean, measured.sd)
+    return CalibratedParameter(measured.path, low, high, measured.mean, measured.sd)

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from doe.declared.model import Declared, Effect, Parameter
+from doe.declared.model import CalibratedParameter, CandidateEffect, Declared
 from doe.measurement.sight import PERFECT, Sight
 from doe.record import Record
 from solver import Record as PourRecord
@@ -97,7 +97,7 @@ class Direction(Record):
         return tuple(share * end for end in self.full)
 
 
-def directions_of(effect: Effect) -> list[Direction]:
+def directions_of(effect: CandidateEffect) -> list[Direction]:
     """Up and, where there is one, down; of two amplitudes along +x, +y, −x and −y."""
     name = effect.name
     if effect.amplitudes == 2:
@@ -142,6 +142,6 @@ def effect_points(declared: Declared, direction: Direction, share: float, number
     return [Point(name, k, moved(declared, k), effects) for k in range(first, number)]
 
 
-def middle(parameters: Sequence[Parameter]) -> tuple[float, ...]:
+def middle(parameters: Sequence[CalibratedParameter]) -> tuple[float, ...]:
     """Every parameter at its independently measured mean, or in the middle of its range."""
     return tuple(p.middle for p in parameters)

@@ -49,7 +49,7 @@ OnPour = Callable[[str, int, Ended], None]
 
 
 @dataclass(frozen=True)
-class Pour:
+class PointPour:
     """What one pour of a point in a condition gave; NaN where nothing could be read."""
 
     summaries: tuple[float, ...]
@@ -65,7 +65,7 @@ class Pour:
         return Outcome(self.outcome).valid
 
 
-Rows = list[list[Pour]]
+Rows = list[list[PointPour]]
 """Pours per point and condition."""
 Result = TypeVar("Result")
 Search = Generator[Sequence[Point], Rows, Result]
@@ -113,7 +113,7 @@ class ModelPours:
         self._conditions, self._paths, self._store = tuple(conditions), tuple(paths), store
         self._places = [c if place is None else place for c in range(len(conditions))]
         self._pours, self._on_pour, self._root = pours, on_pour, root
-        self._known: dict[Place, Pour] = {}
+        self._known: dict[Place, PointPour] = {}
         self._keys: dict[Place, str] = {}
         """Of the pours that are asked for."""
         self.run_now = 0
@@ -218,7 +218,7 @@ class ModelPours:
                 self._known[place] = _pour(asked, stored, point.view)
         return place in self._known
 
-    def _keep(self, what: str, point: Point, condition: int, job: Job, record: Record) -> Pour:
+    def _keep(self, what: str, point: Point, condition: int, job: Job, record: Record) -> PointPour:
         asked = self._conditions[condition]
         key, label = self._keys[point, condition], f"{point.sequence} {point.number}"
         stored = stored_run(job, record, "diagnose", what, label, reader(asked, point.view), key)
@@ -257,7 +257,7 @@ def reader(condition: Condition, view: View = AS_IT_IS) -> Reader:
     return read
 
 
-def _pour(condition: Condition, stored: StoredRun, view: View) -> Pour:
+def _pour(condition: Condition, stored: StoredRun, view: View) -> PointPour:
     """What is kept of a stored pour of ``condition``; NaN for what could not be read."""
 
     def numbers(names: Sequence[str]) -> tuple[float, ...]:
@@ -265,7 +265,7 @@ def _pour(condition: Condition, stored: StoredRun, view: View) -> Pour:
         return tuple(math.nan if x is None else x for x in found)
 
     features = feature_set(condition)
-    return Pour(
+    return PointPour(
         numbers(features.scalars),
         stored.outcome,
         numbers(profile_names(condition)),

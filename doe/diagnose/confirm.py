@@ -24,9 +24,9 @@ from scipy import stats
 
 from doe.declared.model import Declared
 from doe.declared.points import Point
-from doe.declared.pours import ModelPours, Pour
+from doe.declared.pours import ModelPours, PointPour
 from doe.diagnose.posterior import Fit
-from doe.diagnose.result import HeldOut, Model
+from doe.diagnose.result import CalibratedModel, HeldOut
 from doe.measurement.features import coarse_map
 from doe.measurement.measurement import Condition
 from doe.measurement.piles import PileSurface
@@ -39,7 +39,7 @@ CONSTANT_FLOOR = 1e-3
 """Least standard deviation of a summary, as a share of its size."""
 
 
-def model_of(fit: Fit, declared: Declared) -> Model:
+def model_of(fit: Fit, declared: Declared) -> CalibratedModel:
     """The model of a fit, with parameters and amplitudes within their ranges."""
     amplitudes: dict[str, tuple[float, ...]] = {}
     ranges = {effect.name: effect for effect in declared.effects}
@@ -47,7 +47,7 @@ def model_of(fit: Fit, declared: Declared) -> Model:
         own = ranges[one.effect]
         value = min(own.high[one.index], max(own.low[one.index], one.value))
         amplitudes[one.effect] = (*amplitudes.get(one.effect, ()), value)
-    return Model(declared.natural(fit.theta), tuple(amplitudes.items()))
+    return CalibratedModel(declared.natural(fit.theta), tuple(amplitudes.items()))
 
 
 @dataclass(frozen=True)
@@ -59,14 +59,14 @@ class Confirmed:
     profiles: the height profiles of the same pours, per condition (n, k_c) [m]; k_c = 0 without measured ones.
     """
 
-    model: Model
+    model: CalibratedModel
     blocks: tuple[FloatArray, ...]
     broken: int
     profiles: tuple[FloatArray, ...] = ()
 
 
 def confirm(
-    models: Sequence[Model],
+    models: Sequence[CalibratedModel],
     pours: ModelPours,
     number: int,
     widths: Sequence[int],
@@ -83,12 +83,12 @@ def confirm(
     return tuple(_confirmed(model, [next(rows) for _ in range(number)], widths) for model in models)
 
 
-def confirming(model: Model, number: int, sequence: str = "confirm") -> list[Point]:
+def confirming(model: CalibratedModel, number: int, sequence: str = "confirm") -> list[Point]:
     """The points of the ``number`` pours that confirm a model."""
     return [Point(f"{sequence} {number}", k, model.theta, model.effects) for k in range(number)]
 
 
-def _confirmed(model: Model, rows: Sequence[Sequence[Pour]], widths: Sequence[int]) -> Confirmed:
+def _confirmed(model: CalibratedModel, rows: Sequence[Sequence[PointPour]], widths: Sequence[int]) -> Confirmed:
     blocks, profiles, broken = [], [], 0
     for c, width in enumerate(widths):
         valid = [row[c] for row in rows if row[c].valid and np.isfinite(row[c].summaries).all()]

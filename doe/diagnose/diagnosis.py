@@ -11,7 +11,8 @@ import numpy.typing as npt
 from doe.declared.model import Declared, declare
 from doe.declared.pours import ROOT, ModelPours, OnPour
 from doe.diagnose.budget import Budget
-from doe.diagnose.compared import Compared, measured, weighed
+from doe.diagnose.candidate_experiments import CandidateExperiments, next_experiment
+from doe.diagnose.compared_features import Compared, measured, weighed
 from doe.diagnose.confirm import (
     CONTRADICTED,
     Confirmed,
@@ -21,10 +22,9 @@ from doe.diagnose.confirm import (
     model_of,
     residual_maps,
 )
-from doe.diagnose.menu import Menu, next_experiment
 from doe.diagnose.posterior import Posterior
 from doe.diagnose.result import NO_EFFECT, HeldOut, Level, Offered, Suggestion
-from doe.diagnose.teaching import Say, Teacher
+from doe.diagnose.training_pours import Say, TrainingPours
 from doe.diagnose.verdict import NOTHING_FROM, THRESHOLD, Verdict, taken_back, verdict_of
 from doe.errors import MeasurementError
 from doe.holdout import HoldoutCondition, HoldoutError, holdout_errors
@@ -109,18 +109,18 @@ def run_diagnosis(
         return ModelPours(conditions, paths, store, pours, on_pour, root, place)
 
     model, everywhere = pours_in(measurement.fit), pours_in(measurement.conditions)
-    teacher = Teacher(declared, measurement.fit, model, budget, say)
-    compared = pursued(teacher, measurement.fit, budget, say)
-    verdict = verdict_of(compared, declared, teacher.levels, teacher.pours, follow_up is not None)
+    training = TrainingPours(declared, measurement.fit, model, budget, say)
+    compared = pursued(training, measurement.fit, budget, say)
+    verdict = verdict_of(compared, declared, training.levels, training.pours, follow_up is not None)
     say(f"verdict: {verdict.kind}")
     confirmed, verdict = concluded(verdict, compared, declared, measurement.conditions, everywhere, say)
-    menu = Menu((), 0)
+    candidates = CandidateExperiments((), 0)
     if follow_up is None:
-        menu = suggested(verdict, compared.posterior, teacher, measurement.fit, pours_in)
+        candidates = suggested(verdict, compared.posterior, training, measurement.fit, pours_in)
     return Diagnosis(
         declared=declared,
         conditions=measurement.conditions,
-        levels=teacher.levels,
+        levels=training.levels,
         offered=tuple(offered(condition, c, compared) for c, condition in enumerate(measurement.fit)),
         verdict=verdict,
         before=confirmed.before,
@@ -131,9 +131,9 @@ def run_diagnosis(
         maps=residual_maps(
             measurement.conditions, confirmed.before, confirmed.after, everywhere, fresh_pours(measurement.conditions)
         ),
-        suggestions=menu.suggestions,
-        pours=model.run_now + everywhere.run_now + menu.run_now,
-        settings=teacher.settings,
+        suggestions=candidates.suggestions,
+        pours=model.run_now + everywhere.run_now + candidates.run_now,
+        settings=training.settings,
     )
 
 
@@ -153,11 +153,11 @@ def joined(measurement: Measurement, follow_up: Measurement) -> Measurement:
     return replace(measurement, conditions=(*measurement.fit, *follow_up.fit, *measurement.holdout))
 
 
-def pursued(teacher: Teacher, conditions: Sequence[Condition], budget: Budget, say: Say) -> Compared:
+def pursued(training: TrainingPours, conditions: Sequence[Condition], budget: Budget, say: Say) -> Compared:
     """Models and data once what is in question has been looked at more closely."""
     data = [measured(condition) for condition in conditions]
-    instruments = teacher.instruments(data)
-    compared = weighed(teacher.lessons(), teacher.ways, data, instruments)
+    instruments = training.instruments(data)
+    compared = weighed(training.lessons(), training.ways, data, instruments)
     say(f"after screening: {odds(compared.posterior)}")
     looked: set[str] = set()
     for _ in range(budget.looks):
@@ -165,18 +165,18 @@ def pursued(teacher: Teacher, conditions: Sequence[Condition], budget: Budget, s
         name, p = found.best if found.effects else ("", 0.0)
         quiet = NOTHING_FROM if name in looked else QUIET
         settled = found.nothing >= quiet or (p >= SETTLED and name in looked)
-        if settled and not any(teacher.ways[way].effect == name for way, _ in teacher.at_end(found)):
+        if settled and not any(training.ways[way].effect == name for way, _ in training.at_end(found)):
             break
-        poured = teacher.look(found)
+        poured = training.look(found)
         if not poured:
             break
         looked |= set(poured)
-        compared = weighed(teacher.lessons(), teacher.ways, data, instruments)
+        compared = weighed(training.lessons(), training.ways, data, instruments)
         say(f"after a closer look at {', '.join(poured)}: {odds(compared.posterior)}")
     label, p = compared.posterior.best if compared.posterior.effects else ("", 0.0)
     if p >= THRESHOLD:
-        teacher.refine(compared.posterior, label)
-        compared = weighed(teacher.lessons(), teacher.ways, data, instruments)
+        training.refine(compared.posterior, label)
+        compared = weighed(training.lessons(), training.ways, data, instruments)
         say(f"with pours on both sides of its best fit: {odds(compared.posterior)}")
         label = compared.posterior.best[0]
         return compared.refitted(("base", label))
@@ -219,18 +219,20 @@ def odds(found: Posterior) -> str:
 
 
 def suggested(
-    verdict: Verdict, found: Posterior, teacher: Teacher, conditions: Sequence[Condition], pours_in: PoursAt
-) -> Menu:
+    verdict: Verdict, found: Posterior, training: TrainingPours, conditions: Sequence[Condition], pours_in: PoursAt
+) -> CandidateExperiments:
     """What to measure next: the first of the fitted ``conditions`` changed; nothing unless the verdict is ambiguous."""
     if not verdict.kind.startswith("ambiguous"):
-        return Menu((), 0)
+        return CandidateExperiments((), 0)
     weights = {label: found.effects[label] for label in verdict.names[:MOST_RIVALS]}
     if NO_EFFECT in verdict.kind or len(weights) < 2:
         weights["base"] = found.nothing
-    menu = next_experiment(teacher, found, weights, conditions[0], lambda set_ups: pours_in(set_ups, len(conditions)))
+    candidates = next_experiment(
+        training, found, weights, conditions[0], lambda set_ups: pours_in(set_ups, len(conditions))
+    )
     # It is chosen for the likeliest answers, and told of all that are left.
     left = (*verdict.names, *(label for label in weights if label == "base"))
-    return Menu(tuple(replace(one, rivals=left) for one in menu.suggestions), menu.run_now)
+    return CandidateExperiments(tuple(replace(one, rivals=left) for one in candidates.suggestions), candidates.run_now)
 
 
 def offered(condition: Condition, c: int, compared: Compared) -> Offered:

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from doe.declared.model import Declared
 from doe.declared.points import Direction, Point
 from doe.declared.pours import Rows, Search
-from doe.diagnose.compared import usable
+from doe.diagnose.compared_features import usable
 from doe.diagnose.emulator import Lessons, Way, emulated
 from doe.diagnose.result import Level
 

@@ -1,4 +1,4 @@
-"""Which experiment of a menu tells the answers that are left apart, and with which chance.
+"""Which experiment of the candidates tells the answers that are left apart, and with which chance.
 
 The chance of a set-up is how often the right answer ends with a probability of ``SURE`` once n pours of it are there: a
 truth is drawn by the probabilities that the answers have now, the mean of its n pours by what it predicts, and the
@@ -40,7 +40,7 @@ class Prediction:
 
 
 @dataclass(frozen=True)
-class MenuItem:
+class CandidateExperiment:
     """A feasible set-up: prediction by every answer that is left, and the covariance of one pour, (d, d)."""
 
     name: str
@@ -49,17 +49,17 @@ class MenuItem:
 
 
 def rank_experiments(
-    menu: Sequence[MenuItem], weights: Mapping[str, float], replicates: int
+    candidates: Sequence[CandidateExperiment], weights: Mapping[str, float], replicates: int
 ) -> tuple[RankedExperiment, ...]:
-    """Return the menu, the best chance of an answer first, the larger separation first among equals.
+    """Return the candidates, the best chance of an answer first, the larger separation first among equals.
 
     weights: of the answers that are left; replicates: pours that are asked for.
 
-    Raises StatisticsError with fewer than two answers, an empty menu, or a set-up that some answer does not predict.
+    Raises StatisticsError with fewer than two answers, no candidate, or a set-up that some answer does not predict.
     """
-    if len(weights) < 2 or not menu:
-        raise StatisticsError(f"{len(weights)} answers and {len(menu)} set-ups; allowed are at least 2 and 1")
-    for item in menu:
+    if len(weights) < 2 or not candidates:
+        raise StatisticsError(f"{len(weights)} answers and {len(candidates)} set-ups; allowed are at least 2 and 1")
+    for item in candidates:
         missing = sorted(set(weights) - set(item.predictions))
         if missing:
             raise StatisticsError(f"{item.name}: no prediction by {', '.join(missing)}")
@@ -67,12 +67,14 @@ def rank_experiments(
         RankedExperiment(
             item.name, chance_of_an_answer(item, weights, replicates), _least_separation(item, tuple(weights))
         )
-        for item in menu
+        for item in candidates
     ]
     return tuple(sorted(rows, key=lambda row: (-row.chance, -row.separation)))
 
 
-def chance_of_an_answer(item: MenuItem, weights: Mapping[str, float], replicates: int, seed: int = 0) -> float:
+def chance_of_an_answer(
+    item: CandidateExperiment, weights: Mapping[str, float], replicates: int, seed: int = 0
+) -> float:
     """Return how often the true answer ends with a probability of `SURE`, by `DRAWS` made-up data sets of each."""
     names, rng = tuple(weights), np.random.default_rng(seed)
     share = np.array([weights[name] for name in names]) / sum(weights.values())
@@ -91,7 +93,7 @@ def chance_of_an_answer(item: MenuItem, weights: Mapping[str, float], replicates
     return right
 
 
-def _least_separation(item: MenuItem, names: Sequence[str]) -> float:
+def _least_separation(item: CandidateExperiment, names: Sequence[str]) -> float:
     distances = []
     for i, j in combinations(names, 2):
         one, other = item.predictions[i], item.predictions[j]

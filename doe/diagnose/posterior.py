@@ -120,7 +120,7 @@ class Fit:
 
 
 @dataclass(frozen=True)
-class Level:
+class BestAmplitude:
     """The best amplitude of way ``way``, in multiples of its reference amplitude, and its log density there."""
 
     way: int
@@ -150,7 +150,7 @@ class Posterior:
     outside: float
     effects: Mapping[str, float]
     fits: Mapping[str, Fit]
-    levels: tuple[Level, ...]
+    levels: tuple[BestAmplitude, ...]
     log_outside: float
 
     @property
@@ -231,7 +231,7 @@ def posterior(emulator: Emulator, data: Data, temperature: float = TEMPERATURE, 
         for way in np.unique(nodes.way[nodes.way >= 0]):
             own = np.flatnonzero(nodes.way == way)
             best = own[logs[name][own].argmax()]
-            levels.append(Level(int(way), float(nodes.multiple[best]), float(logs[name][best])))
+            levels.append(BestAmplitude(int(way), float(nodes.multiple[best]), float(logs[name][best])))
     return Posterior(
         math.exp(nothing - total),
         math.exp(outside - total),

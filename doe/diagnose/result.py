@@ -132,7 +132,7 @@ class Offered(Record):
 
 
 @dataclass(frozen=True)
-class Model(Record):
+class CalibratedModel(Record):
     """A calibrated model: parameters in natural units and the amplitudes of the effects that are on."""
 
     theta: tuple[float, ...]

@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from doe.declared.model import Declared, Parameter
-from doe.diagnose.compared import Compared
+from doe.declared.model import CalibratedParameter, Declared
+from doe.diagnose.compared_features import Compared
 from doe.diagnose.posterior import FITS, TEMPERATURE, Fit, Posterior
 from doe.diagnose.result import NO_EFFECT, UNEXPLAINED, EffectRow, Level, ParameterRow, Place, Residual
 from doe.record import Record
@@ -214,7 +214,7 @@ def _cosine(one: FloatArray, other: FloatArray) -> float:
     return float(one @ other) / size if size > 0.0 else 0.0
 
 
-def _parameter_row(parameter: Parameter, j: int, before: Fit, after: Fit) -> ParameterRow:
+def _parameter_row(parameter: CalibratedParameter, j: int, before: Fit, after: Fit) -> ParameterRow:
     def of(fit: Fit) -> tuple[float, float]:
         return parameter.natural(float(fit.theta[j])), parameter.deviation * float(np.sqrt(fit.theta_covariance[j, j]))
 

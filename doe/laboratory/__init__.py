@@ -1,7 +1,7 @@
 """From the readings of a bench test to parameters of a material: statistics on tables, no solver and no picture."""
 
 from doe.laboratory.analysis import TESTS, analyse
-from doe.laboratory.replicates import Summary, summarise
+from doe.laboratory.replicates import ReplicateSummary, summarise
 from doe.laboratory.result import CurveFit, Derived, Estimate, LabResult
 from doe.laboratory.tables import LaboratoryError, read_table
 
@@ -12,7 +12,7 @@ __all__ = [
     "Estimate",
     "LabResult",
     "LaboratoryError",
-    "Summary",
+    "ReplicateSummary",
     "analyse",
     "read_table",
     "summarise",

@@ -1,13 +1,13 @@
 """What the paper's formulas give where the answer is known: closed forms over the range of the parameters.
 
-    drop          L/(2H) of a rigid sphere against its e, over friction (``drop_flight.py``)
+    drop          L/(2H) of a rigid sphere against its e, over friction (``contact.py``)
     compression   Equation (1) on a sphere between rigid plates, A = π R δ the area of the contact, ΔL = 2 δ, T = 2 R:
                   E_app/E = 4/(3 π (1 − ν²) √(δ/R))
     shear         Equation (2) there, on the contact that is sheared with no slip, ΔL twice its slip:
                   G_app/G = 8/(π (2 − ν) √(δ/R))
 
 δ/R, overlap over radius, is also the approach of the plates over the thickness, the strain of Equation (1).
-Sources: Hertz 1882; Mindlin 1949; ``drop_flight.py``.
+Sources: Hertz 1882; Mindlin 1949; ``contact.py``.
 """
 
 from __future__ import annotations

@@ -5,12 +5,11 @@
     tracked drop     e = (v_x + v_z)/√(2gH), where a camera gives the velocity after the impact, v_z upward: exact for a
                      central impact, whatever the friction
 
-For a sphere L/(2H) can be inverted (``drop_flight.py``); that value stands beside it, and is the better one where
-bodies are round. Everything is a mean over replicates of what each gives, not what the mean reading gives.
+For a sphere L/(2H) can be inverted (:func:`restitution_of_flight`); that value stands beside it, and is the better one
+where bodies are round. Everything is a mean over replicates of what each gives, not what the mean reading gives.
 
-Where a sphere lands that falls H onto a plate at 45° and bounces: the paper's L/(2H) in closed form, and inverted.
-
-In units of the impact speed V = √(2gH), a sphere leaves with e V/√2 along the normal and k V/√2 along the plate:
+A sphere that falls H onto a plate at 45° leaves, in units of the impact speed V = √(2gH), with e V/√2 along the normal
+and k V/√2 along the plate:
 
     v_x = (e + k)/2 V,  v_z = (e − k)/2 V,  L/(2H) = x (z + √(z² + 1)),  x = v_x/V, z = v_z/V
     k = 1 − μ (1 + e)  while it slides, never less than 5/7, when it leaves without slip
@@ -27,33 +26,11 @@ from collections.abc import Callable
 from scipy.optimize import brentq
 
 from doe.laboratory.result import Derived, derived, no_parameter, per_row
-from doe.laboratory.tables import Row, Table
+from doe.laboratory.tables import Reading, Table
 
 GRAVITY = 9.81
-
 GRIPPING = 5.0 / 7.0
-
 """Share of the tangential velocity that a solid sphere keeps when it leaves without slip."""
-
-
-def tangential_share(restitution: float, friction: float) -> float:
-    """k: tangential velocity after the impact at 45° over that before it."""
-    return max(GRIPPING, 1.0 - friction * (1.0 + restitution))
-
-
-def flight(restitution: float, share: float) -> float:
-    """L/(2H) of a sphere with restitution e and tangential share k."""
-    x, z = 0.5 * (restitution + share), 0.5 * (restitution - share)
-    return x * (z + math.sqrt(z * z + 1.0))
-
-
-def restitution_of_flight(measured: float, share: float) -> float:
-    """The e whose :func:`flight` is ``measured``; NaN if no e in 0 … 1 has it. ``flight`` grows with e."""
-    if not flight(0.0, share) <= measured <= flight(1.0, share):
-        return math.nan
-    return float(brentq(lambda e: flight(e, share) - measured, 0.0, 1.0, xtol=1e-12))
-
-
 PAPER = (
     "L/2H holds for a horizontal rebound only and gives back another number than the contact's restitution (--bias); "
     "restitution_gripping_sphere stands for round bodies, v_x and v_z of a camera settle it"
@@ -95,14 +72,32 @@ def restitution(table: Table) -> tuple[tuple[Derived, ...], tuple[str, ...]]:
     return tuple(found), notes
 
 
-def paper_estimate(row: Row) -> float:
+def paper_estimate(row: Reading) -> float:
     """L/(2H)."""
     return row.values["distance"] / (2.0 * row.values["drop_height"])
 
 
-def tracked_rebound(row: Row) -> float:
+def tracked_rebound(row: Reading) -> float:
     """(v_x + v_z)/√(2gH)."""
     return (row.values["v_x"] + row.values["v_z"]) / math.sqrt(2.0 * GRAVITY * row.values["drop_height"])
+
+
+def flight(restitution: float, share: float) -> float:
+    """L/(2H) of a sphere with restitution e and tangential share k."""
+    x, z = 0.5 * (restitution + share), 0.5 * (restitution - share)
+    return x * (z + math.sqrt(z * z + 1.0))
+
+
+def restitution_of_flight(measured: float, share: float) -> float:
+    """The e whose :func:`flight` is ``measured``; NaN if no e in 0 … 1 has it. ``flight`` grows with e."""
+    if not flight(0.0, share) <= measured <= flight(1.0, share):
+        return math.nan
+    return float(brentq(lambda e: flight(e, share) - measured, 0.0, 1.0, xtol=1e-12))
+
+
+def tangential_share(restitution: float, friction: float) -> float:
+    """k: tangential velocity after the impact at 45° over that before it."""
+    return max(GRIPPING, 1.0 - friction * (1.0 + restitution))
 
 
 def _each(
@@ -110,7 +105,7 @@ def _each(
     name: str,
     of: tuple[str, ...],
     formula: str,
-    rows: tuple[Row, ...],
+    rows: tuple[Reading, ...],
     values: list[float],
     notes: tuple[str, ...] = (),
 ) -> Derived:
@@ -122,7 +117,7 @@ def _path(quantity: str) -> Callable[..., str]:
     return lambda a, b: f"pair.{a}.{b}.{quantity}"
 
 
-def _check(table: Table, row: Row) -> None:
+def _check(table: Table, row: Reading) -> None:
     """One of the two measurements must be there, and a rebound must be slower than the fall."""
     speeds = [name for name in ("v_x", "v_z") if name in row.values]
     if len(speeds) == 1:

@@ -20,7 +20,7 @@ from collections.abc import Callable
 from scipy import stats
 
 from doe.laboratory.result import Derived, Estimate, no_parameter, per_row
-from doe.laboratory.tables import Row, Table
+from doe.laboratory.tables import Reading, Table
 
 SHAPES = (
     "dimensions are not written as a shape: they do not tell an ellipsoid from a box. Put the means into the body's "
@@ -51,12 +51,12 @@ def size_spreads(derived: tuple[Derived, ...]) -> tuple[Estimate, ...]:
     return tuple(_size_spread(one) for one in diameters if one.summary.n > 1)
 
 
-def mean_diameter(row: Row) -> float:
+def mean_diameter(row: Reading) -> float:
     """(L W T)^(1/3) [m]."""
     return math.cbrt(math.prod(row.values[name] for name in COLUMNS))
 
 
-def sphericity(row: Row) -> float:
+def sphericity(row: Reading) -> float:
     """(L W T)^(1/3)/L."""
     return mean_diameter(row) / row.values["length"]
 
@@ -69,7 +69,7 @@ def variation_interval(c: float, n: int, level: float = 0.95) -> tuple[float, fl
     return least, most
 
 
-def _reading(name: str) -> Callable[[Row], float]:
+def _reading(name: str) -> Callable[[Reading], float]:
     return lambda row: row.values[name]
 
 
@@ -92,7 +92,7 @@ def _size_spread(one: Derived) -> Estimate:
     )
 
 
-def _check(table: Table, rows: tuple[Row, ...]) -> None:
+def _check(table: Table, rows: tuple[Reading, ...]) -> None:
     """The length is the longest dimension of every piece, and a component has a thickness or none."""
     for row in rows:
         for name in COLUMNS[1:]:

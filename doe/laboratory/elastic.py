@@ -18,7 +18,7 @@ from scipy import stats
 from doe.errors import StatisticsError
 from doe.laboratory.linear_range import FEWEST_POINTS, linear_range
 from doe.laboratory.result import CurveFit, Derived, Estimate, derived
-from doe.laboratory.tables import Row, Table
+from doe.laboratory.tables import Reading, Table
 
 MODULI = {"compression": ("youngs_modulus", "E = (F/A)/(ΔL/T)"), "shear": ("shear_modulus", "G = (F/A)/(ΔL/T)")}
 """Name and formula of what a test measures."""
@@ -35,7 +35,7 @@ def moduli(table: Table, test: str) -> tuple[tuple[Derived, ...], tuple[CurveFit
     name, formula = MODULI[test]
     found, curves = [], []
     for of, rows in table.groups().items():
-        by_replicate: dict[str, list[Row]] = {}
+        by_replicate: dict[str, list[Reading]] = {}
         for row in rows:
             by_replicate.setdefault(row.replicate, []).append(row)
         own: list[CurveFit] = []
@@ -54,7 +54,7 @@ def moduli(table: Table, test: str) -> tuple[tuple[Derived, ...], tuple[CurveFit
     return tuple(found), tuple(curves)
 
 
-def _reading(table: Table, row: Row) -> float:
+def _reading(table: Table, row: Reading) -> float:
     value = row.values
     if value["displacement"] <= 0.0 or value["force"] <= 0.0:
         column = "displacement" if value["displacement"] <= 0.0 else "force"
@@ -62,7 +62,7 @@ def _reading(table: Table, row: Row) -> float:
     return value["force"] / value["area"] / (value["displacement"] / value["thickness"])
 
 
-def _curve(table: Table, rows: list[Row], quantity: str) -> CurveFit:
+def _curve(table: Table, rows: list[Reading], quantity: str) -> CurveFit:
     first = rows[0]
     for row in rows:
         for column in ("thickness", "area"):

@@ -4,7 +4,7 @@ Nothing is removed: an outlier is named, and the mean without it stands beside t
 so in the file, where it can be seen. Normality is Shapiro and Wilk's W (1965, Biometrika 52:591); ten replicates can
 show gross departures only.
 
-Outliers among replicates: Grubbs's test, and its extension to several, the generalised extreme studentised deviate.
+Outliers are found by Grubbs's test, and its extension to several, the generalised extreme studentised deviate:
 
     R_i = max |x − mean| / s  of what is left after i − 1 removals
     λ_i = (n − i) t / √((n − i − 1 + t²)(n − i + 1)),  t the 1 − α/(2(n − i + 1)) point of Student's t, n − i − 1 df
@@ -27,56 +27,14 @@ from doe.errors import StatisticsError
 from doe.record import Record
 
 ENOUGH_FOR_SEVERAL = 15
-
 LARGEST_SHARE = 0.2
-
 """Of the values, that may be outliers where there are enough to look for several."""
-
 NEGLIGIBLE = 1e-12
-
 """Spread relative to the largest value that is rounding."""
 
 
-def most_outliers(n: int) -> int:
-    """How many of ``n`` values may be named outliers: one below 15, a fifth of them from there on, none of two."""
-    if n < 3:
-        return 0
-    return 1 if n < ENOUGH_FOR_SEVERAL else int(LARGEST_SHARE * n)
-
-
-def critical_deviate(n: int, removed: int, level: float = 0.05) -> float:
-    """λ for the deviate found after ``removed`` removals from ``n`` values."""
-    left = n - removed
-    t = float(stats.t.ppf(1.0 - level / (2.0 * left), left - 2))
-    return (left - 1) * t / math.sqrt((left - 2 + t * t) * left)
-
-
-def deviates(values: npt.ArrayLike, most: int) -> tuple[tuple[int, float], ...]:
-    """Index and R of the farthest value, of the farthest of the rest, … ``most`` of them."""
-    array = np.asarray(values, dtype=np.float64)
-    left, found = list(range(array.size)), []
-    for _ in range(most):
-        rest = array[left]
-        spread = float(rest.std(ddof=1))
-        if spread <= NEGLIGIBLE * float(np.abs(rest).max()):
-            break
-        distance = np.abs(rest - rest.mean()) / spread
-        k = int(distance.argmax())
-        found.append((left[k], float(distance[k])))
-        del left[k]
-    return tuple(found)
-
-
-def outliers(values: npt.ArrayLike, level: float = 0.05) -> tuple[int, ...]:
-    """Indices of the outliers at ``level``, the farthest first."""
-    n = np.asarray(values).size
-    found = deviates(values, most_outliers(n))
-    beyond = [i for i, (_, deviate) in enumerate(found) if deviate > critical_deviate(n, i, level)]
-    return tuple(index for index, _ in found[: beyond[-1] + 1]) if beyond else ()
-
-
 @dataclass(frozen=True)
-class Summary(Record):
+class ReplicateSummary(Record):
     """Statistics of ``n`` replicates, unit of the values; NaN where n is too small or nothing spreads.
 
     low, high: 95 % interval of the mean by Student's t. outliers: indices, the farthest first; mean_without: the mean
@@ -98,7 +56,7 @@ class Summary(Record):
     mean_without: float
 
 
-def summarise(values: npt.ArrayLike, level: float = 0.95) -> Summary:
+def summarise(values: npt.ArrayLike, level: float = 0.95) -> ReplicateSummary:
     """The summary of replicates; StatisticsError without any or with one that is not finite."""
     array = np.asarray(values, dtype=np.float64)
     if array.ndim != 1 or array.size == 0 or not np.isfinite(array).all():
@@ -111,7 +69,7 @@ def summarise(values: npt.ArrayLike, level: float = 0.95) -> Summary:
     w, p = map(float, stats.shapiro(array)) if spreads else (math.nan, math.nan)
     found = outliers(array)
     kept = np.delete(array, list(found))
-    return Summary(
+    return ReplicateSummary(
         n=n,
         mean=mean,
         sd=sd,
@@ -126,3 +84,41 @@ def summarise(values: npt.ArrayLike, level: float = 0.95) -> Summary:
         outlier_test="generalised ESD" if n >= ENOUGH_FOR_SEVERAL else "Grubbs",
         mean_without=float(kept.mean()),
     )
+
+
+def outliers(values: npt.ArrayLike, level: float = 0.05) -> tuple[int, ...]:
+    """Indices of the outliers at ``level``, the farthest first."""
+    n = np.asarray(values).size
+    found = deviates(values, most_outliers(n))
+    beyond = [i for i, (_, deviate) in enumerate(found) if deviate > critical_deviate(n, i, level)]
+    return tuple(index for index, _ in found[: beyond[-1] + 1]) if beyond else ()
+
+
+def most_outliers(n: int) -> int:
+    """How many of ``n`` values may be named outliers: one below 15, a fifth of them from there on, none of two."""
+    if n < 3:
+        return 0
+    return 1 if n < ENOUGH_FOR_SEVERAL else int(LARGEST_SHARE * n)
+
+
+def deviates(values: npt.ArrayLike, most: int) -> tuple[tuple[int, float], ...]:
+    """Index and R of the farthest value, of the farthest of the rest, … ``most`` of them."""
+    array = np.asarray(values, dtype=np.float64)
+    left, found = list(range(array.size)), []
+    for _ in range(most):
+        rest = array[left]
+        spread = float(rest.std(ddof=1))
+        if spread <= NEGLIGIBLE * float(np.abs(rest).max()):
+            break
+        distance = np.abs(rest - rest.mean()) / spread
+        k = int(distance.argmax())
+        found.append((left[k], float(distance[k])))
+        del left[k]
+    return tuple(found)
+
+
+def critical_deviate(n: int, removed: int, level: float = 0.05) -> float:
+    """λ for the deviate found after ``removed`` removals from ``n`` values."""
+    left = n - removed
+    t = float(stats.t.ppf(1.0 - level / (2.0 * left), left - 2))
+    return (left - 1) * t / math.sqrt((left - 2 + t * t) * left)

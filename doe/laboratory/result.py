@@ -1,7 +1,4 @@
-"""What the analysis of a bench test returns: plain records.
-
-From rows to a derived quantity: one value per replicate, summed up.
-"""
+"""What the analysis of a bench test returns: plain records, and from rows one value per replicate, summed up."""
 
 from __future__ import annotations
 
@@ -9,12 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from doe.laboratory.linear_range import LinearRange
-from doe.laboratory.replicates import Summary, summarise
-from doe.laboratory.tables import Row, Table
+from doe.laboratory.replicates import ReplicateSummary, summarise
+from doe.laboratory.tables import Reading, Table
 from doe.record import Record
 
 CONDITIONS = ("drop_height",)
-
 """Names of what is carried along for the twins, and no result."""
 
 
@@ -33,7 +29,7 @@ class Derived(Record):
     file: str
     replicates: tuple[str, ...]
     values: tuple[float, ...]
-    summary: Summary
+    summary: ReplicateSummary
     parameter: str = ""
     notes: tuple[str, ...] = ()
 
@@ -98,7 +94,7 @@ def derived(
 
 
 def per_row(
-    table: Table, name: str, unit: str, formula: str, value: Callable[[Row], float], parameter: Callable[..., str]
+    table: Table, name: str, unit: str, formula: str, value: Callable[[Reading], float], parameter: Callable[..., str]
 ) -> tuple[Derived, ...]:
     """``value`` of every row, one quantity per component or pair; ``parameter`` makes its path from the names."""
     return tuple(

@@ -2,11 +2,8 @@
 
 First the names of the columns, then one row per reading; cells and numbers as `doe.table_file` reads them. ``#`` starts
 a comment: a reading behind it is left out and stays visible. Rows are counted as a spreadsheet does, the first line of
-the file being row 1.
-
-Columns of a laboratory's tables: what each holds, the units that its name may end in, and what it may be.
-
-A column is named ``<stem>_<unit>`` (``force_N``, ``thickness_mm``). Values are SI inside.
+the file being row 1. A column is named ``<stem>_<unit>`` (``force_N``, ``thickness_mm``); the layout of a table says
+what each holds, the units that its name may end in, and what values it may have.
 """
 
 from __future__ import annotations
@@ -20,18 +17,22 @@ from pathlib import Path
 from doe.table_file import read_table as read_cells
 
 LENGTH = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
-
 AREA = {"m2": 1.0, "cm2": 1e-4, "mm2": 1e-6}
-
 FORCE = {"N": 1.0, "kN": 1e3, "mN": 1e-3}
-
 MASS = {"kg": 1.0, "g": 1e-3, "mg": 1e-6}
-
 ANGLE = {"deg": math.pi / 180.0, "rad": 1.0}
-
 SPEED = {"m_s": 1.0, "cm_s": 1e-2, "mm_s": 1e-3}
-
 DENSITY = {"kg_m3": 1.0, "g_cm3": 1e3}
+COMPONENT = ("component",)
+PAIR = ("a", "b")
+MOST_BYTES = 50_000_000
+NAME = re.compile(r"[A-Za-z0-9_-]{1,60}")
+"""What a component may be called: its name becomes part of a parameter's path."""
+REPLICATE, NOTE = "replicate", "note"
+
+
+class LaboratoryError(ValueError):
+    """Readings that nothing can be computed from; one line naming file, row, column and what is allowed."""
 
 
 @dataclass(frozen=True)
@@ -71,11 +72,6 @@ class Column:
         return f"{number} {unit}" if bounds else f"{number} in {unit}"
 
 
-def positive(stem: str, units: dict[str, float], needed: bool = True) -> Column:
-    """A column of numbers above zero."""
-    return Column(stem, units, low=0.0, needed=needed)
-
-
 @dataclass(frozen=True)
 class Layout:
     """What a test's table looks like: columns of names that tell specimens apart, and columns of numbers."""
@@ -86,75 +82,12 @@ class Layout:
     """Whether one replicate may be many rows, the points of a curve."""
 
 
-COMPONENT = ("component",)
-
-PAIR = ("a", "b")
-
-FORCE_DISPLACEMENT = Layout(
-    COMPONENT,
-    (
-        positive("thickness", LENGTH),
-        positive("area", AREA),
-        Column("displacement", LENGTH),
-        Column("force", FORCE),
-    ),
-    curves=True,
-)
-
 INCLINED_PLANE = Layout(PAIR, (Column("angle", ANGLE, low=0.0, high=math.pi / 2.0, zero=True),))
-
-DROP = Layout(
-    PAIR,
-    (
-        positive("drop_height", LENGTH),
-        positive("distance", LENGTH, needed=False),
-        Column("v_x", SPEED, needed=False),
-        Column("v_z", SPEED, needed=False),
-    ),
-)
-
-MOISTURE = Layout(
-    COMPONENT,
-    (positive("mass_before", MASS), positive("mass_after", MASS), positive("mass_container", MASS, needed=False)),
-)
-
-IMMERSION = Layout(
-    COMPONENT,
-    (
-        positive("mass", MASS),
-        Column("mass_reference", MASS, low=0.0, zero=True),
-        Column("mass_with_sample", MASS),
-        positive("liquid_density", DENSITY),
-        positive("mass_soaked", MASS, needed=False),
-    ),
-)
-
 COMPOSITION = Layout(COMPONENT, (Column("mass", MASS, low=0.0, zero=True),))
-
-DIMENSIONS = Layout(
-    COMPONENT,
-    (
-        positive("length", LENGTH),
-        positive("width", LENGTH),
-        Column("thickness", LENGTH, low=0.0, needed=False, blank=True),
-    ),
-)
-
-MOST_BYTES = 50_000_000
-
-NAME = re.compile(r"[A-Za-z0-9_-]{1,60}")
-
-"""What a component may be called: its name becomes part of a parameter's path."""
-
-REPLICATE, NOTE = "replicate", "note"
-
-
-class LaboratoryError(ValueError):
-    """Readings that nothing can be computed from; one line naming file, row, column and what is allowed."""
 
 
 @dataclass(frozen=True)
-class Row:
+class Reading:
     """One reading: its row in the file, whose it is, and the numbers by column (SI)."""
 
     line: int
@@ -168,17 +101,17 @@ class Table:
     """All readings of a file, in its order."""
 
     file: str
-    rows: tuple[Row, ...]
+    rows: tuple[Reading, ...]
 
-    def groups(self) -> dict[tuple[str, ...], tuple[Row, ...]]:
+    def groups(self) -> dict[tuple[str, ...], tuple[Reading, ...]]:
         """Rows by whose they are; a pair means the same in either order."""
-        found: dict[tuple[str, ...], list[Row]] = {}
+        found: dict[tuple[str, ...], list[Reading]] = {}
         for row in self.rows:
             turned = row.of[::-1]
             found.setdefault(turned if turned in found else row.of, []).append(row)
         return {of: tuple(rows) for of, rows in found.items()}
 
-    def wrong(self, row: Row, column: str, text: str) -> LaboratoryError:
+    def wrong(self, row: Reading, column: str, text: str) -> LaboratoryError:
         """An error about one cell."""
         return LaboratoryError(f"{self.file}, row {row.line}, column {column}: {text}")
 
@@ -205,6 +138,54 @@ def read_table(path: Path, layout: Layout) -> Table:
     if not layout.curves:
         _check_single(table)
     return table
+
+
+def positive(stem: str, units: dict[str, float], needed: bool = True) -> Column:
+    """A column of numbers above zero."""
+    return Column(stem, units, low=0.0, needed=needed)
+
+
+FORCE_DISPLACEMENT = Layout(
+    COMPONENT,
+    (
+        positive("thickness", LENGTH),
+        positive("area", AREA),
+        Column("displacement", LENGTH),
+        Column("force", FORCE),
+    ),
+    curves=True,
+)
+DROP = Layout(
+    PAIR,
+    (
+        positive("drop_height", LENGTH),
+        positive("distance", LENGTH, needed=False),
+        Column("v_x", SPEED, needed=False),
+        Column("v_z", SPEED, needed=False),
+    ),
+)
+MOISTURE = Layout(
+    COMPONENT,
+    (positive("mass_before", MASS), positive("mass_after", MASS), positive("mass_container", MASS, needed=False)),
+)
+IMMERSION = Layout(
+    COMPONENT,
+    (
+        positive("mass", MASS),
+        Column("mass_reference", MASS, low=0.0, zero=True),
+        Column("mass_with_sample", MASS),
+        positive("liquid_density", DENSITY),
+        positive("mass_soaked", MASS, needed=False),
+    ),
+)
+DIMENSIONS = Layout(
+    COMPONENT,
+    (
+        positive("length", LENGTH),
+        positive("width", LENGTH),
+        Column("thickness", LENGTH, low=0.0, needed=False, blank=True),
+    ),
+)
 
 
 def _columns(where: str, header: list[str], layout: Layout) -> dict[str, Column]:
@@ -252,7 +233,7 @@ def _row(
     columns: dict[str, Column],
     layout: Layout,
     number: Callable[[str], float],
-) -> Row:
+) -> Reading:
     for key in (*layout.keys, REPLICATE):
         if not NAME.fullmatch(cells[key]):
             raise LaboratoryError(f"{where}, column {key}: {cells[key]!r}; allowed: letters, digits, _ and -")
@@ -261,7 +242,7 @@ def _row(
         for name, column in columns.items()
         if cells[name] or not column.blank
     }
-    return Row(line, tuple(cells[key] for key in layout.keys), cells[REPLICATE], values)
+    return Reading(line, tuple(cells[key] for key in layout.keys), cells[REPLICATE], values)
 
 
 def _value(where: str, name: str, text: str, column: Column, number: Callable[[str], float]) -> float:

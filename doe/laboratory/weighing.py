@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from doe.laboratory.result import Derived, derived, no_parameter, per_row
-from doe.laboratory.tables import LaboratoryError, Row, Table
+from doe.laboratory.tables import LaboratoryError, Reading, Table
 
 FRACTIONS = "the fractions of a sample add up to one, so that their errors hang together"
 
@@ -77,23 +77,23 @@ def composition(table: Table, left_out: Collection[str] = ()) -> tuple[Derived, 
     )
 
 
-def _container(row: Row) -> float:
+def _container(row: Reading) -> float:
     return row.values.get("mass_container", 0.0)
 
 
-def _wet(row: Row) -> float:
+def _wet(row: Reading) -> float:
     return (row.values["mass_before"] - row.values["mass_after"]) / (row.values["mass_before"] - _container(row))
 
 
-def _dry(row: Row) -> float:
+def _dry(row: Reading) -> float:
     return (row.values["mass_before"] - row.values["mass_after"]) / (row.values["mass_after"] - _container(row))
 
 
-def _displaced(row: Row) -> float:
+def _displaced(row: Reading) -> float:
     """Mass of the liquid that the sample displaces [kg]."""
     filled = row.values.get("mass_soaked", row.values["mass"])
     return filled + row.values["mass_reference"] - row.values["mass_with_sample"]
 
 
-def _density(row: Row) -> float:
+def _density(row: Reading) -> float:
     return row.values["mass"] * row.values["liquid_density"] / _displaced(row)

@@ -27,7 +27,7 @@ UNIT_SUFFIXES = ("m", "cm", "mm", "um", "s", "ms", "kg", "g", "mg", "deg", "rad"
 
 
 @dataclass(frozen=True)
-class Row:
+class LongRow:
     """One number of the table, SI."""
 
     line: int
@@ -63,14 +63,14 @@ def read_long_form(path: Path) -> LongForm:
         raise MeasurementError(
             f"{path}: replicate: {missing[0]} is missing of {replicates}; allowed: numbers from 1 on"
         )
-    by_name: dict[str, list[Row]] = {}
+    by_name: dict[str, list[LongRow]] = {}
     for row in rows:
         by_name.setdefault(row.observable, []).append(row)
     values = {name: _array(path, by_name[name], replicates) for name in sorted(by_name)}
     return LongForm(replicates, values, tuple(sorted(unknown)))
 
 
-def _rows(path: Path) -> Iterator[Row | str]:
+def _rows(path: Path) -> Iterator[LongRow | str]:
     """Rows in order; of a row with an unknown observable its name."""
     table = read_table(path, MOST_BYTES, MeasurementError, ":{}", comments=True)
     if not table.rows:
@@ -86,7 +86,7 @@ def _rows(path: Path) -> Iterator[Row | str]:
         yield _row(f"{path}:{line}", line, dict(zip(header, cells, strict=True)), table.number)
 
 
-def _row(where: str, line: int, cells: dict[str, str], number: Callable[[str], float]) -> Row | str:
+def _row(where: str, line: int, cells: dict[str, str], number: Callable[[str], float]) -> LongRow | str:
     name = cells["observable"]
     known = named(name)
     if known is None:
@@ -98,7 +98,7 @@ def _row(where: str, line: int, cells: dict[str, str], number: Callable[[str], f
         kind = "an empty x (it is a scalar)" if known.x_unit is None else f"a place x in {known.x_unit} (it is a curve)"
         raise MeasurementError(f"{where}: {name}: x is {cells['x']!r}; allowed: {kind}")
     x = None if known.x_unit is None else _finite(where, "x", cells["x"], known.x_unit, number)
-    return Row(line, int(cells["replicate"]), name, x, _value(where, cells, known.unit, number))
+    return LongRow(line, int(cells["replicate"]), name, x, _value(where, cells, known.unit, number))
 
 
 def _value(where: str, cells: dict[str, str], unit: str, number: Callable[[str], float]) -> float:
@@ -129,7 +129,7 @@ def _refuse_wrong_unit(where: str, name: str) -> None:
             raise MeasurementError(f"{where}: observable: {name!r} has a wrong or missing unit; allowed: {right}")
 
 
-def _array(path: Path, rows: list[Row], replicates: int) -> tuple[Array | None, Array]:
+def _array(path: Path, rows: list[LongRow], replicates: int) -> tuple[Array | None, Array]:
     places = sorted({row.x for row in rows if row.x is not None})
     column = {x: k for k, x in enumerate(places)}
     values = np.full((replicates, max(1, len(places))), np.nan)

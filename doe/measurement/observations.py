@@ -1,13 +1,12 @@
-"""Table and scanned piles of one condition → its observations.
+"""What was observed in one condition: by its table, scanned piles and photographs, and by a run, in one vocabulary.
 
 What raw data give is computed from them, by the functions that read our runs: pile observables from scanned piles, and
 where there are none from photographs; the slopes in a drum from the listed surface profile. The table's values of those
 only serve as a cross-check.
 
-What a condition's observables are in one replicate of the data, and in one run: two sources, one vocabulary.
-
-A reading is a number, or the values of a curve at the places that the data list. The slopes of a drum's free surface
-are taken over the listed places, in data and runs alike, where the data have the profile.
+A reading of one replicate of the data, or of one run, is a number, or the values of a curve at the places that the data
+list. The slopes of a drum's free surface are taken over the listed places, in data and runs alike, where the data have
+the profile.
 """
 
 from __future__ import annotations
@@ -26,48 +25,15 @@ from doe.measurement.piles import pile_values, read_piles
 from solver import Record, Scene, named, observe_named, slope_angle_deg
 
 Array = npt.NDArray[np.float64]
-
 Readings = dict[str, float | Array]
+Values = dict[str, tuple[Array | None, Array]]
+Origin = Literal["table", "piles", "photographs", "profile"]
 
 PROFILE = "surface_profile_m"
-
 CORE = 10.0e-3
-
 """Half width [m] within which, ends excluded, ``slope_core_deg`` is taken."""
-
 SLOPES = {"slope_deg": np.inf, "slope_core_deg": float(np.nextafter(CORE, 0.0))}
-
 """Slopes of the profile: name → largest |x| [m] of the places that count."""
-
-
-def readings_of_data(condition: Condition, replicate: int) -> Readings:
-    """Readings of one replicate of the data, numbered from 1; NaN where nothing was measured."""
-    return {
-        observation.observable: float(row) if np.ndim(row) == 0 else row
-        for observation in condition.observations
-        for row in [observation.values[replicate - 1]]
-    }
-
-
-def readings_of_record(condition: Condition, record: Record) -> Readings:
-    """The same readings of a run, whatever its outcome; NaN where one cannot be read."""
-    places = {observation.observable: observation.x for observation in condition.observations}
-    readings: Readings = observe_named(record, places)
-    x = places.get(PROFILE)
-    if x is not None:
-        for name in SLOPES.keys() & readings.keys():
-            readings[name] = slope_of_profile(name, x, np.asarray(readings[PROFILE]))
-    return readings
-
-
-def slope_of_profile(name: str, x: Array, height: Array) -> float:
-    """Slope [°] called ``name`` of the surface ``height`` [m] at ``x`` [m], (k,) each; NaN below three places."""
-    return slope_angle_deg(x, height, SLOPES[name])
-
-
-Values = dict[str, tuple[Array | None, Array]]
-
-Origin = Literal["table", "piles", "photographs", "profile"]
 
 
 def read_observations(
@@ -127,6 +93,31 @@ def read_observations(
             observations.append(observation)
     ordered = tuple(sorted(observations, key=lambda observation: observation.observable))
     return replicates, ordered, tuple(checks), tuple(ignored)
+
+
+def readings_of_data(condition: Condition, replicate: int) -> Readings:
+    """Readings of one replicate of the data, numbered from 1; NaN where nothing was measured."""
+    return {
+        observation.observable: float(row) if np.ndim(row) == 0 else row
+        for observation in condition.observations
+        for row in [observation.values[replicate - 1]]
+    }
+
+
+def readings_of_record(condition: Condition, record: Record) -> Readings:
+    """The same readings of a run, whatever its outcome; NaN where one cannot be read."""
+    places = {observation.observable: observation.x for observation in condition.observations}
+    readings: Readings = observe_named(record, places)
+    x = places.get(PROFILE)
+    if x is not None:
+        for name in SLOPES.keys() & readings.keys():
+            readings[name] = slope_of_profile(name, x, np.asarray(readings[PROFILE]))
+    return readings
+
+
+def slope_of_profile(name: str, x: Array, height: Array) -> float:
+    """Slope [°] called ``name`` of the surface ``height`` [m] at ``x`` [m], (k,) each; NaN below three places."""
+    return slope_angle_deg(x, height, SLOPES[name])
 
 
 def _padded(given: Mapping[str, tuple[Array | None, Array]], replicates: int) -> Values:

@@ -4,10 +4,9 @@
 
 Without low or high the range is mean ± 3 sd. A range is clipped to what the parameter may be at all.
 
-A parameter's range, narrowed to what the rigs of all conditions allow.
-
-A declared range says what a number may be by itself; a drum of 111 mL, for one, can be filled to 55 mL only. The end of
-a range that some condition's scene refuses is moved inward to the last value that it takes, by bisection.
+A declared range says what a number may be by itself, and is narrowed to what the rigs of all conditions allow: a drum
+of 111 mL, for one, can be filled to 55 mL only. The end of a range that some condition's scene refuses is moved inward
+to the last value that it takes, by bisection.
 """
 
 from __future__ import annotations

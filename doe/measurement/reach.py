@@ -23,7 +23,7 @@ DISCHARGE = ("discharge_", "discharged_mass_kg", "residual_mass_kg")
 
 
 @dataclass(frozen=True)
-class Resolution(Record):
+class SummaryResolution(Record):
     """How well a condition's replicates fix the mean of one summary."""
 
     summary: str
@@ -45,7 +45,7 @@ class ConditionReach(Record):
     replicates: int
     mean_of: int
     """Pours behind each replicate."""
-    resolutions: tuple[Resolution, ...]
+    resolutions: tuple[SummaryResolution, ...]
 
 
 @dataclass(frozen=True)
@@ -101,15 +101,15 @@ def _condition_reach(condition: Condition) -> ConditionReach:
     return ConditionReach(condition.name, condition.role, condition.replicates, condition.mean_of, resolutions)
 
 
-def _resolution(name: str, unit: str, values: np.typing.NDArray[np.float64], stated: float) -> Resolution:
+def _resolution(name: str, unit: str, values: np.typing.NDArray[np.float64], stated: float) -> SummaryResolution:
     measured = values[np.isfinite(values)]
     n = measured.size
     mean = float(measured.mean()) if n else float("nan")
     if n >= 2:
         sd = float(measured.std(ddof=1))
         error = sd / np.sqrt(n)
-        return Resolution(name, unit, n, mean, sd, float(error), float(stats.t.ppf(0.975, n - 1) * error))
-    return Resolution(name, unit, n, mean, stated, stated, float(stats.norm.ppf(0.975)) * stated)
+        return SummaryResolution(name, unit, n, mean, sd, float(error), float(stats.t.ppf(0.975, n - 1) * error))
+    return SummaryResolution(name, unit, n, mean, stated, stated, float(stats.norm.ppf(0.975)) * stated)
 
 
 def _warnings(reach: Reach) -> tuple[str, ...]:

@@ -12,7 +12,6 @@ from doe.record import Record
 FloatArray = npt.NDArray[np.float64]
 
 LEAST_ERROR = 1e-4
-
 """Standard error [m] below which no height is known: the plate far from the pile is bare in every pour."""
 
 

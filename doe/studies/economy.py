@@ -25,11 +25,8 @@ from doe.studies.study import Study
 from solver import Scene, observable_names, parameters, value, with_values
 
 MARGIN = 0.3
-
 """Of a mean, in standard deviations of one pour with the full settings."""
-
 ALPHA, POWER = 0.05, 0.9
-
 COMPARED = (
     "angle_of_repose_deg",
     "angle_of_repose_cone_deg",
@@ -38,11 +35,8 @@ COMPARED = (
     "bulk_density_kg_m3",
     "discharge_time_s",
 )
-
 """What has to stay: the slope read off the silhouette and off the surface, height, spread, packing and flow."""
-
 SHARE_ALPHA = 0.01
-
 """Level at which the shares of valid pours count as different (Fisher's exact test)."""
 
 
@@ -80,7 +74,7 @@ ECONOMIES: Mapping[str, Economy] = {
 
 
 @dataclass(frozen=True)
-class Compared(Record):
+class ComparedMeans(Record):
     """One observable at one setting, with the economy and without."""
 
     setting: str
@@ -115,7 +109,7 @@ class EconomyTest(Record):
     economy: str
     pours: int
     """Of each kind at each setting."""
-    compared: tuple[Compared, ...]
+    compared: tuple[ComparedMeans, ...]
     shares: tuple[Shares, ...]
     cost: float
     """Wall time of an economical pour over that of a full one, mean over the settings."""
@@ -172,7 +166,7 @@ def judged(study: Study, economy: Economy, rows: Sequence[Sequence[Run]], pours:
     """The comparison of what has been poured; ``rows`` as :func:`rows_of` has them."""
     names = list(settings_of(study))
     asked = [one for one in COMPARED if one in observable_names(study.scene)]
-    compared: list[Compared] = []
+    compared: list[ComparedMeans] = []
     shares: list[Shares] = []
     costs = []
     for k, name in enumerate(names):
@@ -188,17 +182,17 @@ def judged(study: Study, economy: Economy, rows: Sequence[Sequence[Run]], pours:
 
 def _observables(
     name: str, observables: Sequence[str], full: Sequence[Run], cheap: Sequence[Run]
-) -> Iterator[Compared]:
+) -> Iterator[ComparedMeans]:
     for observable in observables:
         one, two = (_values(runs, observable) for runs in (full, cheap))
         base, other = (Sample.of(x) if len(x) else Sample(math.nan, math.nan, 0) for x in (one, two))
         margin = MARGIN * base.sd
         # What cannot be tested (hardly a valid pour, or no scatter) is not shown to be alike.
         if min(base.n, other.n) < 2 or not margin > 0.0:
-            yield Compared(name, observable, base, other, margin, math.nan, math.nan, math.nan, False)
+            yield ComparedMeans(name, observable, base, other, margin, math.nan, math.nan, math.nan, False)
         else:
             test = equivalence_test(welch_test(other, base), margin, ALPHA)
-            yield Compared(name, observable, base, other, margin, test.low, test.high, test.p, test.equivalent)
+            yield ComparedMeans(name, observable, base, other, margin, test.low, test.high, test.p, test.equivalent)
 
 
 def _values(runs: Sequence[Run], observable: str) -> npt.NDArray[np.float64]:

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from solver import ParameterError, Scene, body_counts, canonical, parameters, with_values
 
 MIN_BODIES = 5
-
 """A factor that touches fewer bodies than this cannot be tested: its effect is that of a handful of places."""
 
 

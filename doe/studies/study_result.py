@@ -31,9 +31,7 @@ StageResult = (
     | VerificationResult
     | FurtherResult
 )
-
 USUAL_DESIGNS = {"screening": "Plackett–Burman", "assumptions": "Plackett–Burman", "surface": "Box–Behnken"}
-
 """Stage → title of its design, where a result says none: those of versions in which there was no choice."""
 
 
@@ -132,7 +130,6 @@ class Stages(Record):
 
 
 OWN_STAGES = tuple(one.name for one in fields(Stages) if one.name != "further")
-
 """The stages of this package, in running order."""
 
 

@@ -1,18 +1,16 @@
 """Made-up laboratories: data with a truth that the diagnosis cannot read, and how often it finds it.
 
     laboratories/      files of laboratories: bodies, rig, conditions, what is handed out
-    schedule.py        which truths are asked for, by root and number of the data set
-    truth.py           parameters and amplitudes of a truth of a given strength
+    truth.py           which truths are asked for, and the parameters and amplitudes of each
     outside.py         effects that no library holds
     work_place.py      pours in worker processes, and the clock
     scanner.py         a made-up scanner
     laboratory.py      reads such a file; pours → a folder of measured data, with scans or without
-    answers.py         truths → folders → verdicts → rows
-    sets.py rates.py   rows in sets.jsonl, what an answer is worth, rates and targets
+    sets.py            rows in sets.jsonl, what an answer is worth, rates and targets
     reference.py       pours of every effect, many of each, that tell how strong it is
-    ruler.py limit.py  its strength in σ, and how often any method could name it
+    limit.py           its strength in σ, and how often any method could name it
     replay.py          the rule of the diagnosis on reference pours
-    campaign.py        all of it, for ``explorer validate-diagnosis``
+    campaign.py        all of it, truths → folders → verdicts → rows, for ``explorer validate-diagnosis``
 
 The diagnosis is given the folder and nothing else: no truth, no label, no number.
 """

@@ -1,10 +1,9 @@
-"""The blind campaign: laboratories pour, the diagnosis answers, and the answers are kept.
+"""The blind campaign, from cases to rows: laboratories pour, the diagnosis answers, and the answers are kept.
 
-A set takes ``REPLICATES`` pours per condition and is judged twice, by its table of numbers alone and with its scans.
-The pours that teach belong to the declared model, so that sets share them through the store. Two processes with
-``--shard 1/2`` and ``--shard 2/2`` work on one campaign.
-
-From cases to rows: truths are drawn, poured, judged with and without scans, and tried on what was held out.
+Truths are drawn, poured, judged with and without scans, and tried on what was held out. A set takes ``REPLICATES``
+pours per condition and is judged twice, by its table of numbers alone and with its scans. The pours that teach belong
+to the declared model, so that sets share them through the store. Two processes with ``--shard 1/2`` and ``--shard 2/2``
+work on one campaign.
 """
 
 import os
@@ -21,46 +20,126 @@ from doe.declared.model import declare
 from doe.declared.points import Point
 from doe.declared.pours import ModelPours, room_of
 from doe.diagnose.budget import Budget
+from doe.diagnose.candidate_experiments import as_suggested
 from doe.diagnose.diagnosis import concluded, errors_of, joined, pursued, suggested
-from doe.diagnose.menu import as_suggested
 from doe.diagnose.result import Suggestion
-from doe.diagnose.teaching import Teacher
+from doe.diagnose.training_pours import TrainingPours
 from doe.diagnose.verdict import verdict_of
 from doe.measurement import Condition, Measurement, load_measurement
 from doe.measurement.features import SCALARS, SCAN, feature_set
 from doe.store import Store, default_store
-from doe.validation.laboratory import TREFOILS, Laboratory, Sample, read_laboratory
+from doe.validation.laboratory import TREFOILS, Laboratory, LaboratoryPour, read_laboratory
 from doe.validation.limit import limit_study
 from doe.validation.outside import AMPLITUDE, DEVELOPMENT, possible
 from doe.validation.reference import ROOT as REFERENCE_ROOT
 from doe.validation.reference import extended_to, kept
 from doe.validation.scanner import Scanner
-from doe.validation.sets import NONE, OUT_OF_REACH, Row, append_rows, read_rows
+from doe.validation.sets import NONE, OUT_OF_REACH, SetRow, append_rows, read_rows
 from doe.validation.truth import REPLICATES, ROOT, Case, Strengths, Truth, cases, strengths_of, truth_of
-from doe.validation.work_place import Order, OutOfTimeError, WorkPlace, complete
+from doe.validation.work_place import OutOfTimeError, PourOrder, WorkPlace, complete
 from solver import EFFECTS, PHYSICS
 
-TRIES = 3
-
-"""Times that a laboratory pours ``REPLICATES`` more to replace pours that jammed."""
-
-OFFERS = (SCALARS, SCAN)
-
-"""Kinds of data by which every set is judged."""
-
-NAN = float("nan")
-
-Data = dict[str, list[Sample]]
-
+Data = dict[str, list[LaboratoryPour]]
 """Pours per condition."""
+Say = Callable[[str], None]
+
+TRIES = 3
+"""Times that a laboratory pours ``REPLICATES`` more to replace pours that jammed."""
+OFFERS = (SCALARS, SCAN)
+"""Kinds of data by which every set is judged."""
+NAN = float("nan")
+SETS = "sets.jsonl"
+ROUNDS = 4
+"""Rounds of reference pours for a laboratory that has none: 48 pours of each effect, strengths to some 8 %."""
+
+
+@dataclass(frozen=True)
+class CampaignOrder:
+    """What is asked for.
+
+    minutes: stop after so long, infinite by default; 0: judge nothing. shard: every ``of``-th set from the ``shard``-th
+    on. wide: sets of all strengths, for development. follow_up: whether ambiguous answers are followed up, which takes
+    most of the time. cases: instead of the schedule's. strengths: instead of those by the laboratory's reference pours.
+    """
+
+    out: Path
+    number: int
+    root: int = 1
+    store: Path | None = None
+    minutes: float = float("inf")
+    workers: int | None = None
+    shard: int = 1
+    of: int = 1
+    wide: bool = False
+    follow_up: bool = True
+    laboratory: Path = TREFOILS
+    effects: tuple[str, ...] = tuple(EFFECTS)
+    budget: Budget = Budget()
+    cases: tuple[Case, ...] = ()
+    strengths: Strengths | None = None
+
+    def asked(self, laboratory: Laboratory) -> tuple[Case, ...]:
+        """The data sets."""
+        kinds = possible(laboratory.declared.scene, DEVELOPMENT if self.wide else tuple(AMPLITUDE))
+        found = self.cases or tuple(cases(self.root, self.number, kinds, self.wide))
+        return found[self.shard - 1 :: self.of]
 
 
 @dataclass(frozen=True)
 class Judged:
     """The row of a data set, and what to measure next where the answer is ambiguous."""
 
-    row: Row
+    row: SetRow
     suggestion: Suggestion | None
+
+
+def run_campaign(order: CampaignOrder, say: Say) -> list[SetRow]:
+    """Answer the data sets that ``sets.jsonl`` does not hold yet, until all are there or the time is over."""
+    order.out.mkdir(parents=True, exist_ok=True)
+    path, laboratory = order.out / SETS, read_laboratory(order.laboratory)
+    title, asked = laboratory.declared.title, order.asked(laboratory)
+    known = {(row.root, row.number) for row in read_rows(path) if row.laboratory == title}
+    todo = [case for case in asked if case.seed not in known]
+    say(f"{path}: {len(asked) - len(todo)} of {len(asked)} data sets are there")
+    deadline = time.monotonic() + 60.0 * order.minutes
+    if todo and order.minutes > 0.0:
+        with ExitStack() as stack:
+            store = Store(order.store or default_store())
+            stack.callback(store.close)
+            place = stack.enter_context(WorkPlace(store, order.workers or os.cpu_count() or 1, deadline))
+            try:
+                strengths = order.strengths or measured_strengths(order, laboratory, place, say)
+                answers = Answers(laboratory, strengths, place, order.budget, order.follow_up)
+                for case in todo:
+                    rows = answers.rows(case)
+                    append_rows(path, rows)
+                    for row in rows:
+                        what = f"{row.kind} {row.label} {row.strength:g}, {row.offer}"
+                        say(f"{row.number}: {what}: {row.verdict} ({row.answer}), {row.seconds:.0f} s")
+            except OutOfTimeError:
+                say(f"{order.minutes:g} min are over; all pours are kept, and the same command goes on")
+    wanted = {case.seed for case in asked}
+    return [row for row in read_rows(path) if row.laboratory == title and (row.root, row.number) in wanted]
+
+
+def measured_strengths(order: CampaignOrder, laboratory: Laboratory, place: WorkPlace, say: Say) -> Strengths:
+    """Amplitudes of given strengths by the laboratory's reference pours, which are made where it has none."""
+    measurement = laboratory.declared
+    declared = declare(measurement, order.effects)
+    path = laboratory.reference or order.out / f"reference_{measurement.title}.npz"
+    found = kept(path, measurement, PHYSICS)
+    if laboratory.reference is None:
+        paths = [parameter.path for parameter in measurement.parameters]
+        pours = ModelPours(measurement.fit, paths, place.store, place.pours, place.look_at_the_clock, REFERENCE_ROOT)
+        found = extended_to(found, ROUNDS, declared, pours, path, say)
+    numbers = [feature_set(condition).offered(SCALARS) for condition in measurement.fit]
+    study = limit_study(found.sample, found.levels, {SCALARS: numbers})
+    effects = {one.kind.name: one.kind.effect for one in study.reached}
+    cosines: dict[frozenset[str], float] = {}
+    for pair in study.confusable:
+        both = frozenset((effects[pair.first], effects[pair.second]))
+        cosines[both] = max(cosines.get(both, 0.0), abs(pair.cosine))
+    return strengths_of(study.reached, declared, cosines)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +158,7 @@ class Answers:
         """The declared model."""
         return self.laboratory.declared
 
-    def rows(self, case: Case) -> list[Row]:
+    def rows(self, case: Case) -> list[SetRow]:
         """Rows of ``case``, one for each kind of data."""
         began = time.monotonic()
         truth = truth_of(case, self.strengths)
@@ -94,7 +173,7 @@ class Answers:
             rows[-1] = replace(rows[-1], seconds=poured + time.monotonic() - began)
         return rows
 
-    def judged(self, truth: Truth, data: Data, offer: str) -> Row:
+    def judged(self, truth: Truth, data: Data, offer: str) -> SetRow:
         """The row of a data set that is written to a folder and read like any other, with a follow-up if one is due."""
         seed = (ROOT, *truth.case.seed)
         rng = np.random.default_rng([*seed, 1])
@@ -124,15 +203,15 @@ class Answers:
         if follow_up is not None:
             measurement = joined(measurement, follow_up)
         fitted, held = self.model_pours(measurement.fit), self.model_pours(measurement.holdout)
-        teacher = Teacher(declared, measurement.fit, fitted, self.budget, say)
-        compared = pursued(teacher, measurement.fit, self.budget, say)
-        verdict = verdict_of(compared, declared, teacher.levels, teacher.pours, follow_up is not None)
+        training = TrainingPours(declared, measurement.fit, fitted, self.budget, say)
+        compared = pursued(training, measurement.fit, self.budget, say)
+        verdict = verdict_of(compared, declared, training.levels, training.pours, follow_up is not None)
         conclusion, verdict = concluded(verdict, compared, declared, measurement.holdout, held, say)
         found = compared.posterior
         suggestion = None
         if self.follow_up and follow_up is None:
-            menu = suggested(verdict, found, teacher, measurement.fit, self.model_pours)
-            suggestion = next(iter(menu.suggestions), None)
+            candidates = suggested(verdict, found, training, measurement.fit, self.model_pours)
+            suggestion = next(iter(candidates.suggestions), None)
         best, best_p = found.best
         label = label_of(truth)
         named = {frozenset(name.split("+")) for name in verdict.names}
@@ -143,7 +222,7 @@ class Answers:
         off = [found.fits[one].theta - theta for one in ("base", verdict.final)] if right else []
         bias_before, bias_after = (float(np.sqrt((d**2).mean())) for d in off) if off else (NAN, NAN)
         told = conclusion.held_out
-        row = Row(
+        row = SetRow(
             laboratory=self.measurement.title,
             root=truth.case.root,
             number=truth.case.number,
@@ -206,20 +285,20 @@ class Answers:
                 return data
         return None
 
-    def orders(self, truth: Truth, condition: Condition, numbers: Sequence[int], occasion: str = "") -> list[Order]:
+    def orders(self, truth: Truth, condition: Condition, numbers: Sequence[int], occasion: str = "") -> list[PourOrder]:
         """Pours ``numbers`` of a laboratory in a condition; their seeds follow from root and number of the set."""
         paths = [parameter.path for parameter in self.measurement.parameters]
         laboratory = ModelPours([condition], paths, self.place.store, self.place.pours, root=ROOT)
         name = f"set {truth.case.root}.{truth.case.number} {condition.name}{occasion}"
         points = [Point(name, k, truth.theta, truth.effects) for k in numbers]
         outside = truth.case.label if truth.case.kind == "outside" else ""
-        return [Order(laboratory.scene(p, 0), laboratory.seed(p, 0), condition, outside) for p in points]
+        return [PourOrder(laboratory.scene(p, 0), laboratory.seed(p, 0), condition, outside) for p in points]
 
-    def out_of_reach(self, truth: Truth, offer: str) -> Row:
+    def out_of_reach(self, truth: Truth, offer: str) -> SetRow:
         """The row of a truth that cannot be, or whose pours keep breaking off."""
         verdict = OUT_OF_REACH + (truth.missing or "pours break off")
         case, title = truth.case, self.measurement.title
-        return Row(title, case.root, case.number, case.kind, label_of(truth), case.strength, amplitude_text(truth),
+        return SetRow(title, case.root, case.number, case.kind, label_of(truth), case.strength, amplitude_text(truth),
                    offer, verdict, "", "", NAN, NAN, "", NAN, NAN, {}, {}, NAN, NAN, NAN, NAN, NAN, 0, 0.0)  # fmt: skip
 
     def model_pours(self, conditions: Sequence[Condition], place: int | None = None) -> ModelPours:
@@ -242,93 +321,3 @@ def amplitude_text(truth: Truth) -> str:
 
 def _silent(line: str) -> None:
     """Say nothing."""
-
-
-SETS = "sets.jsonl"
-
-ROUNDS = 4
-
-"""Rounds of reference pours for a laboratory that has none: 48 pours of each effect, strengths to some 8 %."""
-
-Say = Callable[[str], None]
-
-
-@dataclass(frozen=True)
-class CampaignOrder:
-    """What is asked for.
-
-    minutes: stop after so long, infinite by default; 0: judge nothing. shard: every ``of``-th set from the ``shard``-th
-    on. wide: sets of all strengths, for development. follow_up: whether ambiguous answers are followed up, which takes
-    most of the time. cases: instead of the schedule's. strengths: instead of those by the laboratory's reference pours.
-    """
-
-    out: Path
-    number: int
-    root: int = 1
-    store: Path | None = None
-    minutes: float = float("inf")
-    workers: int | None = None
-    shard: int = 1
-    of: int = 1
-    wide: bool = False
-    follow_up: bool = True
-    laboratory: Path = TREFOILS
-    effects: tuple[str, ...] = tuple(EFFECTS)
-    budget: Budget = Budget()
-    cases: tuple[Case, ...] = ()
-    strengths: Strengths | None = None
-
-    def asked(self, laboratory: Laboratory) -> tuple[Case, ...]:
-        """The data sets."""
-        kinds = possible(laboratory.declared.scene, DEVELOPMENT if self.wide else tuple(AMPLITUDE))
-        found = self.cases or tuple(cases(self.root, self.number, kinds, self.wide))
-        return found[self.shard - 1 :: self.of]
-
-
-def run_campaign(order: CampaignOrder, say: Say) -> list[Row]:
-    """Answer the data sets that ``sets.jsonl`` does not hold yet, until all are there or the time is over."""
-    order.out.mkdir(parents=True, exist_ok=True)
-    path, laboratory = order.out / SETS, read_laboratory(order.laboratory)
-    title, asked = laboratory.declared.title, order.asked(laboratory)
-    known = {(row.root, row.number) for row in read_rows(path) if row.laboratory == title}
-    todo = [case for case in asked if case.seed not in known]
-    say(f"{path}: {len(asked) - len(todo)} of {len(asked)} data sets are there")
-    deadline = time.monotonic() + 60.0 * order.minutes
-    if todo and order.minutes > 0.0:
-        with ExitStack() as stack:
-            store = Store(order.store or default_store())
-            stack.callback(store.close)
-            place = stack.enter_context(WorkPlace(store, order.workers or os.cpu_count() or 1, deadline))
-            try:
-                strengths = order.strengths or measured_strengths(order, laboratory, place, say)
-                answers = Answers(laboratory, strengths, place, order.budget, order.follow_up)
-                for case in todo:
-                    rows = answers.rows(case)
-                    append_rows(path, rows)
-                    for row in rows:
-                        what = f"{row.kind} {row.label} {row.strength:g}, {row.offer}"
-                        say(f"{row.number}: {what}: {row.verdict} ({row.answer}), {row.seconds:.0f} s")
-            except OutOfTimeError:
-                say(f"{order.minutes:g} min are over; all pours are kept, and the same command goes on")
-    wanted = {case.seed for case in asked}
-    return [row for row in read_rows(path) if row.laboratory == title and (row.root, row.number) in wanted]
-
-
-def measured_strengths(order: CampaignOrder, laboratory: Laboratory, place: WorkPlace, say: Say) -> Strengths:
-    """Amplitudes of given strengths by the laboratory's reference pours, which are made where it has none."""
-    measurement = laboratory.declared
-    declared = declare(measurement, order.effects)
-    path = laboratory.reference or order.out / f"reference_{measurement.title}.npz"
-    found = kept(path, measurement, PHYSICS)
-    if laboratory.reference is None:
-        paths = [parameter.path for parameter in measurement.parameters]
-        pours = ModelPours(measurement.fit, paths, place.store, place.pours, place.look_at_the_clock, REFERENCE_ROOT)
-        found = extended_to(found, ROUNDS, declared, pours, path, say)
-    numbers = [feature_set(condition).offered(SCALARS) for condition in measurement.fit]
-    study = limit_study(found.sample, found.levels, {SCALARS: numbers})
-    effects = {one.kind.name: one.kind.effect for one in study.reached}
-    cosines: dict[frozenset[str], float] = {}
-    for pair in study.confusable:
-        both = frozenset((effects[pair.first], effects[pair.second]))
-        cosines[both] = max(cosines.get(both, 0.0), abs(pair.cosine))
-    return strengths_of(study.reached, declared, cosines)

@@ -45,7 +45,7 @@ Reading = Mapping[str, float]
 
 
 @dataclass(frozen=True)
-class Sample:
+class LaboratoryPour:
     """One pour as the laboratory has it: its readings, and the spheres (m, 3) and (m,) [m] that a scanner sees."""
 
     reading: Reading
@@ -110,7 +110,11 @@ class Laboratory:
             (folder / f"{name}.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
     def hand_out(
-        self, folder: Path, measured: Mapping[str, Sequence[Sample]], scanner: Scanner | None, seed: Sequence[int]
+        self,
+        folder: Path,
+        measured: Mapping[str, Sequence[LaboratoryPour]],
+        scanner: Scanner | None,
+        seed: Sequence[int],
     ) -> None:
         """Write a data set of pours into an existing ``folder``, with scans where there is a ``scanner``."""
         readings = {name: [sample.reading for sample in samples] for name, samples in measured.items()}

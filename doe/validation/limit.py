@@ -10,7 +10,8 @@ and mirror images of an effect that has a direction share its prior. Whoever nam
 if that is at least τ, names as often as can be at every risk of a wrong name: the risk–coverage curve. On average over
 the prior no rule that uses the same numbers does better; one that seems to has been given more than the data.
 
-How strong an effect is: its shift of the means of a data set, in standard errors, free of what noise adds to it.
+**The ruler** of this project, by which an effect is said to be 6 σ strong, is its shift of the means of a data set, in
+standard errors, free of what noise adds to it, in the scalars of the fitted conditions at ``REPLICATES`` pours each:
 
     d² = δᵀ M δ,    M = (Σ/n + J Jᵀ)⁻¹
 
@@ -24,9 +25,6 @@ Diedrichsen et al. 2016, arXiv 1607.01371, eq. 9):
 
 Its standard error is the jackknife's over folds and, in quadrature, d/√(2 df), for Σ is itself estimated. Σ is shrunk
 to its diagonal as far as its own scatter asks for (Schäfer & Strimmer 2005, doi 10.2202/1544-6115.1175).
-
-**The ruler** of this project, by which an effect is said to be 6 σ strong, is this distance in the scalars of the
-fitted conditions at ``REPLICATES`` pours each.
 """
 
 from __future__ import annotations
@@ -44,11 +42,27 @@ from doe.diagnose.levels import REPLICATES
 from doe.diagnose.result import Level
 from doe.errors import StatisticsError
 from doe.record import Record
-from doe.validation.reference import SIDE, Sample
+from doe.validation.reference import SIDE, ReferencePours
 
 FloatArray = npt.NDArray[np.float64]
 
 FOLDS = 8
+LEAST, MOST = 1.5, 20.0
+"""Range of an amplitude's prior, in standard errors on the ruler (scalars, six pours)."""
+NODES = 24
+"""Amplitudes over which the evidence is summed."""
+NOTHING = 0.5
+"""Prior that nothing is missing; effects share the rest alike."""
+RISKS = (0.003, 0.01, 0.03, 0.1)
+"""Shares of wrong names among the sets of a strength at which a coverage is stated."""
+RISK = 0.03
+"""The one of them at which an effect's own share is stated."""
+SETS = 4000
+"""Made-up data sets of each effect and strength."""
+STRENGTHS = (4.0, 6.0, 10.0)
+"""Strengths [σ] for which limits are stated."""
+CLASS = 0.95
+"""Cosine of two signatures above which data cannot tell the effects apart."""
 
 
 @dataclass(frozen=True)
@@ -74,140 +88,8 @@ class Strength(Record):
     error: float
 
 
-def metric_of(sample: Sample, replicates: int = REPLICATES) -> Metric:
-    """The metric of data sets of ``replicates`` pours per condition.
-
-    Parameters
-    ----------
-    sample
-        Reference pours; needs "base" and "<parameter> -", "<parameter> +" of every parameter.
-    replicates
-        n, pours in each condition.
-
-    Returns
-    -------
-    The metric, with calibrated parameters profiled out.
-
-    Raises
-    ------
-    StatisticsError
-        Where a condition has fewer than three pours of the base model.
-    """
-    sensitivity = np.column_stack(
-        [_slope(sample, name) for name in sample.parameters] or [np.zeros((_size(sample), 0))]
-    )
-    covariance = np.zeros((_size(sample), _size(sample)))
-    first, freedom = 0, sum(len(block) for block in sample.pours["base"])
-    for c, base in enumerate(sample.pours["base"]):
-        if len(base) < 3:
-            raise StatisticsError(f"base: {len(base)} pours of condition {c + 1}; allowed: at least 3")
-        last = first + base.shape[1]
-        residuals, groups = _residuals(sample, c)
-        covariance[first:last, first:last] = shrunk_covariance(residuals) / replicates
-        freedom = min(freedom, len(residuals) - groups)
-        first = last
-    covariance += sensitivity @ sensitivity.T
-    # In units of each feature's standard error: they span ten orders of magnitude.
-    scale = np.sqrt(np.diag(covariance))
-    factor = np.linalg.cholesky(covariance / np.outer(scale, scale))
-    return Metric(np.linalg.inv(factor) / scale, freedom)
-
-
-def fold_shifts(sample: Sample, name: str, metric: Metric, folds: int = FOLDS) -> FloatArray:
-    """Whitened shifts of ``name`` off the base model in each of the folds, (folds, D).
-
-    Raises StatisticsError where a fold would be empty.
-    """
-    least = min(len(block) for kind in (name, "base") for block in sample.pours[kind])
-    if least < folds:
-        raise StatisticsError(f"{name}: {least} pours in a condition that count; allowed: at least {folds}")
-    parts = []
-    for there, base in zip(sample.pours[name], sample.pours["base"], strict=True):
-        parts.append(_fold_means(there, folds) - _fold_means(base, folds))
-    return metric.white(np.concatenate(parts, axis=1))
-
-
-def product(first: FloatArray, second: FloatArray) -> float:
-    """Crossnobis product of two sets of fold shifts, (folds, D) each: no fold meets itself."""
-    folds = len(first)
-    whole = float(first.sum(axis=0) @ second.sum(axis=0))
-    return (whole - float((first * second).sum())) / (folds * (folds - 1))
-
-
-def strength_of(sample: Sample, name: str, metric: Metric) -> Strength:
-    """Length of the shift by ``name``, zero where its square comes out negative, with its standard error."""
-    shifts = fold_shifts(sample, name, metric)
-    folds = len(shifts)
-    square = product(shifts, shifts)
-    value = float(np.sqrt(max(0.0, square)))
-    without = np.array([product(rest, rest) for f in range(folds) for rest in [np.delete(shifts, f, axis=0)]])
-    spread = float(np.sqrt((folds - 1) / folds * ((without - without.mean()) ** 2).sum()))
-    # Of the square; that of its root by the delta method, and of a root near zero by the root of that.
-    error = spread / (2.0 * value) if square > spread else float(np.sqrt(spread))
-    return Strength(value, float(np.hypot(error, value / np.sqrt(2.0 * metric.freedom))))
-
-
-def _residuals(sample: Sample, condition: int) -> tuple[FloatArray, int]:
-    """Deviations from the mean of their kind, of base pours and of those with a parameter moved, and the kinds."""
-    kinds = ["base", *(f"{name} {side}" for name in sample.parameters for side in "-+")]
-    groups = [sample.pours[kind][condition] for kind in kinds]
-    # Each group's mean takes a degree of freedom.
-    scaled = [
-        (group - group.mean(axis=0)) * np.sqrt(len(group) / (len(group) - 1)) for group in groups if len(group) > 1
-    ]
-    return np.concatenate(scaled), len(scaled)
-
-
-def _slope(sample: Sample, parameter: str) -> FloatArray:
-    """What ``parameter`` does per standard deviation of its measurement, (D,)."""
-    low, high = sample.pours[f"{parameter} -"], sample.pours[f"{parameter} +"]
-    return np.concatenate([(b.mean(axis=0) - a.mean(axis=0)) / (2.0 * SIDE) for a, b in zip(low, high, strict=True)])
-
-
-def _fold_means(pours: FloatArray, folds: int) -> FloatArray:
-    """Means of every ``folds``-th pour, (folds, d)."""
-    return np.stack([pours[f::folds].mean(axis=0) for f in range(folds)])
-
-
-def _size(sample: Sample) -> int:
-    return sum(block.shape[1] for block in sample.pours["base"])
-
-
-LEAST, MOST = 1.5, 20.0
-
-"""Range of an amplitude's prior, in standard errors on the ruler (scalars, six pours)."""
-
-NODES = 24
-
-"""Amplitudes over which the evidence is summed."""
-
-NOTHING = 0.5
-
-"""Prior that nothing is missing; effects share the rest alike."""
-
-RISKS = (0.003, 0.01, 0.03, 0.1)
-
-"""Shares of wrong names among the sets of a strength at which a coverage is stated."""
-
-RISK = 0.03
-
-"""The one of them at which an effect's own share is stated."""
-
-SETS = 4000
-
-"""Made-up data sets of each effect and strength."""
-
-STRENGTHS = (4.0, 6.0, 10.0)
-
-"""Strengths [σ] for which limits are stated."""
-
-CLASS = 0.95
-
-"""Cosine of two signatures above which data cannot tell the effects apart."""
-
-
 @dataclass(frozen=True)
-class Kind(Record):
+class DataKind(Record):
     """One direction of an effect. ``two_sided``: its mirror image is possible as well."""
 
     effect: str
@@ -251,7 +133,7 @@ class Reached(Record):
         Strength by kind of data, six pours.
     """
 
-    kind: Kind
+    kind: DataKind
     amplitude: tuple[float, ...]
     ruler: Strength
     weak: Strength | None
@@ -269,7 +151,7 @@ class Confusable(Record):
 
 
 @dataclass(frozen=True)
-class Row(Record):
+class LimitRow(Record):
     """The limit for one kind of data, so many pours in each condition, and one strength."""
 
     data: str
@@ -296,7 +178,7 @@ class LimitStudy(Record):
     pours: Mapping[str, int]
     reached: tuple[Reached, ...]
     confusable: tuple[Confusable, ...]
-    rows: tuple[Row, ...]
+    rows: tuple[LimitRow, ...]
 
 
 @dataclass(frozen=True)
@@ -324,21 +206,8 @@ class Limit(Record):
     by_effect: Mapping[str, float]
 
 
-def signatures_of(sample: Sample, names: Sequence[str], ruler: Sequence[Strength], replicates: int) -> Signatures:
-    """Strengths and cosines of the reference amplitudes ``names`` in the features of ``sample``.
-
-    ``ruler``: their strengths on the ruler. ``replicates``: pours of a data set in each condition.
-    """
-    metric = metric_of(sample, replicates)
-    shifts = [fold_shifts(sample, name, metric) for name in names]
-    strengths = tuple(strength_of(sample, name, metric) for name in names)
-    gram = np.array([[product(a, b) for b in shifts] for a in shifts])
-    size = np.sqrt(np.maximum(np.diag(gram), 1e-6))
-    return Signatures(tuple(names), tuple(ruler), strengths, nearest_correlation(gram / np.outer(size, size)))
-
-
 def limit_study(
-    sample: Sample, levels: Sequence[Level], offered: Mapping[str, Sequence[int]], seed: int = 0
+    sample: ReferencePours, levels: Sequence[Level], offered: Mapping[str, Sequence[int]], seed: int = 0
 ) -> LimitStudy:
     """The limit of every kind of data.
 
@@ -358,7 +227,7 @@ def limit_study(
     Strengths, the pairs that are most alike, and for each kind of data what can be named at each of ``STRENGTHS``,
     with the data's pours and with as many again.
     """
-    kinds = [Kind(one.direction.effect, one.direction.name, len(one.direction.full) == 2) for one in levels]
+    kinds = [DataKind(one.direction.effect, one.direction.name, len(one.direction.full) == 2) for one in levels]
     names = [f"{one.name} strong" for one in kinds]
     samples = {data: sample.first(numbers).varying() for data, numbers in offered.items()}
     scalars = next(iter(samples.values()))
@@ -375,7 +244,7 @@ def limit_study(
                 by_data[data] = found.strength
                 confusable += _most_alike(data, kinds, found)
             rng = np.random.default_rng(seed)
-            rows += [Row(data, replicates, limit_of(found, kinds, strength, rng)) for strength in STRENGTHS]
+            rows += [LimitRow(data, replicates, limit_of(found, kinds, strength, rng)) for strength in STRENGTHS]
     reached = tuple(
         Reached(kind, level.direction.at(level.share), ruler[k], weak[k], {d: by_data[d][k] for d in by_data})
         for k, (kind, level) in enumerate(zip(kinds, levels, strict=True))
@@ -384,32 +253,8 @@ def limit_study(
     return LimitStudy(pours, reached, tuple(confusable), tuple(rows))
 
 
-def _most_alike(data: str, kinds: Sequence[Kind], found: Signatures) -> list[Confusable]:
-    """Pairs of clear signatures of different effects, the most alike first."""
-    clear = [k for k, one in enumerate(found.ruler) if one.value > 2.0 * one.error]
-    pairs = [
-        Confusable(data, kinds[i].name, kinds[j].name, float(found.cosines[i, j]))
-        for i in clear
-        for j in clear
-        if j < i and kinds[i].effect != kinds[j].effect
-    ]
-    return sorted(pairs, key=lambda pair: -abs(pair.cosine))
-
-
-def nearest_correlation(cosines: FloatArray) -> FloatArray:
-    """A matrix of cosines without negative eigenvalues and with a unit diagonal, next to an estimated one."""
-    symmetric = np.clip(0.5 * (cosines + cosines.T), -1.0, 1.0)
-    np.fill_diagonal(symmetric, 1.0)
-    for _ in range(20):
-        values, vectors = np.linalg.eigh(symmetric)
-        symmetric = (vectors * np.maximum(values, 0.0)) @ vectors.T
-        size = np.sqrt(np.diag(symmetric))
-        symmetric = symmetric / np.outer(size, size)
-    return np.asarray(symmetric, dtype=np.float64)
-
-
 def limit_of(
-    found: Signatures, kinds: Sequence[Kind], strength: float, rng: np.random.Generator, sets: int = SETS
+    found: Signatures, kinds: Sequence[DataKind], strength: float, rng: np.random.Generator, sets: int = SETS
 ) -> Limit:
     """The limit for effects that are ``strength`` σ strong on the ruler.
 
@@ -456,6 +301,160 @@ def limit_of(
     )
 
 
+def signatures_of(
+    sample: ReferencePours, names: Sequence[str], ruler: Sequence[Strength], replicates: int
+) -> Signatures:
+    """Strengths and cosines of the reference amplitudes ``names`` in the features of ``sample``.
+
+    ``ruler``: their strengths on the ruler. ``replicates``: pours of a data set in each condition.
+    """
+    metric = metric_of(sample, replicates)
+    shifts = [fold_shifts(sample, name, metric) for name in names]
+    strengths = tuple(strength_of(sample, name, metric) for name in names)
+    gram = np.array([[product(a, b) for b in shifts] for a in shifts])
+    size = np.sqrt(np.maximum(np.diag(gram), 1e-6))
+    return Signatures(tuple(names), tuple(ruler), strengths, nearest_correlation(gram / np.outer(size, size)))
+
+
+def metric_of(sample: ReferencePours, replicates: int = REPLICATES) -> Metric:
+    """The metric of data sets of ``replicates`` pours per condition.
+
+    Parameters
+    ----------
+    sample
+        Reference pours; needs "base" and "<parameter> -", "<parameter> +" of every parameter.
+    replicates
+        n, pours in each condition.
+
+    Returns
+    -------
+    The metric, with calibrated parameters profiled out.
+
+    Raises
+    ------
+    StatisticsError
+        Where a condition has fewer than three pours of the base model.
+    """
+    sensitivity = np.column_stack(
+        [_slope(sample, name) for name in sample.parameters] or [np.zeros((_size(sample), 0))]
+    )
+    covariance = np.zeros((_size(sample), _size(sample)))
+    first, freedom = 0, sum(len(block) for block in sample.pours["base"])
+    for c, base in enumerate(sample.pours["base"]):
+        if len(base) < 3:
+            raise StatisticsError(f"base: {len(base)} pours of condition {c + 1}; allowed: at least 3")
+        last = first + base.shape[1]
+        residuals, groups = _residuals(sample, c)
+        covariance[first:last, first:last] = shrunk_covariance(residuals) / replicates
+        freedom = min(freedom, len(residuals) - groups)
+        first = last
+    covariance += sensitivity @ sensitivity.T
+    # In units of each feature's standard error: they span ten orders of magnitude.
+    scale = np.sqrt(np.diag(covariance))
+    factor = np.linalg.cholesky(covariance / np.outer(scale, scale))
+    return Metric(np.linalg.inv(factor) / scale, freedom)
+
+
+def strength_of(sample: ReferencePours, name: str, metric: Metric) -> Strength:
+    """Length of the shift by ``name``, zero where its square comes out negative, with its standard error."""
+    shifts = fold_shifts(sample, name, metric)
+    folds = len(shifts)
+    square = product(shifts, shifts)
+    value = float(np.sqrt(max(0.0, square)))
+    without = np.array([product(rest, rest) for f in range(folds) for rest in [np.delete(shifts, f, axis=0)]])
+    spread = float(np.sqrt((folds - 1) / folds * ((without - without.mean()) ** 2).sum()))
+    # Of the square; that of its root by the delta method, and of a root near zero by the root of that.
+    error = spread / (2.0 * value) if square > spread else float(np.sqrt(spread))
+    return Strength(value, float(np.hypot(error, value / np.sqrt(2.0 * metric.freedom))))
+
+
+def fold_shifts(sample: ReferencePours, name: str, metric: Metric, folds: int = FOLDS) -> FloatArray:
+    """Whitened shifts of ``name`` off the base model in each of the folds, (folds, D).
+
+    Raises StatisticsError where a fold would be empty.
+    """
+    least = min(len(block) for kind in (name, "base") for block in sample.pours[kind])
+    if least < folds:
+        raise StatisticsError(f"{name}: {least} pours in a condition that count; allowed: at least {folds}")
+    parts = []
+    for there, base in zip(sample.pours[name], sample.pours["base"], strict=True):
+        parts.append(_fold_means(there, folds) - _fold_means(base, folds))
+    return metric.white(np.concatenate(parts, axis=1))
+
+
+def product(first: FloatArray, second: FloatArray) -> float:
+    """Crossnobis product of two sets of fold shifts, (folds, D) each: no fold meets itself."""
+    folds = len(first)
+    whole = float(first.sum(axis=0) @ second.sum(axis=0))
+    return (whole - float((first * second).sum())) / (folds * (folds - 1))
+
+
+def confused(cosine: float, strength: float) -> float:
+    """Probability of taking one of two effects for the other by chance: Φ(−s √((1 − c)/2))."""
+    return float(norm.cdf(-strength * np.sqrt(max(0.0, 1.0 - cosine) / 2.0)))
+
+
+def alike(found: Sequence[Signatures]) -> list[tuple[str, str]]:
+    """Pairs whose cosine is above ``CLASS`` in all of ``found`` (one per set-up): no set-up tells them apart."""
+    names = found[0].names
+    return [
+        (names[i], names[j])
+        for i in range(len(names))
+        for j in range(i)
+        if all(abs(one.cosines[i, j]) > CLASS for one in found)
+    ]
+
+
+def nearest_correlation(cosines: FloatArray) -> FloatArray:
+    """A matrix of cosines without negative eigenvalues and with a unit diagonal, next to an estimated one."""
+    symmetric = np.clip(0.5 * (cosines + cosines.T), -1.0, 1.0)
+    np.fill_diagonal(symmetric, 1.0)
+    for _ in range(20):
+        values, vectors = np.linalg.eigh(symmetric)
+        symmetric = (vectors * np.maximum(values, 0.0)) @ vectors.T
+        size = np.sqrt(np.diag(symmetric))
+        symmetric = symmetric / np.outer(size, size)
+    return np.asarray(symmetric, dtype=np.float64)
+
+
+def _residuals(sample: ReferencePours, condition: int) -> tuple[FloatArray, int]:
+    """Deviations from the mean of their kind, of base pours and of those with a parameter moved, and the kinds."""
+    kinds = ["base", *(f"{name} {side}" for name in sample.parameters for side in "-+")]
+    groups = [sample.pours[kind][condition] for kind in kinds]
+    # Each group's mean takes a degree of freedom.
+    scaled = [
+        (group - group.mean(axis=0)) * np.sqrt(len(group) / (len(group) - 1)) for group in groups if len(group) > 1
+    ]
+    return np.concatenate(scaled), len(scaled)
+
+
+def _slope(sample: ReferencePours, parameter: str) -> FloatArray:
+    """What ``parameter`` does per standard deviation of its measurement, (D,)."""
+    low, high = sample.pours[f"{parameter} -"], sample.pours[f"{parameter} +"]
+    return np.concatenate([(b.mean(axis=0) - a.mean(axis=0)) / (2.0 * SIDE) for a, b in zip(low, high, strict=True)])
+
+
+def _fold_means(pours: FloatArray, folds: int) -> FloatArray:
+    """Means of every ``folds``-th pour, (folds, d)."""
+    return np.stack([pours[f::folds].mean(axis=0) for f in range(folds)])
+
+
+def _size(sample: ReferencePours) -> int:
+    return sum(block.shape[1] for block in sample.pours["base"])
+
+
+def _most_alike(data: str, kinds: Sequence[DataKind], found: Signatures) -> list[Confusable]:
+    """Pairs of clear signatures of different effects, the most alike first."""
+    clear = [k for k, one in enumerate(found.ruler) if one.value > 2.0 * one.error]
+    pairs = [
+        Confusable(data, kinds[i].name, kinds[j].name, float(found.cosines[i, j]))
+        for i in clear
+        for j in clear
+        if j < i and kinds[i].effect != kinds[j].effect
+    ]
+    return sorted(pairs, key=lambda pair: -abs(pair.cosine))
+
+
 def _posteriors(
     t: FloatArray,
     gain: FloatArray,
@@ -480,19 +479,3 @@ def _posteriors(
         columns.append(logsumexp(members, axis=0) + prior)
     stacked = np.stack(columns, axis=1)
     return np.asarray(np.exp(stacked - logsumexp(stacked, axis=1, keepdims=True)))
-
-
-def confused(cosine: float, strength: float) -> float:
-    """Probability of taking one of two effects for the other by chance: Φ(−s √((1 − c)/2))."""
-    return float(norm.cdf(-strength * np.sqrt(max(0.0, 1.0 - cosine) / 2.0)))
-
-
-def alike(found: Sequence[Signatures]) -> list[tuple[str, str]]:
-    """Pairs whose cosine is above ``CLASS`` in all of ``found`` (one per set-up): no set-up tells them apart."""
-    names = found[0].names
-    return [
-        (names[i], names[j])
-        for i in range(len(names))
-        for j in range(i)
-        if all(abs(one.cosines[i, j]) > CLASS for one in found)
-    ]

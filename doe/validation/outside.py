@@ -11,7 +11,7 @@
     raised_funnel      the funnel stands higher than was written down
     stray_spheres      a share of the mass is spheres of the bodies' own mass and solid volume
 
-The first five are for development; a test (``schedule.py``) has all ten. Each pour is driven by hand in a process of
+The first five are for development; a test (``truth.py``) has all ten. Each pour is driven by hand in a process of
 its own (``work_place``), and gives an ordinary record.
 """
 

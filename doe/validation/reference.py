@@ -1,6 +1,6 @@
 """Reference pours of a declared model: so many of every effect that what it does to a pile is known, not estimated.
 
-A ruler (``ruler.py``) and the limit of any diagnosis (``limit.py``) are made of them. All pours have the calibrated
+A ruler and the limit of any diagnosis (both ``limit.py``) are made of them. All pours have the calibrated
 parameters at their measured means; what a parameter does is known from pours ``SIDE`` deviations to either side.
 
 Pours come in rounds, each of the same number of every kind, so that a reference can be made in pieces and stopped
@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from doe.declared.model import Declared, Effect
+from doe.declared.model import CandidateEffect, Declared
 from doe.declared.points import Direction, Point, directions_of, middle
 from doe.declared.pours import ModelPours
 from doe.diagnose.levels import Trials, level_of
@@ -55,15 +55,15 @@ each parameter on either side."""
 
 
 @dataclass(frozen=True)
-class Sample:
+class ReferencePours:
     """Reference pours: what acts → blocks of complete pours; ``parameters``: names of those that are calibrated."""
 
     pours: Mapping[str, Blocks]
     parameters: tuple[str, ...]
 
-    def first(self, numbers: Sequence[int]) -> Sample:
+    def first(self, numbers: Sequence[int]) -> ReferencePours:
         """The same with the first ``numbers[c]`` features of each condition."""
-        return Sample(
+        return ReferencePours(
             {
                 name: tuple(block[:, :number] for block, number in zip(blocks, numbers, strict=True))
                 for name, blocks in self.pours.items()
@@ -71,7 +71,7 @@ class Sample:
             self.parameters,
         )
 
-    def varying(self) -> Sample:
+    def varying(self) -> ReferencePours:
         """The same without features that are constant in the base model's pours."""
         return self.only(self.vary())
 
@@ -83,13 +83,13 @@ class Sample:
             found.append(np.asarray(block.std(axis=0) > CONSTANT * size))
         return tuple(found)
 
-    def only(self, keep: Sequence[npt.NDArray[np.bool_]]) -> Sample:
+    def only(self, keep: Sequence[npt.NDArray[np.bool_]]) -> ReferencePours:
         """The same with the features that ``keep`` names in each condition."""
         pours = {
             name: tuple(block[:, kept] for block, kept in zip(blocks, keep, strict=True))
             for name, blocks in self.pours.items()
         }
-        return Sample(pours, self.parameters)
+        return ReferencePours(pours, self.parameters)
 
 
 @dataclass(frozen=True)
@@ -105,10 +105,10 @@ class Reference:
     """Names of the columns, per fitted condition."""
     levels: tuple[Level, ...]
     rounds: int = 0
-    sample: Sample = Sample({}, ())
+    sample: ReferencePours = ReferencePours({}, ())
 
 
-def reference_directions(effect: Effect) -> list[Direction]:
+def reference_directions(effect: CandidateEffect) -> list[Direction]:
     """Up and, where there is one, down; of two amplitudes along x and along y (the rest follows by symmetry)."""
     found = directions_of(effect)
     if effect.amplitudes == 1:
@@ -177,7 +177,7 @@ def extended(found: Reference, declared: Declared, pours: ModelPours) -> Referen
             blocks.append(np.concatenate([*known, np.array(complete, dtype=np.float32).reshape(len(complete), -1)]))
         sample[kind] = tuple(block.reshape(len(block), -1) for block in blocks)
     parameters = tuple(parameter.name for parameter in declared.parameters)
-    return replace(found, rounds=found.rounds + 1, sample=Sample(sample, parameters))
+    return replace(found, rounds=found.rounds + 1, sample=ReferencePours(sample, parameters))
 
 
 def kept(path: Path, measurement: Measurement, physics: int) -> Reference:
@@ -253,7 +253,7 @@ def load(path: Path) -> Reference:
             features,
             levels,
             head["rounds"],
-            Sample(pours, tuple(head["parameters"])),
+            ReferencePours(pours, tuple(head["parameters"])),
         )
     except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
         raise StatisticsError(f"{path}: not a file of reference pours ({' '.join(str(error).split())[:100]})") from None

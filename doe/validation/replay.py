@@ -19,8 +19,8 @@ from doe.diagnose.emulator import Emulator, Lessons, Way, emulated
 from doe.diagnose.levels import REPLICATES
 from doe.diagnose.posterior import Data, Posterior, posterior
 from doe.record import Record
-from doe.validation.limit import RISKS, Kind
-from doe.validation.reference import SIDE, Blocks, Sample
+from doe.validation.limit import RISKS, DataKind
+from doe.validation.reference import SIDE, Blocks, ReferencePours
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -51,10 +51,10 @@ class Teaching(Record):
 
 
 @dataclass(frozen=True)
-class Truth(Record):
+class PlantedTruth(Record):
     """What acts in data: a direction at one of ``LEVELS``, so strong [σ] on the ruler."""
 
-    kind: Kind
+    kind: DataKind
     level: str
     strength: float
 
@@ -107,9 +107,9 @@ class _Answer:
 
 def replay(
     data: str,
-    sample: Sample,
-    kinds: Sequence[Kind],
-    bands: Sequence[Sequence[Truth]],
+    sample: ReferencePours,
+    kinds: Sequence[DataKind],
+    bands: Sequence[Sequence[PlantedTruth]],
     teaching: Teaching,
     splits: int,
     rng: np.random.Generator,
@@ -143,8 +143,8 @@ def replay(
             kind: tuple(block[rng.permutation(len(block))] for block in blocks) for kind, blocks in sample.pours.items()
         }
         # What never varies in the pours that teach cannot be weighed.
-        keep = Sample({"base": _first(mixed["base"], BASE_POURS)}, ()).vary()
-        split = _Split(Sample(mixed, sample.parameters).only(keep), ways, teaching)
+        keep = ReferencePours({"base": _first(mixed["base"], BASE_POURS)}, ()).vary()
+        split = _Split(ReferencePours(mixed, sample.parameters).only(keep), ways, teaching)
         for own, truths in zip(answers, bands, strict=True):
             own += [_Answer(one.kind.effect, *split.judged(split.data_of(one))) for one in truths]
         for number in range(NULLS):
@@ -160,7 +160,7 @@ def replay(
 class _Split:
     """Reference pours of which the first ones of each kind teach; data are taken behind those that might."""
 
-    def __init__(self, sample: Sample, ways: tuple[Way, ...], teaching: Teaching) -> None:
+    def __init__(self, sample: ReferencePours, ways: tuple[Way, ...], teaching: Teaching) -> None:
         self.pours = sample.pours
         self._ways, self._teaching = ways, teaching
         k = len(sample.parameters)
@@ -170,7 +170,7 @@ class _Split:
                 self._base.append(_lesson(self.pours[f"{name} {side}"], sign * SIDE * np.eye(k)[j]))
         self._first = self._taught({(way, "strong"): teaching.all for way in range(len(ways))})
 
-    def data_of(self, truth: Truth) -> Blocks:
+    def data_of(self, truth: PlantedTruth) -> Blocks:
         """A data set that no model has been taught by."""
         first = self._teaching.most(truth.level)
         return tuple(block[first : first + REPLICATES] for block in self.pours[f"{truth.kind.name} {truth.level}"])

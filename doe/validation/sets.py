@@ -1,4 +1,6 @@
-"""``sets.jsonl``: one line per data set and kind of data, appended as it is judged, and what an answer is worth.
+"""``sets.jsonl``, one line per data set and kind of data: what each answer is worth, and the rates of a campaign.
+
+A line is appended as its set is judged. Its answer is one of
 
 right        the effect's name, or both of a pair
 undecided    ambiguous with the truth in it
@@ -6,9 +8,8 @@ wrong        another name, or ambiguous without the truth; one of a pair alone
 unexplained  more than noise, and no name
 nothing      no missing effect
 
-Rows → rates with their Wilson intervals and denominators, and which targets are met.
-
-Wilson 1927, J. Am. Stat. Assoc. 22:209: (p + z²/2n ± z √(p (1 − p)/n + z²/4n²))/(1 + z²/n), z = 1.96.
+Rows become rates with their denominators and Wilson intervals, and targets that are met or not. Wilson 1927, J. Am.
+Stat. Assoc. 22:209: (p + z²/2n ± z √(p (1 − p)/n + z²/4n²))/(1 + z²/n), z = 1.96.
 """
 
 import json
@@ -31,16 +32,24 @@ from doe.record import Record
 Answer = Literal["right", "undecided", "wrong", "unexplained", "nothing", "out of reach"]
 
 OUT_OF_REACH = "out of reach: "
-
 """Start of the verdict on a truth that cannot be, followed by the reason."""
-
 NONE = "none"
-
 """Label of a set in which nothing is missing."""
+LEVEL = 0.95
+HOLDOUT_GOOD = 1.25
+"""Holdout error ÷ noise floor that a set with a right name should not exceed."""
+RISKS = (0.0, 0.01, 0.025)
+"""Shares of sets with a library effect that get a wrong name at most, of the risk–coverage curve; 0.025 is 4 of 160."""
+BINS = (0.0, 0.5, 0.7, 0.9, 0.99, 1.0)
+"""Ends of the probabilities of the reliability diagram."""
+LEAST_P = 1e-6
+"""Of the truth, as the logarithmic loss counts it."""
+TEMPERATURES = (0.4, 0.55, 0.7, 0.85, 1.0, 1.3)
+"""By which the evidence of kept rows is weighed again."""
 
 
 @dataclass(frozen=True)
-class Row(Record):
+class SetRow(Record):
     """One data set, judged by data of one kind.
 
     Attributes
@@ -141,59 +150,6 @@ class Row(Record):
         return p if math.isfinite(p) else 0.0
 
 
-def answer_to(verdict: str, label: str) -> Answer:
-    """What ``verdict`` is worth where ``label`` is true, see above."""
-    if verdict.startswith(OUT_OF_REACH):
-        return "out of reach"
-    kind, _, rest = verdict.partition(":")
-    if kind == "no_missing_effect":
-        return "nothing"
-    if kind == "unexplained":
-        return "unexplained"
-    names = {frozenset(name.split("+")) for name in rest.split(",")}
-    truth = frozenset(label.split("+"))
-    if kind in ("effect", "effects"):
-        return "right" if names == {truth} else "wrong"
-    left = {NONE: "no_missing_effect"}.get(label)
-    return "undecided" if truth in names or left in rest.split(",") else "wrong"
-
-
-def read_rows(path: Path) -> list[Row]:
-    """Rows in ``path``, in order of numbers and kinds of data; none where there is no such file."""
-    if not path.is_file():
-        return []
-    rows = [_row(json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
-    return sorted(rows, key=lambda row: (row.laboratory, row.root, row.number, row.offer))
-
-
-def append_rows(path: Path, rows: Sequence[Row]) -> None:
-    """Add ``rows`` to the file, in one write, so that processes that share it do not mix lines."""
-    text = "".join(json.dumps(_rounded(row.to_dict()), ensure_ascii=False) + "\n" for row in rows)
-    with path.open("a", encoding="utf-8") as file:
-        file.write(text)
-
-
-def _rounded(value: Any) -> Any:
-    if isinstance(value, float):
-        return float(f"{value:.6g}")
-    return {key: _rounded(one) for key, one in value.items()} if isinstance(value, dict) else value
-
-
-def _row(cells: dict[str, Any]) -> Row:
-    floats = {field.name for field in fields(Row) if field.type is float}
-    # A number that an older file does not have was not taken.
-    values: dict[str, Any] = dict.fromkeys(floats, math.nan)
-    values |= {key: math.nan if value is None and key in floats else value for key, value in cells.items()}
-    return Row(**values)
-
-
-LEVEL = 0.95
-
-HOLDOUT_GOOD = 1.25
-
-"""Holdout error ÷ noise floor that a set with a right name should not exceed."""
-
-
 @dataclass(frozen=True)
 class Rate:
     """``hits`` of ``sets``."""
@@ -219,41 +175,13 @@ class Rate:
 
 
 @dataclass(frozen=True)
-class Target:
+class CampaignTarget:
     """What is aimed at, what came out, and whether that is met (None without a set to tell)."""
 
     name: str
     aim: str
     found: str
     met: bool | None
-
-
-def wilson(hits: int, sets: int, level: float = LEVEL) -> tuple[float, float]:
-    """Wilson's interval of a share; 0 … 1 without sets."""
-    if sets == 0:
-        return 0.0, 1.0
-    z = float(stats.norm.ppf(0.5 + level / 2.0))
-    share = hits / sets
-    middle = share + z * z / (2 * sets)
-    half = z * math.sqrt(share * (1 - share) / sets + z * z / (4 * sets * sets))
-    return max(0.0, (middle - half) / (1 + z * z / sets)), min(1.0, (middle + half) / (1 + z * z / sets))
-
-
-RISKS = (0.0, 0.01, 0.025)
-
-"""Shares of sets with a library effect that get a wrong name at most, of the risk–coverage curve; 0.025 is 4 of 160."""
-
-BINS = (0.0, 0.5, 0.7, 0.9, 0.99, 1.0)
-
-"""Ends of the probabilities of the reliability diagram."""
-
-LEAST_P = 1e-6
-
-"""Of the truth, as the logarithmic loss counts it."""
-
-TEMPERATURES = (0.4, 0.55, 0.7, 0.85, 1.0, 1.3)
-
-"""By which the evidence of kept rows is weighed again."""
 
 
 @dataclass(frozen=True)
@@ -293,7 +221,54 @@ class Scores:
     bias_after: float
 
 
-def scores(rows: Sequence[Row]) -> Scores:
+@dataclass(frozen=True)
+class Tempered:
+    """What another temperature would have made of the last evidence of sets with one effect at most.
+
+    ``log_loss``: as in ``Scores``. ``right``, ``wrong``: names of sets with an effect; ``false``: of sets without
+    one.
+    """
+
+    temperature: float
+    log_loss: float
+    right: Rate
+    wrong: Rate
+    false: Rate
+
+
+def answer_to(verdict: str, label: str) -> Answer:
+    """What ``verdict`` is worth where ``label`` is true, see above."""
+    if verdict.startswith(OUT_OF_REACH):
+        return "out of reach"
+    kind, _, rest = verdict.partition(":")
+    if kind == "no_missing_effect":
+        return "nothing"
+    if kind == "unexplained":
+        return "unexplained"
+    names = {frozenset(name.split("+")) for name in rest.split(",")}
+    truth = frozenset(label.split("+"))
+    if kind in ("effect", "effects"):
+        return "right" if names == {truth} else "wrong"
+    left = {NONE: "no_missing_effect"}.get(label)
+    return "undecided" if truth in names or left in rest.split(",") else "wrong"
+
+
+def read_rows(path: Path) -> list[SetRow]:
+    """Rows in ``path``, in order of numbers and kinds of data; none where there is no such file."""
+    if not path.is_file():
+        return []
+    rows = [_row(json.loads(line)) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
+    return sorted(rows, key=lambda row: (row.laboratory, row.root, row.number, row.offer))
+
+
+def append_rows(path: Path, rows: Sequence[SetRow]) -> None:
+    """Add ``rows`` to the file, in one write, so that processes that share it do not mix lines."""
+    text = "".join(json.dumps(_rounded(row.to_dict()), ensure_ascii=False) + "\n" for row in rows)
+    with path.open("a", encoding="utf-8") as file:
+        file.write(text)
+
+
+def scores(rows: Sequence[SetRow]) -> Scores:
     """Scores of judged sets of one kind of data."""
     library = [row for row in rows if row.kind in ("effect", "pair")]
     tops = [_top(row) for row in rows]
@@ -316,22 +291,7 @@ def scores(rows: Sequence[Row]) -> Scores:
     )
 
 
-@dataclass(frozen=True)
-class Tempered:
-    """What another temperature would have made of the last evidence of sets with one effect at most.
-
-    ``log_loss``: as in ``Scores``. ``right``, ``wrong``: names of sets with an effect; ``false``: of sets without
-    one.
-    """
-
-    temperature: float
-    log_loss: float
-    right: Rate
-    wrong: Rate
-    false: Rate
-
-
-def by_temperature(rows: Sequence[Row]) -> tuple[Tempered, ...]:
+def by_temperature(rows: Sequence[SetRow]) -> tuple[Tempered, ...]:
     """Judged sets of one kind of data at each of ``TEMPERATURES``, pairs of effects left out of truths and answers."""
     some = [row for row in rows if "outside" in row.evidence and row.kind != "pair"]
     found = []
@@ -354,37 +314,7 @@ def by_temperature(rows: Sequence[Row]) -> tuple[Tempered, ...]:
     return tuple(found)
 
 
-def _probabilities(row: Row, temperature: float) -> dict[str, float]:
-    """Of "base", "outside" and every single effect."""
-    singles = [name for name in row.evidence if name not in ("base", "outside") and "+" not in name]
-    priors = priors_of(singles)
-    logs = np.array([math.log(prior) + temperature * row.evidence[name] for name, prior in priors.items()])
-    return dict(zip(priors, np.exp(logs - logsumexp(logs)).tolist(), strict=True))
-
-
-def _truth(row: Row) -> str:
-    return {"null": "base", "outside": "outside"}.get(row.kind, row.label)
-
-
-def _top(row: Row) -> tuple[float, bool]:
-    """Probability of the most probable answer, and whether it is true."""
-    answers = {"base": row.nothing, "outside": row.outside, row.best: row.best_p}
-    best = max(answers, key=lambda name: answers[name])
-    return answers[best], best == _truth(row)
-
-
-def _covered(rows: Sequence[Row], risk: float) -> int:
-    """Right names at the lowest threshold at which at most a share ``risk`` of ``rows`` get a wrong one."""
-    most, right, wrong, covered = risk * len(rows), 0, 0, 0
-    for row in sorted(rows, key=lambda row: -row.best_p):
-        right, wrong = (right + 1, wrong) if row.best == row.label else (right, wrong + 1)
-        if wrong > most:
-            break
-        covered = right
-    return covered
-
-
-def targets(rows: Sequence[Row], offer: str) -> list[Target]:
+def targets(rows: Sequence[SetRow], offer: str) -> list[CampaignTarget]:
     """The targets for data of the kind ``offer``, from judged sets; shares are those of the counts asked of a test."""
     own = [row for row in rows if row.offer == offer]
     effects = [row for row in own if row.kind == "effect"]
@@ -403,7 +333,7 @@ def targets(rows: Sequence[Row], offer: str) -> list[Target]:
         _target("right name at 10 σ", _rate(strong, _right), (57 if scans else 54) / 60, at_most=False),
         _target("outside effects called unexplained", _rate(outside, _unexplained), 48 / 60, at_most=False),
         _target("outside effects blamed on the library", _rate(outside, lambda row: row.named), 6 / 60, at_most=True),
-        Target(
+        CampaignTarget(
             "holdout error ÷ noise floor, right names",
             "median ≤ 1.1",
             f"{median:.2f} over {len(after)} sets" if after else "no set",
@@ -413,22 +343,77 @@ def targets(rows: Sequence[Row], offer: str) -> list[Target]:
     ]
 
 
-def _target(name: str, rate: Rate, aim: float, at_most: bool) -> Target:
+def wilson(hits: int, sets: int, level: float = LEVEL) -> tuple[float, float]:
+    """Wilson's interval of a share; 0 … 1 without sets."""
+    if sets == 0:
+        return 0.0, 1.0
+    z = float(stats.norm.ppf(0.5 + level / 2.0))
+    share = hits / sets
+    middle = share + z * z / (2 * sets)
+    half = z * math.sqrt(share * (1 - share) / sets + z * z / (4 * sets * sets))
+    return max(0.0, (middle - half) / (1 + z * z / sets)), min(1.0, (middle + half) / (1 + z * z / sets))
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, float):
+        return float(f"{value:.6g}")
+    return {key: _rounded(one) for key, one in value.items()} if isinstance(value, dict) else value
+
+
+def _row(cells: dict[str, Any]) -> SetRow:
+    floats = {field.name for field in fields(SetRow) if field.type is float}
+    # A number that an older file does not have was not taken.
+    values: dict[str, Any] = dict.fromkeys(floats, math.nan)
+    values |= {key: math.nan if value is None and key in floats else value for key, value in cells.items()}
+    return SetRow(**values)
+
+
+def _probabilities(row: SetRow, temperature: float) -> dict[str, float]:
+    """Of "base", "outside" and every single effect."""
+    singles = [name for name in row.evidence if name not in ("base", "outside") and "+" not in name]
+    priors = priors_of(singles)
+    logs = np.array([math.log(prior) + temperature * row.evidence[name] for name, prior in priors.items()])
+    return dict(zip(priors, np.exp(logs - logsumexp(logs)).tolist(), strict=True))
+
+
+def _truth(row: SetRow) -> str:
+    return {"null": "base", "outside": "outside"}.get(row.kind, row.label)
+
+
+def _top(row: SetRow) -> tuple[float, bool]:
+    """Probability of the most probable answer, and whether it is true."""
+    answers = {"base": row.nothing, "outside": row.outside, row.best: row.best_p}
+    best = max(answers, key=lambda name: answers[name])
+    return answers[best], best == _truth(row)
+
+
+def _covered(rows: Sequence[SetRow], risk: float) -> int:
+    """Right names at the lowest threshold at which at most a share ``risk`` of ``rows`` get a wrong one."""
+    most, right, wrong, covered = risk * len(rows), 0, 0, 0
+    for row in sorted(rows, key=lambda row: -row.best_p):
+        right, wrong = (right + 1, wrong) if row.best == row.label else (right, wrong + 1)
+        if wrong > most:
+            break
+        covered = right
+    return covered
+
+
+def _target(name: str, rate: Rate, aim: float, at_most: bool) -> CampaignTarget:
     met = (rate.share <= aim if at_most else rate.share >= aim) if rate.sets else None
-    return Target(name, f"{'≤' if at_most else '≥'} {100 * aim:.3g} %", str(rate), met)
+    return CampaignTarget(name, f"{'≤' if at_most else '≥'} {100 * aim:.3g} %", str(rate), met)
 
 
-def _rate(rows: Sequence[Row], hit: Callable[[Row], bool]) -> Rate:
+def _rate(rows: Sequence[SetRow], hit: Callable[[SetRow], bool]) -> Rate:
     return Rate(sum(map(hit, rows)), len(rows))
 
 
-def _right(row: Row) -> bool:
+def _right(row: SetRow) -> bool:
     return row.answer == "right"
 
 
-def _wrong(row: Row) -> bool:
+def _wrong(row: SetRow) -> bool:
     return row.answer == "wrong"
 
 
-def _unexplained(row: Row) -> bool:
+def _unexplained(row: SetRow) -> bool:
     return row.answer == "unexplained"

@@ -1,10 +1,8 @@
-"""What is true of one made-up laboratory, drawn by its root and number: parameters within their measured uncertainty,
-and what acts that the declared model lacks.
+"""What is true of a made-up laboratory: parameters within their measured uncertainty, and what the model lacks.
 
-A truth's strength is that of the ruler (``ruler.py``), measured once by many reference pours of the model
-at an amplitude and at half of it: between and beyond them s = s₁ (a/a₁)^p, with p from the two.
-
-Which truths a campaign asks for, by root and number of the data set: rounds of the same cases, each shuffled.
+A truth is drawn by the root and number of its data set. A campaign asks for rounds of the same cases, each shuffled. A
+truth's strength is that of the ruler (``limit.py``), measured once by many reference pours of the model at an amplitude
+and at half of it: between and beyond them s = s₁ (a/a₁)^p, with p from the two.
 """
 
 import math
@@ -20,20 +18,22 @@ from doe.validation.limit import Reached
 Kind = Literal["null", "effect", "pair", "outside"]
 
 STRENGTHS = (6.0, 10.0)
-
 """[σ] of single effects."""
-
 WIDE_STRENGTHS = (4.0, 6.0, 8.0, 10.0, 15.0, 25.0, 40.0)
-
 """[σ] of those of a development campaign, so that its rule has met whatever comes."""
-
 PAIR_STRENGTHS = (6.0, 10.0)
-
 """Range [σ] of each of two."""
-
 ROUND = {"null": 15, "effect": 12, "pair": 4, "outside": 6}
-
 """Sets of each kind in a round; ten rounds are a test: 150, 60 of each strength, 40 and 60."""
+REPLICATES = 6
+ROOT = 1
+"""Root of the seeds of the laboratories' pours; that of the diagnosis's pours is 0."""
+DISTINCT = 0.9
+"""Cosine of their signatures up to which two effects are made a pair: two that look alike are one to any data."""
+POWERS = (0.7, 2.0)
+"""Range of p: of two strengths with errors it may come out at anything."""
+SEEN = 2.0
+"""Standard errors that a strength is above zero, or nobody knows its amplitude."""
 
 
 @dataclass(frozen=True)
@@ -54,44 +54,6 @@ class Case:
     def seed(self) -> tuple[int, int]:
         """Of all its random numbers."""
         return self.root, self.number
-
-
-def cases(root: int, number: int, outside: Sequence[str], wide: bool = False) -> Iterator[Case]:
-    """The first ``number`` cases of a campaign; ``wide``: of a development campaign."""
-    drawn = 0
-    strengths = WIDE_STRENGTHS if wide else STRENGTHS
-    while drawn < number:
-        rng = np.random.default_rng([root, drawn])
-        one: list[tuple[Kind, str, float]] = [("null", "", float("nan"))] * ROUND["null"]
-        # As many of each strength as a round holds, in turn over the rounds.
-        first = drawn // sum(ROUND.values()) * ROUND["effect"]
-        one += [("effect", "", strengths[(first + k) % len(strengths)]) for k in range(ROUND["effect"])]
-        one += [("pair", "", float(rng.uniform(*PAIR_STRENGTHS))) for _ in range(ROUND["pair"])]
-        begun = drawn // sum(ROUND.values()) * ROUND["outside"]
-        one += [("outside", outside[(begun + k) % len(outside)], float("nan")) for k in range(ROUND["outside"])]
-        for k in rng.permutation(len(one))[: number - drawn]:
-            kind, label, strength = one[k]
-            yield Case(root, drawn, kind, label, strength)
-            drawn += 1
-
-
-REPLICATES = 6
-
-ROOT = 1
-
-"""Root of the seeds of the laboratories' pours; that of the diagnosis's pours is 0."""
-
-DISTINCT = 0.9
-
-"""Cosine of their signatures up to which two effects are made a pair: two that look alike are one to any data."""
-
-POWERS = (0.7, 2.0)
-
-"""Range of p: of two strengths with errors it may come out at anything."""
-
-SEEN = 2.0
-
-"""Standard errors that a strength is above zero, or nobody knows its amplitude."""
 
 
 @dataclass(frozen=True)
@@ -147,6 +109,25 @@ class Strengths:
         if measured is None or measured.weak is None:
             return 1.0
         return float(np.clip(math.log2(measured.ruler.value / measured.weak.value), *POWERS))
+
+
+def cases(root: int, number: int, outside: Sequence[str], wide: bool = False) -> Iterator[Case]:
+    """The first ``number`` cases of a campaign; ``wide``: of a development campaign."""
+    drawn = 0
+    strengths = WIDE_STRENGTHS if wide else STRENGTHS
+    while drawn < number:
+        rng = np.random.default_rng([root, drawn])
+        one: list[tuple[Kind, str, float]] = [("null", "", float("nan"))] * ROUND["null"]
+        # As many of each strength as a round holds, in turn over the rounds.
+        first = drawn // sum(ROUND.values()) * ROUND["effect"]
+        one += [("effect", "", strengths[(first + k) % len(strengths)]) for k in range(ROUND["effect"])]
+        one += [("pair", "", float(rng.uniform(*PAIR_STRENGTHS))) for _ in range(ROUND["pair"])]
+        begun = drawn // sum(ROUND.values()) * ROUND["outside"]
+        one += [("outside", outside[(begun + k) % len(outside)], float("nan")) for k in range(ROUND["outside"])]
+        for k in rng.permutation(len(one))[: number - drawn]:
+            kind, label, strength = one[k]
+            yield Case(root, drawn, kind, label, strength)
+            drawn += 1
 
 
 def truth_of(case: Case, strengths: Strengths) -> Truth:

@@ -1,4 +1,4 @@
-"""Where the work is done: pours in a crew, pours with an outside effect and verdicts in processes beside it.
+"""Where the work is done: pours in a worker pool, pours with an outside effect and verdicts in processes beside it.
 
 Every pour is kept in the store, by scene, seed, physics and outside effect, so that nothing is poured twice.
 """
@@ -16,9 +16,9 @@ from typing import Any
 from doe.measurement import Condition, readings_of_record
 from doe.runner import stored_run
 from doe.store import Store
-from doe.validation.laboratory import Sample
+from doe.validation.laboratory import LaboratoryPour
 from doe.validation.outside import AMPLITUDE, ON_BENCH, OUTSIDE, magnified, outside_pour
-from solver import Crew, Job, Outcome, Record, Scene, begin_worker, pour_key, unpacked
+from solver import Job, Outcome, Record, Scene, WorkerPool, begin_worker, pour_key, unpacked
 
 
 class OutOfTimeError(Exception):
@@ -26,7 +26,7 @@ class OutOfTimeError(Exception):
 
 
 @dataclass(frozen=True)
-class Order:
+class PourOrder:
     """One pour that a laboratory asks for. ``outside``: name of an outside effect, or none."""
 
     scene: Scene
@@ -66,8 +66,8 @@ class WorkPlace:
         self.store, self.workers, self.deadline = store, workers, deadline
         self.poured = 0
         self._stack = ExitStack()
-        self._crew: Crew | None = None
-        self._pool: Pool | None = None
+        self._pool: WorkerPool | None = None
+        self._beside: Pool | None = None
 
     def __enter__(self) -> "WorkPlace":
         return self
@@ -76,29 +76,29 @@ class WorkPlace:
         self._stack.__exit__(*error)
 
     @property
-    def crew(self) -> Crew:
-        """The crew, started when it is first needed."""
-        if self._crew is None:
-            self._crew = self._stack.enter_context(Crew(self.workers))
-        return self._crew
+    def pool(self) -> WorkerPool:
+        """The pool, started when it is first needed."""
+        if self._pool is None:
+            self._pool = self._stack.enter_context(WorkerPool(self.workers))
+        return self._pool
 
     def pours(self, queue: deque[Job], room: Sequence[Scene]) -> Iterator[tuple[Job, Record]]:
-        """Pours of the crew."""
-        return self.crew.run_queue(queue, room)
+        """Pours of the pool."""
+        return self.pool.run_queue(queue, room)
 
     def look_at_the_clock(self, *_: Any) -> None:
         """Raise OutOfTimeError after the deadline."""
         if time.monotonic() > self.deadline:
             raise OutOfTimeError
 
-    def pour(self, orders: Sequence[Order], room: Sequence[Scene]) -> list[Sample | None]:
+    def pour(self, orders: Sequence[PourOrder], room: Sequence[Scene]) -> list[LaboratoryPour | None]:
         """The pours in order, None for one that broke off. ``room``: scenes that nearly all fit into."""
         wanted = [order for order in {order.key: order for order in orders}.values() if not self._known(order)]
         plain = [order for order in wanted if not order.outside]
         queue = deque(Job(order.scene, order.seed, tag=k) for k, order in enumerate(plain))
         # A pair of effects may need more bodies than any single one.
         scenes = [*room, *(job.scene for job in queue)]
-        for job, record in self.crew.run_queue(queue, scenes) if queue else ():
+        for job, record in self.pool.run_queue(queue, scenes) if queue else ():
             self._keep(plain[job.tag], record)
         strange = [order for order in wanted if order.outside]
         tasks = [(order.outside, order.scene, order.seed, order.amount) for order in strange]
@@ -107,19 +107,19 @@ class WorkPlace:
         return [self._sample(order) for order in orders]
 
     def map(self, function: Callable[[Any], Any], tasks: Sequence[Any]) -> Iterator[Any]:
-        """``function`` of every task, in order, in the processes beside the crew."""
+        """``function`` of every task, in order, in the processes beside the pool."""
         if not tasks:
             return
-        if self._pool is None:
-            self._pool = self._stack.enter_context(mp.get_context("spawn").Pool(self.workers, begin_worker))
-        for result in self._pool.imap(function, tasks):
+        if self._beside is None:
+            self._beside = self._stack.enter_context(mp.get_context("spawn").Pool(self.workers, begin_worker))
+        for result in self._beside.imap(function, tasks):
             yield result
             self.look_at_the_clock()
 
-    def _known(self, order: Order) -> bool:
+    def _known(self, order: PourOrder) -> bool:
         return self.store.find(order.key) is not None
 
-    def _sample(self, order: Order) -> Sample | None:
+    def _sample(self, order: PourOrder) -> LaboratoryPour | None:
         stored = self.store.find(order.key)
         assert stored is not None
         if not Outcome(stored.outcome).valid:
@@ -127,9 +127,9 @@ class WorkPlace:
         # Off the raw pour: what is kept may have been read by somebody whose scale is right.
         record = order.seen(unpacked(stored.raw))
         spheres = record.pile.spheres
-        return Sample(order.reader(record), spheres.centre, spheres.radius)
+        return LaboratoryPour(order.reader(record), spheres.centre, spheres.radius)
 
-    def _keep(self, order: Order, record: Record) -> None:
+    def _keep(self, order: PourOrder, record: Record) -> None:
         job = Job(order.scene, order.seed)
         stored = stored_run(
             job,
@@ -150,6 +150,6 @@ def _outside(task: tuple[str, Scene, int, float]) -> Record:
     return outside_pour(*task)
 
 
-def complete(samples: Iterable[Sample | None]) -> list[Sample]:
+def complete(samples: Iterable[LaboratoryPour | None]) -> list[LaboratoryPour]:
     """Pours that came to their end and of which everything could be read."""
     return [one for one in samples if one is not None and all(math.isfinite(x) for x in one.reading.values())]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 if TYPE_CHECKING:
-    from solver.benchmark import Measurement
+    from solver.benchmark import BenchmarkResult
 
 
 def bench(
@@ -64,7 +64,7 @@ def bench(
         typer.echo(f"not installed, left out: {missing}", err=True)
     beds = tuple(sorted(spheres)) or USUAL_BEDS
     options = Options(duration, beds, installed, rounds=rounds, peer_limit=peer_limit)
-    measurements: list[Measurement] = []
+    measurements: list[BenchmarkResult] = []
     before = machine()
     words = [*(f"--only {name}" for name in only), *(f"--spheres {n}" for n in spheres)]
     words += [f"--duration {duration:g}"] if duration != 4.0 else []

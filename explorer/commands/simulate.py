@@ -67,7 +67,7 @@ def simulate(
     from explorer.files.run_result import result_of
     from explorer.scene.file import load_scene, with_settings
     from explorer.tables.pours import RunTable, bench_data, bench_text, write_bench
-    from solver import Crew, Job, run_pours
+    from solver import Job, WorkerPool, run_pours
     from solver.arch import chosen
     from solver.pours.checkpoint import read_checkpoint
     from solver.rigs import BENCH_RIGS
@@ -121,9 +121,9 @@ def simulate(
         jobs = [Job(scene, s, tag=k, interrupted=interrupted) for k, s in enumerate(seeds)]
         if replicates > 1 and not (recorder or kept) and chosen() == "cpu":
             # Nobody looks at them from within, so they run in processes of their own: in one, all wait for the slowest.
-            crew = stack.enter_context(Crew(min(threads or os.cpu_count() or 1, replicates)))
+            pool = stack.enter_context(WorkerPool(min(threads or os.cpu_count() or 1, replicates)))
             ended: Iterator[tuple[int, Record]] = (
-                (job.tag, finished) for job, finished in crew.run_queue(deque(jobs), [scene])
+                (job.tag, finished) for job, finished in pool.run_queue(deque(jobs), [scene])
             )
         else:
             ended = run_pours(jobs, threads=threads, on_sample=sample)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from doe.analysis.analyse import Target, analyse_design
+from doe.analysis.analyse import ResponseTarget, analyse_design
 from doe.analysis.models import ORDERS, Order
 from doe.designs import DESIGNS, factor_letters
 from doe.errors import StatisticsError
@@ -59,7 +59,7 @@ def analyse_runs(runs: Runs, order: AnalyseOrder) -> DesignResult:
     """The analysis of one response."""
     region = region_of(runs.factors)
     reference = np.array([factor.reference for factor in runs.factors])
-    target = None if order.target is None else Target(order.target, order.target_error, reference)
+    target = None if order.target is None else ResponseTarget(order.target, order.target_error, reference)
     try:
         found = analyse_design(
             runs.coded, runs.responses, region, _order(runs, order), _symbols(runs, order.terms), target

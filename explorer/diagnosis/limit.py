@@ -20,11 +20,11 @@ from doe.store import Store, default_store
 from doe.validation.laboratory import read_laboratory
 from doe.validation.limit import RISK, RISKS, LimitStudy, Strength, confused, limit_study
 from doe.validation.reference import ROOT, Reference, extended_to, kept
-from doe.validation.replay import BASE_POURS, NULLS, Replayed, Teaching, Truth, replay
+from doe.validation.replay import BASE_POURS, NULLS, PlantedTruth, Replayed, Teaching, replay
 from explorer.files.output_file import write_whole
 from explorer.files.run_folder import json_text
 from explorer.tables.text_table import text_table
-from solver import EFFECTS, PHYSICS, Crew
+from solver import EFFECTS, PHYSICS, WorkerPool
 
 TEACHINGS, SPLITS = (Teaching(4, 0), Teaching(4, 12), Teaching(8, 12)), 20
 """What teaches the rule, and splits of the reference into pours that teach and data."""
@@ -89,10 +89,10 @@ def replays(found: Reference, study: LimitStudy, offered: Mapping[str, Sequence[
     return tuple(rows)
 
 
-def truths_of(study: LimitStudy) -> list[Truth]:
+def truths_of(study: LimitStudy) -> list[PlantedTruth]:
     """All that reference pours can be data of."""
-    strong = [Truth(one.kind, "strong", one.ruler.value) for one in study.reached]
-    return strong + [Truth(one.kind, "weak", one.weak.value) for one in study.reached if one.weak is not None]
+    strong = [PlantedTruth(one.kind, "strong", one.ruler.value) for one in study.reached]
+    return strong + [PlantedTruth(one.kind, "weak", one.weak.value) for one in study.reached if one.weak is not None]
 
 
 def _declared(source: Path) -> Measurement:
@@ -112,9 +112,9 @@ def _poured(
     with ExitStack() as stack:
         store = Store(order.store or default_store())
         stack.callback(store.close)
-        crew = stack.enter_context(Crew(order.threads))
+        pool = stack.enter_context(WorkerPool(order.threads))
         paths = [parameter.path for parameter in measurement.parameters]
-        pours = ModelPours(measurement.fit, paths, store, crew.run_queue, on_pour, ROOT)
+        pours = ModelPours(measurement.fit, paths, store, pool.run_queue, on_pour, ROOT)
         return extended_to(found, order.rounds, declared, pours, order.reference, say)
 
 

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import escape
 
-from doe.diagnose.menu import as_suggested
+from doe.diagnose.candidate_experiments import as_suggested
 from doe.diagnose.next_experiment import SURE
 from doe.diagnose.result import BASE, Suggestion
 from doe.errors import MeasurementError
@@ -36,7 +36,7 @@ from explorer.report.diagnosis.wording import spelled
 from explorer.scene.text import toml_key, toml_value
 from explorer.units import code, enumeration, number, parameter_label, parameter_value, percent
 from solver import EFFECTS, Scene, Settings, checked, named, parameters, parse_quantity, pour_rig, read_toml, value
-from solver.rigs.surface import Pose, Revolved
+from solver.rigs.surface import Revolved, SurfacePose
 
 ORDER, SCHEMA = "follow_up.json", 1
 DROPPED = ("images", "mean_of", "material")
@@ -375,7 +375,7 @@ def setup_svg(scene: Scene, changed: Mapping[str, float | str]) -> str:
     rig, fed, known = pour_rig(scene), scene.insertion, parameters(scene)
     shells: dict[bool, list[Revolved]] = {False: [], True: []}
     for name, one in zip(rig.surface_names, rig.surfaces(), strict=True):
-        if isinstance(one, Revolved) and one.pose == Pose():
+        if isinstance(one, Revolved) and one.pose == SurfacePose():
             shells[name == "gate"].append(one)
     if not shells[False]:
         return ""

@@ -9,15 +9,15 @@ from typing import ClassVar, Literal
 import numpy as np
 import numpy.typing as npt
 
-from doe.declared.model import Effect
+from doe.declared.model import CandidateEffect
 from doe.diagnose.result import (
     BASE,
     NO_EFFECT,
     UNEXPLAINED,
+    CalibratedModel,
     EffectRow,
     HeldOut,
     Level,
-    Model,
     Offered,
     ParameterRow,
     Place,
@@ -99,7 +99,7 @@ class PouredCondition(Record):
 
 
 @dataclass(frozen=True)
-class PouredModel(Model):
+class PouredModel(CalibratedModel):
     """A calibrated model with its fresh pours. ``broken``: those that broke off or left nothing to be read."""
 
     broken: int = field(kw_only=True)
@@ -212,7 +212,7 @@ class DiagnosisResult(Document):
     final: str
     effects: tuple[EffectRow, ...]
     levels: tuple[Level, ...]
-    ranges: tuple[Effect, ...]
+    ranges: tuple[CandidateEffect, ...]
     parameters: tuple[ParameterRow, ...]
     residuals: tuple[Residual, ...]
     where: tuple[Place, ...]
@@ -264,7 +264,7 @@ class DiagnosisResult(Document):
         """Return the row of an effect or a pair; None where it has none."""
         return next((row for row in self.effects if row.name == label), None)
 
-    def range_of(self, effect: str) -> Effect:
+    def range_of(self, effect: str) -> CandidateEffect:
         """Return the widest range of an effect's amplitudes."""
         return next(one for one in self.ranges if one.name == effect)
 

@@ -49,7 +49,7 @@ from explorer.errors import CommandError
 from explorer.files.output_file import write_whole
 from explorer.files.run_result import versions
 from explorer.report.diagnosis import write_diagnosis_report
-from solver import EFFECTS, Crew
+from solver import EFFECTS, WorkerPool
 
 RULE = Rule(
     prior_nothing=NOTHING,
@@ -106,9 +106,9 @@ def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> Diagnosis:
         stack.callback(progress.close)
         store = Store(path)
         stack.callback(store.close)
-        crew = stack.enter_context(Crew(order.threads))
+        pool = stack.enter_context(WorkerPool(order.threads))
         found = run_diagnosis(
-            measurement, store, crew.run_queue, names, budget, progress.stage, progress.pour, order.seed, follow_up
+            measurement, store, pool.run_queue, names, budget, progress.stage, progress.pour, order.seed, follow_up
         )
     result = result_of(measurement, order, found, progress.elapsed)
     text = json.dumps(result.to_dict(), ensure_ascii=False, allow_nan=False, indent=1)

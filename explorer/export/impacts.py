@@ -38,7 +38,7 @@ from solver.verification.impacts import (
     Engine,
     Impact,
     Rebound,
-    Target,
+    StruckSphere,
     contact_time,
     struck_time,
 )
@@ -98,7 +98,9 @@ def plane_input(folder: Path, impacts: Sequence[Impact], law: ContactSettings = 
     _write(folder, law, spheres, materials, restitution, friction, dt, round(LENGTH * max(times) / dt), plane=True)
 
 
-def target_input(folder: Path, impacts: Sequence[Impact], target: Target, law: ContactSettings = BY_DEFAULT) -> None:
+def target_input(
+    folder: Path, impacts: Sequence[Impact], target: StruckSphere, law: ContactSettings = BY_DEFAULT
+) -> None:
     """Write the same files for impacts on a free sphere each; balls are numbered first, then the targets."""
     one, n = impacts[0], len(impacts)
     place = np.zeros((2 * n, 3))
@@ -161,7 +163,9 @@ def _rebounds(impacts: Sequence[Impact], limit: float | None, law: ContactSettin
     ]
 
 
-def _struck(impacts: Sequence[Impact], target: Target, limit: float | None, law: ContactSettings) -> list[Rebound]:
+def _struck(
+    impacts: Sequence[Impact], target: StruckSphere, limit: float | None, law: ContactSettings
+) -> list[Rebound]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         target_input(folder, impacts, target, law)

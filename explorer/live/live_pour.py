@@ -311,7 +311,7 @@ class LivePour:
             self._event("compiling the effects; the pour goes on when that is done")
             self._pour.move_to(Batch(dataclasses.replace(capacity, effects=True)))
         self._scene = changed
-        self._pour.retune(endless(changed))
+        self._pour.ramp_to(endless(changed))
         self._dt_limit = stability_limit(self._pour.scene)
         self._retuned = True
         self._history.changed(self._pour.time)

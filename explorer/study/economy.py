@@ -16,7 +16,7 @@ from explorer.errors import CommandError
 from explorer.files.output_file import write_whole
 from explorer.files.run_folder import json_text
 from explorer.tables.text_table import text_table
-from solver import Crew
+from solver import WorkerPool
 
 Say = Callable[[str], None]
 SEED = 20261123
@@ -69,11 +69,11 @@ def compare_economy(
         )
 
     try:
-        with Crew() as crew:
-            runner = PourRunner(study.scene, kept, f"economy of {study.name}", SEED, pours=crew.run_queue, tries=1)
+        with WorkerPool() as pool:
+            runner = PourRunner(study.scene, kept, f"economy of {study.name}", SEED, pours=pool.run_queue, tries=1)
             first = runner.run(f"economy {economy.name}", rows)
             each = sum(run.wall_s for runs in first for run in runs) / (TIMED * len(rows))
-            minutes = each * pours * len(rows) / crew.workers / 60.0
+            minutes = each * pours * len(rows) / pool.workers / 60.0
             say(
                 f"{economy.name}: {economy.reason}; {pours} pours of each kind at {len(rows) // 2} settings, about "
                 f"{minutes:.0f} min (margin {MARGIN:g} SD of one pour, "

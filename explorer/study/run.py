@@ -39,7 +39,7 @@ from explorer.files.output_file import write_whole
 from explorer.files.run_result import versions
 from explorer.report import write_report
 from explorer.study.process import PARTIAL
-from solver import Crew
+from solver import WorkerPool
 from solver.arch import chosen
 from solver.observables.made_up import estimator_bias
 
@@ -115,7 +115,7 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> float:
         stack.callback(store.close)
         recorder = stack.enter_context(_recorder(order.record)) if order.record else None
         # A recorder watches pours from within; all others run in processes of their own.
-        crew = stack.enter_context(Crew(order.threads)) if recorder is None and chosen() == "cpu" else None
+        pool = stack.enter_context(WorkerPool(order.threads)) if recorder is None and chosen() == "cpu" else None
         runner = PourRunner(
             study.scene,
             store,
@@ -124,7 +124,7 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> float:
             order.threads,
             on_run=ended,
             observer=recorder,
-            pours=crew.run_queue if crew else None,
+            pours=pool.run_queue if pool else None,
             tries=order.tries,
         )
         bias = estimator_bias(study.estimators)

@@ -14,7 +14,7 @@ from typing import Any
 from explorer.benchmark import FEW, LONG, TO_REST, Result, growth, results
 from explorer.files.run_result import package_version
 from explorer.tables.text_table import text_table
-from solver.benchmark import Measurement
+from solver.benchmark import BenchmarkResult
 
 HEADER = (
     "case",
@@ -43,7 +43,7 @@ FALL = 0.10
 """Share of a committed ratio whose loss is worth a warning."""
 
 
-def table_text(measurements: Sequence[Measurement], complete: bool = True) -> str:
+def table_text(measurements: Sequence[BenchmarkResult], complete: bool = True) -> str:
     """All measurements, and how the cost of a bed grows; says so where some are missing."""
     found = results(measurements)
     lines = [text_table(HEADER, [_row(one, _ratios(one, found)) for one in found]), RATIO_NOTE]
@@ -64,7 +64,7 @@ def table_text(measurements: Sequence[Measurement], complete: bool = True) -> st
 
 
 def markdown(
-    measurements: Sequence[Measurement], found_at: Mapping[str, Any], complete: bool, words: Sequence[str]
+    measurements: Sequence[BenchmarkResult], found_at: Mapping[str, Any], complete: bool, words: Sequence[str]
 ) -> str:
     """The same as a page for ``docs/``.
 
@@ -111,7 +111,7 @@ def markdown(
 
 
 def result_of(
-    measurements: Sequence[Measurement], complete: bool = True, found_at: Mapping[str, Any] | None = None
+    measurements: Sequence[BenchmarkResult], complete: bool = True, found_at: Mapping[str, Any] | None = None
 ) -> dict[str, Any]:
     """The same as plain data, medians of the rounds with the wall time of each, with the machine and the versions."""
     found = results(measurements)
@@ -125,7 +125,7 @@ def result_of(
     }
 
 
-def fallen(measurements: Sequence[Measurement], committed: Mapping[str, Any], name: str) -> list[str]:
+def fallen(measurements: Sequence[BenchmarkResult], committed: Mapping[str, Any], name: str) -> list[str]:
     """Lines about ratios to LIGGGHTS that are lower than those of an earlier run by more than a tenth.
 
     Parameters
@@ -211,7 +211,7 @@ def _ratios(one: Result, found: Sequence[Result]) -> list[float]:
     return []
 
 
-def _growth_lines(measurements: Sequence[Measurement]) -> list[str]:
+def _growth_lines(measurements: Sequence[BenchmarkResult]) -> list[str]:
     exponents = {engine: growth(measurements, engine) for engine in ("ours", "liggghts", "yade")}
     known = {engine: value for engine, value in exponents.items() if not math.isnan(value)}
     return [

@@ -4,13 +4,13 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
-from doe.validation.sets import RISKS, Answer, Rate, Row, Scores, Tempered, by_temperature, scores, targets
+from doe.validation.sets import RISKS, Answer, Rate, Scores, SetRow, Tempered, by_temperature, scores, targets
 from explorer.tables.text_table import text_table
 
 ANSWERS: tuple[Answer, ...] = ("nothing", "right", "undecided", "unexplained", "wrong")
 
 
-def campaign_text(rows: Sequence[Row]) -> str:
+def campaign_text(rows: Sequence[SetRow]) -> str:
     """All tables, for each kind of data."""
     judged = [row for row in rows if row.answer != "out of reach"]
     offers = sorted({row.offer for row in judged})
@@ -31,7 +31,7 @@ def campaign_text(rows: Sequence[Row]) -> str:
     return "\n\n".join(parts)
 
 
-def matrix_text(rows: Sequence[Row]) -> str:
+def matrix_text(rows: Sequence[SetRow]) -> str:
     """Truth by answer: number of sets."""
     groups = sorted(
         {group_of(row) for row in rows}, key=lambda name: (name[:2] != "no", name[:3] == "out", len(name), name)
@@ -44,7 +44,7 @@ def matrix_text(rows: Sequence[Row]) -> str:
     return text_table(["truth", "sets", *ANSWERS], body)
 
 
-def effects_text(rows: Sequence[Row]) -> str:
+def effects_text(rows: Sequence[SetRow]) -> str:
     """Right names of the sets of each library effect, by strength; "-" where there is none."""
     strengths = sorted({row.strength for row in rows if row.kind == "effect"})
     body = []
@@ -59,7 +59,7 @@ def effects_text(rows: Sequence[Row]) -> str:
     return text_table(["right name", *(f"{strength:g} σ" for strength in strengths)], body)
 
 
-def followed_text(rows: Sequence[Row]) -> str:
+def followed_text(rows: Sequence[SetRow]) -> str:
     """Right names before and after the follow-up, and which changes were asked for."""
     asked = Counter(row.follow_up for row in rows if row.follow_up)
     library = [row for row in rows if row.kind in ("effect", "pair")]
@@ -107,7 +107,7 @@ def temperatures_text(found: Sequence[Tempered]) -> str:
     return text_table(["temperature", "log loss", "right names", "wrong names", "names where nothing is missing"], body)
 
 
-def group_of(row: Row) -> str:
+def group_of(row: SetRow) -> str:
     """Line of the confusion matrix that a data set belongs to."""
     if row.kind == "null":
         return "no effect"
@@ -116,7 +116,7 @@ def group_of(row: Row) -> str:
     return "pair" if row.kind == "pair" else f"outside: {row.label}"
 
 
-def _wrong(rows: Sequence[Row]) -> Iterator[str]:
+def _wrong(rows: Sequence[SetRow]) -> Iterator[str]:
     for row in rows:
         if row.answer == "wrong" or (row.kind in ("null", "outside") and row.named):
             strength = "" if math.isnan(row.strength) else f" at {row.strength:.3g} σ"

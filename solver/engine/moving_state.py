@@ -25,11 +25,8 @@ LOADED_ONCE = frozenset(
         *("swing", "first", "members", "kind", "local", "radius", "body"),
     )
 )
-
 """Fields of bodies and members that only loading a scene writes."""
-
 SCRATCH = frozenset(("near", "next"))
-
 """Fields of bodies that building the contact list fills before it reads them."""
 
 

@@ -16,7 +16,6 @@ from solver.engine.state import BODY, CONTACT, MEMBER, WALL, WORLD
 Arrays = dict[str, npt.NDArray[Any]]
 
 TABLES = {"world": WORLD, "body": BODY, "member": MEMBER, "contact": CONTACT, "wall": WALL}
-
 """Groups that a snapshot holds; what is not here follows from the scene and is loaded from it."""
 
 

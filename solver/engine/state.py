@@ -13,11 +13,8 @@ from solver.effects.columns import COLUMNS, KEPT
 from solver.laws import CONTACT_LAWS, HertzMindlin
 
 Vec3 = ti.types.vector(3, ti.f64)
-
 Vec4 = ti.types.vector(4, ti.f64)
-
 Ints3 = ti.types.vector(3, ti.i32)
-
 Mat3 = ti.types.matrix(3, 3, ti.f64)
 
 WORLD = {
@@ -53,7 +50,6 @@ WORLD = {
     "outlet": ti.f64,  # height of the outlet [m]
     "inlet_radius": ti.f64,  # radius of the feed opening [m]
 }
-
 """Per world, shape (worlds,)."""
 
 BODY = {
@@ -94,7 +90,6 @@ BODY = {
     "border": ti.i32,  # list of the sleepers that something awake may push, ascending
     "at_border": ti.i32,  # 1: is in that list
 }
-
 """Per body, shape (worlds, bodies)."""
 
 MEMBER = {
@@ -104,11 +99,9 @@ MEMBER = {
     "centre": Vec3,  # in the world [m], valid while ``listed``
     "listed": ti.i32,  # 1: has entries in the contact list
 }
-
 """Per member sphere, shape (worlds, members)."""
 
 HISTORY = {"i": ti.i32, "j": ti.i32, "spring": Vec3, "loss": Vec3, "radius": ti.f64, "expected": ti.f64}
-
 """What a contact keeps when the list is built again, shape (worlds, contacts)."""
 
 CONTACT = {
@@ -127,7 +120,6 @@ CONTACT = {
     "triangles": ti.i32,  # and how many
     "live": ti.i32,  # list of the entries that have a body awake or a moving wall, ascending; then the others
 }
-
 """Per entry of the contact list, ordered by (i, j), shape (worlds, contacts)."""
 
 PAIR = {
@@ -136,8 +128,7 @@ PAIR = {
     "normal": Vec3,  # at a lead: sum of δ n [m]
     "point": Vec3,  # at a lead: sum of δ times the contact's place relative to the first body's centre [m²]
 }
-
-"""Per entry of the contact list where contacts of a pair share (``clump_rules.py``), shape (worlds, contacts)."""
+"""Per entry of the contact list where contacts of a pair share (``narrowphase.py``), shape (worlds, contacts)."""
 
 WALL = {
     "origin": Vec3,  # pose: local frame → world [m]
@@ -160,7 +151,6 @@ WALL = {
     "cells": Ints3,  # number of cells along each axis
     "first_cell": ti.i32,  # where its cells begin
 }
-
 """Per surface of the rig as declared, shape (worlds, walls)."""
 
 SURFACE = {
@@ -168,7 +158,6 @@ SURFACE = {
     "geometry": Vec4,  # of a revolved segment: r0, z0, r1, z1 [m]
     "wall": ti.i32,
 }
-
 """What a sphere can touch: a primitive is one, a mesh one per smooth patch; shape (worlds, surfaces)."""
 
 TRIANGLE = {
@@ -180,7 +169,6 @@ TRIANGLE = {
     "corners": Ints3,  # the same at a, b, c: 0 keep, 1 leave it to the other patch
     "guards": Mat3,  # row per edge: unit vector in the neighbour's plane, away from the edge
 }
-
 """Per triangle of the meshes, ordered by surface, shape (worlds, triangles)."""
 
 SUMMARY = {
@@ -196,17 +184,12 @@ SUMMARY = {
     "asleep": ti.i32,  # bodies that sleep
     "finite": ti.i32,  # 0 once a number is not finite
 }
-
 """Per world, written by the kernel at the end of a launch, shape (worlds,)."""
 
 QUANTA = {"bodies": 128, "members": 1024, "contacts": 16384}
-
 MESH_QUANTA = {"triangles": 256, "cells": 4096, "cell_items": 16384}
-
 """What a size is a multiple of, so that scenes much alike share the kernels that are compiled for it."""
-
 KINDS = 6
-
 """Contact classes of the smallest table; a larger one has twice as many, or four times."""
 
 

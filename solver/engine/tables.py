@@ -1,12 +1,9 @@
-"""Bodies of one world as flat tables: the form in which the arrays of a batch take them.
+"""Bodies of a world and surfaces of its rig as flat tables: the form in which the arrays of a batch take them.
 
-Surfaces of a rig as flat tables: the form in which the arrays of a batch take them.
-
-A triangle mesh as the solver wants it: smooth patches, who answers at an edge, and a grid to find triangles.
-
-Faces that share an edge at less than ``SMOOTH_ANGLE`` form a patch, and a sphere has one contact with a patch, at the
-patch's nearest point: rolling over a finely meshed plane is rolling on a plane. Two patches that meet in an edge would
-both push there; the duty at the edge is given to one of them, and to neither where the neighbour's face is nearer.
+A triangle mesh becomes smooth patches, who answers at an edge, and a grid to find triangles. Faces that share an edge
+at less than ``SMOOTH_ANGLE`` form a patch, and a sphere has one contact with a patch, at the patch's nearest point:
+rolling over a finely meshed plane is rolling on a plane. Two patches that meet in an edge would both push there; the
+duty at the edge is given to one of them, and to neither where the neighbour's face is nearer.
 Idea: faces before edges before corners (Hu, Hu & Song 2013, Powder Technology 246:516).
 """
 
@@ -30,12 +27,22 @@ if TYPE_CHECKING:
     import trimesh
 
 Array = npt.NDArray[np.float64]
-
 Ints = npt.NDArray[np.int32]
+
+SMOOTH_ANGLE = math.radians(5.0)
+"""Largest angle between the normals of neighbouring faces that act as one surface."""
+TRIANGLES_PER_CELL = 2.0
+"""The grid has about one cell for this many triangles along each of its two directions of the surface."""
+MAX_CELLS = 64
+"""Most cells of the grid along an axis."""
+KEEP, LEAVE, SEE_GUARD = 0, 1, 2
+"""Duties at an edge, as in ``state.TRIANGLE``."""
+PLANE, REVOLVED, PATCH = 0, 1, 2
+"""``state.SURFACE`` shapes."""
 
 
 @dataclass(frozen=True)
-class Layout:
+class BodyTables:
     """Bodies of one world in order of entry, as the arrays want them (n bodies, m member spheres)."""
 
     numbers: Array
@@ -50,57 +57,30 @@ class Layout:
     """Linear size of each body relative to the declared one; shape (n,)."""
 
 
-def layout(scene: Scene, order: Ints, scale: Array | None = None) -> Layout:
-    """Arrange bodies of the components in ``order`` (index into ``scene.bodies``, in order of entry).
+@dataclass(frozen=True)
+class WallTables:
+    """k walls, p surfaces (primitives first, then the patches of the meshes), n triangles."""
 
-    ``scale`` (n,) is the linear size s of each body, by default 1: spheres and reach go with s, mass with s³, inertia
-    with s⁵.
-    """
-    scale = np.ones(len(order)) if scale is None else scale
-    clumps = [body.clump for body in scene.bodies]
-    sizes = np.array([len(clumps[k].radii) for k in order], dtype=np.int32)
-    first = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int32)
-    each = [
-        [clump.mass, *clump.inertia, clump.bounding_radius, *outline(body)]
-        for clump, body in zip(clumps, scene.bodies, strict=True)
-    ]
-    numbers = np.array([each[k] for k in order])
-    numbers *= scale[:, None] ** np.array([3, 5, 5, 5, 1, 1, 1, 1, 1, 0])
-    spheres = np.concatenate([np.column_stack([clumps[k].centres, clumps[k].radii]) for k in order])
-    spheres *= np.repeat(scale, sizes)[:, None]
-    owner = np.repeat(np.arange(len(order), dtype=np.int32), sizes)[:, None]
-    places = np.column_stack([first, sizes, order]).astype(np.int32)
-    return Layout(numbers, places, np.ascontiguousarray(spheres), np.ascontiguousarray(owner), scale)
-
-
-def outline(body: Body) -> tuple[float, ...]:
-    """What the air meets: semi-axes (3) [m], diameter of the sphere of the same volume [m], sphericity.
-
-    The surface is that of the ellipsoid with the body's outer dimensions, within 1.1 % (K. Thomsen 2004):
-    4π (((ab)ᵖ + (ac)ᵖ + (bc)ᵖ)/3)^(1/p), p = 1.6075.
-    """
-    a, b, c = (extent / 2.0 for extent in body.extents)
-    diameter = (6.0 * body.mass / (math.pi * body.density)) ** (1.0 / 3.0)
-    p = 1.6075
-    surface = 4.0 * math.pi * (((a * b) ** p + (a * c) ** p + (b * c) ** p) / 3.0) ** (1.0 / p)
-    return a, b, c, diameter, min(1.0, math.pi * diameter**2 / surface)
-
-
-SMOOTH_ANGLE = math.radians(5.0)
-
-"""Largest angle between the normals of neighbouring faces that act as one surface."""
-
-TRIANGLES_PER_CELL = 2.0
-
-"""The grid has about one cell for this many triangles along each of its two directions of the surface."""
-
-MAX_CELLS = 64
-
-"""Most cells of the grid along an axis."""
-
-KEEP, LEAVE, SEE_GUARD = 0, 1, 2
-
-"""Duties at an edge, as in ``state.TRIANGLE``."""
+    poses: Array
+    """origin, quaternion; shape (k, 7)."""
+    grids: Array
+    """lower corner and cell edge, 0 for a primitive; shape (k, 4)."""
+    cells: Ints
+    """cells along each axis and where they begin; shape (k, 4)."""
+    geometry: Array
+    """r0, z0, r1, z1 of a revolved segment; shape (p, 4)."""
+    surfaces: Ints
+    """shape and wall; shape (p, 2)."""
+    primitives: int
+    corners: Array
+    """shape (n, 9)."""
+    guards: Array
+    """shape (n, 9)."""
+    triangles: Ints
+    """surface, duties of edges (3) and of corners (3); shape (n, 7)."""
+    first: Ints
+    """Where the triangles of a cell begin, shape (cells + 1,)."""
+    items: Ints
 
 
 @dataclass(frozen=True)
@@ -128,6 +108,85 @@ class MeshWall:
     """Triangles of the cells."""
 
 
+def body_tables(scene: Scene, order: Ints, scale: Array | None = None) -> BodyTables:
+    """Arrange bodies of the components in ``order`` (index into ``scene.bodies``, in order of entry).
+
+    ``scale`` (n,) is the linear size s of each body, by default 1: spheres and reach go with s, mass with s³, inertia
+    with s⁵.
+    """
+    scale = np.ones(len(order)) if scale is None else scale
+    clumps = [body.clump for body in scene.bodies]
+    sizes = np.array([len(clumps[k].radii) for k in order], dtype=np.int32)
+    first = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int32)
+    each = [
+        [clump.mass, *clump.inertia, clump.bounding_radius, *outline(body)]
+        for clump, body in zip(clumps, scene.bodies, strict=True)
+    ]
+    numbers = np.array([each[k] for k in order])
+    numbers *= scale[:, None] ** np.array([3, 5, 5, 5, 1, 1, 1, 1, 1, 0])
+    spheres = np.concatenate([np.column_stack([clumps[k].centres, clumps[k].radii]) for k in order])
+    spheres *= np.repeat(scale, sizes)[:, None]
+    owner = np.repeat(np.arange(len(order), dtype=np.int32), sizes)[:, None]
+    places = np.column_stack([first, sizes, order]).astype(np.int32)
+    return BodyTables(numbers, places, np.ascontiguousarray(spheres), np.ascontiguousarray(owner), scale)
+
+
+def outline(body: Body) -> tuple[float, ...]:
+    """What the air meets: semi-axes (3) [m], diameter of the sphere of the same volume [m], sphericity.
+
+    The surface is that of the ellipsoid with the body's outer dimensions, within 1.1 % (K. Thomsen 2004):
+    4π (((ab)ᵖ + (ac)ᵖ + (bc)ᵖ)/3)^(1/p), p = 1.6075.
+    """
+    a, b, c = (extent / 2.0 for extent in body.extents)
+    diameter = (6.0 * body.mass / (math.pi * body.density)) ** (1.0 / 3.0)
+    p = 1.6075
+    surface = 4.0 * math.pi * (((a * b) ** p + (a * c) ** p + (b * c) ** p) / 3.0) ** (1.0 / p)
+    return a, b, c, diameter, min(1.0, math.pi * diameter**2 / surface)
+
+
+@lru_cache(maxsize=32)
+def wall_tables(surfaces: tuple[Surface, ...]) -> WallTables:
+    """Arrange ``surfaces``; wall k of the arrays is ``surfaces[k]``."""
+    primitives = [k for k, surface in enumerate(surfaces) if not isinstance(surface, TriangleMesh)]
+    geometry = [_segment(surfaces[k]) for k in primitives]
+    rows = [(REVOLVED if isinstance(surfaces[k], Revolved) else PLANE, k) for k in primitives]
+    grids, cells = np.zeros((len(surfaces), 4)), np.zeros((len(surfaces), 4), dtype=np.int32)
+    meshes: list[MeshWall] = []
+    offsets: list[int] = []
+    cell_count = triangle_count = item_count = 0
+    first, items = [np.zeros(0, dtype=np.int32)], [np.zeros(0, dtype=np.int32)]
+    for k, surface in enumerate(surfaces):
+        if not isinstance(surface, TriangleMesh):
+            continue
+        mesh = mesh_wall(surface)
+        grids[k], cells[k] = (*mesh.low, mesh.cell), (*mesh.cells, cell_count)
+        # Where one mesh's cells end and the next one's begin, the ends meet.
+        first.append(mesh.first[:-1] + item_count)
+        items.append(mesh.items + triangle_count)
+        cell_count += len(mesh.first) - 1
+        triangle_count += len(mesh.patch)
+        item_count += len(mesh.items)
+        offsets.append(len(rows))
+        patches = int(mesh.patch.max()) + 1
+        rows += [(PATCH, k)] * patches
+        geometry += [(0.0, 0.0, 0.0, 0.0)] * patches
+        meshes.append(mesh)
+    marks = [_marks(mesh, start) for mesh, start in zip(meshes, offsets, strict=True)]
+    return WallTables(
+        poses=np.array([[*surface.pose.origin, *surface.pose.quaternion] for surface in surfaces], dtype=float),
+        grids=grids,
+        cells=cells,
+        geometry=np.array(geometry, dtype=float).reshape(-1, 4),
+        surfaces=np.array(rows, dtype=np.int32).reshape(-1, 2),
+        primitives=len(primitives),
+        corners=_joined([mesh.corners for mesh in meshes], 9),
+        guards=_joined([mesh.guards for mesh in meshes], 9),
+        triangles=_joined(marks, 7).astype(np.int32),
+        first=np.concatenate([*first, [item_count]]).astype(np.int32),
+        items=np.concatenate(items).astype(np.int32),
+    )
+
+
 def mesh_wall(surface: TriangleMesh) -> MeshWall:
     """Tables of ``surface``."""
     import trimesh
@@ -141,6 +200,36 @@ def mesh_wall(surface: TriangleMesh) -> MeshWall:
     corners = np.ascontiguousarray(mesh.triangles.reshape(-1, 9))
     low, cell, cells, first, items = _grid(mesh.triangles)
     return MeshWall(corners, patch, edges, guards, _vertex_duties(mesh, patch), low, cell, cells, first, items)
+
+
+def extent(surface: Surface, angular_velocity: Sequence[float], domain: float) -> float:
+    """Distance [m] from its origin of the furthest point that ``angular_velocity`` displaces; ``domain``: of a plane.
+
+    A surface that turns about its own axis of symmetry stays where it is.
+    """
+    omega = np.array(angular_velocity, dtype=float)
+    axis = rotation_matrix(np.array(surface.pose.quaternion)) @ np.array([0.0, 0.0, 1.0])
+    if not isinstance(surface, TriangleMesh) and np.linalg.norm(np.cross(omega, axis)) <= 1e-12 * np.linalg.norm(omega):
+        return 0.0
+    if isinstance(surface, TriangleMesh):
+        return float(np.linalg.norm(np.array(surface.vertices), axis=1).max())
+    if isinstance(surface, Revolved):
+        return max(float(np.hypot(surface.r0, surface.z0)), float(np.hypot(surface.r1, surface.z1)))
+    return 4.0 * domain
+
+
+def _segment(surface: Surface) -> tuple[float, float, float, float]:
+    if isinstance(surface, Revolved):
+        return surface.r0, surface.z0, surface.r1, surface.z1
+    return 0.0, 0.0, 0.0, 0.0
+
+
+def _marks(mesh: MeshWall, start: int) -> Ints:
+    return np.column_stack([mesh.patch + start, mesh.edges, mesh.vertex_duty]).astype(np.int32)
+
+
+def _joined(tables: Sequence[npt.NDArray[Any]], width: int) -> Array:
+    return np.concatenate([np.zeros((0, width)), *tables]).astype(float)
 
 
 def _patches(mesh: trimesh.Trimesh) -> Ints:
@@ -210,107 +299,3 @@ def _grid(triangles: Array) -> tuple[Array, float, tuple[int, int, int], Ints, I
     first = np.concatenate([[0], np.cumsum([len(items) for items in contents])]).astype(np.int32)
     items = np.array([t for items in contents for t in items], dtype=np.int32)
     return low, cell, (int(counts[0]), int(counts[1]), int(counts[2])), first, items
-
-
-PLANE, REVOLVED, PATCH = 0, 1, 2
-
-"""``state.SURFACE`` shapes."""
-
-
-@dataclass(frozen=True)
-class WallTables:
-    """k walls, p surfaces (primitives first, then the patches of the meshes), n triangles."""
-
-    poses: Array
-    """origin, quaternion; shape (k, 7)."""
-    grids: Array
-    """lower corner and cell edge, 0 for a primitive; shape (k, 4)."""
-    cells: Ints
-    """cells along each axis and where they begin; shape (k, 4)."""
-    geometry: Array
-    """r0, z0, r1, z1 of a revolved segment; shape (p, 4)."""
-    surfaces: Ints
-    """shape and wall; shape (p, 2)."""
-    primitives: int
-    corners: Array
-    """shape (n, 9)."""
-    guards: Array
-    """shape (n, 9)."""
-    triangles: Ints
-    """surface, duties of edges (3) and of corners (3); shape (n, 7)."""
-    first: Ints
-    """Where the triangles of a cell begin, shape (cells + 1,)."""
-    items: Ints
-
-
-@lru_cache(maxsize=32)
-def wall_tables(surfaces: tuple[Surface, ...]) -> WallTables:
-    """Arrange ``surfaces``; wall k of the arrays is ``surfaces[k]``."""
-    primitives = [k for k, surface in enumerate(surfaces) if not isinstance(surface, TriangleMesh)]
-    geometry = [_segment(surfaces[k]) for k in primitives]
-    rows = [(REVOLVED if isinstance(surfaces[k], Revolved) else PLANE, k) for k in primitives]
-    grids, cells = np.zeros((len(surfaces), 4)), np.zeros((len(surfaces), 4), dtype=np.int32)
-    meshes: list[MeshWall] = []
-    offsets: list[int] = []
-    cell_count = triangle_count = item_count = 0
-    first, items = [np.zeros(0, dtype=np.int32)], [np.zeros(0, dtype=np.int32)]
-    for k, surface in enumerate(surfaces):
-        if not isinstance(surface, TriangleMesh):
-            continue
-        mesh = mesh_wall(surface)
-        grids[k], cells[k] = (*mesh.low, mesh.cell), (*mesh.cells, cell_count)
-        # Where one mesh's cells end and the next one's begin, the ends meet.
-        first.append(mesh.first[:-1] + item_count)
-        items.append(mesh.items + triangle_count)
-        cell_count += len(mesh.first) - 1
-        triangle_count += len(mesh.patch)
-        item_count += len(mesh.items)
-        offsets.append(len(rows))
-        patches = int(mesh.patch.max()) + 1
-        rows += [(PATCH, k)] * patches
-        geometry += [(0.0, 0.0, 0.0, 0.0)] * patches
-        meshes.append(mesh)
-    marks = [_marks(mesh, start) for mesh, start in zip(meshes, offsets, strict=True)]
-    return WallTables(
-        poses=np.array([[*surface.pose.origin, *surface.pose.quaternion] for surface in surfaces], dtype=float),
-        grids=grids,
-        cells=cells,
-        geometry=np.array(geometry, dtype=float).reshape(-1, 4),
-        surfaces=np.array(rows, dtype=np.int32).reshape(-1, 2),
-        primitives=len(primitives),
-        corners=_joined([mesh.corners for mesh in meshes], 9),
-        guards=_joined([mesh.guards for mesh in meshes], 9),
-        triangles=_joined(marks, 7).astype(np.int32),
-        first=np.concatenate([*first, [item_count]]).astype(np.int32),
-        items=np.concatenate(items).astype(np.int32),
-    )
-
-
-def extent(surface: Surface, angular_velocity: Sequence[float], domain: float) -> float:
-    """Distance [m] from its origin of the furthest point that ``angular_velocity`` displaces; ``domain``: of a plane.
-
-    A surface that turns about its own axis of symmetry stays where it is.
-    """
-    omega = np.array(angular_velocity, dtype=float)
-    axis = rotation_matrix(np.array(surface.pose.quaternion)) @ np.array([0.0, 0.0, 1.0])
-    if not isinstance(surface, TriangleMesh) and np.linalg.norm(np.cross(omega, axis)) <= 1e-12 * np.linalg.norm(omega):
-        return 0.0
-    if isinstance(surface, TriangleMesh):
-        return float(np.linalg.norm(np.array(surface.vertices), axis=1).max())
-    if isinstance(surface, Revolved):
-        return max(float(np.hypot(surface.r0, surface.z0)), float(np.hypot(surface.r1, surface.z1)))
-    return 4.0 * domain
-
-
-def _segment(surface: Surface) -> tuple[float, float, float, float]:
-    if isinstance(surface, Revolved):
-        return surface.r0, surface.z0, surface.r1, surface.z1
-    return 0.0, 0.0, 0.0, 0.0
-
-
-def _marks(mesh: MeshWall, start: int) -> Ints:
-    return np.column_stack([mesh.patch + start, mesh.edges, mesh.vertex_duty]).astype(np.int32)
-
-
-def _joined(tables: Sequence[npt.NDArray[Any]], width: int) -> Array:
-    return np.concatenate([np.zeros((0, width)), *tables]).astype(float)

@@ -15,14 +15,13 @@ from solver.engine.kernels.neighbours import MOST
 from solver.engine.moving_state import Moving
 from solver.engine.snapshot import Arrays
 from solver.engine.state import Capacity, State, state
-from solver.engine.tables import Layout, WallTables, extent, wall_tables
+from solver.engine.tables import BodyTables, WallTables, extent, wall_tables
 from solver.laws import CONTACT_LAWS
 from solver.rigs.rig import Container
 from solver.scenes.body import Body
 from solver.scenes.scene import Scene
 
 Array = npt.NDArray[np.float64]
-
 Ints = npt.NDArray[np.int32]
 
 SUMMARY_COLUMNS = (
@@ -45,7 +44,6 @@ SUMMARY_COLUMNS = (
     "wall_work",
     "taken_out",
 )
-
 """Columns of a summary, SI; what they mean stands in ``state.SUMMARY`` and ``state.WORLD``."""
 
 
@@ -83,7 +81,7 @@ def compiled_in(scenes: Sequence[Scene]) -> dict[str, Any]:
     }
 
 
-def settings_of(scene: Scene, bodies: Layout, dt: float) -> dict[str, Any]:
+def settings_of(scene: Scene, bodies: BodyTables, dt: float) -> dict[str, Any]:
     """What a world is set up with, by ``transfer.SETTINGS``."""
     numerics, inside = scene.numerics, scene.rig.container(0.0)
     return {
@@ -110,7 +108,7 @@ class Batch:
         self._steps = np.zeros(capacity.worlds, dtype=np.int32)
         self._scenes: dict[int, Scene] = {}
 
-    def load(self, w: int, scene: Scene, bodies: Layout, dt: float, active: Sequence[bool]) -> None:
+    def load(self, w: int, scene: Scene, bodies: BodyTables, dt: float, active: Sequence[bool]) -> None:
         """Empty world ``w`` and set it up for ``scene``; no body has entered yet. ``active``: one per surface."""
         s = self._s
         for name, needed in (("bodies", len(bodies.numbers)), ("members", len(bodies.spheres))):

@@ -36,7 +36,7 @@ class ContactLaw:
     columns: ClassVar[tuple[str, ...]]
     """Constants of a pair of materials, as the kernels read them; ``e_star`` [Pa] and ``friction`` are among them."""
     ramped: ClassVar[tuple[str, ...]]
-    """Those of them that a running pile approaches gradually (``retune.py``): what a pile could explode by."""
+    """Those of them that a running pile approaches gradually (``parameter_ramp.py``): what a pile could explode by."""
     spring_column: ClassVar[str]
     """The one that the stiffness of the tangential spring is proportional to."""
     refuses: ClassVar[tuple[str, ...]] = ()

@@ -1,9 +1,9 @@
 """What an observable is: a named scalar with its unit, what it is read off, and what reading it can reveal.
 
+It returns a :class:`Value`, a number with its unit and, where one exists, its spread.
+
 To add one: a function and a line in the table of its file, or an entry point ``observable.NAME`` of a package of one's
 own (``solver/plugins.py``). Every rig that gives its group gives it; page, studies, measured data and reports follow.
-
-What an observable returns: a number with its unit and, where one exists, its spread.
 """
 
 from __future__ import annotations
@@ -29,16 +29,6 @@ class Value:
     unit: str
     spread: float | None = None
     """Sample standard deviation of the parts that ``value`` is the mean of (views, flanks), same unit."""
-
-
-def mean_value(parts: Sequence[float], unit: str) -> Value:
-    """Mean and sample standard deviation of those ``parts`` that could be measured; NaN where none could."""
-    finite = np.asarray(parts, dtype=np.float64)
-    finite = finite[np.isfinite(finite)]
-    if finite.size == 0:
-        return Value(float("nan"), unit, None)
-    spread = float(finite.std(ddof=1)) if finite.size > 1 else None
-    return Value(float(finite.mean()), unit, spread)
 
 
 @dataclass(frozen=True)
@@ -70,6 +60,16 @@ class ComponentObservable:
     unit: str
     doc: str
     function: Callable[[PileReading], dict[str, Value]]
+
+
+def mean_value(parts: Sequence[float], unit: str) -> Value:
+    """Mean and sample standard deviation of those ``parts`` that could be measured; NaN where none could."""
+    finite = np.asarray(parts, dtype=np.float64)
+    finite = finite[np.isfinite(finite)]
+    if finite.size == 0:
+        return Value(float("nan"), unit, None)
+    spread = float(finite.std(ddof=1)) if finite.size > 1 else None
+    return Value(float(finite.mean()), unit, spread)
 
 
 def of_pile(

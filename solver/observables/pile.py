@@ -1,8 +1,8 @@
 """The observables of a pile at rest, each a function PileReading → Value.
 
-Angle of the cone that a pile is equivalent to: three estimators that use the whole pile, not its outline.
-
-For a homogeneous cone of height H, base radius R and tan(angle) = H/R:
+The angle of repose is read by the image method (``repose.py``), and as that of the cone that a pile is equivalent to,
+by three estimators that use the whole pile, not its outline. For a homogeneous cone of height H, base radius R and
+tan(angle) = H/R:
 
     centre of mass          z_com = H/4
     mass within radius ρR   3ρ² - 2ρ³ of the whole, so r50 = R/2 exactly
@@ -47,8 +47,13 @@ from solver.rigs.rig import PILE
 Array = npt.NDArray[np.float64]
 
 BASE_RADII = np.linspace(0.2, 1.0, 801)
-
 """Base radii that :func:`fitted_cone_angle_deg` tries, as fractions of the profile's reach."""
+SHAPE, FLOW, ASYMMETRY, PACKING = Telltale
+PROFILE_RING = 5.0e-3
+"""Width of the rings of :func:`height_profile` [m]."""
+PROFILE_RINGS = 30
+SURFACE_RINGS = 60
+"""Rings of the surface that the cone is fitted to, out to 3 r50."""
 
 
 def mass_cone_angle_deg(z_com: float, r50: float) -> float:
@@ -82,19 +87,6 @@ def fitted_cone_angle_deg(radius: Array, height: Array) -> float:
 
 def _degrees(rise: float, run: float) -> float:
     return float(np.degrees(np.arctan2(rise, run))) if run > 0.0 else float("nan")
-
-
-SHAPE, FLOW, ASYMMETRY, PACKING = Telltale
-
-PROFILE_RING = 5.0e-3
-
-"""Width of the rings of :func:`height_profile` [m]."""
-
-PROFILE_RINGS = 30
-
-SURFACE_RINGS = 60
-
-"""Rings of the surface that the cone is fitted to, out to 3 r50."""
 
 
 def angle_of_repose(reading: PileReading) -> Value:
@@ -272,5 +264,4 @@ OBSERVABLES = (
     of_pile("centroid_y_m", "m", centroid_y, ASYMMETRY, group=PILE, scanned=True),
     of_pile("stray_fraction", "1", stray_fraction, FLOW, group=PILE, scanned=True),
 )
-
 """What is read off a pile on the plate, in the order of tables."""

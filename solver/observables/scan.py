@@ -21,7 +21,6 @@ from solver.scenes.scene import Scene
 Array = npt.NDArray[np.float64]
 
 CENTRE_SLACK = 1e-3
-
 """By how much of a body's size the combination may miss the declared centre of mass."""
 
 

@@ -1,7 +1,4 @@
-"""Top surface of a pile: its height map and the azimuthal mean h(r).
-
-Where the mass of a pile lies on the plate.
-"""
+"""Top surface of a pile, its height map and the azimuthal mean h(r), and where its mass lies on the plate."""
 
 from __future__ import annotations
 

@@ -1,12 +1,12 @@
-"""The light on the backdrop: a quadratic surface through what surrounds the pile, and the noise about it.
+"""The light on the backdrop, and what stands out from it: masks at a few thresholds, darker and lighter.
 
-It starts from the upper rim of the picture, where a whole pile cannot be, and grows downward over every pixel that
-follows the surface, so that a slanting or falling-off light is no threshold's business any more.
-
-What stands out from the backdrop: masks at a few thresholds, darker and lighter, and the parts that they fall into.
+The light is a quadratic surface through what surrounds the pile, and the noise about it. It starts from the upper rim
+of the picture, where a whole pile cannot be, and grows downward over every pixel that follows the surface, so that a
+slanting or falling-off light is no threshold's business any more.
 
 A picture may hold a pile, a plate and a shadow of different grey. Otsu's threshold (1979) splits what stands out in
-two, and each of the halves in two again; which of these masks has the pile's edge is decided by how sharp it is.
+two, and each of the halves in two again; which of these masks, and which of its parts, has the pile's edge is decided
+by how sharp it is.
 """
 
 from __future__ import annotations
@@ -21,20 +21,21 @@ from scipy import ndimage
 from solver.observables.silhouette import EIGHT_NEIGHBOURS
 
 Array = npt.NDArray[np.float64]
-
 Image = npt.NDArray[np.bool_]
 
 DOWN_TO = (0.0, 0.0, 0.4, 0.55, 0.7, 0.85, 1.0, 1.0)
-
 """Share of the rows, from the top, over which the surface is fitted, round by round; 0: the rim alone."""
-
 FEWEST_LEVELS = 4.0
-
 """Grey levels by which backdrop may miss the surface, however little noise there is."""
-
 NORMAL = 1.4826
-
 """Standard deviation of a normal distribution over its median absolute deviation."""
+LEAST_CONTRAST = 8.0
+"""Grey levels between backdrop and threshold."""
+LEAST_SIGNAL = 4.0
+"""The same in standard deviations of the noise."""
+LEAST_AREA = 0.002
+"""Share of the picture that a pile covers at least."""
+BINS = 256
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +46,17 @@ class Illumination:
     """Shape of the picture."""
     noise: float
     """Standard deviation of a pixel of the backdrop about the surface."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A part of a mask that may be the pile. Arrays have row 0 on top."""
+
+    sign: int
+    """1: darker than the backdrop, -1: lighter."""
+    part: Image
+    others: tuple[Image, ...]
+    """Further parts of the same mask that do not hang from the top, largest first."""
 
 
 def illumination(grey: Array) -> Illumination:
@@ -65,46 +77,6 @@ def illumination(grey: Array) -> Illumination:
     residual = np.abs(flat - surface)
     noise = NORMAL * float(np.median(residual[residual <= max(4.0 * scale, FEWEST_LEVELS)]))
     return Illumination(surface.reshape(grey.shape), noise)
-
-
-def _terms(shape: tuple[int, ...]) -> Array:
-    y, x = np.meshgrid(np.linspace(-1, 1, shape[0]), np.linspace(-1, 1, shape[1]), indexing="ij")
-    return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1).reshape(-1, 6)
-
-
-def _rim(shape: tuple[int, ...]) -> Image:
-    """The upper sixth, and the sides of the upper half."""
-    rim = np.zeros(shape, dtype=bool)
-    side = max(2, shape[1] // 12)
-    rim[: max(2, shape[0] // 6)] = True
-    rim[: shape[0] // 2, :side] = rim[: shape[0] // 2, -side:] = True
-    return rim
-
-
-LEAST_CONTRAST = 8.0
-
-"""Grey levels between backdrop and threshold."""
-
-LEAST_SIGNAL = 4.0
-
-"""The same in standard deviations of the noise."""
-
-LEAST_AREA = 0.002
-
-"""Share of the picture that a pile covers at least."""
-
-BINS = 256
-
-
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """A part of a mask that may be the pile. Arrays have row 0 on top."""
-
-    sign: int
-    """1: darker than the backdrop, -1: lighter."""
-    part: Image
-    others: tuple[Image, ...]
-    """Further parts of the same mask that do not hang from the top, largest first."""
 
 
 def candidates(grey: Array, light: Illumination) -> Iterator[Candidate]:
@@ -162,3 +134,17 @@ def standing_parts(mask: Image) -> list[Image]:
     standing = [k for k in large if k not in hanging]
     # If only something that reaches the top is left, it is a pile that is cut there.
     return [labels == k for k in (standing or large)]
+
+
+def _rim(shape: tuple[int, ...]) -> Image:
+    """The upper sixth, and the sides of the upper half."""
+    rim = np.zeros(shape, dtype=bool)
+    side = max(2, shape[1] // 12)
+    rim[: max(2, shape[0] // 6)] = True
+    rim[: shape[0] // 2, :side] = rim[: shape[0] // 2, -side:] = True
+    return rim
+
+
+def _terms(shape: tuple[int, ...]) -> Array:
+    y, x = np.meshgrid(np.linspace(-1, 1, shape[0]), np.linspace(-1, 1, shape[1]), indexing="ij")
+    return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1).reshape(-1, 6)

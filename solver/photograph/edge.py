@@ -5,7 +5,7 @@ are taken along the edge, and a pixel belongs to the pile where it is nearer to 
 in Lankton & Tannenbaum 2008, here without a moving contour). A shadow or a slanting light changes both means alike and
 the half-way place little; noise and the texture of bodies cancel in the means.
 
-How the edge of a pile shows: its contrast, the noise, the width of the change, and how rough the outline is.
+How well the edge shows: its contrast, the noise, the width of the change, and how rough the outline is.
 """
 
 from __future__ import annotations
@@ -23,36 +23,24 @@ from solver.photograph.base_line import BaseLine
 from solver.photograph.picture import NotAPile, Reason
 
 Array = npt.NDArray[np.float64]
-
 Image = npt.NDArray[np.bool_]
 
 COLUMNS = 1000
-
 """Columns that a pile is resampled to where the picture has fewer."""
-
 FOOT = 0.03
-
 """Share of the height above which the width of the pile is looked for."""
-
 LEAST_COLUMNS = 5.0
-
 """Pixels of the mask that a pile is wide."""
-
 MARGIN = 0.1
-
 """Share of that width that is resampled on either side of it."""
-
 BAND = 2.5
-
 """Half width of the band about the rough edge, in pixels of the mask."""
-
 NEIGHBOURHOOD = 0.06
-
 """Side of the square, over the width of the patch, in which the means of both sides are taken."""
-
 LEVELS = (0.35, 0.5, 0.65)
-
 """Where between outside (0) and inside (1) the edge is put: the middle one counts, the others show how sharp it is."""
+SPAN = 0.06
+"""Share of the height, over which the change of the grey across the edge is taken."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,28 +127,6 @@ def silhouettes(patch: Patch, noise: float) -> Silhouettes:
     return Silhouettes(tuple(images), inside, outside)
 
 
-def _blur(noise: float, contrast: float, step: float) -> float:
-    """Width of the smoothing [pixels of the patch] that leaves noise of an eighth of the contrast, 0.5 … 3 pixels of
-    the picture: a Gaussian of width s leaves noise/(2 s √π)."""
-    wanted = 8.0 * noise / max(contrast, 1.0) / (2.0 * np.sqrt(np.pi))
-    return float(np.clip(wanted, 0.5, 3.0)) / step
-
-
-def _mean_where(values: Array, where: Image, side: int) -> Array:
-    """Mean of ``values`` over a square of ``side`` where ``where`` holds; over all of ``where`` if it holds nowhere
-    near."""
-    weight = ndimage.uniform_filter(where.astype(np.float64), side, mode="nearest")
-    total = ndimage.uniform_filter(np.where(where, values, 0.0), side, mode="nearest")
-    overall = float(values[where].mean()) if where.any() else float(values.mean())
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(weight > 1e-3, total / weight, overall)
-
-
-SPAN = 0.06
-
-"""Share of the height."""
-
-
 def pixel_noise(grey: Array) -> float:
     """Standard deviation of a pixel of ``grey``, from second differences along the rows, which slanting light does not
     touch: median, so that edges and the pile do not count. Over one pixel and over eight, the block of a JPEG, within
@@ -216,6 +182,23 @@ def roughness(outline: Outline, flank: FlankLine | None) -> float:
     (u_in, u_out), (z_in, z_out) = flank.u, flank.z
     line = z_in + (z_out - z_in) / (u_out - u_in) * (outline.u[inside] - u_in)
     return float(np.sqrt(np.mean((outline.top[inside] - line) ** 2)) * np.cos(np.arctan(flank.slope)))
+
+
+def _blur(noise: float, contrast: float, step: float) -> float:
+    """Width of the smoothing [pixels of the patch] that leaves noise of an eighth of the contrast, 0.5 … 3 pixels of
+    the picture: a Gaussian of width s leaves noise/(2 s √π)."""
+    wanted = 8.0 * noise / max(contrast, 1.0) / (2.0 * np.sqrt(np.pi))
+    return float(np.clip(wanted, 0.5, 3.0)) / step
+
+
+def _mean_where(values: Array, where: Image, side: int) -> Array:
+    """Mean of ``values`` over a square of ``side`` where ``where`` holds; over all of ``where`` if it holds nowhere
+    near."""
+    weight = ndimage.uniform_filter(where.astype(np.float64), side, mode="nearest")
+    total = ndimage.uniform_filter(np.where(where, values, 0.0), side, mode="nearest")
+    overall = float(values[where].mean()) if where.any() else float(values.mean())
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(weight > 1e-3, total / weight, overall)
 
 
 def _flank_columns(tops: Array) -> npt.NDArray[np.intp]:

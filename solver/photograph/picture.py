@@ -4,7 +4,7 @@ Grey is the luma of Rec. 601, 0.299 R + 0.587 G + 0.114 B, of the gamma-coded va
 white. The orientation that a camera notes beside the picture is applied. Coordinates are those of the picture as it is
 then seen: x to the right, y down, in its own pixels, (0, 0) the middle of the top left one.
 
-Why a picture gives no angle: a name and a sentence, in place of a number.
+Where a picture gives no angle, a name and a sentence say why, in place of a number.
 """
 
 from __future__ import annotations
@@ -21,17 +21,11 @@ from PIL import Image, ImageOps, UnidentifiedImageError
 Grey = npt.NDArray[np.float32]
 
 FORMATS = ("JPEG", "PNG", "TIFF", "BMP", "WEBP")
-
 MOST_PIXELS = 60_000_000
-
 MOST_BYTES = 150_000_000
-
 LEAST_SIDE = 32
-
 LONGEST = 2400
-
 """Longest side [px] that is worked on: an angle gains nothing from more."""
-
 WHITE = 255.0
 
 
@@ -59,6 +53,39 @@ class Picture:
     def index(self, place: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """The inverse of :meth:`place`."""
         return (place + 0.5) / self.reduced - 0.5
+
+
+class Reason(StrEnum):
+    """What a picture lacks."""
+
+    BLANK = "blank"
+    NO_CLEAR_SILHOUETTE = "no clear silhouette"
+    TOO_SMALL = "too small"
+    CUT_BY_FRAME = "cut by the frame"
+    TWO_PILES = "two piles"
+    TILTED_CAMERA = "tilted camera"
+    CAMERA_LOOKS_DOWN = "camera looks down"
+    NO_FLANK = "no flank"
+    NO_SCALE = "no reference length"
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A picture that is not taken for a pile."""
+
+    name: str
+    """Of the picture."""
+    reason: Reason
+    detail: str
+    """One sentence: what was seen, and what would help."""
+
+
+class NotAPile(Exception):
+    """Ends the reading of a picture; :func:`~solver.photograph.read.read_photograph` makes it a :class:`Refusal`."""
+
+    def __init__(self, reason: Reason, detail: str) -> None:
+        super().__init__(f"{reason}: {detail}")
+        self.reason, self.detail = reason, detail
 
 
 def open_picture(path: Path) -> Picture:
@@ -113,36 +140,3 @@ def _grey(image: Image.Image, path: Path) -> Grey:
 
 def _too_many() -> str:
     return f"allowed: up to {MOST_PIXELS // 1_000_000} megapixels; scale the picture down"
-
-
-class Reason(StrEnum):
-    """What a picture lacks."""
-
-    BLANK = "blank"
-    NO_CLEAR_SILHOUETTE = "no clear silhouette"
-    TOO_SMALL = "too small"
-    CUT_BY_FRAME = "cut by the frame"
-    TWO_PILES = "two piles"
-    TILTED_CAMERA = "tilted camera"
-    CAMERA_LOOKS_DOWN = "camera looks down"
-    NO_FLANK = "no flank"
-    NO_SCALE = "no reference length"
-
-
-@dataclass(frozen=True)
-class Refusal:
-    """A picture that is not taken for a pile."""
-
-    name: str
-    """Of the picture."""
-    reason: Reason
-    detail: str
-    """One sentence: what was seen, and what would help."""
-
-
-class NotAPile(Exception):
-    """Ends the reading of a picture; :func:`~solver.photograph.read.read_photograph` makes it a :class:`Refusal`."""
-
-    def __init__(self, reason: Reason, detail: str) -> None:
-        super().__init__(f"{reason}: {detail}")
-        self.reason, self.detail = reason, detail

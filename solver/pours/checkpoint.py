@@ -1,11 +1,10 @@
-"""A pour interrupted and gone on with: the same bits as one that was never interrupted.
+"""A pour interrupted and gone on with, or brought back to an earlier moment: the same bits as one that ran through.
 
 A checkpoint file (``.npz``) holds the world's arrays (``solver/engine/snapshot.py``) and what the pour has decided so
-far. It belongs to one scene, seed and version of the solver; for any other it is refused.
+far. It can go on elsewhere, belongs to one scene, seed and version of the solver, and is refused for any other.
 
-A pour brought back to an earlier moment of its own, in the same batch: from there it repeats the same bits.
-
-Quicker than a checkpoint (``solver/pours/checkpoint.py``), which can be kept in a file and go on elsewhere.
+A kept moment (:class:`Kept`) goes back into the batch that it was taken from, while the pour runs. It holds only what
+moves (``solver/engine/moving_state.py``), so keeping one and going back is quicker than with a checkpoint.
 """
 
 from __future__ import annotations
@@ -47,10 +46,10 @@ PLAIN = (
     "_left",
     "_ramp_left",
 )
-
 """Parts of a pour that are numbers, text, or lists of them."""
-
 HEAD = "pour.json"
+DECIDED = (*(name for name in PLAIN if name != "samples"), "ended", "outcome", "message", "_table", "_ramp", "_inside")
+"""What a pour has decided, in values that it replaces and never changes."""
 
 
 @dataclass(frozen=True)
@@ -65,10 +64,24 @@ class Checkpoint:
     world: Arrays
 
 
-def fingerprint(scene: Scene) -> str:
-    """The same for pours of one key (mesh files by their contents), where a checkpoint holds the same arrays."""
-    held = [f"{group}.{name}" for group, table in TABLES.items() for name in table]
-    return hashlib.sha256(f"{pour_key(scene, seed=0)} {PLAIN} {held}".encode()).hexdigest()
+@dataclass(frozen=True)
+class Kept:
+    """One moment of a pour."""
+
+    time: float
+    """[s]"""
+    scene: Scene
+    """With the parameters that were in force."""
+    decided: Mapping[str, Any]
+    lengths: tuple[int, ...]
+    to_do: tuple[Any, ...]
+    random: Mapping[str, Any]
+    world: Moving
+
+    @property
+    def nbytes(self) -> int:
+        """Memory that it takes [B], but for a few hundred."""
+        return self.world.nbytes
 
 
 def checkpoint_of(pour: Pour) -> Checkpoint:
@@ -143,34 +156,10 @@ def read_checkpoint(path: Path) -> Checkpoint:
         raise ParameterError(f"{path}: not a checkpoint, or a damaged one ({error})") from error
 
 
-DECIDED = (*(name for name in PLAIN if name != "samples"), "ended", "outcome", "message", "_table", "_ramp", "_inside")
-
-"""What a pour has decided, in values that it replaces and never changes."""
-
-
-@dataclass(frozen=True)
-class Kept:
-    """One moment of a pour."""
-
-    time: float
-    """[s]"""
-    scene: Scene
-    """With the parameters that were in force."""
-    decided: Mapping[str, Any]
-    lengths: tuple[int, ...]
-    to_do: tuple[Any, ...]
-    random: Mapping[str, Any]
-    world: Moving
-
-    @property
-    def nbytes(self) -> int:
-        """Memory that it takes [B], but for a few hundred."""
-        return self.world.nbytes
-
-
-def growing(pour: Pour) -> tuple[list[Any], ...]:
-    """Lists that only grow, so that their length is enough to have them as they were."""
-    return pour.samples, pour.supply.entries, pour._free_surface
+def fingerprint(scene: Scene) -> str:
+    """The same for pours of one key (mesh files by their contents), where a checkpoint holds the same arrays."""
+    held = [f"{group}.{name}" for group, table in TABLES.items() for name in table]
+    return hashlib.sha256(f"{pour_key(scene, seed=0)} {PLAIN} {held}".encode()).hexdigest()
 
 
 def keep(pour: Pour) -> Kept:
@@ -200,3 +189,8 @@ def put_back(pour: Pour, kept: Kept) -> None:
     pour.batch.set_law(pour.w, pour._table)
     pour.batch.set_effects(pour.w, kept.scene)
     pour.batch.put_moving(pour.w, kept.world)
+
+
+def growing(pour: Pour) -> tuple[list[Any], ...]:
+    """Lists that only grow, so that their length is enough to have them as they were."""
+    return pour.samples, pour.supply.entries, pour._free_surface

@@ -18,11 +18,8 @@ from solver.laws import ContactLaw
 Array = npt.NDArray[np.float64]
 
 RAMP_TIME = 0.02
-
 """Duration of a change of stiffness [s]; at least 10 ms."""
-
 RAMP_STEPS = 100
-
 """Number of steps in which the constants are changed."""
 
 

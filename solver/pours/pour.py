@@ -41,7 +41,6 @@ from solver.scenes.scene import Scene, actual, pour_rig
 from solver.scenes.time_step import time_step
 
 SETTLE_LIMIT = 1.0
-
 """``fill_then_open``: the rig acts this long [s] after the last body entered even if the fill still moves."""
 
 Summary = dict[str, float]
@@ -144,7 +143,7 @@ class Pour:
         self._sample(dict(zip(SUMMARY_COLUMNS, row.tolist(), strict=True)))
         return True
 
-    def retune(self, scene: Scene) -> None:
+    def ramp_to(self, scene: Scene) -> None:
         """Let the running pour follow the material of ``scene``; wakes it up if it had come to rest.
 
         Friction and effects act at once; stiffness and damping are ramped (see ``solver/pours/parameter_ramp.py``).

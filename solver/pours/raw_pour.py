@@ -39,17 +39,11 @@ from solver.scenes.scene import Scene, pour_rig
 from solver.version import PHYSICS
 
 FORMAT = 1
-
 LENGTH = 1e-5
-
 """Unit of the lengths that are kept [m]."""
-
 TURN = 1.0 / 32767
-
 """Unit of the components of a quaternion."""
-
 HOLE = -(2**31) // 2
-
 CURVES = (
     "kinetic_energy",
     "contacts",

@@ -11,7 +11,6 @@ import numpy.typing as npt
 from solver.scenes.scene import Scene
 
 Array = npt.NDArray[np.float64]
-
 Ints = npt.NDArray[np.int32]
 
 
@@ -42,7 +41,6 @@ class Outcome(StrEnum):
 
 
 Verdict = tuple[Outcome, str]
-
 """Outcome and message; the message is empty where the outcome says all."""
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from solver.engine.tables import Layout
+from solver.engine.tables import BodyTables
 from solver.observables.free_surface import column_places
 from solver.pours.record import Bodies, Entries, FreeSurface, Pile, Spheres, Trace
 from solver.pours.supply import Entry
@@ -19,7 +19,7 @@ from solver.scenes.scene import Scene
 Array = npt.NDArray[np.float64]
 
 
-def bodies_of(scene: Scene, order: npt.NDArray[np.int32], places: Layout, state: Array) -> Bodies:
+def bodies_of(scene: Scene, order: npt.NDArray[np.int32], places: BodyTables, state: Array) -> Bodies:
     """Bodies that have entered, from the rows of ``Batch.bodies``."""
     n = len(state)
     return Bodies(

@@ -19,11 +19,9 @@ from solver.pours.record import Record
 from solver.scenes.scene import Scene, actual, body_counts
 
 CONTACTS_PER_MEMBER = 16
-
 """Room in the contact list: entries per member sphere. A bed of long bodies holds 2–4."""
 
 WORLDS_PER_THREAD = 4
-
 """Pours in flight per thread: enough to even out that some are free flight and some a packed pile."""
 
 

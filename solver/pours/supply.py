@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from solver.engine.tables import layout
+from solver.engine.tables import body_tables
 from solver.pours.record import Spheres
 from solver.rigs.feed import Feed
 from solver.scenes import insertion
@@ -38,7 +38,9 @@ class Supply:
         self.random = np.random.default_rng(seed)
         self.order = insertion.shuffled_components(body_counts(scene), self.random)
         """Component of every body, (n,)."""
-        self.layout = layout(scene, self.order, drawn_sizes([body.sizes for body in scene.bodies], self.order, seed))
+        self.layout = body_tables(
+            scene, self.order, drawn_sizes([body.sizes for body in scene.bodies], self.order, seed)
+        )
         self.entries: list[Entry] = []
         self._scene = scene
         self._due = insertion.entry_times(self.layout.numbers[:, 0], scene.insertion.rate) - scene.insertion.lead

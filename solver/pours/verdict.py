@@ -12,9 +12,7 @@ from solver.rigs.rig import PourRig
 from solver.scenes.numerics import Numerics
 
 RUNNING: Verdict = (Outcome.RUNNING, "")
-
 STALL_TIME = 0.5
-
 """A container that has let nothing out for this long [s] is done, even if what is stuck in it rocks: twice the time
 that a body needs to fall through the funnel."""
 

@@ -3,7 +3,7 @@
 In one process all worlds wait at the end of a launch for the slowest, and while Python feeds and samples one world the
 other cores rest: two threads of :func:`solver.pours.run.run_queue` do the work of 1.5, two workers that of 2. The bits
 are the same. Of workers that need kernels which nobody has compiled yet, one compiles them and the others wait. A
-worker ends with its pipe: at :meth:`Crew.close`, or when the process that made it is gone.
+worker ends with its pipe: at :meth:`WorkerPool.close`, or when the process that made it is gone.
 """
 
 from __future__ import annotations
@@ -33,13 +33,11 @@ if TYPE_CHECKING:
     from solver.pours.run import Job
 
 MOMENTS = 3
-
 """Moments of decision of a pour after which its kernels are compiled."""
-
 GONE = "a worker process has ended before its work was done"
 
 
-class Crew:
+class WorkerPool:
     """Processes that are started when they are first needed and kept for the next queue."""
 
     def __init__(self, workers: int | None = None) -> None:
@@ -81,7 +79,7 @@ class Crew:
             process.join()
         self._processes = []
 
-    def __enter__(self) -> Crew:
+    def __enter__(self) -> WorkerPool:
         return self
 
     def __exit__(self, *error: object) -> None:
@@ -89,10 +87,10 @@ class Crew:
 
 
 def warm_up(rooms: Sequence[Sequence[Scene]], workers: int | None = None) -> Iterator[tuple[int, float | None]]:
-    """Have the kernels compiled and kept that a crew needs for the scenes of each room.
+    """Have the kernels compiled and kept that a pool needs for the scenes of each room.
 
     Args:
-        rooms: scenes that are to be run by one crew, as in :meth:`Crew.run_queue`.
+        rooms: scenes that are to be run by one pool, as in :meth:`WorkerPool.run_queue`.
         workers: processes at once, by default one per core.
 
     Yields:

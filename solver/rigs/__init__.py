@@ -10,7 +10,7 @@ from solver.rigs.lifting_cylinder import LiftingCylinder
 from solver.rigs.mesh_funnel import MeshFunnel
 from solver.rigs.rig import BenchRig, PourRig, Rig
 from solver.rigs.rotating_drum import RotatingDrum
-from solver.rigs.surface import Plane, Pose, Revolved, Surface, TriangleMesh
+from solver.rigs.surface import Plane, Revolved, Surface, SurfacePose, TriangleMesh
 
 RIGS: Registry[type[PourRig]] = Registry(
     "rig", (Funnel, MeshFunnel, LiftingCylinder, DrawDownBox, RotatingDrum), derived_from(PourRig)
@@ -29,10 +29,10 @@ __all__ = [
     "Funnel",
     "MeshFunnel",
     "Plane",
-    "Pose",
     "PourRig",
     "Revolved",
     "Rig",
     "Surface",
+    "SurfacePose",
     "TriangleMesh",
 ]

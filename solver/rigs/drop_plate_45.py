@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 from solver.params import param
 from solver.rigs.rig import BenchRig
-from solver.rigs.surface import Plane, Pose, Surface
+from solver.rigs.surface import Plane, Surface, SurfacePose
 
 FACING_UP_AND_RIGHT = (math.cos(math.pi / 8.0), 0.0, math.sin(math.pi / 8.0), 0.0)
 """An eighth of a turn about +y: local z becomes (1, 0, 1)/√2."""
@@ -44,4 +44,4 @@ class DropPlate45(BenchRig):
 
     def surfaces(self) -> tuple[Surface, ...]:
         """The plate, through the origin."""
-        return (Plane(self.wall, Pose((0.0, 0.0, 0.0), FACING_UP_AND_RIGHT)),)
+        return (Plane(self.wall, SurfacePose((0.0, 0.0, 0.0), FACING_UP_AND_RIGHT)),)

@@ -2,9 +2,7 @@
 
 The mesh stands with z up, as it is in its file; its outlet, the lowest cut through it, is put above the middle of the
 plate. It may be a thin shell or a solid with walls, round or not. What a body can pass is the largest circle about the
-axis within a cut; the gate that keeps the outlet shut is a disc over all of it.
-
-Openings of a shell of triangles: how wide it is where a horizontal plane cuts it, about a vertical axis.
+axis within a cut (:class:`Opening`); the gate that keeps the outlet shut is a disc over all of it.
 """
 
 from __future__ import annotations
@@ -22,7 +20,7 @@ from solver.params import ParameterError, param
 from solver.rigs.feed import RoundFeed
 from solver.rigs.outlet import RoundOutlet
 from solver.rigs.rig import DISCHARGE, PILE, Action, Container, PourRig, Switch
-from solver.rigs.surface import Pose, Revolved, Surface, TriangleMesh, horizontal, load_mesh
+from solver.rigs.surface import Revolved, Surface, SurfacePose, TriangleMesh, horizontal, load_mesh
 from solver.shapes.mesh_file import LENGTH_UNITS, SUFFIXES
 
 if TYPE_CHECKING:
@@ -31,90 +29,12 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 DIRECTIONS = 720
-
 """Half degrees in which the wall is looked for from the axis."""
-
 HAIR = 1e-6
-
 """Angle [rad] that segments are longer at either end, so that none looks between two that meet."""
-
-
-@dataclass(frozen=True)
-class Opening:
-    """A level cut, seen from the axis: distance of the nearest and of the farthest wall [m].
-
-    closed: whether a wall stands in every direction; otherwise the axis is outside of it.
-    """
-
-    nearest: float
-    farthest: float
-    closed: bool
-
-
-def cut(mesh: trimesh.Trimesh, height: float) -> Array:
-    """Segments in which the plane z = ``height`` cuts ``mesh``: ends (x, y) [m], shape (n, 2, 2)."""
-    import trimesh
-
-    found = trimesh.intersections.mesh_plane(mesh, (0.0, 0.0, 1.0), (0.0, 0.0, height))  # type: ignore[no-untyped-call]
-    return np.asarray(found, dtype=np.float64).reshape(-1, 2, 3)[:, :, :2]
-
-
-def middle(segments: Array) -> tuple[float, float]:
-    """Middle (x, y) [m] of the smallest upright rectangle around ``segments`` (n, 2, 2)."""
-    corners = segments.reshape(-1, 2)
-    x, y = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
-    return float(x), float(y)
-
-
-def shut(mesh: trimesh.Trimesh, axis: tuple[float, float]) -> bool:
-    """Whether a face stands across the vertical line through ``axis`` (x, y): a lid, a bottom, or a wall aslant."""
-    a, b, c = (mesh.triangles[:, k, :2] - axis for k in range(3))
-    turns = np.stack([p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0] for p, q in ((a, b), (b, c), (c, a))])
-    area = np.abs(turns.sum(axis=0))
-    seen = area > 1e-9 * max(float(area.max(initial=0.0)), 1e-30)
-    return bool((((turns >= 0.0).all(axis=0) | (turns <= 0.0).all(axis=0)) & seen).any())
-
-
-def opening(segments: Array, axis: tuple[float, float]) -> Opening:
-    """What ``segments`` (n, 2, 2) of a cut leave open about ``axis`` (x, y)."""
-    start, end = segments[:, 0] - axis, segments[:, 1] - axis
-    along = end - start
-    length2 = np.maximum((along**2).sum(axis=1), 1e-30)
-    share = np.clip(-(start * along).sum(axis=1) / length2, 0.0, 1.0)
-    nearest = np.linalg.norm(start + share[:, None] * along, axis=1)
-    farthest = np.linalg.norm(np.concatenate([start, end]), axis=1)
-    return Opening(float(nearest.min()), float(farthest.max()), _all_round(start, end))
-
-
-def _all_round(start: Array, end: Array) -> bool:
-    """Whether segments, seen from the origin, leave no direction free."""
-    first = np.arctan2(start[:, 1], start[:, 0])
-    turn = np.arctan2(start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0], (start * end).sum(axis=1))
-    looked = np.linspace(-np.pi, np.pi, DIRECTIONS, endpoint=False)
-    # How far each direction is from the first end, in the sense of the segment's own turn; a hair before it counts.
-    ahead = np.mod((looked[:, None] - first[None, :]) * np.where(turn < 0.0, -1.0, 1.0) + HAIR, 2.0 * np.pi)
-    return bool((ahead <= np.abs(turn) + 2.0 * HAIR).any(axis=1).all())
-
-
 RIM = 0.005
-
 """Share of the mesh's height, from its ends, at which outlet and inlet are looked at."""
-
 MOST_FACES = 20_000
-
-
-@dataclass(frozen=True)
-class Placed:
-    """A mesh whose outlet stands above the origin, its lowest point in the plane z = 0, with its openings [m]."""
-
-    mesh: TriangleMesh
-    height: float
-    reach: float
-    """Of its farthest corner from the axis."""
-    outlet: Opening
-    inlet: Opening
-    shut: bool
-    """Something stands in the way straight down from the inlet to the outlet."""
 
 
 @dataclass(frozen=True)
@@ -158,7 +78,9 @@ class MeshFunnel(PourRig):
     def surfaces(self) -> tuple[Surface, ...]:
         """Plate, mesh and gate, in the order of ``surface_names``."""
         placed = self.placed
-        raised = TriangleMesh(placed.mesh.vertices, placed.mesh.faces, self.wall, Pose((0.0, 0.0, self.outlet_height)))
+        raised = TriangleMesh(
+            placed.mesh.vertices, placed.mesh.faces, self.wall, SurfacePose((0.0, 0.0, self.outlet_height))
+        )
         gate = Revolved(0.0, self.outlet_height, placed.outlet.farthest, self.outlet_height, self.wall)
         return horizontal(0.0, self.wall), raised, gate
 
@@ -208,6 +130,67 @@ class MeshFunnel(PourRig):
             )
 
 
+@dataclass(frozen=True)
+class Placed:
+    """A mesh whose outlet stands above the origin, its lowest point in the plane z = 0, with its openings [m]."""
+
+    mesh: TriangleMesh
+    height: float
+    reach: float
+    """Of its farthest corner from the axis."""
+    outlet: Opening
+    inlet: Opening
+    shut: bool
+    """Something stands in the way straight down from the inlet to the outlet."""
+
+
+@dataclass(frozen=True)
+class Opening:
+    """A level cut, seen from the axis: distance of the nearest and of the farthest wall [m].
+
+    closed: whether a wall stands in every direction; otherwise the axis is outside of it.
+    """
+
+    nearest: float
+    farthest: float
+    closed: bool
+
+
+def opening(segments: Array, axis: tuple[float, float]) -> Opening:
+    """What ``segments`` (n, 2, 2) of a cut leave open about ``axis`` (x, y)."""
+    start, end = segments[:, 0] - axis, segments[:, 1] - axis
+    along = end - start
+    length2 = np.maximum((along**2).sum(axis=1), 1e-30)
+    share = np.clip(-(start * along).sum(axis=1) / length2, 0.0, 1.0)
+    nearest = np.linalg.norm(start + share[:, None] * along, axis=1)
+    farthest = np.linalg.norm(np.concatenate([start, end]), axis=1)
+    return Opening(float(nearest.min()), float(farthest.max()), _all_round(start, end))
+
+
+def cut(mesh: trimesh.Trimesh, height: float) -> Array:
+    """Segments in which the plane z = ``height`` cuts ``mesh``: ends (x, y) [m], shape (n, 2, 2)."""
+    import trimesh
+
+    found = trimesh.intersections.mesh_plane(mesh, (0.0, 0.0, 1.0), (0.0, 0.0, height))  # type: ignore[no-untyped-call]
+    return np.asarray(found, dtype=np.float64).reshape(-1, 2, 3)[:, :, :2]
+
+
+def middle(segments: Array) -> tuple[float, float]:
+    """Middle (x, y) [m] of the smallest upright rectangle around ``segments`` (n, 2, 2)."""
+    corners = segments.reshape(-1, 2)
+    x, y = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
+    return float(x), float(y)
+
+
+def shut(mesh: trimesh.Trimesh, axis: tuple[float, float]) -> bool:
+    """Whether a face stands across the vertical line through ``axis`` (x, y): a lid, a bottom, or a wall aslant."""
+    a, b, c = (mesh.triangles[:, k, :2] - axis for k in range(3))
+    turns = np.stack([p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0] for p, q in ((a, b), (b, c), (c, a))])
+    area = np.abs(turns.sum(axis=0))
+    seen = area > 1e-9 * max(float(area.max(initial=0.0)), 1e-30)
+    return bool((((turns >= 0.0).all(axis=0) | (turns <= 0.0).all(axis=0)) & seen).any())
+
+
 @lru_cache(maxsize=8)
 def _placed(file: Path, metres_per_unit: float, wall: str, stamp: int) -> Placed:
     """The mesh in ``file`` as it was at ``stamp``."""
@@ -232,3 +215,13 @@ def _placed(file: Path, metres_per_unit: float, wall: str, stamp: int) -> Placed
     reach = float(np.hypot(moved[:, 0], moved[:, 1]).max())
     corners = tuple((float(x), float(y), float(z)) for x, y, z in moved)
     return Placed(TriangleMesh(corners, shell.faces, wall), height, reach, outlet, inlet, shut(mesh, axis))
+
+
+def _all_round(start: Array, end: Array) -> bool:
+    """Whether segments, seen from the origin, leave no direction free."""
+    first = np.arctan2(start[:, 1], start[:, 0])
+    turn = np.arctan2(start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0], (start * end).sum(axis=1))
+    looked = np.linspace(-np.pi, np.pi, DIRECTIONS, endpoint=False)
+    # How far each direction is from the first end, in the sense of the segment's own turn; a hair before it counts.
+    ahead = np.mod((looked[:, None] - first[None, :]) * np.where(turn < 0.0, -1.0, 1.0) + HAIR, 2.0 * np.pi)
+    return bool((ahead <= np.abs(turn) + 2.0 * HAIR).any(axis=1).all())

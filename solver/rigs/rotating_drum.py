@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from solver.params import ParameterError, param
 from solver.rigs.feed import BoxFeed
 from solver.rigs.rig import EVERYWHERE, FREE_SURFACE, Action, Container, Move, PourRig, Watch
-from solver.rigs.surface import FACING_MINUS_Y, FACING_PLUS_Y, Pose, Revolved, Surface, turned_plane
+from solver.rigs.surface import FACING_MINUS_Y, FACING_PLUS_Y, Revolved, Surface, SurfacePose, turned_plane
 
 FEED_BOTTOM, FEED_WIDTH, FEED_TOP = 0.1, 0.6, 0.75
 """The feed: between these heights above the axis and within this half width, in radii of the drum. Its upper corners
@@ -99,7 +99,9 @@ class RotatingDrum(PourRig):
         """Shell and end plates, each with its origin on the axis."""
         half = self.axial_length / 2.0
         return (
-            Revolved(self.radius, -half, self.radius, half, self.wall, Pose((0.0, 0.0, self.radius), FACING_PLUS_Y)),
+            Revolved(
+                self.radius, -half, self.radius, half, self.wall, SurfacePose((0.0, 0.0, self.radius), FACING_PLUS_Y)
+            ),
             turned_plane((0.0, -half, self.radius), FACING_PLUS_Y, self.wall),
             turned_plane((0.0, half, self.radius), FACING_MINUS_Y, self.wall),
         )

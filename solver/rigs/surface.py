@@ -1,6 +1,7 @@
 """Surfaces that rigs are made of: planes, straight lines turned about an axis, and triangle meshes, in any pose.
 
-Quaternions that turn a surface's local z axis into a direction of the world, and planes that face one.
+A pose turns a surface's local z axis into a direction of the world; ``FACING_…`` are the quaternions (wxyz) of planes
+that face along an axis.
 """
 
 from __future__ import annotations
@@ -15,10 +16,19 @@ import numpy as np
 from solver.params import ParameterError
 
 Point = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+HALF = math.sqrt(0.5)
+FACING_PLUS_Y: Quaternion = (HALF, -HALF, 0.0, 0.0)
+"""A quarter turn about −x: local z becomes +y."""
+FACING_MINUS_Y: Quaternion = (HALF, HALF, 0.0, 0.0)
+"""A quarter turn about +x: local z becomes −y."""
+FACING_DOWN: Quaternion = (0.0, 1.0, 0.0, 0.0)
+"""Half a turn about x: local z becomes −z."""
 
 
 @dataclass(frozen=True)
-class Pose:
+class SurfacePose:
     """Where a surface is: its local frame's origin [m] and orientation (unit quaternion wxyz) in the world."""
 
     origin: Point = (0.0, 0.0, 0.0)
@@ -30,7 +40,7 @@ class Plane:
     """The local plane z = 0; bodies are on the side of +z."""
 
     material: str
-    pose: Pose = Pose()
+    pose: SurfacePose = SurfacePose()
 
 
 @dataclass(frozen=True)
@@ -45,7 +55,7 @@ class Revolved:
     r1: float
     z1: float
     material: str
-    pose: Pose = Pose()
+    pose: SurfacePose = SurfacePose()
 
 
 @dataclass(frozen=True)
@@ -58,7 +68,7 @@ class TriangleMesh:
     vertices: tuple[Point, ...]
     faces: tuple[tuple[int, int, int], ...]
     material: str
-    pose: Pose = Pose()
+    pose: SurfacePose = SurfacePose()
 
 
 Surface = Plane | Revolved | TriangleMesh
@@ -66,7 +76,12 @@ Surface = Plane | Revolved | TriangleMesh
 
 def horizontal(height: float, material: str) -> Plane:
     """The plane z = ``height`` [m]."""
-    return Plane(material, Pose((0.0, 0.0, height)))
+    return Plane(material, SurfacePose((0.0, 0.0, height)))
+
+
+def turned_plane(origin: Point, quaternion: Quaternion, material: str) -> Plane:
+    """A plane through ``origin`` [m] whose side with bodies is the turned local +z."""
+    return Plane(material, SurfacePose(origin, quaternion))
 
 
 def rectangle(corner: Point, edge_a: Point, edge_b: Point, material: str) -> TriangleMesh:
@@ -77,7 +92,7 @@ def rectangle(corner: Point, edge_a: Point, edge_b: Point, material: str) -> Tri
     return TriangleMesh(vertices, ((0, 1, 2), (0, 2, 3)), material)
 
 
-def load_mesh(path: Path, material: str, metres_per_unit: float, pose: Pose = Pose()) -> TriangleMesh:
+def load_mesh(path: Path, material: str, metres_per_unit: float, pose: SurfacePose = SurfacePose()) -> TriangleMesh:
     """A wall from a file that trimesh reads (STL, OBJ, PLY, GLB); parts of a scene are joined, equal vertices merged.
 
     Raises ParameterError for a file that cannot be read, and for one without a triangle of positive area.
@@ -98,27 +113,3 @@ def load_mesh(path: Path, material: str, metres_per_unit: float, pose: Pose = Po
     vertices = tuple((float(x), float(y), float(z)) for x, y, z in mesh.vertices * metres_per_unit)
     faces = tuple((int(a), int(b), int(c)) for a, b, c in mesh.faces)
     return TriangleMesh(vertices, faces, material, pose)
-
-
-Vector = tuple[float, float, float]
-
-Quaternion = tuple[float, float, float, float]
-
-HALF = math.sqrt(0.5)
-
-FACING_PLUS_Y: Quaternion = (HALF, -HALF, 0.0, 0.0)
-
-"""A quarter turn about −x: local z becomes +y."""
-
-FACING_MINUS_Y: Quaternion = (HALF, HALF, 0.0, 0.0)
-
-"""A quarter turn about +x: local z becomes −y."""
-
-FACING_DOWN: Quaternion = (0.0, 1.0, 0.0, 0.0)
-
-"""Half a turn about x: local z becomes −z."""
-
-
-def turned_plane(origin: Vector, quaternion: Quaternion, material: str) -> Plane:
-    """A plane through ``origin`` [m] whose side with bodies is the turned local +z."""
-    return Plane(material, Pose(origin, quaternion))

@@ -38,11 +38,9 @@ DIMENSIONS: dict[str, tuple[str, ...]] = {
     "sphere": ("diameter",),
     "mesh": (),
 }
-
 """Names of the entries of ``Solid.dimensions``, as they stand in parameter paths."""
 
 SIZE_FIELDS = {"size_distribution": "kind", "size_spread": "spread"}
-
 """Last part of a parameter path → field of ``SizeDistribution``."""
 
 

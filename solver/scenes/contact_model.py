@@ -4,7 +4,7 @@ The defaults are those of files that name none. EDEM and LIGGGHTS calculate with
 history`` with ``mindlin`` and ``uncapped``.
 
     law                 which force acts (``laws/``)
-    clump_rule          what of a clump of spheres a contact feels (``kernels/clump_rules.py``)
+    clump_rule          what of a clump of spheres a contact feels (``engine/kernels/narrowphase.py``)
     tangential_law      what happens to the tangential spring when the contact area changes (``laws/hertz_mindlin.py``)
     tangential_dashpot  whether Coulomb's limit holds for spring and dashpot together or for the spring alone
 """
@@ -17,9 +17,7 @@ from solver.laws import CONTACT_LAWS, HertzMindlin
 from solver.params import param
 
 CLUMP_RULES = ("body_mass", "local_mass", "local_mass_shared")
-
 TANGENTIAL_LAWS = ("mindlin_rescale", "mindlin")
-
 TANGENTIAL_DASHPOTS = ("capped", "uncapped")
 
 

@@ -19,9 +19,7 @@ from solver.shapes.clump import Clump
 Array = npt.NDArray[np.float64]
 
 PROTOCOLS = ("pour_through", "fill_then_open")
-
 TRIES = 40
-
 """Random poses that are tried for one body before it waits for the next moment."""
 
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from solver.params import param
 
 ROLLING_SLOPE = 0.01
-
 """A single body on the plate whose path is no steeper than this rolls, for ever; others tumble and come to rest."""
 
 

@@ -12,7 +12,7 @@ Parameter paths (the same grammar in ``--set``, study files, sliders and the sto
 
 Which rig it is (``rig.name`` in files and ``--set``) is no parameter: another rig has others (:func:`with_rig`).
 
-The scene as it is: the declared one with its effects of material and set-up carried out.
+A scene is the declared one; :func:`actual` carries out its effects of material and set-up.
 """
 
 from __future__ import annotations
@@ -29,15 +29,6 @@ from solver.scenes.contact_model import ContactModel
 from solver.scenes.insertion import Insertion
 from solver.scenes.material import Material, Pair
 from solver.scenes.numerics import Numerics
-
-
-def actual(scene: Scene) -> Scene:
-    """``scene`` after its set-up effects; they are off in the result, so doing it again changes nothing."""
-    for kind in set_up_effects():
-        effect = scene.effect(kind.name)
-        if isinstance(effect, SetUpEffect) and effect.on:
-            scene = effect.applied(scene).without_effect(kind.name)
-    return scene
 
 
 @dataclass(frozen=True)
@@ -185,19 +176,6 @@ def values(scene: Scene) -> dict[str, Any]:
     return {path: _value(scene, path) for path in parameters(scene)}
 
 
-def _value(scene: Scene, path: str) -> Any:
-    kind, *rest = path.split(".")
-    if kind == "material":
-        return getattr(scene.material(rest[0]), rest[1])
-    if kind == "pair":
-        return getattr(scene.pair(rest[0], rest[1]), rest[2])
-    if kind == "body":
-        return scene.bodies[0].spheres if rest == ["spheres"] else _body(scene, rest[0]).value(rest[1])
-    if kind == "effect":
-        return getattr(scene.effect(rest[0]), rest[1])
-    return getattr(getattr(scene, kind), rest[0])
-
-
 def with_values(scene: Scene, values: dict[str, Any]) -> Scene:
     """``scene`` with parameters replaced; each value is checked against its range, and the result as a whole.
 
@@ -242,18 +220,26 @@ def check(scene: Scene) -> None:
         rig.feed().check(scene.insertion.region_radius, longest)
 
 
-def _check_duration(rig: PourRig, numerics: Numerics) -> None:
-    if numerics.duration > 0.0 and rig.running_time is not None:
-        raise ParameterError(f"numerics.duration: {numerics.duration:g} s in a {rig.name}, which runs for its own time")
-    if numerics.duration > numerics.max_time:
-        raise ParameterError(
-            f"numerics.duration: {numerics.duration:g} s is beyond numerics.max_time; "
-            f"allowed: up to {numerics.max_time:g} s"
-        )
+def actual(scene: Scene) -> Scene:
+    """``scene`` after its set-up effects; they are off in the result, so doing it again changes nothing."""
+    for kind in set_up_effects():
+        effect = scene.effect(kind.name)
+        if isinstance(effect, SetUpEffect) and effect.on:
+            scene = effect.applied(scene).without_effect(kind.name)
+    return scene
 
 
-def _body(scene: Scene, name: str) -> Body:
-    return next(body for body in scene.bodies if body.name == name)
+def _value(scene: Scene, path: str) -> Any:
+    kind, *rest = path.split(".")
+    if kind == "material":
+        return getattr(scene.material(rest[0]), rest[1])
+    if kind == "pair":
+        return getattr(scene.pair(rest[0], rest[1]), rest[2])
+    if kind == "body":
+        return scene.bodies[0].spheres if rest == ["spheres"] else _body(scene, rest[0]).value(rest[1])
+    if kind == "effect":
+        return getattr(scene.effect(rest[0]), rest[1])
+    return getattr(getattr(scene, kind), rest[0])
 
 
 def _with_value(scene: Scene, parts: list[str], new: Any) -> Scene:
@@ -274,3 +260,17 @@ def _with_value(scene: Scene, parts: list[str], new: Any) -> Scene:
 
 def _swap(items: tuple[Any, ...], old: Any, changes: dict[str, Any]) -> tuple[Any, ...]:
     return tuple(dataclasses.replace(item, **changes) if item is old else item for item in items)
+
+
+def _body(scene: Scene, name: str) -> Body:
+    return next(body for body in scene.bodies if body.name == name)
+
+
+def _check_duration(rig: PourRig, numerics: Numerics) -> None:
+    if numerics.duration > 0.0 and rig.running_time is not None:
+        raise ParameterError(f"numerics.duration: {numerics.duration:g} s in a {rig.name}, which runs for its own time")
+    if numerics.duration > numerics.max_time:
+        raise ParameterError(
+            f"numerics.duration: {numerics.duration:g} s is beyond numerics.max_time; "
+            f"allowed: up to {numerics.max_time:g} s"
+        )

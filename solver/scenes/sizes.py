@@ -21,23 +21,15 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
-
 Ints = npt.NDArray[np.int32]
 
 KINDS = ("none", "uniform", "log_normal")
-
 MOST_SPREAD = 0.5
-
 CUT = 3.0
-
 """Standard deviations of ln s at which a log-normal distribution is cut off."""
-
 LEAST_SPREAD = 1e-6
-
 """Below this, a nanometre on a millimetre, all bodies have the declared size."""
-
 SIZE_STREAM = 1
-
 """Spawn key of the generator of sizes: orders, places and orientations of a pour do not depend on them."""
 
 

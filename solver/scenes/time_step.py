@@ -23,11 +23,8 @@ from solver.scenes.scene import Scene
 from solver.shapes.clump import scaled
 
 IMPACT_SPEED = 2.0
-
 """Speed [m/s] at which the body limit is taken; a fall of 0.2 m."""
-
 LEAPFROG = 2.0
-
 """Largest ω dt of a stable leapfrog step."""
 
 

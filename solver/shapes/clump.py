@@ -1,11 +1,10 @@
 """Clumps: rigid bodies that touch by their member spheres and move with the inertia of the true solid.
 
-Fitted member spheres, kept between programs: a fit takes seconds, reading it back a millisecond.
-
-One file per fit, of shipped bodies in ``assets/clumps``, of all others in ``$REPOSE_CACHE`` or ``clumps`` in the user's
-cache directory. Its name is a digest of all that the fit depends on (the solid, a mesh by its contents; the spheres
-asked for; the version of the fitting), so a file is either the fit that was asked for or not found. A cache that cannot
-be read or written is as none.
+A fit of member spheres takes seconds, reading it back a millisecond, so fits are kept between programs: one file per
+fit, of shipped bodies in ``assets/clumps``, of all others in ``$REPOSE_CACHE`` or ``clumps`` in the user's cache
+directory. Its name is a digest of all that the fit depends on (the solid, a mesh by its contents; the spheres asked
+for; the version of the fitting), so a file is either the fit that was asked for or not found. A cache that cannot be
+read or written is as none.
 """
 
 from __future__ import annotations
@@ -27,66 +26,20 @@ from solver.assets import shipped_fits
 from solver.shapes.clump_error import ClumpFit, extent_errors, measured_fit
 from solver.shapes.solid import ShapeError, Solid, file_stamp, mass_properties, surface_mesh
 from solver.shapes.solid_points import interior_points, surface_points
-from solver.shapes.sphere_fit import Orbits, Target, not_facing, refine, start_layouts, without_idle
+from solver.shapes.sphere_fit import FitTarget, Orbits, not_facing, refine, start_layouts, without_idle
 from solver.shapes.sphere_number import LEAST_RADIUS, doubling, fitted
 from solver.shapes.sphere_union import squared_distances
 from solver.version import FITTING
 
 Array = npt.NDArray[np.float64]
-
 Fit = tuple[Array, Array, ClumpFit]
-
 """Centres (n, 3) [m], radii (n,) [m] and how well they stand for the solid."""
 
-
-def cache_folder() -> Path:
-    """Where fits are kept."""
-    named = os.environ.get("REPOSE_CACHE")
-    return Path(named) if named else Path(platformdirs.user_cache_dir("repose-explorer")) / "clumps"
-
-
-def kept_fit(solid: Solid, spheres: str, fit: Callable[[Solid, str], Fit]) -> Fit:
-    """The fit of ``solid`` from the cache, or made by ``fit`` and kept; the same bits either way."""
-    name = fit_name(solid, spheres)
-    found = read_fit(shipped_fits() / name) or read_fit(cache_folder() / name)
-    if found is None:
-        found = fit(solid, spheres)
-        write_fit(cache_folder() / name, found)
-    return found
-
-
-def fit_name(solid: Solid, spheres: str) -> str:
-    """Name of the file of a fit."""
-    mesh = Path(solid.file).read_bytes() if solid.file else b""
-    named = [solid.kind, [float(x).hex() for x in solid.dimensions], solid.unit, spheres, FITTING]
-    return f"{hashlib.sha256(repr(named).encode() + mesh).hexdigest()[:32]}.npz"
-
-
-def read_fit(path: Path) -> Fit | None:
-    """The fit in a file, or None."""
-    try:
-        with np.load(path, allow_pickle=False) as kept:
-            centres, radii = kept["centres"], kept["radii"]
-            share, covered, rms, largest, x, y, z, smallest = (float(number) for number in kept["fit"])
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-        return None
-    return centres, radii, ClumpFit(len(radii), share, covered, rms, largest, (x, y, z), smallest)
-
-
-def write_fit(path: Path, fit: Fit) -> None:
-    """Keep a fit; a place that cannot be written keeps none."""
-    centres, radii, quality = fit
-    _, share, covered, rms, largest, errors, smallest = astuple(quality)
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        # Written apart and moved: another program never reads half a file.
-        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".part", delete=False) as part:
-            np.savez(
-                part, centres=centres, radii=radii, fit=np.array([share, covered, rms, largest, *errors, smallest])
-            )
-        Path(part.name).replace(path)
-    except OSError:
-        return
+MOST_SPHERES = 128
+EXTENT_LIMIT = 0.02
+# points of equal area: a symmetric solid folds them into one octant, eight times as dense
+FIT_POINTS, FIT_POINTS_SYMMETRIC = 1000, 800
+INTERIOR_POINTS = 30_000
 
 
 @dataclass(frozen=True)
@@ -110,17 +63,7 @@ DEMANDS: dict[str, Demand] = {
     "standard": Demand(rms=0.0312, least_radius=0.7, most_spheres=40),
     "fine": Demand(rms=0.0145, least_radius=0.6, most_spheres=48),
 }
-
 RESOLUTIONS = tuple(DEMANDS)
-
-MOST_SPHERES = 128
-
-EXTENT_LIMIT = 0.02
-
-# points of equal area: a symmetric solid folds them into one octant, eight times as dense
-FIT_POINTS, FIT_POINTS_SYMMETRIC = 1000, 800
-
-INTERIOR_POINTS = 30_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,6 +174,56 @@ def scaled(clump: Clump, scale: float) -> Clump:
     return _clump(centres, radii, clump.mass * scale**3, inertia, fit)
 
 
+def cache_folder() -> Path:
+    """Where fits are kept."""
+    named = os.environ.get("REPOSE_CACHE")
+    return Path(named) if named else Path(platformdirs.user_cache_dir("repose-explorer")) / "clumps"
+
+
+def kept_fit(solid: Solid, spheres: str, fit: Callable[[Solid, str], Fit]) -> Fit:
+    """The fit of ``solid`` from the cache, or made by ``fit`` and kept; the same bits either way."""
+    name = fit_name(solid, spheres)
+    found = read_fit(shipped_fits() / name) or read_fit(cache_folder() / name)
+    if found is None:
+        found = fit(solid, spheres)
+        write_fit(cache_folder() / name, found)
+    return found
+
+
+def fit_name(solid: Solid, spheres: str) -> str:
+    """Name of the file of a fit."""
+    mesh = Path(solid.file).read_bytes() if solid.file else b""
+    named = [solid.kind, [float(x).hex() for x in solid.dimensions], solid.unit, spheres, FITTING]
+    return f"{hashlib.sha256(repr(named).encode() + mesh).hexdigest()[:32]}.npz"
+
+
+def read_fit(path: Path) -> Fit | None:
+    """The fit in a file, or None."""
+    try:
+        with np.load(path, allow_pickle=False) as kept:
+            centres, radii = kept["centres"], kept["radii"]
+            share, covered, rms, largest, x, y, z, smallest = (float(number) for number in kept["fit"])
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None
+    return centres, radii, ClumpFit(len(radii), share, covered, rms, largest, (x, y, z), smallest)
+
+
+def write_fit(path: Path, fit: Fit) -> None:
+    """Keep a fit; a place that cannot be written keeps none."""
+    centres, radii, quality = fit
+    _, share, covered, rms, largest, errors, smallest = astuple(quality)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        # Written apart and moved: another program never reads half a file.
+        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".part", delete=False) as part:
+            np.savez(
+                part, centres=centres, radii=radii, fit=np.array([share, covered, rms, largest, *errors, smallest])
+            )
+        Path(part.name).replace(path)
+    except OSError:
+        return
+
+
 def _numbers(name: str, values: npt.ArrayLike) -> Array:
     try:
         array = np.array(values, dtype=np.float64)
@@ -266,10 +259,10 @@ def _new_fit(solid: Solid, spheres: str) -> tuple[Array, Array, ClumpFit]:
     return centres, radii, measured_fit(solid, centres, radii)
 
 
-def _target(solid: Solid) -> Target:
+def _target(solid: Solid) -> FitTarget:
     symmetric = solid.kind != "mesh"
     surface, normals = surface_points(solid, FIT_POINTS_SYMMETRIC if symmetric else FIT_POINTS)
-    return Target(
+    return FitTarget(
         np.abs(surface) if symmetric else surface,
         np.abs(normals) if symmetric else normals,
         interior_points(solid, INTERIOR_POINTS),
@@ -290,7 +283,7 @@ def _so_many_spheres(solid: Solid, number: int) -> tuple[Array, Array]:
     return list(fitted(solid, doubling(number)))[-1]
 
 
-def _fewest_spheres(target: Target, demand: Demand, diameter: float) -> Orbits:
+def _fewest_spheres(target: FitTarget, demand: Demand, diameter: float) -> Orbits:
     floor = demand.least_radius * target.inscribed_radius
     limit = demand.rms * diameter
     best_score, best, next_count = np.inf, None, 1
@@ -310,7 +303,7 @@ def _fewest_spheres(target: Target, demand: Demand, diameter: float) -> Orbits:
     return best
 
 
-def _score(orbits: Orbits, target: Target) -> float:
+def _score(orbits: Orbits, target: FitTarget) -> float:
     """RMS gap [m], raised by outer dimensions beyond their limit so that such clumps come last."""
     centres, radii = orbits.spheres()
     distance = np.sqrt(squared_distances(target.surface, centres))

@@ -1,8 +1,7 @@
-"""How well member spheres stand for a solid: the statement that goes with every clump.
+"""How well member spheres stand for a solid: distance of the surfaces, volume, and the mass of the spheres themselves.
 
-What a clump gets wrong about its solid: distance of the surfaces, volume, and the mass of the spheres themselves.
-
-The spheres' mass and inertia are shown only: a body moves with those of the true solid.
+:class:`ClumpFit` is the statement that goes with every clump, :class:`SphereError` what the spheres get wrong when they
+are looked at closely. Their mass and inertia are shown only: a body moves with those of the true solid.
 """
 
 from __future__ import annotations
@@ -19,6 +18,10 @@ from solver.shapes.sphere_union import distance_to_union, open_points, outer_dim
 Array = npt.NDArray[np.float64]
 
 CHECK_POINTS, CHECK_INTERIOR_POINTS = 4000, 200_000
+POINTS = 20_000
+"""Points on the union's surface, before those inside other spheres are left out."""
+LOOKED_AT = 16
+"""Surface points whose facets are tried for the nearest place on a mesh."""
 
 
 @dataclass(frozen=True)
@@ -44,37 +47,6 @@ class ClumpFit:
     smallest_radius: float
 
 
-def extent_errors(bounds: Array, centres: Array, radii: Array) -> Array:
-    """Outer dimensions (3,) of the union relative to those between ``bounds`` (2, 3), less one."""
-    return outer_dimensions(centres, radii) / (bounds[1] - bounds[0]) - 1.0
-
-
-def measured_fit(solid: Solid, centres: Array, radii: Array) -> ClumpFit:
-    """The fit's errors, on other and more points than it was made with."""
-    deviation = distance_to_union(surface_points(solid, CHECK_POINTS)[0], centres, radii)
-    inside = interior_points(solid, CHECK_INTERIOR_POINTS)
-    covered = np.any([((inside - c) ** 2).sum(axis=1) <= r**2 for c, r in zip(centres, radii, strict=True)], axis=0)
-    errors = extent_errors(np.array(surface_mesh(solid).bounds), centres, radii)
-    return ClumpFit(
-        n_spheres=len(radii),
-        volume_ratio=float(union_volume(centres, radii) / mass_properties(solid, 1.0).volume),
-        covered_ratio=float(covered.mean()),
-        surface_rms=float(np.sqrt((deviation**2).mean())),
-        surface_max=float(deviation.max()),
-        extent_errors=(float(errors[0]), float(errors[1]), float(errors[2])),
-        smallest_radius=float(radii.min()),
-    )
-
-
-POINTS = 20_000
-
-"""Points on the union's surface, before those inside other spheres are left out."""
-
-LOOKED_AT = 16
-
-"""Surface points whose facets are tried for the nearest place on a mesh."""
-
-
 @dataclass(frozen=True, eq=False)
 class SphereError:
     """How far a union of spheres is from the solid that it stands for.
@@ -97,6 +69,28 @@ class SphereError:
     volume: float
     second: Array
     smallest_radius: float
+
+
+def extent_errors(bounds: Array, centres: Array, radii: Array) -> Array:
+    """Outer dimensions (3,) of the union relative to those between ``bounds`` (2, 3), less one."""
+    return outer_dimensions(centres, radii) / (bounds[1] - bounds[0]) - 1.0
+
+
+def measured_fit(solid: Solid, centres: Array, radii: Array) -> ClumpFit:
+    """The fit's errors, on other and more points than it was made with."""
+    deviation = distance_to_union(surface_points(solid, CHECK_POINTS)[0], centres, radii)
+    inside = interior_points(solid, CHECK_INTERIOR_POINTS)
+    covered = np.any([((inside - c) ** 2).sum(axis=1) <= r**2 for c, r in zip(centres, radii, strict=True)], axis=0)
+    errors = extent_errors(np.array(surface_mesh(solid).bounds), centres, radii)
+    return ClumpFit(
+        n_spheres=len(radii),
+        volume_ratio=float(union_volume(centres, radii) / mass_properties(solid, 1.0).volume),
+        covered_ratio=float(covered.mean()),
+        surface_rms=float(np.sqrt((deviation**2).mean())),
+        surface_max=float(deviation.max()),
+        extent_errors=(float(errors[0]), float(errors[1]), float(errors[2])),
+        smallest_radius=float(radii.min()),
+    )
 
 
 def sphere_error(solid: Solid, centres: Array, radii: Array) -> SphereError:

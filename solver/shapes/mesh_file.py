@@ -19,27 +19,16 @@ if TYPE_CHECKING:
     import trimesh
 
 SUFFIXES = (".stl", ".obj", ".ply", ".glb")
-
 LENGTH_UNITS = UNITS["m"]
-
 MOST_BYTES = 100_000_000
-
 MOST_FACES = 500_000
-
 WELD = 1e-7
-
 """Corners nearer than about this, relative to the largest extent, are one: single precision resolves 6e-8."""
-
 FLAT = 1e-9
-
 """Volume over the cube of the largest extent below which a surface encloses nothing; a hair 1 : 1 : 1000 has 1e-6."""
-
 THIN = 1e-6
-
 """Deviation of the corners from a plane, relative to that within it, below which they lie in it."""
-
 WINDING_CELLS = 200_000
-
 FEWEST_BAD_RAYS = 2
 
 

@@ -14,7 +14,6 @@ Array = npt.NDArray[np.float64]
 
 # fractional parts of powers of 1/g with g³ = g + 1: the plane's low-discrepancy pair (Roberts 2018)
 PLASTIC = 1.32471795724474602596
-
 PITCH = np.array([1.0 / PLASTIC, 1.0 / PLASTIC**2])
 
 

@@ -18,11 +18,12 @@ import numpy.typing as npt
 
 from solver.shapes.mesh_file import LENGTH_UNITS, SUFFIXES, MeshFileError, read_solid_mesh
 
+# Imported by the functions that make a mesh, here and in the other files of shapes: with what it brings along, trimesh
+# takes as long as the rest of the program, and a pour of known bodies needs none of it.
 if TYPE_CHECKING:
     import trimesh
 
 Kind = Literal["ellipsoid", "cylinder", "box", "sphere", "mesh"]
-
 Array = npt.NDArray[np.float64]
 
 DIMENSION_NAMES: dict[str, tuple[str, ...]] = {
@@ -32,7 +33,6 @@ DIMENSION_NAMES: dict[str, tuple[str, ...]] = {
     "sphere": ("diameter",),
     "mesh": (),
 }
-
 ALLOWED = (
     "{ ellipsoid = [a, b, c] }, { cylinder = [diameter, length] }, { box = [x, y, z] }, "
     '{ sphere = diameter } in metres, or { mesh = "file.stl", unit = "mm" }'

@@ -7,7 +7,7 @@ that the Jacobian is analytic and sparse; steps are Levenberg's (1944) and Marqu
 Where the solid is mirror-symmetric in the three coordinate planes, the unknowns are one sphere per orbit, and
 surface points are folded into one octant: the clump is symmetric to the last bit and rests as the solid does.
 
-Where a sphere fit may start: rows of spheres, tried by ascending number.
+A fit starts from rows of spheres (:func:`start_layouts`), tried by ascending number.
 """
 
 from __future__ import annotations
@@ -23,13 +23,18 @@ from solver.shapes.sphere_union import Array, squared_distances
 
 # outer dimensions may differ by this fraction before the penalty sets in; the accepted limit is 2 %
 EXTENT_TOLERANCE = 0.01
-
 # weight of one unit of excess extent against the RMS gap
 EXTENT_WEIGHT = 3.0
+# spheres more or fewer in every other row: staggered rows on plates, short outer rows on seeds
+STAGGERS = (0, 1, -1, -2, -3, 2, 3)
+# every so many of the interior points are enough to place a start
+THINNING = 7
+# layouts for one number of spheres: a plate has 13, a crooked body would have many more
+MOST_PER_COUNT = 14
 
 
 @dataclass(frozen=True, eq=False)
-class Target:
+class FitTarget:
     """What the spheres should follow. Lengths in m.
 
     Args:
@@ -99,7 +104,47 @@ def orbits_of(centres: Array, radii: Array, symmetric: bool) -> Orbits:
     return Orbits(points, radii, free, np.array([o for o, _ in images]), np.array([s for _, s in images]))
 
 
-def refine(orbits: Orbits, target: Target, least_radius: float, steps: int) -> Orbits:
+def start_layouts(target: FitTarget, most: int, least_radius: float) -> dict[int, list[Orbits]]:
+    """Starting layouts by number of spheres, up to `most`.
+
+    Rows run along x, side by side along y, in layers along z.
+
+    A layout is given by the number of layers, the number of rows, the spacing along the rows and the
+    difference between neighbouring rows; a row is as long as the solid is there. In an asymmetric solid each
+    centre moves to the mean of the interior points nearest to it, so that the rows of a bent or hollowed body
+    lie inside. Radii start near the largest inscribed one, and at least at `least_radius` [m]: small spheres
+    have to prove useful.
+    """
+    from scipy.spatial import cKDTree
+
+    radius = target.inscribed_radius
+    extents = target.bounds[1] - target.bounds[0]
+    compact = int(extents[2] > 0.5 * extents[0]) + int(extents[2] > 0.8 * extents[0])
+    layers = range(1, 2 + max(compact, min(int(extents[2] / radius - 2.0), 3)))
+    rows = range(1, 2 + min(int(np.ceil((extents[1] / radius - 2.0) / 0.8)), 8))
+    surface = cKDTree(target.surface)
+    layouts: dict[int, list[Orbits]] = {}
+    seen: set[tuple[int, int, tuple[int, ...]]] = set()
+    for n_layers, n_rows in product(layers, rows):
+        found = _rows(target, n_layers, n_rows)
+        for stagger, spacing in product(STAGGERS, radius * np.geomspace(12.0, 0.3, 80)):
+            counts = tuple(row.count(stagger, spacing, 1.5 * radius) for row in found)
+            tried = layouts.setdefault(sum(counts), [])
+            if not 1 <= sum(counts) <= most or (n_layers, n_rows, counts) in seen or len(tried) == MOST_PER_COUNT:
+                continue
+            seen.add((n_layers, n_rows, counts))
+            centres = np.concatenate(
+                [row.places(count, 0.75 * radius) for row, count in zip(found, counts, strict=True)]
+            )
+            if not target.symmetric:
+                centres = _cell_means(target.interior[::THINNING], centres)
+            inscribed = surface.query(np.abs(centres) if target.symmetric else centres)[0]
+            radii = np.clip(inscribed, max(least_radius, 0.9 * radius), radius)
+            tried.append(orbits_of(centres, radii, target.symmetric))
+    return {count: tried for count, tried in layouts.items() if tried}
+
+
+def refine(orbits: Orbits, target: FitTarget, least_radius: float, steps: int) -> Orbits:
     """Orbits after at most `steps` damped Gauss–Newton steps; radii stay >= least_radius [m]."""
     model = _Residuals(orbits, target)
     x = model.pack(orbits)
@@ -126,7 +171,7 @@ def refine(orbits: Orbits, target: Target, least_radius: float, steps: int) -> O
     return model.unpack(x)
 
 
-def without_idle(orbits: Orbits, target: Target) -> Orbits:
+def without_idle(orbits: Orbits, target: FitTarget) -> Orbits:
     """Orbits without those of which no sphere is nearest to any surface point."""
     centres, radii = orbits.spheres()
     distance = np.sqrt(squared_distances(target.surface, centres))
@@ -144,6 +189,15 @@ def without_idle(orbits: Orbits, target: Target) -> Orbits:
     )
 
 
+def not_facing(surface: Array, normals: Array, centres: Array) -> Array:
+    """1e6 where a centre lies in front of a surface point, else 0; (m, n).
+
+    A sphere in a re-entrant corner touches the surface from outside: it must not count as following it.
+    """
+    in_front = (normals @ centres.T) > (normals * surface).sum(axis=1)[:, None]
+    return np.where(in_front, 1e6, 0.0)
+
+
 class _Residuals:
     """Gaps and extent errors in units of the inscribed radius, as a function of the packed unknowns x.
 
@@ -152,7 +206,7 @@ class _Residuals:
     do not hang on the number of cores.
     """
 
-    def __init__(self, orbits: Orbits, target: Target) -> None:
+    def __init__(self, orbits: Orbits, target: FitTarget) -> None:
         self.orbits, self.unit = orbits, target.inscribed_radius
         self.surface = target.surface / self.unit
         self.bounds = target.bounds / self.unit
@@ -228,65 +282,6 @@ def _sums(place: npt.NDArray[np.int64], values: Array, size: int) -> Array:
     return np.asarray(np.bincount(place.ravel(), values.ravel(), size), dtype=np.float64)
 
 
-def not_facing(surface: Array, normals: Array, centres: Array) -> Array:
-    """1e6 where a centre lies in front of a surface point, else 0; (m, n).
-
-    A sphere in a re-entrant corner touches the surface from outside: it must not count as following it.
-    """
-    in_front = (normals @ centres.T) > (normals * surface).sum(axis=1)[:, None]
-    return np.where(in_front, 1e6, 0.0)
-
-
-# spheres more or fewer in every other row: staggered rows on plates, short outer rows on seeds
-STAGGERS = (0, 1, -1, -2, -3, 2, 3)
-
-# every so many of the interior points are enough to place a start
-THINNING = 7
-
-# layouts for one number of spheres: a plate has 13, a crooked body would have many more
-MOST_PER_COUNT = 14
-
-
-def start_layouts(target: Target, most: int, least_radius: float) -> dict[int, list[Orbits]]:
-    """Starting layouts by number of spheres, up to `most`.
-
-    Rows run along x, side by side along y, in layers along z.
-
-    A layout is given by the number of layers, the number of rows, the spacing along the rows and the
-    difference between neighbouring rows; a row is as long as the solid is there. In an asymmetric solid each
-    centre moves to the mean of the interior points nearest to it, so that the rows of a bent or hollowed body
-    lie inside. Radii start near the largest inscribed one, and at least at `least_radius` [m]: small spheres
-    have to prove useful.
-    """
-    from scipy.spatial import cKDTree
-
-    radius = target.inscribed_radius
-    extents = target.bounds[1] - target.bounds[0]
-    compact = int(extents[2] > 0.5 * extents[0]) + int(extents[2] > 0.8 * extents[0])
-    layers = range(1, 2 + max(compact, min(int(extents[2] / radius - 2.0), 3)))
-    rows = range(1, 2 + min(int(np.ceil((extents[1] / radius - 2.0) / 0.8)), 8))
-    surface = cKDTree(target.surface)
-    layouts: dict[int, list[Orbits]] = {}
-    seen: set[tuple[int, int, tuple[int, ...]]] = set()
-    for n_layers, n_rows in product(layers, rows):
-        found = _rows(target, n_layers, n_rows)
-        for stagger, spacing in product(STAGGERS, radius * np.geomspace(12.0, 0.3, 80)):
-            counts = tuple(row.count(stagger, spacing, 1.5 * radius) for row in found)
-            tried = layouts.setdefault(sum(counts), [])
-            if not 1 <= sum(counts) <= most or (n_layers, n_rows, counts) in seen or len(tried) == MOST_PER_COUNT:
-                continue
-            seen.add((n_layers, n_rows, counts))
-            centres = np.concatenate(
-                [row.places(count, 0.75 * radius) for row, count in zip(found, counts, strict=True)]
-            )
-            if not target.symmetric:
-                centres = _cell_means(target.interior[::THINNING], centres)
-            inscribed = surface.query(np.abs(centres) if target.symmetric else centres)[0]
-            radii = np.clip(inscribed, max(least_radius, 0.9 * radius), radius)
-            tried.append(orbits_of(centres, radii, target.symmetric))
-    return {count: tried for count, tried in layouts.items() if tried}
-
-
 @dataclass(frozen=True)
 class _Row:
     """A row along x at (y, z), from x = low to high [m]; parity alternates from the outermost row inwards."""
@@ -306,7 +301,7 @@ class _Row:
         return np.stack([x, np.full(count, self.y), np.full(count, self.z)], axis=1)
 
 
-def _rows(target: Target, n_layers: int, n_rows: int) -> list[_Row]:
+def _rows(target: FitTarget, n_layers: int, n_rows: int) -> list[_Row]:
     inset = target.inscribed_radius
     low, high = target.bounds
     heights = _spread(low[2], high[2], n_layers, inset)

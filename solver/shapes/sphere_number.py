@@ -19,21 +19,15 @@ import numpy as np
 
 from solver.shapes.solid import Solid, surface_mesh
 from solver.shapes.solid_points import interior_points, surface_points
-from solver.shapes.sphere_fit import Orbits, Target, orbits_of, refine, start_layouts, without_idle
+from solver.shapes.sphere_fit import FitTarget, Orbits, orbits_of, refine, start_layouts, without_idle
 from solver.shapes.sphere_union import Array, distance_to_union, open_points, squared_distances
 
 SURFACE_POINTS, INTERIOR_POINTS = 2000, 30_000
-
 START_POINTS = 6000
-
 MOST_IN_ROWS, LAYOUTS = 32, 4
-
 STEPS = 60
-
 SCORE_POINTS = 200
-
 LEAST_RADIUS = 0.5
-
 """Smallest member sphere relative to the largest inside the solid; it sets the time step."""
 
 
@@ -63,14 +57,14 @@ def fitted(solid: Solid, numbers: list[int], least_radius: float = LEAST_RADIUS)
         yield before.spheres()
 
 
-def general_target(solid: Solid) -> Target:
+def general_target(solid: Solid) -> FitTarget:
     """What spheres should follow, without use of mirror planes."""
     surface, normals = surface_points(solid, SURFACE_POINTS)
     bounds = np.array(surface_mesh(solid).bounds)
-    return Target(surface, normals, interior_points(solid, INTERIOR_POINTS), bounds, symmetric=False)
+    return FitTarget(surface, normals, interior_points(solid, INTERIOR_POINTS), bounds, symmetric=False)
 
 
-def deviation(target: Target, centres: Array, radii: Array) -> float:
+def deviation(target: FitTarget, centres: Array, radii: Array) -> float:
     """The larger RMS distance [m] of the two ways between the solid's surface and the union's, to the points' spacing.
 
     From the union the distance is taken to the tangent plane of the nearest surface point, if that is shorter than the
@@ -88,14 +82,14 @@ def deviation(target: Target, centres: Array, radii: Array) -> float:
     return float(max(np.sqrt((outward**2).mean()), np.sqrt((area * back**2).sum() / area.sum())))
 
 
-def _inscribed(target: Target, centres: Array, floor: float) -> Array:
+def _inscribed(target: FitTarget, centres: Array, floor: float) -> Array:
     """Radii of the largest inscribed spheres at ``centres``, within ``floor`` and the largest of all [m]."""
     from scipy.spatial import cKDTree
 
     return np.clip(cKDTree(target.surface).query(centres)[0], floor, max(floor, target.inscribed_radius))
 
 
-def _cells(target: Target, inside: Array, number: int, floor: float) -> Orbits:
+def _cells(target: FitTarget, inside: Array, number: int, floor: float) -> Orbits:
     """Means of ``number`` cells of the interior; the first ones are the points that lie furthest from each other."""
     from scipy.spatial import cKDTree
 
@@ -112,7 +106,7 @@ def _cells(target: Target, inside: Array, number: int, floor: float) -> Orbits:
     return orbits_of(centres, _inscribed(target, centres, floor), symmetric=False)
 
 
-def _cover(target: Target, inside: Array, number: int, floor: float) -> tuple[Array, Array]:
+def _cover(target: FitTarget, inside: Array, number: int, floor: float) -> tuple[Array, Array]:
     """Centres and radii of inscribed spheres by the volume that each adds; smaller ones than the floor are not used."""
     from scipy.spatial import cKDTree
 
@@ -129,7 +123,7 @@ def _cover(target: Target, inside: Array, number: int, floor: float) -> tuple[Ar
     return inside[chosen], np.maximum(depth[chosen], floor)
 
 
-def _grown(target: Target, before: Orbits, number: int, floor: float) -> Orbits:
+def _grown(target: FitTarget, before: Orbits, number: int, floor: float) -> Orbits:
     """The spheres of ``before`` and smallest ones just below the surface points that are furthest from them."""
     centres, radii = before.spheres()
     gap = (np.sqrt(squared_distances(target.surface, centres)) - radii).min(axis=1)

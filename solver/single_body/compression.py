@@ -25,15 +25,10 @@ from solver.single_body.bench import Bench, BenchResult, Quantity, ball, held
 Array = npt.NDArray[np.float64]
 
 UPPER = 1
-
 """Index of the plate that moves."""
-
 MOMENTS = 200
-
 """Readings while squeezing, and again while shearing."""
-
 SETTLING = 0.02
-
 """Time at rest between squeezing and shearing [s]."""
 
 

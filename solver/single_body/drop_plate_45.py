@@ -28,26 +28,18 @@ from solver.single_body.bench import UPRIGHT, Bench, BenchResult, Quantity, ball
 Array = npt.NDArray[np.float64]
 
 NORMAL = np.array([1.0, 0.0, 1.0]) / math.sqrt(2.0)
-
 BEFORE_IMPACT = 1e-3
-
 """From this long [s] before the impact on, the body is watched closely."""
-
 GIVEN_UP = 1.0
-
 """A body that is not clear of the plate, whichever way it turns, this long [s] after the impact is given up."""
-
 MOMENT_STEPS = 5
-
 RESTITUTIONS = (0.2, 0.35, 0.5, 0.65, 0.8)
-
 FRICTIONS = (0.0, 0.1, 0.3, 0.6)
-
 """What the bias of the paper's estimate is shown over."""
 
 
 @dataclass(frozen=True)
-class Rebound:
+class PlateRebound:
     """Velocity of the centre of mass after the impact [m/s]; NaN for a body that stays on the plate."""
 
     v_x: float
@@ -86,12 +78,12 @@ def measure(scene: Scene, seed: int) -> BenchResult:
     )
 
 
-def restitution(rebound: Rebound, gravity: float, height: float) -> float:
+def restitution(rebound: PlateRebound, gravity: float, height: float) -> float:
     """e = (v_x + v_z)/√(2gH)."""
     return (rebound.v_x + rebound.v_z) / math.sqrt(2.0 * gravity * height)
 
 
-def paper_estimate(rebound: Rebound, gravity: float, height: float) -> float:
+def paper_estimate(rebound: PlateRebound, gravity: float, height: float) -> float:
     """L/(2H), L = v_x (v_z + √(v_z² + 2gH))/g."""
     flight = (rebound.v_z + math.sqrt(rebound.v_z**2 + 2.0 * gravity * height)) / gravity
     return rebound.v_x * flight / (2.0 * height)
@@ -112,7 +104,7 @@ def paper_bias(scene: Scene) -> tuple[tuple[str, tuple[float, ...]], ...]:
     return tuple((name, tuple(row[k] for row in rows)) for k, name in enumerate(names))
 
 
-def drop(scene: Scene, specimen: Body, quaternion: Array) -> Rebound:
+def drop(scene: Scene, specimen: Body, quaternion: Array) -> PlateRebound:
     """Let ``specimen`` fall on the plate so that it first touches after falling ``drop_height``."""
     rig = cast(DropPlate45, scene.rig)
     bench = Bench(scene, rig, specimen)
@@ -135,8 +127,8 @@ def drop(scene: Scene, specimen: Body, quaternion: Array) -> Rebound:
         if flight < math.inf and float(state[0:3] @ NORMAL) > clump.bounding_radius:
             v = state[7:10]
             # Gravity acts during the contact, too: taken as an impact in its middle.
-            return Rebound(float(v[0]), float(v[2]) + gravity * (flight + 0.5 * contact))
-    return Rebound(math.nan, math.nan)
+            return PlateRebound(float(v[0]), float(v[2]) + gravity * (flight + 0.5 * contact))
+    return PlateRebound(math.nan, math.nan)
 
 
 def _with_pair(scene: Scene, body: Body, pair: Pair) -> Scene:

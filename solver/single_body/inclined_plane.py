@@ -17,31 +17,19 @@ from solver.scenes.scene import Scene
 from solver.single_body.bench import Bench, BenchResult, Quantity, held
 
 FAST = 20.0
-
 """Speed of the first tilt, and of the way to where the second begins [°/s]."""
-
 MARGIN = 3.0
-
 """How far below the rough angle the slow tilt begins [°]."""
-
 STEEPEST = 85.0
-
 """Tilt at which a body that holds is given up [°]."""
-
 SLIDING = 1e-3
-
 """Speed at which the body slides [m/s]."""
-
 MOMENT = 1e-3
-
 """Simulated time between two changes of the tilt [s]."""
-
 SETTLING = 0.1
-
 """Time to settle on the level plane [s]."""
 
 Path = list[tuple[float, float, float]]
-
 """Tilt [°], displacement [m], speed [m/s]."""
 
 

@@ -11,7 +11,7 @@ from scipy.special import ellipk
 from solver.scenes.body import Body, Members
 from solver.scenes.insertion import rotation_matrix
 from solver.scenes.material import Pair
-from solver.single_body.laboratory import EARTH, GRAIN, RADIUS, WALL, Laboratory, bench, scene_of, sphere
+from solver.single_body.free_world import EARTH, GRAIN, RADIUS, WALL, FreeWorld, grain_on_plate, scene_of, sphere
 from solver.verification.row import Row, of_scale, of_value
 
 Array = npt.NDArray[np.float64]
@@ -28,7 +28,7 @@ def momentum() -> Iterator[Row]:
     """Two unequal spinning spheres in an oblique, frictional, damped impact."""
     large, small = sphere(0.008, name="large"), sphere(0.003, name="small")
     pairs = (Pair("grain", "grain", 0.6, 0.5), Pair("grain", "wall", 0.6, 0.5))
-    lab = Laboratory(scene_of((large, small), (GRAIN, WALL), pairs), [0, 1], plate=False)
+    lab = FreeWorld(scene_of((large, small), (GRAIN, WALL), pairs), [0, 1], plate=False)
     lab.put(0, (0.0, 0.0, 0.0), velocity=(0.1, 0.2, 0.0), spin=(30.0, -20.0, 10.0))
     lab.put(1, (0.0115, 0.002, 0.001), velocity=(-0.9, 0.1, 0.2), spin=(-50.0, 80.0, 40.0))
     before = _momenta(lab, (large, small))
@@ -45,8 +45,8 @@ def energy() -> Iterator[Row]:
         ("bouncing sphere", [(0.0, 0.0, 2.0)]),
         ("eight spheres", [(x, y, z) for x in (-0.55, 0.55) for y in (-0.55, 0.55) for z in (1.5, 3.0)]),
     ):
-        scene = bench(friction=0.0, restitution=1.0, gravity=EARTH)
-        lab = Laboratory(scene, len(places), fraction=0.3)
+        scene = grain_on_plate(friction=0.0, restitution=1.0, gravity=EARTH)
+        lab = FreeWorld(scene, len(places), fraction=0.3)
         generator = np.random.default_rng(5)
         for b, place in enumerate(places):
             aside = generator.normal(size=3) * (0.02 if len(places) > 1 else 0.0)
@@ -62,7 +62,7 @@ def energy() -> Iterator[Row]:
 def tumbling() -> Iterator[Row]:
     """A free brick that spins about its middle axis turns over and over; period by elliptic integrals."""
     members = Members(((0.0, 0.0, 0.0),), (2e-3,), 1e-3, tuple(BRICK_INERTIA))
-    lab = Laboratory(bench(Body("grain", "grain", 1.0, members, GRAIN.density)), 1, dt=1e-5, plate=False)
+    lab = FreeWorld(grain_on_plate(Body("grain", "grain", 1.0, members, GRAIN.density)), 1, dt=1e-5, plate=False)
     start = np.array([0.3, 60.0, 0.2])
     lab.put(0, (0.0, 0.0, 0.0), spin=start)
     chunk, spins, axes = 50, [start], []
@@ -102,7 +102,7 @@ def _crossings(values: Array) -> Array:
     return np.asarray(k + values[k] / (values[k] - values[k + 1]))
 
 
-def _momenta(lab: Laboratory, bodies: tuple[Body, ...]) -> tuple[Array, Array]:
+def _momenta(lab: FreeWorld, bodies: tuple[Body, ...]) -> tuple[Array, Array]:
     linear, angular = np.zeros(3), np.zeros(3)
     for row, body in zip(lab.state(), bodies, strict=True):
         linear += body.mass * row[7:10]
@@ -111,7 +111,7 @@ def _momenta(lab: Laboratory, bodies: tuple[Body, ...]) -> tuple[Array, Array]:
     return linear, angular
 
 
-def _mechanical(lab: Laboratory) -> float:
+def _mechanical(lab: FreeWorld) -> float:
     """Kinetic and potential energy [J] of bodies in free flight; velocities brought from the half to the full step."""
     gravity = np.array(lab.scene.gravity)
     rows, body = lab.state(), lab.scene.bodies[0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator
 
-from solver.single_body.laboratory import GRAIN, RADIUS, Laboratory, bench, sphere
+from solver.single_body.free_world import GRAIN, RADIUS, FreeWorld, grain_on_plate, sphere
 from solver.verification.impacts import STEPS_PER_CONTACT, Impact, contact_time, rebounds
 from solver.verification.row import Row, of_value
 
@@ -35,9 +35,9 @@ def coincident() -> Iterator[Row]:
     for copies in (1, COPIES):
         soft = dataclasses.replace(GRAIN, shear_modulus=GRAIN.shear_modulus / copies)
         # The wall is as much softer, so that every contact is exactly a quarter.
-        scene = bench(sphere(copies=copies), 0.3, 1.0, grain=soft, wall=dataclasses.replace(soft, name="wall"))
+        scene = grain_on_plate(sphere(copies=copies), 0.3, 1.0, grain=soft, wall=dataclasses.replace(soft, name="wall"))
         dt = contact_time(OBLIQUE) / STEPS_PER_CONTACT
-        lab = Laboratory(scene, 1, dt)
+        lab = FreeWorld(scene, 1, dt)
         lab.put(0, (0.0, 0.0, RADIUS), velocity=(1.0, 0.2, -1.0), spin=(40.0, 60.0, -20.0))
         lab.run_apart(8 * STEPS_PER_CONTACT, STEPS_PER_CONTACT // 4)
         outcomes.append(lab.state()[0])

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from solver.scenes.body import Body, Members
 from solver.scenes.material import effective_youngs_modulus
-from solver.single_body.laboratory import EARTH, GRAIN, RADIUS, WALL, Laboratory, bench
+from solver.single_body.free_world import EARTH, GRAIN, RADIUS, WALL, FreeWorld, grain_on_plate
 from solver.verification.row import Row, of_scale, of_value
 
 GRAVITY = 9.81
@@ -17,7 +17,7 @@ SLAB_SIDE, SLAB_MASS = 0.03, 5e-3
 
 def rolling() -> Iterator[Row]:
     """A sphere that starts sliding at 0.5 m/s ends up rolling at 5/7 of it, whatever the friction."""
-    lab = Laboratory(bench(friction=0.3, gravity=EARTH), 1)
+    lab = FreeWorld(grain_on_plate(friction=0.3, gravity=EARTH), 1)
     depth = resting_depth(lab.scene.bodies[0].mass, 1)
     lab.put(0, (0.0, 0.0, RADIUS - depth), velocity=(0.5, 0.0, 0.0))
     lab.run(int(0.15 / lab.dt))
@@ -30,7 +30,7 @@ def rolling() -> Iterator[Row]:
 def slider() -> Iterator[Row]:
     """A slab on four spheres, which cannot roll, slides at 1 m/s and slows down by μ g."""
     friction, start = 0.3, 1.0
-    lab = Laboratory(bench(slab(), friction=friction, gravity=EARTH), 1)
+    lab = FreeWorld(grain_on_plate(slab(), friction=friction, gravity=EARTH), 1)
     lab.put(0, (0.0, 0.0, RADIUS - resting_depth(SLAB_MASS, 4)), velocity=(start, 0.0, 0.0))
     steps = int(0.2 / lab.dt)
     lab.run(steps)
@@ -44,7 +44,7 @@ def slope() -> Iterator[Row]:
     for fraction, holds in ((0.9, True), (1.1, False)):
         angle = fraction * math.atan(friction)
         along, across = GRAVITY * math.sin(angle), GRAVITY * math.cos(angle)
-        lab = Laboratory(bench(slab(), friction=friction, restitution=0.3, gravity=(along, 0.0, -across)), 1)
+        lab = FreeWorld(grain_on_plate(slab(), friction=friction, restitution=0.3, gravity=(along, 0.0, -across)), 1)
         lab.put(0, (0.0, 0.0, RADIUS - resting_depth(SLAB_MASS, 4)))
         # Springs and the tilt of the slab settle first.
         lab.run(int(0.3 / lab.dt))

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from scipy.special import beta, betaincinv
 
 from solver.scenes.material import Material, Pair, effective_youngs_modulus
-from solver.single_body.laboratory import Laboratory, scene_of, sphere
+from solver.single_body.free_world import FreeWorld, scene_of, sphere
 from solver.verification.chung_ooi import ALUMINIUM_T2, GLASS, LIMESTONE, MAGNESIUM, RIGID
 from solver.verification.impacts import hertz_depth
 from solver.verification.row import Row, of_scale, of_value
@@ -61,7 +61,7 @@ class Elastic:
 
 
 @dataclass(frozen=True)
-class Trace:
+class ContactTrace:
     """Overlap [m] and force [N] at every time [s] of a contact."""
 
     time: Array
@@ -83,7 +83,7 @@ def t1() -> Iterator[Row]:
         pairs = (Pair("grain", "grain", 0.35, 1.0), Pair("grain", "wall", 0.35, 1.0))
         e_star = effective_youngs_modulus(material, material)
         impact = Elastic(body.mass / 2.0, 0.005, e_star, 20.0)
-        lab = Laboratory(scene_of((body,), (material, RIGID), pairs), 2, impact.duration / STEPS, plate=False)
+        lab = FreeWorld(scene_of((body,), (material, RIGID), pairs), 2, impact.duration / STEPS, plate=False)
         lab.put(0, (0.0, 0.0, 0.01), velocity=(0.0, 0.0, -10.0))
         lab.put(1, (0.0, 0.0, -0.01), velocity=(0.0, 0.0, 10.0))
         yield from _rows("T1", material, impact, _trace(lab, impact, 0.02))
@@ -95,12 +95,12 @@ def t2() -> Iterator[Row]:
         body = sphere(0.1, material)
         pairs = (Pair("grain", "grain", 0.0, 1.0), Pair("grain", "wall", 0.0, 1.0))
         impact = Elastic(body.mass, 0.1, effective_youngs_modulus(material, RIGID), 0.2)
-        lab = Laboratory(scene_of((body,), (material, RIGID), pairs), 1, impact.duration / STEPS)
+        lab = FreeWorld(scene_of((body,), (material, RIGID), pairs), 1, impact.duration / STEPS)
         lab.put(0, (0.0, 0.0, 0.1), velocity=(0.0, 0.0, -0.2))
         yield from _rows("T2", material, impact, _trace(lab, impact, 0.1))
 
 
-def _trace(lab: Laboratory, impact: Elastic, touch: float) -> Trace:
+def _trace(lab: FreeWorld, impact: Elastic, touch: float) -> ContactTrace:
     """Run step by step; bodies touch where they are ``touch`` [m] apart, or the only one is that high.
 
     The force is the reduced mass times the change of the relative velocity over the step that began at this overlap.
@@ -114,10 +114,10 @@ def _trace(lab: Laboratory, impact: Elastic, touch: float) -> Trace:
         velocity.append(relative[9])
     overlap = np.asarray(touch - np.array(height), dtype=np.float64)
     time = np.arange(len(overlap) - 1, dtype=np.float64) * lab.dt
-    return Trace(time, overlap[:-1], np.asarray(impact.mass / lab.dt * np.diff(velocity), dtype=np.float64))
+    return ContactTrace(time, overlap[:-1], np.asarray(impact.mass / lab.dt * np.diff(velocity), dtype=np.float64))
 
 
-def _rows(test: str, material: Material, impact: Elastic, trace: Trace) -> Iterator[Row]:
+def _rows(test: str, material: Material, impact: Elastic, trace: ContactTrace) -> Iterator[Row]:
     name, most = material.name, float(impact.force(impact.depth))
     yield of_value(test, f"depth, {name} [m]", impact.depth, trace.overlap.max(), LIMIT, SOURCE)
     yield of_value(test, f"largest force, {name} [N]", most, trace.force.max(), LIMIT, SOURCE)
@@ -126,7 +126,7 @@ def _rows(test: str, material: Material, impact: Elastic, trace: Trace) -> Itera
     yield _worst(test, f"force over time, {name} [N]", impact.force(impact.overlap(trace.time)), trace, most)
 
 
-def _worst(test: str, quantity: str, expected: Array, trace: Trace, most: float) -> Row:
+def _worst(test: str, quantity: str, expected: Array, trace: ContactTrace, most: float) -> Row:
     k = int(np.argmax(np.abs(trace.force - expected)))
     at = f"worst, t = {trace.time[k]:.3g} s"
     return of_scale(test, quantity, expected[k], trace.force[k], (most, "largest force"), LIMIT, SOURCE, at)

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from solver.scenes.contact_model import ContactModel
 from solver.scenes.material import Material, Pair, effective_youngs_modulus
-from solver.single_body.laboratory import Laboratory, scene_of, sphere
+from solver.single_body.free_world import FreeWorld, scene_of, sphere
 from solver.verification.chung_ooi import RIGID
 
 Array = npt.NDArray[np.float64]
@@ -48,7 +48,7 @@ class Impact:
 
 
 @dataclass(frozen=True)
-class Target:
+class StruckSphere:
     """A free sphere at rest that is hit instead of the plane."""
 
     material: Material
@@ -103,7 +103,7 @@ def rebounds(
     scene = replace(scene_of(bodies, (*materials, RIGID), (*walls, *balls)), contact=contact)
     times = [contact_time(i) for i in impacts]
     dt = dt or min(times) / STEPS_PER_CONTACT
-    lab = Laboratory(scene, [kinds.index((i.material, i.radius, i.restitution, i.friction)) for i in impacts], dt)
+    lab = FreeWorld(scene, [kinds.index((i.material, i.radius, i.restitution, i.friction)) for i in impacts], dt)
     spacing = 4.0 * max(i.radius for i in impacts)
     for b, one in enumerate(impacts):
         spin = (0.0, -one.surface_speed / one.radius, 0.0)
@@ -116,7 +116,9 @@ def rebounds(
     ]
 
 
-def struck(impacts: Sequence[Impact], target: Target, contact: ContactModel = DECLARED_BY_NOBODY) -> list[Rebound]:
+def struck(
+    impacts: Sequence[Impact], target: StruckSphere, contact: ContactModel = DECLARED_BY_NOBODY
+) -> list[Rebound]:
     """Run ``impacts`` on a target each, side by side; they share material, radius, speed, restitution and friction."""
     one, n = impacts[0], len(impacts)
     ball, heavy = sphere(one.radius, one.material, name="ball"), sphere(target.radius, target.material, name="target")
@@ -124,7 +126,7 @@ def struck(impacts: Sequence[Impact], target: Target, contact: ContactModel = DE
     pairs = [Pair(a, b, one.friction, one.restitution) for k, a in enumerate(names) for b in names[k:]]
     scene = replace(scene_of((ball, heavy), (one.material, target.material, RIGID), pairs), contact=contact)
     dt = struck_time(one, target) / STEPS_PER_CONTACT
-    lab = Laboratory(scene, [0] * n + [1] * n, dt, plate=False)
+    lab = FreeWorld(scene, [0] * n + [1] * n, dt, plate=False)
     for k, impact in enumerate(impacts):
         y = 3.0 * k * target.radius
         place, spin = (0.0, y, impact.radius + target.radius), (0.0, -impact.surface_speed / impact.radius, 0.0)
@@ -139,7 +141,7 @@ def struck(impacts: Sequence[Impact], target: Target, contact: ContactModel = DE
     ]
 
 
-def struck_time(impact: Impact, target: Target) -> float:
+def struck_time(impact: Impact, target: StruckSphere) -> float:
     """Duration [s] of the impact on ``target`` if it were elastic and the target far heavier."""
     e_star = effective_youngs_modulus(impact.material, target.material)
     radius = impact.radius * target.radius / (impact.radius + target.radius)
@@ -153,7 +155,7 @@ class Engine:
     name: str
     rebounds: Callable[[Sequence[Impact]], list[Rebound]]
     """Impacts on the rigid plane, in any mixture."""
-    struck: Callable[[Sequence[Impact], Target], list[Rebound]]
+    struck: Callable[[Sequence[Impact], StruckSphere], list[Rebound]]
     """Impacts that differ in their spins only, each on a target of its own."""
 
 

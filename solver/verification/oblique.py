@@ -38,7 +38,7 @@ DISPLACEMENT = Convention(scaled="always", damped=False)
 
 
 @dataclass(frozen=True)
-class Outcome:
+class ObliqueImpact:
     """The three quantities of the paper at one angle."""
 
     restitution: float
@@ -114,15 +114,15 @@ def slides(theta: float, restitution: float) -> bool:
     return math.tan(math.radians(theta)) > 3.5 * FRICTION * (1.0 + restitution)
 
 
-def closed_form(theta: float, restitution: float) -> Outcome:
+def closed_form(theta: float, restitution: float) -> ObliqueImpact:
     """Outcome of an impact at ``theta`` [°] that slides throughout."""
     v_n, v_t = SPEED * math.cos(math.radians(theta)), SPEED * math.sin(math.radians(theta))
     slip = FRICTION * (1.0 + restitution) * v_n
     angle = math.degrees(math.atan((v_t - 3.5 * slip) / (restitution * v_n)))
-    return Outcome(1.0 - slip / v_t, -2.5 * slip / RADIUS, angle)
+    return ObliqueImpact(1.0 - slip / v_t, -2.5 * slip / RADIUS, angle)
 
 
-def _curve(quantity: str, curve: Curve, name: str, found: dict[float, Outcome]) -> Iterator[Row]:
+def _curve(quantity: str, curve: Curve, name: str, found: dict[float, ObliqueImpact]) -> Iterator[Row]:
     scale = (span(curve), "span")
     for theta, value in curve:
         at, here = f"θ = {theta:g}°", getattr(found[theta], name)
@@ -140,13 +140,15 @@ def _impacts(material: Material, restitution: float, angles: Angles) -> list[Imp
     ]
 
 
-def _outcomes(material: Material, restitution: float, angles: Angles, engine: Engine = OURS) -> dict[float, Outcome]:
+def _outcomes(
+    material: Material, restitution: float, angles: Angles, engine: Engine = OURS
+) -> dict[float, ObliqueImpact]:
     return _read(angles, engine.rebounds(_impacts(material, restitution, angles)))
 
 
-def _read(angles: Angles, out: list[Rebound]) -> dict[float, Outcome]:
+def _read(angles: Angles, out: list[Rebound]) -> dict[float, ObliqueImpact]:
     return {
-        theta: Outcome(
+        theta: ObliqueImpact(
             one.v_t / (SPEED * math.sin(math.radians(theta))),
             one.surface_speed / RADIUS,
             math.degrees(math.atan(one.contact_speed / one.v_n)),

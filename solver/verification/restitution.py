@@ -12,7 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from solver.scenes.time_step import time_step
-from solver.single_body.laboratory import GRAIN, RADIUS, bench
+from solver.single_body.free_world import GRAIN, RADIUS, grain_on_plate
 from solver.verification.chung_ooi import CAST_IRON, OXIDE
 from solver.verification.impacts import Impact, rebounds
 from solver.verification.row import Row, of_value
@@ -38,7 +38,7 @@ def table() -> Iterator[Row]:
     grain = [Impact(GRAIN, RADIUS, 1.0, restitution=e) for e in TABLE]
     for e, out in zip(TABLE, rebounds(grain), strict=True):
         yield of_value("restitution", "e out, fine step", e, out.v_n, LIMIT, SOURCE, at=f"e = {e:g}")
-    dt = time_step(bench())
+    dt = time_step(grain_on_plate())
     starts = [k / BEGINNINGS * dt for k in range(BEGINNINGS)]
     begun = [Impact(GRAIN, RADIUS, 1.0, restitution=e, gap=gap) for e in TABLE for gap in starts]
     out_of = np.array([out.v_n for out in rebounds(begun, dt)]).reshape(len(TABLE), BEGINNINGS)

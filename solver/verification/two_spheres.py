@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator
 
 from solver.scenes.material import Material, Pair, effective_youngs_modulus
-from solver.single_body.laboratory import Laboratory, scene_of, sphere
+from solver.single_body.free_world import FreeWorld, scene_of, sphere
 from solver.verification.chung_ooi import (
     ALUMINIUM,
     COPPER,
@@ -23,7 +23,7 @@ from solver.verification.chung_ooi import (
     Curve,
     span,
 )
-from solver.verification.impacts import OURS, STEPS_PER_CONTACT, Engine, Target, hertz_depth
+from solver.verification.impacts import OURS, STEPS_PER_CONTACT, Engine, StruckSphere, hertz_depth
 from solver.verification.row import Row, of_scale, of_value
 from solver.verification.spinning import FRICTION, RADIUS, RESTITUTION, SPEED, beta, spinning
 
@@ -43,7 +43,7 @@ def t7() -> Iterator[Row]:
         spins = [SPEED * math.tan(math.radians(angle)) / RADIUS for angle in GEAR_ANGLES]
         e_star = effective_youngs_modulus(material, material)
         dt = _time_step(body.mass / 2.0, 2.0 * SPEED, e_star, RADIUS / 2.0)
-        lab = Laboratory(scene_of((body,), (material, RIGID), pairs), 2 * len(spins), dt, plate=False)
+        lab = FreeWorld(scene_of((body,), (material, RIGID), pairs), 2 * len(spins), dt, plate=False)
         for k, spin in enumerate(spins):
             y = 4.0 * k * RADIUS
             lab.put(2 * k, (0.0, y, RADIUS), velocity=(0.0, 0.0, -SPEED), spin=(0.0, -spin, 0.0))
@@ -79,7 +79,7 @@ def _on_target(engine: Engine, stiffness: float, curve: Curve) -> list[float]:
         ALUMINIUM.poisson_ratio,
     )
     impacts = spinning(ALUMINIUM, curve, RESTITUTION)
-    after = engine.struck(impacts, Target(heavy, TARGET_RADIUS))
+    after = engine.struck(impacts, StruckSphere(heavy, TARGET_RADIUS))
     return [beta(before, one) for before, one in zip(impacts, after, strict=True)]
 
 

@@ -15,11 +15,11 @@ import numpy as np
 
 from doe.declared.model import declare
 from doe.declared.points import directions_of, moved
-from doe.declared.pours import Pour
-from doe.diagnose.compared import Measured, weighed
+from doe.declared.pours import PointPour
+from doe.diagnose.compared_features import MeasuredFeatures, weighed
 from doe.diagnose.diagnosis import Diagnosis, concluded, errors_of
 from doe.diagnose.emulator import Lessons, Way
-from doe.diagnose.next_experiment import MenuItem, Prediction, rank_experiments
+from doe.diagnose.next_experiment import CandidateExperiment, Prediction, rank_experiments
 from doe.diagnose.result import Level, Offered, Suggestion
 from doe.diagnose.verdict import verdict_of
 from doe.measurement.features import SCALARS, SCAN
@@ -183,7 +183,7 @@ class FormulaPours:
         shift = self._world.shift(condition, self._declared.theta(point.theta), acting)
         pour = self._world.pours(self._draw, condition, 1, shift)[:, :D]
         outcome = "measured" if point.number or condition else "jammed"
-        return Pour(tuple(pour[0]), outcome, tuple(profiles(pour)[0]))
+        return PointPour(tuple(pour[0]), outcome, tuple(profiles(pour)[0]))
 
 
 def along(direction, multiple):
@@ -223,8 +223,8 @@ def diagnosed(
     stated = np.zeros(WIDTH)
     stated[0] = 0.2
     offers = [
-        Measured("fit", SCAN, tuple(FEATURES), blocks[0], stated),
-        Measured("fit fast", SCALARS, tuple(SUMMARIES), blocks[1][:, :D], stated[:D]),
+        MeasuredFeatures("fit", SCAN, tuple(FEATURES), blocks[0], stated),
+        MeasuredFeatures("fit fast", SCALARS, tuple(SUMMARIES), blocks[1][:, :D], stated[:D]),
     ]
     lessons = lessons_of(world, declared, levels, draw)
     compared = weighed(lessons, ways, offers)
@@ -260,7 +260,7 @@ def suggestions(verdict):
     rivals = {name: k for k, name in enumerate((*verdict.names, "base")[:2])}
     pour = np.eye(3)
     menu = [
-        MenuItem(
+        CandidateExperiment(
             name,
             {rival: Prediction(np.array([gap * k, 0.0, 0.0]), 0.05 * pour) for rival, k in rivals.items()},
             pour,

@@ -14,13 +14,23 @@ from explorer.cli import app
 from explorer.export.run import PeerTimeout
 from explorer.scene.file import load_scene
 from explorer.tables.benchmark import fallen, markdown, result_of, table_text
-from solver.benchmark import RADIUS, SPACING, Bed, Box, Measurement, measure_bed, measure_pour, shuffled, side_by_side
+from solver.benchmark import (
+    RADIUS,
+    SPACING,
+    Bed,
+    BenchmarkResult,
+    Box,
+    measure_bed,
+    measure_pour,
+    shuffled,
+    side_by_side,
+)
 
 NAN = math.nan
 
 
 def measured(case, engine, spheres, steps, wall, contacts=NAN):
-    return Measurement(case, engine, spheres, spheres, steps, wall, 4.0, contacts, contacts)
+    return BenchmarkResult(case, engine, spheres, spheres, steps, wall, 4.0, contacts, contacts)
 
 
 TWO_BEDS = [
@@ -104,7 +114,7 @@ def test_the_page_for_docs_has_date_machine_ranges_and_what_is_asked():
 def test_engines_take_turns_and_one_that_times_out_has_no_second_turn(monkeypatch):
     """The runs are counted, not timed: either no time is too long, or every time is."""
     quick = measured("case", "ours", 1, 1, 1.0)
-    late = Measurement("case", "yade", 1, 1, 0, 60.0, 0.0, NAN, NAN, timed_out=True)
+    late = BenchmarkResult("case", "yade", 1, 1, 0, 60.0, 0.0, NAN, NAN, timed_out=True)
     monkeypatch.setattr("explorer.benchmark.LONG", math.inf)
     turns = list(benchmark._in_turn(Options(4.0, (), (), rounds=4), [lambda: quick, lambda: late]))
     assert [one.engine for one in turns] == ["ours", "yade", "ours", "ours", "ours"]

@@ -76,7 +76,7 @@ def test_table_8_gives_table_9_the_papers_equation_and_a_solution(tmp_path):
     assert anova["r_squared"] == pytest.approx(0.983, abs=5e-4)
     assert anova["r_squared_adjusted"] == pytest.approx(0.9612, abs=5e-5)
     assert anova["cv_percent"] == pytest.approx(1.59, abs=5e-3)
-    # As the README quotes it; its check by leaving out one run at a time is in tests/doe/test_surface.py.
+    # As the README quotes it; its check by leaving out one run at a time is in tests/doe/analysis/test_surface.py.
     assert anova["r_squared_predicted"] == pytest.approx(0.832, abs=5e-4)
     printed = [18.31, 0.14, 149.7, -219.08, 3.01, 1.85, 22.22, -0.026, -249, 113.81]
     natural = result["analysis"]["model"]["surface"]["coefficients_natural"]

@@ -10,7 +10,7 @@ from doe.diagnose.result import Level
 from doe.measurement.features import feature_set
 from doe.store import READINGS
 from doe.validation.laboratory import TREFOILS, read_laboratory
-from doe.validation.reference import Reference, Sample, save
+from doe.validation.reference import Reference, ReferencePours, save
 from solver import PHYSICS
 from tests.explorer.command_line import explorer
 
@@ -41,7 +41,7 @@ def made_up(model, physics=PHYSICS):
     levels = tuple(
         Level(Direction(name, name, (0.3,)), 0.5, 12.0) for name in ("rolling_resistance", "size_dispersion")
     )
-    sample = Sample(pours, tuple(p.path for p in model.parameters))
+    sample = ReferencePours(pours, tuple(p.path for p in model.parameters))
     return Reference(model.title, physics, READINGS, tuple(names), levels, ROUNDS, sample)
 
 

@@ -10,7 +10,7 @@ from explorer.export.impacts import plane_input, target_input
 from explorer.export.liggghts import INPUT, unclamped_restitution
 from explorer.export.run import PeerTimeout, run_liggghts
 from solver.verification.chung_ooi import ALUMINIUM, NYLON
-from solver.verification.impacts import STEPS_PER_CONTACT, Impact, Target, contact_time, struck_time
+from solver.verification.impacts import STEPS_PER_CONTACT, Impact, StruckSphere, contact_time, struck_time
 
 FAST, SLOW = (Impact(ALUMINIUM, 0.1, v, 0.05, 0.3, 0.5, 0.4) for v in (0.4, 0.2))
 OTHER = Impact(NYLON, 0.1, 0.2, 0.0, 0.3, 0.5, 0.4, gap=1e-4)
@@ -50,7 +50,7 @@ def test_impacts_on_the_plane_are_told_as_they_are(tmp_path):
 
 
 def test_an_impact_on_a_target_touches_it_at_the_start(tmp_path):
-    target = Target(ALUMINIUM, 0.5)
+    target = StruckSphere(ALUMINIUM, 0.5)
     target_input(tmp_path, [SLOW, SLOW], target)
     places, speeds = spheres(tmp_path)
     assert places[:2, 6] - places[2:, 6] == pytest.approx(0.6)

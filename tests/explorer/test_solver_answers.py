@@ -53,7 +53,7 @@ def test_a_rig_answers_what_the_command_line_prints(tmp_path):
     assert told.exit_code == 0
     assert told.stdout.strip() == answer.text
     found = json.loads(answer.files["drop_plate_45.json"])["quantities"]["restitution"]
-    # The rebound is tracked to a fifth of a percent (tests/solver/test_bench_tests.py).
+    # The rebound is tracked to a fifth of a percent (tests/solver/single_body/test_bench_tests.py).
     assert found["value"] == pytest.approx(found["reference"], rel=2e-3)
 
 

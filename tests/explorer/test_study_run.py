@@ -10,7 +10,7 @@ from doe.studies.study_result import OWN_STAGES
 from explorer.study import run as study_run
 from solver import asset_path
 from tests.doe.formula_runner import FormulaRunner
-from tests.doe.test_campaign import planted
+from tests.doe.studies.test_campaign import planted
 from tests.explorer.command_line import explorer
 from tests.explorer.study_panel_at_hand import study_with_own_profiles
 

@@ -9,7 +9,7 @@ from doe.diagnose.budget import Budget
 from doe.diagnose.diagnosis import run_diagnosis
 from doe.measurement.load import load_measurement
 from doe.store import Store
-from solver import Crew
+from solver import WorkerPool
 from solver.assets import measurement_folder
 
 pytestmark = pytest.mark.slow
@@ -33,10 +33,10 @@ def diagnosed(tmp_path_factory):
     """Both data sets, one after the other, from one store: the second finds the pours of the first there."""
     store = Store(tmp_path_factory.mktemp("trefoils") / "runs.sqlite")
     found = {}
-    with Crew() as crew:
+    with WorkerPool() as pool:
         for name in ("trefoil_1", "trefoil_2"):
             data = load_measurement(measurement_folder(name))
-            found[name] = run_diagnosis(data, store, crew.run_queue, CANDIDATES, Budget(), print)
+            found[name] = run_diagnosis(data, store, pool.run_queue, CANDIDATES, Budget(), print)
     store.close()
     return found
 

@@ -20,7 +20,7 @@ from solver.pours.record import Entries
 from solver.scenes.insertion import rotation_matrix
 from solver.scenes.scene import with_values
 from solver.scenes.time_step import time_step
-from solver.single_body.laboratory import Laboratory
+from solver.single_body.free_world import FreeWorld
 
 RUNNERS = {"liggghts": run_liggghts, "yade": run_yade}
 LENGTH = 24.6e-3
@@ -69,7 +69,7 @@ class Case:
 
 def ours(case):
     """Step → :class:`Motion` from our solver."""
-    lab = Laboratory(case.scene, len(case.position), dt=case.dt, active=(case.plate, False, False))
+    lab = FreeWorld(case.scene, len(case.position), dt=case.dt, active=(case.plate, False, False))
     if not case.tangential_damping:
         table = law_table(case.scene)
         table[..., HertzMindlin.columns.index("shear_damping")] = 0.0

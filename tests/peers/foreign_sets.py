@@ -20,7 +20,7 @@ import numpy as np
 from doe.diagnose.budget import Budget
 from doe.store import Store
 from doe.validation.campaign import Answers, CampaignOrder, measured_strengths
-from doe.validation.laboratory import TREFOILS, Sample, read_laboratory
+from doe.validation.laboratory import TREFOILS, LaboratoryPour, read_laboratory
 from doe.validation.sets import append_rows, read_rows
 from doe.validation.truth import REPLICATES, Case, Truth, drawn_theta
 from doe.validation.work_place import WorkPlace
@@ -137,7 +137,7 @@ class ForeignAnswers(Answers):
     def poured(self, recipe, condition, order):
         """One pour: what lies on the plate."""
         queue = deque([Job(order.scene, order.seed)])
-        ((_, record),) = self.place.crew.run_queue(queue, [order.scene])
+        ((_, record),) = self.place.pool.run_queue(queue, [order.scene])
         deck = recipe.deck(deck_of(record, order.scene.numerics.duration), condition.turned)
         with TemporaryDirectory() as folder:
             write_liggghts(Path(folder), deck)
@@ -147,7 +147,7 @@ class ForeignAnswers(Answers):
         centre, radius, owner = on_the_plate(order.scene, deck, frame)
         pile = scanned_pile(order.scene, centre, radius, owner)
         read = observe_scan(pile, order.scene, dict.fromkeys(self.laboratory.readings))
-        return Sample({name: float(x) for name, x in read.items()}, centre, radius)
+        return LaboratoryPour({name: float(x) for name, x in read.items()}, centre, radius)
 
 
 def on_the_plate(scene, deck, frame):

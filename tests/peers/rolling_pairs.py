@@ -17,7 +17,7 @@ from doe.measurement.load import load_measurement
 from explorer.export.deck import deck_of
 from explorer.export.liggghts import write_liggghts
 from explorer.export.run import run_liggghts
-from solver import Crew, Job, observe_scan, scanned_pile, with_values
+from solver import Job, WorkerPool, observe_scan, scanned_pile, with_values
 from solver.assets import measurement_folder
 from tests.peers.foreign_sets import OUT, on_the_plate
 
@@ -32,9 +32,9 @@ READ = (
 )
 
 
-def pair(crew, scene, seed):
+def pair(pool, scene, seed):
     """One pour by both engines: engine → readings."""
-    ((_, record),) = crew.run_queue(deque([Job(scene, seed)]), [scene])
+    ((_, record),) = pool.run_queue(deque([Job(scene, seed)]), [scene])
     spheres = record.pile.spheres
     deck = deck_of(record, scene.numerics.duration)
     with TemporaryDirectory() as folder:
@@ -52,9 +52,9 @@ def main(number):
     condition = load_measurement(measurement_folder("trefoil_2")).fit[0]
     scene = with_values(condition.scene, {"effect.rolling_resistance.rolling_friction": TRUE_FRICTION})
     rows = []
-    with Crew(1) as crew, (OUT / "rolling_pairs.jsonl").open("w") as file:
+    with WorkerPool(1) as pool, (OUT / "rolling_pairs.jsonl").open("w") as file:
         for k in range(number):
-            rows.append({"seed": SEED + k} | pair(crew, scene, SEED + k))
+            rows.append({"seed": SEED + k} | pair(pool, scene, SEED + k))
             file.write(json.dumps(rows[-1], default=float) + "\n")
             print(f"{k + 1} of {number}", flush=True)
     for name in READ:

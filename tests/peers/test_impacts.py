@@ -8,7 +8,7 @@ from explorer.export.impacts import liggghts_engine
 from explorer.tables.verification import MISSED_ALONE, peers_text
 from solver.laws import LinearSpringDashpot
 from solver.scenes.contact_model import ContactModel
-from solver.single_body.laboratory import GRAIN
+from solver.single_body.free_world import GRAIN
 from solver.verification import BY_ANY_ENGINE, verify, verify_engine
 from solver.verification.chung_ooi import POLYETHYLENE, STEEL, T5_RECOIL
 from solver.verification.impacts import Impact, rebounds

@@ -11,7 +11,7 @@ from solver import backend
 from solver.pours.record import Record
 from solver.pours.run import Job, run_pours
 from solver.scenes.scene import with_values
-from tests.solver.test_pour import QUICK
+from tests.solver.pours.test_pour import QUICK
 
 HEAP = with_values(QUICK, {"rig.mass": "8g"})
 SHUT = with_values(HEAP, {"insertion.protocol": "fill_then_open"})

@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 from scipy import stats
 
-from doe.analysis.analyse import Model
+from doe.analysis.analyse import FittedModel
 from doe.analysis.model_adequacy import BoxCox, Diagnostics
 from explorer.design.result import DesignResult
 from explorer.report.content import Spec
@@ -89,7 +89,7 @@ def box_cox_profile(found: BoxCox) -> Spec | None:
     return chart(traces, layout, 320)
 
 
-def ridge(result: DesignResult, model: Model) -> Spec:
+def ridge(result: DesignResult, model: FittedModel) -> Spec:
     """Left: highest and lowest response within a distance of the centre, band 95 %; right: where the highest is."""
     df = model.surface.df_residual
     left, right = side_by_side(2, 0.12)

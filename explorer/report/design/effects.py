@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from doe.analysis.contrasts import Curvature
-from doe.analysis.screening import Effect
+from doe.analysis.screening import FactorEffect
 from explorer.design.result import DesignResult, DrawnEffects
 from explorer.report.content import Block, Bullets, Facts, Figure, Section, Table, Text
 from explorer.report.figures.effects import half_normal, main_effects, pareto
@@ -47,7 +47,7 @@ def effects(result: DesignResult) -> Section | None:
     return Section("Effects", tuple(blocks))
 
 
-def largest(effects: Sequence[Effect]) -> tuple[Effect, ...]:
+def largest(effects: Sequence[FactorEffect]) -> tuple[FactorEffect, ...]:
     """The effects that a chart has room for, in their order."""
     kept = {effect.name for effect in sorted(effects, key=_rank)[:MOST_DRAWN]}
     return tuple(effect for effect in effects if effect.name in kept)
@@ -87,16 +87,16 @@ def curvature(found: Curvature, response: str) -> str:
     )
 
 
-def _rank(effect: Effect) -> float:
+def _rank(effect: FactorEffect) -> float:
     return -abs(effect.effect) if math.isfinite(effect.effect) else 0.0
 
 
-def _of_factors(part: DrawnEffects) -> tuple[Effect, ...]:
+def _of_factors(part: DrawnEffects) -> tuple[FactorEffect, ...]:
     names = {factor.name for factor in part.factors}
     return tuple(effect for effect in part.analysis.effects if effect.name in names)
 
 
-def _only(part: DrawnEffects, effects: tuple[Effect, ...]) -> DrawnEffects:
+def _only(part: DrawnEffects, effects: tuple[FactorEffect, ...]) -> DrawnEffects:
     return replace(part, analysis=replace(part.analysis, effects=effects))
 
 

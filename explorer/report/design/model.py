@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from doe.analysis.analyse import DesignAnalysis, Model
+from doe.analysis.analyse import DesignAnalysis, FittedModel
 from doe.analysis.model_adequacy import BoxCox, Diagnostics
 from explorer.design.result import DesignResult, SheetFactor
 from explorer.report.content import Block, Bullets, Facts, Figure, Folded, Section, Table, Text
@@ -74,7 +74,7 @@ def fit_summary(analysis: DesignAnalysis) -> Table:
     return Table(header, tuple(rows), "What these runs can bear; – where they cannot separate the terms.")
 
 
-def coefficient_table(found: Model) -> Table:
+def coefficient_table(found: FittedModel) -> Table:
     """Coded and actual coefficients of the model's terms."""
     fitted = found.surface
     rows = tuple(
@@ -119,7 +119,7 @@ def diagnostics(result: DesignResult) -> Section | None:
     return Section("Diagnostics", (*blocks, Folded("All runs against the model", (run_table(result, model),))))
 
 
-def run_table(result: DesignResult, model: Model) -> Table:
+def run_table(result: DesignResult, model: FittedModel) -> Table:
     """Every run with its residual and its weight in the fit."""
     fitted, found, response = model.surface, model.diagnostics, result.response.path
     rows = tuple(

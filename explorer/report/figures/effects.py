@@ -10,7 +10,7 @@ from typing import Protocol
 
 from scipy import stats
 
-from doe.analysis.screening import Effect, ErrorSource, Screening
+from doe.analysis.screening import ErrorSource, FactorEffect, Screening
 from doe.stages.screening import ScreeningResult
 from doe.studies.study import Factor
 from explorer.report.content import Spec
@@ -209,7 +209,7 @@ def _titles(part: EffectsOf) -> dict[str, str]:
     }  # fmt: skip
 
 
-def _t(effect: Effect, source: ErrorSource) -> float:
+def _t(effect: FactorEffect, source: ErrorSource) -> float:
     """|t| of an effect against an error; NaN where it was not tested."""
     test = effect.test_by(source)
     return math.nan if test is None else abs(test.t)

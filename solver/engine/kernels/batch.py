@@ -1,6 +1,6 @@
-"""The kernel that runs a batch: worlds in parallel, the steps of a world one after the other.
+"""The kernel that runs a batch: worlds in parallel, the steps of a world one after the other, and a summary at the end.
 
-Sums over a world as it stands: energies, masses, the fastest body. Nothing of the motion is changed.
+The summary of a world as it stands is its energies, its masses and the fastest body; it changes nothing of the motion.
 """
 
 from solver.backend import lanes, serial, ti

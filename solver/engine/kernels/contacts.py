@@ -1,6 +1,6 @@
 """Forces of all contacts of one world, each pair once and in the order of the list (so the bits repeat).
 
-The contacts of a world as they are: read, and nothing changed.
+:func:`push` adds them to the bodies; :func:`read_contacts` tells the contacts as they are and changes nothing.
 """
 
 from solver.backend import serial, ti
@@ -19,12 +19,12 @@ from solver.engine.kernels.narrowphase import (
     shared_point,
     sum_pairs,
 )
+from solver.engine.kernels.transfer import IntRow, Table
 from solver.engine.kernels.walls import surface_velocity
 from solver.engine.state import Vec3
 from solver.laws.law import normal_force, tangential_force
 
 HELD_OVERLAP = 1e-45
-
 """Overlap [m] that stands for surfaces held at a gap: their contact radius, 1e-24 m, bears and damps nothing."""
 
 
@@ -103,7 +103,7 @@ def respond(s: ti.template(), w, k, n, overlap, velocity, omega, mass, part, sti
 
     ``velocity`` is that of a relative to its partner at the contact, ``omega`` the relative angular velocity (only
     effects ask for it). A torque comes from effects alone; it acts on both bodies, in opposite directions.
-    ``mass`` [kg] is what the dashpots damp, ``part`` the contact's share in its pair (``clump_rules.py``).
+    ``mass`` [kg] is what the dashpots damp, ``part`` the contact's share in its pair (``narrowphase.py``).
 
     If ``still``, nothing moves in the entry and no step passes: what it keeps stays as it is, and no energy goes. Such
     an entry is evaluated whenever the list is built, so anything else would let the list's length act on the motion.
@@ -258,11 +258,6 @@ def push(s: ti.template(), w):
         s.body.torque[w, present] = s.body.torque[w, present] + torque_sum
     s.world.overlap[w] = largest
     s.world.dissipated[w] = s.world.dissipated[w] + dissipated
-
-
-Table = ti.types.ndarray(dtype=ti.f64, ndim=2)
-
-IntRow = ti.types.ndarray(dtype=ti.i32, ndim=1)
 
 
 @ti.kernel

@@ -12,7 +12,6 @@ from solver.engine.kernels.geometry import rotation
 from solver.engine.state import Vec3
 
 CONTACT_ACTS = tuple(kind.act for kind in CONTACT_EFFECTS)
-
 BODY_ACTS = tuple(kind.act for kind in BODY_EFFECTS)
 
 

@@ -12,7 +12,6 @@ from solver.engine.kernels.neighbours import place_members
 from solver.engine.state import Vec3
 
 MIDPOINT_ITERATIONS = 3
-
 """Fixed-point iterations of the midpoint rule; each gains a factor |ω| dt, below 1e-2 here."""
 
 

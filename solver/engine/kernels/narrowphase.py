@@ -1,6 +1,6 @@
-"""Where the surfaces of an entry of the contact list meet, and whether they may act on each other.
+"""Where the surfaces of an entry of the contact list meet, whether they act on each other, and on what of a clump.
 
-What of a clump a contact feels: the mass that damps it, and its share where several spheres touch the same partner.
+Of a clump a contact feels the mass that damps it, and a share where several spheres touch the same partner.
 
 The normal dashpot c = c_n √(2 E* a m) gives the declared restitution e when m is the mass that the contact moves. A
 sphere off the centre of its body moves less than the whole:
@@ -23,6 +23,9 @@ The locally reduced mass, and one contact per pair as the cure of too much stiff
 from solver.backend import ti
 from solver.engine.kernels.walls import from_patch, from_primitive
 from solver.engine.state import Vec3, Vec4
+
+BODY_MASS, LOCAL_MASS, SHARED = 0, 1, 2
+"""Places in ``contact_model.CLUMP_RULES``."""
 
 
 @ti.func
@@ -76,11 +79,6 @@ def lasts(s: ti.template(), w, k, overlap):
     if ti.static(s.effects):
         acts = overlap > 0.0 or may_hold(s, w, k)
     return acts
-
-
-BODY_MASS, LOCAL_MASS, SHARED = 0, 1, 2
-
-"""Places in ``contact_model.CLUMP_RULES``."""
 
 
 @ti.func

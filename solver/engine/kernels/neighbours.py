@@ -1,12 +1,10 @@
 """The contact list of a world: pairs of member spheres, and spheres near a surface, that may touch soon.
 
-Bodies near each other are found by the body grid, then sorted out member against box, then member against member, so
-the cost grows with the number of bodies. The list reaches as far as a pull may hold (``grip``) and the margins of both
-partners beyond; it holds while nothing has travelled further than its own margin. A margin is as wide as a body moves
-in ``AHEAD`` steps: one fast body does not make the list long for all the others. Tangential springs, and what effects
-keep of a contact, are carried over by merging two ordered lists.
-
-Bodies near each other: a hashed grid of their centres, then their bounding boxes.
+Bodies near each other are found by a hashed grid of their centres and by their bounding boxes, then sorted out member
+against box, then member against member, so the cost grows with the number of bodies. The list reaches as far as a pull
+may hold (``grip``) and the margins of both partners beyond; it holds while nothing has travelled further than its own
+margin. A margin is as wide as a body moves in ``AHEAD`` steps: one fast body does not make the list long for all the
+others. Tangential springs, and what effects keep of a contact, are carried over by merging two ordered lists.
 """
 
 from solver.backend import ti
@@ -14,6 +12,11 @@ from solver.engine.kernels.geometry import nearest_on_triangle, offset, rotation
 from solver.engine.kernels.narrowphase import find_leads
 from solver.engine.kernels.walls import from_primitive, into_wall
 from solver.engine.state import Ints3, Vec3
+
+AHEAD = 60.0
+"""Steps that a body at its present speed takes to use up its margin."""
+LEAST, MOST = 0.1, 1.5
+"""Limits of a margin, in skins: a body at rest may be hit, and a fast one needs no room for what is far away."""
 
 
 @ti.func
@@ -76,15 +79,6 @@ def find_near(s: ti.template(), w, a):
                     near += 1
             b = s.body.next[w, b]
     return near
-
-
-AHEAD = 60.0
-
-"""Steps that a body at its present speed takes to use up its margin."""
-
-LEAST, MOST = 0.1, 1.5
-
-"""Limits of a margin, in skins: a body at rest may be hit, and a fast one needs no room for what is far away."""
 
 
 @ti.func

@@ -11,11 +11,8 @@ from solver.engine.kernels.motion import energy_per_mass
 from solver.engine.state import Vec3
 
 BALANCE = 0.02
-
 """Imbalance at which a body may fall asleep, as a fraction of its weight."""
-
 WAKE = 0.1
-
 """Imbalance at which it wakes, as a fraction of its weight."""
 
 

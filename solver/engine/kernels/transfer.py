@@ -1,12 +1,11 @@
-"""NumPy arrays as small kernels take them.
+"""What goes between NumPy and the arrays of a world, one small kernel per table or group of fields.
 
-A scene as tables → the arrays of an empty world: one small kernel per table.
+    load_…              a scene as tables → the arrays of an empty world
+    read_…              the arrays of a world → rows of numbers
+    pack…, unpack…      fields of a world → one row of numbers, and back
 
-The arrays of a world → rows of numbers: one small kernel per table.
-
-Fields of a world into one row of numbers and back, in one launch per group of fields.
-
-``width`` is the number of columns that an entry of the group takes, ``first`` the number in the row where it begins.
+Of a group that is packed, ``width`` is the number of columns that an entry takes, ``first`` the number in the row where
+the group begins.
 """
 
 from solver.backend import serial, ti
@@ -15,28 +14,22 @@ from solver.engine.kernels.geometry import rotation
 from solver.engine.state import WORLD, Ints3, Mat3, Vec3, Vec4
 
 Table = ti.types.ndarray(dtype=ti.f64, ndim=2)
-
 Row = ti.types.ndarray(dtype=ti.f64, ndim=1)
-
 IntTable = ti.types.ndarray(dtype=ti.i32, ndim=2)
-
 IntRow = ti.types.ndarray(dtype=ti.i32, ndim=1)
+
+SETTINGS = (
+    *("dt", "gravity", "skin", "cell", "sleep_speed", "sleep_time", "domain", "outlet", "inlet_radius"),
+    *("clump_rule", "tangential_law", "tangential_dashpot"),
+)
+"""What a world is set up with: fields of ``state.WORLD``."""
+Settings = ti.types.struct(**{name: WORLD[name] for name in SETTINGS})
 
 
 @ti.func
 def triple(table: ti.template(), row, column):
     """Three neighbouring cells of a row as a vector."""
     return Vec3(table[row, column], table[row, column + 1], table[row, column + 2])
-
-
-SETTINGS = (
-    *("dt", "gravity", "skin", "cell", "sleep_speed", "sleep_time", "domain", "outlet", "inlet_radius"),
-    *("clump_rule", "tangential_law", "tangential_dashpot"),
-)
-
-"""What a world is set up with: fields of ``state.WORLD``."""
-
-Settings = ti.types.struct(**{name: WORLD[name] for name in SETTINGS})
 
 
 @ti.kernel

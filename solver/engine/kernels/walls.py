@@ -10,7 +10,6 @@ from solver.engine.kernels.geometry import nearest_on_revolved, nearest_on_trian
 from solver.engine.state import Vec3, Vec4
 
 APART = 1e30
-
 """A distance [m] for "does not touch"."""
 
 

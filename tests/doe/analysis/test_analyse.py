@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from doe.analysis.analyse import Target, analyse_design
+from doe.analysis.analyse import ResponseTarget, analyse_design
 from doe.analysis.contrasts import is_regular
 from doe.designs import box_behnken, factorial, fold_over, plackett_burman
 from doe.errors import StatisticsError
@@ -144,7 +144,7 @@ def test_box_behnken_of_four_factors_is_solved_for_a_target():
         return 10 + 2 * x[..., 0] - x[..., 1] + x[..., 0] * x[..., 2] + x[..., 3] ** 2
 
     values = truth(design) + 1e-3 * np.random.default_rng(4).standard_normal(len(design))
-    analysis = analyse_design(design, values[:, None], region("ABCD"), target=Target(11.0, 0.0, np.zeros(4)))
+    analysis = analyse_design(design, values[:, None], region("ABCD"), target=ResponseTarget(11.0, 0.0, np.zeros(4)))
     assert analysis.optimum.reached
     assert truth(analysis.optimum.point) == pytest.approx(11.0, abs=5e-3)  # five times the noise
     # In the plane y = 10 + 2 A - B + … the nearest point to the centre is about (0.4, -0.2, 0, 0).
@@ -155,16 +155,16 @@ def test_box_behnken_of_four_factors_is_solved_for_a_target():
 def test_a_corner_beyond_every_run_is_called_an_extrapolation():
     design = box_behnken(3, 5).astype(float)
     values = 10 + design @ [1.0, 1.0, 1.0] + 0.01 * np.random.default_rng(4).standard_normal(17)
-    analysis = analyse_design(design, values[:, None], region("ABC"), target=Target(12.95, 0.0, np.zeros(3)))
+    analysis = analyse_design(design, values[:, None], region("ABC"), target=ResponseTarget(12.95, 0.0, np.zeros(3)))
     assert any("extrapolation" in note for note in analysis.notes)
-    inside = analyse_design(design, values[:, None], region("ABC"), target=Target(11.0, 0.0, np.zeros(3)))
+    inside = analyse_design(design, values[:, None], region("ABC"), target=ResponseTarget(11.0, 0.0, np.zeros(3)))
     assert not any("extrapolation" in note for note in inside.notes)
 
 
 def test_more_than_four_factors_are_not_solved_but_told():
     design = factorial(5).astype(float)
     values = 10 + design[:, 0] + 0.1 * np.random.default_rng(4).standard_normal(32)
-    analysis = analyse_design(design, values[:, None], region("ABCDE"), target=Target(10.5, 0.0, np.zeros(5)))
+    analysis = analyse_design(design, values[:, None], region("ABCDE"), target=ResponseTarget(10.5, 0.0, np.zeros(5)))
     assert analysis.optimum is None
     assert any("up to 4 factors" in note for note in analysis.notes)
 

@@ -3,21 +3,21 @@
 import numpy as np
 import pytest
 
-from doe.declared.model import Condition, Declared, Effect, Parameter
+from doe.declared.model import CalibratedParameter, CandidateEffect, Declared, DeclaredCondition
 from doe.declared.points import AS_IT_IS, Direction, View, base_points, directions_of, effect_points, middle, moved
 from doe.measurement.features import features_of_record
 from doe.validation.laboratory import TREFOILS, read_laboratory
 from solver import run_pour, with_values
 
 PARAMETERS = (
-    Parameter("friction", 0.4, 0.8, 0.5, 0.05),
-    Parameter("restitution", 0.3, 0.9),
-    Parameter("wall friction", 0.2, 0.9, 0.6, 0.02),
+    CalibratedParameter("friction", 0.4, 0.8, 0.5, 0.05),
+    CalibratedParameter("restitution", 0.3, 0.9),
+    CalibratedParameter("wall friction", 0.2, 0.9, 0.6, 0.02),
 )
-DECLARED = Declared(PARAMETERS, (), (Condition("one", ("height",)),))
-ROLLING = Effect("rolling_resistance", (0.0,), (0.2,))
-DENSITY = Effect("density_error", (-0.3,), (0.5,))
-TILT = Effect("plate_tilt", (-5.0, -4.0), (5.0, 4.0))
+DECLARED = Declared(PARAMETERS, (), (DeclaredCondition("one", ("height",)),))
+ROLLING = CandidateEffect("rolling_resistance", (0.0,), (0.2,))
+DENSITY = CandidateEffect("density_error", (-0.3,), (0.5,))
+TILT = CandidateEffect("plate_tilt", (-5.0, -4.0), (5.0, 4.0))
 
 
 def test_more_points_continue_the_sequence():
@@ -57,7 +57,7 @@ def test_parameters_are_moved_evenly_and_apart():
 
 
 def test_a_parameter_stays_within_its_range():
-    narrow = Declared((Parameter("friction", 0.49, 0.52, 0.5, 0.05),), (), ())
+    narrow = Declared((CalibratedParameter("friction", 0.49, 0.52, 0.5, 0.05),), (), ())
     assert [moved(narrow, k)[0] for k in range(2)] == pytest.approx([0.52, 0.49])
     assert middle(PARAMETERS) == (0.5, pytest.approx(0.6), 0.6)
     # One that nobody measured moves by the deviation of an even distribution.

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from doe.declared import pours as module
-from doe.declared.model import Condition, Declared
+from doe.declared.model import Declared, DeclaredCondition
 from doe.declared.points import Point
-from doe.declared.pours import ModelPours, Pour
+from doe.declared.pours import ModelPours, PointPour
 from doe.diagnose.confirm import confirm
 from doe.diagnose.levels import whitened_shift
-from doe.diagnose.result import Model
+from doe.diagnose.result import CalibratedModel
 from doe.measurement import summary_names
 from doe.measurement.features import feature_set
 from doe.store import Store
@@ -51,7 +51,7 @@ def test_two_models_are_confirmed_by_pours_of_their_own(poured):
     pours, jobs = poured
     width = len(read_laboratory(TREFOILS).readings) - 1
     for asked in ((0.5,), (0.6, 0.5)):
-        found = confirm([Model((friction,)) for friction in asked], pours, 3, [width])
+        found = confirm([CalibratedModel((friction,)) for friction in asked], pours, 3, [width])
         assert [one.blocks[0].tolist() for one in found] == [[[friction] * width] * 3 for friction in asked]
     # The last asks for what the first has poured.
     assert len(jobs) == 6
@@ -96,9 +96,9 @@ def test_a_point_that_is_asked_for_twice_is_poured_once(poured):
 
 
 def test_an_effect_under_which_no_pour_ends_is_infinitely_far():
-    declared = Declared((), (), (Condition("one", ("a", "b")),))
-    centre = [(Pour(tuple(row), "measured"),) for row in np.random.default_rng(0).normal(size=(8, 2))]
-    for moved in (Pour((math.nan, 1.0), "measured"), Pour((1.0, 1.0), "jammed")):
+    declared = Declared((), (), (DeclaredCondition("one", ("a", "b")),))
+    centre = [(PointPour(tuple(row), "measured"),) for row in np.random.default_rng(0).normal(size=(8, 2))]
+    for moved in (PointPour((math.nan, 1.0), "measured"), PointPour((1.0, 1.0), "jammed")):
         assert whitened_shift(declared, centre, [(moved,)]) == math.inf
 
 
@@ -136,9 +136,9 @@ def test_a_turned_rig_sees_a_tilt_the_other_way_and_a_displaced_funnel_as_before
 
 
 def test_a_possible_addition_has_the_seeds_of_its_place_in_the_data():
-    """Wherever it stands in the menu, its pours are found again once it is measured."""
+    """Wherever it stands among the candidates, its pours are found again once it is measured."""
     first, second = read_laboratory(TREFOILS).declared.fit
     point = Point("base", 3, (0.5,))
-    menu = ModelPours([first, second], [FRICTION], None, None, place=2)
+    candidates = ModelPours([first, second], [FRICTION], None, None, place=2)
     data = ModelPours([first, first, second], [FRICTION], None, None)
-    assert menu.seed(point, 0) == menu.seed(point, 1) == data.seed(point, 2)
+    assert candidates.seed(point, 0) == candidates.seed(point, 1) == data.seed(point, 2)

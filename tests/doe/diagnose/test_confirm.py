@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from doe.diagnose.confirm import Confirmed, confirming, residual_maps
-from doe.diagnose.result import Model
+from doe.diagnose.result import CalibratedModel
 from doe.measurement import load_measurement
 from doe.measurement.piles import PileSurface
 from doe.measurement.residual_map import LEAST_ERROR, height_difference
@@ -51,7 +51,7 @@ def test_a_pile_that_stands_elsewhere_shows_where():
             for one in points
         ]
 
-    before, after = (Confirmed(Model((), effects), (), 0) for effects in places)
+    before, after = (Confirmed(CalibratedModel((), effects), (), 0) for effects in places)
     (found,) = residual_maps(
         [condition, scanned] if not condition.surfaces else [scanned],
         before,
@@ -72,12 +72,12 @@ def test_a_pile_that_stands_elsewhere_shows_where():
 
 def test_without_scans_there_is_no_map():
     condition = replace(load_measurement(Path(measurement_folder("trefoil_1"))).fit[0], surfaces={})
-    model = Confirmed(Model(()), (), 0)
+    model = Confirmed(CalibratedModel(()), (), 0)
     assert residual_maps([condition], model, model, SimpleNamespace(records=None), 3) == ()
 
 
 def test_the_points_that_confirm_are_those_that_were_poured():
-    points = confirming(Model((1.0,), (("air_drag", (0.5,)),)), 2)
+    points = confirming(CalibratedModel((1.0,), (("air_drag", (0.5,)),)), 2)
     assert [(one.sequence, one.number, one.theta, one.effects) for one in points] == [
         ("confirm 2", k, (1.0,), (("air_drag", (0.5,)),)) for k in range(2)
     ]

@@ -14,15 +14,15 @@ import pytest
 
 from doe.declared.model import declare
 from doe.declared.points import AS_IT_IS
-from doe.declared.pours import Pour
-from doe.diagnose import diagnosis, teaching
+from doe.declared.pours import PointPour
+from doe.diagnose import diagnosis, training_pours
 from doe.diagnose.budget import LEAST, Budget, scaled_budget
-from doe.diagnose.compared import Measured
+from doe.diagnose.compared_features import MeasuredFeatures
 from doe.diagnose.confirm import CONTRADICTED
 from doe.diagnose.levels import REPLICATES, whitened_shift
-from doe.diagnose.posterior import Level as Best
-from doe.diagnose.result import Level, Model
-from doe.diagnose.teaching import Teacher
+from doe.diagnose.posterior import BestAmplitude
+from doe.diagnose.result import CalibratedModel, Level
+from doe.diagnose.training_pours import TrainingPours
 from doe.errors import StatisticsError
 from doe.measurement import load_measurement, summary_names
 from doe.measurement.features import SCAN, feature_set
@@ -104,7 +104,7 @@ class FormulaPours:
         mean = self.formula(theta, acting(point), condition.name, width)
         # No surface can be read off a formula.
         surface = (math.nan,) * (feature_set(condition).offered(SCAN) - width)
-        return Pour(tuple(mean + noise(text, width)), "measured", (), surface)
+        return PointPour(tuple(mean + noise(text, width)), "measured", (), surface)
 
 
 @pytest.fixture
@@ -127,7 +127,9 @@ def measure(monkeypatch, effects, seed, formula=expected, held_out=None):
 
     def measured(condition, offer=None):
         names = summary_names(condition)
-        return Measured(condition.name, "scalars", names, replicates(condition), np.zeros(len(names)), 1, len(names))
+        return MeasuredFeatures(
+            condition.name, "scalars", names, replicates(condition), np.zeros(len(names)), 1, len(names)
+        )
 
     monkeypatch.setattr(diagnosis, "measured", measured)
     monkeypatch.setattr(diagnosis, "complete_rows", replicates)
@@ -284,23 +286,23 @@ def test_a_closer_look_pours_the_base_model_too(measurement, monkeypatch):
 
 def test_closer_looks_pour_both_sides_of_a_best_fit(measurement):
     declared = declare(measurement, NAMES)
-    teacher = Teacher(declared, measurement.fit, FormulaPours(measurement.fit, [], None, None), BUDGET, str)
-    way = next(k for k, one in enumerate(teacher.ways) if one.name == "rolling_resistance")
+    training = TrainingPours(declared, measurement.fit, FormulaPours(measurement.fit, [], None, None), BUDGET, str)
+    way = next(k for k, one in enumerate(training.ways) if one.name == "rolling_resistance")
     base = SimpleNamespace(log_evidence=0.0)
     # At 0.8 of its level: nearer to all of it than to half.
     found = SimpleNamespace(
-        effects={"rolling_resistance": 0.5}, levels=[Best(way, 0.8, 3.0)], fits={"base": base}, nothing=0.5
+        effects={"rolling_resistance": 0.5}, levels=[BestAmplitude(way, 0.8, 3.0)], fits={"base": base}, nothing=0.5
     )
 
     def poured():
-        lessons = teacher.lessons()
+        lessons = training.lessons()
         amplitudes = lessons.amplitude[lessons.way == way]
         return int((amplitudes == 1.0).sum()), int((amplitudes == 0.5).sum())
 
     screened = poured()
-    assert teacher.look(found) == ("rolling_resistance",)
+    assert training.look(found) == ("rolling_resistance",)
     assert poured() == (screened[0] + BUDGET.more, screened[1])
-    teacher.look(found)
+    training.look(found)
     assert poured() == (screened[0] + BUDGET.more, screened[1] + BUDGET.more)
 
 
@@ -325,7 +327,7 @@ def test_symmetries_cost_no_pours(measurement, monkeypatch):
 def test_a_model_that_never_ends_well_is_refused(measurement, monkeypatch):
     class Jammed(FormulaPours):
         def pour(self, point, condition):
-            return Pour((math.nan,) * len(summary_names(condition)), "jammed")
+            return PointPour((math.nan,) * len(summary_names(condition)), "jammed")
 
     monkeypatch.setattr(diagnosis, "ModelPours", Jammed)
     measure(monkeypatch, (), 1)
@@ -361,7 +363,7 @@ def test_whitened_shift_is_the_distance_in_standard_errors(measurement):
 
     def pours(number, mean):
         rows = rng.normal(size=(number, width))
-        return [[Pour(tuple(mean + row), "measured")] * len(declared.conditions) for row in rows]
+        return [[PointPour(tuple(mean + row), "measured")] * len(declared.conditions) for row in rows]
 
     found = whitened_shift(declared, pours(4000, 0.0), pours(4000, step))
     # Sampling error of 4000 pours: 2 %; the covariance is the unit matrix, shrunk or not.
@@ -372,12 +374,14 @@ def test_whitened_shift_is_the_distance_in_standard_errors(measurement):
 def test_the_teacher_says_what_every_effect_was_poured_at(measurement):
     said = []
     declared = declare(measurement, NAMES)
-    teacher = Teacher(declared, measurement.fit, FormulaPours(measurement.fit, [], None, None), BUDGET, said.append)
-    assert len(teacher.ways) == 1 + 1 + 2 + 4 + 4
+    training = TrainingPours(
+        declared, measurement.fit, FormulaPours(measurement.fit, [], None, None), BUDGET, said.append
+    )
+    assert len(training.ways) == 1 + 1 + 2 + 4 + 4
     assert any(line.startswith("rolling_resistance: up to") for line in said)
-    lessons = teacher.lessons()
+    lessons = training.lessons()
     assert lessons.theta.shape[1] == 3
-    assert set(lessons.way.tolist()) == set(range(-1, len(teacher.ways)))
+    assert set(lessons.way.tolist()) == set(range(-1, len(training.ways)))
 
 
 def too_small(declared, direction, base, points, trials):
@@ -387,18 +391,18 @@ def too_small(declared, direction, base, points, trials):
 
 
 def test_what_all_pours_show_to_be_too_little_is_poured_farther_out(measurement, monkeypatch):
-    monkeypatch.setattr(teaching, "level_of", too_small)
+    monkeypatch.setattr(training_pours, "level_of", too_small)
     declared = declare(measurement, NAMES)
-    teacher = Teacher(declared, measurement.fit, FormulaPours(measurement.fit, [], None, None), BUDGET, str)
-    for level in teacher.levels:
+    training = TrainingPours(declared, measurement.fit, FormulaPours(measurement.fit, [], None, None), BUDGET, str)
+    for level in training.levels:
         # Full amplitudes shift by 22 standard errors in each condition.
         full = 22.0 * math.sqrt(len(measurement.fit))
         assert level.share > 0.2
         # By four pours a shift is known to √(6/4 + 6/24) = 1.3 along itself.
         assert level.shift == pytest.approx(full * level.share, abs=4.0)
     # What had been poured before teaches at its own multiple of the new level.
-    lessons = teacher.lessons()
-    for number, (way, level) in enumerate(zip(teacher.ways, teacher.levels, strict=True)):
+    lessons = training.lessons()
+    for number, (way, level) in enumerate(zip(training.ways, training.levels, strict=True)):
         assert way.unit == level.direction.at(level.share)
         multiples = set(lessons.amplitude[lessons.way == number])
         assert 1.0 in multiples
@@ -407,7 +411,7 @@ def test_what_all_pours_show_to_be_too_little_is_poured_farther_out(measurement,
 
 
 def test_pours_that_break_off_farther_out_keep_a_level_below(measurement, monkeypatch):
-    monkeypatch.setattr(teaching, "level_of", too_small)
+    monkeypatch.setattr(training_pours, "level_of", too_small)
     whole = FormulaPours.pour
 
     def broken(self, point, condition):
@@ -419,10 +423,10 @@ def test_pours_that_break_off_farther_out_keep_a_level_below(measurement, monkey
 
     monkeypatch.setattr(FormulaPours, "pour", broken)
     declared = declare(measurement, NAMES)
-    teacher = Teacher(declared, measurement.fit, FormulaPours(measurement.fit, [], None, None), BUDGET, str)
-    level = next(one for one in teacher.levels if one.direction.effect == "rolling_resistance")
+    training = TrainingPours(declared, measurement.fit, FormulaPours(measurement.fit, [], None, None), BUDGET, str)
+    level = next(one for one in training.levels if one.direction.effect == "rolling_resistance")
     assert 0.05 <= level.share <= 0.12
-    assert max(one.share for one in teacher.levels) > 0.1
+    assert max(one.share for one in training.levels) > 0.1
 
 
 def test_ranges_fit_the_set_up(measurement):
@@ -439,7 +443,7 @@ def test_the_box_is_three_deviations_about_a_measured_mean(measurement):
 
 def test_data_without_a_readable_replicate_have_no_error_row(measurement):
     widths = [len(summary_names(condition)) for condition in measurement.conditions]
-    model = Model((0.5,) * 3)
+    model = CalibratedModel((0.5,) * 3)
     confirmed = diagnosis.Confirmed(model, tuple(np.zeros((0, width)) for width in widths), 12)
     conclusion = diagnosis.Conclusion(confirmed, confirmed, None)
     assert diagnosis.errors_of(measurement.conditions, "holdout", conclusion) == ()

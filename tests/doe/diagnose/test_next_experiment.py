@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from doe.diagnose.next_experiment import DRAWS, SURE, MenuItem, Prediction, chance_of_an_answer, rank_experiments
+from doe.diagnose.next_experiment import (
+    DRAWS,
+    SURE,
+    CandidateExperiment,
+    Prediction,
+    chance_of_an_answer,
+    rank_experiments,
+)
 from doe.diagnose.posterior import TEMPERATURE
 from doe.errors import StatisticsError
 
@@ -15,7 +22,7 @@ WEIGHTS = {"a": 0.5, "b": 0.5}
 
 def item(gap, own=0.0, name="x", d=1):
     zero, wide = np.zeros(d), own * np.eye(d)
-    return MenuItem(name, {"a": Prediction(zero, wide), "b": Prediction(zero + gap, wide)}, np.eye(d))
+    return CandidateExperiment(name, {"a": Prediction(zero, wide), "b": Prediction(zero + gap, wide)}, np.eye(d))
 
 
 @pytest.mark.parametrize(("gap", "pours", "own"), [(0.5, 6, 0.0), (1.0, 6, 0.0), (1.0, 12, 0.0), (1.0, 6, 0.1)])
@@ -33,15 +40,20 @@ def test_a_likely_answer_needs_less():
     assert near > chance_of_an_answer(item(1.0), WEIGHTS, 6)
 
 
-def test_the_menu_is_ranked_and_set_ups_that_say_nothing_come_last():
-    menu = [item(0.0, name="same"), item(3.0, name="apart"), item(3.0, own=9.0, name="vague"), item(1.0, name="near")]
-    found = rank_experiments(menu, WEIGHTS, replicates=6)
+def test_the_candidates_are_ranked_and_set_ups_that_say_nothing_come_last():
+    candidates = [
+        item(0.0, name="same"),
+        item(3.0, name="apart"),
+        item(3.0, own=9.0, name="vague"),
+        item(1.0, name="near"),
+    ]
+    found = rank_experiments(candidates, WEIGHTS, replicates=6)
     assert [row.name for row in found] == ["apart", "near", "vague", "same"]
     assert found[0].separation == pytest.approx(3.0)
     assert found[-1].chance == 0.0
 
 
-def test_bad_menus_are_refused():
+def test_bad_candidates_are_refused():
     with pytest.raises(StatisticsError, match="at least 2"):
         rank_experiments([item(1.0)], {"a": 1.0}, 6)
     with pytest.raises(StatisticsError, match="no prediction by c"):

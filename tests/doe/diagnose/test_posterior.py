@@ -23,9 +23,9 @@ from doe.diagnose.emulator import (
 )
 from doe.diagnose.posterior import BEYOND, FITS, NOTHING, OUTSIDE, PAIRS, SPREADS, Data, log_t, multiples, posterior
 from doe.errors import StatisticsError
-from doe.validation.limit import RISKS, Kind
-from doe.validation.replay import NULLS, Teaching, Truth, replay
-from tests.doe.validation.test_ruler import D, sample_of, unit
+from doe.validation.limit import RISKS, DataKind
+from doe.validation.replay import NULLS, PlantedTruth, Teaching, replay
+from tests.doe.validation.test_limit_ruler import D, sample_of, unit
 
 SIZE = 2 * D
 UNSQUASHED = Squash(np.zeros(D), np.full(D, 1e9))
@@ -381,7 +381,7 @@ def test_a_rare_large_count_is_drawn_in():
 
 
 def truths(kinds):
-    return [Truth(kind, "weak", 4.9) for kind in kinds]
+    return [PlantedTruth(kind, "weak", 4.9) for kind in kinds]
 
 
 @pytest.mark.parametrize("teaching", [Teaching(8, 0), Teaching(4, 12)])
@@ -389,7 +389,7 @@ def test_a_replay_names_what_is_far_apart_and_nothing_where_nothing_is(teaching)
     """Two effects of 4 pours' deviations at right angles; data have half of it, 2 √6 = 4.9 σ."""
     shifts = {"a strong": 4.0 * unit(0), "a weak": 2.0 * unit(0), "b strong": 4.0 * unit(7), "b weak": 2.0 * unit(7)}
     sample = sample_of(np.random.default_rng(1), shifts)
-    kinds = [Kind(name, name, False) for name in "ab"]
+    kinds = [DataKind(name, name, False) for name in "ab"]
     (found,) = replay("scan", sample, kinds, [truths(kinds)], teaching, 10, np.random.default_rng(0))
     assert (found.sets, found.nulls) == (20, 10 * NULLS)
     assert found.right == 1.0
@@ -402,7 +402,7 @@ def test_a_replay_names_what_is_far_apart_and_nothing_where_nothing_is(teaching)
 def test_a_replay_of_effects_that_are_alike_is_a_guess():
     shifts = {f"{name} {size}": length * unit(0) for name in "ab" for size, length in (("strong", 4.0), ("weak", 2.0))}
     sample = sample_of(np.random.default_rng(1), shifts)
-    kinds = [Kind(name, name, False) for name in "ab"]
+    kinds = [DataKind(name, name, False) for name in "ab"]
     (found,) = replay("scan", sample, kinds, [truths(kinds)], Teaching(8, 0), 40, np.random.default_rng(0))
     assert 0.2 < found.right < 0.8
     assert found.named[RISKS.index(0.01)] < 0.2
@@ -415,7 +415,7 @@ def test_a_feature_that_hardly_ever_varies_does_not_spoil_the_answer():
     for blocks in sample.pours.values():
         blocks[0][:, 3] = 0.0
     sample.pours["base"][0][::40, 3] = 1.0
-    kinds = [Kind("a", "a", False)]
+    kinds = [DataKind("a", "a", False)]
     (found,) = replay("scan", sample, kinds, [truths(kinds)], Teaching(8, 0), 20, np.random.default_rng(0))
     assert found.named == (1.0,) * len(RISKS)
 

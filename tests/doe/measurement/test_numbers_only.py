@@ -5,7 +5,7 @@ import shutil
 import numpy as np
 
 from doe.declared.model import declare
-from doe.diagnose.compared import measured
+from doe.diagnose.compared_features import measured
 from doe.diagnose.diagnosis import complete_rows
 from doe.measurement import load_measurement
 from doe.validation.laboratory import TREFOILS, read_laboratory

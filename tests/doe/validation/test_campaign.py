@@ -16,7 +16,7 @@ from doe.measurement import load_measurement
 from doe.store import Store
 from doe.validation.campaign import Answers, CampaignOrder, run_campaign
 from doe.validation.laboratory import read_laboratory
-from doe.validation.limit import Kind, Reached, Strength
+from doe.validation.limit import DataKind, Reached, Strength
 from doe.validation.truth import Case, strengths_of, truth_of
 from doe.validation.work_place import WorkPlace
 from tests.doe.validation.disguise import disguise
@@ -34,7 +34,7 @@ CASES = (
 
 def strengths(declared: Declared):
     """Nobody has measured the small model: an amplitude that is strong by all experience."""
-    found = (Reached(Kind(EFFECTS[0], EFFECTS[0], False), (0.3,), Strength(12.0, 0.5), Strength(6.0, 0.5), {}),)
+    found = (Reached(DataKind(EFFECTS[0], EFFECTS[0], False), (0.3,), Strength(12.0, 0.5), Strength(6.0, 0.5), {}),)
     return dataclasses.replace(strengths_of(found, declared, {}), declared=declared)
 
 

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from doe.declared.model import Condition, Declared, Effect, Parameter
+from doe.declared.model import CalibratedParameter, CandidateEffect, Declared, DeclaredCondition
 from doe.declared.points import Direction, base_points, effect_points
-from doe.declared.pours import Pour
+from doe.declared.pours import PointPour
 from doe.diagnose.levels import STRONG, Trials, level_of
 from doe.diagnose.result import Level
 from doe.validation.limit import (
     RISK,
     RISKS,
-    Kind,
+    DataKind,
     Signatures,
     Strength,
     alike,
@@ -23,7 +23,7 @@ from doe.validation.limit import (
     limit_study,
     nearest_correlation,
 )
-from tests.doe.validation.test_ruler import sample_of, unit
+from tests.doe.validation.test_limit_ruler import sample_of, unit
 
 SETS = 20_000
 
@@ -34,7 +34,7 @@ def two(cosine, gain=1.0):
     return Signatures(names, ruler, (Strength(10.0 * gain, 0.1),) * 2, np.array([[1.0, cosine], [cosine, 1.0]]))
 
 
-KINDS = [Kind("a", "a", False), Kind("b", "b", False)]
+KINDS = [DataKind("a", "a", False), DataKind("b", "b", False)]
 
 
 def limit(found, strength, kinds=KINDS):
@@ -91,7 +91,7 @@ def test_an_effect_that_the_ruler_does_not_see_takes_no_part():
 
 def test_two_directions_of_one_effect_are_one_name():
     """However alike: taking one for the other is no error."""
-    kinds = [Kind("tilt", "tilt x", True), Kind("tilt", "tilt y", True)]
+    kinds = [DataKind("tilt", "tilt x", True), DataKind("tilt", "tilt y", True)]
     assert limit(two(0.99), 4.0, kinds).right == 1.0
 
 
@@ -138,15 +138,15 @@ def test_a_study_of_made_up_pours():
 def test_the_amplitude_is_sought_that_shifts_by_as_much_as_wanted():
     """A made-up effect shifts a feature by ten pours' deviations at its full range: the search ends near ``STRONG``."""
     declared = Declared(
-        (Parameter("friction", 0.1, 0.9, 0.5, 0.05),),
-        (Effect("push", (0.0,), (2.0,)),),
-        (Condition("low", ("height", "width")),),
+        (CalibratedParameter("friction", 0.1, 0.9, 0.5, 0.05),),
+        (CandidateEffect("push", (0.0,), (2.0,)),),
+        (DeclaredCondition("low", ("height", "width")),),
     )
     rng = np.random.default_rng(4)
 
     def poured(points):
         share = [dict(point.effects).get("push", (0.0,))[0] / 2.0 for point in points]
-        return [[Pour((15.0 * s + rng.standard_normal(), rng.standard_normal()), "at_rest")] for s in share]
+        return [[PointPour((15.0 * s + rng.standard_normal(), rng.standard_normal()), "at_rest")] for s in share]
 
     base = poured(base_points(declared, 48))
     direction = Direction("push", "push", (2.0,))

@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from doe.declared.model import Condition, Declared, Effect, Parameter
+from doe.declared.model import CalibratedParameter, CandidateEffect, Declared, DeclaredCondition
 from doe.declared.points import Direction
-from doe.declared.pours import Pour
+from doe.declared.pours import PointPour
 from doe.diagnose.result import Level
 from doe.errors import StatisticsError
 from doe.validation.reference import (
@@ -21,9 +21,13 @@ from doe.validation.reference import (
 )
 
 DECLARED = Declared(
-    (Parameter("friction", 0.1, 0.9, 0.5, 0.05), Parameter("restitution", 0.2, 0.8)),
-    (Effect("push", (0.0,), (2.0,)), Effect("density", (-0.3,), (0.3,)), Effect("tilt", (-5.0, -5.0), (5.0, 5.0))),
-    (Condition("low", ("height",)), Condition("high", ("height", "width"))),
+    (CalibratedParameter("friction", 0.1, 0.9, 0.5, 0.05), CalibratedParameter("restitution", 0.2, 0.8)),
+    (
+        CandidateEffect("push", (0.0,), (2.0,)),
+        CandidateEffect("density", (-0.3,), (0.3,)),
+        CandidateEffect("tilt", (-5.0, -5.0), (5.0, 5.0)),
+    ),
+    (DeclaredCondition("low", ("height",)), DeclaredCondition("high", ("height", "width"))),
 )
 LEVELS = tuple(Level(direction, 0.5, 12.0) for effect in DECLARED.effects for direction in reference_directions(effect))
 NOTHING = Reference("made up", 2, 2, (("height", "area"), ("height", "width", "area")), LEVELS)
@@ -44,7 +48,7 @@ class Poured:
         size = sum(point.theta) + sum(sum(amplitude) for _, amplitude in point.effects)
         summaries = (size, point.number * 1.1)[: condition + 1]
         surface = (np.nan if point.number % 11 == 10 else 0.1 * size,)
-        return Pour(summaries, "jammed" if point.number % 7 == 6 else "measured", surface=surface)
+        return PointPour(summaries, "jammed" if point.number % 7 == 6 else "measured", surface=surface)
 
 
 def rounds(number, pours=None):

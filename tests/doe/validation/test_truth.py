@@ -5,24 +5,24 @@ import math
 import numpy as np
 import pytest
 
-from doe.declared.model import Condition, Declared, Effect, Parameter
-from doe.validation.limit import Kind, Reached, Strength
+from doe.declared.model import CalibratedParameter, CandidateEffect, Declared, DeclaredCondition
+from doe.validation.limit import DataKind, Reached, Strength
 from doe.validation.truth import Case, strengths_of, truth_of
 
 DECLARED = Declared(
-    (Parameter("friction", 0.4, 0.7, 0.5, 0.05), Parameter("restitution", 0.2, 0.8)),
+    (CalibratedParameter("friction", 0.4, 0.7, 0.5, 0.05), CalibratedParameter("restitution", 0.2, 0.8)),
     (
-        Effect("push", (0.0,), (2.0,)),
-        Effect("density", (-0.3,), (0.3,)),
-        Effect("tilt", (-5.0, -5.0), (5.0, 5.0)),
-        Effect("hidden", (0.0,), (1.0,)),
+        CandidateEffect("push", (0.0,), (2.0,)),
+        CandidateEffect("density", (-0.3,), (0.3,)),
+        CandidateEffect("tilt", (-5.0, -5.0), (5.0, 5.0)),
+        CandidateEffect("hidden", (0.0,), (1.0,)),
     ),
-    (Condition("low", ("height",)),),
+    (DeclaredCondition("low", ("height",)),),
 )
 
 
 def reached(effect, name, amplitude, ruler, weak=None):
-    kind = Kind(effect, name, len(amplitude) == 2)
+    kind = DataKind(effect, name, len(amplitude) == 2)
     return Reached(kind, amplitude, Strength(ruler, 0.3), None if weak is None else Strength(weak, 0.3), {})
 
 

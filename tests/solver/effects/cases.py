@@ -5,13 +5,13 @@ import dataclasses
 import numpy as np
 
 from solver.effects import EFFECTS, Effect, body_effects, contact_effects
-from solver.engine.tables import layout
+from solver.engine.tables import body_tables
 from solver.engine.world import SUMMARY_COLUMNS, Batch
-from solver.rigs.surface import Plane, Pose
+from solver.rigs.surface import Plane, SurfacePose
 from solver.scenes.body import Body, Members
 from solver.scenes.material import Pair
 from solver.scenes.time_step import time_step
-from solver.single_body.laboratory import FREE, GRAIN, RADIUS, ROOM, UPRIGHT, WALL, Laboratory, scene_of, sphere
+from solver.single_body.free_world import FREE, GRAIN, RADIUS, ROOM, UPRIGHT, WALL, FreeWorld, scene_of, sphere
 
 ROOM_WITH_EFFECTS = dataclasses.replace(ROOM, effects=True)
 """That of a laboratory with an effect on."""
@@ -69,7 +69,7 @@ def scene_with(
 ):
     """Bodies of the material "grain" over a plane through the origin, which ``turn`` (wxyz) turns; with ``effects``."""
     pairs = (Pair("grain", "grain", friction, restitution), Pair("grain", "wall", friction, restitution))
-    plane = Plane("wall", Pose((0.0, 0.0, 0.0), tuple(float(x) for x in turn)))
+    plane = Plane("wall", SurfacePose((0.0, 0.0, 0.0), tuple(float(x) for x in turn)))
     scene = scene_of(bodies or (sphere(material=grain),), (grain, WALL), pairs, (plane,), tuple(map(float, gravity)))
     scene = dataclasses.replace(scene, numerics=dataclasses.replace(scene.numerics, sleep_speed=sleep_speed))
     return with_effects(scene, *effects)
@@ -103,7 +103,7 @@ def crowd(capacity, scene, n=24, w=0):
 
 def fill(batch, scene, w, n=24):
     """The same in a batch that is there."""
-    batch.load(w, scene, layout(scene, np.zeros(n, dtype=np.int32)), time_step(scene), (True,))
+    batch.load(w, scene, body_tables(scene, np.zeros(n, dtype=np.int32)), time_step(scene), (True,))
     rng = np.random.default_rng(3)
     for b in range(n):
         place = RADIUS * np.array([2.1 * (b % 3 - 1), 2.1 * (b // 3 % 3 - 1), 1.1 + 2.1 * (b // 9)])
@@ -123,7 +123,7 @@ def tumble(scene, dt=None, scale=(1.0, 1.0), turn=NOT_TURNED, quaternion=UPRIGHT
     ``scale`` multiplies lengths and times, ``turn`` turns all of it (``quaternion``: the same rotation).
     """
     length, time = scale
-    lab = Laboratory(scene, 3, dt=dt)
+    lab = FreeWorld(scene, 3, dt=dt)
     places = RADIUS * np.array([[0.0, 0.0, 1.1], [8.0, 0.0, 1.001], [0.7, 0.3, 3.4]])
     velocities = np.array([[0.1, 0.05, -0.3], [0.2, 0.0, 0.0], [0.0, 0.0, -0.4]])
     spins = np.array([[3.0, -8.0, 20.0], [0.0, 0.2 / RADIUS, 10.0], [-5.0, 4.0, 9.0]])

@@ -9,7 +9,7 @@ from solver.engine.state import Vec3
 from solver.engine.tables import outline
 from solver.scenes.body import Body, Members
 from solver.scenes.material import Material
-from solver.single_body.laboratory import EARTH, RADIUS, Laboratory, sphere
+from solver.single_body.free_world import EARTH, RADIUS, FreeWorld, sphere
 from tests.solver.effects.cases import felt, scene_with
 
 pytestmark = pytest.mark.usefixtures("taichi")
@@ -89,7 +89,7 @@ def test_the_area_that_an_ellipsoid_shows():
 
 def test_terminal_speed_of_a_sphere():
     """v = √(4/3 (ρ/ρ_air) D g/C_D(Re)) by iteration, without buoyancy, which is not in the model."""
-    lab = Laboratory(
+    lab = FreeWorld(
         scene_with(felt("air_drag", strength=1.0), bodies=(sphere(material=FOAM),), grain=FOAM, gravity=EARTH),
         1,
         dt=1e-3,
@@ -116,7 +116,7 @@ def test_a_flake_falls_slower_flat_than_on_edge():
     )
     flake = Body("grain", "grain", 1.0, spheres, 400.0)
     assert outline(flake)[:3] == pytest.approx(axes)
-    lab = Laboratory(scene_with(felt("air_drag", strength=1.0), bodies=(flake,)), 2, dt=1e-3, plate=False)
+    lab = FreeWorld(scene_with(felt("air_drag", strength=1.0), bodies=(flake,)), 2, dt=1e-3, plate=False)
     half = np.sqrt(0.5)
     lab.put(0, (0.0, 0.0, 0.0), velocity=(0.0, 0.0, -1.0))
     lab.put(1, (0.5, 0.0, 0.0), velocity=(0.0, 0.0, -1.0), quaternion=(half, half, 0.0, 0.0))

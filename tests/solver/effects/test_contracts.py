@@ -11,7 +11,7 @@ import pytest
 from solver.effects import EFFECTS
 from solver.params import declared
 from solver.scenes.insertion import rotation_matrix
-from solver.single_body.laboratory import EARTH, GRAIN, RADIUS, WALL, Laboratory, sphere
+from solver.single_body.free_world import EARTH, GRAIN, RADIUS, WALL, FreeWorld, sphere
 from tests.solver.effects.cases import (
     FELT,
     IN_KERNELS,
@@ -139,7 +139,7 @@ def pair_of_spheres(effect, friction, restitution):
     """Two unequal spheres that meet obliquely, spinning, in free space: states before and after, masses, inertias."""
     bodies = (sphere(RADIUS, name="big"), sphere(0.6 * RADIUS, name="small"))
     scene = scene_with(effect, bodies=bodies, friction=friction, restitution=restitution)
-    lab = Laboratory(scene, (0, 1), fraction=0.02, plate=False)
+    lab = FreeWorld(scene, (0, 1), fraction=0.02, plate=False)
     lab.put(0, (0, 0, 0), velocity=(0.3, 0.1, 0.2), spin=(10.0, 20.0, -40.0))
     lab.put(1, (0.3 * RADIUS, 0.1 * RADIUS, 1.6 * RADIUS), velocity=(0.1, 0.0, -0.6), spin=(-30.0, 5.0, 60.0))
     before = lab.state()
@@ -200,7 +200,7 @@ def test_at_walls_only():
     _, walls, *_ = pair_of_spheres(felt("wall_adhesion", work_of_adhesion=50.0), 0.5, 0.6)
     assert np.array_equal(plain, walls)
     ceiling = scene_with(felt("wall_adhesion"), turn=(0.0, 1.0, 0.0, 0.0), gravity=EARTH, restitution=0.3)
-    lab = Laboratory(ceiling, 1)
+    lab = FreeWorld(ceiling, 1)
     lab.put(0, (0.0, 0.0, -RADIUS + 1e-6))
     lab.run(round(0.3 / lab.dt))
     assert lab.state()[0, 2] == pytest.approx(-RADIUS, abs=1e-5)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from solver.scenes.body import Body, Members
-from solver.single_body.laboratory import EARTH, GRAIN, RADIUS, Laboratory
+from solver.single_body.free_world import EARTH, GRAIN, RADIUS, FreeWorld
 from tests.solver.effects.cases import IN_KERNELS, all_felt, felt, scene_with, with_effects
 
 pytestmark = pytest.mark.usefixtures("taichi")
@@ -34,7 +34,7 @@ PLAIN = scene_with(bodies=(pin(),), gravity=EARTH)
 def poured(scene, sleep_speed=2e-3):
     """18 pins are dropped in three layers and come to rest, or nearly: samples of the account, what was put in."""
     scene = dataclasses.replace(scene, numerics=dataclasses.replace(scene.numerics, sleep_speed=sleep_speed))
-    lab = Laboratory(scene, N, fraction=0.3)
+    lab = FreeWorld(scene, N, fraction=0.3)
     rng, put_in = np.random.default_rng(4), 0.0
     for b in range(N):
         place = RADIUS * np.array([3.2 * (b % 3 - 1), 2.4 * (b // 3 % 2), 3.0 + 3.0 * (b // 6)])

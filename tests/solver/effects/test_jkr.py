@@ -7,7 +7,7 @@ from scipy.optimize import brentq
 from solver.backend import ti
 from solver.effects.jkr import grip, pulls, root
 from solver.scenes.material import effective_youngs_modulus
-from solver.single_body.laboratory import GRAIN, RADIUS, WALL, Laboratory, sphere
+from solver.single_body.free_world import GRAIN, RADIUS, WALL, FreeWorld, sphere
 from tests.solver.effects.cases import felt, heavy, scene_with
 
 pytestmark = pytest.mark.usefixtures("taichi")
@@ -79,7 +79,7 @@ def test_surfaces_part_at_three_units():
 @pytest.fixture(scope="module")
 def curve(taichi):
     """A heavy sphere goes down on the plane and up again at 1 mm/s: (overlap, force on it) of the two ways."""
-    lab = Laboratory(
+    lab = FreeWorld(
         scene_with(felt("adhesion_jkr", work_of_adhesion=WORK), bodies=(heavy(1e6),), friction=0.0, restitution=1.0),
         1,
         dt=1e-5,
@@ -127,7 +127,7 @@ def test_pull_off_force_and_where_it_parts(curve):
 
 def test_equilibrium_without_load():
     """a³ = 9 π w R²/(2 E*) where the force is zero."""
-    lab = Laboratory(scene_with(felt("adhesion_jkr", work_of_adhesion=WORK), restitution=0.2), 1)
+    lab = FreeWorld(scene_with(felt("adhesion_jkr", work_of_adhesion=WORK), restitution=0.2), 1)
     a = (9.0 * np.pi * WORK * RADIUS**2 / (2.0 * E_STAR)) ** (1.0 / 3.0)
     lab.put(0, (0.0, 0.0, RADIUS - 0.5 * overlap_of(a)))
     lab.run(round(0.2 / lab.dt))
@@ -138,7 +138,7 @@ def test_two_works_of_adhesion_on_a_wall_add_up():
     """Half by ``adhesion_jkr`` and half by ``wall_adhesion`` holds a sphere as the whole by one of them."""
     a = (9.0 * np.pi * WORK * RADIUS**2 / (2.0 * E_STAR)) ** (1.0 / 3.0)
     halves = (felt("adhesion_jkr", work_of_adhesion=0.5 * WORK), felt("wall_adhesion", work_of_adhesion=0.5 * WORK))
-    lab = Laboratory(scene_with(*halves, restitution=0.2), 1)
+    lab = FreeWorld(scene_with(*halves, restitution=0.2), 1)
     lab.put(0, (0.0, 0.0, RADIUS - 0.5 * overlap_of(a)))
     lab.run(round(0.2 / lab.dt))
     assert RADIUS - lab.state()[0, 2] == pytest.approx(overlap_of(a), rel=1e-6)
@@ -148,7 +148,7 @@ def test_two_works_of_adhesion_on_a_wall_add_up():
 def test_it_holds_a_weight_up_to_the_pull_off_force(weight, holds):
     """A sphere under a ceiling, whose weight grows slowly to a part of 3/2 π w R."""
     scene = scene_with(felt("adhesion_jkr", work_of_adhesion=WORK), turn=(0.0, 1.0, 0.0, 0.0), restitution=0.2)
-    lab = Laboratory(scene, 1)
+    lab = FreeWorld(scene, 1)
     lab.put(0, (0.0, 0.0, -RADIUS + 1e-6))
     for share in np.linspace(0.0, weight, 100):
         lab.batch.set_gravity(0, (0.0, 0.0, -share * PULL_OFF / sphere().mass))
@@ -164,7 +164,7 @@ def test_friction_under_tension():
     It spins about a horizontal axis; the torque is that limit times R until it rolls.
     """
     friction = 0.3
-    lab = Laboratory(
+    lab = FreeWorld(
         scene_with(felt("adhesion_jkr", work_of_adhesion=WORK), friction=friction, restitution=0.2), 1, fraction=0.02
     )
     a = (9.0 * np.pi * WORK * RADIUS**2 / (2.0 * E_STAR)) ** (1.0 / 3.0)

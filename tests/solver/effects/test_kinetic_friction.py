@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from solver.scenes.material import effective_youngs_modulus
-from solver.single_body.laboratory import GRAIN, RADIUS, WALL, Laboratory
+from solver.single_body.free_world import GRAIN, RADIUS, WALL, FreeWorld
 from tests.solver.effects.cases import felt, hertz_rest, scene_with, sled
 
 pytestmark = pytest.mark.usefixtures("taichi")
@@ -20,7 +20,7 @@ def down(angle):
 def on_slope(angle, speed=0.0, transition=0.01):
     effect = felt("kinetic_friction", friction_drop=DROP, transition_speed=transition)
     scene = scene_with(effect, bodies=(sled(),), friction=STATIC, restitution=0.3, gravity=down(angle))
-    lab = Laboratory(scene, 1)
+    lab = FreeWorld(scene, 1)
     foot = lab.scene.bodies[0].mass * 9.81 * np.cos(angle) / 4.0
     lab.put(0, (0.0, 0.0, RADIUS - hertz_rest(foot, effective_youngs_modulus(GRAIN, WALL))), velocity=(speed, 0, 0))
     return lab

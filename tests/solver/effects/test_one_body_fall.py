@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 from solver.effects.air_drag import AIR_DENSITY, AIR_VISCOSITY
 from solver.scenes.material import Material
-from solver.single_body.laboratory import EARTH, RADIUS, Laboratory, sphere
+from solver.single_body.free_world import EARTH, RADIUS, FreeWorld, sphere
 from tests.solver.effects.cases import felt, scene_with
 from tests.solver.effects.test_air_drag import haider_levenspiel
 
@@ -24,7 +24,7 @@ TRUE_STRENGTH = 1.3
 
 def heights(strength):
     """Fall from rest, a sample every 20 ms for 1 s."""
-    lab = Laboratory(
+    lab = FreeWorld(
         scene_with(felt("air_drag", strength=strength), bodies=(sphere(material=FOAM),), grain=FOAM, gravity=EARTH),
         1,
         dt=STEP,

@@ -10,7 +10,7 @@ from solver.pours.pour import Pour
 from solver.pours.run import capacity_for
 from solver.scenes.material_file import load_material
 from solver.scenes.scene import with_values
-from solver.single_body.laboratory import ROOM
+from solver.single_body.free_world import ROOM
 from tests.solver.effects.cases import ROOM_WITH_EFFECTS, felt, with_effects
 
 pytestmark = pytest.mark.usefixtures("taichi")
@@ -80,11 +80,11 @@ def test_switched_on_while_it_runs():
     assert pour.samples[-1] == energies
     assert pour.steps == steps
     sticky = with_effects(HEAP, felt("rolling_resistance"), felt("capillary_bridge"))
-    pour.retune(sticky)
+    pour.ramp_to(sticky)
     drive(pour, 0.4)
     assert pour.time == pytest.approx(plain.time, abs=1e-3)
     assert np.abs(pour.bodies().position - later.position).max() > 1e-4
-    pour.retune(HEAP)
+    pour.ramp_to(HEAP)
     assert pour.scene == HEAP
     drive(pour, 0.42)
 
@@ -92,7 +92,7 @@ def test_switched_on_while_it_runs():
 def test_it_cannot_be_switched_on_where_it_is_not_compiled():
     pour = drive(Pour(Batch(ROOM), 0, HEAP, 5), 0.05)
     with pytest.raises(RuntimeError, match="effects=True"):
-        pour.retune(MOIST)
+        pour.ramp_to(MOIST)
 
 
 def test_a_stiffer_contact_takes_a_shorter_step():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from solver.scenes.material import effective_youngs_modulus
-from solver.single_body.laboratory import GRAIN, RADIUS, WALL, Laboratory
+from solver.single_body.free_world import GRAIN, RADIUS, WALL, FreeWorld
 from tests.solver.effects.cases import felt, heavy, scene_with
 
 pytestmark = pytest.mark.usefixtures("taichi")
@@ -15,7 +15,7 @@ E_STAR = effective_youngs_modulus(GRAIN, WALL)
 def test_pull_by_area_rests_where_both_forces_agree():
     """4/3 E* √R δ^{3/2} = 2π k R δ at δ = (3π k √R/(2 E*))²."""
     density = 2e5
-    lab = Laboratory(scene_with(felt("adhesion_sjkr", cohesion_energy_density=density), restitution=0.2), 1)
+    lab = FreeWorld(scene_with(felt("adhesion_sjkr", cohesion_energy_density=density), restitution=0.2), 1)
     rest = (3.0 * np.pi * density * np.sqrt(RADIUS) / (2.0 * E_STAR)) ** 2
     lab.put(0, (0.0, 0.0, RADIUS - 0.7 * rest))
     lab.run(round(0.3 / lab.dt))
@@ -24,7 +24,7 @@ def test_pull_by_area_rests_where_both_forces_agree():
 
 def moved(effect, start, stop, speed, chunk, body=None, seconds_per_step=1e-5):
     """A heavy sphere moves along the normal of the plane from one gap to another: rows of (gap, force on it)."""
-    lab = Laboratory(
+    lab = FreeWorld(
         scene_with(effect, bodies=(body or heavy(1e6),), friction=0.0, restitution=1.0), 1, dt=seconds_per_step
     )
     return lab, along(lab, start, stop, speed, chunk)
@@ -89,7 +89,7 @@ def test_willetts_number_of_yade():
     """
     effect = felt("capillary_bridge", surface_tension=0.024, bridge_volume=12e-19, contact_angle=np.radians(10.0))
     bodies = (heavy(1.0, 19e-6, "small"), heavy(1.0, 32.5e-6, "big"))
-    lab = Laboratory(scene_with(effect, bodies=bodies, friction=0.0, restitution=1.0), (0, 1), dt=1e-6, plate=False)
+    lab = FreeWorld(scene_with(effect, bodies=bodies, friction=0.0, restitution=1.0), (0, 1), dt=1e-6, plate=False)
     lab.put(0, (0.0, 0.0, 0.0))
     lab.put(1, (0.0, 0.0, (19e-6 + 32.5e-6) * 0.99999), velocity=(0.0, 0.0, 1e-3))
     lab.run(249)

@@ -11,7 +11,7 @@ from solver.laws import CONTACT_LAWS, HertzMindlin
 from solver.laws.restitution import normal_damping
 from solver.scenes.contact_model import ContactModel
 from solver.scenes.material import effective_youngs_modulus
-from solver.single_body.laboratory import EARTH, GRAIN, RADIUS, WALL, Laboratory
+from solver.single_body.free_world import EARTH, GRAIN, RADIUS, WALL, FreeWorld
 from tests.solver.effects.cases import felt, heavy, hertz_rest, scene_with
 
 pytestmark = pytest.mark.usefixtures("taichi")
@@ -34,7 +34,7 @@ def rebounds(effect, speeds, restitution, law=HertzMindlin.name):
     """Restitution of spheres that hit the plane side by side at ``speeds``, without gravity."""
     scene = scene_with(effect, friction=0.0, restitution=restitution)
     # A third of the usual step: linear springs have fewer steps to a contact than Hertz's.
-    lab = Laboratory(dataclasses.replace(scene, contact=ContactModel(law=law)), len(speeds), fraction=0.03)
+    lab = FreeWorld(dataclasses.replace(scene, contact=ContactModel(law=law)), len(speeds), fraction=0.03)
     for b, speed in enumerate(speeds):
         lab.put(b, (0.05 * b, 0.0, RADIUS + 1e-6), velocity=(0.0, 0.0, -speed))
     # The slowest takes longest, t ∝ v^(−1/5): 1.3 ms at 0.1 m/s.
@@ -56,7 +56,7 @@ def test_restitution_over_speed(sensitivity, reference, law):
 
 def test_switched_on_a_contact_that_stands_keeps_its_damper():
     """A sphere that oscillates on the plane when the effect comes must not lose its damping."""
-    lab = Laboratory(scene_with(felt("air_drag", strength=1e-9), gravity=EARTH, restitution=0.3), 1)
+    lab = FreeWorld(scene_with(felt("air_drag", strength=1e-9), gravity=EARTH, restitution=0.3), 1)
     rest = hertz_rest(lab.scene.bodies[0].mass * 9.81, effective_youngs_modulus(GRAIN, WALL))
     lab.put(0, (0.0, 0.0, RADIUS - 0.5 * rest))
     lab.run(10)
@@ -79,7 +79,7 @@ def test_a_dent_is_reloaded_along_its_unloading_branch():
     scene = scene_with(
         felt("plastic_contact", plasticity=plasticity), bodies=(heavy(1e6),), friction=0.0, restitution=1.0
     )
-    lab = Laboratory(scene, 1, dt=1e-5)
+    lab = FreeWorld(scene, 1, dt=1e-5)
     stiffness = 4.0 / 3.0 * effective_youngs_modulus(GRAIN, WALL) * np.sqrt(RADIUS)
     deepest, compared = 0.0, 0
     for start, stop in ((-1e-6, 1e-5), (1e-5, 8e-6), (8e-6, 1.4e-5), (1.4e-5, -1e-6)):

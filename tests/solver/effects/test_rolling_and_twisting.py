@@ -10,7 +10,7 @@ from solver.effects.twisting import twisting_torque
 from solver.engine.state import Vec3
 from solver.laws.hertz_mindlin import tangential_damping
 from solver.scenes.material import effective_shear_modulus, effective_youngs_modulus
-from solver.single_body.laboratory import EARTH, GRAIN, RADIUS, WALL, Laboratory, sphere
+from solver.single_body.free_world import EARTH, GRAIN, RADIUS, WALL, FreeWorld, sphere
 from tests.solver.effects.cases import felt, hertz_rest, scene_with
 
 pytestmark = pytest.mark.usefixtures("taichi")
@@ -29,7 +29,7 @@ def rolling(resistance, gravity=EARTH, **more):
 @pytest.mark.parametrize("friction", [0.01, 0.1])
 def test_a_rolling_sphere_slows_by_five_sevenths_of_the_coefficient(friction):
     """m v' = −T, I ω' = T R − μ_r R m g, v = ω R, I = 2/5 m R²:  v' = −5/7 μ_r g, at two speeds side by side."""
-    lab = Laboratory(rolling(friction), 2)
+    lab = FreeWorld(rolling(friction), 2)
     for b, speed in enumerate((0.3, 0.5)):
         lab.put(b, (0.0, 0.1 * b, RADIUS - REST), velocity=(speed, 0, 0), spin=(0, speed / RADIUS, 0))
     lab.run(round(0.05 / lab.dt))
@@ -41,7 +41,7 @@ def test_a_rolling_sphere_slows_by_five_sevenths_of_the_coefficient(friction):
 
 
 def test_a_sphere_stops_and_stays():
-    lab = Laboratory(rolling(0.2), 1)
+    lab = FreeWorld(rolling(0.2), 1)
     lab.put(0, (0.0, 0.0, RADIUS - REST), velocity=(0.1, 0, 0), spin=(0, 0.1 / RADIUS, 0))
     lab.run(round(0.5 / lab.dt))
     there = lab.state()[0, 0]
@@ -57,7 +57,7 @@ def test_on_a_slope_it_holds_below_the_angle_of_rolling_friction(share):
     """v' = 5/7 g (sin α − μ_r cos α) above tan⁻¹ μ_r."""
     friction = 0.2
     angle = np.arctan(share * friction)
-    lab = Laboratory(rolling(friction, gravity=(9.81 * np.sin(angle), 0.0, -9.81 * np.cos(angle))), 1)
+    lab = FreeWorld(rolling(friction, gravity=(9.81 * np.sin(angle), 0.0, -9.81 * np.cos(angle))), 1)
     lab.put(0, (0.0, 0.0, RADIUS - REST))
     lab.run(round(0.1 / lab.dt))
     first = lab.state()[0].copy()
@@ -79,7 +79,7 @@ def test_between_two_spheres_the_torque_is_on_the_reduced_radius():
     """
     friction = 0.1
     # The lower one rests on the plane, so F_n between the two is the weight of the upper one.
-    lab = Laboratory(rolling(friction, friction=0.0), 2, fraction=0.05)
+    lab = FreeWorld(rolling(friction, friction=0.0), 2, fraction=0.05)
     e_star = effective_youngs_modulus(GRAIN, GRAIN)
     between = hertz_rest(MASS * 9.81, e_star, RADIUS / 2.0)
     lower = RADIUS - hertz_rest(2.0 * MASS * 9.81, effective_youngs_modulus(GRAIN, WALL))
@@ -97,7 +97,7 @@ def test_between_two_spheres_the_torque_is_on_the_reduced_radius():
 @pytest.mark.parametrize("strength", [1.0, 10.0])
 def test_a_spinning_sphere_slows_by_two_thirds_of_the_contact_radius(strength):
     """Torque ⅔ a μ F_n s about the normal."""
-    lab = Laboratory(scene_with(felt("twisting", strength=strength), gravity=EARTH, friction=0.4), 1)
+    lab = FreeWorld(scene_with(felt("twisting", strength=strength), gravity=EARTH, friction=0.4), 1)
     lab.put(0, (0.0, 0.0, RADIUS - REST), spin=(0.0, 0.0, 50.0))
     lab.run(round(0.05 / lab.dt))
     first = lab.state()[0, 12]
@@ -113,7 +113,7 @@ def test_a_small_twist_swings_and_dies_down():
     """A damped oscillator: ω² = 4 G* a³ s/I, decay ½ · ½ η_t a² s/I with the tangential dashpot η_t."""
     strength, first = 5.0, 0.05
     scene = scene_with(felt("twisting", strength=strength), gravity=EARTH, restitution=0.3)
-    lab = Laboratory(scene, 1)
+    lab = FreeWorld(scene, 1)
     lab.put(0, (0.0, 0.0, RADIUS - REST), spin=(0.0, 0.0, first))
     a, inertia = np.sqrt(RADIUS * REST), 0.4 * MASS * RADIUS**2
     g_star = effective_shear_modulus(GRAIN, WALL)

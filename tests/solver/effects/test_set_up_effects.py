@@ -11,7 +11,7 @@ from solver.scenes.material import Pair, effective_youngs_modulus
 from solver.scenes.material_file import load_material
 from solver.scenes.scene import actual, body_counts, poured_mass, with_values
 from solver.shapes.solid import Solid
-from solver.single_body.laboratory import EARTH, GRAIN, PLATE, RADIUS, WALL, Laboratory, scene_of
+from solver.single_body.free_world import EARTH, GRAIN, PLATE, RADIUS, WALL, FreeWorld, scene_of
 from tests.solver.effects.cases import ROOM, felt, hertz_rest, scene_with, sled, with_effects
 
 SCENE = load_material("sunflower_extract")
@@ -122,7 +122,7 @@ def test_on_a_tilted_plate_a_body_slides_beyond_the_angle_of_friction(factor, sl
     x, y = tilt * np.cos(0.7), tilt * np.sin(0.7)
     tilted = felt("plate_tilt", tilt_x=x, tilt_y=y)
     scene = scene_with(tilted, bodies=(sled(),), friction=friction, restitution=0.3, gravity=EARTH)
-    lab = Laboratory(scene, 1)
+    lab = FreeWorld(scene, 1)
     e_star = effective_youngs_modulus(GRAIN, WALL)
     lab.put(0, (0.0, 0.0, RADIUS - hertz_rest(scene.bodies[0].mass * 9.81 / 4.0, e_star)))
     lab.run(round(0.1 / lab.dt))

@@ -9,7 +9,7 @@ import pytest
 from solver.effects.columns import COUPLE, HERTZ, MEMORY
 from solver.engine.kernels.neighbours import MOST
 from solver.scenes.time_step import time_step
-from solver.single_body.laboratory import EARTH, RADIUS, ROOM, Laboratory
+from solver.single_body.free_world import EARTH, RADIUS, ROOM, FreeWorld
 from tests.solver.effects.cases import (
     ROOM_WITH_EFFECTS,
     THREE_WORLDS,
@@ -160,7 +160,7 @@ def test_a_pile_that_sticks_and_does_not_roll_falls_asleep_and_stands():
 
 def test_a_sleeper_that_hangs_by_a_pull_is_held_and_falls_when_it_ends():
     scene = scene_with(felt("adhesion_jkr"), turn=(0.0, 1.0, 0.0, 0.0), **SLEEPY)
-    lab = Laboratory(scene, 1)
+    lab = FreeWorld(scene, 1)
     lab.put(0, (0.0, 0.0, -RADIUS + 1e-6))
     assert lab.run(round(0.3 / lab.dt))["asleep"] == 1
     there = lab.state()[0, 2]
@@ -176,7 +176,7 @@ def test_a_sleeper_that_hangs_by_a_pull_is_held_and_falls_when_it_ends():
 def test_a_sleeper_wakes_when_what_sticks_to_it_is_pulled_away():
     """A sphere stands on another that sleeps; it is lifted, and the pull wakes the other."""
     scene = scene_with(felt("adhesion_jkr", work_of_adhesion=5.0), **SLEEPY)
-    lab = Laboratory(scene, 2)
+    lab = FreeWorld(scene, 2)
     lab.put(0, (0.0, 0.0, RADIUS))
     lab.put(1, (0.0, 0.0, 3.0 * RADIUS))
     assert lab.run(round(0.4 / lab.dt))["asleep"] == 2

@@ -25,7 +25,7 @@ import trimesh
 
 from solver.assets import measurement_folder
 from solver.effects import EFFECTS, set_up_effects
-from solver.engine.tables import layout
+from solver.engine.tables import body_tables
 from solver.engine.world import SUMMARY_COLUMNS, Batch, compiled_in
 from solver.laws import CONTACT_LAWS, HertzMindlin
 from solver.pours.pour import Pour
@@ -41,7 +41,7 @@ from solver.scenes.time_step import time_step
 from solver.shapes import clump
 from solver.shapes.solid import Kind, Solid, mass_properties
 from solver.single_body import BENCH_TESTS
-from solver.single_body.laboratory import ROOM, UPRIGHT
+from solver.single_body.free_world import ROOM, UPRIGHT
 from tests.solver.effects.cases import IN_KERNELS, felt, with_effects
 
 Array = npt.NDArray[np.float64]
@@ -109,7 +109,9 @@ def heap_numbers(scenes: Mapping[str, Scene], worlds: int = 1, first: int = 0) -
     batch = Batch(dataclasses.replace(ROOM, worlds=worlds, **compiled_in(list(scenes.values()))))
     steps = np.zeros(worlds, dtype=np.int32)
     for w, scene in enumerate(scenes.values(), start=first):
-        batch.load(w, scene, layout(scene, np.zeros(CLUMPS, dtype=np.int32)), time_step(scene), (True, True, False))
+        batch.load(
+            w, scene, body_tables(scene, np.zeros(CLUMPS, dtype=np.int32)), time_step(scene), (True, True, False)
+        )
         rng = np.random.default_rng(7)
         for b in range(CLUMPS):
             place = np.array([ACROSS * (b % 2), ACROSS * (b // 2 % 2), UP * (b // 4) + 2.998e-3])

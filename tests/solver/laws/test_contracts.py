@@ -8,7 +8,7 @@ import pytest
 
 from solver import pour_key
 from solver.effects import EFFECTS
-from solver.engine.tables import layout
+from solver.engine.tables import body_tables
 from solver.engine.world import Batch, compiled_in, law_table
 from solver.laws import CONTACT_LAWS, ContactLaw, HertzMindlin, LinearSpringDashpot
 from solver.params import ParameterError
@@ -18,13 +18,13 @@ from solver.scenes.contact_model import ContactModel
 from solver.scenes.insertion import rotation_matrix
 from solver.scenes.material_file import scene_from
 from solver.scenes.scene import parameters, with_values
-from solver.single_body.laboratory import EARTH, FREE, GRAIN, RADIUS, ROOM, WALL, Laboratory, bench, sphere
+from solver.single_body.free_world import EARTH, FREE, GRAIN, RADIUS, ROOM, WALL, FreeWorld, grain_on_plate, sphere
 from solver.verification.impacts import Impact, rebounds
 from tests.solver.effects.cases import FELT, IN_KERNELS, felt, scene_with, tumble, with_effects
 from tests.solver.effects.test_contracts import momenta
 from tests.solver.pour_digests import digest
-from tests.solver.test_material_file import mutated
-from tests.solver.test_pour import QUICK
+from tests.solver.pours.test_pour import QUICK
+from tests.solver.scenes.test_material_file import mutated
 
 pytestmark = pytest.mark.usefixtures("taichi")
 
@@ -41,7 +41,7 @@ def grazed(law, restitution=0.6, friction=0.5, chunk=None):
     """Two unequal spheres meet obliquely, spinning: states before and after, summaries, masses, inertias."""
     bodies = (sphere(RADIUS, name="big"), sphere(0.6 * RADIUS, name="small"))
     scene = under(law, scene_with(bodies=bodies, friction=friction, restitution=restitution))
-    lab = Laboratory(scene, (0, 1), fraction=0.02, plate=False)
+    lab = FreeWorld(scene, (0, 1), fraction=0.02, plate=False)
     lab.put(0, (0, 0, 0), velocity=(0.3, 0.1, 0.2), spin=(10.0, 20.0, -40.0))
     lab.put(1, (0.3 * RADIUS, 0.1 * RADIUS, 1.6 * RADIUS), velocity=(0.1, 0.0, -0.6), spin=(-30.0, 5.0, 60.0))
     before, steps = lab.state(), round(0.02 / lab.dt)
@@ -119,7 +119,7 @@ def test_the_restitution_that_is_declared_comes_out_at_every_speed(law, speed):
 @every_law
 def test_a_contact_never_pulls(law):
     """A grain that is drawn off the plate at once feels no tension, however strong the dashpot."""
-    lab = Laboratory(under(law, bench(restitution=0.05)), 1)
+    lab = FreeWorld(under(law, grain_on_plate(restitution=0.05)), 1)
     lab.put(0, (0.0, 0.0, RADIUS - 1e-6), velocity=(0.0, 0.0, 1.0))
     lab.run(2)
     assert lab.state()[0, 9] >= 1.0
@@ -144,7 +144,7 @@ def test_rolling_takes_the_tangential_stiffness_of_the_law(law):
     """Below its cap the torque spring is k_t R*² ω_r dt: after one step of a pure spin, with k_t of the law itself."""
     scene = under(law, scene_with(EFFECTS["rolling_resistance"](rolling_friction=1.0), friction=0.0, restitution=1.0))
     dt, overlap, spin = 1e-6, 1e-4, 2.0
-    lab = Laboratory(scene, 1, dt=dt)
+    lab = FreeWorld(scene, 1, dt=dt)
     lab.put(0, (0.0, 0.0, RADIUS - overlap), spin=(0.0, spin, 0.0))
     lab.run(1)
     inertia = scene.bodies[0].clump.inertia[0]
@@ -170,7 +170,7 @@ def test_a_running_pile_approaches_stiffness_and_damping_and_takes_friction_at_o
     """Four times G: halfway twice the modulus, and springs that keep their displacement pull as k_t grows."""
     stiff = dataclasses.replace(GRAIN, shear_modulus=4.0 * GRAIN.shear_modulus)
     before, after = (
-        law_table(under(law, bench(grain=grain, friction=mu))) for grain, mu in ((GRAIN, 0.3), (stiff, 0.6))
+        law_table(under(law, grain_on_plate(grain=grain, friction=mu))) for grain, mu in ((GRAIN, 0.3), (stiff, 0.6))
     )
     kind = CONTACT_LAWS[law]
     ramp = Ramp(kind, before, after, 1.0)
@@ -197,9 +197,9 @@ def test_pours_of_two_laws_run_side_by_side_with_the_bits_that_each_has_alone():
 
 
 def test_a_batch_takes_scenes_of_its_own_law_only():
-    batch, other = Batch(ROOM), under(LinearSpringDashpot.name, bench())
+    batch, other = Batch(ROOM), under(LinearSpringDashpot.name, grain_on_plate())
     with pytest.raises(ValueError, match=r"contact\.law: the batch was made for hertz_mindlin"):
-        batch.load(0, other, layout(other, np.zeros(1, dtype=np.int32)), 1e-5, (True,))
+        batch.load(0, other, body_tables(other, np.zeros(1, dtype=np.int32)), 1e-5, (True,))
 
 
 def test_a_material_file_names_its_law_in_either_place(tmp_path):
@@ -239,8 +239,8 @@ def test_a_law_of_a_package_is_compiled_like_any_other(softer):
     """Deeper by √2 at the same speed."""
     depths = []
     for law in (LinearSpringDashpot.name, Softer.name):
-        scene = under(law, bench(restitution=1.0, friction=0.0, gravity=FREE))
-        lab = Laboratory(scene, 1, dt=1e-6)
+        scene = under(law, grain_on_plate(restitution=1.0, friction=0.0, gravity=FREE))
+        lab = FreeWorld(scene, 1, dt=1e-6)
         lab.put(0, (0.0, 0.0, RADIUS), velocity=(0.0, 0.0, -1.0))
         heights = []
         while not heights or lab.state()[0, 9] < 0.0:

@@ -11,7 +11,7 @@ from solver.laws.restitution import damping_ratio
 from solver.scenes.body import Body, Members
 from solver.scenes.contact_model import ContactModel
 from solver.scenes.material import effective_youngs_modulus
-from solver.single_body.laboratory import GRAIN, RADIUS, Laboratory, bench
+from solver.single_body.free_world import GRAIN, RADIUS, FreeWorld, grain_on_plate
 from solver.verification.impacts import hertz_depth
 
 pytestmark = pytest.mark.usefixtures("taichi")
@@ -25,7 +25,7 @@ FINE = 2000
 
 
 def scene_of_one(restitution=1.0, friction=0.0, body=None):
-    return dataclasses.replace(bench(body, friction=friction, restitution=restitution), contact=LINEAR)
+    return dataclasses.replace(grain_on_plate(body, friction=friction, restitution=restitution), contact=LINEAR)
 
 
 def stiffness(scene):
@@ -47,7 +47,7 @@ def impact(speed, restitution):
     scene = scene_of_one(restitution)
     k = stiffness(scene)
     dt = math.pi * math.sqrt(MASS / k) / FINE
-    lab = Laboratory(scene, 1, dt=dt)
+    lab = FreeWorld(scene, 1, dt=dt)
     lab.put(0, (0.0, 0.0, RADIUS), velocity=(0.0, 0.0, -speed))
     rows = []
     for step in range(1, 2 * FINE):
@@ -87,7 +87,7 @@ def test_a_grain_held_by_friction_swings_with_the_tangential_stiffness():
     scene = dataclasses.replace(scene, gravity=(0.0, 0.0, -500.0))
     k = stiffness(scene)
     omega = math.sqrt(k / MASS)
-    lab = Laboratory(scene, 1, dt=2.0 * math.pi / omega / FINE)
+    lab = FreeWorld(scene, 1, dt=2.0 * math.pi / omega / FINE)
     v0 = 1e-3
     # The velocity is that of the half step before the first.
     lab.put(0, (0.0, 0.0, RADIUS - MASS * 500.0 / k), velocity=(v0 * math.cos(0.5 * omega * lab.dt), 0.0, 0.0))

@@ -13,7 +13,7 @@ from solver.pours.run import capacity_for
 from solver.rigs.outlet import RoundOutlet, Slot, obstruction
 from solver.scenes.body import Members
 from solver.scenes.scene import with_values
-from tests.solver.test_pour import COARSE
+from tests.solver.pours.test_pour import COARSE
 
 HEIGHT, HALF = 0.065, 0.015
 ROUND, SLOT = RoundOutlet(HALF), Slot(HALF)
@@ -135,6 +135,6 @@ def test_a_petiole_in_the_neck_obstructs_the_outlet_however_many_bodies_may_hang
 @pytest.mark.usefixtures("taichi")
 def test_a_changed_friction_lets_an_obstructed_pour_go_on():
     pour = stopped({})
-    pour.retune(with_values(pour.scene, {"pair.petiole.rigid_sieve_plate.static_friction": 0.0}))
+    pour.ramp_to(with_values(pour.scene, {"pair.petiole.rigid_sieve_plate.static_friction": 0.0}))
     assert pour.outcome == pour.ended[0] == Outcome.RUNNING
     assert pour.steps_due() > 0

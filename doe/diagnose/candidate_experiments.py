@@ -1,0 +1,238 @@
+"""What to measure next: the feasible changes of the rig, each poured with every answer that is left.
+
+The pours are those that teach the models (``training_pours.py``), made in the changed rig, so that data sets of one
+declared model share them, and those of the chosen set-up serve again when its data are weighed. In each set-up a
+regression of its own says what every answer predicts at its best fit, in all features that the data offer; what fit,
+regression and the axis of a scan leave open is in the covariance.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.declared.points import AS_IT_IS
+from doe.declared.pours import ModelPours
+from doe.diagnose.compared_features import usable
+from doe.diagnose.emulator import Emulator, Lessons, emulated, planar_weights
+from doe.diagnose.next_experiment import CandidateExperiment, Prediction, rank_experiments
+from doe.diagnose.posterior import Posterior
+from doe.diagnose.result import Suggestion
+from doe.diagnose.training_pours import TrainingPours, acting
+from doe.errors import StatisticsError
+from doe.measurement.condition_table import turned as turned_scene
+from doe.measurement.features import feature_set, offer_of
+from doe.measurement.measurement import Condition
+from doe.record import Record
+from solver import EFFECTS, ParameterError, Scene, parameters, value, with_values
+
+FloatArray = npt.NDArray[np.float64]
+PoursIn = Callable[[Sequence[Condition]], ModelPours]
+
+BASE_POURS, POURS = 12, 4
+"""Pours of the base model, and of every direction of an effect that is left, in each set-up of the candidates."""
+PLANNED = (6, 12, 24)
+"""Pours that may be asked of the laboratory."""
+LIKELY = 0.8
+"""Chance of an answer from which on the fewer pours will do."""
+INTERVAL = 2.0 * 1.96
+"""Standard deviations in a 95 % interval."""
+
+
+@dataclass(frozen=True)
+class Change(Record):
+    """A change of the first fitted condition that a laboratory can make in minutes.
+
+    ``factors`` multiply its parameters, ``choices`` replace settings.
+    """
+
+    name: str
+    factors: Mapping[str, float] = field(default_factory=dict)
+    choices: Mapping[str, str] = field(default_factory=dict)
+
+    def named(self, turned: bool) -> str:
+        """Its name, with the rig ``turned`` by 180° on its bench or not."""
+        if not turned:
+            return self.name
+        return f"{self.name}, {TURNED}" if self.factors or self.choices else TURNED
+
+
+TURNED = "rig turned by 180° on its bench"
+"""What any change is made with where an effect with a direction is left: it costs no pours, for all else is the same in
+a turned rig, and tells what stays with the bench from what turns with the rig."""
+CHANGES = (
+    Change("as it is, poured again"),
+    Change("half the mass", {"rig.mass": 0.5}),
+    Change("half as much mass again", {"rig.mass": 1.5}),
+    Change("outlet at 0.6 times the height", {"rig.outlet_height": 0.6}),
+    Change("outlet at 1.5 times the height", {"rig.outlet_height": 1.5}),
+    Change("outlet at twice the height", {"rig.outlet_height": 2.0}),
+    Change("outlet 1.3 times as wide", {"rig.outlet_diameter": 1.3}),
+    Change("fed four times as fast", {"insertion.rate": 4.0}),
+    Change("fed at 0.4 times the rate", {"insertion.rate": 0.4}),
+    Change("dropped four times as fast", {"insertion.drop_speed": 4.0}),
+    Change("filled with the outlet closed, then opened", choices={"insertion.protocol": "fill_then_open"}),
+    Change("outlet 1.3 times as wide at twice the height", {"rig.outlet_diameter": 1.3, "rig.outlet_height": 2.0}),
+)
+
+
+@dataclass(frozen=True)
+class CandidateExperiments:
+    """Set-ups in order, and how many pours had to be run for them."""
+
+    suggestions: tuple[Suggestion, ...]
+    run_now: int
+
+
+def next_experiment(
+    training: TrainingPours, found: Posterior, weights: Mapping[str, float], condition: Condition, pours_in: PoursIn
+) -> CandidateExperiments:
+    """The candidates for telling answers apart, the most discriminating set-up first.
+
+    Parameters
+    ----------
+    training, found
+        What taught the models, and the posterior that leaves them.
+    weights
+        Probability of every answer that is left, "base" for nothing missing; no candidates with fewer than two.
+    condition
+        The fitted condition that is changed.
+    pours_in
+        The pours of the declared model in set-ups.
+    """
+    if len(weights) < 2:
+        return CandidateExperiments((), 0)
+    directed = {way.effect for way in training.ways if way.angle is not None}
+    turned = any(name in directed for label in weights for name in label.split("+"))
+    changes = {change.named(turned): values for change, values in feasible(condition.scene)}
+    set_ups = [changed(condition, name, values, turned) for name, values in changes.items()]
+    # What is measured there is weighed by all effects.
+    set_ups = [one for one in set_ups if training.possible_in(one.scene)]
+    model = pours_in(set_ups)
+    probes = training.base(BASE_POURS) + training.probes(found, tuple(weights), POURS)
+    # All set-ups at once, so that no core waits for the last pour of one of them; what is only looked at after that.
+    plain = dict.fromkeys(probe.point.seen(AS_IT_IS) for probe in probes)
+    model.run("what to measure next", list(plain))
+    rows = model.run("what to measure next", [probe.point for probe in probes])
+    items = []
+    for c, set_up in enumerate(set_ups):
+        lessons = training.told(probes, [[row[c]] for row in rows])
+        with suppress(StatisticsError):  # a set-up that jams tells nothing
+            items.append(_item(training, found, tuple(weights), lessons, model, c, set_up))
+    if not items:
+        return CandidateExperiments((), model.run_now)
+    asked = dict.fromkeys(name for label in weights if label != "base" for name in label.split("+"))
+    levers = tuple(f"{name}: {EFFECTS[name].lever}" for name in asked)
+    for planned in PLANNED:
+        ranked = rank_experiments(items, weights, planned)
+        if ranked[0].chance >= LIKELY:
+            break
+    suggestions = [
+        Suggestion(one, changes[one.name], condition.name, tuple(weights), levers, planned, turned) for one in ranked
+    ]
+    return CandidateExperiments(tuple(suggestions), model.run_now)
+
+
+def _item(
+    training: TrainingPours,
+    found: Posterior,
+    labels: Sequence[str],
+    lessons: Lessons,
+    pours: ModelPours,
+    c: int,
+    set_up: Condition,
+) -> CandidateExperiment:
+    """What every answer predicts in a set-up, whitened by a regression of its own.
+
+    Raises StatisticsError where an answer has too few pours that ended.
+    """
+    offered = feature_set(set_up).offered(offer_of(set_up))
+    taught, (columns,) = usable(lessons, [np.arange(offered)])
+    used = sorted(set(taught.way[taught.way >= 0].tolist()))
+    if missing := set(lessons.way.tolist()) - {-1, *used}:
+        raise StatisticsError(f"{training.ways[missing.pop()].name}: no pour of it ended")
+    taught = replace(taught, way=np.array([used.index(way) if way >= 0 else -1 for way in taught.way]))
+    emulator = emulated(taught, [training.ways[way] for way in used])
+    # The axis of a scan is off in the new pours as well.
+    shared = np.zeros((len(columns), 0))
+    axis_error = max((one.axis_error for one in set_up.surfaces.values()), default=0.0)
+    if axis_error > 0.0:
+        axis = training.axis_in(pours, c, len(feature_set(set_up).scalars), axis_error)[:, columns]
+        slope = emulator.squashes[0].slope(emulator.squashes[0].centre)
+        shared = emulator.whitening @ (axis * slope).T
+    expected = {label: emulator.at(_rows(emulator, training, found, label)) for label in labels}
+    # How well a regression of few pours knows an answer is no property of it that would give it away.
+    noise = np.mean([variance[0] for _, variance in expected.values()], axis=0) + emulator.slope_variance
+    predictions, slopes = {}, emulator.slopes
+    for label, ((mean, *beside), _) in expected.items():
+        fit = found.fits[label]
+        loose = np.array([one - mean for one in beside]).reshape(-1, len(mean))
+        covariance = np.diag(noise) + slopes @ fit.theta_covariance @ slopes.T
+        covariance += loose.T @ loose + shared @ shared.T
+        predictions[label] = Prediction(mean + slopes @ fit.theta, covariance)
+    return CandidateExperiment(set_up.name, predictions, np.eye(len(columns)))
+
+
+def _rows(emulator: Emulator, training: TrainingPours, found: Posterior, label: str) -> FloatArray:
+    """Rows of the regression: at the best fit of ``label``, and with each amplitude a standard deviation beside it."""
+    base, here = emulator.row(), emulator.row()
+    beside = []
+    number = {way.name: k for k, way in enumerate(emulator.ways)}
+    for way, amplitude in acting(found, label, training.ways):
+        effect = training.ways[way].effect
+        size = math.hypot(*training.ways[way].unit)
+        own = [one for one in found.fits[label].amplitudes if one.effect == effect]
+        spread = [(one.high - one.low) / INTERVAL / size for one in own]
+        if len(own) == 1:
+            acts = {number[training.ways[way].name]: 1.0}
+            first, *others = (
+                emulator.weighted_row([(acts, a)]) - base for a in (amplitude, amplitude + min(spread[0], amplitude))
+            )
+        else:
+            planar = {one.angle: k for k, one in enumerate(emulator.ways) if one.effect == effect}
+            x, y = (one.value / size for one in own)
+            first, *others = (
+                emulator.weighted_row(
+                    [({planar[a]: w for a, w in planar_weights(math.atan2(q, p)).items()}, math.hypot(p, q))]
+                )
+                - base
+                for p, q in ((x, y), (x + spread[0], y), (x, y + spread[1]))
+            )
+        here = here + first
+        beside += [one - first for one in others]
+    return np.array([here, *(here + one for one in beside)])
+
+
+def changed(condition: Condition, name: str, values: Mapping[str, float | str], about: bool) -> Condition:
+    """``condition`` under another name, with ``values`` set and the rig turned ``about`` on its bench."""
+    scene = turned_scene(condition.scene) if about else condition.scene
+    return replace(condition, name=name, scene=with_values(scene, dict(values)), turned=condition.turned != about)
+
+
+def as_suggested(condition: Condition, asked: Suggestion) -> Condition:
+    """``condition`` with the change of a suggestion, under its name."""
+    return changed(condition, asked.experiment.name, asked.values, asked.turned)
+
+
+def feasible(scene: Scene) -> list[tuple[Change, dict[str, float | str]]]:
+    """The changes that the rig of ``scene`` can do, with the values [SI] that they come to."""
+    found = []
+    known = parameters(scene)
+    for change in CHANGES:
+        if "insertion.protocol" in change.choices and scene.numerics.duration > 0.0:
+            continue  # filled first, it would be read before it has run out
+        if not (set(change.factors) | set(change.choices)) <= set(known):
+            continue
+        values: dict[str, float | str] = {path: f * float(value(scene, path)) for path, f in change.factors.items()}
+        values |= change.choices
+        if values and all(value(scene, path) == new for path, new in values.items()):
+            continue  # as it is already
+        with suppress(ParameterError):  # beyond what the rig allows
+            with_values(scene, dict(values))
+            found.append((change, values))
+    return found

@@ -1,0 +1,254 @@
+"""Which features are compared, and what the data are in them.
+
+A feature is compared where the data offer it in at least two replicates and half of them (in the one that there is),
+where ``READABLE`` of the base model's pours give it, and where it varies at all in the pours. What the data offer is a
+matter of names (``doe/measurement/features.py``), so nothing here looks at a value and chooses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.diagnose.emulator import Emulator, Lessons, Way, emulated
+from doe.diagnose.posterior import Data, Posterior, fitted, posterior
+from doe.errors import StatisticsError
+from doe.measurement.features import SCAN, feature_set, features_of_data, offer_of, sight_of
+from doe.measurement.measurement import Condition
+from doe.measurement.sight import PERFECT, Sight
+from doe.measurement.summaries import summary_uncertainties
+
+FloatArray = npt.NDArray[np.float64]
+
+READABLE = 0.8
+"""Share of the base model's pours in which a feature has to be there."""
+BIAS_ERROR = 0.3
+"""Standard deviation of a sight's bias, as a share of it: it is that of the base model's piles, and cameras are not
+what is assumed of them."""
+CONSTANT = 1e-9
+"""Scatter within groups of pours, as a share of the feature's size, below which it says nothing."""
+
+
+@dataclass(frozen=True)
+class MeasuredFeatures:
+    """Features that a condition's data offer: names, replicates (r, d) and the stated error of each, (d,).
+
+    ``scalars``: how many of them are not read off a surface. ``sight``: what the scans were seen through;
+    ``axis_error``: of their axis [m].
+    """
+
+    condition: str
+    offer: str
+    names: tuple[str, ...]
+    values: FloatArray
+    instrument: FloatArray
+    mean_of: int = 1
+    scalars: int = 0
+    axis_error: float = 0.0
+    sight: Sight = PERFECT
+
+    def pours(self, columns: npt.NDArray[np.int64]) -> FloatArray:
+        """The replicates in which all of ``columns`` could be read."""
+        block = self.values[:, columns]
+        return np.asarray(block[np.isfinite(block).all(axis=1)], dtype=np.float64)
+
+
+def measured(condition: Condition, offer: str | None = None) -> MeasuredFeatures:
+    """What ``condition`` offers, or the part of it that data of the kind ``offer`` would have."""
+    names, values = feature_set(condition), features_of_data(condition)
+    most = names.offered(offer_of(condition)) if offer is None else min(names.offered(offer), values.shape[1])
+    stated = np.zeros(most)
+    stated[: len(names.scalars)] = np.nan_to_num(summary_uncertainties(condition))
+    found = offer_of(condition) if offer is None else offer
+    return MeasuredFeatures(
+        condition=condition.name,
+        offer=found,
+        names=names.names[:most],
+        values=values[:, :most],
+        instrument=stated,
+        mean_of=condition.mean_of,
+        scalars=len(names.scalars),
+        axis_error=max((one.axis_error for one in condition.surfaces.values()), default=0.0),
+        sight=sight_of(condition) if found == SCAN else PERFECT,
+    )
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Data and models in the same features.
+
+    Attributes
+    ----------
+    conditions, names
+        Of the conditions, and by condition of the features.
+    left_out
+        "condition: feature" of what the data offer and no pour varies or gives.
+    data, emulator, posterior
+        What is weighed, by what, and what came out.
+    blocks
+        Measured replicates, by condition (r, d_c).
+    plain
+        The emulator without what the signatures have in common, in the same coordinates: for the amplitude of what is
+        named.
+    """
+
+    conditions: tuple[str, ...]
+    names: tuple[tuple[str, ...], ...]
+    left_out: tuple[str, ...]
+    blocks: tuple[FloatArray, ...]
+    data: Data
+    emulator: Emulator
+    posterior: Posterior
+    plain: Emulator
+
+    def refitted(self, labels: Sequence[str]) -> Compared:
+        """The same with the fits of ``labels`` by the plain emulator, their evidence as it was."""
+        fits = dict(self.posterior.fits)
+        for label in labels:
+            found = fitted(self.plain, self.data, label)
+            fits[label] = replace(found, log_evidence=fits[label].log_evidence, p=fits[label].p)
+        return replace(self, posterior=replace(self.posterior, fits=fits))
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """What the scanner of a condition does to all features of the base model's pours, by the same pours seen both ways.
+
+    ``bias``: its sight, (d,). ``axis``: its axis being off by one standard deviation along x and along y, (2, d).
+    """
+
+    bias: FloatArray
+    axis: FloatArray
+
+
+def weighed(
+    lessons: Lessons,
+    ways: Sequence[Way],
+    conditions: Sequence[MeasuredFeatures],
+    instruments: Sequence[Instrument] = (),
+) -> Compared:
+    """Weigh all models by the data of the fitted ``conditions``, freed from the bias of their ``instruments``.
+
+    Raises StatisticsError where a condition has nothing that can be compared.
+    """
+    if instruments:
+        conditions = [_freed(one, instrument) for one, instrument in zip(conditions, instruments, strict=True)]
+    taught, columns = usable(lessons, [_there(condition) for condition in conditions])
+    left_out = [
+        f"{condition.condition}: {condition.names[k]}"
+        for condition, chosen in zip(conditions, columns, strict=True)
+        for k in sorted(set(range(len(condition.names))) - set(chosen.tolist()))
+    ]
+    for condition, chosen in zip(conditions, columns, strict=True):
+        if chosen.size == 0 or len(condition.pours(chosen)) == 0:
+            raise StatisticsError(f"{condition.condition}: no number of the data varies in the pours and can be read")
+    blocks = tuple(condition.pours(chosen) for condition, chosen in zip(conditions, columns, strict=True))
+    numbers = np.array([len(b) * one.mean_of for b, one in zip(blocks, conditions, strict=True)], dtype=np.float64)
+    weights = numbers / numbers.mean()
+    emulator, plain = (emulated(taught, ways, weights.tolist(), shrunk) for shrunk in (True, False))
+    data = Data(
+        emulator.seen(blocks),
+        float(numbers.mean()),
+        _scatter(emulator, blocks, weights, conditions),
+        _loadings(emulator, blocks, conditions, columns, instruments),
+    )
+    names = tuple(tuple(one.names[k] for k in chosen) for one, chosen in zip(conditions, columns, strict=True))
+    labels = tuple(one.condition for one in conditions)
+    return Compared(labels, names, tuple(left_out), blocks, data, emulator, posterior(emulator, data), plain)
+
+
+def usable(lessons: Lessons, offered: Sequence[npt.NDArray[np.int64]]) -> tuple[Lessons, list[npt.NDArray[np.int64]]]:
+    """The complete pours with those of the ``offered`` features that they give and that vary, and which these are."""
+    columns = [some[_readable(lessons, c)[some]] for c, some in enumerate(offered)]
+    taught = _complete(lessons.only(columns))
+    columns = [chosen[_varies(taught, c)] for c, chosen in enumerate(columns)]
+    return _complete(lessons.only(columns)), columns
+
+
+def _there(condition: MeasuredFeatures) -> npt.NDArray[np.int64]:
+    """Features that the data of a condition give."""
+    number = len(condition.values)
+    return np.flatnonzero(np.isfinite(condition.values).sum(axis=0) >= max(min(2, number), number / 2))
+
+
+def _readable(lessons: Lessons, c: int) -> npt.NDArray[np.bool_]:
+    """Which features the base model's pours give."""
+    base = lessons.blocks[c][lessons.way == -1]
+    # A pour that broke off says nothing of a feature.
+    ended = np.isfinite(base).any(axis=1)
+    return np.asarray(np.isfinite(base[ended]).mean(axis=0) >= READABLE)
+
+
+def _complete(lessons: Lessons) -> Lessons:
+    """Pours of which every condition came to a valid end and could be read."""
+    return lessons.where(np.all([np.isfinite(block).all(axis=1) for block in lessons.blocks], axis=0))
+
+
+def _varies(lessons: Lessons, c: int) -> npt.NDArray[np.bool_]:
+    """Which features of a condition vary within any group of pours that teach the scatter."""
+    own = lessons.where(lessons.own)
+    block, groups = own.blocks[c], own.groups()
+    size = np.abs(block).max(axis=0, initial=0.0)
+    varies = np.zeros(block.shape[1], dtype=bool)
+    for group in np.unique(groups):
+        some = block[groups == group]
+        varies |= np.ptp(some, axis=0) > CONSTANT * size
+    return varies
+
+
+def _scatter(
+    emulator: Emulator, blocks: Sequence[FloatArray], weights: FloatArray, conditions: Sequence[MeasuredFeatures]
+) -> float:
+    """r: variance of the replicates over that of pours, 1 at least, and at most known to be more than the noise of Σ.
+
+    Whitening by a Σ of ν degrees of freedom makes other pours look wider, by about ν/(ν − d − 1) in d features.
+    """
+    square = expected = 0.0
+    first = 0
+    for squash, block, weight, one in zip(emulator.squashes, blocks, weights, conditions, strict=True):
+        d = block.shape[1]
+        last = first + d
+        if len(block) > 1 and one.mean_of == 1:
+            drawn_in = squash(block)
+            left = (drawn_in - drawn_in.mean(axis=0)) @ emulator.whitening[:, first:last].T
+            square += float((left**2).sum()) / weight
+            slack = emulator.freedom / max(0.5 * emulator.freedom, emulator.freedom - d - 1.0)
+            expected += (len(block) - 1) * d * slack
+        first = last
+    return max(1.0, square / expected) if expected > 0.0 else 1.0
+
+
+def _freed(condition: MeasuredFeatures, instrument: Instrument) -> MeasuredFeatures:
+    return replace(condition, values=condition.values - instrument.bias[: condition.values.shape[1]])
+
+
+def _loadings(
+    emulator: Emulator,
+    blocks: Sequence[FloatArray],
+    conditions: Sequence[MeasuredFeatures],
+    columns: Sequence[npt.NDArray[np.int64]],
+    instruments: Sequence[Instrument],
+) -> FloatArray:
+    """I: what the errors of instruments, which no averaging reduces, do to z, (D, q).
+
+    Stated errors of numbers are independent. What a scan's axis is off, and what is not known of the bias of its sight,
+    move all that is read off the surface together.
+    """
+    size, first, found = len(emulator.whitening), 0, []
+    for c, (squash, block, one, chosen) in enumerate(zip(emulator.squashes, blocks, conditions, columns, strict=True)):
+        slope = squash.slope(block.mean(axis=0))
+        places = np.arange(first, first + len(chosen))
+        first += len(chosen)
+        stated = one.instrument[chosen] * slope
+        for k in np.flatnonzero(stated > 0.0):
+            found.append(stated[k] * np.eye(size)[places[k]])
+        if instruments:
+            changes = [*instruments[c].axis, BIAS_ERROR * instruments[c].bias]
+            for change in (change[chosen] for change in changes if change.any()):
+                moved = np.zeros(size)
+                moved[places] = change * slope
+                found.append(moved)
+    return np.asarray(emulator.whitening @ np.array(found).T, dtype=np.float64) if found else np.zeros((size, 0))

@@ -1,0 +1,420 @@
+"""The pours that teach the models: the base model, every effect at its level, and more of what stays in question.
+
+Measured values come in only in the choice of what is poured more, and at which multiple of its level (a power of two,
+so that data sets of one model ask for the same pours); all pours belong to the declared model.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.declared.model import Declared, possible
+from doe.declared.points import AS_IT_IS, Direction, Point, View, base_points, directions_of, effect_points
+from doe.declared.pours import ModelPours, PointPour, Search
+from doe.diagnose.budget import Budget
+from doe.diagnose.compared_features import Instrument, MeasuredFeatures
+from doe.diagnose.emulator import Lessons, Way
+from doe.diagnose.levels import STRONG, Trials, level_of, taught_shifts
+from doe.diagnose.posterior import LEAST, Posterior
+from doe.diagnose.result import Level
+from doe.errors import StatisticsError
+from doe.measurement.measurement import Condition
+from doe.measurement.sight import PERFECT, Sight
+from doe.measurement.summaries import summary_names
+from solver import Scene, pour_rig
+
+FloatArray = npt.NDArray[np.float64]
+Say = Callable[[str], None]
+
+TRIALS = Trials(pours=1, most=5, enough=6.0, too_much=18.0)
+"""One pour tells the order of a shift, and all pours of an effect whether it is enough."""
+RAISES = 3
+"""Times at most that an effect is poured farther out, whose pours together shift by less than is enough."""
+TOLD = 4.0
+"""Shift that four pours tell from none: farther out by no more than that has to grow to ``STRONG``."""
+ENDED = 0.75
+"""Share of pours that have to come to a valid end where an effect is poured farther out."""
+NEAR = (0.2, 2.5)
+"""Multiples of a level at which the pours of its search teach: a parabola follows no answer farther."""
+SHIFTED = 12
+"""Pours of the base model that are looked at from elsewhere, for a displaced funnel."""
+IN_QUESTION = 0.03
+"""Probability of an effect from which on it is in question."""
+FURTHER, FOLLOWED = 5.0, 3
+"""Log evidence over the base model's from which on an effect is followed further whose best fit is at the end of what
+was poured, and how many of these at once: what is strong looks like nothing that was poured."""
+BEHIND = 4.0
+"""Log evidence by which a direction may be behind the best one of its effect and be in question with it."""
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A pour that teaches: of way ``way`` at a multiple of its level, or of the base model (−1, 0)."""
+
+    point: Point
+    way: int
+    multiple: float
+
+
+class TrainingPours:
+    """Pours what teaches the models of a declared scene in the set-ups of ``conditions``.
+
+    ``declared`` holds the first of these, or all: amplitudes are found by what they do in them, so that a condition
+    that comes later changes nothing of what was poured in the others.
+
+    Raises StatisticsError where the base model comes to no valid end.
+    """
+
+    def __init__(
+        self, declared: Declared, conditions: Sequence[Condition], pours: ModelPours, budget: Budget, say: Say
+    ) -> None:
+        self._declared, self._conditions = declared, tuple(conditions)
+        self._pours, self._budget, self._say = pours, budget, say
+        self._acting: dict[Point, tuple[int, float]] = {}
+        """Way and multiple of every point that was poured."""
+        self._rows: dict[Point, list[PointPour]] = {}
+        self._tried: list[tuple[Direction, float, list[Point]]] = []
+        self._directions = [one for effect in declared.effects for one in directions_of(effect)]
+        self._turned = all(_turns(condition.scene) for condition in conditions)
+        self._heaps = all(pour_rig(condition.scene).leaves_heap for condition in conditions)
+        base = base_points(declared, budget.base)
+        self._keep(base, pours.run("base model", base), -1, 0.0)
+        self._base = [self._rows[point] for point in base]
+        valid = min(sum(row[c].valid for row in self._base) for c in range(len(conditions)))
+        if valid < max(4, len(base) // 3):
+            outcomes = sorted({pour.outcome for row in self._base for pour in row if not pour.valid})
+            raise StatisticsError(
+                f"base model: {valid} of {len(base)} pours end in a valid pile (the others: {', '.join(outcomes)}); "
+                "the declared model does not do what was measured"
+            )
+        say(f"base model: {len(base)} settings")
+        self._levels = self._found_levels()
+        self._pour("screening", [(way, 1.0, budget.screening) for way in range(len(self.ways))])
+        self._tell_shifts()
+        refused: dict[int, float] = {}
+        for _ in range(RAISES):
+            if not self._raise_levels(refused):
+                break
+            self._tell_shifts()
+        self._keep_trials()
+        for direction, level in zip(self._directions, self._levels, strict=True):
+            if not direction.angle:
+                reach = f"up to {_words(direction, level.share)}, which shifts by {level.shift:.1f} standard errors"
+                say(f"{direction.name}: {reach}")
+        say(f"screening: {len(self._rows)} settings of {len(declared.effects)} effects")
+
+    @property
+    def ways(self) -> tuple[Way, ...]:
+        """Directions of effects at their levels."""
+        return tuple(
+            Way(one.effect, one.name, one.at(level.share), 1.0 / level.share, one.angle)
+            for one, level in zip(self._directions, self._levels, strict=True)
+        )
+
+    @property
+    def settings(self) -> int:
+        """Settings poured so far."""
+        return len({point.seen(AS_IT_IS) for point in self._rows})
+
+    @property
+    def levels(self) -> tuple[Level, ...]:
+        """Reference amplitudes, way by way."""
+        return tuple(self._levels)
+
+    @property
+    def pours(self) -> tuple[int, ...]:
+        """Pours that taught each way."""
+        ways = [way for way, _ in self._acting.values()]
+        return tuple(ways.count(way) for way in range(len(self._levels)))
+
+    def look(self, found: Posterior) -> tuple[str, ...]:
+        """Pour more of what ``found`` leaves in question, near its best fits; the effects that were poured.
+
+        And of the base model: all models begin with it, and where it is less well known than they are, data without an
+        effect agree with them better by the noise of its pours.
+        """
+        further = self.at_end(found)
+        wanted = [(way, multiple, self._budget.screening) for way, multiple in further]
+        wanted += [
+            (way, multiple, self._taught(way, multiple) + self._budget.more)
+            for way, multiple in self._in_question(found)
+            if way not in dict(further)
+        ]
+        if wanted:
+            self._pour("closer look", wanted, self._taught(-1, 0.0) + self._budget.more)
+        return tuple(dict.fromkeys(self.ways[way].effect for way, _, _ in wanted))
+
+    def refine(self, found: Posterior, label: str) -> None:
+        """Pour the effects of ``label`` on both sides of their best fits, so that these are no extrapolation."""
+        wanted = []
+        for name in label.split("+"):
+            level = max(
+                (one for one in found.levels if self.ways[one.way].effect == name), key=lambda one: one.log_density
+            )
+            power = math.log2(level.amplitude)
+            for one in (math.floor(power), math.ceil(power)):
+                multiple = min(2.0**one, self.ways[level.way].most)
+                wanted.append((level.way, multiple, max(self._taught(level.way, multiple), self._budget.more)))
+        self._pour("refinement", wanted)
+
+    def lessons(self) -> Lessons:
+        """All pours, NaN where one broke off or a feature could not be read."""
+        probes = [Probe(point, *self._acting[point]) for point in self._rows]
+        return self.told(probes, list(self._rows.values()))
+
+    def instruments(self, conditions: Sequence[MeasuredFeatures]) -> list[Instrument]:
+        """By condition what its scanner does to the base model's pours; empty where every sight and axis is perfect."""
+        if all(one.sight == PERFECT and one.axis_error == 0.0 for one in conditions):
+            return []
+        return [
+            _instrument(self._declared, self._pours, c, one.scalars, one.axis_error, one.sight)
+            for c, one in enumerate(conditions)
+        ]
+
+    def axis_in(self, pours: ModelPours, c: int, scalars: int, error: float) -> FloatArray:
+        """What a scan's axis that is ``error`` [m] off along x and y does in condition ``c`` of ``pours``, (2, d)."""
+        return _instrument(self._declared, pours, c, scalars, error).axis
+
+    def probes(self, found: Posterior, labels: Sequence[str], number: int) -> list[Probe]:
+        """``number`` pours of each effect of ``labels``, as they teach it, near its best fit in ``found``."""
+        wanted: dict[tuple[int, float], None] = {}
+        for label in labels:
+            for way, multiple in acting(found, label, self.ways):
+                nearest = min(2.0 ** round(math.log2(multiple)), self.ways[way].most)
+                # One that is poured in all directions of the plane needs them all.
+                same = self._all_of(way) if self.ways[way].angle is not None else [way]
+                wanted |= {(one, nearest): None for one in same}
+        return [
+            Probe(point, way, multiple)
+            for way, multiple in wanted
+            for point in self._points(self._directions[way], min(1.0, multiple * self._levels[way].share), number)
+        ]
+
+    def possible_in(self, scene: Scene) -> bool:
+        """Whether ``scene`` can be set up with every effect at both ends of its range."""
+        return all(
+            possible(scene, effect.name, end) for effect in self._declared.effects for end in (effect.low, effect.high)
+        )
+
+    def base(self, number: int) -> list[Probe]:
+        """``number`` pours of the base model, as they teach it."""
+        return [Probe(point, -1, 0.0) for point in base_points(self._declared, number)]
+
+    def told(self, probes: Sequence[Probe], rows: Sequence[Sequence[PointPour]]) -> Lessons:
+        """What pours of ``probes``, one per condition each, teach; NaN where one broke off or could not be read."""
+        blocks = []
+        for pours in zip(*rows, strict=True):
+            block = np.array([(*pour.summaries, *pour.surface) for pour in pours], dtype=np.float64)
+            block[[not pour.valid for pour in pours]] = np.nan
+            blocks.append(block)
+        return Lessons(
+            np.array([self._declared.theta(probe.point.theta) for probe in probes]).reshape(len(probes), -1),
+            np.array([probe.way for probe in probes], dtype=np.int64),
+            np.array([probe.multiple for probe in probes], dtype=np.float64),
+            np.array([probe.point.view == AS_IT_IS for probe in probes]),
+            tuple(blocks),
+        )
+
+    def _found_levels(self) -> list[Level]:
+        """The level of every direction; one for all directions in the plane."""
+        asked = [one for one in self._directions if not one.angle]
+
+        def tried(direction: Direction, share: float, number: int) -> list[Point]:
+            points = self._points(direction, share, number)
+            self._tried.append((direction, share, points))
+            return points
+
+        def search(one: Direction) -> Search[Level]:
+            level = yield from level_of(self._declared, one, self._base, partial(tried, one), TRIALS)
+            # What screening will ask for, while others are still searched.
+            yield self._points(one, level.share, self._budget.screening)
+            return level
+
+        searches = [search(one) for one in asked]
+        widest = [point for one in asked for point in self._points(one, 1.0, 1)]
+        first = range(len(self._declared.conditions))
+        found = self._pours.answered("amplitudes", searches, first, widest)
+        levels, last = [], iter(found)
+        for one in self._directions:
+            if not one.angle:
+                level = next(last)
+            levels.append(replace(level, direction=one))
+        return levels
+
+    def _tell_shifts(self) -> None:
+        """The shifts of the levels in the scalars, by all pours so far."""
+        first = len(self._declared.conditions)
+        scalars = [np.arange(len(summary_names(condition))) for condition in self._conditions[:first]]
+        lessons = self.lessons()
+        shifts = taught_shifts(replace(lessons, blocks=lessons.blocks[:first]).only(scalars), self.ways)
+        self._levels = [replace(one, shift=float(shift)) for one, shift in zip(self._levels, shifts, strict=True)]
+
+    def _raise_levels(self, refused: dict[int, float]) -> bool:
+        """Pour farther out what shifts the scalars too little; whether there was any.
+
+        ``refused``: by way the least share at which pours broke off.
+        """
+        first = len(self._declared.conditions)
+        asked: dict[int, tuple[float, list[Point]]] = {}
+        for way, (direction, level) in enumerate(zip(self._directions, self._levels, strict=True)):
+            if direction.angle or level.shift >= TRIALS.enough or level.share == 1.0:
+                continue
+            share = min(1.0, level.share * STRONG / max(level.shift, TOLD))
+            if way in refused:
+                share = min(share, math.sqrt(level.share * refused[way]))
+            for one in self._all_of(way) if direction.angle is not None else [way]:
+                asked[one] = share, self._points(self._directions[one], share, self._budget.screening)
+        self._pours.run("screening", list({p.seen(AS_IT_IS): None for _, points in asked.values() for p in points}))
+        for way, (share, points) in asked.items():
+            rows = self._pours.run("screening", points)
+            if np.mean([all(pour.valid for pour in row[:first]) for row in rows]) < ENDED:
+                refused[way] = share
+                continue
+            outward = share / self._levels[way].share
+            self._acting |= {p: (w, a / outward) for p, (w, a) in self._acting.items() if w == way}
+            self._levels[way] = replace(self._levels[way], share=share)
+            self._keep(points, rows, way, 1.0)
+        return bool(asked)
+
+    def _keep_trials(self) -> None:
+        """Pours by which a level was found teach as well, where they are not too far from it."""
+        for direction, share, points in self._tried:
+            way = self._directions.index(direction)
+            multiple = share / self._levels[way].share
+            if direction.angle is None and multiple != 1.0 and NEAR[0] <= multiple <= NEAR[1]:
+                self._keep(points, self._pours.run("amplitudes", points), way, multiple)
+
+    def _points(self, direction: Direction, share: float, number: int) -> list[Point]:
+        """Pours of ``direction`` at ``share`` of its range, by whatever stands in for them."""
+        if direction.angle is not None and direction.effect == "funnel_offset" and self._heaps:
+            dx, dy = direction.at(share)
+            return [one.seen(View(shift=(dx, dy))) for one in base_points(self._declared, max(number, SHIFTED))]
+        if direction.angle and self._turned:
+            first = next(one for one in self._directions if one.effect == direction.effect)
+            turns = View(turns=round(direction.angle / (0.5 * math.pi)))
+            return [one.seen(turns) for one in effect_points(self._declared, first, share, number)]
+        return effect_points(self._declared, direction, share, number)
+
+    def _pour(self, what: str, wanted: Iterable[tuple[int, float, int]], base: int = 0) -> None:
+        """Pour ways at multiples of their levels up to so many of each, of a planar effect in all its directions.
+
+        And the base model up to ``base`` times: all at once, so that no core waits for the last pour of one of them.
+        """
+        asked = [(-1, 0.0, base_points(self._declared, base))]
+        for way, multiple, number in wanted:
+            angle = self.ways[way].angle
+            for w in [way] if angle is None else self._all_of(way):
+                share = min(1.0, multiple * self._levels[w].share)
+                asked.append((w, share / self._levels[w].share, self._points(self._directions[w], share, number)))
+        plain = dict.fromkeys(point.seen(AS_IT_IS) for _, _, points in asked for point in points)
+        self._pours.run(what, list(plain))
+        for way, multiple, points in asked:
+            self._keep(points, self._pours.run(what, points), way, multiple)
+
+    def _all_of(self, way: int) -> list[int]:
+        """Ways of the effect of ``way``."""
+        effect = self._directions[way].effect
+        return [number for number, one in enumerate(self._directions) if one.effect == effect]
+
+    def _keep(self, points: Sequence[Point], rows: Sequence[list[PointPour]], way: int, multiple: float) -> None:
+        for point, row in zip(points, rows, strict=True):
+            self._rows[point], self._acting[point] = row, (way, multiple)
+
+    def _taught(self, way: int, multiple: float) -> int:
+        return sum(one == (way, multiple) for one in self._acting.values())
+
+    def _in_question(self, found: Posterior) -> list[tuple[int, float]]:
+        """Ways, with a multiple at which they are poured beside their best fit."""
+        probability: dict[str, float] = {}
+        for label, p in found.effects.items():
+            for name in label.split("+"):
+                probability[name] = probability.get(name, 0.0) + p
+        best: dict[str, float] = {}
+        for level in found.levels:
+            effect = self.ways[level.way].effect
+            best[effect] = max(best.get(effect, -math.inf), level.log_density)
+        asked: list[tuple[int, float]] = []
+        for level in found.levels:
+            way = self.ways[level.way]
+            if probability[way.effect] > IN_QUESTION and level.log_density > best[way.effect] - BEHIND:
+                asked.append((level.way, self._beside(level.way, level.amplitude)))
+        # Beside another effect it may fit best elsewhere than alone.
+        pairs = [label for label, p in found.effects.items() if "+" in label and p > IN_QUESTION]
+        paired = [one for label in pairs for one in acting(found, label, self.ways)]
+        asked += [(way, self._beside(way, amplitude)) for way, amplitude in paired]
+        return list(dict.fromkeys(asked))
+
+    def _beside(self, way: int, amplitude: float) -> float:
+        """The power of two of a level that is nearest to ``amplitude``, or the one on its other side once that has been
+        poured: known well on one side only, a model pays for what it does not know on the other.
+        """
+        power = math.log2(amplitude)
+        sides = sorted((math.floor(power), math.ceil(power)), key=lambda one: abs(one - power))
+        multiples = [min(2.0**one, self.ways[way].most) for one in sides]
+        return next((one for one in multiples if self._taught(way, one) < self._budget.more), multiples[0])
+
+    def at_end(self, found: Posterior) -> list[tuple[int, float]]:
+        """Ways whose best fit is the largest amplitude that the models reach, with a larger one that there can be."""
+        base = found.fits["base"].log_evidence
+        ends = []
+        for level in sorted(found.levels, key=lambda one: -one.log_density):
+            way, reached = self.ways[level.way], self._reached(level.way)
+            further = min(2.0 * reached, way.most)
+            if level.log_density - base > FURTHER and level.amplitude > reached and further > 1.001 * reached:
+                ends.append((level.way, further))
+        return ends[:FOLLOWED]
+
+    def _reached(self, way: int) -> float:
+        return max(multiple for one, multiple in self._acting.values() if one == way)
+
+
+def acting(found: Posterior, label: str, ways: Sequence[Way]) -> list[tuple[int, float]]:
+    """Ways and multiples of their reference amplitudes at which the effects of ``label`` fit best; of an effect with a
+    direction in the plane its first way, whatever its direction. None of "base".
+    """
+    places = []
+    for name in label.split("+"):
+        own = [level for level in found.levels if ways[level.way].effect == name]
+        if not own:
+            continue
+        best = max(own, key=lambda one: one.log_density)
+        way, amplitude = best.way, best.amplitude
+        if "+" in label:
+            # Beside another effect it may be of another size and sign.
+            values = [one.value for one in found.fits[label].amplitudes if one.effect == name]
+            way = next((one.way for one in own if ways[one.way].unit[0] * values[0] > 0.0), way)
+            amplitude = max(LEAST, math.hypot(*values) / math.hypot(*ways[way].unit))
+        places.append((way, amplitude))
+    return places
+
+
+def _instrument(
+    declared: Declared, pours: ModelPours, c: int, scalars: int, axis_error: float, sight: Sight = PERFECT
+) -> Instrument:
+    """What a scanner does to the base model's pours in condition ``c`` of ``pours``; not to the ``scalars``."""
+    points = base_points(declared, SHIFTED)
+    shifts = ((axis_error, 0.0), (0.0, axis_error))
+    views = [AS_IT_IS, View(sight=sight), *(View(shift=shift) for shift in shifts)]
+    seen = pours.run("scanner", [p.seen(v) for v in views for p in points], [c])
+    rows = np.array([(*row.summaries, *row.surface) for (row,) in seen]).reshape(len(views), len(points), -1)
+    change = rows[1:] - rows[0]
+    # Numbers of the table come from other instruments.
+    change[:, :, :scalars] = 0.0
+    ended = np.isfinite(change).all(axis=(0, 2))
+    bias, *axis = change[:, ended].mean(axis=1)
+    return Instrument(bias, np.array(axis))
+
+
+def _turns(scene: Scene) -> bool:
+    """Whether a quarter turn leaves the declared ``scene`` as it is."""
+    return pour_rig(scene).quarter_turns and scene.gravity[0] == scene.gravity[1] == 0.0 and not any(scene.axis)
+
+
+def _words(direction: Direction, share: float) -> str:
+    return " ".join(f"{one:.3g}" for one in direction.at(share))

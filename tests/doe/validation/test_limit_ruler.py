@@ -1,0 +1,111 @@
+"""The ruler: strengths of made-up effects whose shift, noise and sensitivity are known."""
+
+import numpy as np
+import pytest
+
+from doe.diagnose.emulator import shrunk_covariance
+from doe.errors import StatisticsError
+from doe.validation.limit import fold_shifts, metric_of, product, strength_of
+from doe.validation.reference import SIDE, ReferencePours
+
+D, POURS = 6, 96
+
+
+def sample_of(rng, shifts, pours=POURS, sensitivity=None, scale=1.0):
+    """Pours of unit noise (times ``scale``) in two conditions of ``D`` features; a shift is that of both."""
+
+    def blocks(shift, number):
+        return tuple(scale * (rng.standard_normal((number, D)) + part) for part in np.split(shift, 2))
+
+    nothing = np.zeros(2 * D)
+    slope = nothing if sensitivity is None else sensitivity
+    kinds = {"base": blocks(nothing, 2 * pours)}
+    kinds |= {name: blocks(shift, pours) for name, shift in shifts.items()}
+    kinds |= {"friction -": blocks(-SIDE * slope, pours), "friction +": blocks(SIDE * slope, pours)}
+    return ReferencePours(kinds, ("friction",))
+
+
+def unit(*places):
+    """Unit vector along ``places``."""
+    one = np.zeros(2 * D)
+    one[list(places)] = 1.0
+    return one / np.linalg.norm(one)
+
+
+def strengths(sample, names, replicates=6):
+    metric = metric_of(sample, replicates)
+    return [strength_of(sample, name, metric) for name in names]
+
+
+def test_strength_is_the_shift_in_standard_errors_whatever_the_units():
+    """|δ| = 5 pours' standard deviations: 5 √6 standard errors of six pours."""
+    for scale in (1.0, 1e-6):
+        sample = sample_of(np.random.default_rng(1), {"push": 5.0 * unit(0, 3, 8)}, scale=scale)
+        (found,) = strengths(sample, ["push"])
+        assert abs(found.value - 5.0 * np.sqrt(6.0)) < 3.0 * found.error
+        assert found.error < 0.05 * found.value
+
+
+def test_the_square_is_free_of_what_noise_adds():
+    """The mean square of no effect at all is zero; the plain one would be 12 · 6 (1/16 + 1/32) = 6.75."""
+    squares = []
+    for seed in range(150):
+        sample = sample_of(np.random.default_rng(seed), {"nothing": np.zeros(2 * D)}, pours=16)
+        shifts = fold_shifts(sample, "nothing", metric_of(sample))
+        squares.append(product(shifts, shifts))
+    error = np.std(squares) / np.sqrt(len(squares))
+    assert abs(np.mean(squares)) < 3.0 * error
+    assert error < 0.3
+
+
+def test_the_stated_error_is_that_of_repeated_references():
+    found = [
+        strengths(sample_of(np.random.default_rng(seed), {"push": 3.0 * unit(1, 7)}, pours=32), ["push"])[0]
+        for seed in range(60)
+    ]
+    spread = np.std([one.value for one in found])
+    assert 0.7 < np.mean([one.error for one in found]) / spread < 1.4
+
+
+def test_what_recalibration_can_do_counts_for_little():
+    """Along a parameter of sensitivity J the noise is 1/n + J²: d² = a² / (1/n + J²); across it, d² = n a²."""
+    sensitivity = 2.0 * unit(0, 1)
+    sample = sample_of(
+        np.random.default_rng(5), {"along": 4.0 * unit(0, 1), "across": 4.0 * unit(4, 9)}, sensitivity=sensitivity
+    )
+    along, across = strengths(sample, ["along", "across"])
+    assert along.value == pytest.approx(4.0 / np.sqrt(1.0 / 6.0 + 4.0), abs=0.2)
+    assert across.value == pytest.approx(4.0 * np.sqrt(6.0), rel=0.06)
+
+
+def test_twice_the_pours_are_root_two_stronger():
+    sample = sample_of(np.random.default_rng(8), {"push": 3.0 * unit(2)})
+    (six,), (twelve,) = strengths(sample, ["push"]), strengths(sample, ["push"], 12)
+    assert twelve.value / six.value == pytest.approx(np.sqrt(2.0), rel=0.02)
+
+
+def test_correlations_are_shrunk_away_where_there_are_few_rows():
+    """Ten rows of twenty unrelated features: a plain covariance has no inverse, this one has, and keeps variances."""
+    rows = np.random.default_rng(0).standard_normal((10, 20))
+    found = shrunk_covariance(rows)
+    assert np.linalg.eigvalsh(found).min() > 0.05
+    assert np.diag(found) == pytest.approx((rows**2).mean(axis=0))
+
+
+def test_strong_correlations_stay_where_there_are_many_rows():
+    rng = np.random.default_rng(0)
+    common = rng.standard_normal((2000, 1))
+    rows = common + 0.5 * rng.standard_normal((2000, 4))
+    assert shrunk_covariance(rows)[0, 1] == pytest.approx(1.0, abs=0.1)
+
+
+def test_too_few_pours_are_refused():
+    sample = sample_of(np.random.default_rng(0), {"push": unit(0)}, pours=5)
+    with pytest.raises(StatisticsError, match="push: 5 pours"):
+        fold_shifts(sample, "push", metric_of(sample))
+
+
+def test_a_feature_that_never_varies_is_left_out():
+    rng = np.random.default_rng(0)
+    blocks = {name: (np.column_stack([rng.standard_normal(9), np.full(9, 3.0)]),) for name in ("base", "push")}
+    assert [block.shape[1] for block in ReferencePours(blocks, ()).varying().pours["push"]] == [1]

@@ -1,0 +1,166 @@
+"""Counting: intervals against statsmodels, answers and targets of made-up rows by hand."""
+
+import json
+import math
+import re
+from dataclasses import replace
+
+import pytest
+from statsmodels.stats.proportion import proportion_confint
+
+from doe.diagnose.posterior import NOTHING, OUTSIDE, PAIRS
+from doe.diagnose.verdict import THRESHOLD
+from doe.validation.sets import (
+    LEAST_P,
+    TEMPERATURES,
+    SetRow,
+    answer_to,
+    append_rows,
+    by_temperature,
+    read_rows,
+    scores,
+    targets,
+    wilson,
+)
+from explorer.tables.validation import campaign_text
+
+NAN = math.nan
+
+
+def row(number, kind, label, verdict, strength=NAN, after=NAN, offer="scan"):
+    return SetRow(
+        "blind", 5, number, kind, label, strength, "", offer, verdict, "", "", 0.1, 0.1, "a", 0.8, NAN,
+        {"base": 0.0}, {"base": 0.5}, NAN, 2.0 * after, after, NAN, NAN, 12, 1.5,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(("hits", "sets"), [(0, 150), (3, 150), (7, 9), (9, 9)])
+def test_wilson_interval_is_that_of_statsmodels(hits, sets):
+    assert wilson(hits, sets) == pytest.approx(proportion_confint(hits, sets, method="wilson"), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "label", "answer"),
+    [
+        ("no_missing_effect", "none", "nothing"),
+        ("no_missing_effect", "a", "nothing"),
+        ("effect:a", "a", "right"),
+        ("effect:a", "none", "wrong"),
+        ("effect:a", "a+b", "wrong"),
+        ("effects:b+a", "a+b", "right"),
+        ("effects:a+c", "a", "wrong"),
+        ("ambiguous:b,a", "a", "undecided"),
+        ("ambiguous:b,c", "a", "wrong"),
+        ("ambiguous:b,no_missing_effect", "a", "wrong"),
+        ("ambiguous:b,no_missing_effect", "none", "undecided"),
+        ("ambiguous:a+b,a+c", "a+b", "undecided"),
+        ("unexplained", "sticky_funnel", "unexplained"),
+        ("out of reach: bounds", "a", "out of reach"),
+    ],
+)
+def test_what_an_answer_is_worth(verdict, label, answer):
+    assert answer_to(verdict, label) == answer
+
+
+@pytest.mark.parametrize(
+    ("verdict", "named"),
+    [
+        ("effect:a", True),
+        ("effects:a+b", True),
+        ("ambiguous:a,b", True),
+        ("ambiguous:a,no_missing_effect", False),
+        ("ambiguous:unexplained,a", False),
+        ("no_missing_effect", False),
+        ("unexplained", False),
+    ],
+)
+def test_who_is_accused(verdict, named):
+    assert row(0, "null", "none", verdict).named is named
+
+
+def test_rows_come_back_as_they_were_written(tmp_path):
+    rows = [row(1, "null", "none", "no_missing_effect"), row(0, "effect", "a", "ambiguous:a,b", 6.0, 1.25)]
+    for one in rows:
+        append_rows(tmp_path / "sets.jsonl", [one])
+    assert [str(one) for one in read_rows(tmp_path / "sets.jsonl")] == [str(one) for one in reversed(rows)]
+    for line in (tmp_path / "sets.jsonl").read_text().splitlines():
+        assert json.loads(line)["root"] == 5
+
+
+def judged(number, kind, label, verdict, best, best_p, nothing=0.0, outside=0.0, truth_p=NAN):
+    one = row(number, kind, label, verdict, 6.0)
+    return replace(one, best=best, best_p=best_p, nothing=nothing, outside=outside, truth_p=truth_p)
+
+
+def test_scores_by_hand():
+    rows = [
+        judged(0, "null", "none", "no_missing_effect", "a", 0.1, nothing=0.8),
+        judged(1, "effect", "a", "effect:a", "a", 0.95, truth_p=0.95),
+        judged(2, "effect", "b", "ambiguous:a,b", "a", 0.6, truth_p=0.4),
+        judged(3, "effect", "b", "effect:b", "b", 1.0, truth_p=1.0),
+        judged(4, "pair", "a+b", "effect:a", "a", 0.92),
+        judged(5, "outside", "draught", "unexplained", "a", 0.2, outside=0.7),
+    ]
+    found = scores(rows)
+    # The pair was not weighed: its probability counts as the least.
+    p = [0.8, 0.95, 0.4, 1.0, LEAST_P, 0.7]
+    assert found.log_loss == pytest.approx(-sum(map(math.log, p)) / 6)
+    # By probability: b right at 1, a right at 0.95, then the pair's wrong name.
+    assert [(rate.hits, rate.sets) for rate in found.coverage] == [(2, 4)] * 3
+    assert [(one.right.hits, one.right.sets) for one in found.reliability] == [(0, 0), (0, 1), (2, 2), (1, 2), (1, 1)]
+    # a and b named rightly, and one of the pair: 3 of the 5 that act.
+    assert found.f1 == pytest.approx(2 * 3 / (2 * 3 + 2))
+
+
+def weighed(number, kind, label, **evidence):
+    return replace(row(number, kind, label, "unexplained", 6.0), evidence={"base": 0.0, "outside": -50.0} | evidence)
+
+
+def test_other_temperatures_by_hand():
+    rows = [
+        weighed(0, "effect", "a", a=8.0, b=2.0),
+        weighed(1, "effect", "a", a=2.0, b=8.0),
+        weighed(2, "null", "none", a=6.0, b=0.0),
+        weighed(3, "pair", "a+b", a=9.0, b=0.0),
+    ]
+    found = {one.temperature: one for one in by_temperature(rows)}
+    share = (1 - NOTHING - OUTSIDE - PAIRS) / 2
+    for temperature in TEMPERATURES:
+        one, total = found[temperature], NOTHING + share * (math.exp(8 * temperature) + math.exp(2 * temperature))
+        logs = [math.log(total / share) - x * temperature for x in (8, 2)]
+        logs += [math.log(1 + share * (1 + math.exp(6 * temperature)) / NOTHING)]
+        assert one.log_loss == pytest.approx(sum(logs) / 3, rel=1e-6)
+        sure = share * math.exp(8 * temperature) / total >= THRESHOLD
+        assert (one.right.hits, one.wrong.hits, one.right.sets) == (sure, sure, 2)
+        accused = share * math.exp(6 * temperature) / (NOTHING + share * (1 + math.exp(6 * temperature))) >= THRESHOLD
+        assert (one.false.hits, one.false.sets) == (accused, 1)
+    # Colder is surer.
+    assert not found[0.4].right.hits
+    assert found[1.0].right.hits
+    assert found[1.0].false.hits
+
+
+def test_targets_by_hand():
+    rows = [row(k, "null", "none", "no_missing_effect") for k in range(49)]
+    rows += [row(49, "null", "none", "ambiguous:a,b")]
+    rows += [row(50 + k, "effect", "a", "effect:a", 10.0, after) for k, after in enumerate((0.9, 1.0, 1.2, 1.4))]
+    rows += [row(54, "effect", "a", "effect:b", 10.0)]
+    rows += [row(55, "effect", "a", "out of reach: bounds", 6.0)]
+    rows += [row(56, "outside", "sticky_funnel", "unexplained"), row(57, "outside", "sticky_funnel", "effect:b")]
+    rows += [row(58, "pair", "a+b", "effect:a", 7.3), row(59, "pair", "a+b", "unexplained", 6.8)]
+    rows += [row(60, "effect", "a", "effect:b", 25.0), row(50, "effect", "a", "unexplained", 10.0, offer="scalars")]
+    found = {one.name: one for one in targets([one for one in rows if one.answer != "out of reach"], "scan")}
+    assert found["effect named where none is"].found.startswith("1/50 = 2.0 %")
+    # What is stronger than the test's strengths is not among its targets.
+    assert found["wrong name, effects of 6 and 10 σ and pairs"].found.startswith("2/7 = 28.6 %")
+    assert found["right name at 10 σ"].found.startswith("4/5 = 80.0 %")
+    assert found["right name at 6 σ"].met is None
+    assert found["holdout error ÷ noise floor, right names"].found == "1.10 over 4 sets"
+    assert found["holdout error ÷ noise floor ≤ 1.25, right names"].found.startswith("3/4 = 75.0 %")
+    assert found["outside effects called unexplained"].found.startswith("1/2")
+    assert found["outside effects blamed on the library"].found.startswith("1/2")
+    text = campaign_text(rows)
+    assert "60 of 61 data sets within reach" in text
+    assert re.search(r"effect, 10 σ +5 +0 +4 +0 +0 +1\n", text)
+    assert "wrong, set 5.54: a at 10 σ → effect:b" in text
+    assert "with scalars" in text

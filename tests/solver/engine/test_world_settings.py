@@ -1,0 +1,62 @@
+"""What a world is set up with arrives in the field of its name."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from solver.engine.kernels.neighbours import MOST
+from solver.engine.kernels.transfer import SETTINGS
+from solver.engine.tables import body_tables
+from solver.engine.world import Batch
+from solver.rigs import Funnel
+from solver.single_body.free_world import ROOM, grain_on_plate
+
+pytestmark = pytest.mark.usefixtures("taichi")
+
+DT = 1.25e-5
+CONVENTIONS = {"clump_rule": "local_mass", "tangential_law": "mindlin", "tangential_dashpot": "uncapped"}
+"""Second choice of each convention of the contact law."""
+GRAVITY = (0.5, -1.5, -9.0)
+
+
+def test_every_setting_arrives_in_its_own_field():
+    scene = grain_on_plate(gravity=GRAVITY)
+    scene = replace(
+        scene,
+        rig=Funnel(outlet_height=0.07, inlet_diameter=0.13, domain_half_width=0.31, wall="wall"),
+        numerics=replace(scene.numerics, skin=1.5e-4, sleep_speed=2.5e-4, sleep_time=0.0125),
+    )
+    bodies = body_tables(scene, np.zeros(3, dtype=np.int32))
+    batch = Batch(ROOM)
+    batch.load(0, scene, bodies, DT, (True,) * len(scene.rig.surfaces()))
+    world = {name.removeprefix("world."): values for name, values in batch.take(0).items() if name.startswith("world.")}
+    inside = scene.rig.container(0.0)
+    expected = {
+        "dt": DT,
+        "skin": 1.5e-4,
+        "cell": 2.0 * bodies.numbers[0, 4] + 2.0 * MOST * 1.5e-4,
+        "sleep_speed": 2.5e-4,
+        "sleep_time": 0.0125,
+        "domain": 0.31,
+        "outlet": inside.height,
+        "inlet_radius": inside.radius,
+        "clump_rule": 0.0,
+        "tangential_law": 0.0,
+        "tangential_dashpot": 0.0,
+    }
+    # Or two could change places unseen; the three that name a choice have a test of their own.
+    assert len({float(value) for value in expected.values()}) == len(expected) - len(CONVENTIONS) + 1
+    assert set(SETTINGS) == {*expected, "gravity"}
+    assert {name: float(world[name]) for name in expected} == expected
+    assert tuple(world["gravity"]) == GRAVITY
+
+
+@pytest.mark.parametrize("name", CONVENTIONS)
+def test_a_convention_of_the_contact_law_arrives_in_its_own_field(name):
+    scene = grain_on_plate()
+    scene = replace(scene, contact=replace(scene.contact, **{name: CONVENTIONS[name]}))
+    batch = Batch(ROOM)
+    batch.load(0, scene, body_tables(scene, np.zeros(1, dtype=np.int32)), DT, (True,))
+    world = batch.take(0)
+    assert {one: int(world[f"world.{one}"]) for one in CONVENTIONS} == {one: int(one == name) for one in CONVENTIONS}

@@ -1,0 +1,114 @@
+"""Worker processes: the same bits as in this process, errors that arrive, and nothing left behind."""
+
+import multiprocessing as mp
+import os
+import signal
+import subprocess
+import sys
+from collections import deque
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from solver import load_material, with_values
+from solver.pours.run import Job, run_pours
+from solver.pours.worker_pool import Rooms, WorkerPool, deaf_to_interrupts
+
+HEAP = with_values(
+    load_material("sunflower_extract"), {"rig.mass": 0.003, "body.spheres": "coarse", "numerics.max_time": 0.4}
+)
+
+
+@pytest.fixture(scope="module")
+def pool():
+    with WorkerPool(2) as workers:
+        yield workers
+
+
+def test_same_bits_as_in_one_process(taichi, pool):
+    jobs = [Job(HEAP, seed, tag=seed) for seed in range(3)]
+    apart = {job.tag: record for job, record in pool.run_queue(deque(jobs), [HEAP])}
+    here = dict(run_pours(jobs, worlds=2))
+    assert sorted(apart) == [0, 1, 2]
+    for seed, record in here.items():
+        np.testing.assert_array_equal(apart[seed].bodies.position, record.bodies.position)
+        assert apart[seed].outcome == record.outcome
+
+
+def test_jobs_may_be_added_while_it_runs(pool):
+    queue = deque([Job(HEAP, 1, tag=0)])
+    seen = []
+    for job, _ in pool.run_queue(queue, [HEAP]):
+        seen.append(job.tag)
+        if job.tag < 2:
+            queue.append(Job(HEAP, 2, tag=job.tag + 1))
+    assert seen == [0, 1, 2]
+
+
+def test_a_workers_error_arrives_with_its_text(pool):
+    queue = deque([Job(with_values(HEAP, {"rig.mass": 0.2}), 1)])
+    with pytest.raises(RuntimeError, match="a pour broke off"):
+        list(pool.run_queue(queue, [HEAP]))
+
+
+def test_a_worker_that_is_killed_is_named():
+    with WorkerPool(1) as pool:
+        pours = pool.run_queue(deque([Job(HEAP, 1), Job(HEAP, 2)]), [HEAP])
+        next(pours)
+        ((process, _),) = pool._processes
+        os.kill(process.pid, signal.SIGKILL)
+        with pytest.raises(RuntimeError, match="a worker process has ended"):
+            list(pours)
+
+
+def test_nothing_is_left_after_close():
+    pool = WorkerPool(1)
+    list(pool.run_queue(deque([Job(HEAP, 1)]), [HEAP]))
+    ((process, _),) = pool._processes
+    pool.close()
+    assert process.exitcode == 0
+
+
+def hears_interrupts(pipe):
+    pipe.send(signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ()))
+
+
+def test_a_process_is_deaf_to_interrupts_from_its_first_moment():
+    ours, theirs = mp.Pipe()
+    process = mp.get_context("spawn").Process(target=hears_interrupts, args=(theirs,))
+    with deaf_to_interrupts():
+        process.start()
+    assert not ours.recv()
+    process.join()
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+
+
+def test_so_is_the_first_one_of_a_program():
+    """With it multiprocessing starts its resource tracker, and lets Ctrl-C through again."""
+    name = "tests.solver.pours.test_worker_pool"
+    code = f"from {name} import test_a_process_is_deaf_to_interrupts_from_its_first_moment as t; t()"
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=Path(__file__).parents[3])
+
+
+def test_a_scene_without_effects_in_the_kernels_has_a_room_without_them(taichi):
+    """Whatever else was asked for; a tilt is a matter of the set-up and needs none."""
+    rolling = with_values(HEAP, {"effect.rolling_resistance.rolling_friction": 0.1})
+    tilted = with_values(HEAP, {"effect.plate_tilt.tilt_x": 2.0})
+    rooms = Rooms()
+    rooms.make([rolling, HEAP])
+    assert rooms.for_scene(rolling).capacity.effects
+    assert not rooms.for_scene(HEAP).capacity.effects
+    assert rooms.for_scene(tilted) is rooms.for_scene(HEAP)
+
+
+def test_a_room_is_kept_until_it_is_too_small(taichi):
+    rooms = Rooms()
+    rooms.make([HEAP])
+    first = rooms.for_scene(HEAP)
+    rooms.make([with_values(HEAP, {"rig.mass": 0.001})])
+    assert rooms.for_scene(HEAP) is first
+    larger = with_values(HEAP, {"rig.mass": 0.1})
+    rooms.make([larger])
+    assert rooms.for_scene(larger).capacity.bodies > first.capacity.bodies
+    assert rooms.for_scene(HEAP) is rooms.for_scene(larger)
