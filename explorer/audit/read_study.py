@@ -1,8 +1,7 @@
 """A folder with study.toml and CSV files → `doe.audit.PublishedStudy`. The format: doe/audit/README.md.
 
-The stages of a calibration in a study.toml: screening, ascent, surface, optimum, verification.
-
-The CSV files of a published study: text as printed, with file, line and column for whoever has to mend it.
+study.toml declares the target, single claims, and the stages of a calibration: screening, ascent, surface, optimum,
+verification. The CSV files hold text as printed, with file, line and column for whoever has to mend it.
 """
 
 from __future__ import annotations
@@ -42,264 +41,15 @@ from doe.table_file import read_table as read_cells
 from explorer.audit.entries import Entries, read_entries
 from solver.assets import asset_path
 
-MOST_BYTES = 2_000_000
-
-"""Bytes of one file; published tables hold thousands."""
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table as text: column → cells; ``lines`` are the line numbers of its rows."""
-
-    name: str
-    columns: Mapping[str, tuple[str, ...]]
-    lines: tuple[int, ...]
-
-    @property
-    def rows(self) -> int:
-        """Number of rows."""
-        return len(self.lines)
-
-    def texts(self, column: str) -> tuple[str, ...]:
-        """Cells of a column; AuditError where there is none of that name."""
-        if column not in self.columns:
-            raise AuditError(f"{self.name}: no column {column!r}; it has {', '.join(self.columns)}")
-        return self.columns[column]
-
-    def numbers(self, column: str) -> tuple[Printed, ...]:
-        """A column in which every cell is a number."""
-        return tuple(self.number(column, row) for row in range(self.rows))
-
-    def number(self, column: str, row: int) -> Printed:
-        """One cell; AuditError names file, line and column where it is no number."""
-        try:
-            return printed(self.texts(column)[row])
-        except AuditError as error:
-            raise AuditError(f"{self.name}, line {self.lines[row]}, {column}: {error}") from None
-
-    def number_or_none(self, column: str, row: int) -> Printed | None:
-        """One cell, None where it is empty or the column is not there."""
-        return self.number(column, row) if self.columns.get(column, ())[row : row + 1] not in ((), ("",)) else None
-
-
-def places(table: Table, value: Printed) -> tuple[str, ...]:
-    """Where the table prints ``value``, in words: "restitution of petiole–petiole"; a row is named by its words."""
-    found = []
-    for row in range(table.rows):
-        cells = {column: texts[row] for column, texts in table.columns.items()}
-        numbers = {column: printed_or_none(text) for column, text in cells.items()}
-        name = "–".join(text for column, text in cells.items() if text and numbers[column] is None) or f"row {row + 1}"
-        like = [c for c, number in numbers.items() if number and not number.bound and value.agrees(number.value)]
-        found += [f"{column} of {name}" for column in like]
-    return tuple(found)
-
-
-def read_table(folder: Path, name: str) -> Table:
-    """A CSV file of a study's folder. Raises AuditError for what is not one, OSError for what cannot be opened."""
-    if Path(name).name != name or not name:
-        raise AuditError(f"{name!r} is not the name of a file beside study.toml")
-    path = folder / name
-    table = read_cells(path, MOST_BYTES, AuditError)
-    if len(table.rows) < 2:
-        raise AuditError(f"{path}: a line of column names and at least one row are needed")
-    (_, header), *rows = table.rows
-    if len(set(header)) < len(header) or "" in header:
-        raise AuditError(f"{path}: column names must be there and differ: {', '.join(header)}")
-    for number, row in rows:
-        if len(row) != len(header):
-            raise AuditError(f"{path}, line {number}: {len(row)} cells; the table has {len(header)} columns")
-    # Numbers as printed, but with a point: everything behind reads their digits. Words keep their commas.
-    cells = zip(
-        *([plain if printed_or_none(plain := table.plain(cell)) else cell for cell in row] for _, row in rows),
-        strict=True,
-    )
-    columns = dict(zip(header, cells, strict=True))
-    return Table(name, columns, tuple(number for number, _ in rows))
-
-
 FloatArray = npt.NDArray[np.float64]
-
-STATISTICS = ("r_squared", "r_squared_adjusted", "r_squared_predicted", "cv_percent", "adequate_precision", "sigma")
-
-MOST_FACTORS = 8
-
-"""Of a second-order surface: 45 terms."""
-
-
-def read_screening(entries: Entries, folder: Path) -> Screening:
-    """``[screening]``: its factors (factor, low, high) and ANOVA (factor, sum_of_squares, f_value, p_value)."""
-    runs = read_table(folder, entries.text("runs"))
-    factors, anova = read_table(folder, entries.text("factors")), read_table(folder, entries.text("anova"))
-    names = factors.texts("factor")
-    if anova.texts("factor") != names:
-        raise AuditError(f"{anova.name}: its factors are not those of {factors.name}, in the same order")
-    design = _numbers(runs, names) if entries.flag("design", False) else None
-    ranges = tuple(
-        ScreenedFactor(name, factors.number("low", k).value, factors.number("high", k).value)
-        for k, name in enumerate(names)
-    )
-    for row, one in enumerate(ranges):
-        if not one.low < one.high:
-            raise AuditError(f"{factors.name}, line {factors.lines[row]}: low must be below high")
-    level = entries.number("level", 0.0, 1.0) if "level" in entries else 0.05
-    significant = entries.texts("significant") if "significant" in entries else None
-    unknown = [name for name in significant or () if name not in names]
-    if unknown:
-        raise entries.error("significant", f"{unknown[0]!r} is not one of {', '.join(names)}")
-    if runs.rows <= len(names):
-        raise AuditError(f"{runs.name}: {runs.rows} runs cannot tell {len(names)} factors; one more is needed")
-    return Screening(
-        where_runs=entries.text("where_runs"),
-        where_anova=entries.text("where_anova"),
-        factors=ranges,
-        responses=runs.numbers(entries.text("response")),
-        design=design,
-        error_df=entries.whole("error_df", 1),
-        sums=anova.numbers("sum_of_squares"),
-        f=anova.numbers("f_value") if "f_value" in anova.columns else (),
-        p=anova.numbers("p_value") if "p_value" in anova.columns else (),
-        total=entries.figure_or_none("total"),
-        significant=significant,
-        level=level,
-        level_of_others=entries.number("level_of_others", 0.0, 1.0) if "level_of_others" in entries else level,
-    )
-
-
-def read_ascent(entries: Entries, folder: Path) -> Ascent:
-    """``[ascent]`` with ``[ascent.factors]``: name in the screening → column of its settings."""
-    table, columns = read_table(folder, entries.text("file")), entries.table("factors")
-    names = columns.names()
-    if not names:
-        raise entries.error("factors", "at least one is needed")
-    steps = table.texts(entries.text("step"))
-    best = entries.text("best") if "best" in entries else None
-    if best is not None and best not in steps:
-        raise entries.error("best", f"{best!r} is not one of {', '.join(steps)}")
-    return Ascent(
-        where=entries.text("where"),
-        factors=names,
-        steps=steps,
-        settings=_numbers(table, tuple(columns.text(name) for name in names)),
-        responses=table.numbers(entries.text("response")),
-        errors=table.numbers(entries.text("error")) if "error" in entries else (),
-        best=best,
-    )
-
-
-def read_surface(entries: Entries, folder: Path, ascent: Ascent | None) -> SurfaceStudy:
-    """``[surface]`` with ``[[surface.factor]]``, ``[surface.statistics]`` and ``[surface.equation]``; ``ascent`` is the
-    walk that its levels may be said to be steps of."""
-    runs, anova = read_table(folder, entries.text("runs")), read_table(folder, entries.text("anova"))
-    factors = entries.tables("factor")
-    if not 1 <= len(factors) <= MOST_FACTORS:
-        raise entries.error("factor", f"{len(factors)} factors; allowed: 1 … {MOST_FACTORS}")
-    names = tuple(one.text("name") for one in factors)
-    if len(set(names)) < len(names):
-        raise entries.error("factor", f"names must differ: {', '.join(names)}")
-    low = np.array([one.number("low") for one in factors])
-    high = np.array([one.number("high") for one in factors])
-    if not (low < high).all():
-        raise entries.error("factor", "low must be below high")
-    levels = _numbers(runs, tuple(one.text("column") for one in factors))
-    screened = tuple(one.text("screened", name) for one, name in zip(factors, names, strict=True))
-    for one in factors:
-        one.finish()
-    coded = levels if entries.flag("coded", True) else (2 * levels - low - high) / (high - low)
-    where_runs = entries.text("where_runs")
-    where_anova = entries.text("where_anova")
-    given = entries.table("statistics") if "statistics" in entries else None
-    statistics = {} if given is None else {key: given.figure(key) for key in STATISTICS if key in given}
-    if given is not None:
-        given.finish()
-    return SurfaceStudy(
-        where_runs=where_runs,
-        where_anova=where_anova,
-        where_statistics=entries.text("where_statistics", where_anova),
-        factors=names,
-        screened=screened,
-        low=low,
-        high=high,
-        coded=coded,
-        responses=runs.numbers(entries.text("response")),
-        anova=tuple(_anova_line(anova, row) for row in range(anova.rows)),
-        statistics=statistics,
-        equation=_equation(entries.table("equation"), names) if "equation" in entries else None,
-        steps=_steps(entries.table("steps"), ascent) if "steps" in entries else None,
-    )
-
-
-def read_optimum(entries: Entries, surface: SurfaceStudy | None) -> Optimum:
-    """``[optimum]`` with ``values``: factor of the surface → its value, natural unit."""
-    if surface is None:
-        raise entries.error("values", "there is no [surface] that this could be the optimum of")
-    values = entries.table("values")
-    found = Optimum(
-        where=entries.text("where"),
-        values=tuple(values.figure(name) for name in surface.factors),
-        predicted=entries.figure_or_none("predicted"),
-    )
-    values.finish()
-    entries.finish()
-    return found
-
-
-def read_verified(entries: Entries, folder: Path) -> Verified:
-    """``[verification]``."""
-    table = read_table(folder, entries.text("file"))
-    return Verified(
-        where=entries.text("where"),
-        responses=table.numbers(entries.text("response")),
-        mean=entries.figure_or_none("mean"),
-        relative_error_percent=entries.figure_or_none("relative_error_percent"),
-        p_two_sample=entries.figure_or_none("p_two_sample"),
-    )
-
-
-def _numbers(table: Table, columns: tuple[str, ...]) -> FloatArray:
-    """Columns as values, shape (rows, columns)."""
-    return np.array([[cell.value for cell in table.numbers(column)] for column in columns]).T
-
-
-def _steps(entries: Entries, ascent: Ascent | None) -> DesignSteps:
-    found = {}
-    for key in ("low", "centre", "high"):
-        found[key] = entries.text(key)
-        if ascent is None or found[key] not in ascent.steps:
-            known = "there is no [ascent]" if ascent is None else f"allowed: {', '.join(ascent.steps)}"
-            raise entries.error(key, f"{found[key]!r} is no step of the ascent; {known}")
-    entries.finish()
-    return DesignSteps(**found)
-
-
-def _anova_line(table: Table, row: int) -> AnovaLine:
-    cells = {key: table.number_or_none(key, row) for key in ("sum_of_squares", "df", "mean_square")}
-    return AnovaLine(
-        table.texts("source")[row],
-        **cells,
-        f=table.number_or_none("f_value", row),
-        p=table.number_or_none("p_value", row),
-    )
-
-
-def _equation(entries: Entries, factors: tuple[str, ...]) -> Equation:
-    units = entries.text("units")
-    if units not in ("coded", "natural"):
-        raise entries.error("units", f"{units!r} is not one of coded, natural")
-    terms, known = entries.table("terms"), ("1", *term_names(factors)[1:])
-    coefficients = {}
-    for key in terms.names():
-        name = key if key == "1" else source_name(key, factors)
-        if name not in known:
-            raise terms.error(key, f"is not one of {', '.join(known)}")
-        coefficients[name] = terms.figure(key)
-    equation = Equation(entries.text("where"), units == "coded", coefficients)
-    entries.finish()
-    return equation
-
-
-FORMAT = 1
-
 Part = TypeVar("Part")
+
+MOST_BYTES = 2_000_000
+"""Bytes of one file; published tables hold thousands."""
+STATISTICS = ("r_squared", "r_squared_adjusted", "r_squared_predicted", "cv_percent", "adequate_precision", "sigma")
+MOST_FACTORS = 8
+"""Of a second-order surface: 45 terms."""
+FORMAT = 1
 
 
 def shipped_study() -> Path:
@@ -455,3 +205,244 @@ def _drop_test(entries: Entries, folder: Path) -> DropTest:
 def _labels(table: Table, entries: Entries) -> tuple[str, ...]:
     """Names of the rows: cells of the column `label`, or of the first one."""
     return table.texts(entries.text("label", next(iter(table.columns))))
+
+
+def read_screening(entries: Entries, folder: Path) -> Screening:
+    """``[screening]``: its factors (factor, low, high) and ANOVA (factor, sum_of_squares, f_value, p_value)."""
+    runs = read_table(folder, entries.text("runs"))
+    factors, anova = read_table(folder, entries.text("factors")), read_table(folder, entries.text("anova"))
+    names = factors.texts("factor")
+    if anova.texts("factor") != names:
+        raise AuditError(f"{anova.name}: its factors are not those of {factors.name}, in the same order")
+    design = _numbers(runs, names) if entries.flag("design", False) else None
+    ranges = tuple(
+        ScreenedFactor(name, factors.number("low", k).value, factors.number("high", k).value)
+        for k, name in enumerate(names)
+    )
+    for row, one in enumerate(ranges):
+        if not one.low < one.high:
+            raise AuditError(f"{factors.name}, line {factors.lines[row]}: low must be below high")
+    level = entries.number("level", 0.0, 1.0) if "level" in entries else 0.05
+    significant = entries.texts("significant") if "significant" in entries else None
+    unknown = [name for name in significant or () if name not in names]
+    if unknown:
+        raise entries.error("significant", f"{unknown[0]!r} is not one of {', '.join(names)}")
+    if runs.rows <= len(names):
+        raise AuditError(f"{runs.name}: {runs.rows} runs cannot tell {len(names)} factors; one more is needed")
+    return Screening(
+        where_runs=entries.text("where_runs"),
+        where_anova=entries.text("where_anova"),
+        factors=ranges,
+        responses=runs.numbers(entries.text("response")),
+        design=design,
+        error_df=entries.whole("error_df", 1),
+        sums=anova.numbers("sum_of_squares"),
+        f=anova.numbers("f_value") if "f_value" in anova.columns else (),
+        p=anova.numbers("p_value") if "p_value" in anova.columns else (),
+        total=entries.figure_or_none("total"),
+        significant=significant,
+        level=level,
+        level_of_others=entries.number("level_of_others", 0.0, 1.0) if "level_of_others" in entries else level,
+    )
+
+
+def read_ascent(entries: Entries, folder: Path) -> Ascent:
+    """``[ascent]`` with ``[ascent.factors]``: name in the screening → column of its settings."""
+    table, columns = read_table(folder, entries.text("file")), entries.table("factors")
+    names = columns.names()
+    if not names:
+        raise entries.error("factors", "at least one is needed")
+    steps = table.texts(entries.text("step"))
+    best = entries.text("best") if "best" in entries else None
+    if best is not None and best not in steps:
+        raise entries.error("best", f"{best!r} is not one of {', '.join(steps)}")
+    return Ascent(
+        where=entries.text("where"),
+        factors=names,
+        steps=steps,
+        settings=_numbers(table, tuple(columns.text(name) for name in names)),
+        responses=table.numbers(entries.text("response")),
+        errors=table.numbers(entries.text("error")) if "error" in entries else (),
+        best=best,
+    )
+
+
+def read_surface(entries: Entries, folder: Path, ascent: Ascent | None) -> SurfaceStudy:
+    """``[surface]`` with ``[[surface.factor]]``, ``[surface.statistics]`` and ``[surface.equation]``; ``ascent`` is the
+    walk that its levels may be said to be steps of."""
+    runs, anova = read_table(folder, entries.text("runs")), read_table(folder, entries.text("anova"))
+    factors = entries.tables("factor")
+    if not 1 <= len(factors) <= MOST_FACTORS:
+        raise entries.error("factor", f"{len(factors)} factors; allowed: 1 … {MOST_FACTORS}")
+    names = tuple(one.text("name") for one in factors)
+    if len(set(names)) < len(names):
+        raise entries.error("factor", f"names must differ: {', '.join(names)}")
+    low = np.array([one.number("low") for one in factors])
+    high = np.array([one.number("high") for one in factors])
+    if not (low < high).all():
+        raise entries.error("factor", "low must be below high")
+    levels = _numbers(runs, tuple(one.text("column") for one in factors))
+    screened = tuple(one.text("screened", name) for one, name in zip(factors, names, strict=True))
+    for one in factors:
+        one.finish()
+    coded = levels if entries.flag("coded", True) else (2 * levels - low - high) / (high - low)
+    where_runs = entries.text("where_runs")
+    where_anova = entries.text("where_anova")
+    given = entries.table("statistics") if "statistics" in entries else None
+    statistics = {} if given is None else {key: given.figure(key) for key in STATISTICS if key in given}
+    if given is not None:
+        given.finish()
+    return SurfaceStudy(
+        where_runs=where_runs,
+        where_anova=where_anova,
+        where_statistics=entries.text("where_statistics", where_anova),
+        factors=names,
+        screened=screened,
+        low=low,
+        high=high,
+        coded=coded,
+        responses=runs.numbers(entries.text("response")),
+        anova=tuple(_anova_line(anova, row) for row in range(anova.rows)),
+        statistics=statistics,
+        equation=_equation(entries.table("equation"), names) if "equation" in entries else None,
+        steps=_steps(entries.table("steps"), ascent) if "steps" in entries else None,
+    )
+
+
+def _steps(entries: Entries, ascent: Ascent | None) -> DesignSteps:
+    found = {}
+    for key in ("low", "centre", "high"):
+        found[key] = entries.text(key)
+        if ascent is None or found[key] not in ascent.steps:
+            known = "there is no [ascent]" if ascent is None else f"allowed: {', '.join(ascent.steps)}"
+            raise entries.error(key, f"{found[key]!r} is no step of the ascent; {known}")
+    entries.finish()
+    return DesignSteps(**found)
+
+
+def _anova_line(table: Table, row: int) -> AnovaLine:
+    cells = {key: table.number_or_none(key, row) for key in ("sum_of_squares", "df", "mean_square")}
+    return AnovaLine(
+        table.texts("source")[row],
+        **cells,
+        f=table.number_or_none("f_value", row),
+        p=table.number_or_none("p_value", row),
+    )
+
+
+def _equation(entries: Entries, factors: tuple[str, ...]) -> Equation:
+    units = entries.text("units")
+    if units not in ("coded", "natural"):
+        raise entries.error("units", f"{units!r} is not one of coded, natural")
+    terms, known = entries.table("terms"), ("1", *term_names(factors)[1:])
+    coefficients = {}
+    for key in terms.names():
+        name = key if key == "1" else source_name(key, factors)
+        if name not in known:
+            raise terms.error(key, f"is not one of {', '.join(known)}")
+        coefficients[name] = terms.figure(key)
+    equation = Equation(entries.text("where"), units == "coded", coefficients)
+    entries.finish()
+    return equation
+
+
+def read_optimum(entries: Entries, surface: SurfaceStudy | None) -> Optimum:
+    """``[optimum]`` with ``values``: factor of the surface → its value, natural unit."""
+    if surface is None:
+        raise entries.error("values", "there is no [surface] that this could be the optimum of")
+    values = entries.table("values")
+    found = Optimum(
+        where=entries.text("where"),
+        values=tuple(values.figure(name) for name in surface.factors),
+        predicted=entries.figure_or_none("predicted"),
+    )
+    values.finish()
+    entries.finish()
+    return found
+
+
+def read_verified(entries: Entries, folder: Path) -> Verified:
+    """``[verification]``."""
+    table = read_table(folder, entries.text("file"))
+    return Verified(
+        where=entries.text("where"),
+        responses=table.numbers(entries.text("response")),
+        mean=entries.figure_or_none("mean"),
+        relative_error_percent=entries.figure_or_none("relative_error_percent"),
+        p_two_sample=entries.figure_or_none("p_two_sample"),
+    )
+
+
+def _numbers(table: Table, columns: tuple[str, ...]) -> FloatArray:
+    """Columns as values, shape (rows, columns)."""
+    return np.array([[cell.value for cell in table.numbers(column)] for column in columns]).T
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table as text: column → cells; ``lines`` are the line numbers of its rows."""
+
+    name: str
+    columns: Mapping[str, tuple[str, ...]]
+    lines: tuple[int, ...]
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return len(self.lines)
+
+    def texts(self, column: str) -> tuple[str, ...]:
+        """Cells of a column; AuditError where there is none of that name."""
+        if column not in self.columns:
+            raise AuditError(f"{self.name}: no column {column!r}; it has {', '.join(self.columns)}")
+        return self.columns[column]
+
+    def numbers(self, column: str) -> tuple[Printed, ...]:
+        """A column in which every cell is a number."""
+        return tuple(self.number(column, row) for row in range(self.rows))
+
+    def number(self, column: str, row: int) -> Printed:
+        """One cell; AuditError names file, line and column where it is no number."""
+        try:
+            return printed(self.texts(column)[row])
+        except AuditError as error:
+            raise AuditError(f"{self.name}, line {self.lines[row]}, {column}: {error}") from None
+
+    def number_or_none(self, column: str, row: int) -> Printed | None:
+        """One cell, None where it is empty or the column is not there."""
+        return self.number(column, row) if self.columns.get(column, ())[row : row + 1] not in ((), ("",)) else None
+
+
+def read_table(folder: Path, name: str) -> Table:
+    """A CSV file of a study's folder. Raises AuditError for what is not one, OSError for what cannot be opened."""
+    if Path(name).name != name or not name:
+        raise AuditError(f"{name!r} is not the name of a file beside study.toml")
+    path = folder / name
+    table = read_cells(path, MOST_BYTES, AuditError)
+    if len(table.rows) < 2:
+        raise AuditError(f"{path}: a line of column names and at least one row are needed")
+    (_, header), *rows = table.rows
+    if len(set(header)) < len(header) or "" in header:
+        raise AuditError(f"{path}: column names must be there and differ: {', '.join(header)}")
+    for number, row in rows:
+        if len(row) != len(header):
+            raise AuditError(f"{path}, line {number}: {len(row)} cells; the table has {len(header)} columns")
+    # Numbers as printed, but with a point: everything behind reads their digits. Words keep their commas.
+    cells = zip(
+        *([plain if printed_or_none(plain := table.plain(cell)) else cell for cell in row] for _, row in rows),
+        strict=True,
+    )
+    columns = dict(zip(header, cells, strict=True))
+    return Table(name, columns, tuple(number for number, _ in rows))
+
+
+def places(table: Table, value: Printed) -> tuple[str, ...]:
+    """Where the table prints ``value``, in words: "restitution of petiole–petiole"; a row is named by its words."""
+    found = []
+    for row in range(table.rows):
+        cells = {column: texts[row] for column, texts in table.columns.items()}
+        numbers = {column: printed_or_none(text) for column, text in cells.items()}
+        name = "–".join(text for column, text in cells.items() if text and numbers[column] is None) or f"row {row + 1}"
+        like = [c for c, number in numbers.items() if number and not number.bound and value.agrees(number.value)]
+        found += [f"{column} of {name}" for column in like]
+    return tuple(found)

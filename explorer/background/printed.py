@@ -1,6 +1,6 @@
-"""What a command of the command line prints, for a page that waits for it in a thread: the solver runs beside it.
+"""What a command of the command line prints, for a page that waits for it in a thread while the solver runs beside it.
 
-A scene of the page as a file that commands in other processes take.
+A scene of the page reaches such a command as a material file.
 """
 
 from __future__ import annotations
@@ -18,10 +18,9 @@ from explorer.scene.text import material_toml
 from solver import Scene
 
 FAILURE = 1
-
 """Exit code of a command that has done its work and has no good news."""
-
 LONGEST_LINE = 300
+TITLE_LETTERS = 20
 
 
 def printed(arguments: Sequence[str], program: Sequence[str] = PROGRAM) -> str:
@@ -46,9 +45,6 @@ def printed(arguments: Sequence[str], program: Sequence[str] = PROGRAM) -> str:
         return said.strip()
     lines = refused.strip().splitlines() or [f"{arguments[0]} ended with exit code {process.returncode}"]
     raise CommandError(lines[-1].removeprefix("error: ")[:LONGEST_LINE])
-
-
-TITLE_LETTERS = 20
 
 
 def kept_scene(scene: Scene, folder: Path) -> Path:

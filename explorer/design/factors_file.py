@@ -1,4 +1,4 @@
-"""The factors file of a design, TOML.
+"""The factors file of a design, TOML, and the names in it and on the command line that are allowed.
 
 title = "…"                       what is studied
 responses = ["strength_MPa"]      columns to fill in (one called "response" if not given)
@@ -10,8 +10,6 @@ low, high                         the range; in the design −1 and +1
 unit = "°C"                       shown, never converted
 reference                         the measured or present value, near which a solution is looked for; by default the
                                   middle
-
-Names that the command line offers: axial points, orders of the model.
 """
 
 from __future__ import annotations
@@ -33,18 +31,28 @@ from doe.studies.study_table import entries, number, only, required, whole
 from explorer.errors import CommandError
 
 NAME = re.compile(r"[^\W\d][\w-]{0,59}")
-
 UNIT = re.compile(r"[^\s=@|,;\[\]\"'`<>][^|,;\[\]\"`<>\n]{0,19}")
-
 RESERVED = ("row", "replicate", "run", "seed")
-
 """Columns of the sheet that are not factors."""
-
 MOST_FACTORS = 47
-
 TOP_KEYS = ("title", "responses", "replicates", "centre", "seed", "first_seed", "factor")
-
 FACTOR_KEYS = ("name", "low", "high", "unit", "reference")
+
+
+class Alpha(StrEnum):
+    """Where the axial points of a central composite design stand."""
+
+    ROTATABLE = "rotatable"
+    FACE_CENTRED = "face-centred"
+    INSCRIBED = "inscribed"
+
+
+class ModelOrder(StrEnum):
+    """Orders of the polynomial."""
+
+    LINEAR = "linear"
+    INTERACTIONS = "interactions"
+    QUADRATIC = "quadratic"
 
 
 @dataclass(frozen=True)
@@ -156,19 +164,3 @@ def _factor(entry: dict[str, Any], position: int) -> Factor:
     only(entry, FACTOR_KEYS, where)
     required(entry, ("name", "low", "high"), where)
     return make_factor(entry["name"], entry["low"], entry["high"], entry.get("unit", ""), entry.get("reference"), where)
-
-
-class Alpha(StrEnum):
-    """Where the axial points of a central composite design stand."""
-
-    ROTATABLE = "rotatable"
-    FACE_CENTRED = "face-centred"
-    INSCRIBED = "inscribed"
-
-
-class ModelOrder(StrEnum):
-    """Orders of the polynomial."""
-
-    LINEAR = "linear"
-    INTERACTIONS = "interactions"
-    QUADRATIC = "quadratic"

@@ -1,9 +1,8 @@
-"""Reading a filled sheet: from this program, from a spreadsheet that saved it, or from any CSV with a factors file.
+"""A filled sheet: read from this program, a spreadsheet that saved it, or any CSV with a factors file; and its runs.
 
 Cells and numbers as `doe.table_file` reads them. A cell that cannot be read is named by its line in the file (the row
-of a spreadsheet) and its column.
-
-The runs of one response of a filled sheet: coded levels, replicates side by side, and what each run is called.
+of a spreadsheet) and its column. The runs of one response have coded levels, replicates side by side, and what each run
+is called.
 """
 
 from __future__ import annotations
@@ -22,11 +21,14 @@ from doe.table_file import CellTable, read_table
 from explorer.design.factors_file import RESERVED, Factor, make_factor, no_repeats, region_of
 from explorer.errors import CommandError
 
+Array = npt.NDArray[np.float64]
+
 MISSING = ("", "NA", "-", "–")
-
 MOST_BYTES = 10_000_000
-
 HEADER_CELL = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<unit>[^\]]*)\])?$")
+WORDS = re.compile(r"[^<>&\"'`\x00-\x1f]{0,60}")
+SNAP = 1e-6
+"""A coded level this near to low, middle or high is that level: what twelve digits and a spreadsheet leave."""
 
 
 @dataclass(frozen=True)
@@ -144,15 +146,6 @@ def _columns(path: Path, titles: list[tuple[str, str]]) -> dict[str, int]:
 def short(text: str) -> str:
     """``text`` in quotes, with its first 37 characters where it is long."""
     return repr(text if len(text) <= 40 else text[:37] + "…")
-
-
-Array = npt.NDArray[np.float64]
-
-WORDS = re.compile(r"[^<>&\"'`\x00-\x1f]{0,60}")
-
-SNAP = 1e-6
-
-"""A coded level this near to low, middle or high is that level: what twelve digits and a spreadsheet leave."""
 
 
 @dataclass(frozen=True)

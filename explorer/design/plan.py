@@ -1,6 +1,4 @@
-"""A design with its replicates in the order in which it is run.
-
-The sheet of a design: a CSV file that is filled in anywhere and read again.
+"""A design with its replicates in the order in which it is run, and its sheet: a CSV file to fill in anywhere.
 
 # design | box-behnken | …                          what it is
 # factor | shear_modulus | 46.18 | 58.34 | MPa | 56.3      name, low, high, unit, reference
@@ -27,7 +25,6 @@ from explorer.errors import CommandError
 Array = npt.NDArray[np.float64]
 
 MOST_RUNS = 20_000
-
 OPTIONS = {
     "runs": "--runs",
     "fold": "--fold",
@@ -36,8 +33,9 @@ OPTIONS = {
     "alpha": "--alpha",
     "centre": "--centre",
 }
-
 """Option of a design → how it is spelt on the command line."""
+COLUMNS = ("row", "replicate", "run", "seed")
+SEPARATOR = " | "
 
 
 @dataclass(frozen=True)
@@ -115,11 +113,6 @@ def _refuse_foreign_options(design: Design, options: DesignOptions) -> None:
 
 def _first(*values: int | None) -> int:
     return next(value for value in values if value is not None)
-
-
-COLUMNS = ("row", "replicate", "run", "seed")
-
-SEPARATOR = " | "
 
 
 def sheet_text(plan: Plan, file: FactorsFile) -> str:

@@ -1,6 +1,6 @@
-"""What `explorer design` says about a design: its size, aliases, and what it will be able to see.
+"""What `explorer design` and `explorer analyse` print.
 
-An analysed design for the terminal: the answer, then the tables behind it.
+A design: its size, its aliases, and what it will be able to see. An analysis: the answer, then the tables behind it.
 """
 
 from __future__ import annotations
@@ -69,23 +69,16 @@ def plan_text(plan: Plan, file: FactorsFile, sigma: float | None, effect: float 
     return "\n\n".join([*parts, *plan.points.notes, _power_text(plan, sigma, effect)])
 
 
-def planned_order(plan: Plan) -> Order | None:
-    """The model that the runs will bear; None where they leave no error even for the linear one."""
-    letters = factor_letters(plan.coded.shape[1])
-    values = np.zeros((len(plan.coded), plan.replicates))
-    if plan.design.main_effects_only or not bearable(plan.coded, values, letters, terms_of(letters, "linear")):
-        return "linear" if bearable(plan.coded, values, letters, terms_of(letters, "linear")) else None
-    return highest_order(plan.coded, values, letters)
-
-
-def _power(plan: Plan, sigma: float | None, effect: float | None) -> tuple[TermPrecision, ...]:
-    order = planned_order(plan)
-    if order is None:
-        return ()
-    letters = factor_letters(plan.coded.shape[1])
-    runs = plan.coded[plan.sequence[:, 0]]
-    # Without a sigma everything is counted in it.
-    return precision(runs, letters, terms_of(letters, order), sigma or 1.0, effect or math.nan)
+def _beyond(plan: Plan, file: FactorsFile) -> list[str]:
+    """A sentence about runs beyond low … high, which a laboratory may not be able to make."""
+    if np.abs(plan.coded).max() <= 1 + 1e-9:
+        return []
+    natural = region_of(file.factors).natural(plan.coded)
+    ends = [
+        f"{factor.name} {number(low, 6)} … {number(high, 6)}"
+        for factor, low, high in zip(file.factors, natural.min(axis=0), natural.max(axis=0), strict=True)
+    ]
+    return [f"The axial runs go beyond low … high: {enumeration(ends)}. --alpha inscribed keeps them within."]
 
 
 def _power_text(plan: Plan, sigma: float | None, effect: float | None) -> str:
@@ -115,20 +108,23 @@ def _power_text(plan: Plan, sigma: float | None, effect: float | None) -> str:
     )
 
 
-def _beyond(plan: Plan, file: FactorsFile) -> list[str]:
-    """A sentence about runs beyond low … high, which a laboratory may not be able to make."""
-    if np.abs(plan.coded).max() <= 1 + 1e-9:
-        return []
-    natural = region_of(file.factors).natural(plan.coded)
-    ends = [
-        f"{factor.name} {number(low, 6)} … {number(high, 6)}"
-        for factor, low, high in zip(file.factors, natural.min(axis=0), natural.max(axis=0), strict=True)
-    ]
-    return [f"The axial runs go beyond low … high: {enumeration(ends)}. --alpha inscribed keeps them within."]
+def planned_order(plan: Plan) -> Order | None:
+    """The model that the runs will bear; None where they leave no error even for the linear one."""
+    letters = factor_letters(plan.coded.shape[1])
+    values = np.zeros((len(plan.coded), plan.replicates))
+    if plan.design.main_effects_only or not bearable(plan.coded, values, letters, terms_of(letters, "linear")):
+        return "linear" if bearable(plan.coded, values, letters, terms_of(letters, "linear")) else None
+    return highest_order(plan.coded, values, letters)
 
 
-def _cell(value: float) -> str:
-    return number(value)
+def _power(plan: Plan, sigma: float | None, effect: float | None) -> tuple[TermPrecision, ...]:
+    order = planned_order(plan)
+    if order is None:
+        return ()
+    letters = factor_letters(plan.coded.shape[1])
+    runs = plan.coded[plan.sequence[:, 0]]
+    # Without a sigma everything is counted in it.
+    return precision(runs, letters, terms_of(letters, order), sigma or 1.0, effect or math.nan)
 
 
 def analysis_text(result: DesignResult) -> str:
@@ -160,3 +156,7 @@ def analysis_text(result: DesignResult) -> str:
 def _table(table: Table) -> str:
     # Typographic minus signs are no numbers to a terminal's columns.
     return text_table(table.header, [[cell.replace("−", "-").replace("–", "-") for cell in row] for row in table.rows])
+
+
+def _cell(value: float) -> str:
+    return number(value)

@@ -1,10 +1,7 @@
 """What the laboratory's commands give on the page: the text of the terminal, the line that repeats it, charts, files.
 
-Each function does what the command of its name does, from files that are there. None of them knows the page.
-
-Answers that take the solver: bench tests run on it, a photograph beside a pour. Each is a command in a child.
-
-The page's own process never loads the solver, and what is shown is what the terminal prints.
+Each function does what the command of its name does, and none of them knows the page. What takes the solver (a bench
+test run on it, a pour beside a photograph) is a command in a child: the page's own process never loads the solver.
 """
 
 from __future__ import annotations
@@ -49,6 +46,8 @@ from solver.assets import asset_path
 from solver.photograph import open_picture
 
 STRAIGHT = "Points of every replicate; the line is the part taken as straight, drawn on to zero force."
+ON_THE_SOLVER = "What the solver's own instrument read in the course of the test."
+PLOT = "beside.png"
 
 
 @dataclass(frozen=True)
@@ -83,6 +82,13 @@ def bench_answer(order: LabOrder) -> Answer:
     return Answer(lab_text(result), shlex.join(["explorer", *lab_words(order)]), plots, {f"{order.test}.toml": part})
 
 
+def twin_answer(order: LabOrder) -> Answer:
+    """`explorer lab --simulate` and `--bias`: beside the readings' answer, what the test gives on the solver."""
+    words = lab_words(order)
+    said = printed(words)
+    return replace(bench_answer(order), text=said, command=shlex.join(["explorer", *words]))
+
+
 def lab_words(order: LabOrder) -> list[str]:
     """The command line of ``order``, without the program's name."""
     words = ["lab", order.test, str(order.file)]
@@ -91,6 +97,19 @@ def lab_words(order: LabOrder) -> list[str]:
     words += ["--simulate"] if order.simulate else []
     words += ["--material", order.material] if order.material else []
     return [*words, "--bias"] if order.bias else words
+
+
+def rig_answer(scene: Scene, rig: str, values: Mapping[str, float | str], seed: int, folder: Path) -> Answer:
+    """`explorer simulate RIG`: a bench test of one body of ``scene``; its parameters are kept as a file in ``folder``.
+
+    ``values``: path → value (SI) of the rig's own parameters. Raises ParameterError before anything is run.
+    """
+    source = rig_source(rig, str(kept_scene(scene, folder)))
+    line = command_line(source, with_values(source.scene, dict(values)), seed)
+    data: dict[str, Any] = json.loads(printed([*shlex.split(line)[1:], "--json"]))
+    plots: Plots = {title: Plot(partial(dict, spec), ON_THE_SOLVER) for title, spec in bench_charts(data).items()}
+    files = {f"{rig}.json": f"{json_text(data)}\n".encode()}
+    return Answer(bench_text(data), line, plots, files)
 
 
 def photograph_answer(photo: str, ruler: Ruler) -> Answer:
@@ -107,6 +126,18 @@ def photograph_answer(photo: str, ruler: Ruler) -> Answer:
         files[f"{stem}_outline.csv"] = outline_text(measured.piles[0]).encode()
     text = "\n".join([measure_text(measured), *refusal_lines(measured.refusals)]).strip()
     return Answer(text, shlex.join(words), {}, files, np.asarray(drawn, dtype=np.uint8))
+
+
+def compared_answer(photo: str, ruler: Ruler, scene: Scene, folder: Path) -> Answer:
+    """`explorer measure --from-simulation`: the photograph, and beside it a pour of ``scene`` read by the same fit."""
+    words = [*measure_words(photo, ruler), "--from-simulation", str(kept_scene(scene, folder))]
+    with tempfile.TemporaryDirectory() as apart:
+        drawn = Path(apart) / PLOT
+        said = printed([*words, "--plot", str(drawn)])
+        content = drawn.read_bytes()
+        with Image.open(drawn) as picture:
+            pixels = np.asarray(picture.convert("RGB"), dtype=np.uint8)
+    return Answer(said, shlex.join(["explorer", *words]), {}, {PLOT: content}, pixels)
 
 
 def measure_words(photo: str, ruler: Ruler) -> list[str]:
@@ -149,40 +180,3 @@ def audit_answer(folder: Path | None) -> Answer:
     found = audit_study(read_study(folder or shipped_study()))
     words = ["explorer", "audit", *([str(folder)] if folder else [])]
     return Answer(audit_text(found), shlex.join(words), {}, {"audit.html": audit_html(found).encode()})
-
-
-ON_THE_SOLVER = "What the solver's own instrument read in the course of the test."
-
-PLOT = "beside.png"
-
-
-def twin_answer(order: LabOrder) -> Answer:
-    """`explorer lab --simulate` and `--bias`: beside the readings' answer, what the test gives on the solver."""
-    words = lab_words(order)
-    said = printed(words)
-    return replace(bench_answer(order), text=said, command=shlex.join(["explorer", *words]))
-
-
-def rig_answer(scene: Scene, rig: str, values: Mapping[str, float | str], seed: int, folder: Path) -> Answer:
-    """`explorer simulate RIG`: a bench test of one body of ``scene``; its parameters are kept as a file in ``folder``.
-
-    ``values``: path → value (SI) of the rig's own parameters. Raises ParameterError before anything is run.
-    """
-    source = rig_source(rig, str(kept_scene(scene, folder)))
-    line = command_line(source, with_values(source.scene, dict(values)), seed)
-    data: dict[str, Any] = json.loads(printed([*shlex.split(line)[1:], "--json"]))
-    plots: Plots = {title: Plot(partial(dict, spec), ON_THE_SOLVER) for title, spec in bench_charts(data).items()}
-    files = {f"{rig}.json": f"{json_text(data)}\n".encode()}
-    return Answer(bench_text(data), line, plots, files)
-
-
-def compared_answer(photo: str, ruler: Ruler, scene: Scene, folder: Path) -> Answer:
-    """`explorer measure --from-simulation`: the photograph, and beside it a pour of ``scene`` read by the same fit."""
-    words = [*measure_words(photo, ruler), "--from-simulation", str(kept_scene(scene, folder))]
-    with tempfile.TemporaryDirectory() as apart:
-        drawn = Path(apart) / PLOT
-        said = printed([*words, "--plot", str(drawn)])
-        content = drawn.read_bytes()
-        with Image.open(drawn) as picture:
-            pixels = np.asarray(picture.convert("RGB"), dtype=np.uint8)
-    return Answer(said, shlex.join(["explorer", *words]), {}, {PLOT: content}, pixels)

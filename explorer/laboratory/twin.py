@@ -8,10 +8,8 @@ A round trip closes where what comes out is within ``CLOSES`` of what was put in
                           1/E* = (1 − ν²)/E + (1 − ν_w²)/E_w,  1/G* = (2 − ν)/G + (2 − ν_w)/G_w
 
 Where the paper's formula is applied to the same simulated test (L/2H, Equation 1), what it misses by is shown and
-closes nothing. From the drop, the twin also finds the e with which a ball of the body's mass lands where the
-laboratory's bodies did.
-
-The paper's formulas applied to simulated bench tests, beside their closed forms (``doe/laboratory/bias.py``).
+closes nothing; :func:`simulated_bias` puts it beside its closed form (``doe/laboratory/bias.py``). From the drop, the
+twin also finds the e with which a ball of the body's mass lands where the laboratory's bodies did.
 """
 
 from __future__ import annotations
@@ -34,12 +32,11 @@ from solver.scenes.material import Material
 from solver.single_body import BenchResult, run_bench_test
 
 TILT_RATE = 5.0
-
 """Of the inclined plane [°/s]; the angle moves by less than a hundredth of a degree against the rig's own 1 °/s."""
-
 LOWEST, HIGHEST = 0.05, 1.0
-
 """Restitutions that the solver takes."""
+FIRST_READING = 0.02
+"""The twin's squeezing is shown from this share of its largest strain on: before, few steps fell into a reading."""
 
 
 def twins(result: LabResult, scene: Scene) -> Iterator[TwinRow]:
@@ -52,28 +49,6 @@ def twins(result: LabResult, scene: Scene) -> Iterator[TwinRow]:
             yield from _restitution(of, own, scene)
         else:
             yield from _moduli(of, own, scene)
-
-
-def bench_scene(scene: Scene, test: str, of: tuple[str, ...]) -> Scene:
-    """``scene`` with the rig of ``test``, the specimen of ``of`` on it, and the partner's material as its surface."""
-    body, wall = specimen(scene, of)
-    # A ball, or a body that slides without turning: what is measured does not hang on how many spheres stand for it.
-    rig_scene = with_rig(with_values(scene, {"body.spheres": "coarse"}), RIGS[test])
-    return dataclasses.replace(rig_scene, rig=dataclasses.replace(rig_scene.rig, body=body.name, wall=wall))  # type: ignore[type-var]
-
-
-def specimen(scene: Scene, of: tuple[str, ...]) -> tuple[Body, str]:
-    """The body that is tested and the material that it lies on; of one component alone, the wall's."""
-    bodies = {name: body for body in reversed(scene.bodies) for name in (body.material, body.name)}
-    one, other = of if len(of) == 2 else (of[0], scene.rig.wall)
-    if not {*of} & {*bodies}:
-        raise CommandError(f"--simulate: {'-'.join(of)}: no body of that name; there are {', '.join(bodies)}")
-    if one not in bodies:
-        one, other = other, one
-    wall = other if other in {m.name for m in scene.materials} else bodies[other].material
-    if len(of) == 2 and scene.contact_pair(bodies[one], wall) is not scene.pair(*of):
-        raise CommandError(f"--simulate: {'-'.join(of)}: a plate of {wall} would touch by another pair of the material")
-    return bodies[one], wall
 
 
 def _friction(of: tuple[str, ...], own: dict[str, Derived], scene: Scene) -> Iterator[TwinRow]:
@@ -155,11 +130,6 @@ def _closing(of: tuple[str, ...], name: str, unit: str, own: Derived | None, fou
     return TwinRow(of, name, unit, measured, quantity.reference, quantity.value, closes)
 
 
-FIRST_READING = 0.02
-
-"""The twin's squeezing is shown from this share of its largest strain on: before, few steps fell into a reading."""
-
-
 def simulated_bias(test: str, scene: Scene, of: tuple[str, ...]) -> BiasTable:
     """What the formula of ``test`` gives on the solver for one component or pair; CommandError where none is built."""
     if test == "drop":
@@ -203,3 +173,25 @@ def _compression(found: BenchResult, scene: Scene, of: tuple[str, ...]) -> BiasT
 
 def _at(wanted: float, strain: np.ndarray, ratio: np.ndarray) -> float:
     return float(np.interp(wanted, strain, ratio))
+
+
+def bench_scene(scene: Scene, test: str, of: tuple[str, ...]) -> Scene:
+    """``scene`` with the rig of ``test``, the specimen of ``of`` on it, and the partner's material as its surface."""
+    body, wall = specimen(scene, of)
+    # A ball, or a body that slides without turning: what is measured does not hang on how many spheres stand for it.
+    rig_scene = with_rig(with_values(scene, {"body.spheres": "coarse"}), RIGS[test])
+    return dataclasses.replace(rig_scene, rig=dataclasses.replace(rig_scene.rig, body=body.name, wall=wall))  # type: ignore[type-var]
+
+
+def specimen(scene: Scene, of: tuple[str, ...]) -> tuple[Body, str]:
+    """The body that is tested and the material that it lies on; of one component alone, the wall's."""
+    bodies = {name: body for body in reversed(scene.bodies) for name in (body.material, body.name)}
+    one, other = of if len(of) == 2 else (of[0], scene.rig.wall)
+    if not {*of} & {*bodies}:
+        raise CommandError(f"--simulate: {'-'.join(of)}: no body of that name; there are {', '.join(bodies)}")
+    if one not in bodies:
+        one, other = other, one
+    wall = other if other in {m.name for m in scene.materials} else bodies[other].material
+    if len(of) == 2 and scene.contact_pair(bodies[one], wall) is not scene.pair(*of):
+        raise CommandError(f"--simulate: {'-'.join(of)}: a plate of {wall} would touch by another pair of the material")
+    return bodies[one], wall

@@ -1,11 +1,7 @@
-"""The angle of repose of a pour that still moves: when to read it, and what was read last.
+"""The angle of repose of a pour that still moves: when to read it, what was read last, and the process that reads it.
 
-A reading takes some 25 ms, for which the pour would stand still: while it runs, another process reads
-(``explorer/live/angle_reader.py``). What stands still is read here, so that its angle is that of what is seen.
-
-The process that reads angles while the solver goes on: piles in, angles out, until the line is cut.
-
-The parent imports this file, so what reads is imported inside :func:`run` only.
+A reading takes some 25 ms, for which the pour would stand still: while it runs, another process reads (piles in, angles
+out, until the line is cut). What stands still is read here, so that its angle is that of what is seen.
 """
 
 from __future__ import annotations
@@ -24,17 +20,11 @@ from solver.observables.repose import Outline
 from solver.pours.record import Pile
 
 LEAST_SHARE_BELOW = 0.25
-
 """Share of the poured mass that has to lie below the outlet: the first few bodies are no pile that has an angle."""
-
 SIMULATED_INTERVAL, WALL_INTERVAL = 0.1, 0.5
-
 """The angle is read anew after this long of simulated or of wall time [s], whichever comes first."""
-
 WALL_SHARE = 0.15
-
 """Largest share of the wall time that reading may take; a big pile is read less often."""
-
 ANGLES: Mapping[str, Callable[[PileReading], Value]] = {
     "angle_of_repose_deg": angle_of_repose,
     "angle_of_repose_left_deg": angle_of_repose_left,

@@ -1,8 +1,7 @@
-"""One pour that obeys commands: the part of the solver process that owns Taichi's objects.
+"""One pour that obeys commands and shows itself: the part of the solver's process that owns Taichi's objects.
 
-A pour alone in its batch: begun with everything compiled that it will need, and let run.
-
-What a live pour shows: frames, and details of its contacts while somebody looks at them, by shared memory.
+The pour is alone in its batch, and begun with everything compiled that it will need. Frames go to shared memory, and
+details of its contacts while somebody looks at them.
 """
 
 from __future__ import annotations
@@ -50,96 +49,14 @@ from solver.scenes.scene import Scene, with_values
 from solver.scenes.time_step import stability_limit
 
 FRAME_INTERVAL = 1.0 / 60.0
-
 """Wall time [s] between published frames."""
-
 DETAIL_INTERVAL = 0.1
-
 """Wall time [s] between details, while they are looked at."""
-
-
-class Publisher:
-    """Publishes one pour after the other; ``wall`` is the present moment [s] on the caller's clock.
-
-    The last finite state stays on the screen when that of a pour is no longer finite.
-    """
-
-    def __init__(self, frames: FrameWriter, details: DetailWriter) -> None:
-        self._frames, self._details = frames, details
-        self._watch = Watch(wanted=False)
-        self._framed = self._detailed = -math.inf
-
-    def watch(self, order: Watch) -> None:
-        """What is looked at from now on."""
-        self._watch = order
-
-    def publish(self, pour: Pour, generation: int, wall: float) -> None:
-        """Publish the present state."""
-        self._frame(pour, generation, wall)
-        self._detail(pour, generation, wall)
-
-    def publish_due(self, pour: Pour, generation: int, wall: float) -> None:
-        """Publish what has not been for its interval."""
-        if wall - self._framed >= FRAME_INTERVAL:
-            self._frame(pour, generation, wall)
-        if wall - self._detailed >= DETAIL_INTERVAL:
-            self._detail(pour, generation, wall)
-
-    def _frame(self, pour: Pour, generation: int, wall: float) -> None:
-        self._framed = wall
-        if pour.outcome != Outcome.NON_FINITE:
-            self._frames.publish(pour.bodies(), generation, pour.time, pour.surface_poses())
-
-    def _detail(self, pour: Pour, generation: int, wall: float) -> None:
-        self._detailed = wall
-        if self._watch.wanted and pour.outcome != Outcome.NON_FINITE:
-            bodies, contacts = pour.bodies(), pour.contacts()
-            self._details.publish(generation, pour.time, bodies, pour.supply.times, contacts, self._watch.body)
-
-
-def begun(scene: Scene, seed: int, announce: Callable[[str], None]) -> Pour:
-    """A pour of ``scene`` before its first launch but one step; ``announce`` is told what takes long."""
-    announce("fitting member spheres to the shapes")
-    for body in scene.bodies:
-        _ = body.clump  # fitted once per process and shape; the pour below takes it from the cache
-    announce("compiling the solver")
-    pour = Pour(Batch(capacity_for([scene], 1)), 0, endless(scene), seed)
-    _compile(pour)
-    return pour
-
-
-def endless(scene: Scene) -> Scene:
-    """``scene`` without the limit on simulated time: in the live view the person at the screen ends a pour."""
-    return dataclasses.replace(scene, numerics=dataclasses.replace(scene.numerics, max_time=math.inf))
-
-
-def launch(pour: Pour, steps: int) -> bool:
-    """Run ``steps``; True at a moment of decision, before which nobody asks for the world's summary."""
-    launched = np.array([steps], dtype=np.int32)
-    if not pour.decides_after(steps):
-        pour.batch.run(launched)
-        return pour.after(steps)
-    return pour.after(steps, pour.batch.advance(launched)[0])
-
-
-def _compile(pour: Pour) -> None:
-    """Compile every kernel now, those of a change of stiffness too, so that the first slider does not stall."""
-    launch(pour, pour.steps_due(1))
-    kinds = pour.batch.capacity.kinds
-    pour.batch.scale_springs(0, np.ones((kinds, kinds)))
-    pour.batch.measure(0)
-
-
 KEPT_EVERY = 0.02
-
 """Simulated time [s] between two moments that can be come back to at once; those between are run again."""
-
 STATUS_INTERVAL = 0.1
-
 """Wall time [s] between reports."""
-
 BEFORE_FIRST_SAMPLE = {"entered": 0.0, "discharged": 0.0, "kinetic": 0.0, "touching": 0.0}
-
 """Sums over all bodies while none has been sampled yet."""
 
 
@@ -350,3 +267,75 @@ class LivePour:
 
     def _event(self, text: str) -> None:
         self._report(Event(self._generation, self._pour.time, text))
+
+
+class Publisher:
+    """Publishes one pour after the other; ``wall`` is the present moment [s] on the caller's clock.
+
+    The last finite state stays on the screen when that of a pour is no longer finite.
+    """
+
+    def __init__(self, frames: FrameWriter, details: DetailWriter) -> None:
+        self._frames, self._details = frames, details
+        self._watch = Watch(wanted=False)
+        self._framed = self._detailed = -math.inf
+
+    def watch(self, order: Watch) -> None:
+        """What is looked at from now on."""
+        self._watch = order
+
+    def publish(self, pour: Pour, generation: int, wall: float) -> None:
+        """Publish the present state."""
+        self._frame(pour, generation, wall)
+        self._detail(pour, generation, wall)
+
+    def publish_due(self, pour: Pour, generation: int, wall: float) -> None:
+        """Publish what has not been for its interval."""
+        if wall - self._framed >= FRAME_INTERVAL:
+            self._frame(pour, generation, wall)
+        if wall - self._detailed >= DETAIL_INTERVAL:
+            self._detail(pour, generation, wall)
+
+    def _frame(self, pour: Pour, generation: int, wall: float) -> None:
+        self._framed = wall
+        if pour.outcome != Outcome.NON_FINITE:
+            self._frames.publish(pour.bodies(), generation, pour.time, pour.surface_poses())
+
+    def _detail(self, pour: Pour, generation: int, wall: float) -> None:
+        self._detailed = wall
+        if self._watch.wanted and pour.outcome != Outcome.NON_FINITE:
+            bodies, contacts = pour.bodies(), pour.contacts()
+            self._details.publish(generation, pour.time, bodies, pour.supply.times, contacts, self._watch.body)
+
+
+def begun(scene: Scene, seed: int, announce: Callable[[str], None]) -> Pour:
+    """A pour of ``scene`` before its first launch but one step; ``announce`` is told what takes long."""
+    announce("fitting member spheres to the shapes")
+    for body in scene.bodies:
+        _ = body.clump  # fitted once per process and shape; the pour below takes it from the cache
+    announce("compiling the solver")
+    pour = Pour(Batch(capacity_for([scene], 1)), 0, endless(scene), seed)
+    _compile(pour)
+    return pour
+
+
+def _compile(pour: Pour) -> None:
+    """Compile every kernel now, those of a change of stiffness too, so that the first slider does not stall."""
+    launch(pour, pour.steps_due(1))
+    kinds = pour.batch.capacity.kinds
+    pour.batch.scale_springs(0, np.ones((kinds, kinds)))
+    pour.batch.measure(0)
+
+
+def endless(scene: Scene) -> Scene:
+    """``scene`` without the limit on simulated time: in the live view the person at the screen ends a pour."""
+    return dataclasses.replace(scene, numerics=dataclasses.replace(scene.numerics, max_time=math.inf))
+
+
+def launch(pour: Pour, steps: int) -> bool:
+    """Run ``steps``; True at a moment of decision, before which nobody asks for the world's summary."""
+    launched = np.array([steps], dtype=np.int32)
+    if not pour.decides_after(steps):
+        pour.batch.run(launched)
+        return pour.after(steps)
+    return pour.after(steps, pour.batch.advance(launched)[0])

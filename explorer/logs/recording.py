@@ -1,6 +1,4 @@
-"""What a recording holds: shapes, what moved when, curves, events and texts; and which files it consists of.
-
-A recording read back, as `pour_log` wrote it.
+"""A recording read back, as `pour_log` wrote it: shapes, what moved when, curves, events and texts; and its files.
 
 A file of a killed writer is read up to the last frame that was written out.
 """
@@ -23,16 +21,14 @@ from explorer.logs.blueprint import CURVES, TIMELINE, curve_entity
 from explorer.logs.replay import check_recording
 
 Array = npt.NDArray[np.float64]
-
 Floats = npt.NDArray[np.float32]
 
 SAME_TIME = 1e-6
-
 """[s]; recorded times are whole nanoseconds, those of a slider rounded to this."""
-
 FRAME_INTERVAL = 0.02
-
 """Simulated time [s] between frames that are kept."""
+BODIES = "/world/bodies/"
+WORLD = "/world/"
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,11 +152,6 @@ def index_at(times: Array, time: float) -> int | None:
     """Index of the last entry that is not later than ``time`` [s]; None before the first."""
     k = int(np.searchsorted(times, time + SAME_TIME, side="right")) - 1
     return None if k < 0 else k
-
-
-BODIES = "/world/bodies/"
-
-WORLD = "/world/"
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,6 @@
-"""`explorer measure`: read the pictures, find their scale, put a simulation beside them, write what was asked for.
+"""`explorer measure`: from options, checked before any picture is opened, to a reading per picture and its files.
 
-What `explorer measure` was asked for, checked before any picture is opened.
-
-What `explorer measure` finds: a reading per picture, and the simulated piles beside them.
+Pictures are read, their scale is found, a simulation is put beside them, and what was asked for is written.
 """
 
 from __future__ import annotations
@@ -29,7 +27,6 @@ from solver.photograph import (
 )
 
 FARTHEST = 1e5
-
 """Largest coordinate that a picture may be asked about [px]."""
 
 
@@ -141,12 +138,6 @@ def run_measure(order: MeasureOrder) -> Measured:
     return measured
 
 
-def outline_text(pile: PhotographedPile) -> str:
-    """A measured outline as the page lays it over a simulated pile (`explorer/files/measured_curves.py`)."""
-    rows = (f"{u:.6g},{z:.6g}\n" for u, z in zip(pile.outline.u, pile.outline.top, strict=True))
-    return f"# {' '.join(pile.name.split())}\nu_m,z_m\n" + "".join(rows)
-
-
 def _reading(picture: Picture, order: MeasureOrder) -> PhotographedPile | Refusal:
     try:
         scale = _metres_per_pixel(picture, order)
@@ -160,3 +151,9 @@ def _metres_per_pixel(picture: Picture, order: MeasureOrder) -> float | None:
         return order.metres_per_pixel
     ends = order.reference_ends
     return order.reference_length / (dist(ends[:2], ends[2:]) if ends else reference_pixels(picture))
+
+
+def outline_text(pile: PhotographedPile) -> str:
+    """A measured outline as the page lays it over a simulated pile (`explorer/files/measured_curves.py`)."""
+    rows = (f"{u:.6g},{z:.6g}\n" for u, z in zip(pile.outline.u, pile.outline.top, strict=True))
+    return f"# {' '.join(pile.name.split())}\nu_m,z_m\n" + "".join(rows)

@@ -1,4 +1,4 @@
-"""Named sets of parameter values: shipped ones, and those that a user has saved.
+"""Named sets of parameter values, shipped and saved by a person, and the folder where the page keeps what is saved.
 
 A preset is a TOML file:
 
@@ -7,8 +7,6 @@ A preset is a TOML file:
     about = "What it is for, in a sentence."
     [values]
     "pair.*.*.static_friction" = 0.0        # * stands for any one name; values in SI or with a unit
-
-Where the page keeps what a person made with it.
 """
 
 from __future__ import annotations
@@ -31,13 +29,9 @@ from solver.scenes.scene import Scene, canonical, parameters
 from solver.toml_table import as_table, read_toml, refuse_unknown, table_at
 
 KEYS = ("format", "title", "about", "values")
-
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _-]{0,39}")
-
 OWN_MARK = " (own)"
-
 """Behind the name of a user's preset in a list."""
-
 MOST_BYTES = 100_000
 
 

@@ -1,7 +1,4 @@
-"""Where a scene came from, and the command line that repeats what it has become since.
-
-What differs between two scenes, as lines for a person.
-"""
+"""Where a scene came from, what it has become since, and the command line that repeats it."""
 
 from __future__ import annotations
 
@@ -17,45 +14,6 @@ from solver.params import UNITS, ParameterError, parse_quantity
 from solver.scenes.material_file import with_settings
 from solver.scenes.scene import Scene, parameters, values, with_rig
 from solver.toml_table import read_toml
-
-
-@dataclass(frozen=True)
-class Difference:
-    """A parameter that has two values, SI or the names of choices."""
-
-    path: str
-    before: float | str
-    now: float | str
-    unit: str
-    live: bool
-    """Whether a running pour takes a new value at once."""
-
-    def __str__(self) -> str:
-        """``path: before → now`` with the units of the screen."""
-        before, now = shown(self.before, self.unit), shown(self.now, self.unit)
-        if before == now:  # alike to the digits of the screen
-            before, now = str(self.before), f"{self.now} {'' if self.unit == '1' else self.unit}".strip()
-        return f"{self.path}: {before} → {now}"
-
-
-def differences(before: Scene, now: Scene) -> Iterator[Difference]:
-    """Parameters that both scenes have and that differ, in the order of ``now``."""
-    old = values(before)
-    declared = parameters(now)
-    for path, new in values(now).items():
-        if path in old and old[path] != new:
-            yield Difference(path, old[path], new, declared[path].unit, declared[path].live)
-
-
-def changes(before: Scene, now: Scene) -> Iterator[str]:
-    """Parameters that differ between two scenes of the same materials and bodies, with both values and their unit."""
-    return map(str, differences(before, now))
-
-
-def shown(number: float | str, unit: str) -> str:
-    """A value with the unit of the screen, or the name of a choice."""
-    return number if isinstance(number, str) else quantity(number, unit)
-
 
 PROGRAM = ("explorer", "simulate")
 
@@ -155,3 +113,41 @@ def _applied(base: Scene, texts: Sequence[str]) -> Scene | None:
         return with_settings(base, dict(text.split("=", 1) for text in texts))
     except ParameterError:
         return None
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A parameter that has two values, SI or the names of choices."""
+
+    path: str
+    before: float | str
+    now: float | str
+    unit: str
+    live: bool
+    """Whether a running pour takes a new value at once."""
+
+    def __str__(self) -> str:
+        """``path: before → now`` with the units of the screen."""
+        before, now = shown(self.before, self.unit), shown(self.now, self.unit)
+        if before == now:  # alike to the digits of the screen
+            before, now = str(self.before), f"{self.now} {'' if self.unit == '1' else self.unit}".strip()
+        return f"{self.path}: {before} → {now}"
+
+
+def differences(before: Scene, now: Scene) -> Iterator[Difference]:
+    """Parameters that both scenes have and that differ, in the order of ``now``."""
+    old = values(before)
+    declared = parameters(now)
+    for path, new in values(now).items():
+        if path in old and old[path] != new:
+            yield Difference(path, old[path], new, declared[path].unit, declared[path].live)
+
+
+def changes(before: Scene, now: Scene) -> Iterator[str]:
+    """Parameters that differ between two scenes of the same materials and bodies, with both values and their unit."""
+    return map(str, differences(before, now))
+
+
+def shown(number: float | str, unit: str) -> str:
+    """A value with the unit of the screen, or the name of a choice."""
+    return number if isinstance(number, str) else quantity(number, unit)

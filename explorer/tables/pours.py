@@ -1,10 +1,8 @@
-"""The table that a simulation prints: one line per pour as it finishes, then the means.
+"""What ``explorer simulate`` prints: a line per pour as it finishes, then the means; of a bench test, its quantities.
 
-What ``explorer simulate`` prints and keeps of a bench test: the measured value beside the one that was put in.
-
-Plain data: ``test``, ``body``, ``wall``, ``note``; ``quantities`` name → value, reference, error (value/reference − 1),
-spread, unit; ``series`` and ``table`` name → list of numbers; ``parameters`` path → value in SI, unit; ``versions``. A
-number that could not be measured is null.
+A bench test is kept as plain data: ``test``, ``body``, ``wall``, ``note``; ``quantities`` name → value, reference (what
+was put in), error (value/reference − 1), spread, unit; ``series`` and ``table`` name → list of numbers; ``parameters``
+path → value in SI, unit; ``versions``. A number that could not be measured is null.
 """
 
 from __future__ import annotations
@@ -36,7 +34,6 @@ COLUMNS = {
     "in rig g": -8,
     "wall s": -6,
 }
-
 """Heading → width, negative for a column of numbers.
 
 "angle" is the first observable of the rig, "within" its standard deviation over the views of one pile (the flanks, the
@@ -100,10 +97,6 @@ def energy_line(accounts: Sequence[dict[str, float | None]]) -> str:
     )
 
 
-def _number(number: float | None, form: str) -> str:
-    return "-" if number is None or not math.isfinite(number) else format(number, form)
-
-
 def bench_data(scene: Scene, result: BenchResult) -> dict[str, Any]:
     """All about one bench test as plain data."""
     return {
@@ -129,6 +122,10 @@ def bench_data(scene: Scene, result: BenchResult) -> dict[str, Any]:
     }
 
 
+def _finite(number: float | None) -> float | None:
+    return None if number is None or not math.isfinite(number) else float(number)
+
+
 def bench_text(data: dict[str, Any]) -> str:
     """The same for people: quantities, then the table where there is one."""
     rows = [
@@ -152,19 +149,19 @@ def bench_text(data: dict[str, Any]) -> str:
     return "\n\n".join([*parts, data["note"]] if data["note"] else parts)
 
 
+def _percent(error: float | None) -> str:
+    return "-" if error is None else f"{100.0 * error:+.3f}"
+
+
 def write_bench(folder: Path, data: dict[str, Any]) -> None:
     """Write ``result.json`` and ``parameters.toml`` into an existing ``folder``."""
     (folder / "result.json").write_text(json_text(data) + "\n", encoding="utf-8")
     (folder / "parameters.toml").write_text(parameters_text(data["parameters"]), encoding="utf-8")
 
 
-def _finite(number: float | None) -> float | None:
-    return None if number is None or not math.isfinite(number) else float(number)
-
-
 def _cell(number: float | None) -> str:
     return "-" if number is None else f"{number:.5g}"
 
 
-def _percent(error: float | None) -> str:
-    return "-" if error is None else f"{100.0 * error:+.3f}"
+def _number(number: float | None, form: str) -> str:
+    return "-" if number is None or not math.isfinite(number) else format(number, form)

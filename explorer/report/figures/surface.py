@@ -1,6 +1,6 @@
-"""Charts of a response surface: contours through the optimum, predicted against observed, residuals.
+"""Charts of a response surface: contours through the optimum, the fit and its residuals, and the surface in space.
 
-The response surface in space: as a height over two factors, and the settings that give the target among three.
+In space it is a height over two factors, and the settings that give the target among three.
 """
 
 from __future__ import annotations
@@ -35,6 +35,9 @@ from explorer.report.figures.style import (
 from explorer.units import axis_title, observable_title, unit_of_observable, unit_of_parameter
 
 GRID = 41
+SOLID_GRID = 25
+CUBE = 17
+"""Points along each side of the grids."""
 
 
 def contours(fitted: FittedTarget) -> Spec:
@@ -84,6 +87,39 @@ def contours(fitted: FittedTarget) -> Spec:
     return chart(traces, layout, 420)
 
 
+def _slice(fitted: FittedTarget, i: int, j: int) -> Array:
+    """The model on a grid over factors i (columns) and j (rows), the others at the point of the sections."""
+    across, up = np.meshgrid(np.linspace(-1, 1, GRID), np.linspace(-1, 1, GRID))
+    fixed = fitted.model.region.coded(fitted.section_point)
+    coded = np.broadcast_to(fixed, (GRID, GRID, fixed.size)).copy()
+    coded[..., i], coded[..., j] = across, up
+    return fitted.model.predict(coded)
+
+
+def _marks(fitted: FittedTarget, pair: tuple[int, int], scale: list[float], axes: Json, in_legend: bool) -> list[Json]:
+    """Runs of the design, the measured parameters where they lie in the region, and the optimum if there is one."""
+    natural = fitted.design[:, pair] / scale
+    reference = np.array([float(fitted.factors[k].reference) for k in pair]) / scale
+    low, high = fitted.low[list(pair)] / scale, fitted.high[list(pair)] / scale
+    runs = {"size": 7, "color": "#ffffff", "line": {"color": INK, "width": 1.2}}
+    star = {"size": 13, "symbol": "star", "line": {"color": "#ffffff", "width": 1}}
+    diamond = {"size": 10, "symbol": "diamond", "color": "#ffffff", "line": {"color": INK, "width": 1.5}}
+    shown: Json = {"showlegend": in_legend, **axes}
+    marks = [points(natural[:, 0].tolist(), natural[:, 1].tolist(), "points of the design", INK, marker=runs, **shown)]
+    if ((low <= reference) & (reference <= high)).all():
+        x, y = (float(value) for value in reference)
+        marks.append(points([x], [y], fitted.reference_name, INK, marker=diamond, **shown))
+    if fitted.chosen is None:
+        return marks
+    at = np.array(fitted.chosen)[list(pair)] / scale
+    return [*marks, points([float(at[0])], [float(at[1])], fitted.chosen_name, CHOSEN, marker=star, **shown)]
+
+
+def _colours(level: float, reach: float, title: str) -> Json:
+    bar = {"title": {"text": title, "side": "right"}, "thickness": 12, "outlinewidth": 0}
+    return {"colorscale": BELOW_TO_ABOVE, "cmin": level - reach, "cmax": level + reach, "colorbar": bar}
+
+
 def fit(fitted: FittedTarget) -> Spec:
     """Left: predicted against observed per run; right: externally studentized residuals over the prediction."""
     unit = unit_of_observable(fitted.observable)
@@ -131,46 +167,6 @@ def residual_quantiles(fitted: FittedTarget) -> Spec:
         "yaxis": axis("studentized residual"),
     }
     return chart(traces, layout, 380)
-
-
-def _slice(fitted: FittedTarget, i: int, j: int) -> Array:
-    """The model on a grid over factors i (columns) and j (rows), the others at the point of the sections."""
-    across, up = np.meshgrid(np.linspace(-1, 1, GRID), np.linspace(-1, 1, GRID))
-    fixed = fitted.model.region.coded(fitted.section_point)
-    coded = np.broadcast_to(fixed, (GRID, GRID, fixed.size)).copy()
-    coded[..., i], coded[..., j] = across, up
-    return fitted.model.predict(coded)
-
-
-def _marks(fitted: FittedTarget, pair: tuple[int, int], scale: list[float], axes: Json, in_legend: bool) -> list[Json]:
-    """Runs of the design, the measured parameters where they lie in the region, and the optimum if there is one."""
-    natural = fitted.design[:, pair] / scale
-    reference = np.array([float(fitted.factors[k].reference) for k in pair]) / scale
-    low, high = fitted.low[list(pair)] / scale, fitted.high[list(pair)] / scale
-    runs = {"size": 7, "color": "#ffffff", "line": {"color": INK, "width": 1.2}}
-    star = {"size": 13, "symbol": "star", "line": {"color": "#ffffff", "width": 1}}
-    diamond = {"size": 10, "symbol": "diamond", "color": "#ffffff", "line": {"color": INK, "width": 1.5}}
-    shown: Json = {"showlegend": in_legend, **axes}
-    marks = [points(natural[:, 0].tolist(), natural[:, 1].tolist(), "points of the design", INK, marker=runs, **shown)]
-    if ((low <= reference) & (reference <= high)).all():
-        x, y = (float(value) for value in reference)
-        marks.append(points([x], [y], fitted.reference_name, INK, marker=diamond, **shown))
-    if fitted.chosen is None:
-        return marks
-    at = np.array(fitted.chosen)[list(pair)] / scale
-    return [*marks, points([float(at[0])], [float(at[1])], fitted.chosen_name, CHOSEN, marker=star, **shown)]
-
-
-def _colours(level: float, reach: float, title: str) -> Json:
-    bar = {"title": {"text": title, "side": "right"}, "thickness": 12, "outlinewidth": 0}
-    return {"colorscale": BELOW_TO_ABOVE, "cmin": level - reach, "cmax": level + reach, "colorbar": bar}
-
-
-SOLID_GRID = 25
-
-CUBE = 17
-
-"""Points along each side of the grids."""
 
 
 def height_over(fitted: FittedTarget, pair: tuple[int, int]) -> Spec:
@@ -242,6 +238,10 @@ def solutions(fitted: FittedTarget) -> Spec | None:
     return _in_space(traces, [axis_title(factor.path, factor.name) for factor in factors])
 
 
+def _no_caps() -> Json:
+    return {side: {"show": False} for side in "xyz"}
+
+
 def _dots(places: Sequence[Sequence[float]], name: str, marker: Json) -> Json:
     """Marks at the x, y and z in ``places``."""
     x, y, z = map(list, places)
@@ -257,7 +257,3 @@ def _in_space(traces: list[Json], titles: list[str]) -> Spec:
         one["title"]["font"] = {"size": 11}
     camera = {"eye": {"x": 1.5, "y": -1.6, "z": 0.9}}
     return chart(traces, {"scene": scene | {"camera": camera}, "margin": {"l": 4, "r": 4, "t": 28, "b": 4}}, 460)
-
-
-def _no_caps() -> Json:
-    return {side: {"show": False} for side in "xyz"}

@@ -1,7 +1,4 @@
-"""Where the camera of a browser stands: presets, a link that leads back to a view, and going along with a body.
-
-Controls of the camera: presets with their keys, and a link to the view.
-"""
+"""Where the camera of a browser stands: presets with their keys, a link that leads back to a view, following a body."""
 
 from __future__ import annotations
 
@@ -26,12 +23,47 @@ DIRECTIONS: Mapping[str, tuple[float, float, float]] = {
     # Not quite from above: straight down, the camera would not know which way is up.
     "Top": (0.0, -1e-3, 1.0),
 }
-
 """From the pile to the camera."""
-
 STILL = 1e-5
-
 """A body that has moved by less than this [m] does not move the camera."""
+LINK = "Link to this view"
+VIEW_KEYS: dict[str, Any] = dict(zip(DIRECTIONS, ("1", "2", "3", "4"), strict=True))
+
+
+class CameraPanel:
+    """Moves the cameras of browsers.
+
+    Args:
+        server: the page.
+        post: where actions go.
+        height: tells how high it is what has to be in the picture [m].
+        leaves: is told of a browser whose camera goes to a preset.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, post: Post, height: Callable[[], float], leaves: ClientAction = lambda _: None
+    ) -> None:
+        self._server, self._height, self._leaves = server, height, leaves
+        gui = server.gui
+        acts = {name: partial(self._look_from, name) for name in DIRECTIONS}
+        with gui.add_folder("Camera"):
+            client_buttons(gui, "View", acts, post, hint="Keys 1, 2, 3, 4.")
+            link = gui.add_button(LINK, hint="Puts the address of what you see into the field below.")
+            self._link: Any = gui.add_text("Address", "", hint="Opens the page with this view.")
+        for name, key in VIEW_KEYS.items():
+            add_client_key(gui, f"View: {name.lower()}", key, acts[name], post)
+
+        @link.on_click
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client is not None:
+                post(partial(self._show_link, event.client))
+
+    def _look_from(self, name: str, client: Any) -> None:
+        self._leaves(client)
+        go_to(client, view_of(self._height(), name))
+
+    def _show_link(self, client: Any) -> None:
+        self._link.value = link_to(self._server, client.camera)
 
 
 def view_of(height: float, name: str) -> View:
@@ -75,44 +107,3 @@ def link_to(server: viser.ViserServer, camera: Any) -> str:
         f"{name}={','.join(f'{round(float(x), 4) + 0.0:g}' for x in values)}" for name, values in numbers.items()
     )
     return f"http://{address(server.get_host())}:{server.get_port()}/?{query}"
-
-
-LINK = "Link to this view"
-
-VIEW_KEYS: dict[str, Any] = dict(zip(DIRECTIONS, ("1", "2", "3", "4"), strict=True))
-
-
-class CameraPanel:
-    """Moves the cameras of browsers.
-
-    Args:
-        server: the page.
-        post: where actions go.
-        height: tells how high it is what has to be in the picture [m].
-        leaves: is told of a browser whose camera goes to a preset.
-    """
-
-    def __init__(
-        self, server: viser.ViserServer, post: Post, height: Callable[[], float], leaves: ClientAction = lambda _: None
-    ) -> None:
-        self._server, self._height, self._leaves = server, height, leaves
-        gui = server.gui
-        acts = {name: partial(self._look_from, name) for name in DIRECTIONS}
-        with gui.add_folder("Camera"):
-            client_buttons(gui, "View", acts, post, hint="Keys 1, 2, 3, 4.")
-            link = gui.add_button(LINK, hint="Puts the address of what you see into the field below.")
-            self._link: Any = gui.add_text("Address", "", hint="Opens the page with this view.")
-        for name, key in VIEW_KEYS.items():
-            add_client_key(gui, f"View: {name.lower()}", key, acts[name], post)
-
-        @link.on_click
-        def _(event: viser.GuiEvent[Any]) -> None:
-            if event.client is not None:
-                post(partial(self._show_link, event.client))
-
-    def _look_from(self, name: str, client: Any) -> None:
-        self._leaves(client)
-        go_to(client, view_of(self._height(), name))
-
-    def _show_link(self, client: Any) -> None:
-        self._link.value = link_to(self._server, client.camera)

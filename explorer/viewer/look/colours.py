@@ -1,7 +1,4 @@
-"""Colours of bodies by what they do: quantities, their range, and the bar that explains them.
-
-Controls of the colours: by which quantity, in which range; and the bar that explains them.
-"""
+"""Colours of bodies by what they do: quantities, their range, the bar that explains them, and the controls of it."""
 
 from __future__ import annotations
 
@@ -24,10 +21,13 @@ from explorer.viewer.style import SELECTED, VIRIDIS, css, linear, linear_all, ma
 Array = npt.NDArray[np.float64]
 
 TOP_PERCENTILE = 99.0
-
 """An automatic range reaches to here: a single fast body must not make all others look the same."""
-
 NICE = (1.0, 2.0, 5.0, 10.0)
+COLOUR_KEY, NEXT_COLOUR = "C", "Colour by the next quantity"
+LARGEST = 1e6
+"""Largest end of a fixed range of colours, in the unit of the screen."""
+STEP = 1e-3
+"""Of its ends; viser rounds what a box shows to this, and by itself to whole numbers."""
 
 
 class Numbered(Protocol):
@@ -70,7 +70,6 @@ QUANTITIES: Mapping[str, Quantity] = {
     "coordination number": Quantity("", 1.0, lambda details: details.neighbours, "other bodies that a body touches"),
     "residence time": Quantity("s", 1.0, _residence, "time since a body entered"),
 }
-
 """Of a live pour."""
 
 
@@ -130,17 +129,6 @@ def bar_html(look: Look, quantity: Quantity | None, details: Numbered | None) ->
         f"<div style='display:flex; justify-content:space-between'>{ends}</div>"
         f"<div style='opacity:0.75'>{look.colour_by}{unit}{meaning}</div></div>"
     )
-
-
-COLOUR_KEY, NEXT_COLOUR = "C", "Colour by the next quantity"
-
-LARGEST = 1e6
-
-"""Largest end of a fixed range of colours, in the unit of the screen."""
-
-STEP = 1e-3
-
-"""Of its ends; viser rounds what a box shows to this, and by itself to whole numbers."""
 
 
 class ColourPanel:
