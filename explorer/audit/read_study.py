@@ -38,7 +38,7 @@ from doe.audit.study import (
 from doe.audit.surface_refit import source_name
 from doe.errors import AuditError
 from doe.table_file import read_table as read_cells
-from explorer.audit.entries import Entries, read_entries
+from explorer.audit.entries import TableEntries, read_entries
 from solver.assets import asset_path
 
 FloatArray = npt.NDArray[np.float64]
@@ -68,11 +68,11 @@ def read_study(folder: Path) -> PublishedStudy:
         raise AuditError(text if text.startswith(str(folder)) else f"{folder}/{text}") from None
 
 
-def _study(entries: Entries, folder: Path) -> PublishedStudy:
+def _study(entries: TableEntries, folder: Path) -> PublishedStudy:
     if entries.whole("format", 0) != FORMAT:
         raise entries.error("format", f"this program reads format {FORMAT}")
 
-    def optional(key: str, read: Callable[[Entries, Path], Part]) -> Part | None:
+    def optional(key: str, read: Callable[[TableEntries, Path], Part]) -> Part | None:
         return _finished(read, entries.table(key), folder) if key in entries else None
 
     ascent = optional("ascent", read_ascent)
@@ -96,13 +96,13 @@ def _study(entries: Entries, folder: Path) -> PublishedStudy:
     return study
 
 
-def _finished(read: Callable[[Entries, Path], Part], entries: Entries, folder: Path) -> Part:
+def _finished(read: Callable[[TableEntries, Path], Part], entries: TableEntries, folder: Path) -> Part:
     part = read(entries, folder)
     entries.finish()
     return part
 
 
-def _target(entries: Entries, folder: Path) -> Target:
+def _target(entries: TableEntries, folder: Path) -> Target:
     mean = entries.figure("mean")
     if mean.value == 0:
         raise entries.error("mean", "0 is not allowed: relative errors are divided by it")
@@ -120,7 +120,7 @@ def _target(entries: Entries, folder: Path) -> Target:
     )
 
 
-def _derived(entries: Entries, folder: Path) -> Derived:
+def _derived(entries: TableEntries, folder: Path) -> Derived:
     table = read_table(folder, entries.text("file"))
     column, formula = entries.text("column"), entries.text("formula")
     names = names_in(formula)
@@ -134,7 +134,7 @@ def _derived(entries: Entries, folder: Path) -> Derived:
     )
 
 
-def _measured(entries: Entries, folder: Path) -> tuple[Measured, ...]:
+def _measured(entries: TableEntries, folder: Path) -> tuple[Measured, ...]:
     table, where, made_from = read_table(folder, entries.text("file")), entries.text("where"), entries.text("made_from")
     labels, parts = _labels(table, entries), []
     single = read_table(folder, entries.text("replicates")) if "replicates" in entries else None
@@ -149,7 +149,7 @@ def _measured(entries: Entries, folder: Path) -> tuple[Measured, ...]:
     return tuple(parts)
 
 
-def _of_label(table: Table, key: str, label: str, column: str) -> tuple[Printed, ...]:
+def _of_label(table: PrintedTable, key: str, label: str, column: str) -> tuple[Printed, ...]:
     """All cells of a column in the rows of one label; AuditError where there is none."""
     rows = [row for row, name in enumerate(table.texts(key)) if name == label]
     if not rows:
@@ -157,7 +157,7 @@ def _of_label(table: Table, key: str, label: str, column: str) -> tuple[Printed,
     return tuple(table.number(column, row) for row in rows)
 
 
-def _total(entries: Entries, folder: Path) -> Total:
+def _total(entries: TableEntries, folder: Path) -> Total:
     table = read_table(folder, entries.text("file"))
     column = entries.text("column")
     return Total(
@@ -165,7 +165,7 @@ def _total(entries: Entries, folder: Path) -> Total:
     )
 
 
-def _quote(entries: Entries, folder: Path) -> Quote:
+def _quote(entries: TableEntries, folder: Path) -> Quote:
     quantity, value = entries.text("quantity"), entries.figure("value")
     where, said, text = entries.text("where"), entries.text("table"), entries.text("text", " ").strip()
     if "file" not in entries:
@@ -183,7 +183,7 @@ def _quote(entries: Entries, folder: Path) -> Quote:
     return Quote(where, quantity, value, original, said, text, column, among, elsewhere)
 
 
-def _drop_test(entries: Entries, folder: Path) -> DropTest:
+def _drop_test(entries: TableEntries, folder: Path) -> DropTest:
     table, formula = read_table(folder, entries.text("file")), entries.text("formula")
     unknown = set(names_in(formula)) - set("LHhvtg") - {"vx", "vy"}
     if unknown:
@@ -202,12 +202,12 @@ def _drop_test(entries: Entries, folder: Path) -> DropTest:
     )
 
 
-def _labels(table: Table, entries: Entries) -> tuple[str, ...]:
+def _labels(table: PrintedTable, entries: TableEntries) -> tuple[str, ...]:
     """Names of the rows: cells of the column `label`, or of the first one."""
     return table.texts(entries.text("label", next(iter(table.columns))))
 
 
-def read_screening(entries: Entries, folder: Path) -> Screening:
+def read_screening(entries: TableEntries, folder: Path) -> Screening:
     """``[screening]``: its factors (factor, low, high) and ANOVA (factor, sum_of_squares, f_value, p_value)."""
     runs = read_table(folder, entries.text("runs"))
     factors, anova = read_table(folder, entries.text("factors")), read_table(folder, entries.text("anova"))
@@ -246,7 +246,7 @@ def read_screening(entries: Entries, folder: Path) -> Screening:
     )
 
 
-def read_ascent(entries: Entries, folder: Path) -> Ascent:
+def read_ascent(entries: TableEntries, folder: Path) -> Ascent:
     """``[ascent]`` with ``[ascent.factors]``: name in the screening → column of its settings."""
     table, columns = read_table(folder, entries.text("file")), entries.table("factors")
     names = columns.names()
@@ -267,7 +267,7 @@ def read_ascent(entries: Entries, folder: Path) -> Ascent:
     )
 
 
-def read_surface(entries: Entries, folder: Path, ascent: Ascent | None) -> SurfaceStudy:
+def read_surface(entries: TableEntries, folder: Path, ascent: Ascent | None) -> SurfaceStudy:
     """``[surface]`` with ``[[surface.factor]]``, ``[surface.statistics]`` and ``[surface.equation]``; ``ascent`` is the
     walk that its levels may be said to be steps of."""
     runs, anova = read_table(folder, entries.text("runs")), read_table(folder, entries.text("anova"))
@@ -309,7 +309,7 @@ def read_surface(entries: Entries, folder: Path, ascent: Ascent | None) -> Surfa
     )
 
 
-def _steps(entries: Entries, ascent: Ascent | None) -> DesignSteps:
+def _steps(entries: TableEntries, ascent: Ascent | None) -> DesignSteps:
     found = {}
     for key in ("low", "centre", "high"):
         found[key] = entries.text(key)
@@ -320,7 +320,7 @@ def _steps(entries: Entries, ascent: Ascent | None) -> DesignSteps:
     return DesignSteps(**found)
 
 
-def _anova_line(table: Table, row: int) -> AnovaLine:
+def _anova_line(table: PrintedTable, row: int) -> AnovaLine:
     cells = {key: table.number_or_none(key, row) for key in ("sum_of_squares", "df", "mean_square")}
     return AnovaLine(
         table.texts("source")[row],
@@ -330,7 +330,7 @@ def _anova_line(table: Table, row: int) -> AnovaLine:
     )
 
 
-def _equation(entries: Entries, factors: tuple[str, ...]) -> Equation:
+def _equation(entries: TableEntries, factors: tuple[str, ...]) -> Equation:
     units = entries.text("units")
     if units not in ("coded", "natural"):
         raise entries.error("units", f"{units!r} is not one of coded, natural")
@@ -346,7 +346,7 @@ def _equation(entries: Entries, factors: tuple[str, ...]) -> Equation:
     return equation
 
 
-def read_optimum(entries: Entries, surface: SurfaceStudy | None) -> Optimum:
+def read_optimum(entries: TableEntries, surface: SurfaceStudy | None) -> Optimum:
     """``[optimum]`` with ``values``: factor of the surface → its value, natural unit."""
     if surface is None:
         raise entries.error("values", "there is no [surface] that this could be the optimum of")
@@ -361,7 +361,7 @@ def read_optimum(entries: Entries, surface: SurfaceStudy | None) -> Optimum:
     return found
 
 
-def read_verified(entries: Entries, folder: Path) -> Verified:
+def read_verified(entries: TableEntries, folder: Path) -> Verified:
     """``[verification]``."""
     table = read_table(folder, entries.text("file"))
     return Verified(
@@ -373,13 +373,13 @@ def read_verified(entries: Entries, folder: Path) -> Verified:
     )
 
 
-def _numbers(table: Table, columns: tuple[str, ...]) -> FloatArray:
+def _numbers(table: PrintedTable, columns: tuple[str, ...]) -> FloatArray:
     """Columns as values, shape (rows, columns)."""
     return np.array([[cell.value for cell in table.numbers(column)] for column in columns]).T
 
 
 @dataclass(frozen=True)
-class Table:
+class PrintedTable:
     """A table as text: column → cells; ``lines`` are the line numbers of its rows."""
 
     name: str
@@ -413,7 +413,7 @@ class Table:
         return self.number(column, row) if self.columns.get(column, ())[row : row + 1] not in ((), ("",)) else None
 
 
-def read_table(folder: Path, name: str) -> Table:
+def read_table(folder: Path, name: str) -> PrintedTable:
     """A CSV file of a study's folder. Raises AuditError for what is not one, OSError for what cannot be opened."""
     if Path(name).name != name or not name:
         raise AuditError(f"{name!r} is not the name of a file beside study.toml")
@@ -433,10 +433,10 @@ def read_table(folder: Path, name: str) -> Table:
         strict=True,
     )
     columns = dict(zip(header, cells, strict=True))
-    return Table(name, columns, tuple(number for number, _ in rows))
+    return PrintedTable(name, columns, tuple(number for number, _ in rows))
 
 
-def places(table: Table, value: Printed) -> tuple[str, ...]:
+def places(table: PrintedTable, value: Printed) -> tuple[str, ...]:
     """Where the table prints ``value``, in words: "restitution of petiole–petiole"; a row is named by its words."""
     found = []
     for row in range(table.rows):

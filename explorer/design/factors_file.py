@@ -56,7 +56,7 @@ class ModelOrder(StrEnum):
 
 
 @dataclass(frozen=True)
-class Factor(Record):
+class DesignFactor(Record):
     """One factor: low, high and reference in ``unit``."""
 
     name: str
@@ -76,7 +76,7 @@ class FactorsFile(Record):
     """Factors with what else the file says about the runs; None where it says nothing."""
 
     title: str
-    factors: tuple[Factor, ...]
+    factors: tuple[DesignFactor, ...]
     responses: tuple[str, ...]
     replicates: int | None = None
     centre: int | None = None
@@ -84,7 +84,7 @@ class FactorsFile(Record):
     first_seed: int | None = None
 
 
-def region_of(factors: tuple[Factor, ...]) -> Region:
+def region_of(factors: tuple[DesignFactor, ...]) -> Region:
     """The box low … high; factors go by their letters A, B, … there."""
     low, high = (np.array([getattr(factor, end) for factor in factors]) for end in ("low", "high"))
     return Region(factor_letters(len(factors)), (low + high) / 2, (high - low) / 2, ())
@@ -104,7 +104,7 @@ def read_factors(path: Path) -> FactorsFile:
         raise CommandError(f"{path}: {error}") from None
 
 
-def make_factor(name: Any, low: Any, high: Any, unit: Any, reference: Any, where: str) -> Factor:
+def make_factor(name: Any, low: Any, high: Any, unit: Any, reference: Any, where: str) -> DesignFactor:
     """A checked factor; raises StudyFileError."""
     checked_name(name, f"{where}.name")
     if not isinstance(unit, str) or (unit and not UNIT.fullmatch(unit)):
@@ -115,7 +115,7 @@ def make_factor(name: Any, low: Any, high: Any, unit: Any, reference: Any, where
     if not np.isfinite(most - least):
         raise StudyFileError(f"{where}: the range {least:g} … {most:g} of {name} is too wide to be a number")
     middle = least + (most - least) / 2 if reference is None else number(reference, f"{where}.reference")
-    return Factor(name, least, most, "" if unit == "1" else unit, middle)
+    return DesignFactor(name, least, most, "" if unit == "1" else unit, middle)
 
 
 def checked_name(name: Any, where: str) -> str:
@@ -129,7 +129,7 @@ def checked_name(name: Any, where: str) -> str:
     return name
 
 
-def no_repeats(factors: tuple[Factor, ...], responses: tuple[str, ...]) -> None:
+def no_repeats(factors: tuple[DesignFactor, ...], responses: tuple[str, ...]) -> None:
     """Refuse a name that two columns would have; raises StudyFileError."""
     columns = [*(factor.name for factor in factors), *responses]
     for name in columns:
@@ -159,7 +159,7 @@ def _checked(table: dict[str, Any]) -> FactorsFile:
     return FactorsFile(" ".join(title.split()), factors, responses, **optional)
 
 
-def _factor(entry: dict[str, Any], position: int) -> Factor:
+def _factor(entry: dict[str, Any], position: int) -> DesignFactor:
     where = f"factor[{position}]"
     only(entry, FACTOR_KEYS, where)
     required(entry, ("name", "low", "high"), where)

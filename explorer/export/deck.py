@@ -30,7 +30,7 @@ Array = npt.NDArray[np.float64]
 
 FILE = "deck.json"
 SIDES = 96
-"""Corners of a circle."""
+"""Corners of a circle of a revolved wall."""
 BANDS = 3
 """Rings of triangles along the line that is turned: more of them are less slender."""
 HOLDS = (RollingResistance.name,)
@@ -40,7 +40,7 @@ LAWS = (HertzMindlin.name, LinearSpringDashpot.name)
 
 
 @dataclass(frozen=True)
-class Clump:
+class DeckClump:
     """One component: member spheres in the principal frame about the centre of mass, mass, inertia and material."""
 
     name: str
@@ -59,7 +59,7 @@ class Clump:
 
 
 @dataclass(frozen=True)
-class Mesh:
+class DeckMesh:
     """A thin wall of triangles, which pushes from either side."""
 
     name: str
@@ -80,7 +80,7 @@ class Deck:
     steps: int
     gravity: tuple[float, float, float]
     """[m/s²]."""
-    clumps: tuple[Clump, ...]
+    clumps: tuple[DeckClump, ...]
     wall_youngs_modulus: float
     wall_poisson_ratio: float
     friction: Array
@@ -99,7 +99,7 @@ class Deck:
     entries: Entries
     plate: float | None
     """Height of the infinite plate [m]; None: there is none."""
-    meshes: tuple[Mesh, ...]
+    meshes: tuple[DeckMesh, ...]
     box: Array
     """Corners (low, high) of the room in which bodies are expected [m], shape (2, 3)."""
 
@@ -210,7 +210,7 @@ def assembled(
     steps: int,
     entries: Entries,
     plate: float | None = None,
-    meshes: tuple[Mesh, ...] = (),
+    meshes: tuple[DeckMesh, ...] = (),
 ) -> Deck:
     """A deck with the materials and bodies of ``scene`` that enter as ``entries`` say, and whatever walls are given."""
     friction, restitution = _pair_tables(scene)
@@ -238,12 +238,12 @@ def assembled(
     )
 
 
-def _clumps(scene: Scene) -> tuple[Clump, ...]:
+def _clumps(scene: Scene) -> tuple[DeckClump, ...]:
     clumps = []
     for body in scene.bodies:
         clump, material = body.clump, scene.material(body.material)
         clumps.append(
-            Clump(
+            DeckClump(
                 name=body.name,
                 centres=np.array(clump.centres),
                 radii=np.array(clump.radii),
@@ -280,7 +280,7 @@ def _plate(rig: Rig) -> float:
     return next(surface.pose.origin[2] for surface in rig.surfaces() if isinstance(surface, Plane))
 
 
-def _meshes(scene: Scene, record: Record) -> tuple[Mesh, ...]:
+def _meshes(scene: Scene, record: Record) -> tuple[DeckMesh, ...]:
     gated = scene.insertion.protocol == "fill_then_open"
     opening = round(record.gate_opened / record.dt) if record.gate_opened > 0.0 else -1
     meshes = []
@@ -288,7 +288,7 @@ def _meshes(scene: Scene, record: Record) -> tuple[Mesh, ...]:
         if isinstance(surface, Plane) or (name == "gate" and not gated):
             continue
         triangles = revolved_triangles(surface) if isinstance(surface, Revolved) else mesh_triangles(surface)
-        meshes.append(Mesh(name, triangles, opening if name == "gate" else -1))
+        meshes.append(DeckMesh(name, triangles, opening if name == "gate" else -1))
     return tuple(meshes)
 
 
@@ -342,8 +342,8 @@ def write_deck(folder: Path, deck: Deck) -> None:
 def read_deck(folder: Path) -> Deck:
     """The deck in ``folder``; OSError where there is none."""
     table: dict[str, Any] = json.loads((folder / FILE).read_text(encoding="utf-8"))
-    table["clumps"] = tuple(Clump(**_arrays(entry, "centres", "radii", "inertia")) for entry in table["clumps"])
-    table["meshes"] = tuple(Mesh(**_arrays(entry, "triangles")) for entry in table["meshes"])
+    table["clumps"] = tuple(DeckClump(**_arrays(entry, "centres", "radii", "inertia")) for entry in table["clumps"])
+    table["meshes"] = tuple(DeckMesh(**_arrays(entry, "triangles")) for entry in table["meshes"])
     entries = table["entries"]
     whole = {key: np.array(entries[key], dtype=np.int32) for key in ("step", "component")}
     table["entries"] = Entries(**(_arrays(entries, "time", "position", "quaternion", "velocity") | whole))

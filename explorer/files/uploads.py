@@ -36,10 +36,10 @@ MOST_ZIP_BYTES, MOST_UNPACKED_BYTES, MOST_MEMBERS = 50_000_000, 200_000_000, 100
 LABEL = re.compile(r"[^A-Za-z0-9_-]+")
 PART = re.compile(r"[A-Za-z0-9_. -]+")
 """What a part of a path in an archive may consist of."""
-KEPT = ("mass", "outlet_height", "domain_half_width")
+KEPT_IN_FUNNEL = ("mass", "outlet_height", "domain_half_width")
 """Parameters of the rig of before that the funnel has as well."""
 FEED_SHARE = 0.8
-"""Radius of the feed over that of a mesh's opening, where the usual feed would be wider."""
+"""Radius of the feed over that of a mesh funnel's opening, where the usual feed would be wider."""
 
 
 def kept_file(name: str, content: bytes, folder: Path, suffixes: Sequence[str]) -> Path:
@@ -172,7 +172,7 @@ def funnel_source(present: Scene, name: str, content: bytes, unit: str | None, f
         given = unit or FIXED_UNIT.get(mesh.suffix.lower(), USUAL_UNIT)
         rig = MeshFunnel(mesh=str(mesh.absolute()), unit=given, wall=present.rig.wall)
         feed = min(present.insertion.region_radius, FEED_SHARE * rig.placed.inlet.nearest)
-        own = {f"rig.{name}": getattr(present.rig, name) for name in KEPT if hasattr(present.rig, name)}
+        own = {f"rig.{name}": getattr(present.rig, name) for name in KEPT_IN_FUNNEL if hasattr(present.rig, name)}
         placed = with_rig(present, rig.name)
         # What suited the rig of before may not suit a funnel.
         fed = present.insertion if present.insertion.protocol in rig.protocols else placed.insertion

@@ -65,12 +65,12 @@ def _restitution(of: tuple[str, ...], own: dict[str, Derived], scene: Scene) -> 
     found = run_bench_test(bench)
     yield _closing(of, "restitution", "1", own["restitution"], found)
     paper = found.quantity("restitution_paper_L_over_2H")
-    flight = own.get("restitution_paper_L_over_2H", own["restitution"])
-    if flight.formula != "L/(2H)":
+    measured = own.get("restitution_paper_L_over_2H", own["restitution"])
+    if measured.formula != "L/(2H)":
         yield TwinRow(of, "L_over_2H", "1", None, own["restitution"].summary.mean, paper.value, None)
         return
-    yield TwinRow(of, "L_over_2H", "1", flight.summary.mean, None, paper.value, None)
-    landing = restitution_that_lands(bench, flight.summary.mean)
+    yield TwinRow(of, "L_over_2H", "1", measured.summary.mean, None, paper.value, None)
+    landing = restitution_that_lands(bench, measured.summary.mean)
     if landing is not None:
         yield TwinRow(of, "restitution_that_lands_there", "1", None, own["restitution"].summary.mean, landing, None)
 
@@ -133,14 +133,14 @@ def _closing(of: tuple[str, ...], name: str, unit: str, own: Derived | None, fou
 def simulated_bias(test: str, scene: Scene, of: tuple[str, ...]) -> BiasTable:
     """What the formula of ``test`` gives on the solver for one component or pair; CommandError where none is built."""
     if test == "drop":
-        return _drop(run_bench_test(bench_scene(scene, test, of)), "-".join(of))
+        return _drop_bias(run_bench_test(bench_scene(scene, test, of)), "-".join(of))
     if test == "compression":
         bench = with_values(bench_scene(scene, test, of), {"rig.strain": STRAINS[-1]})
-        return _compression(run_bench_test(bench), scene, of)
+        return _compression_bias(run_bench_test(bench), scene, of)
     raise CommandError(f"--bias --simulate: {test}; allowed: drop, compression")
 
 
-def _drop(found: BenchResult, name: str) -> BiasTable:
+def _drop_bias(found: BenchResult, name: str) -> BiasTable:
     table = dict(found.table)
     columns = (table[key] for key in ("static_friction", "restitution", "tracked", "paper_L_over_2H"))
     rows = [
@@ -155,24 +155,23 @@ def _drop(found: BenchResult, name: str) -> BiasTable:
     )
 
 
-def _compression(found: BenchResult, scene: Scene, of: tuple[str, ...]) -> BiasTable:
+def _compression_bias(found: BenchResult, scene: Scene, of: tuple[str, ...]) -> BiasTable:
     series = {key: np.array(values) for key, values in found.series}
     material = scene.material(next(b for b in scene.bodies if of[0] in (b.name, b.material)).material)
     # The largest approach belongs to the largest strain: their ratio is the thickness, also of a last step too many.
     strain = series["approach_m"] * (STRAINS[-1] / series["approach_m"][-1])
     ratio = series["youngs_modulus_paper_equation_1_Pa"] / material.youngs_modulus
     shown = [wanted for wanted in STRAINS if wanted >= FIRST_READING * STRAINS[-1]]
-    rows = [(wanted, compression_ratio(wanted, material.poisson_ratio), _at(wanted, strain, ratio)) for wanted in shown]
+    simulated = np.interp(shown, strain, ratio).tolist()
+    rows = [
+        (at, compression_ratio(at, material.poisson_ratio), seen) for at, seen in zip(shown, simulated, strict=True)
+    ]
     return BiasTable(
         title=f"{found.body} between plates of {found.wall}: E by Equation (1) over the E of its material",
         columns=("strain", "ratio", "simulated"),
         rows=tuple(rows),
         statement=f"ν = {material.poisson_ratio:g}; the closed form takes the plates as rigid",
     )
-
-
-def _at(wanted: float, strain: np.ndarray, ratio: np.ndarray) -> float:
-    return float(np.interp(wanted, strain, ratio))
 
 
 def bench_scene(scene: Scene, test: str, of: tuple[str, ...]) -> Scene:

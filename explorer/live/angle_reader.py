@@ -33,8 +33,8 @@ ANGLES: Mapping[str, Callable[[PileReading], Value]] = {
 
 
 @dataclass(frozen=True)
-class Angles:
-    """What was read of a pile."""
+class PileAngles:
+    """The angles of repose read off a pile."""
 
     observables: Mapping[str, Value] = field(default_factory=dict)
     """The angles by name; empty before there was a pile."""
@@ -42,10 +42,12 @@ class Angles:
     """The view that the left and the right angle were read from, with the lines of its flanks."""
 
 
-def read_angles(pile: Pile) -> Angles:
+def read_angles(pile: Pile) -> PileAngles:
     """What ``pile`` is read as."""
     reading = PileReading(pile)
-    return Angles({name: angle(reading) for name, angle in ANGLES.items()}, reading.front if reading.is_pile else None)
+    return PileAngles(
+        {name: angle(reading) for name, angle in ANGLES.items()}, reading.front if reading.is_pile else None
+    )
 
 
 class AngleReader:
@@ -60,9 +62,9 @@ class AngleReader:
         self._unheard = 0
         self.forget()
 
-    def forget(self, angles: Angles | None = None) -> None:
+    def forget(self, angles: PileAngles | None = None) -> None:
         """Begin anew: another pour, or an earlier moment of this one, of which ``angles`` had been read."""
-        self.newest = angles or Angles()
+        self.newest = angles or PileAngles()
         self._forgotten = self._unheard
         self._read_at = self._wall_due = self._wall_earliest = -math.inf
 
@@ -130,8 +132,6 @@ def run(line: Connection) -> None:
     """Main function of the process. It ends with the solver's process, whose end of the line closes with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     give_way(LIVE)
-    from explorer.live.angle_reader import read_angles
-
     try:
         while True:
             line.send(read_angles(line.recv()))

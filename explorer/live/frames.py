@@ -21,6 +21,7 @@ from solver.pours.record import Bodies
 T = TypeVar("T")
 
 READ_ATTEMPTS = 5
+"""Copies of a slot that are tried before the last whole one is given again."""
 MAX_BODIES = 32768
 """Bodies for which there is room in a frame."""
 MAX_SURFACES = 64

@@ -35,7 +35,7 @@ from explorer.live.messages import (
     StepBack,
     Watch,
 )
-from explorer.live.throttle import Pace
+from explorer.live.throttle import Throttle
 from explorer.outcomes import outcome_text
 from explorer.scene.source import changes
 from solver.effects.columns import kernel_effects
@@ -69,7 +69,7 @@ class LivePour:
         """``reading``: a line to a process that reads angles; without it they are read between two launches."""
         self._screen, self._report = screen, report
         self._angles = AngleReader(reading, clock.perf_counter)
-        self._pace = Pace(speed=1.0)
+        self._throttle = Throttle(speed=1.0)
         self._reported = 0.0
         self._begin(start)
 
@@ -80,7 +80,7 @@ class LivePour:
                 self._begin(command)
             case Play():
                 self._paused = False
-                self._pace.restart(clock.perf_counter(), self._pour.time)
+                self._throttle.restart(clock.perf_counter(), self._pour.time)
             case Pause():
                 self._paused, self._run_until = True, -math.inf
                 self._keep()
@@ -90,12 +90,12 @@ class LivePour:
             case Step(duration=duration):
                 # Steps that are asked for while one runs are added to it.
                 self._paused, self._run_until = True, max(self._run_until, self._pour.time) + duration
-                self._pace.restart(clock.perf_counter(), self._pour.time)
+                self._throttle.restart(clock.perf_counter(), self._pour.time)
             case StepBack(duration=duration):
                 self._go_back(self._pour.time - duration)
             case SetSpeed(factor=factor):
-                self._pace.speed = factor
-                self._pace.restart(clock.perf_counter(), self._pour.time)
+                self._throttle.speed = factor
+                self._throttle.restart(clock.perf_counter(), self._pour.time)
             case SetParameters(values=values):
                 self._set_parameters(values)
             case Watch():
@@ -107,17 +107,17 @@ class LivePour:
         """Wall time until the next launch is due; None while nothing is to be done."""
         if self._pour.steps_due(1) == 0 or self._stepped:
             return None
-        return max(0.0, self._pace.wait(clock.perf_counter(), self._pour.time))
+        return max(0.0, self._throttle.wait(clock.perf_counter(), self._pour.time))
 
     def advance(self) -> None:
         """Run one short launch, then publish and report what is due."""
-        steps = self._pour.steps_due(min(self._pace.steps(self._pour.dt), self._steps_to_stop()))
+        steps = self._pour.steps_due(min(self._throttle.steps(self._pour.dt), self._steps_to_stop()))
         before = clock.perf_counter()
         decided = launch(self._pour, steps)
         if (decided and self._history.since(self._pour.time) >= KEPT_EVERY) or self._stepped:
             self._keep()
         now = clock.perf_counter()
-        self._pace.launched(steps, now - before, now, self._pour.time)
+        self._throttle.launched(steps, now - before, now, self._pour.time)
         over = self._pour.outcome != Outcome.RUNNING
         if over:
             self._event(outcome_text(self._pour.outcome, self._pour.message))
@@ -148,9 +148,9 @@ class LivePour:
             scene=self._scene,
             seed=pour.seed,
             generation=self._generation,
-            speed=self._pace.speed,
-            capped=state == SessionState.RUNNING and self._pace.capped,
-            real_time_factor=self._pace.real_time_factor if state == SessionState.RUNNING else 0.0,
+            speed=self._throttle.speed,
+            capped=state == SessionState.RUNNING and self._throttle.capped,
+            real_time_factor=self._throttle.real_time_factor if state == SessionState.RUNNING else 0.0,
             phase=pour.phase,
             outcome=pour.outcome,
             time=pour.time,
@@ -179,12 +179,12 @@ class LivePour:
         self._paused, self._run_until, self._retuned = False, -math.inf, False
         self._keep()
         self._publish()
-        self._pace.restart(clock.perf_counter(), self._pour.time)
+        self._throttle.restart(clock.perf_counter(), self._pour.time)
         self._report(self.status())
 
     def _announce(self, start: Start, message: str) -> None:
         self._report(
-            Status(SessionState.STARTING, message, start.scene, start.seed, start.generation, self._pace.speed)
+            Status(SessionState.STARTING, message, start.scene, start.seed, start.generation, self._throttle.speed)
         )
 
     def _keep(self) -> None:
@@ -233,7 +233,7 @@ class LivePour:
         self._retuned = True
         self._history.changed(self._pour.time)
         self._keep()
-        self._pace.restart(clock.perf_counter(), self._pour.time)
+        self._throttle.restart(clock.perf_counter(), self._pour.time)
 
     def _publish(self) -> None:
         self._screen.publish(self._pour, self._generation, clock.perf_counter())

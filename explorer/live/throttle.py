@@ -24,7 +24,7 @@ WINDOW = 1.0
 """Wall time [s] over which the real-time factor is measured."""
 
 
-class Pace:
+class Throttle:
     """Keeps a pour at up to ``speed`` seconds of simulated time per second. Times are in seconds throughout."""
 
     def __init__(self, speed: float) -> None:

@@ -78,7 +78,7 @@ class Component:
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class RecordedSurface:
     """One surface of the rig: poses (k, 7), origin [m] and orientation wxyz, from ``times`` on; seen or not."""
 
     shape: Shape
@@ -104,7 +104,7 @@ class Recording:
 
     times: Array
     components: tuple[Component, ...]
-    surfaces: tuple[Surface, ...]
+    surfaces: tuple[RecordedSurface, ...]
     curves: Mapping[str, tuple[Array, Array]]
     """Name → times [s] and values."""
     events: tuple[tuple[float, str], ...]
@@ -268,7 +268,7 @@ def _places(
     return [np.delete(np.arange(len(size) + len(away)), away) for size, away in zip(sizes, gone, strict=True)]
 
 
-def _surface(entity: str, columns: Mapping[str, _Rows]) -> Surface:
+def _surface(entity: str, columns: Mapping[str, _Rows]) -> RecordedSurface:
     there, gone = columns["Mesh3D:vertex_positions"].times, columns.get("Clear:is_recursive")
     switches = sorted([(t, True) for t in there] + [(t, False) for t in (() if gone is None else gone.times)])
     placed = columns.get("Transform3D:translation")
@@ -277,7 +277,7 @@ def _surface(entity: str, columns: Mapping[str, _Rows]) -> Surface:
         turned = np.concatenate(_blocks(columns["Transform3D:quaternion"], 4))
         times = placed.times
         poses = np.concatenate([np.concatenate(_blocks(placed, 3)), turned[:, [3, 0, 1, 2]]], axis=1)
-    return Surface(
+    return RecordedSurface(
         _shape(entity.removeprefix(WORLD), columns),
         times,
         poses.astype(np.float64),

@@ -8,7 +8,6 @@ from __future__ import annotations
 import io
 import math
 from dataclasses import dataclass
-from math import dist
 from pathlib import Path
 
 from explorer.errors import CommandError
@@ -102,7 +101,7 @@ def _numbers(text: str, option: str, form: str) -> tuple[float, ...]:
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MeasuredPhotographs:
     """What came out, in the order of the pictures."""
 
     readings: tuple[PhotographedPile | Refusal, ...]
@@ -119,13 +118,13 @@ class Measured:
         return tuple(reading for reading in self.readings if isinstance(reading, Refusal))
 
 
-def run_measure(order: MeasureOrder) -> Measured:
+def run_measure(order: MeasureOrder) -> MeasuredPhotographs:
     """Every picture is opened before the first is measured, so that a bad file ends the command at once.
 
     Raises PhotographError for a file that is no picture, and whatever the simulated source raises.
     """
     pictures = [open_picture(path) for path in order.pictures]
-    measured = Measured(
+    measured = MeasuredPhotographs(
         tuple(_reading(picture, order) for picture in pictures),
         None if order.simulation is None else simulated_piles(order.simulation),
     )
@@ -150,7 +149,7 @@ def _metres_per_pixel(picture: Picture, order: MeasureOrder) -> float | None:
     if order.reference_length is None:
         return order.metres_per_pixel
     ends = order.reference_ends
-    return order.reference_length / (dist(ends[:2], ends[2:]) if ends else reference_pixels(picture))
+    return order.reference_length / (math.dist(ends[:2], ends[2:]) if ends else reference_pixels(picture))
 
 
 def outline_text(pile: PhotographedPile) -> str:

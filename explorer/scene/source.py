@@ -9,8 +9,8 @@ from pathlib import Path
 
 from explorer.errors import CommandError
 from explorer.scene.file import load_scene, material_scene, study_scene
-from explorer.units import SCREEN_UNIT, quantity
-from solver.params import UNITS, ParameterError, parse_quantity
+from explorer.units import entry_unit, quantity
+from solver.params import ParameterError, parse_quantity
 from solver.scenes.material_file import with_settings
 from solver.scenes.scene import Scene, parameters, values, with_rig
 from solver.toml_table import read_toml
@@ -94,8 +94,8 @@ def setting_text(change: Difference) -> str:
     """``path=value``, in the unit of the screen where that gives back every bit, otherwise in SI with all digits."""
     if isinstance(change.now, str):
         return f"{change.path}={change.now}"
-    number, unit = float(change.now), SCREEN_UNIT.get(change.unit, "" if change.unit == "1" else change.unit)
-    short = f"{number / UNITS.get(change.unit, {}).get(unit, 1.0):.6g}{unit}"
+    number, unit = float(change.now), entry_unit(change.unit)
+    short = f"{unit.of(number):.6g}{unit.symbol}"
     exact = parse_quantity(short, change.unit, change.path) == number
     return f"{change.path}={short if exact else repr(number)}"
 

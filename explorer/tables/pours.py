@@ -131,8 +131,8 @@ def bench_text(data: dict[str, Any]) -> str:
     rows = [
         (
             name,
-            _cell(entry["value"]),
-            _cell(entry["reference"]),
+            _number(entry["value"], ".5g"),
+            _number(entry["reference"], ".5g"),
             _percent(entry["error"]),
             entry["unit"],
         )
@@ -144,7 +144,7 @@ def bench_text(data: dict[str, Any]) -> str:
     ]
     if data["table"]:
         columns = data["table"]
-        lines = [tuple(_cell(number) for number in row) for row in zip(*columns.values(), strict=True)]
+        lines = [tuple(_number(number, ".5g") for number in row) for row in zip(*columns.values(), strict=True)]
         parts.append(text_table(tuple(columns), lines))
     return "\n\n".join([*parts, data["note"]] if data["note"] else parts)
 
@@ -157,10 +157,6 @@ def write_bench(folder: Path, data: dict[str, Any]) -> None:
     """Write ``result.json`` and ``parameters.toml`` into an existing ``folder``."""
     (folder / "result.json").write_text(json_text(data) + "\n", encoding="utf-8")
     (folder / "parameters.toml").write_text(parameters_text(data["parameters"]), encoding="utf-8")
-
-
-def _cell(number: float | None) -> str:
-    return "-" if number is None else f"{number:.5g}"
 
 
 def _number(number: float | None, form: str) -> str:

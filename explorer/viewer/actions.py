@@ -30,7 +30,7 @@ ClientAction = Callable[[Any], None]
 """Something that is done to one browser."""
 Found = TypeVar("Found")
 
-WAIT = 0.2
+ARROW_WAIT = 0.2
 """How long an arrow key waits [s], and how near to it in time a slider's new value is the slider's own answer."""
 
 
@@ -135,10 +135,10 @@ class SliderHands:
             pressed = time.monotonic()
 
             def decide() -> None:
-                if abs(self._moved - pressed) > WAIT:
+                if abs(self._moved - pressed) > ARROW_WAIT:
                     post(action)
 
-            timer = threading.Timer(WAIT, decide)
+            timer = threading.Timer(ARROW_WAIT, decide)
             timer.daemon = True
             timer.start()
 

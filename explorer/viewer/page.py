@@ -60,7 +60,7 @@ class Page:
         self._server, self._session, self._recorder = server, session, recorder
         self._events: deque[Event] = deque(maxlen=EVENTS_REMEMBERED)
         self._actions, self._people = Actions(), People(server)
-        self._orders = Orders({"diagnosis": diagnosis} | ({} if study is None else {"study": study}))
+        self._orders = OrderEvents({"diagnosis": diagnosis} | ({} if study is None else {"study": study}))
         self._notice, self._time = "", session.status().time
         light(server)
         apply_theme(server, DARK)
@@ -148,7 +148,7 @@ class People:
         def _(client: viser.ClientHandle) -> None:
             if self.present > 1:
                 client.add_notification(
-                    f"You are browser {number(client.client_id)}",
+                    f"You are browser {browser_number(client.client_id)}",
                     f"{self.present} browsers are at this page, with the same pour.",
                     auto_close_seconds=8.0,
                 )
@@ -165,18 +165,18 @@ class People:
         return replace(event, text=f"{event.text} · browser {self._last}")
 
     def _acted(self, client_id: int, message: Any) -> None:
-        self._last, self._at = number(client_id), time.monotonic()
+        self._last, self._at = browser_number(client_id), time.monotonic()
 
 
-def number(client_id: int) -> int:
+def browser_number(client_id: int) -> int:
     """What a browser is called."""
     return client_id + 1
 
 
-class Orders:
-    """Compares what there is with what there was; ``commands``: name → what runs in the background."""
+class OrderEvents:
+    """Tells of what is there and was not the last time; ``commands``: name → what runs in the background."""
 
-    def __init__(self, commands: Mapping[str, Command]) -> None:
+    def __init__(self, commands: Mapping[str, BackgroundCommand]) -> None:
         self._commands = dict(commands)
         self._states = {name: command.status().state for name, command in self._commands.items()}
         self._generation: int | None = None
@@ -197,7 +197,7 @@ class Orders:
                 yield Event(status.generation, status.time, f"{name}: {now}", is_order=now in ASKED_FOR)
 
 
-class Command(Protocol):
+class BackgroundCommand(Protocol):
     """A study, or a diagnosis."""
 
     def status(self) -> CommandStatus:

@@ -21,13 +21,13 @@ from solver.scenes.scene import Scene, body_counts
 Array = npt.NDArray[np.float64]
 
 FINE = 2000
-"""Bodies up to which each is drawn with all its faces, however far it is."""
+"""Bodies of a component up to which each is drawn with all its faces, however far it is."""
 RING_SPACING = 0.05
 """Circles on the plate, a scale for the eye [m]."""
 PLATE_RADIUS = 0.2
 """Radius of the disc that stands for the infinite plate [m]."""
 CORNERS = 72
-"""Corners of such a circle."""
+"""Corners of a circle on the plate and of a rim."""
 LINE = 8e-4
 """Thickness of lines [m]."""
 CLEAR, OPACITY = 0.16, {GATE_NAME: 0.5}
@@ -43,7 +43,10 @@ class SceneNodes:
         numbers = body_counts(scene)
         self.bodies = BodyNodes(
             server,
-            [Kind(mesh, component_colour(k), n) for k, (mesh, n) in enumerate(zip(self.meshes, numbers, strict=True))],
+            [
+                DrawnComponent(mesh, component_colour(k), n)
+                for k, (mesh, n) in enumerate(zip(self.meshes, numbers, strict=True))
+            ],
             root,
         )
         self._rig = rig_nodes(server, scene, root)
@@ -97,7 +100,7 @@ def component_colour(k: int) -> Colour:
 class BodyNodes:
     """Nodes of all bodies, below the node ``root``; none for a component without bodies."""
 
-    def __init__(self, server: viser.ViserServer, kinds: Sequence[Kind], root: str = "") -> None:
+    def __init__(self, server: viser.ViserServer, kinds: Sequence[DrawnComponent], root: str = "") -> None:
         self._kinds = tuple(kinds)
         self._colours = np.array([linear(kind.colour) for kind in kinds], dtype=np.uint8).reshape(-1, 3)
         self.nodes: list[Any] = [
@@ -115,7 +118,7 @@ class BodyNodes:
         return self._colours[frame.component % len(self._colours)]
 
     def paint(self, frame: Frame, colours: npt.NDArray[np.uint8]) -> None:
-        """Give the bodies of ``frame`` their ``colours`` (n, 3), those of batched meshes (``palette.linear``)."""
+        """Give the bodies of ``frame`` their ``colours`` (n, 3), those of batched meshes (``style.linear``)."""
         for k, node, kind in self._there():
             chosen = np.flatnonzero(frame.component == k)[: kind.most]
             painted = _plain(kind)
@@ -130,28 +133,28 @@ class BodyNodes:
     def clear(self) -> None:
         """Hide all bodies."""
         for _, node, kind in self._there():
-            _place(node, nowhere(kind.most))
+            _place(node, hidden_poses(kind.most))
 
     def remove(self) -> None:
         """Take all nodes off the page."""
         for _, node, _ in self._there():
             node.remove()
 
-    def _there(self) -> list[tuple[int, Any, Kind]]:
+    def _there(self) -> list[tuple[int, Any, DrawnComponent]]:
         pairs = enumerate(zip(self.nodes, self._kinds, strict=True))
         return [(k, node, kind) for k, (node, kind) in pairs if node is not None]
 
 
 @dataclass(frozen=True, eq=False)
-class Kind:
+class DrawnComponent:
     """One component: its mesh, its colour, and how many of it there can be."""
 
-    mesh: Mesh
+    mesh: BodyMesh
     colour: Colour
     most: int
 
 
-class Mesh(Protocol):
+class BodyMesh(Protocol):
     """Surface of a body in its own frame."""
 
     @property
@@ -163,8 +166,8 @@ class Mesh(Protocol):
         """Indices of vertices, shape (f, 3)."""
 
 
-def _batch(server: viser.ViserServer, name: str, kind: Kind) -> Any:
-    none = nowhere(kind.most)
+def _batch(server: viser.ViserServer, name: str, kind: DrawnComponent) -> Any:
+    none = hidden_poses(kind.most)
     return server.scene.add_batched_meshes_simple(
         name,
         kind.mesh.vertices,
@@ -177,18 +180,18 @@ def _batch(server: viser.ViserServer, name: str, kind: Kind) -> Any:
     )
 
 
-def _plain(kind: Kind) -> npt.NDArray[np.uint8]:
+def _plain(kind: DrawnComponent) -> npt.NDArray[np.uint8]:
     return np.tile(np.array(linear(kind.colour), dtype=np.uint8), (kind.most, 1))
 
 
-def _place(node: Any, poses: Poses) -> None:
+def _place(node: Any, poses: InstancePoses) -> None:
     node.batched_positions = poses.position
     node.batched_wxyzs = poses.quaternion
     node.batched_scales = poses.scale
 
 
 @dataclass(frozen=True)
-class Poses:
+class InstancePoses:
     """Instances of one component as viser wants them; bodies that are not in the scene have scale 0."""
 
     position: npt.NDArray[np.float32]
@@ -199,13 +202,13 @@ class Poses:
     """Size of a body relative to its mesh, or 0, shape (n,)."""
 
 
-def component_poses(frame: Frame, component: int, n: int, seen: npt.NDArray[np.bool_] | None = None) -> Poses:
+def component_poses(frame: Frame, component: int, n: int, seen: npt.NDArray[np.bool_] | None = None) -> InstancePoses:
     """Poses of the bodies of one component, ``n`` of which will enter in all, in order of entry.
 
     Those that are not ``seen``, shape (bodies of the frame,), are hidden; by default those that have left the domain.
     """
     seen = frame.inside if seen is None else seen
-    poses = nowhere(n)
+    poses = hidden_poses(n)
     chosen = np.flatnonzero(frame.component == component)[:n]
     poses.position[: len(chosen)] = frame.position[chosen]
     poses.quaternion[: len(chosen)] = frame.quaternion[chosen]
@@ -213,11 +216,11 @@ def component_poses(frame: Frame, component: int, n: int, seen: npt.NDArray[np.b
     return poses
 
 
-def nowhere(n: int) -> Poses:
+def hidden_poses(n: int) -> InstancePoses:
     """``n`` hidden instances."""
     quaternion = np.zeros((n, 4), dtype=np.float32)
     quaternion[:, 0] = 1.0
-    return Poses(np.zeros((n, 3), dtype=np.float32), quaternion, np.zeros(n, dtype=np.float32))
+    return InstancePoses(np.zeros((n, 3), dtype=np.float32), quaternion, np.zeros(n, dtype=np.float32))
 
 
 def rig_nodes(server: viser.ViserServer, scene: Scene, root: str = "") -> dict[str, Any]:

@@ -9,7 +9,7 @@ import pytest
 
 from doe.designs import box_behnken, central_composite, factorial, latin_hypercube, plackett_burman
 from explorer.design.analysis import AnalyseOrder, analyse_runs
-from explorer.design.factors_file import Factor
+from explorer.design.factors_file import DesignFactor
 from explorer.design.filled_sheet import Runs
 from explorer.design.result import DesignResult
 from explorer.design.text import analysis_text
@@ -24,7 +24,7 @@ def runs(design, values, design_name=""):
     responses = np.atleast_2d(np.asarray(values, dtype=float).T).T
     return Runs(
         design=design_name,
-        factors=tuple(Factor(f"f{j + 1}", 10.0, 20.0, "mm", 14.0) for j in range(k)),
+        factors=tuple(DesignFactor(f"f{j + 1}", 10.0, 20.0, "mm", 14.0) for j in range(k)),
         response="load",
         unit="N",
         coded=np.asarray(design, dtype=float),

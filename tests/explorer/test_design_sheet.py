@@ -7,7 +7,7 @@ from doe.designs import box_behnken
 from doe.errors import StatisticsError
 from explorer.design.factors_file import Alpha, read_factors, region_of
 from explorer.design.filled_sheet import read_sheet, runs_of
-from explorer.design.plan import PlanOrder, make_plan, sheet_text
+from explorer.design.run_plan import DesignOrder, make_plan, sheet_text
 from explorer.errors import CommandError
 from solver.assets import asset_path
 
@@ -70,12 +70,12 @@ def filled(text, values):
 @pytest.mark.parametrize(
     "order",
     [
-        PlanOrder("plackett-burman", replicates=2, centre=2, fold=True),
-        PlanOrder("box-behnken"),
-        PlanOrder("central-composite", alpha=Alpha.INSCRIBED),
-        PlanOrder("factorial", generators=("C=AB",), replicates=3),
-        PlanOrder("lhs", runs=12),
-        PlanOrder("sobol", runs=16),
+        DesignOrder("plackett-burman", replicates=2, centre=2, fold=True),
+        DesignOrder("box-behnken"),
+        DesignOrder("central-composite", alpha=Alpha.INSCRIBED),
+        DesignOrder("factorial", generators=("C=AB",), replicates=3),
+        DesignOrder("lhs", runs=12),
+        DesignOrder("sobol", runs=16),
     ],
     ids=lambda order: order.design,
 )
@@ -96,17 +96,17 @@ def test_a_design_is_read_from_its_sheet_as_it_was_made(tmp_path, order):
 
 def test_levels_of_a_sheet_are_exactly_low_middle_and_high_again(tmp_path):
     file = read_factors(factors_file(tmp_path))
-    plan = make_plan(PlanOrder("box-behnken"), file)
+    plan = make_plan(DesignOrder("box-behnken"), file)
     runs = runs_of(read_sheet(sheet_file(tmp_path, filled(sheet_text(plan, file), range(17)))), "strength")
     assert np.array_equal(runs.coded, box_behnken(3, 5))
 
 
 def test_order_of_the_runs_is_shuffled_by_its_seed_and_seeds_stay_with_their_runs(tmp_path):
     file = read_factors(factors_file(tmp_path))
-    one, again, other = (make_plan(PlanOrder("factorial", replicates=2, seed=seed), file) for seed in (1, 1, 2))
+    one, again, other = (make_plan(DesignOrder("factorial", replicates=2, seed=seed), file) for seed in (1, 1, 2))
     assert np.array_equal(one.sequence, again.sequence)
     assert not np.array_equal(one.sequence, other.sequence)
-    in_order = make_plan(PlanOrder("factorial", replicates=2, standard_order=True), file)
+    in_order = make_plan(DesignOrder("factorial", replicates=2, standard_order=True), file)
     assert in_order.sequence[:, 0].tolist() == [*range(8), *range(8)]
     of_run = {tuple(pair): seed for pair, seed in zip(in_order.sequence.tolist(), in_order.seeds.tolist(), strict=True)}
     assert len(set(of_run.values())) == 16
@@ -117,10 +117,10 @@ def test_order_of_the_runs_is_shuffled_by_its_seed_and_seeds_stay_with_their_run
 def test_the_files_own_numbers_hold_until_an_option_says_otherwise(tmp_path):
     text = "replicates = 2\ncentre = 3\nseed = 9\nfirst_seed = 100\n" + FACTORS
     file = read_factors(factors_file(tmp_path, text))
-    plan = make_plan(PlanOrder("box-behnken"), file)
+    plan = make_plan(DesignOrder("box-behnken"), file)
     assert len(plan.sequence) == (12 + 3) * 2
     assert sorted(plan.seeds.tolist()) == list(range(100, 130))
-    assert len(make_plan(PlanOrder("box-behnken", replicates=1, centre=5), file).sequence) == 17
+    assert len(make_plan(DesignOrder("box-behnken", replicates=1, centre=5), file).sequence) == 17
 
 
 def test_shipped_sheet_is_table_8(tmp_path):
@@ -263,14 +263,14 @@ def test_a_bad_factors_file_gets_one_line_with_its_key(tmp_path, old, new, messa
 @pytest.mark.parametrize(
     "order, message",
     [
-        (PlanOrder("box-behnken", runs=20), "--runs: is not for box-behnken"),
-        (PlanOrder("lhs", fold=True), "--fold: is not for lhs"),
-        (PlanOrder("sobol", centre=3), "--centre: is not for sobol"),
-        (PlanOrder("lhs", generators=("C=AB",)), "--generator: is not for lhs"),
-        (PlanOrder("factorial", generators=("C=AB",), fraction=1), "fraction: has generators of its own"),
-        (PlanOrder("factorial", alpha=Alpha.INSCRIBED), "--alpha: is not for factorial"),
-        (PlanOrder("lhs", runs=30_000), "--runs 30000: allowed"),
-        (PlanOrder("factorial", replicates=9000), "allowed are 20000 runs"),
+        (DesignOrder("box-behnken", runs=20), "--runs: is not for box-behnken"),
+        (DesignOrder("lhs", fold=True), "--fold: is not for lhs"),
+        (DesignOrder("sobol", centre=3), "--centre: is not for sobol"),
+        (DesignOrder("lhs", generators=("C=AB",)), "--generator: is not for lhs"),
+        (DesignOrder("factorial", generators=("C=AB",), fraction=1), "fraction: has generators of its own"),
+        (DesignOrder("factorial", alpha=Alpha.INSCRIBED), "--alpha: is not for factorial"),
+        (DesignOrder("lhs", runs=30_000), "--runs 30000: allowed"),
+        (DesignOrder("factorial", replicates=9000), "allowed are 20000 runs"),
     ],
 )
 def test_an_option_of_another_design_is_refused(tmp_path, order, message):
@@ -282,5 +282,5 @@ def test_a_table_with_too_few_columns_is_refused(tmp_path):
     more = "".join(f'[[factor]]\nname = "f{k}"\nlow = 0\nhigh = 1\n' for k in range(6))
     file = read_factors(factors_file(tmp_path, FACTORS + more))
     with pytest.raises(StatisticsError, match="runs 8: has 7 columns for 9 factors; allowed: at least 12"):
-        make_plan(PlanOrder("plackett-burman", runs=8), file)
-    assert len(make_plan(PlanOrder("plackett-burman"), file).coded) == 12
+        make_plan(DesignOrder("plackett-burman", runs=8), file)
+    assert len(make_plan(DesignOrder("plackett-burman"), file).coded) == 12

@@ -13,7 +13,7 @@ from explorer.errors import CommandError
 from explorer.export import EXPORTS, names
 from explorer.export.bed import BED_WRITERS, Bed
 from explorer.export.deck import DeckTarget, assembled, deck_of, read_deck, revolved_triangles, write_stl
-from explorer.export.frames import Frame, motion, read_frames, rigid_fit
+from explorer.export.frames import SphereFrame, motion, read_frames, rigid_fit
 from explorer.export.liggghts import unclamped_restitution, write_liggghts
 from explorer.export.target import ExportTarget
 from explorer.scene.file import load_scene, with_settings
@@ -170,7 +170,7 @@ def test_bodies_are_found_again_from_their_spheres(taichi):
         speeds.append(velocity[k] + np.cross(spin[k], arms))
         spins.append(np.tile(spin[k], (len(arms), 1)))
     n = sum(map(len, rows))
-    frame = Frame(0, np.arange(1, n + 1), np.ones(n), *map(np.concatenate, (rows, speeds, spins)))
+    frame = SphereFrame(0, np.arange(1, n + 1), np.ones(n), *map(np.concatenate, (rows, speeds, spins)))
     found = motion(deck, frame)
     assert found.position == pytest.approx(places, abs=1e-12)
     assert found.velocity == pytest.approx(velocity, abs=1e-12)

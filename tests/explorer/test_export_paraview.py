@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from explorer.errors import CommandError
-from explorer.export.paraview import Moment, collection, contact_grid, moments, rig_grid, shape_grid, write_paraview
+from explorer.export.paraview import PourState, collection, contact_grid, moments, rig_grid, shape_grid, write_paraview
 from explorer.scene.file import load_scene, with_settings
 from solver.pours.contacts import Contacts
 from tests.explorer.command_line import TINY, explorer, refused, settings
@@ -33,7 +33,7 @@ def with_contacts(moment):
         np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1.0]]),
         np.array([[0.003, 0.004, 0.012], [0.0, 0.0, 0.02]]),
     )
-    return Moment(moment.time, moment.bodies, moment.spheres, contacts, moment.poses, moment.gate_shut)
+    return PourState(moment.time, moment.bodies, moment.spheres, contacts, moment.poses, moment.gate_shut)
 
 
 def test_moments_come_at_their_times_and_the_last_one_is_the_end(poured):
@@ -97,7 +97,7 @@ def test_contacts_of_a_pile_at_rest_carry_its_weight(taichi):
 
 def test_an_open_gate_is_not_drawn(poured, scene):
     moment = poured[0][-1]
-    shut = Moment(moment.time, moment.bodies, moment.spheres, moment.contacts, moment.poses, True)
+    shut = PourState(moment.time, moment.bodies, moment.spheres, moment.contacts, moment.poses, True)
     names = scene.rig.surface_names
     assert set(rig_grid(scene, shut)[4]["surface"]) == set(range(len(names)))
     drawn = {names[k] for k in rig_grid(scene, moment)[4]["surface"]}

@@ -8,7 +8,7 @@ import pytest
 
 from doe.studies.campaign import run_campaign
 from explorer.design.analysis import AnalyseOrder, run_analyse
-from explorer.laboratory.answers import analysis_answer
+from explorer.laboratory.command_results import analysis_result
 from explorer.report import report_html, report_markdown
 from explorer.report.comparison import comparison
 from explorer.report.content import Table
@@ -82,7 +82,7 @@ def test_the_terminal_shows_ranges_and_a_choice_where_nothing_is_identified():
 def test_the_page_and_the_report_of_a_design_say_the_same():
     order = AnalyseOrder("sunflower_extract", target=24.68)
     result = run_analyse(order)
-    answer, markdown = analysis_answer(order), design_markdown(result)
+    answer, markdown = analysis_result(order), design_markdown(result)
     page = answer.files["report.html"].decode()
     for confidence_set, feasible, chosen in texts_of(result.optimum.to_dict()).values():
         for text in (answer.text, markdown, page):

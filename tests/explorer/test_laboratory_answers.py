@@ -7,15 +7,15 @@ import pytest
 
 from doe.laboratory import TESTS
 from explorer.design.analysis import AnalyseOrder
-from explorer.design.plan import PlanOrder
+from explorer.design.run_plan import DesignOrder
 from explorer.errors import CommandError
-from explorer.laboratory.answers import (
+from explorer.laboratory.command_results import (
     Ruler,
-    analysis_answer,
-    audit_answer,
-    bench_answer,
-    photograph_answer,
-    sheet_answer,
+    analysis_result,
+    audit_result,
+    bench_result,
+    photograph_result,
+    sheet_result,
 )
 from explorer.laboratory.part import measured_source, read_part
 from explorer.laboratory.run import LabOrder, analysed
@@ -33,7 +33,7 @@ def told(answer, *more):
 
 @pytest.mark.parametrize("test", TESTS)
 def test_a_bench_test_is_told_as_in_the_terminal_and_its_part_can_be_read(test, tmp_path):
-    answer = bench_answer(LabOrder(test, test))
+    answer = bench_result(LabOrder(test, test))
     assert answer.text.strip() == told(answer)
     (name, content), *_ = answer.files.items()
     (tmp_path / name).write_bytes(content)
@@ -43,24 +43,24 @@ def test_a_bench_test_is_told_as_in_the_terminal_and_its_part_can_be_read(test, 
 
 
 def test_options_are_part_of_the_command_line():
-    shear = bench_answer(LabOrder("shear", "shear", compression="compression"))
+    shear = bench_result(LabOrder("shear", "shear", compression="compression"))
     assert shear.text.strip() == told(shear)
-    rest = bench_answer(LabOrder("composition", "composition", left_out=("light_impurity",)))
+    rest = bench_result(LabOrder("composition", "composition", left_out=("light_impurity",)))
     assert rest.text.strip() == told(rest)
-    assert rest.text != bench_answer(LabOrder("composition", "composition")).text
+    assert rest.text != bench_result(LabOrder("composition", "composition")).text
 
 
 def test_a_photograph_is_read_and_drawn():
-    answer = photograph_answer("cone_25_30", Ruler(scale_mm=0.2))
+    answer = photograph_result("cone_25_30", Ruler(scale_mm=0.2))
     assert answer.text == told(answer)
     assert answer.picture.ndim == 3
     assert np.ptp(answer.picture) > 100
     assert {name.split(".")[-1] for name in answer.files} == {"png", "csv"}
-    assert "outline" not in "".join(photograph_answer(str(asset_path("photographs", "cone_25_30")), Ruler()).files)
+    assert "outline" not in "".join(photograph_result(str(asset_path("photographs", "cone_25_30")), Ruler()).files)
 
 
 def test_a_bar_in_the_picture_gives_lengths_too():
-    answer = photograph_answer("cone_25_30", Ruler(reference_mm=100.0))
+    answer = photograph_result("cone_25_30", Ruler(reference_mm=100.0))
     assert answer.text == told(answer)
     assert "--reference-length 100" in answer.command
     assert "cone_25_30_outline.csv" in answer.files
@@ -70,13 +70,13 @@ def test_a_picture_of_nothing_says_so(tmp_path):
     from PIL import Image
 
     Image.new("L", (640, 480), 128).save(tmp_path / "nothing.png")
-    answer = photograph_answer(str(tmp_path / "nothing.png"), Ruler())
+    answer = photograph_result(str(tmp_path / "nothing.png"), Ruler())
     assert answer.text.startswith("nothing.png: no angle: ")
 
 
 def test_a_sheet_is_that_of_the_command(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    answer = sheet_answer(PlanOrder("box-behnken", replicates=2), "sunflower_extract", 0.5)
+    answer = sheet_result(DesignOrder("box-behnken", replicates=2), "sunflower_extract", 0.5)
     assert told(answer).startswith(answer.text.strip())
     assert (tmp_path / "runs.csv").read_bytes() == answer.files["runs.csv"]
 
@@ -84,20 +84,20 @@ def test_a_sheet_is_that_of_the_command(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("order", "said"),
     [
-        (PlanOrder("plackett-burman", runs=12, fold=True), "--runs 12 --fold"),
-        (PlanOrder("factorial", generators=("C=AB",)), "--generator C=AB"),
+        (DesignOrder("plackett-burman", runs=12, fold=True), "--runs 12 --fold"),
+        (DesignOrder("factorial", generators=("C=AB",)), "--generator C=AB"),
     ],
 )
 def test_options_of_a_design_are_part_of_its_command_line(order, said, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    answer = sheet_answer(order, "sunflower_extract", None)
+    answer = sheet_result(order, "sunflower_extract", None)
     assert said in answer.command
     assert told(answer).startswith(answer.text.strip())
     assert (tmp_path / "runs.csv").read_bytes() == answer.files["runs.csv"]
 
 
 def test_an_analysis_has_its_words_its_charts_and_its_report():
-    answer = analysis_answer(AnalyseOrder("sunflower_extract", target=24.68))
+    answer = analysis_result(AnalyseOrder("sunflower_extract", target=24.68))
     assert answer.text.strip() == told(answer)
     assert {"Contours", "Predicted and observed", "Single runs", "Ridge", "Solution surface"} <= set(answer.plots)
     drawn = {title: plot.make() for title, plot in answer.plots.items()}
@@ -106,7 +106,7 @@ def test_an_analysis_has_its_words_its_charts_and_its_report():
 
 
 def test_an_audit_is_that_of_the_command():
-    answer = audit_answer(None)
+    answer = audit_result(None)
     assert answer.text.strip() == told(answer)
     assert "142 reproduced" in answer.text
     assert b"</html>" in answer.files["audit.html"]

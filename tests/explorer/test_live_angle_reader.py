@@ -15,7 +15,7 @@ from explorer.live.angle_reader import (
     WALL_INTERVAL,
     WALL_SHARE,
     AngleReader,
-    Angles,
+    PileAngles,
     read_angles,
 )
 from solver.observables.made_up import cone
@@ -45,7 +45,7 @@ def due(reader, clock, time, wall):
 def test_a_cone_is_read_from_a_quarter_of_the_mass_on():
     reader = AngleReader(None, Clock())
     reader.read(PILE, LEAST_SHARE_BELOW - 1e-6, 0.0)
-    assert reader.newest == Angles()
+    assert reader.newest == PileAngles()
     reader.read(PILE, LEAST_SHARE_BELOW, 0.0)
     # Pixels of 0.2 mm on a flank of some 50 mm, and spheres in place of a smooth surface.
     assert reader.newest.observables["angle_of_repose_deg"].value == pytest.approx(30.0, abs=1.0)
@@ -116,12 +116,12 @@ def test_what_another_process_reads_is_the_same_and_comes_when_it_is_heard(line)
 def test_an_answer_about_another_moment_than_the_present_one_is_not_taken(line):
     reader = AngleReader(line.near, Clock())
     reader.ask(PILE, 1.0, 1.0)
-    reader.forget(Angles())  # the pour is brought back
+    reader.forget(PileAngles())  # the pour is brought back
     assert reader.due(0.5)
     reader.ask(STEEPER, 1.0, 0.5)  # nobody listens yet
     line.answer()
     assert not reader.hear()
-    assert reader.newest == Angles()
+    assert reader.newest == PileAngles()
     reader.ask(STEEPER, 1.0, 0.5)
     line.answer()
     assert reader.hear()

@@ -1,11 +1,11 @@
 import pytest
 
-from explorer.live.throttle import FRAME_WALL, LAUNCH_WALL, Pace
+from explorer.live.throttle import FRAME_WALL, LAUNCH_WALL, Throttle
 
 
 def driven(speed, dt, cost, seconds):
     """Let a pour with the given cost of a step [s] run for ``seconds`` of wall time; returns it and the times."""
-    pace, wall, time, longest = Pace(speed), 100.0, 5.0, 0.0
+    pace, wall, time, longest = Throttle(speed), 100.0, 5.0, 0.0
     pace.restart(wall, time)
     while wall < 100.0 + seconds:
         wait = pace.wait(wall, time)
@@ -48,7 +48,7 @@ def test_launches_are_short(cost):
 
 
 def test_a_stall_is_not_caught_up():
-    pace = Pace(1.0)
+    pace = Throttle(1.0)
     pace.restart(0.0, 0.0)
     pace.launched(10, 3.0, 3.0, 0.001)
     assert pace.wait(3.0, 0.001) == 0.0

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from explorer.viewer.actions import WAIT, SliderHands
+from explorer.viewer.actions import ARROW_WAIT, SliderHands
 from tests.explorer.background import wait_for
 
 
@@ -41,7 +41,7 @@ def test_an_arrow_on_a_slider_does_not(page, first):
     page.post("step")
     if first == "key":
         page.server.send(0.31)
-    time.sleep(2 * WAIT)
+    time.sleep(2 * ARROW_WAIT)
     assert page.posted == []
 
 

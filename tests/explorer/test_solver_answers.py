@@ -8,9 +8,9 @@ from io import BytesIO
 
 import pytest
 
-from explorer.background.printed import kept_scene, printed
+from explorer.background.command_output import command_output, kept_scene
 from explorer.errors import CommandError
-from explorer.laboratory.answers import Ruler, compared_answer, rig_answer, twin_answer
+from explorer.laboratory.command_results import Ruler, compared_result, rig_result, twin_result
 from explorer.laboratory.run import LabOrder
 from explorer.scene.file import load_scene
 from explorer.viewer.output.engine_export import packed_export
@@ -21,7 +21,7 @@ MATERIAL = load_material("nine_sphere_seed")
 
 
 def python(*arguments):
-    return printed(arguments, program=(sys.executable, "-c"))
+    return command_output(arguments, program=(sys.executable, "-c"))
 
 
 def test_what_a_command_prints_is_told():
@@ -45,7 +45,7 @@ def test_a_refusal_is_its_last_line():
 def test_a_rig_answers_what_the_command_line_prints(tmp_path):
     """The fastest of the three, on the solver itself."""
     settings = {"rig.drop_height": 0.1, "rig.specimen": "sphere"}
-    answer = rig_answer(MATERIAL, "drop_plate_45", settings, 1, tmp_path)
+    answer = rig_result(MATERIAL, "drop_plate_45", settings, 1, tmp_path)
     words = shlex.split(answer.command)
     assert words[:3] == ["explorer", "simulate", "drop_plate_45"]
     assert "rig.drop_height=100mm" in words
@@ -58,9 +58,9 @@ def test_a_rig_answers_what_the_command_line_prints(tmp_path):
 
 
 def test_a_rig_that_cannot_be_is_refused_before_anything_runs(tmp_path, monkeypatch):
-    monkeypatch.setattr("explorer.laboratory.answers.printed", lambda words: pytest.fail(str(words)))
+    monkeypatch.setattr("explorer.laboratory.command_results.printed", lambda words: pytest.fail(str(words)))
     with pytest.raises(ValueError, match="drop_height"):
-        rig_answer(MATERIAL, "drop_plate_45", {"rig.drop_height": -1.0}, 1, tmp_path)
+        rig_result(MATERIAL, "drop_plate_45", {"rig.drop_height": -1.0}, 1, tmp_path)
 
 
 def test_curves_of_a_rig_become_charts(tmp_path, monkeypatch):
@@ -73,20 +73,20 @@ def test_curves_of_a_rig_become_charts(tmp_path, monkeypatch):
         "series": {"approach_m": [0.0, 1e-6, 2e-6], "force_N": [0.0, 1.0, None], "modulus_Pa": [None, 1.0, 2.0]},
         "table": {},
     }
-    monkeypatch.setattr("explorer.laboratory.answers.printed", lambda words: json.dumps(data))
-    answer = rig_answer(MATERIAL, "compression", {}, 1, tmp_path)
+    monkeypatch.setattr("explorer.laboratory.command_results.printed", lambda words: json.dumps(data))
+    answer = rig_result(MATERIAL, "compression", {}, 1, tmp_path)
     assert list(answer.plots) == ["force_N over approach_m", "modulus_Pa over approach_m"]
     (curve,) = answer.plots["force_N over approach_m"].make()["data"]
     assert curve["y"] == [0.0, 1.0, None]
     data["series"] = {"v_x_m_s": [1.0], "v_z_m_s": [0.2]}  # one drop is no curve
-    assert rig_answer(MATERIAL, "compression", {}, 1, tmp_path).plots == {}
+    assert rig_result(MATERIAL, "compression", {}, 1, tmp_path).plots == {}
 
 
 def test_a_twin_is_the_command_with_its_options(monkeypatch):
     asked = []
-    monkeypatch.setattr("explorer.laboratory.answers.printed", lambda words: asked.append(words) or "closes")
+    monkeypatch.setattr("explorer.laboratory.command_results.printed", lambda words: asked.append(words) or "closes")
     order = LabOrder("shear", "shear", compression="compression", material="mine.toml", simulate=True, bias=True)
-    answer = twin_answer(order)
+    answer = twin_result(order)
     words = "lab shear shear --compression compression --simulate --material mine.toml --bias"
     assert asked == [words.split()]
     assert (answer.text, answer.command) == ("closes", f"explorer {words}")
@@ -95,7 +95,7 @@ def test_a_twin_is_the_command_with_its_options(monkeypatch):
 
 
 def test_the_bias_of_a_formula_is_the_commands():
-    answer = twin_answer(LabOrder("compression", "compression", bias=True))
+    answer = twin_result(LabOrder("compression", "compression", bias=True))
     told = explorer(*shlex.split(answer.command)[1:])
     assert told.exit_code == 0
     assert told.stdout.strip() == answer.text
@@ -108,8 +108,8 @@ def test_a_photograph_beside_a_pour_has_both_in_its_picture(tmp_path, monkeypatc
         Image.new("RGB", (30, 20), "red").save(words[words.index("--plot") + 1])
         return f"beside {words[words.index('--from-simulation') + 1]}"
 
-    monkeypatch.setattr("explorer.laboratory.answers.printed", drawn)
-    answer = compared_answer("cone_25_30", Ruler(scale_mm=0.2), MATERIAL, tmp_path)
+    monkeypatch.setattr("explorer.laboratory.command_results.printed", drawn)
+    answer = compared_result("cone_25_30", Ruler(scale_mm=0.2), MATERIAL, tmp_path)
     kept = answer.text.removeprefix("beside ")
     assert load_scene(kept) == MATERIAL
     assert answer.picture.shape == (20, 30, 3)

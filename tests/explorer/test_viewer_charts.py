@@ -15,8 +15,8 @@ from explorer.viewer.pour.chart import (
     MOST_MARKS,
     NO_MARKS,
     Chart,
-    History,
     Marks,
+    PourCurves,
     change_label,
     change_times,
     with_marks,
@@ -87,7 +87,7 @@ def test_a_mark_beyond_the_last_point_leaves_no_gap_in_a_full_curve():
 
 
 def test_the_angle_is_drawn_between_its_spread():
-    history = History()
+    history = PourCurves()
     history.add(STATUS)
     wider = {"angle_of_repose_deg": Value(3.0, "deg", 5.0)}
     history.add(replace(STATUS, time=2.5, observables=wider))

@@ -6,7 +6,7 @@ import zipfile
 import pytest
 from viser import UploadedFile
 
-from explorer.laboratory.answers import Answer
+from explorer.laboratory.command_results import CommandResult
 from explorer.scene.source import material_source
 from explorer.viewer.actions import Actions
 from explorer.viewer.guarded_server import guarded_server
@@ -123,7 +123,7 @@ def test_a_rig_is_run_with_what_is_on_the_screen(bench, monkeypatch):
 
     def answered(scene, rig, values, seed, folder):
         asked.update(values, scene=scene, rig=rig)
-        return Answer("0.62 for 0.62", "explorer simulate drop_plate_45")
+        return CommandResult("0.62 for 0.62", "explorer simulate drop_plate_45")
 
     monkeypatch.setattr("explorer.viewer.laboratory.rig_panel.rig_answer", answered)
     bench.choose_rig("drop_plate_45")
@@ -138,7 +138,7 @@ def test_a_rig_is_run_with_what_is_on_the_screen(bench, monkeypatch):
 def test_a_bench_test_is_repeated_on_the_solver_with_the_material_that_is_poured(bench, monkeypatch):
     asked = []
     monkeypatch.setattr(
-        "explorer.viewer.laboratory.bench_panel.twin_answer", lambda order: asked.append(order) or Answer("", "")
+        "explorer.viewer.laboratory.bench_panel.twin_answer", lambda order: asked.append(order) or CommandResult("", "")
     )
     bench.bench._test.value = "drop"
     bench.bench._readings.offer(("drop",))
@@ -157,7 +157,7 @@ def test_a_photograph_is_compared_with_what_is_poured(bench, monkeypatch):
 
     def answered(photo, ruler, scene, folder):
         asked.append((photo, ruler.reference_mm, scene))
-        return Answer("beside", "explorer measure")
+        return CommandResult("beside", "explorer measure")
 
     monkeypatch.setattr("explorer.viewer.laboratory.photograph_panel.compared_answer", answered)
     bench.photograph._bar.value = 100.0
@@ -215,7 +215,7 @@ def test_the_tab_tells_what_is_done_and_what_was_refused(server, tmp_path):
 
 
 def test_a_command_line_is_selected_as_a_whole():
-    html = answer_html(Answer("one & two", "explorer audit"))
+    html = answer_html(CommandResult("one & two", "explorer audit"))
     assert "one &amp; two" in html
     assert "user-select:all" in html
 

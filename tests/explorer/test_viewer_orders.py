@@ -7,7 +7,7 @@ import pytest
 
 from explorer.background.command_process import CommandStatus
 from explorer.live.messages import Event, SessionState, Status
-from explorer.viewer.page import Orders, People
+from explorer.viewer.page import OrderEvents, People
 from tests.explorer.beads import bead_scene
 
 STATUS = Status(SessionState.RUNNING, "", bead_scene(), seed=7, generation=1, speed=1.0, time=0.4)
@@ -22,7 +22,7 @@ class Study:
 
 
 def test_another_pour_is_an_order_and_the_first_is_not():
-    orders = Orders({})
+    orders = OrderEvents({})
     assert list(orders.of_the_pour(STATUS)) == []
     assert list(orders.of_the_pour(STATUS)) == []
     (event,) = orders.of_the_pour(replace(STATUS, generation=2, time=0.0))
@@ -36,7 +36,7 @@ def test_another_pour_is_an_order_and_the_first_is_not():
 )
 def test_a_study_is_told_once_per_state_and_ends_by_itself(state, asked):
     study = Study()
-    orders = Orders({"study": study})
+    orders = OrderEvents({"study": study})
     assert list(orders.in_the_background(STATUS)) == []
     study.state = state
     assert list(orders.in_the_background(STATUS)) == [Event(1, 0.4, f"study: {state}", is_order=asked)]

@@ -9,7 +9,7 @@ import pytest
 from explorer.background.command_process import CommandStatus
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, SessionState, Status
-from explorer.viewer.pour.chart import MOST_POINTS, History
+from explorer.viewer.pour.chart import MOST_POINTS, PourCurves
 from explorer.viewer.pour.readout import (
     OUTCOME_WORDS,
     PHASE_WORDS,
@@ -134,7 +134,7 @@ def test_nothing_is_said_twice():
 
 
 def test_the_chart_has_the_mass_from_the_start_and_the_angle_where_it_was_read():
-    history = History()
+    history = PourCurves()
     read = STATUS.observables
     for time, mass, observed in ((0.0, 0.0, {}), (1.0, 4e-3, {}), (2.0, 8e-3, read), (3.0, 9e-3, read)):
         assert history.add(replace(STATUS, time=time, discharged_mass=mass, observables=observed))
@@ -149,7 +149,7 @@ def test_the_chart_has_the_mass_from_the_start_and_the_angle_where_it_was_read()
 
 
 def test_the_chart_begins_again_with_a_new_pour():
-    history = History()
+    history = PourCurves()
     history.add(STATUS)
     assert history.add(replace(STATUS, generation=2, time=0.2, observables={}))
     time, angle, _ = history.columns()
@@ -158,7 +158,7 @@ def test_the_chart_begins_again_with_a_new_pour():
 
 
 def test_the_chart_goes_back_with_the_pour():
-    history = History()
+    history = PourCurves()
     readings = [{"angle_of_repose_deg": Value(20.0 + k, "deg")} for k in range(5)]
     for k, read in enumerate(readings):
         history.add(replace(STATUS, time=1.0 + k, observables=read, discharged_mass=1e-3 * k))
@@ -175,7 +175,7 @@ def test_the_chart_goes_back_with_the_pour():
 
 
 def test_a_long_chart_is_thinned_out():
-    history = History()
+    history = PourCurves()
     for k in range(5 * MOST_POINTS):
         read = {"angle_of_repose_deg": Value(20.0 + 1e-3 * k, "deg")}
         history.add(replace(STATUS, time=1.0 + k, observables=read))

@@ -17,7 +17,7 @@ from explorer.report.html import page
 
 PANEL_HEIGHT = 420
 LEAST_POINTS = 3
-"""Below that a column is a few numbers, which the table has, and no curve."""
+"""Fewer readings of the solver's instrument are a few numbers, which the table has, and no curve."""
 
 
 def write_curves(path: Path, result: LabResult) -> None:

@@ -42,8 +42,9 @@ LABELLED = 12
 MOST = 8
 """Factors that are drawn, those with the largest effects."""
 ACROSS = 4
-GAP = 0.03
-ROW_GAP = 0.16
+"""Of them side by side."""
+GAP, ROW_GAP = 0.03, 0.16
+"""Space between them [share of the width, of the height]."""
 
 
 class EffectsOf(Protocol):
@@ -169,7 +170,7 @@ def main_effects(screening: EffectsOf) -> Spec | None:
     effects = analysis.factor_effects()[:MOST]
     if not effects or math.isnan(analysis.mean):
         return None
-    words = {factor.name: parameter_label(factor.path) for factor in screening.factors}
+    titles = _titles(screening)
     middle = unit.of(analysis.mean)
     traces: list[Json] = []
     layout: Json = {"showlegend": False, "shapes": [], "annotations": []}
@@ -180,13 +181,11 @@ def main_effects(screening: EffectsOf) -> Spec | None:
         place = {"xaxis": f"x{suffix(k)}", "yaxis": f"y{suffix(k)}"}
         drawn = {"mode": "lines+markers", "line": line(FACTOR), "error_y": error_bars([width, width], FACTOR)}
         name = effect.name
-        # A name that spells its parameter out needs no second wording.
-        title = name.replace("_", " ") if "_" in name else f"{name} · {words[name]}"
         hover = {"hovertemplate": label(name) + " %{x}: %{y:.2f}" + unit.symbol + "<extra></extra>"}
         traces.append(
             points(["low", "high"], [middle - shift, middle + shift], name, FACTOR, **drawn, **place, **hover)
         )
-        layout |= _place(k, rows, title)
+        layout |= _place(k, rows, titles[name])
         layout["shapes"].append(
             {"type": "line", "xref": f"x{suffix(k)} domain", "yref": f"y{suffix(k)}", "x0": 0, "x1": 1}
             | {"y0": middle, "y1": middle, "line": line(DUMMY, "dot")}

@@ -38,8 +38,9 @@ from explorer.units import axis_title, observable_title, unit_of_observable, uni
 Array = npt.NDArray[np.float64]
 
 TRACE_POINTS = 31
+"""Points along each factor of the profiler."""
 ROW_GAP = 0.13
-"""Space between two rows, for the title of the axis [share of the height]."""
+"""Space between two rows of the profiler, for the title of the axis [share of the height]."""
 
 
 @dataclass(frozen=True)

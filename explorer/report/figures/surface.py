@@ -34,10 +34,8 @@ from explorer.report.figures.style import (
 )
 from explorer.units import axis_title, observable_title, unit_of_observable, unit_of_parameter
 
-GRID = 41
-SOLID_GRID = 25
-CUBE = 17
-"""Points along each side of the grids."""
+GRID, SOLID_GRID, CUBE = 41, 25, 17
+"""Points along each side of the grids: in a plane, of a height in space, of a body in space."""
 
 
 def contours(fitted: FittedTarget) -> Spec:

@@ -12,7 +12,7 @@ import viser
 
 from explorer.viewer.actions import ClientAction, Post, add_client_key, client_buttons
 from explorer.viewer.guarded_server import address
-from explorer.viewer.view import VIEW_DIRECTION, VIEW_FIELD, View, view_from
+from explorer.viewer.view import VIEW_DIRECTION, VIEW_FIELD, CameraView, view_from
 
 Array = npt.NDArray[np.float64]
 
@@ -66,12 +66,12 @@ class CameraPanel:
         self._link.value = link_to(self._server, client.camera)
 
 
-def view_of(height: float, name: str) -> View:
+def view_of(height: float, name: str) -> CameraView:
     """The preset ``name``: everything up to ``height`` [m] in one picture."""
     return view_from(DIRECTIONS[name], height)
 
 
-def go_to(client: Any, view: View) -> None:
+def go_to(client: Any, view: CameraView) -> None:
     """Put the camera of a browser to ``view``, and its field of view to that of new clients."""
     go_to_place(client, view)
     client.camera.fov = VIEW_FIELD
@@ -83,10 +83,10 @@ def go_along(clients: Iterable[Any], target: Array) -> None:
         camera = client.camera
         offset = camera.position - camera.look_at
         if np.linalg.norm(camera.look_at - target) > STILL:
-            go_to_place(client, View(target + offset, target))
+            go_to_place(client, CameraView(target + offset, target))
 
 
-def go_to_place(client: Any, view: View) -> None:
+def go_to_place(client: Any, view: CameraView) -> None:
     """Put the camera of a browser to ``view`` and leave its field of view alone."""
     with client.atomic():
         # In this order: a new position takes the point that is looked at along.

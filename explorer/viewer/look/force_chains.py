@@ -20,13 +20,14 @@ from explorer.viewer.style import CHAINS
 Segments = npt.NDArray[np.float32]
 
 STRONGER = (1.0, 2.0, 4.0)
-"""Where the classes begin, as multiples of the threshold."""
+"""Where the classes of force begin, as multiples of the threshold."""
 THICKNESS = (6e-4, 1.2e-3, 2.4e-3)
-"""Thickness of their lines [m]."""
+"""Thickness of the lines of each class [m]."""
 LEAST_SHARE = 1e-9
 """Contacts that do not press at all are no part of a chain, even with a threshold of 0 (share of the mean force)."""
 CHAINS_KEY, FORCE_CHAINS = "K", "Force chains"
 MOST_TIMES_MEAN = 5.0
+"""Largest threshold that can be chosen, in mean forces."""
 
 
 class ForceChains:

@@ -9,7 +9,7 @@ from typing import Any
 
 import viser
 
-from explorer.background.printed import kept_scene, printed
+from explorer.background.command_output import command_output, kept_scene
 from explorer.errors import CommandError
 from explorer.export import OWN, names
 from explorer.files.exports import zipped
@@ -65,6 +65,6 @@ def packed_export(scene: Path, program: str, seed: int) -> bytes:
     """
     with tempfile.TemporaryDirectory() as apart:
         folder = Path(apart) / f"{scene.stem}_{program}"
-        printed(["export", str(scene), str(folder), "--to", program, "--seed", str(seed)])
+        command_output(["export", str(scene), str(folder), "--to", program, "--seed", str(seed)])
         written = sorted(one for one in folder.rglob("*") if one.is_file())
         return zipped({str(path.relative_to(apart)): path for path in written})

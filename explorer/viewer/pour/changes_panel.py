@@ -27,11 +27,13 @@ LiveValues = Mapping[str, Any]
 """Path → value in SI, of all live parameters."""
 
 MOST_ENTRIES = 200
+"""Changes that can be undone."""
 MERGED = 1.0
 """Changes of the same parameters that follow one another within this wall time [s] are one entry: a slider's drag."""
 UNDO, REDO, BACK, DEFAULT = "Undo (Z)", "Redo (Y)", "All back", "Pour the default"
 KEYS: dict[str, Any] = {UNDO: "Z", REDO: "Y"}
 MOST_SHOWN = 40
+"""Lines of the list against the default."""
 ONE = "one parameter …"
 NO_PRESET = "choose …"
 

@@ -36,8 +36,9 @@ Array = npt.NDArray[np.float64]
 MOST_MARKS = 40
 """Moments that are marked; the oldest are given up."""
 HALF_WIDTH = 1e-5
-"""Half the foot of a spike [s]."""
+"""Half the foot of a spike, which is a mark [s]."""
 MOST_LETTERS = 64
+"""Of the legend of the marks."""
 NO_MARKS = "no change yet"
 LEGEND_INTERVAL = 1.0
 """Wall time [s] between two texts of a legend: with every one of them the browser makes the chart anew."""
@@ -55,7 +56,7 @@ class Chart(Panel):
     name, tab = "chart", POUR
 
     def __init__(self, page: PageContext) -> None:
-        self._history, self._top_deg = History(), LEAST_TOP_DEG
+        self._history, self._top_deg = PourCurves(), LEAST_TOP_DEG
         self._marks = Marks()
         self._plot = page.server.gui.add_uplot(
             self._history.drawn(()),
@@ -119,12 +120,12 @@ def axis(scale: str, side: Any, label: str = "") -> viser.uplot.Axis:
     return made if not label else made | {"label": label, "labelSize": 18}
 
 
-class History:
+class PourCurves:
     """Angle of repose and mass below the outlet of one pour. The angle is read less often, and begins later."""
 
     def __init__(self) -> None:
         self._generation, self._time = 0, 0.0
-        self._angle, self._spread, self._mass = Curve(), Curve(), Curve()
+        self._angle, self._spread, self._mass = ThinnedCurve(), ThinnedCurve(), ThinnedCurve()
         self._observed: Mapping[str, Value] = {}
 
     def add(self, status: Status) -> bool:
@@ -132,7 +133,7 @@ class History:
         fresh = status.generation != self._generation
         if fresh:
             self._generation, self._observed = status.generation, {}
-            self._angle, self._spread, self._mass = Curve(), Curve(), Curve()
+            self._angle, self._spread, self._mass = ThinnedCurve(), ThinnedCurve(), ThinnedCurve()
         back = not fresh and status.time < self._time
         self._time = status.time
         if back:
@@ -170,7 +171,7 @@ class History:
         return with_marks((moments, np.maximum(angle - around, 0.0), angle + around, angle, mass), marks)
 
 
-class Curve:
+class ThinnedCurve:
     """Values over simulated time [s], thinned out when they become many."""
 
     def __init__(self) -> None:

@@ -21,7 +21,7 @@ from explorer.session import Session
 from explorer.units import InputError, checked, quantity, screen_unit, title
 from explorer.viewer.actions import Post
 from explorer.viewer.panel import POUR
-from explorer.viewer.pour.scene_bound import SceneBound
+from explorer.viewer.pour.rebuilt_panel import RebuiltPanel
 from explorer.viewer.style import small_html
 from explorer.viewer.tour import Stop
 from solver.effects import EFFECTS, SetUpEffect
@@ -45,7 +45,7 @@ BOXES = 3
 """Most boxes in a row: viser's longest vector."""
 
 
-class LivePanel(SceneBound["LiveSections"]):
+class LivePanel(RebuiltPanel["LiveSections"]):
     """What acts on the running pour."""
 
     name, tab = "live", POUR
@@ -236,7 +236,7 @@ def linear_faces(gui: viser.GuiApi, parameter: Parameter, start: float) -> tuple
 def log_faces(gui: viser.GuiApi, parameter: Parameter, start: float) -> tuple[Face, ...]:
     """A number box in the unit of the screen, and below it a slider over its power of ten."""
     name, (low, high) = title(parameter), screen_range(parameter)
-    unit = screen_unit(parameter).name
+    unit = screen_unit(parameter).symbol
     bottom, top = decades_around(start, low, high)
 
     def power_of(number: float) -> float:
@@ -319,20 +319,22 @@ class PairMatrix:
                 continue
             row.shown, row.handle.value = numbers, numbers if len(numbers) > 1 else numbers[0]
 
-    def _row(self, gui: viser.GuiApi, scene: Scene, one: str, others: tuple[str, ...]) -> Row:
+    def _row(self, gui: viser.GuiApi, scene: Scene, one: str, others: tuple[str, ...]) -> PairRow:
         paths = tuple(f"pair.{one}.{other}.{self._name}" for other in others)
         numbers, (low, high) = self._numbers(scene, paths), screen_range(self._parameter)
         hint = f"{one} with {', '.join(others)}. {self._parameter.doc}"
         if len(numbers) == 1:
-            return Row(gui.add_number(one, numbers[0], min=low, max=high, step=LINEAR_STEP, hint=hint), paths, numbers)
+            return PairRow(
+                gui.add_number(one, numbers[0], min=low, max=high, step=LINEAR_STEP, hint=hint), paths, numbers
+            )
         add: Any = gui.add_vector2 if len(numbers) == 2 else gui.add_vector3
         ends = {"min": (low,) * len(numbers), "max": (high,) * len(numbers)}
-        return Row(add(one, numbers, **ends, step=LINEAR_STEP, hint=hint), paths, numbers)
+        return PairRow(add(one, numbers, **ends, step=LINEAR_STEP, hint=hint), paths, numbers)
 
     def _numbers(self, scene: Scene, paths: tuple[str, ...]) -> tuple[float, ...]:
         return tuple(screen_unit(self._parameter).to_screen(float(value(scene, path))) for path in paths)
 
-    def _listen(self, row: Row, post: Post) -> None:
+    def _listen(self, row: PairRow, post: Post) -> None:
         def entered(event: viser.GuiEvent[Any]) -> None:
             if event.client_id is None:  # set by follow(), not by a person
                 return
@@ -342,7 +344,7 @@ class PairMatrix:
 
         row.handle.on_update(entered)
 
-    def _take(self, row: Row, sent: object) -> None:
+    def _take(self, row: PairRow, sent: object) -> None:
         """Set those pairs of a row whose box shows another number than before."""
         low, high = screen_range(self._parameter)
         numbers = tuple(checked(number, low, high, title(self._parameter)) for number in entries(sent))
@@ -357,7 +359,7 @@ class PairMatrix:
 
 
 @dataclass
-class Row:
+class PairRow:
     """Boxes for the pairs of one material with some others."""
 
     handle: Any

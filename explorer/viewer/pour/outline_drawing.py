@@ -28,7 +28,7 @@ SCALE_BAR = 20.0
 """Length of the scale bar [mm]."""
 WAITING = "The silhouette is drawn once there is a pile below the outlet."
 THICKNESS = 1.5e-3
-"""Of the lines [m]."""
+"""Of the lines in 3-D [m]."""
 NOWHERE: Array = np.zeros((1, 2, 3))
 
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from explorer.live.frames import Frame
 from explorer.logs.recording import SAME_TIME, Component, Instances, Recording, index_at
-from explorer.viewer.look.colours import Quantity
+from explorer.viewer.look.colours import ColourQuantity
 
 Array = npt.NDArray[np.float64]
 
@@ -27,7 +27,7 @@ class RecordedFrames:
     def __init__(self, recording: Recording) -> None:
         self._recording = recording
         told = tells_who_is_who(recording)
-        self.quantities: Mapping[str, Quantity] = QUANTITIES if told else {}
+        self.quantities: Mapping[str, ColourQuantity] = QUANTITIES if told else {}
         """What the bodies can be coloured by."""
         self.note = NOT_RECORDED if told else f"{NOT_RECORDED} {NOT_TOLD}"
         """What they cannot be coloured by, in words."""
@@ -52,12 +52,12 @@ class RecordedFrames:
             scale=np.concatenate([one.scale for one in there]),
         )
 
-    def motion(self, number: int) -> Motion:
+    def motion(self, number: int) -> RecordedMotion:
         """What its bodies can be coloured by; call it for recordings that have ``quantities`` only."""
         time, there = self._at(number)
         speeds = [mean_speeds(component, time) for component in self._recording.components]
         since = [seen[one.place] for seen, one in zip(self._first_seen, there, strict=True)]
-        return Motion(number, np.concatenate(speeds), time - np.concatenate(since))
+        return RecordedMotion(number, np.concatenate(speeds), time - np.concatenate(since))
 
     def _at(self, number: int) -> tuple[float, list[Instances]]:
         time = float(self._recording.times[number - 1])
@@ -65,7 +65,7 @@ class RecordedFrames:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class RecordedMotion:
     """What is known of the n bodies of a frame. NaN where nothing is."""
 
     number: int
@@ -76,9 +76,9 @@ class Motion:
     """Time since a body is first in the recording [s], shape (n,)."""
 
 
-QUANTITIES: Mapping[str, Quantity] = {
-    "speed": Quantity("m/s", 1.0, lambda motion: motion.speed, "mean from the frame before to the one after"),
-    "residence time": Quantity(
+QUANTITIES: Mapping[str, ColourQuantity] = {
+    "speed": ColourQuantity("m/s", 1.0, lambda motion: motion.speed, "mean from the frame before to the one after"),
+    "residence time": ColourQuantity(
         "s", 1.0, lambda motion: motion.residence, "time since a body is first in the recording"
     ),
 }

@@ -29,20 +29,21 @@ from explorer.viewer.look.look import in_sight
 from explorer.viewer.look.look_settings import CutPanel, LookSettings
 from explorer.viewer.pour.chart import LEAST_TOP_DEG, axis
 from explorer.viewer.pour.run_panel import FASTEST, SLOWEST
-from explorer.viewer.replay.recorded_frames import Motion, RecordedFrames
-from explorer.viewer.scene_nodes import BodyNodes, Kind, drawn, seen_through
+from explorer.viewer.replay.recorded_frames import RecordedFrames, RecordedMotion
+from explorer.viewer.scene_nodes import BodyNodes, DrawnComponent, drawn, seen_through
 from explorer.viewer.style import ANGLE_LINE, CONTACTS_LINE, DARK, ENERGY_LINE, MASS_LINE, ThemeSwitch, apply_theme
 from explorer.viewer.view import light, look_at_height
 
 Array = npt.NDArray[np.float64]
 
 FRAME_INTERVAL = 1.0 / 30.0
+"""Wall time [s] between two looks at the replay."""
 EVENTS_SHOWN = 6
 PLAY_PAUSE, TO_START, BACK, STEP = "Play / pause (space)", "To start (R)", "◀ frame (←)", "frame ▶ (→)"
 HAIR = 1e-6
 """Time [s] by which the end of a chart moves to and fro."""
 SLIDER_STEP = 1e-3
-"""[s]; about as fine as frames lie."""
+"""Step of the time slider [s]; about as fine as frames lie."""
 CURVES = (
     ("angle_of_repose_deg", "angle [°]", ANGLE_LINE),
     ("discharged_mass_g", "mass [g]", MASS_LINE),
@@ -235,7 +236,7 @@ class ReplayLook:
         height = highest(recording)
         CameraPanel(server, post, lambda: height)
         self._frame = self._frames.frame(1)
-        self._motion: Motion | None = None
+        self._motion: RecordedMotion | None = None
         self._told_for: object = None
 
     def show(self, time: float) -> None:
@@ -260,7 +261,7 @@ class ReplayNodes:
     """Nodes of one recording."""
 
     def __init__(self, server: viser.ViserServer, recording: Recording) -> None:
-        self.bodies = BodyNodes(server, [Kind(c.shape, c.shape.colour, c.most) for c in recording.components])
+        self.bodies = BodyNodes(server, [DrawnComponent(c.shape, c.shape.colour, c.most) for c in recording.components])
         self._surfaces = [
             (
                 surface,

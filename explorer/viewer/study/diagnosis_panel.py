@@ -24,7 +24,7 @@ from explorer.viewer.tour import Stop
 from solver import EFFECTS
 from solver.assets import shipped_measurements
 
-MOST = 100_000
+MOST_POURS = 100_000
 BY_ITSELF = (
     f"As many pours as the program takes by itself: {Budget().base} of the declared model, {Budget().screening} of "
     f"every direction of an effect, then {Budget().more} at a time of what stays in question."
@@ -72,7 +72,7 @@ class DiagnosisPanel(Panel):
             "Folder", "", hint="Folder with measurement.toml, on the machine that serves this page."
         )
         with gui.add_folder("Effects in question, and how much is poured", expand_by_default=False):
-            self._candidates = Candidates(server)
+            self._candidates = CandidateEffects(server)
         acts = {"Start": self._start, "Pause / go on": self._pause, "Cancel": diagnosis.cancel}
         more = {"Resume": self._resume, "Queue": self._queue, "Clear queue": diagnosis.clear_queue}
         self._view = ProcessView(server, "Diagnosis", acts, post, more)
@@ -166,7 +166,7 @@ def _first(result: DiagnosisResult) -> list[tuple[str, float]]:
     return likely(result)[:ANSWERS]
 
 
-class Candidates:
+class CandidateEffects:
     """A check box per effect, all set at first, and the number of pours; both are read when a diagnosis starts."""
 
     def __init__(self, server: viser.ViserServer) -> None:
@@ -179,7 +179,7 @@ class Candidates:
             name: gui.add_checkbox(name.replace("_", " "), True, hint=f"What reveals it: {kind.lever}.")
             for name, kind in EFFECTS.items()
         }
-        self._pours = gui.add_number("Pours (0: by itself)", 0, min=0, max=MOST, step=10, hint=BY_ITSELF)
+        self._pours = gui.add_number("Pours (0: by itself)", 0, min=0, max=MOST_POURS, step=10, hint=BY_ITSELF)
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -192,5 +192,5 @@ class Candidates:
     @property
     def budget(self) -> int | None:
         """About so many pours before the first closer look; None: as many as the program takes by itself."""
-        pours = checked(self._pours.value, 0, MOST, "pours")
+        pours = checked(self._pours.value, 0, MOST_POURS, "pours")
         return round(pours) or None

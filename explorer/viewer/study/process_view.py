@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 import viser
 
 from explorer.background.command_process import CommandStatus
-from explorer.background.progress import Failure, StageProgress, failures
+from explorer.background.progress import FailedRun, StageProgress, failures
 from explorer.viewer.actions import Action, Post, button_group
 
 MARKDOWN_MARKS = re.compile(r"([\\`*_{}\[\]<>()#+!|~&])")
@@ -103,7 +103,7 @@ def _row(stage: StageProgress, status: CommandStatus, so_far: str) -> str:
     return f"| {escaped(stage.name)} | {count} | {mark} | {escaped(found)} |"
 
 
-def failures_markdown(lost: tuple[Failure, ...]) -> str:
+def failures_markdown(lost: tuple[FailedRun, ...]) -> str:
     """The newest runs that gave no pile, and what took their places."""
     rows = "\n".join(
         f"| {escaped(one.run.stage)} | {escaped(one.run.label)} | {_outcome(one)} | {one.run.seed} | {_next(one)} |"
@@ -115,12 +115,12 @@ def failures_markdown(lost: tuple[Failure, ...]) -> str:
     return f"{head}\n\n| Stage | Setting | Outcome | Seed | Next seed |\n|:--|:--|:--|--:|:--|\n{rows}"
 
 
-def _outcome(one: Failure) -> str:
+def _outcome(one: FailedRun) -> str:
     text = one.run.outcome.replace("_", " ")
     return escaped(f"{text}: {one.run.message}" if one.run.message else text)
 
 
-def _next(one: Failure) -> str:
+def _next(one: FailedRun) -> str:
     if one.replaced_by is None:
         return "none"
     return escaped(f"{one.replaced_by.seed}: {one.replaced_by.outcome.replace('_', ' ')}")

@@ -39,7 +39,7 @@ SEPARATOR = " | "
 
 
 @dataclass(frozen=True)
-class PlanOrder:
+class DesignOrder:
     """What a user asked for; None: as the factors file says, else the usual value."""
 
     design: str
@@ -55,7 +55,7 @@ class PlanOrder:
 
 
 @dataclass(frozen=True)
-class Plan:
+class RunPlan:
     """A design and its runs.
 
     ``sequence`` (runs, 2): row of the points and replicate, from 0, in the order in which they are run. ``seeds``
@@ -79,7 +79,7 @@ class Plan:
         return len(self.sequence) // len(self.coded)
 
 
-def make_plan(order: PlanOrder, file: FactorsFile) -> Plan:
+def make_plan(order: DesignOrder, file: FactorsFile) -> RunPlan:
     """The design of an order; raises CommandError or StatisticsError for options that do not fit it."""
     if order.design not in DESIGNS:
         raise CommandError(f"design {order.design[:40]!r}: allowed are {', '.join(DESIGNS)}")
@@ -98,7 +98,7 @@ def make_plan(order: PlanOrder, file: FactorsFile) -> Plan:
     every = np.array([(row, replicate) for replicate in range(replicates) for row in range(rows)])
     seeds = _first(file.first_seed, 1) + np.arange(len(every))
     turn = np.arange(len(every)) if order.standard_order else np.random.default_rng(seed).permutation(len(every))
-    return Plan(design, points, every[turn], seeds[turn], seed)
+    return RunPlan(design, points, every[turn], seeds[turn], seed)
 
 
 def _refuse_foreign_options(design: Design, options: DesignOptions) -> None:
@@ -115,7 +115,7 @@ def _first(*values: int | None) -> int:
     return next(value for value in values if value is not None)
 
 
-def sheet_text(plan: Plan, file: FactorsFile) -> str:
+def sheet_text(plan: RunPlan, file: FactorsFile) -> str:
     """The empty sheet."""
     stream = io.StringIO()
     stream.write(

@@ -23,10 +23,10 @@ from PIL import Image
 from doe.audit import audit_study
 from explorer.audit.read_study import read_study, shipped_study
 from explorer.audit.report import audit_html, audit_text
-from explorer.background.printed import kept_scene, printed
+from explorer.background.command_output import command_output, kept_scene
 from explorer.design.analysis import AnalyseOrder, run_analyse
 from explorer.design.factors_file import read_factors
-from explorer.design.plan import PlanOrder, make_plan, sheet_text
+from explorer.design.run_plan import DesignOrder, make_plan, sheet_text
 from explorer.design.text import analysis_text, plan_text
 from explorer.files.run_folder import json_text
 from explorer.laboratory.part import part_table
@@ -48,11 +48,15 @@ from solver.photograph import open_picture
 STRAIGHT = "Points of every replicate; the line is the part taken as straight, drawn on to zero force."
 ON_THE_SOLVER = "What the solver's own instrument read in the course of the test."
 PLOT = "beside.png"
+"""File of the photograph beside the pour."""
 
 
 @dataclass(frozen=True)
-class Answer:
-    """``files``: name → content, to be taken along. ``picture``: RGB, (height, width, 3), where there is one."""
+class CommandResult:
+    """What a command gives.
+
+    ``files``: name → content, to be taken along. ``picture``: RGB, (height, width, 3), where there is one.
+    """
 
     text: str
     command: str
@@ -74,19 +78,21 @@ class Ruler:
         return self.scale_mm is not None or self.reference_mm is not None
 
 
-def bench_answer(order: LabOrder) -> Answer:
+def bench_result(order: LabOrder) -> CommandResult:
     """`explorer lab`: readings → parameters."""
     result = analysed(order)
     plots: Plots = {title: Plot(partial(dict, spec), STRAIGHT) for title, spec in curve_charts(result).items()}
     part = part_file(result, part_table(result)).encode()
-    return Answer(lab_text(result), shlex.join(["explorer", *lab_words(order)]), plots, {f"{order.test}.toml": part})
+    return CommandResult(
+        lab_text(result), shlex.join(["explorer", *lab_words(order)]), plots, {f"{order.test}.toml": part}
+    )
 
 
-def twin_answer(order: LabOrder) -> Answer:
-    """`explorer lab --simulate` and `--bias`: beside the readings' answer, what the test gives on the solver."""
+def twin_result(order: LabOrder) -> CommandResult:
+    """`explorer lab --simulate` and `--bias`: beside what the readings give, what the test gives on the solver."""
     words = lab_words(order)
-    said = printed(words)
-    return replace(bench_answer(order), text=said, command=shlex.join(["explorer", *words]))
+    said = command_output(words)
+    return replace(bench_result(order), text=said, command=shlex.join(["explorer", *words]))
 
 
 def lab_words(order: LabOrder) -> list[str]:
@@ -99,20 +105,20 @@ def lab_words(order: LabOrder) -> list[str]:
     return [*words, "--bias"] if order.bias else words
 
 
-def rig_answer(scene: Scene, rig: str, values: Mapping[str, float | str], seed: int, folder: Path) -> Answer:
+def rig_result(scene: Scene, rig: str, values: Mapping[str, float | str], seed: int, folder: Path) -> CommandResult:
     """`explorer simulate RIG`: a bench test of one body of ``scene``; its parameters are kept as a file in ``folder``.
 
     ``values``: path → value (SI) of the rig's own parameters. Raises ParameterError before anything is run.
     """
     source = rig_source(rig, str(kept_scene(scene, folder)))
     line = command_line(source, with_values(source.scene, dict(values)), seed)
-    data: dict[str, Any] = json.loads(printed([*shlex.split(line)[1:], "--json"]))
+    data: dict[str, Any] = json.loads(command_output([*shlex.split(line)[1:], "--json"]))
     plots: Plots = {title: Plot(partial(dict, spec), ON_THE_SOLVER) for title, spec in bench_charts(data).items()}
     files = {f"{rig}.json": f"{json_text(data)}\n".encode()}
-    return Answer(bench_text(data), line, plots, files)
+    return CommandResult(bench_text(data), line, plots, files)
 
 
-def photograph_answer(photo: str, ruler: Ruler) -> Answer:
+def photograph_result(photo: str, ruler: Ruler) -> CommandResult:
     """`explorer measure`: the angle of repose on a photograph (file, or a shipped one's name), or why there is none."""
     order = measure_order([photo], ruler.scale_mm, ruler.reference_mm, None, "auto", None, None, None)
     measured = run_measure(order)
@@ -125,19 +131,19 @@ def photograph_answer(photo: str, ruler: Ruler) -> Answer:
     if measured.piles and ruler.known:
         files[f"{stem}_outline.csv"] = outline_text(measured.piles[0]).encode()
     text = "\n".join([measure_text(measured), *refusal_lines(measured.refusals)]).strip()
-    return Answer(text, shlex.join(words), {}, files, np.asarray(drawn, dtype=np.uint8))
+    return CommandResult(text, shlex.join(words), {}, files, np.asarray(drawn, dtype=np.uint8))
 
 
-def compared_answer(photo: str, ruler: Ruler, scene: Scene, folder: Path) -> Answer:
+def compared_result(photo: str, ruler: Ruler, scene: Scene, folder: Path) -> CommandResult:
     """`explorer measure --from-simulation`: the photograph, and beside it a pour of ``scene`` read by the same fit."""
     words = [*measure_words(photo, ruler), "--from-simulation", str(kept_scene(scene, folder))]
     with tempfile.TemporaryDirectory() as apart:
         drawn = Path(apart) / PLOT
-        said = printed([*words, "--plot", str(drawn)])
+        said = command_output([*words, "--plot", str(drawn)])
         content = drawn.read_bytes()
         with Image.open(drawn) as picture:
             pixels = np.asarray(picture.convert("RGB"), dtype=np.uint8)
-    return Answer(said, shlex.join(["explorer", *words]), {}, {PLOT: content}, pixels)
+    return CommandResult(said, shlex.join(["explorer", *words]), {}, {PLOT: content}, pixels)
 
 
 def measure_words(photo: str, ruler: Ruler) -> list[str]:
@@ -148,7 +154,7 @@ def measure_words(photo: str, ruler: Ruler) -> list[str]:
     return words
 
 
-def sheet_answer(order: PlanOrder, factors: str, sigma: float | None) -> Answer:
+def sheet_result(order: DesignOrder, factors: str, sigma: float | None) -> CommandResult:
     """`explorer design`: the runs of a design as a sheet to fill in."""
     file = read_factors(asset_path("designs", factors))
     plan = make_plan(order, file)
@@ -163,20 +169,20 @@ def sheet_answer(order: PlanOrder, factors: str, sigma: float | None) -> Answer:
         words += [] if number is None else [option, f"{number:g}"]
     words += ["--fold"] if order.fold else []
     words += [word for generator in order.generators for word in ("--generator", generator)]
-    return Answer(
+    return CommandResult(
         plan_text(plan, file, sigma, None), shlex.join(words), {}, {"runs.csv": sheet_text(plan, file).encode()}
     )
 
 
-def analysis_answer(order: AnalyseOrder) -> Answer:
+def analysis_result(order: AnalyseOrder) -> CommandResult:
     """`explorer analyse`: what a filled sheet says."""
     result = run_analyse(order)
     files = {"report.html": design_html(result).encode()}
-    return Answer(analysis_text(result), shlex.join(result.command), design_plots(result), files)
+    return CommandResult(analysis_text(result), shlex.join(result.command), design_plots(result), files)
 
 
-def audit_answer(folder: Path | None) -> Answer:
+def audit_result(folder: Path | None) -> CommandResult:
     """`explorer audit`: a published study recomputed from its own tables; None: the shipped article."""
     found = audit_study(read_study(folder or shipped_study()))
     words = ["explorer", "audit", *([str(folder)] if folder else [])]
-    return Answer(audit_text(found), shlex.join(words), {}, {"audit.html": audit_html(found).encode()})
+    return CommandResult(audit_text(found), shlex.join(words), {}, {"audit.html": audit_html(found).encode()})

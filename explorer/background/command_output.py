@@ -23,7 +23,7 @@ LONGEST_LINE = 300
 TITLE_LETTERS = 20
 
 
-def printed(arguments: Sequence[str], program: Sequence[str] = PROGRAM) -> str:
+def command_output(arguments: Sequence[str], program: Sequence[str] = PROGRAM) -> str:
     """Standard output of ``program arguments``, which gives way to everything that a person looks at.
 
     A command that ends with ``FAILURE`` and has printed something has an answer too. Raises CommandError with the last

@@ -21,7 +21,7 @@ class SceneControls(Protocol):
 Controls = TypeVar("Controls", bound=SceneControls)
 
 
-class SceneBound(Panel, Generic[Controls]):
+class RebuiltPanel(Panel, Generic[Controls]):
     """Holds the place of controls on the page; :meth:`build` makes them for a scene."""
 
     def __init__(self, page: PageContext) -> None:
