@@ -46,7 +46,7 @@ def contours(fitted: FittedTarget) -> Spec:
     """
     unit, factors, region = unit_of_observable(fitted.observable), fitted.factors, fitted.model.region
     pairs = list(combinations(range(len(factors)), 2))
-    grids = [_slice(fitted, i, j) / unit.size for i, j in pairs]
+    grids = [_slice(fitted, i, j, GRID) / unit.size for i, j in pairs]
     level = float(np.mean(grids)) if fitted.target is None else unit.of(fitted.target)
     reach = max(float(np.abs(grid - level).max()) for grid in grids) or 1.0
     domains = side_by_side(len(pairs), 0.1)
@@ -85,12 +85,11 @@ def contours(fitted: FittedTarget) -> Spec:
     return chart(traces, layout, 420)
 
 
-def _slice(fitted: FittedTarget, i: int, j: int) -> Array:
-    """The model on a grid over factors i (columns) and j (rows), the others at the point of the sections."""
-    across, up = np.meshgrid(np.linspace(-1, 1, GRID), np.linspace(-1, 1, GRID))
+def _slice(fitted: FittedTarget, i: int, j: int, side: int) -> Array:
+    """The model on a grid over factors i (columns) and j (rows), ``side`` points each, the others at the section."""
     fixed = fitted.model.region.coded(fitted.section_point)
-    coded = np.broadcast_to(fixed, (GRID, GRID, fixed.size)).copy()
-    coded[..., i], coded[..., j] = across, up
+    coded = np.broadcast_to(fixed, (side, side, fixed.size)).copy()
+    coded[..., i], coded[..., j] = np.meshgrid(np.linspace(-1, 1, side), np.linspace(-1, 1, side))
     return fitted.model.predict(coded)
 
 
@@ -171,9 +170,7 @@ def height_over(fitted: FittedTarget, pair: tuple[int, int]) -> Spec:
     """The model over two factors, the others at the optimum, with the observed runs above it."""
     model, region, unit, (i, j) = fitted.model, fitted.model.region, unit_of_observable(fitted.observable), pair
     sides = np.linspace(-1.0, 1.0, SOLID_GRID)
-    coded = np.broadcast_to(region.coded(fitted.section_point), (SOLID_GRID, SOLID_GRID, region.centre.size)).copy()
-    coded[..., i], coded[..., j] = np.meshgrid(sides, sides)
-    heights = model.predict(coded) / unit.size
+    heights = _slice(fitted, i, j, SOLID_GRID) / unit.size
     level = float(heights.mean()) if fitted.target is None else unit.of(fitted.target)
     reach = max(float(np.abs(heights - level).max()), 1e-9)
     sizes = [unit_of_parameter(fitted.factors[k].path).size for k in pair]
@@ -216,7 +213,12 @@ def solutions(fitted: FittedTarget) -> Spec | None:
     sizes = np.array([unit_of_parameter(factor.path).size for factor in factors])
     x, y, z = (fitted.model.region.natural(coded) / sizes).T
     heights = fitted.model.predict(coded).round(6).tolist()
-    same = {"isomin": target, "isomax": target, "surface": {"count": 1}, "caps": _no_caps()}
+    same = {
+        "isomin": target,
+        "isomax": target,
+        "surface": {"count": 1},
+        "caps": {edge: {"show": False} for edge in "xyz"},
+    }
     colour = [[0.0, TARGET], [1.0, TARGET]]
     traces: list[Json] = [
         {"type": "isosurface", "x": x.tolist(), "y": y.tolist(), "z": z.tolist(), "name": "model = target"}
@@ -234,10 +236,6 @@ def solutions(fitted: FittedTarget) -> Spec | None:
         star = {"size": 7, "color": CHOSEN, "symbol": "diamond"}
         traces.append(_dots([[float(v)] for v in chosen], fitted.chosen_name, star))
     return _in_space(traces, [axis_title(factor.path, factor.name) for factor in factors])
-
-
-def _no_caps() -> Json:
-    return {side: {"show": False} for side in "xyz"}
 
 
 def _dots(places: Sequence[Sequence[float]], name: str, marker: Json) -> Json:

@@ -147,7 +147,7 @@ def answer_markdown(result: DiagnosisResult) -> str:
     """The verdict in a sentence, the likely answers, and the errors before, after, and by noise alone."""
     verdict, sentence = escaped(result.verdict), escaped(verdict_sentence(result).replace("`", ""))
     odds = "\n".join(
-        f"| {escaped(spelled(one).replace('`', ''))} | {escaped(chance(p))} |" for one, p in _first(result)
+        f"| {escaped(spelled(one).replace('`', ''))} | {escaped(chance(p))} |" for one, p in likely(result)[:ANSWERS]
     )
     errors, words = result.error.told()
     rows = "\n".join(
@@ -160,10 +160,6 @@ def answer_markdown(result: DiagnosisResult) -> str:
     )
     head = f"| Error on {words} data | Before | After | Noise floor |\n|:--|--:|--:|--:|"
     return f"**{verdict}** — {sentence}\n\n| Answer | Probability |\n|:--|--:|\n{odds}\n\n{head}\n{rows}"
-
-
-def _first(result: DiagnosisResult) -> list[tuple[str, float]]:
-    return likely(result)[:ANSWERS]
 
 
 class CandidateEffects:

@@ -58,7 +58,7 @@ def test_a_rig_answers_what_the_command_line_prints(tmp_path):
 
 
 def test_a_rig_that_cannot_be_is_refused_before_anything_runs(tmp_path, monkeypatch):
-    monkeypatch.setattr("explorer.laboratory.command_results.printed", lambda words: pytest.fail(str(words)))
+    monkeypatch.setattr("explorer.laboratory.command_results.command_output", lambda words: pytest.fail(str(words)))
     with pytest.raises(ValueError, match="drop_height"):
         rig_result(MATERIAL, "drop_plate_45", {"rig.drop_height": -1.0}, 1, tmp_path)
 
@@ -73,7 +73,7 @@ def test_curves_of_a_rig_become_charts(tmp_path, monkeypatch):
         "series": {"approach_m": [0.0, 1e-6, 2e-6], "force_N": [0.0, 1.0, None], "modulus_Pa": [None, 1.0, 2.0]},
         "table": {},
     }
-    monkeypatch.setattr("explorer.laboratory.command_results.printed", lambda words: json.dumps(data))
+    monkeypatch.setattr("explorer.laboratory.command_results.command_output", lambda words: json.dumps(data))
     answer = rig_result(MATERIAL, "compression", {}, 1, tmp_path)
     assert list(answer.plots) == ["force_N over approach_m", "modulus_Pa over approach_m"]
     (curve,) = answer.plots["force_N over approach_m"].make()["data"]
@@ -84,7 +84,9 @@ def test_curves_of_a_rig_become_charts(tmp_path, monkeypatch):
 
 def test_a_twin_is_the_command_with_its_options(monkeypatch):
     asked = []
-    monkeypatch.setattr("explorer.laboratory.command_results.printed", lambda words: asked.append(words) or "closes")
+    monkeypatch.setattr(
+        "explorer.laboratory.command_results.command_output", lambda words: asked.append(words) or "closes"
+    )
     order = LabOrder("shear", "shear", compression="compression", material="mine.toml", simulate=True, bias=True)
     answer = twin_result(order)
     words = "lab shear shear --compression compression --simulate --material mine.toml --bias"
@@ -108,7 +110,7 @@ def test_a_photograph_beside_a_pour_has_both_in_its_picture(tmp_path, monkeypatc
         Image.new("RGB", (30, 20), "red").save(words[words.index("--plot") + 1])
         return f"beside {words[words.index('--from-simulation') + 1]}"
 
-    monkeypatch.setattr("explorer.laboratory.command_results.printed", drawn)
+    monkeypatch.setattr("explorer.laboratory.command_results.command_output", drawn)
     answer = compared_result("cone_25_30", Ruler(scale_mm=0.2), MATERIAL, tmp_path)
     kept = answer.text.removeprefix("beside ")
     assert load_scene(kept) == MATERIAL

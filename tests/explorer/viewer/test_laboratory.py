@@ -116,7 +116,7 @@ def test_a_rig_is_run_with_what_is_on_the_screen(bench, monkeypatch):
         asked.update(values, scene=scene, rig=rig)
         return CommandResult("0.62 for 0.62", "explorer simulate drop_plate_45")
 
-    monkeypatch.setattr("explorer.viewer.laboratory.rig_panel.rig_answer", answered)
+    monkeypatch.setattr("explorer.viewer.laboratory.rig_panel.rig_result", answered)
     bench.choose_rig("drop_plate_45")
     bench.rig._inputs["rig.drop_height"].value = 300.0
     bench.rig._inputs["rig.body"].value = "petiole"
@@ -129,7 +129,7 @@ def test_a_rig_is_run_with_what_is_on_the_screen(bench, monkeypatch):
 def test_a_bench_test_is_repeated_on_the_solver_with_the_material_that_is_poured(bench, monkeypatch):
     asked = []
     monkeypatch.setattr(
-        "explorer.viewer.laboratory.bench_panel.twin_answer", lambda order: asked.append(order) or CommandResult("", "")
+        "explorer.viewer.laboratory.bench_panel.twin_result", lambda order: asked.append(order) or CommandResult("", "")
     )
     bench.bench._test.value = "drop"
     bench.bench._readings.offer(("drop",))
@@ -150,7 +150,7 @@ def test_a_photograph_is_compared_with_what_is_poured(bench, monkeypatch):
         asked.append((photo, ruler.reference_mm, scene))
         return CommandResult("beside", "explorer measure")
 
-    monkeypatch.setattr("explorer.viewer.laboratory.photograph_panel.compared_answer", answered)
+    monkeypatch.setattr("explorer.viewer.laboratory.photograph_panel.compared_result", answered)
     bench.photograph._bar.value = 100.0
     assert bench.do(bench.photograph._compare) == ""
     assert asked == [(bench.photograph._photo.chosen, 100.0, bench.session.now.scene)]
