@@ -1,7 +1,4 @@
-"""Units as a person reads them: a value in SI and its parameter → the number and unit on the screen, and back.
-
-Numbers, units and names as a person reads them: SI inside a result, MPa, mm, g/s and ° in a report.
-"""
+"""Numbers, units and names as a person reads and enters them: SI inside, MPa, mm, g/s and ° on page and in reports."""
 
 from __future__ import annotations
 
@@ -14,79 +11,20 @@ from solver import load_material, parameters
 from solver.observables import OBSERVABLES
 from solver.params import UNITS, Parameter
 
-SCREEN_UNIT = {"Pa": "MPa", "m": "mm", "kg": "g", "kg/s": "g/s"}
-
-"""What is shown instead of the SI unit."""
-
-DECIMALS = {"mm": 1, "g": 1, "g/s": 1}
+READ_IN = {"Pa": "MPa", "m": "mm", "kg": "g", "kg/s": "g/s", "J/m3": "kJ/m3", "J/m2": "mJ/m2", "N/m": "mN/m"}
+"""SI unit → the unit that is read instead of it, as files spell it; all others are read as they are."""
+ENTERED_IN_SI = ("J/m3", "J/m2", "N/m")
+"""Of these the page and the command line show and take SI: amplitudes of effects, which start at 0."""
+SYMBOLS = {"deg": "°", "kg/m3": "kg/m³", "m/s2": "m/s²", "kJ/m3": "kJ/m³", "mJ/m2": "mJ/m²", "1": ""}
+"""Unit as files spell it → its symbol in a report, where that is another."""
+MISSING = "–"
+"""What stands for a number that could not be computed."""
+OWN = "own:"
+"""Beginning of the path of a quantity that no scene declares: "own:NAME [UNIT]", its values in that unit already."""
 
 
 class InputError(ValueError):
     """A number from the page that cannot be used; one line, fit for a user."""
-
-
-@dataclass(frozen=True)
-class ScreenUnit:
-    """Unit on the screen, and its size in SI."""
-
-    name: str
-    factor: float
-
-    def to_screen(self, value: float) -> float:
-        """SI → screen, to six digits: what a number box shows."""
-        return float(f"{value / self.factor:.6g}")
-
-    def to_si(self, number: float) -> float:
-        """Screen → SI."""
-        return number * self.factor
-
-
-def screen_unit(parameter: Parameter) -> ScreenUnit:
-    """Unit in which ``parameter`` is shown; empty for a plain number."""
-    name = SCREEN_UNIT.get(parameter.unit, "" if parameter.unit == "1" else parameter.unit)
-    return ScreenUnit(name, UNITS.get(parameter.unit, {}).get(name, 1.0))
-
-
-def title(parameter: Parameter) -> str:
-    """Name of a parameter for a label: last part of its path, with the unit on the screen."""
-    words = parameter.path.split(".")[-1].replace("_", " ").capitalize()
-    unit = screen_unit(parameter).name
-    return f"{words} [{unit}]" if unit else words
-
-
-def checked(number: object, low: float, high: float, name: str) -> float:
-    """A number that came from a browser, within ``low`` … ``high``.
-
-    viser checks nothing on the server: anything can arrive here. A number outside the range is taken as its
-    end; what is no finite number raises InputError.
-    """
-    if isinstance(number, bool) or not isinstance(number, (int, float)) or not math.isfinite(number):
-        raise InputError(f"{name}: {str(number)[:40]!r} is not a finite number")
-    return min(max(float(number), low), high)
-
-
-def quantity(value: float, unit: str) -> str:
-    """Short text of a value in SI with the unit of the screen, e.g. 0.03, "kg" → "30 g"."""
-    name = SCREEN_UNIT.get(unit, "" if unit == "1" else unit)
-    factor = UNITS.get(unit, {}).get(name, 1.0)
-    if not math.isfinite(value):
-        return "–"
-    return f"{value / factor:.4g} {name}".strip()
-
-
-MISSING = "–"
-
-"""What stands for a number that could not be computed."""
-
-SYMBOLS = {"deg": "°", "kg/m3": "kg/m³", "m/s2": "m/s²", "kJ/m3": "kJ/m³", "mJ/m2": "mJ/m²", "1": ""}
-
-READING_UNIT = SCREEN_UNIT | {"J/m3": "kJ/m3", "J/m2": "mJ/m2", "N/m": "mN/m"}
-
-"""What is written instead of the SI unit."""
-
-OWN = "own:"
-
-"""Beginning of the path of a quantity that no scene declares: "own:NAME [UNIT]", its values in that unit already."""
 
 
 @dataclass(frozen=True)
@@ -100,6 +38,14 @@ class ReadingUnit:
         """SI → this unit."""
         return value / self.size
 
+    def to_screen(self, value: float) -> float:
+        """SI → this unit, to six digits: what a number box shows."""
+        return float(f"{self.of(value):.6g}")
+
+    def to_si(self, number: float) -> float:
+        """This unit → SI."""
+        return number * self.size
+
     def attach(self, text: str) -> str:
         """``text`` with the symbol behind it; a degree sign takes no blank."""
         if text == MISSING or not self.symbol:
@@ -107,16 +53,63 @@ class ReadingUnit:
         return f"{text}{self.symbol}" if self.symbol == "°" else f"{text} {self.symbol}"
 
 
-@cache
-def parameter_units() -> dict[str, str]:
-    """Last part of a parameter's path → its SI unit, as the solver declares it."""
-    declared = parameters(load_material("sunflower_extract"))
-    return {path.rsplit(".", 1)[-1]: parameter.unit for path, parameter in declared.items()}
+def reading_unit(si: str) -> ReadingUnit:
+    """Unit in which a report writes a number in the SI unit ``si``."""
+    name = READ_IN.get(si, si)
+    return ReadingUnit(SYMBOLS.get(name, name), UNITS.get(si, {}).get(name, 1.0))
+
+
+def entry_unit(si: str) -> ReadingUnit:
+    """Unit in which page and command line show and take a number in the SI unit ``si``, as files spell it."""
+    name = si if si in ENTERED_IN_SI else READ_IN.get(si, si)
+    return ReadingUnit("" if name == "1" else name, UNITS.get(si, {}).get(name, 1.0))
+
+
+def screen_unit(parameter: Parameter) -> ReadingUnit:
+    """Unit in which ``parameter`` is shown and entered; no symbol for a plain number."""
+    return entry_unit(parameter.unit)
+
+
+def title(parameter: Parameter) -> str:
+    """Name of a parameter for a label: last part of its path, with the unit on the screen."""
+    words = parameter.path.split(".")[-1].replace("_", " ").capitalize()
+    unit = screen_unit(parameter).symbol
+    return f"{words} [{unit}]" if unit else words
+
+
+def quantity(value: float, si: str) -> str:
+    """Short text of a value in SI with the unit of the screen, e.g. 0.03, "kg" → "30 g"."""
+    unit = entry_unit(si)
+    return unit.attach(f"{unit.of(value):.4g}") if math.isfinite(value) else MISSING
+
+
+def checked(number: object, low: float, high: float, name: str) -> float:
+    """A number that came from a browser, within ``low`` … ``high``.
+
+    viser checks nothing on the server: anything can arrive here. A number outside the range is taken as its
+    end; what is no finite number raises InputError.
+    """
+    if isinstance(number, bool) or not isinstance(number, (int, float)) or not math.isfinite(number):
+        raise InputError(f"{name}: {str(number)[:40]!r} is not a finite number")
+    return min(max(float(number), low), high)
 
 
 def own_path(name: str, unit: str) -> str:
     """Path of a quantity of someone's own, read in ``unit``; "" for a plain number."""
     return f"{OWN}{name} [{unit}]"
+
+
+def _own(path: str) -> tuple[str, str]:
+    """Words and unit of a quantity of someone's own."""
+    name, _, unit = path.removeprefix(OWN).rpartition(" [")
+    return name.replace("_", " "), unit.removesuffix("]")
+
+
+@cache
+def parameter_units() -> dict[str, str]:
+    """Last part of a parameter's path → its SI unit, as the solver declares it."""
+    declared = parameters(load_material("sunflower_extract"))
+    return {path.rsplit(".", 1)[-1]: parameter.unit for path, parameter in declared.items()}
 
 
 def unit_of_parameter(path: str) -> ReadingUnit:
@@ -190,12 +183,6 @@ def observable_title(name: str) -> str:
     return observable_label(name) + (f" [{unit}]" if unit else "")
 
 
-def _own(path: str) -> tuple[str, str]:
-    """Words and unit of a quantity of someone's own."""
-    name, _, unit = path.removeprefix(OWN).rpartition(" [")
-    return name.replace("_", " "), unit.removesuffix("]")
-
-
 def number(value: float | None, digits: int = 3) -> str:
     """``digits`` significant digits, without exponent between 1e-4 and 1e6."""
     if value is None or not math.isfinite(value):
@@ -253,9 +240,3 @@ def enumeration(items: Sequence[str]) -> str:
     if not items:
         return "none"
     return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
-
-
-def reading_unit(si: str) -> ReadingUnit:
-    """Unit in which a number in the SI unit ``si`` is read."""
-    name = READING_UNIT.get(si, si)
-    return ReadingUnit(SYMBOLS.get(name, name), UNITS.get(si, {}).get(name, 1.0))

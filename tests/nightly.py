@@ -39,13 +39,13 @@ PARTS = {
     "solver": Part((*SLOW, "tests/solver", "--ignore=tests/solver/photograph")),
     "photographs": Part((*SLOW, "tests/solver/photograph")),
     "exports and laboratory": Part(
-        (*SLOW, "tests/explorer/test_export_paraview.py", "tests/explorer/test_laboratory_round_trip.py")
+        (*SLOW, "tests/explorer/export/test_paraview.py", "tests/explorer/laboratory/test_round_trip.py")
     ),
     "validation campaign, small": Part((*SLOW, "tests/doe/validation")),
     "other engines, short": Part((*PYTEST, "-m", "slow or not slow", "tests/peers/test_short_pour.py")),
     "page speed": Part((sys.executable, "-m", "tests.browser.page_speed")),
     "README, whole": Part((*SLOW, "tests/test_readme.py")),
-    "trefoils": Part((*SLOW, "tests/explorer/test_trefoils.py"), nightly=False),
+    "trefoils": Part((*SLOW, "tests/explorer/diagnosis/test_trefoils.py"), nightly=False),
     "other engines, 18 pours each": Part((*SLOW, "-s", "tests/peers/test_same_pile.py"), nightly=False),
     "benchmark": Part(
         (sys.executable, "-m", "explorer", "bench", "--table", "docs/benchmark.md", "--json", "docs/benchmark.json"),

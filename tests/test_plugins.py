@@ -141,7 +141,7 @@ def test_a_design_is_made_listed_and_run_by_a_stage(site, tmp_path):
 STUDY = """
 import sys
 from explorer.study import run as study_run
-from tests.explorer.test_study_run import Formula
+from tests.explorer.study.test_run import Formula
 study_run.PourRunner = Formula
 from explorer.cli import main
 sys.argv = ["explorer", "calibrate", "--headless", *sys.argv[1:]]
@@ -203,7 +203,7 @@ from explorer.diagnosis.process import DiagnoseProcess
 from explorer.scene.source import material_source
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.page import Page
-from tests.explorer.test_viewer_page import Session
+from tests.explorer.viewer.test_page import Session
 folder = Path(sys.argv[1])
 server = guarded_server("127.0.0.1", 0, "test")
 diagnosis = DiagnoseProcess(folder / "diagnoses", folder / "runs.sqlite")

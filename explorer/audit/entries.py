@@ -18,7 +18,7 @@ class Digits(str):
     """The text of a TOML float: 0.50 stays "0.50"."""
 
 
-def read_entries(folder: Path) -> Entries:
+def read_entries(folder: Path) -> TableEntries:
     """``study.toml`` of a folder. Raises AuditError where it is missing or is no TOML."""
     path = folder / FILE
     if not path.is_file():
@@ -29,10 +29,10 @@ def read_entries(folder: Path) -> Entries:
         raise AuditError(f"{path}: not a text file in UTF-8") from None
     except tomllib.TOMLDecodeError as error:
         raise AuditError(f"{path}: {error}") from None
-    return Entries(table, FILE)
+    return TableEntries(table, FILE)
 
 
-class Entries:
+class TableEntries:
     """One table of the file; every key that is asked for is taken, and `finish` refuses what is left."""
 
     def __init__(self, table: Mapping[str, Any], where: str) -> None:
@@ -94,19 +94,19 @@ class Entries:
             raise self.error(key, f"true or false is needed, not {value!r}")
         return value
 
-    def table(self, key: str) -> Entries:
+    def table(self, key: str) -> TableEntries:
         """A table inside this one."""
         value = self._get(key)
         if not isinstance(value, dict):
             raise self.error(key, f"a table [{key}] is needed, not {value!r}")
-        return Entries(value, self._name(key))
+        return TableEntries(value, self._name(key))
 
-    def tables(self, key: str) -> tuple[Entries, ...]:
+    def tables(self, key: str) -> tuple[TableEntries, ...]:
         """A list of tables, empty where it is missing."""
         value = self._get(key, [])
         if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
             raise self.error(key, f"a list of tables [[{key}]] is needed")
-        return tuple(Entries(item, f"{self._name(key)} {number}") for number, item in enumerate(value, 1))
+        return tuple(TableEntries(item, f"{self._name(key)} {number}") for number, item in enumerate(value, 1))
 
     def finish(self) -> None:
         """Raise AuditError for a key that nothing asked for."""

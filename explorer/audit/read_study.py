@@ -1,8 +1,7 @@
 """A folder with study.toml and CSV files → `doe.audit.PublishedStudy`. The format: doe/audit/README.md.
 
-The stages of a calibration in a study.toml: screening, ascent, surface, optimum, verification.
-
-The CSV files of a published study: text as printed, with file, line and column for whoever has to mend it.
+study.toml declares the target, single claims, and the stages of a calibration: screening, ascent, surface, optimum,
+verification. The CSV files hold text as printed, with file, line and column for whoever has to mend it.
 """
 
 from __future__ import annotations
@@ -39,94 +38,176 @@ from doe.audit.study import (
 from doe.audit.surface_refit import source_name
 from doe.errors import AuditError
 from doe.table_file import read_table as read_cells
-from explorer.audit.entries import Entries, read_entries
+from explorer.audit.entries import TableEntries, read_entries
 from solver.assets import asset_path
 
-MOST_BYTES = 2_000_000
-
-"""Bytes of one file; published tables hold thousands."""
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table as text: column → cells; ``lines`` are the line numbers of its rows."""
-
-    name: str
-    columns: Mapping[str, tuple[str, ...]]
-    lines: tuple[int, ...]
-
-    @property
-    def rows(self) -> int:
-        """Number of rows."""
-        return len(self.lines)
-
-    def texts(self, column: str) -> tuple[str, ...]:
-        """Cells of a column; AuditError where there is none of that name."""
-        if column not in self.columns:
-            raise AuditError(f"{self.name}: no column {column!r}; it has {', '.join(self.columns)}")
-        return self.columns[column]
-
-    def numbers(self, column: str) -> tuple[Printed, ...]:
-        """A column in which every cell is a number."""
-        return tuple(self.number(column, row) for row in range(self.rows))
-
-    def number(self, column: str, row: int) -> Printed:
-        """One cell; AuditError names file, line and column where it is no number."""
-        try:
-            return printed(self.texts(column)[row])
-        except AuditError as error:
-            raise AuditError(f"{self.name}, line {self.lines[row]}, {column}: {error}") from None
-
-    def number_or_none(self, column: str, row: int) -> Printed | None:
-        """One cell, None where it is empty or the column is not there."""
-        return self.number(column, row) if self.columns.get(column, ())[row : row + 1] not in ((), ("",)) else None
-
-
-def places(table: Table, value: Printed) -> tuple[str, ...]:
-    """Where the table prints ``value``, in words: "restitution of petiole–petiole"; a row is named by its words."""
-    found = []
-    for row in range(table.rows):
-        cells = {column: texts[row] for column, texts in table.columns.items()}
-        numbers = {column: printed_or_none(text) for column, text in cells.items()}
-        name = "–".join(text for column, text in cells.items() if text and numbers[column] is None) or f"row {row + 1}"
-        like = [c for c, number in numbers.items() if number and not number.bound and value.agrees(number.value)]
-        found += [f"{column} of {name}" for column in like]
-    return tuple(found)
-
-
-def read_table(folder: Path, name: str) -> Table:
-    """A CSV file of a study's folder. Raises AuditError for what is not one, OSError for what cannot be opened."""
-    if Path(name).name != name or not name:
-        raise AuditError(f"{name!r} is not the name of a file beside study.toml")
-    path = folder / name
-    table = read_cells(path, MOST_BYTES, AuditError)
-    if len(table.rows) < 2:
-        raise AuditError(f"{path}: a line of column names and at least one row are needed")
-    (_, header), *rows = table.rows
-    if len(set(header)) < len(header) or "" in header:
-        raise AuditError(f"{path}: column names must be there and differ: {', '.join(header)}")
-    for number, row in rows:
-        if len(row) != len(header):
-            raise AuditError(f"{path}, line {number}: {len(row)} cells; the table has {len(header)} columns")
-    # Numbers as printed, but with a point: everything behind reads their digits. Words keep their commas.
-    cells = zip(
-        *([plain if printed_or_none(plain := table.plain(cell)) else cell for cell in row] for _, row in rows),
-        strict=True,
-    )
-    columns = dict(zip(header, cells, strict=True))
-    return Table(name, columns, tuple(number for number, _ in rows))
-
-
 FloatArray = npt.NDArray[np.float64]
+Part = TypeVar("Part")
 
+MOST_BYTES = 2_000_000
+"""Bytes of one file; published tables hold thousands."""
 STATISTICS = ("r_squared", "r_squared_adjusted", "r_squared_predicted", "cv_percent", "adequate_precision", "sigma")
-
 MOST_FACTORS = 8
-
 """Of a second-order surface: 45 terms."""
+FORMAT = 1
 
 
-def read_screening(entries: Entries, folder: Path) -> Screening:
+def shipped_study() -> Path:
+    """Folder of the article that is shipped."""
+    return asset_path("source_tables", "table1_physical").parent
+
+
+def read_study(folder: Path) -> PublishedStudy:
+    """The study in ``folder``. Raises AuditError with one line that names file, key or line, and what is allowed."""
+    if not folder.is_dir():
+        raise AuditError(f"{folder}: no such folder")
+    try:
+        return _study(read_entries(folder), folder)
+    except AuditError as error:
+        text = str(error)
+        raise AuditError(text if text.startswith(str(folder)) else f"{folder}/{text}") from None
+
+
+def _study(entries: TableEntries, folder: Path) -> PublishedStudy:
+    if entries.whole("format", 0) != FORMAT:
+        raise entries.error("format", f"this program reads format {FORMAT}")
+
+    def optional(key: str, read: Callable[[TableEntries, Path], Part]) -> Part | None:
+        return _finished(read, entries.table(key), folder) if key in entries else None
+
+    ascent = optional("ascent", read_ascent)
+    surface = optional("surface", partial(read_surface, ascent=ascent))
+    study = PublishedStudy(
+        title=entries.text("title"),
+        source=entries.text("source", " ").strip(),
+        target=_finished(_target, entries.table("target"), folder),
+        derived=tuple(_finished(_derived, one, folder) for one in entries.tables("derived")),
+        measured=tuple(part for one in entries.tables("measured") for part in _finished(_measured, one, folder)),
+        totals=tuple(_finished(_total, one, folder) for one in entries.tables("total")),
+        quotes=tuple(_finished(_quote, one, folder) for one in entries.tables("quoted")),
+        drop_test=optional("drop_test", _drop_test),
+        screening=optional("screening", read_screening),
+        ascent=ascent,
+        surface=surface,
+        optimum=read_optimum(entries.table("optimum"), surface) if "optimum" in entries else None,
+        verified=optional("verification", read_verified),
+    )
+    entries.finish()
+    return study
+
+
+def _finished(read: Callable[[TableEntries, Path], Part], entries: TableEntries, folder: Path) -> Part:
+    part = read(entries, folder)
+    entries.finish()
+    return part
+
+
+def _target(entries: TableEntries, folder: Path) -> Target:
+    mean = entries.figure("mean")
+    if mean.value == 0:
+        raise entries.error("mean", "0 is not allowed: relative errors are divided by it")
+    replicates = None
+    if "file" in entries:
+        replicates = read_table(folder, entries.text("file")).numbers(entries.text("column"))
+    return Target(
+        where=entries.text("where", "text"),
+        quantity=entries.text("quantity"),
+        unit=entries.text("unit", "1"),
+        mean=mean,
+        sd=entries.figure_or_none("sd"),
+        n=entries.whole("n", 1) if "n" in entries else None,
+        replicates=replicates,
+    )
+
+
+def _derived(entries: TableEntries, folder: Path) -> Derived:
+    table = read_table(folder, entries.text("file"))
+    column, formula = entries.text("column"), entries.text("formula")
+    names = names_in(formula)
+    return Derived(
+        where=entries.text("where"),
+        quantity=entries.text("quantity", column),
+        formula=formula,
+        rows=_labels(table, entries),
+        printed=table.numbers(column),
+        inputs=tuple({name: table.number(name, row) for name in names} for row in range(table.rows)),
+    )
+
+
+def _measured(entries: TableEntries, folder: Path) -> tuple[Measured, ...]:
+    table, where, made_from = read_table(folder, entries.text("file")), entries.text("where"), entries.text("made_from")
+    labels, parts = _labels(table, entries), []
+    single = read_table(folder, entries.text("replicates")) if "replicates" in entries else None
+    key = entries.text("label", next(iter(table.columns)))
+    for column in entries.texts("columns"):
+        cells = [(label, table.number_or_none(column, row)) for row, label in enumerate(labels)]
+        table.texts(column)
+        there = [(label, cell) for label, cell in cells if cell is not None]
+        runs = None if single is None else tuple(_of_label(single, key, label, column) for label, _ in there)
+        rows, prints = tuple(label for label, _ in there), tuple(cell for _, cell in there)
+        parts.append(Measured(where, column.replace("_", " "), made_from, rows, prints, runs))
+    return tuple(parts)
+
+
+def _of_label(table: PrintedTable, key: str, label: str, column: str) -> tuple[Printed, ...]:
+    """All cells of a column in the rows of one label; AuditError where there is none."""
+    rows = [row for row, name in enumerate(table.texts(key)) if name == label]
+    if not rows:
+        raise AuditError(f"{table.name}: no row with {key} = {label!r}")
+    return tuple(table.number(column, row) for row in rows)
+
+
+def _total(entries: TableEntries, folder: Path) -> Total:
+    table = read_table(folder, entries.text("file"))
+    column = entries.text("column")
+    return Total(
+        entries.text("where"), entries.text("quantity", column), table.numbers(column), entries.figure("total")
+    )
+
+
+def _quote(entries: TableEntries, folder: Path) -> Quote:
+    quantity, value = entries.text("quantity"), entries.figure("value")
+    where, said, text = entries.text("where"), entries.text("table"), entries.text("text", " ").strip()
+    if "file" not in entries:
+        return Quote(where, quantity, value, None, said, text)
+    table, column = read_table(folder, entries.text("file")), entries.text("column")
+    among = table.numbers(column)
+    original, elsewhere = None, places(table, value)
+    if "row" in entries:
+        row = entries.table("row")
+        wanted = {key: row.text(key) for key in row.names()}
+        found = [k for k in range(table.rows) if all(table.texts(key)[k] == text for key, text in wanted.items())]
+        if len(found) != 1:
+            raise entries.error("row", f"{len(found)} rows of {table.name} fit; exactly one is needed")
+        original = among[found[0]]
+    return Quote(where, quantity, value, original, said, text, column, among, elsewhere)
+
+
+def _drop_test(entries: TableEntries, folder: Path) -> DropTest:
+    table, formula = read_table(folder, entries.text("file")), entries.text("formula")
+    unknown = set(names_in(formula)) - set("LHhvtg") - {"vx", "vy"}
+    if unknown:
+        raise entries.error("formula", f"{sorted(unknown)[0]!r} is not known; allowed: L, H, h, v, vx, vy, t, g")
+    restitutions = table.numbers(entries.text("column"))
+    wrong = [one.text for one in restitutions if not 0 <= one.value <= 1]
+    if wrong:
+        raise entries.error("column", f"a restitution of {wrong[0]} is not allowed; allowed: 0 … 1")
+    return DropTest(
+        where=entries.text("where"),
+        formula=formula,
+        plate_angle_deg=entries.number("plate_angle_deg", 0.0, 89.0),
+        fall=entries.number("fall", 0.0, 100.0),
+        landing=entries.number("landing", 0.0, 100.0) if "landing" in entries else None,
+        restitutions=restitutions,
+    )
+
+
+def _labels(table: PrintedTable, entries: TableEntries) -> tuple[str, ...]:
+    """Names of the rows: cells of the column `label`, or of the first one."""
+    return table.texts(entries.text("label", next(iter(table.columns))))
+
+
+def read_screening(entries: TableEntries, folder: Path) -> Screening:
     """``[screening]``: its factors (factor, low, high) and ANOVA (factor, sum_of_squares, f_value, p_value)."""
     runs = read_table(folder, entries.text("runs"))
     factors, anova = read_table(folder, entries.text("factors")), read_table(folder, entries.text("anova"))
@@ -165,7 +246,7 @@ def read_screening(entries: Entries, folder: Path) -> Screening:
     )
 
 
-def read_ascent(entries: Entries, folder: Path) -> Ascent:
+def read_ascent(entries: TableEntries, folder: Path) -> Ascent:
     """``[ascent]`` with ``[ascent.factors]``: name in the screening → column of its settings."""
     table, columns = read_table(folder, entries.text("file")), entries.table("factors")
     names = columns.names()
@@ -186,7 +267,7 @@ def read_ascent(entries: Entries, folder: Path) -> Ascent:
     )
 
 
-def read_surface(entries: Entries, folder: Path, ascent: Ascent | None) -> SurfaceStudy:
+def read_surface(entries: TableEntries, folder: Path, ascent: Ascent | None) -> SurfaceStudy:
     """``[surface]`` with ``[[surface.factor]]``, ``[surface.statistics]`` and ``[surface.equation]``; ``ascent`` is the
     walk that its levels may be said to be steps of."""
     runs, anova = read_table(folder, entries.text("runs")), read_table(folder, entries.text("anova"))
@@ -228,39 +309,7 @@ def read_surface(entries: Entries, folder: Path, ascent: Ascent | None) -> Surfa
     )
 
 
-def read_optimum(entries: Entries, surface: SurfaceStudy | None) -> Optimum:
-    """``[optimum]`` with ``values``: factor of the surface → its value, natural unit."""
-    if surface is None:
-        raise entries.error("values", "there is no [surface] that this could be the optimum of")
-    values = entries.table("values")
-    found = Optimum(
-        where=entries.text("where"),
-        values=tuple(values.figure(name) for name in surface.factors),
-        predicted=entries.figure_or_none("predicted"),
-    )
-    values.finish()
-    entries.finish()
-    return found
-
-
-def read_verified(entries: Entries, folder: Path) -> Verified:
-    """``[verification]``."""
-    table = read_table(folder, entries.text("file"))
-    return Verified(
-        where=entries.text("where"),
-        responses=table.numbers(entries.text("response")),
-        mean=entries.figure_or_none("mean"),
-        relative_error_percent=entries.figure_or_none("relative_error_percent"),
-        p_two_sample=entries.figure_or_none("p_two_sample"),
-    )
-
-
-def _numbers(table: Table, columns: tuple[str, ...]) -> FloatArray:
-    """Columns as values, shape (rows, columns)."""
-    return np.array([[cell.value for cell in table.numbers(column)] for column in columns]).T
-
-
-def _steps(entries: Entries, ascent: Ascent | None) -> DesignSteps:
+def _steps(entries: TableEntries, ascent: Ascent | None) -> DesignSteps:
     found = {}
     for key in ("low", "centre", "high"):
         found[key] = entries.text(key)
@@ -271,7 +320,7 @@ def _steps(entries: Entries, ascent: Ascent | None) -> DesignSteps:
     return DesignSteps(**found)
 
 
-def _anova_line(table: Table, row: int) -> AnovaLine:
+def _anova_line(table: PrintedTable, row: int) -> AnovaLine:
     cells = {key: table.number_or_none(key, row) for key in ("sum_of_squares", "df", "mean_square")}
     return AnovaLine(
         table.texts("source")[row],
@@ -281,7 +330,7 @@ def _anova_line(table: Table, row: int) -> AnovaLine:
     )
 
 
-def _equation(entries: Entries, factors: tuple[str, ...]) -> Equation:
+def _equation(entries: TableEntries, factors: tuple[str, ...]) -> Equation:
     units = entries.text("units")
     if units not in ("coded", "natural"):
         raise entries.error("units", f"{units!r} is not one of coded, natural")
@@ -297,161 +346,103 @@ def _equation(entries: Entries, factors: tuple[str, ...]) -> Equation:
     return equation
 
 
-FORMAT = 1
-
-Part = TypeVar("Part")
-
-
-def shipped_study() -> Path:
-    """Folder of the article that is shipped."""
-    return asset_path("source_tables", "table1_physical").parent
-
-
-def read_study(folder: Path) -> PublishedStudy:
-    """The study in ``folder``. Raises AuditError with one line that names file, key or line, and what is allowed."""
-    if not folder.is_dir():
-        raise AuditError(f"{folder}: no such folder")
-    try:
-        return _study(read_entries(folder), folder)
-    except AuditError as error:
-        text = str(error)
-        raise AuditError(text if text.startswith(str(folder)) else f"{folder}/{text}") from None
-
-
-def _study(entries: Entries, folder: Path) -> PublishedStudy:
-    if entries.whole("format", 0) != FORMAT:
-        raise entries.error("format", f"this program reads format {FORMAT}")
-
-    def optional(key: str, read: Callable[[Entries, Path], Part]) -> Part | None:
-        return _finished(read, entries.table(key), folder) if key in entries else None
-
-    ascent = optional("ascent", read_ascent)
-    surface = optional("surface", partial(read_surface, ascent=ascent))
-    study = PublishedStudy(
-        title=entries.text("title"),
-        source=entries.text("source", " ").strip(),
-        target=_finished(_target, entries.table("target"), folder),
-        derived=tuple(_finished(_derived, one, folder) for one in entries.tables("derived")),
-        measured=tuple(part for one in entries.tables("measured") for part in _finished(_measured, one, folder)),
-        totals=tuple(_finished(_total, one, folder) for one in entries.tables("total")),
-        quotes=tuple(_finished(_quote, one, folder) for one in entries.tables("quoted")),
-        drop_test=optional("drop_test", _drop_test),
-        screening=optional("screening", read_screening),
-        ascent=ascent,
-        surface=surface,
-        optimum=read_optimum(entries.table("optimum"), surface) if "optimum" in entries else None,
-        verified=optional("verification", read_verified),
-    )
-    entries.finish()
-    return study
-
-
-def _finished(read: Callable[[Entries, Path], Part], entries: Entries, folder: Path) -> Part:
-    part = read(entries, folder)
-    entries.finish()
-    return part
-
-
-def _target(entries: Entries, folder: Path) -> Target:
-    mean = entries.figure("mean")
-    if mean.value == 0:
-        raise entries.error("mean", "0 is not allowed: relative errors are divided by it")
-    replicates = None
-    if "file" in entries:
-        replicates = read_table(folder, entries.text("file")).numbers(entries.text("column"))
-    return Target(
-        where=entries.text("where", "text"),
-        quantity=entries.text("quantity"),
-        unit=entries.text("unit", "1"),
-        mean=mean,
-        sd=entries.figure_or_none("sd"),
-        n=entries.whole("n", 1) if "n" in entries else None,
-        replicates=replicates,
-    )
-
-
-def _derived(entries: Entries, folder: Path) -> Derived:
-    table = read_table(folder, entries.text("file"))
-    column, formula = entries.text("column"), entries.text("formula")
-    names = names_in(formula)
-    return Derived(
+def read_optimum(entries: TableEntries, surface: SurfaceStudy | None) -> Optimum:
+    """``[optimum]`` with ``values``: factor of the surface → its value, natural unit."""
+    if surface is None:
+        raise entries.error("values", "there is no [surface] that this could be the optimum of")
+    values = entries.table("values")
+    found = Optimum(
         where=entries.text("where"),
-        quantity=entries.text("quantity", column),
-        formula=formula,
-        rows=_labels(table, entries),
-        printed=table.numbers(column),
-        inputs=tuple({name: table.number(name, row) for name in names} for row in range(table.rows)),
+        values=tuple(values.figure(name) for name in surface.factors),
+        predicted=entries.figure_or_none("predicted"),
     )
+    values.finish()
+    entries.finish()
+    return found
 
 
-def _measured(entries: Entries, folder: Path) -> tuple[Measured, ...]:
-    table, where, made_from = read_table(folder, entries.text("file")), entries.text("where"), entries.text("made_from")
-    labels, parts = _labels(table, entries), []
-    single = read_table(folder, entries.text("replicates")) if "replicates" in entries else None
-    key = entries.text("label", next(iter(table.columns)))
-    for column in entries.texts("columns"):
-        cells = [(label, table.number_or_none(column, row)) for row, label in enumerate(labels)]
-        table.texts(column)
-        there = [(label, cell) for label, cell in cells if cell is not None]
-        runs = None if single is None else tuple(_of_label(single, key, label, column) for label, _ in there)
-        rows, prints = tuple(label for label, _ in there), tuple(cell for _, cell in there)
-        parts.append(Measured(where, column.replace("_", " "), made_from, rows, prints, runs))
-    return tuple(parts)
-
-
-def _of_label(table: Table, key: str, label: str, column: str) -> tuple[Printed, ...]:
-    """All cells of a column in the rows of one label; AuditError where there is none."""
-    rows = [row for row, name in enumerate(table.texts(key)) if name == label]
-    if not rows:
-        raise AuditError(f"{table.name}: no row with {key} = {label!r}")
-    return tuple(table.number(column, row) for row in rows)
-
-
-def _total(entries: Entries, folder: Path) -> Total:
+def read_verified(entries: TableEntries, folder: Path) -> Verified:
+    """``[verification]``."""
     table = read_table(folder, entries.text("file"))
-    column = entries.text("column")
-    return Total(
-        entries.text("where"), entries.text("quantity", column), table.numbers(column), entries.figure("total")
-    )
-
-
-def _quote(entries: Entries, folder: Path) -> Quote:
-    quantity, value = entries.text("quantity"), entries.figure("value")
-    where, said, text = entries.text("where"), entries.text("table"), entries.text("text", " ").strip()
-    if "file" not in entries:
-        return Quote(where, quantity, value, None, said, text)
-    table, column = read_table(folder, entries.text("file")), entries.text("column")
-    among = table.numbers(column)
-    original, elsewhere = None, places(table, value)
-    if "row" in entries:
-        row = entries.table("row")
-        wanted = {key: row.text(key) for key in row.names()}
-        found = [k for k in range(table.rows) if all(table.texts(key)[k] == text for key, text in wanted.items())]
-        if len(found) != 1:
-            raise entries.error("row", f"{len(found)} rows of {table.name} fit; exactly one is needed")
-        original = among[found[0]]
-    return Quote(where, quantity, value, original, said, text, column, among, elsewhere)
-
-
-def _drop_test(entries: Entries, folder: Path) -> DropTest:
-    table, formula = read_table(folder, entries.text("file")), entries.text("formula")
-    unknown = set(names_in(formula)) - set("LHhvtg") - {"vx", "vy"}
-    if unknown:
-        raise entries.error("formula", f"{sorted(unknown)[0]!r} is not known; allowed: L, H, h, v, vx, vy, t, g")
-    restitutions = table.numbers(entries.text("column"))
-    wrong = [one.text for one in restitutions if not 0 <= one.value <= 1]
-    if wrong:
-        raise entries.error("column", f"a restitution of {wrong[0]} is not allowed; allowed: 0 … 1")
-    return DropTest(
+    return Verified(
         where=entries.text("where"),
-        formula=formula,
-        plate_angle_deg=entries.number("plate_angle_deg", 0.0, 89.0),
-        fall=entries.number("fall", 0.0, 100.0),
-        landing=entries.number("landing", 0.0, 100.0) if "landing" in entries else None,
-        restitutions=restitutions,
+        responses=table.numbers(entries.text("response")),
+        mean=entries.figure_or_none("mean"),
+        relative_error_percent=entries.figure_or_none("relative_error_percent"),
+        p_two_sample=entries.figure_or_none("p_two_sample"),
     )
 
 
-def _labels(table: Table, entries: Entries) -> tuple[str, ...]:
-    """Names of the rows: cells of the column `label`, or of the first one."""
-    return table.texts(entries.text("label", next(iter(table.columns))))
+def _numbers(table: PrintedTable, columns: tuple[str, ...]) -> FloatArray:
+    """Columns as values, shape (rows, columns)."""
+    return np.array([[cell.value for cell in table.numbers(column)] for column in columns]).T
+
+
+@dataclass(frozen=True)
+class PrintedTable:
+    """A table as text: column → cells; ``lines`` are the line numbers of its rows."""
+
+    name: str
+    columns: Mapping[str, tuple[str, ...]]
+    lines: tuple[int, ...]
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return len(self.lines)
+
+    def texts(self, column: str) -> tuple[str, ...]:
+        """Cells of a column; AuditError where there is none of that name."""
+        if column not in self.columns:
+            raise AuditError(f"{self.name}: no column {column!r}; it has {', '.join(self.columns)}")
+        return self.columns[column]
+
+    def numbers(self, column: str) -> tuple[Printed, ...]:
+        """A column in which every cell is a number."""
+        return tuple(self.number(column, row) for row in range(self.rows))
+
+    def number(self, column: str, row: int) -> Printed:
+        """One cell; AuditError names file, line and column where it is no number."""
+        try:
+            return printed(self.texts(column)[row])
+        except AuditError as error:
+            raise AuditError(f"{self.name}, line {self.lines[row]}, {column}: {error}") from None
+
+    def number_or_none(self, column: str, row: int) -> Printed | None:
+        """One cell, None where it is empty or the column is not there."""
+        return self.number(column, row) if self.columns.get(column, ())[row : row + 1] not in ((), ("",)) else None
+
+
+def read_table(folder: Path, name: str) -> PrintedTable:
+    """A CSV file of a study's folder. Raises AuditError for what is not one, OSError for what cannot be opened."""
+    if Path(name).name != name or not name:
+        raise AuditError(f"{name!r} is not the name of a file beside study.toml")
+    path = folder / name
+    table = read_cells(path, MOST_BYTES, AuditError)
+    if len(table.rows) < 2:
+        raise AuditError(f"{path}: a line of column names and at least one row are needed")
+    (_, header), *rows = table.rows
+    if len(set(header)) < len(header) or "" in header:
+        raise AuditError(f"{path}: column names must be there and differ: {', '.join(header)}")
+    for number, row in rows:
+        if len(row) != len(header):
+            raise AuditError(f"{path}, line {number}: {len(row)} cells; the table has {len(header)} columns")
+    # Numbers as printed, but with a point: everything behind reads their digits. Words keep their commas.
+    cells = zip(
+        *([plain if printed_or_none(plain := table.plain(cell)) else cell for cell in row] for _, row in rows),
+        strict=True,
+    )
+    columns = dict(zip(header, cells, strict=True))
+    return PrintedTable(name, columns, tuple(number for number, _ in rows))
+
+
+def places(table: PrintedTable, value: Printed) -> tuple[str, ...]:
+    """Where the table prints ``value``, in words: "restitution of petiole–petiole"; a row is named by its words."""
+    found = []
+    for row in range(table.rows):
+        cells = {column: texts[row] for column, texts in table.columns.items()}
+        numbers = {column: printed_or_none(text) for column, text in cells.items()}
+        name = "–".join(text for column, text in cells.items() if text and numbers[column] is None) or f"row {row + 1}"
+        like = [c for c, number in numbers.items() if number and not number.bound and value.agrees(number.value)]
+        found += [f"{column} of {name}" for column in like]
+    return tuple(found)

@@ -1,6 +1,6 @@
-"""The audit as a report: the same sections as HTML and as Markdown.
+"""The findings of an audit for a reader: a text for the terminal, and the same sections as HTML and as Markdown.
 
-The findings of an audit as text for a terminal: what differs first, what is reproduced counted by its table.
+What differs comes first; what is reproduced is counted by its table.
 """
 
 from __future__ import annotations
@@ -23,43 +23,15 @@ HEADINGS: dict[Status, str] = {
     "cannot be checked": "cannot be checked",
     "reproduced": "reproduced",
 }
+WHAT = (
+    "A figure is reproduced if the recomputed value rounds to the print, allowing for the rounding of the printed "
+    "numbers it is computed from. Everything is recomputed from the publication's own tables; nothing is simulated."
+)
 
 
 def audit_text(audit: Audit) -> str:
     """Everything about ``audit`` but the list of what is reproduced, which stands in the report."""
     return "\n\n".join(part for part in _parts(audit) if part)
-
-
-def counted(audit: Audit) -> str:
-    """The counts in one line."""
-    counts = Counter(figure.status for figure in audit.figures)
-    return ", ".join(f"{counts[status]} {words}" for status, words in HEADINGS.items())
-
-
-def printed_and_recomputed(figure: Figure) -> str:
-    """Both numbers of a figure that differs, in one phrase."""
-    return f"printed {figure.printed}, recomputed {recomputed_text(figure)}"
-
-
-def recomputed_text(figure: Figure) -> str:
-    """What was recomputed, with a digit more than the print; a dash where nothing was."""
-    if figure.recomputed is None:
-        return "-"
-    if isinstance(figure.recomputed, str):
-        return figure.recomputed
-    digits = figure.printed.lstrip("<>+-").partition(".")[2]
-    if not digits.isdigit() and "." in figure.printed:
-        return f"{figure.recomputed:.4g}"
-    text = f"{figure.recomputed:.{len(digits) + 1}f}"
-    if not float(text) and figure.recomputed:
-        return f"{figure.recomputed:.2g}"
-    return text.removesuffix("0") if digits else text.removesuffix(".0")
-
-
-def reproduced_by_place(audit: Audit) -> tuple[tuple[str, str, str], ...]:
-    """(place, check, how many) of what is reproduced, in the order of the study."""
-    counts = Counter((figure.where, figure.check) for figure in audit.having("reproduced"))
-    return tuple((where, check, str(count)) for (where, check), count in counts.items())
 
 
 def _parts(audit: Audit) -> Iterator[str]:
@@ -80,12 +52,6 @@ def _differs(figure: Figure) -> str:
 
 def _listed(heading: str, lines: list[str]) -> str:
     return "\n".join((heading, *(f"- {line}" for line in lines))) if lines else ""
-
-
-WHAT = (
-    "A figure is reproduced if the recomputed value rounds to the print, allowing for the rounding of the printed "
-    "numbers it is computed from. Everything is recomputed from the publication's own tables; nothing is simulated."
-)
 
 
 def write_audit(audit: Audit, folder: Path) -> None:
@@ -143,3 +109,35 @@ def _reproduced(audit: Audit) -> tuple[Block, ...]:
         return ()
     counts = Table(("Where", "Check", "Figures"), reproduced_by_place(audit))
     return counts, Folded("Every one of them", _table(figures, "How it was recomputed"))
+
+
+def counted(audit: Audit) -> str:
+    """The counts in one line."""
+    counts = Counter(figure.status for figure in audit.figures)
+    return ", ".join(f"{counts[status]} {words}" for status, words in HEADINGS.items())
+
+
+def printed_and_recomputed(figure: Figure) -> str:
+    """Both numbers of a figure that differs, in one phrase."""
+    return f"printed {figure.printed}, recomputed {recomputed_text(figure)}"
+
+
+def recomputed_text(figure: Figure) -> str:
+    """What was recomputed, with a digit more than the print; a dash where nothing was."""
+    if figure.recomputed is None:
+        return "-"
+    if isinstance(figure.recomputed, str):
+        return figure.recomputed
+    digits = figure.printed.lstrip("<>+-").partition(".")[2]
+    if not digits.isdigit() and "." in figure.printed:
+        return f"{figure.recomputed:.4g}"
+    text = f"{figure.recomputed:.{len(digits) + 1}f}"
+    if not float(text) and figure.recomputed:
+        return f"{figure.recomputed:.2g}"
+    return text.removesuffix("0") if digits else text.removesuffix(".0")
+
+
+def reproduced_by_place(audit: Audit) -> tuple[tuple[str, str, str], ...]:
+    """(place, check, how many) of what is reproduced, in the order of the study."""
+    counts = Counter((figure.where, figure.check) for figure in audit.having("reproduced"))
+    return tuple((where, check, str(count)) for (where, check), count in counts.items())

@@ -1,16 +1,15 @@
-"""A command of the command line in a process of its own, at lower priority, so that the live pour stays smooth.
+"""A command of the command line in a process of its own, and the orders that wait for it.
 
-The command writes ``progress.jsonl`` into its output folder, one object per event, which is all that is read here:
+It has lower priority, so that the live pour stays smooth. The command writes ``progress.jsonl`` into its output folder,
+one object per event, which is all that is read here:
 
     {"time": seconds, "stage": text, "done": runs, "planned": runs, "eta_s": seconds or null, "line": text or null}
 
 and, where the command tells it, "stages": {name: [done, planned]} and "run", one run that ended
 (`explorer.background.progress`).
 
-Orders that wait while a command runs: the next one begins when the one before has come to its end.
-
-An end is a report or a failure; a command that was cancelled leaves the line waiting for the next start, because who
-cancels wants quiet.
+The next order begins when the one before has come to its end: a report or a failure. A command that was cancelled
+leaves the line waiting for the next start, because who cancels wants quiet.
 """
 
 from __future__ import annotations
@@ -33,18 +32,15 @@ from explorer.errors import CommandError
 from explorer.priority import BACKGROUND, lowered, session_gives_way
 
 CommandState = Literal["idle", "running", "paused", "cancelled", "finished", "failed"]
+Order = TypeVar("Order")
 
 CANCEL_WAIT = 5.0
-
 """Seconds that a cancelled command has to write what it has, before it is ended for good."""
-
 LOCK_WAIT = 1.0
-
 """Seconds that the folder of a command of our own, which has ended, may stay locked by its workers."""
-
 PROGRAM = (sys.executable, "-m", "explorer")
-
 """How the command line is called."""
+MOST_WAITING = 5
 
 
 @dataclass(frozen=True)
@@ -244,11 +240,6 @@ def _locked(file: IO[bytes], patience: float) -> bool:
 def _whole_lines(stream: IO[bytes]) -> list[bytes]:
     """Lines that end in a newline; the writer may be in the middle of the last one."""
     return [line for line in stream if line.endswith(b"\n")]
-
-
-MOST_WAITING = 5
-
-Order = TypeVar("Order")
 
 
 class WaitingLine(Generic[Order]):

@@ -1,7 +1,4 @@
-"""Names of the folders that commands in the background write into, and which of them hold a result.
-
-The JSON file that a command left in its output folder, read again only when it has changed.
-"""
+"""Output folders of commands in the background: their names, which of them hold a result, and the result as JSON."""
 
 from __future__ import annotations
 
@@ -15,7 +12,6 @@ from typing import Any
 from explorer.errors import CommandError
 
 STAMP = r"\d{8}-\d{6}(?:-\d+)?"
-
 """Date, time and perhaps a number: the end of an output folder's name."""
 
 

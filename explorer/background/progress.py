@@ -270,7 +270,7 @@ class StageProgress:
 
 
 @dataclass(frozen=True)
-class Failure:
+class FailedRun:
     """A run without a pile and what became of its replicate: ``replaced_by`` is the next seed tried, if any."""
 
     run: TriedRun
@@ -300,11 +300,11 @@ def with_run(tried: tuple[TriedRun, ...], event: ProgressEvent) -> tuple[TriedRu
     return (*tried, run)[-MOST_TRIED:]
 
 
-def failures(tried: tuple[TriedRun, ...]) -> tuple[Failure, ...]:
+def failures(tried: tuple[TriedRun, ...]) -> tuple[FailedRun, ...]:
     """Every failed run with the one that took its place, newest first."""
     by_place = {(run.stage, run.label, run.replicate, run.attempt): run for run in tried}
     return tuple(
-        Failure(run, by_place.get((run.stage, run.label, run.replicate, run.attempt + 1)))
+        FailedRun(run, by_place.get((run.stage, run.label, run.replicate, run.attempt + 1)))
         for run in reversed(tried)
         if not run.valid
     )

@@ -48,7 +48,7 @@ def design(
 ) -> None:
     """Write the runs of a design; says what is confused with what, and which effects it will be able to see."""
     from explorer.design.factors_file import read_factors
-    from explorer.design.plan import PlanOrder, make_plan, sheet_text
+    from explorer.design.run_plan import DesignOrder, make_plan, sheet_text
     from explorer.design.text import plan_result, plan_text
     from explorer.errors import CommandError
     from explorer.files.output_file import write_whole
@@ -63,7 +63,7 @@ def design(
         if value is not None and not 0 < value < float("inf"):
             raise CommandError(f"{option} {value:g}: allowed: a positive number")
     file = read_factors(asset_path("designs", factors))
-    order = PlanOrder(kind, runs, replicates, centre, seed, fold, tuple(generator), fraction, alpha, standard_order)
+    order = DesignOrder(kind, runs, replicates, centre, seed, fold, tuple(generator), fraction, alpha, standard_order)
     plan = make_plan(order, file)
     said = json_text(plan_result(plan, file, sigma, effect)) if json else plan_text(plan, file, sigma, effect)
     write_whole(out, sheet_text(plan, file))

@@ -8,7 +8,7 @@ from pathlib import Path
 import typer
 
 
-class Kind(StrEnum):
+class StarterKind(StrEnum):
     """What can be started."""
 
     MATERIAL = "material"
@@ -16,7 +16,7 @@ class Kind(StrEnum):
 
 
 def new(
-    kind: Kind = typer.Argument(help="What to start."),
+    kind: StarterKind = typer.Argument(help="What to start."),
     name: str = typer.Argument(metavar="NAME", help="Its name: letters, digits, - and _."),
     out: Path = typer.Option(Path(), help="Folder to write into."),
     material: str | None = typer.Option(
@@ -38,21 +38,21 @@ def new(
     from explorer.errors import CommandError
     from explorer.scene.starter_files import STUDY_ENDING, write_material, write_study
 
-    if kind == Kind.MATERIAL and material is not None:
+    if kind == StarterKind.MATERIAL and material is not None:
         raise CommandError("--material: belongs to `new study`")
-    if kind == Kind.STUDY and (like is not None or part):
+    if kind == StarterKind.STUDY and (like is not None or part):
         raise CommandError("--like, --part: belong to `new material`")
     if like is not None or part:
         from explorer.laboratory.part import write_measured_material
 
         written = [write_measured_material(out, name, like, part)]
     else:
-        written = [write_material(out, name)] if kind == Kind.MATERIAL else write_study(out, name, material)
+        written = [write_material(out, name)] if kind == StarterKind.MATERIAL else write_study(out, name, material)
     for path in written:
         typer.echo(f"wrote {path}")
     file = str(written[-1])
     command = ["simulate", file]
-    if kind == Kind.STUDY:
+    if kind == StarterKind.STUDY:
         results = Path("results") / written[-1].stem.removesuffix(STUDY_ENDING)
         command = ["calibrate", "--headless", "--study", file, "--profile", "quick", "--out", str(results)]
     typer.echo(f"try it: explorer {shlex.join(command)}")

@@ -19,12 +19,9 @@ from explorer.errors import CommandError
 from solver import Like, Names, Number, ParameterError, Settings, TomlTable, Whole, checked, read_toml
 
 NAME = re.compile(r"[^\W\d][\w-]{0,59}")
-
 UNIT = re.compile(r"[^\s=@|,;\[\]\"'`<>][^|,;\[\]\"`<>\n]{0,19}")
-
 RESERVED = ("row", "replicate", "run", "seed")
 """Columns of the sheet that are not factors."""
-
 MOST_FACTORS = 47
 
 
@@ -57,7 +54,7 @@ class FactorsTable(TomlTable):
 
 
 @dataclass(frozen=True)
-class Factor(Record):
+class DesignFactor(Record):
     """One factor: low, high and reference in ``unit``."""
 
     name: str
@@ -77,7 +74,7 @@ class FactorsFile(Record):
     """Factors with what else the file says about the runs; None where it says nothing."""
 
     title: str
-    factors: tuple[Factor, ...]
+    factors: tuple[DesignFactor, ...]
     responses: tuple[str, ...]
     replicates: int | None = None
     centre: int | None = None
@@ -85,7 +82,7 @@ class FactorsFile(Record):
     first_seed: int | None = None
 
 
-def region_of(factors: tuple[Factor, ...]) -> Region:
+def region_of(factors: tuple[DesignFactor, ...]) -> Region:
     """The box low … high; factors go by their letters A, B, … there."""
     low, high = (np.array([getattr(factor, end) for factor in factors]) for end in ("low", "high"))
     return Region(factor_letters(len(factors)), (low + high) / 2, (high - low) / 2, ())
@@ -103,7 +100,7 @@ def read_factors(path: Path) -> FactorsFile:
         raise CommandError(f"{path}: {error}") from None
 
 
-def make_factor(name: str, low: float, high: float, unit: str, reference: float | None, where: str) -> Factor:
+def make_factor(name: str, low: float, high: float, unit: str, reference: float | None, where: str) -> DesignFactor:
     """A checked factor; raises StudyFileError."""
     checked_name(name, f"{where}.name")
     if unit and not UNIT.fullmatch(unit):
@@ -116,7 +113,7 @@ def make_factor(name: str, low: float, high: float, unit: str, reference: float 
     if not math.isfinite(high - low):
         raise StudyFileError(f"{where}: the range {low:g} … {high:g} of {name} is too wide to be a number")
     middle = low + (high - low) / 2 if reference is None else reference
-    return Factor(name, low, high, "" if unit == "1" else unit, middle)
+    return DesignFactor(name, low, high, "" if unit == "1" else unit, middle)
 
 
 def checked_name(name: str, where: str) -> str:
@@ -130,7 +127,7 @@ def checked_name(name: str, where: str) -> str:
     return name
 
 
-def no_repeats(factors: tuple[Factor, ...], responses: tuple[str, ...]) -> None:
+def no_repeats(factors: tuple[DesignFactor, ...], responses: tuple[str, ...]) -> None:
     """Refuse a name that two columns would have; raises StudyFileError."""
     columns = [*(factor.name for factor in factors), *responses]
     for name in columns:

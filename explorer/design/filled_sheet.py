@@ -1,9 +1,8 @@
-"""Reading a filled sheet: from this program, from a spreadsheet that saved it, or from any CSV with a factors file.
+"""A filled sheet: read from this program, a spreadsheet that saved it, or any CSV with a factors file; and its runs.
 
 Cells and numbers as `doe.table_file` reads them. A cell that cannot be read is named by its line in the file (the row
-of a spreadsheet) and its column.
-
-The runs of one response of a filled sheet: coded levels, replicates side by side, and what each run is called.
+of a spreadsheet) and its column. The runs of one response have coded levels, replicates side by side, and what each run
+is called.
 """
 
 from __future__ import annotations
@@ -19,14 +18,17 @@ import numpy.typing as npt
 
 from doe.errors import StudyFileError
 from doe.table_file import CellTable, read_table
-from explorer.design.factors_file import RESERVED, Factor, make_factor, no_repeats, region_of
+from explorer.design.factors_file import RESERVED, DesignFactor, make_factor, no_repeats, region_of
 from explorer.errors import CommandError
 
-MISSING = ("", "NA", "-", "–")
+Array = npt.NDArray[np.float64]
 
+EMPTY_CELLS = ("", "NA", "-", "–")
 MOST_BYTES = 10_000_000
-
 HEADER_CELL = re.compile(r"^(?P<name>.*?)\s*(?:\[(?P<unit>[^\]]*)\])?$")
+WORDS = re.compile(r"[^<>&\"'`\x00-\x1f]{0,60}")
+SNAP = 1e-6
+"""A coded level this near to low, middle or high is that level: what twelve digits and a spreadsheet leave."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,7 @@ class Sheet:
 
     path: Path
     design: str
-    factors: tuple[Factor, ...]
+    factors: tuple[DesignFactor, ...]
     columns: dict[str, int]
     units: dict[str, str]
     cells: tuple[tuple[str, ...], ...]
@@ -53,7 +55,7 @@ class Sheet:
     def number(self, position: int, column: str) -> float:
         """A cell as a number, NaN where it is empty; raises CommandError with line and column."""
         text = self.cells[position][self.columns[column]]
-        if text in MISSING:
+        if text in EMPTY_CELLS:
             return math.nan
         value = self.table.number(text)
         if math.isnan(value):
@@ -64,7 +66,7 @@ class Sheet:
         return value
 
 
-def read_sheet(path: Path, factors: Sequence[Factor] = ()) -> Sheet:
+def read_sheet(path: Path, factors: Sequence[DesignFactor] = ()) -> Sheet:
     """Read a sheet; ``factors`` take the place of those that its comments declare.
 
     Raises CommandError with one line: file, line, column, what is allowed.
@@ -100,7 +102,7 @@ def read_sheet(path: Path, factors: Sequence[Factor] = ()) -> Sheet:
     return Sheet(path, design, known, columns, units, tuple(cells), tuple(lines), table)
 
 
-def _declarations(path: Path, table: CellTable) -> tuple[str, tuple[Factor, ...]]:
+def _declarations(path: Path, table: CellTable) -> tuple[str, tuple[DesignFactor, ...]]:
     """The design and the factors that the comments declare."""
     design, factors = "", []
     for line, comment in table.comments:
@@ -116,7 +118,7 @@ def _declarations(path: Path, table: CellTable) -> tuple[str, tuple[Factor, ...]
     return design, tuple(factors)
 
 
-def _declared(path: Path, line: int, parts: list[str]) -> Factor:
+def _declared(path: Path, line: int, parts: list[str]) -> DesignFactor:
     where = f"{path}, line {line}"
     if len(parts) not in (3, 4, 5):
         raise CommandError(f"{where}: allowed is '# factor | name | low | high | unit | reference'")
@@ -146,21 +148,12 @@ def short(text: str) -> str:
     return repr(text if len(text) <= 40 else text[:37] + "…")
 
 
-Array = npt.NDArray[np.float64]
-
-WORDS = re.compile(r"[^<>&\"'`\x00-\x1f]{0,60}")
-
-SNAP = 1e-6
-
-"""A coded level this near to low, middle or high is that level: what twelve digits and a spreadsheet leave."""
-
-
 @dataclass(frozen=True)
 class Runs:
     """One response of a sheet. coded (rows, k); responses, labels (rows, replicates): NaN and "" where missing."""
 
     design: str
-    factors: tuple[Factor, ...]
+    factors: tuple[DesignFactor, ...]
     response: str
     unit: str
     coded: Array
@@ -211,7 +204,7 @@ def _check_words(sheet: Sheet, response: str) -> None:
             )
 
 
-def _kept(sheet: Sheet, only: Sequence[str]) -> tuple[Factor, ...]:
+def _kept(sheet: Sheet, only: Sequence[str]) -> tuple[DesignFactor, ...]:
     names = [factor.name for factor in sheet.factors]
     for name in only:
         if name not in names:
@@ -219,7 +212,7 @@ def _kept(sheet: Sheet, only: Sequence[str]) -> tuple[Factor, ...]:
     return tuple(factor for factor in sheet.factors if not only or factor.name in only)
 
 
-def _levels(sheet: Sheet, factors: Sequence[Factor], position: int, needed: bool) -> list[float]:
+def _levels(sheet: Sheet, factors: Sequence[DesignFactor], position: int, needed: bool) -> list[float]:
     """Levels of a run; an empty one is refused where the run has a response."""
     levels = [sheet.number(position, factor.name) for factor in factors]
     for factor, level in zip(factors, levels, strict=True):

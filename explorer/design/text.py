@@ -1,6 +1,6 @@
-"""What `explorer design` says about a design: its size, aliases, and what it will be able to see.
+"""What `explorer design` and `explorer analyse` print.
 
-An analysed design for the terminal: the answer, then the tables behind it.
+A design: its size, its aliases, and what it will be able to see. An analysis: the answer, then the tables behind it.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from doe.analysis.power import TermPrecision, precision
 from doe.designs import factor_letters
 from doe.record import plain
 from explorer.design.factors_file import FactorsFile, region_of
-from explorer.design.plan import Plan
 from explorer.design.result import DesignResult
+from explorer.design.run_plan import RunPlan
 from explorer.report.content import Facts, Table
 from explorer.report.design.effects import curvature, effect_table
 from explorer.report.design.model import diagnostics, fit_summary
@@ -27,7 +27,7 @@ from explorer.tables.text_table import text_table
 from explorer.units import enumeration, number
 
 
-def plan_result(plan: Plan, file: FactorsFile, sigma: float | None, effect: float | None) -> dict[str, Any]:
+def plan_result(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: float | None) -> dict[str, Any]:
     """A design as JSON types."""
     return {
         "design": plan.design.name,
@@ -48,7 +48,7 @@ def plan_result(plan: Plan, file: FactorsFile, sigma: float | None, effect: floa
     }
 
 
-def plan_text(plan: Plan, file: FactorsFile, sigma: float | None, effect: float | None) -> str:
+def plan_text(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: float | None) -> str:
     """A design in words and tables."""
     letters = factor_letters(len(file.factors))
     parts = [
@@ -69,26 +69,19 @@ def plan_text(plan: Plan, file: FactorsFile, sigma: float | None, effect: float 
     return "\n\n".join([*parts, *plan.points.notes, _power_text(plan, sigma, effect)])
 
 
-def planned_order(plan: Plan) -> Order | None:
-    """The model that the runs will bear; None where they leave no error even for the linear one."""
-    letters = factor_letters(plan.coded.shape[1])
-    values = np.zeros((len(plan.coded), plan.replicates))
-    if plan.design.main_effects_only or not bearable(plan.coded, values, letters, terms_of(letters, "linear")):
-        return "linear" if bearable(plan.coded, values, letters, terms_of(letters, "linear")) else None
-    return highest_order(plan.coded, values, letters)
+def _beyond(plan: RunPlan, file: FactorsFile) -> list[str]:
+    """A sentence about runs beyond low … high, which a laboratory may not be able to make."""
+    if np.abs(plan.coded).max() <= 1 + 1e-9:
+        return []
+    natural = region_of(file.factors).natural(plan.coded)
+    ends = [
+        f"{factor.name} {number(low, 6)} … {number(high, 6)}"
+        for factor, low, high in zip(file.factors, natural.min(axis=0), natural.max(axis=0), strict=True)
+    ]
+    return [f"The axial runs go beyond low … high: {enumeration(ends)}. --alpha inscribed keeps them within."]
 
 
-def _power(plan: Plan, sigma: float | None, effect: float | None) -> tuple[TermPrecision, ...]:
-    order = planned_order(plan)
-    if order is None:
-        return ()
-    letters = factor_letters(plan.coded.shape[1])
-    runs = plan.coded[plan.sequence[:, 0]]
-    # Without a sigma everything is counted in it.
-    return precision(runs, letters, terms_of(letters, order), sigma or 1.0, effect or math.nan)
-
-
-def _power_text(plan: Plan, sigma: float | None, effect: float | None) -> str:
+def _power_text(plan: RunPlan, sigma: float | None, effect: float | None) -> str:
     found = _power(plan, sigma, effect)
     if not found:
         return (
@@ -103,8 +96,8 @@ def _power_text(plan: Plan, sigma: float | None, effect: float | None) -> str:
                 one.kind
             ],
             str(one.terms),
-            *(_cell(value) for value in (one.standard_error, one.smallest, one.smallest_of_all)),
-            *([_cell(one.power)] if effect else []),
+            *(number(value) for value in (one.standard_error, one.smallest, one.smallest_of_all)),
+            *([number(one.power)] if effect else []),
         ]
         for one in found
     ]
@@ -115,20 +108,23 @@ def _power_text(plan: Plan, sigma: float | None, effect: float | None) -> str:
     )
 
 
-def _beyond(plan: Plan, file: FactorsFile) -> list[str]:
-    """A sentence about runs beyond low … high, which a laboratory may not be able to make."""
-    if np.abs(plan.coded).max() <= 1 + 1e-9:
-        return []
-    natural = region_of(file.factors).natural(plan.coded)
-    ends = [
-        f"{factor.name} {number(low, 6)} … {number(high, 6)}"
-        for factor, low, high in zip(file.factors, natural.min(axis=0), natural.max(axis=0), strict=True)
-    ]
-    return [f"The axial runs go beyond low … high: {enumeration(ends)}. --alpha inscribed keeps them within."]
+def planned_order(plan: RunPlan) -> Order | None:
+    """The model that the runs will bear; None where they leave no error even for the linear one."""
+    letters = factor_letters(plan.coded.shape[1])
+    values = np.zeros((len(plan.coded), plan.replicates))
+    if plan.design.main_effects_only or not bearable(plan.coded, values, letters, terms_of(letters, "linear")):
+        return "linear" if bearable(plan.coded, values, letters, terms_of(letters, "linear")) else None
+    return highest_order(plan.coded, values, letters)
 
 
-def _cell(value: float) -> str:
-    return number(value)
+def _power(plan: RunPlan, sigma: float | None, effect: float | None) -> tuple[TermPrecision, ...]:
+    order = planned_order(plan)
+    if order is None:
+        return ()
+    letters = factor_letters(plan.coded.shape[1])
+    runs = plan.coded[plan.sequence[:, 0]]
+    # Without a sigma everything is counted in it.
+    return precision(runs, letters, terms_of(letters, order), sigma or 1.0, effect or math.nan)
 
 
 def analysis_text(result: DesignResult) -> str:

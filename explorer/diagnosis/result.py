@@ -148,7 +148,7 @@ class DataRead(Record):
 
 
 @dataclass(frozen=True)
-class Order(Record):
+class DiagnosisOrder(Record):
     """What was asked for; no effects: all of them."""
 
     out: str
@@ -228,7 +228,7 @@ class DiagnosisResult(Document):
     piles: tuple[PileProfiles, ...]
     maps: tuple[ResidualMap, ...]
     data: DataRead
-    order: Order
+    order: DiagnosisOrder
     units: dict[str, str]
     pours: PourCounts
     timing: Duration

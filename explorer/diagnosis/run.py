@@ -31,13 +31,13 @@ from explorer.diagnosis.next_folder import read_next, write_next
 from explorer.diagnosis.result import (
     BeforeAndAfter,
     DataRead,
+    DiagnosisOrder,
     DiagnosisResult,
     Duration,
     ErrorRow,
     Errors,
     MeanAndDeviation,
     MeasuredCondition,
-    Order,
     PileProfiles,
     PourCounts,
     PouredCondition,
@@ -174,7 +174,7 @@ def result_of(measurement: Measurement, order: DiagnoseOrder, found: Diagnosis, 
         piles=tuple(picture for c in range(len(found.conditions)) for picture in _piles(found, c)),
         maps=found.maps,
         data=DataRead(str(order.folder), measurement.title, measurement.ignored, measurement.notes),
-        order=Order(
+        order=DiagnosisOrder(
             str(order.out),
             order.effects,
             order.budget,

@@ -1,9 +1,7 @@
 """Files for other programs: a file per target, and what they share.
 
 target.py       the protocol of a target
-deck.py         what a deck says, whatever the engine, and the file that holds it
-deck_of_scene.py  deck_of(record): the deck that repeats a pour of ours, and the protocol of an engine that takes one
-triangles.py    cone and gate as triangles, STL
+deck.py         the deck that repeats a pour of ours, whatever the engine: what it says, its file, walls as STL
 liggghts.py     LIGGGHTS-PUBLIC 3.8 (in.liggghts)
 yade.py         YADE 2023 (yade_pour.py, copied into the folder, reads deck.json)
 bed.py          a bed of equal spheres for both, for timing

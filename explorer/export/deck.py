@@ -1,10 +1,7 @@
-"""A deck: everything that another engine needs to repeat a pour, in SI and in no engine's terms.
+"""A deck: everything that another engine needs to repeat a pour of ours, in SI and in no engine's terms.
 
-``deck.json`` holds it in every exported folder; LIGGGHTS's input is written from it, YADE's script reads it.
-
-Walls as triangles, and STL.
-
-From a pour of ours to the deck that repeats it: materials, bodies, walls, and what no deck can hold.
+Materials, bodies, and walls as triangles; a scene with what no deck can hold is refused. ``deck.json`` holds it in
+every exported folder; LIGGGHTS's input and its STL files are written from it, YADE's script reads it.
 """
 
 from __future__ import annotations
@@ -32,10 +29,18 @@ from solver.scenes.scene import actual, pour_rig
 Array = npt.NDArray[np.float64]
 
 FILE = "deck.json"
+SIDES = 96
+"""Corners of a circle of a revolved wall."""
+BANDS = 3
+"""Rings of triangles along the line that is turned: more of them are less slender."""
+HOLDS = (RollingResistance.name,)
+"""Effects of contacts that a deck can say; an engine may have the law of fewer."""
+LAWS = (HertzMindlin.name, LinearSpringDashpot.name)
+"""Contact laws that a deck can say; an engine may have fewer."""
 
 
 @dataclass(frozen=True)
-class Clump:
+class DeckClump:
     """One component: member spheres in the principal frame about the centre of mass, mass, inertia and material."""
 
     name: str
@@ -54,7 +59,7 @@ class Clump:
 
 
 @dataclass(frozen=True)
-class Mesh:
+class DeckMesh:
     """A thin wall of triangles, which pushes from either side."""
 
     name: str
@@ -75,7 +80,7 @@ class Deck:
     steps: int
     gravity: tuple[float, float, float]
     """[m/s²]."""
-    clumps: tuple[Clump, ...]
+    clumps: tuple[DeckClump, ...]
     wall_youngs_modulus: float
     wall_poisson_ratio: float
     friction: Array
@@ -94,7 +99,7 @@ class Deck:
     entries: Entries
     plate: float | None
     """Height of the infinite plate [m]; None: there is none."""
-    meshes: tuple[Mesh, ...]
+    meshes: tuple[DeckMesh, ...]
     box: Array
     """Corners (low, high) of the room in which bodies are expected [m], shape (2, 3)."""
 
@@ -106,98 +111,6 @@ class Deck:
     def members(self, body: int) -> Array:
         """Centres of the member spheres of a body in its principal frame [m], shape (m, 3)."""
         return self.clumps[int(self.entries.component[body])].centres
-
-
-def write_deck(folder: Path, deck: Deck) -> None:
-    """Write ``deck.json`` into ``folder``."""
-    text = json.dumps(dataclasses.asdict(deck), indent=1, default=lambda array: array.tolist(), allow_nan=False)
-    (folder / FILE).write_text(text + "\n", encoding="utf-8")
-
-
-def read_deck(folder: Path) -> Deck:
-    """The deck in ``folder``; OSError where there is none."""
-    table: dict[str, Any] = json.loads((folder / FILE).read_text(encoding="utf-8"))
-    table["clumps"] = tuple(Clump(**_arrays(entry, "centres", "radii", "inertia")) for entry in table["clumps"])
-    table["meshes"] = tuple(Mesh(**_arrays(entry, "triangles")) for entry in table["meshes"])
-    entries = table["entries"]
-    whole = {key: np.array(entries[key], dtype=np.int32) for key in ("step", "component")}
-    table["entries"] = Entries(**(_arrays(entries, "time", "position", "quaternion", "velocity") | whole))
-    table["gravity"] = tuple(table["gravity"])
-    return Deck(**_arrays(table, "friction", "restitution", "box"))
-
-
-def _arrays(table: dict[str, Any], *keys: str) -> dict[str, Any]:
-    return table | {key: np.array(table[key], dtype=float) for key in keys}
-
-
-SIDES = 96
-
-"""Corners of a circle."""
-
-BANDS = 3
-
-"""Rings of triangles along the line that is turned: more of them are less slender."""
-
-
-def revolved_triangles(surface: Revolved) -> Array:
-    """Corners (t, 3, 3) [m] of a polygonal cone, or of one triangle around a disc.
-
-    The polygons have the area of the circles that they stand for: flats are 1.8e-4 radii inside, corners 3.6e-4
-    outside. A disc (a gate) becomes the triangle that holds it: every edge inside a flat surface is one more place
-    at which engines may push twice.
-    """
-    if surface.z0 == surface.z1 and min(surface.r0, surface.r1) == 0.0:
-        return _around(max(surface.r0, surface.r1), surface.z0)
-    angle = np.linspace(0.0, 2.0 * np.pi, SIDES, endpoint=False)
-    circle = math.sqrt(2.0 * np.pi / SIDES / math.sin(2.0 * np.pi / SIDES))
-    corners = circle * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    share = np.linspace(0.0, 1.0, BANDS + 1)
-    radii, heights = surface.r0 + share * (surface.r1 - surface.r0), surface.z0 + share * (surface.z1 - surface.z0)
-    rings = np.stack([np.column_stack([r * corners, np.full(SIDES, z)]) for r, z in zip(radii, heights, strict=True)])
-    low, high = rings[:-1], rings[1:]
-    low_next, high_next = np.roll(low, -1, axis=1), np.roll(high, -1, axis=1)
-    quads = [np.stack([low, low_next, high_next], axis=2), np.stack([low, high_next, high], axis=2)]
-    return np.concatenate([quad.reshape(-1, 3, 3) for quad in quads])
-
-
-def mesh_triangles(surface: TriangleMesh) -> Array:
-    """Corners (t, 3, 3) [m] of a mesh where it stands."""
-    turn = rotation_matrix(np.array(surface.pose.quaternion))
-    corners = np.array(surface.vertices) @ turn.T + np.array(surface.pose.origin)
-    return np.asarray(corners[np.array(surface.faces)])
-
-
-def write_stl(path: Path, name: str, triangles: Array) -> None:
-    """Write triangles (t, 3, 3) [m] as an STL file in text form."""
-    lines = [f"solid {name}"]
-    for corners in triangles:
-        normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
-        normal = normal / np.linalg.norm(normal)
-        lines += [f"facet normal {_row(normal)}", "  outer loop"]
-        lines += [f"    vertex {_row(corner)}" for corner in corners]
-        lines += ["  endloop", "endfacet"]
-    lines.append(f"endsolid {name}")
-    path.write_text("\n".join(lines) + "\n", encoding="ascii")
-
-
-def _around(radius: float, height: float) -> Array:
-    """The equilateral triangle whose inscribed circle has ``radius``."""
-    angle = np.radians([90.0, 210.0, 330.0])
-    corners = 2.0 * radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    return np.column_stack([corners, np.full(3, height)])[None]
-
-
-def _row(values: Array) -> str:
-    return " ".join(f"{value:.12g}" for value in values)
-
-
-HOLDS = (RollingResistance.name,)
-
-"""Effects of contacts that a deck can say; an engine may have the law of fewer."""
-
-LAWS = (HertzMindlin.name, LinearSpringDashpot.name)
-
-"""Contact laws that a deck can say; an engine may have fewer."""
 
 
 class DeckTarget(ExportTarget):
@@ -297,7 +210,7 @@ def assembled(
     steps: int,
     entries: Entries,
     plate: float | None = None,
-    meshes: tuple[Mesh, ...] = (),
+    meshes: tuple[DeckMesh, ...] = (),
 ) -> Deck:
     """A deck with the materials and bodies of ``scene`` that enter as ``entries`` say, and whatever walls are given."""
     friction, restitution = _pair_tables(scene)
@@ -325,12 +238,12 @@ def assembled(
     )
 
 
-def _clumps(scene: Scene) -> tuple[Clump, ...]:
+def _clumps(scene: Scene) -> tuple[DeckClump, ...]:
     clumps = []
     for body in scene.bodies:
         clump, material = body.clump, scene.material(body.material)
         clumps.append(
-            Clump(
+            DeckClump(
                 name=body.name,
                 centres=np.array(clump.centres),
                 radii=np.array(clump.radii),
@@ -367,7 +280,7 @@ def _plate(rig: Rig) -> float:
     return next(surface.pose.origin[2] for surface in rig.surfaces() if isinstance(surface, Plane))
 
 
-def _meshes(scene: Scene, record: Record) -> tuple[Mesh, ...]:
+def _meshes(scene: Scene, record: Record) -> tuple[DeckMesh, ...]:
     gated = scene.insertion.protocol == "fill_then_open"
     opening = round(record.gate_opened / record.dt) if record.gate_opened > 0.0 else -1
     meshes = []
@@ -375,7 +288,7 @@ def _meshes(scene: Scene, record: Record) -> tuple[Mesh, ...]:
         if isinstance(surface, Plane) or (name == "gate" and not gated):
             continue
         triangles = revolved_triangles(surface) if isinstance(surface, Revolved) else mesh_triangles(surface)
-        meshes.append(Mesh(name, triangles, opening if name == "gate" else -1))
+        meshes.append(DeckMesh(name, triangles, opening if name == "gate" else -1))
     return tuple(meshes)
 
 
@@ -383,3 +296,77 @@ def _box(scene: Scene) -> Array:
     half, longest = scene.rig.domain_half_width, max(max(body.extents) for body in scene.bodies)
     top = pour_rig(scene).feed().floor + scene.insertion.region_height + longest
     return np.array([[-half, -half, -0.01], [half, half, top]])
+
+
+def revolved_triangles(surface: Revolved) -> Array:
+    """Corners (t, 3, 3) [m] of a polygonal cone, or of one triangle around a disc.
+
+    The polygons have the area of the circles that they stand for: flats are 1.8e-4 radii inside, corners 3.6e-4
+    outside. A disc (a gate) becomes the triangle that holds it: every edge inside a flat surface is one more place
+    at which engines may push twice.
+    """
+    if surface.z0 == surface.z1 and min(surface.r0, surface.r1) == 0.0:
+        return _around(max(surface.r0, surface.r1), surface.z0)
+    angle = np.linspace(0.0, 2.0 * np.pi, SIDES, endpoint=False)
+    circle = math.sqrt(2.0 * np.pi / SIDES / math.sin(2.0 * np.pi / SIDES))
+    corners = circle * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    share = np.linspace(0.0, 1.0, BANDS + 1)
+    radii, heights = surface.r0 + share * (surface.r1 - surface.r0), surface.z0 + share * (surface.z1 - surface.z0)
+    rings = np.stack([np.column_stack([r * corners, np.full(SIDES, z)]) for r, z in zip(radii, heights, strict=True)])
+    low, high = rings[:-1], rings[1:]
+    low_next, high_next = np.roll(low, -1, axis=1), np.roll(high, -1, axis=1)
+    quads = [np.stack([low, low_next, high_next], axis=2), np.stack([low, high_next, high], axis=2)]
+    return np.concatenate([quad.reshape(-1, 3, 3) for quad in quads])
+
+
+def _around(radius: float, height: float) -> Array:
+    """The equilateral triangle whose inscribed circle has ``radius``."""
+    angle = np.radians([90.0, 210.0, 330.0])
+    corners = 2.0 * radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return np.column_stack([corners, np.full(3, height)])[None]
+
+
+def mesh_triangles(surface: TriangleMesh) -> Array:
+    """Corners (t, 3, 3) [m] of a mesh where it stands."""
+    turn = rotation_matrix(np.array(surface.pose.quaternion))
+    corners = np.array(surface.vertices) @ turn.T + np.array(surface.pose.origin)
+    return np.asarray(corners[np.array(surface.faces)])
+
+
+def write_deck(folder: Path, deck: Deck) -> None:
+    """Write ``deck.json`` into ``folder``."""
+    text = json.dumps(dataclasses.asdict(deck), indent=1, default=lambda array: array.tolist(), allow_nan=False)
+    (folder / FILE).write_text(text + "\n", encoding="utf-8")
+
+
+def read_deck(folder: Path) -> Deck:
+    """The deck in ``folder``; OSError where there is none."""
+    table: dict[str, Any] = json.loads((folder / FILE).read_text(encoding="utf-8"))
+    table["clumps"] = tuple(DeckClump(**_arrays(entry, "centres", "radii", "inertia")) for entry in table["clumps"])
+    table["meshes"] = tuple(DeckMesh(**_arrays(entry, "triangles")) for entry in table["meshes"])
+    entries = table["entries"]
+    whole = {key: np.array(entries[key], dtype=np.int32) for key in ("step", "component")}
+    table["entries"] = Entries(**(_arrays(entries, "time", "position", "quaternion", "velocity") | whole))
+    table["gravity"] = tuple(table["gravity"])
+    return Deck(**_arrays(table, "friction", "restitution", "box"))
+
+
+def _arrays(table: dict[str, Any], *keys: str) -> dict[str, Any]:
+    return table | {key: np.array(table[key], dtype=float) for key in keys}
+
+
+def write_stl(path: Path, name: str, triangles: Array) -> None:
+    """Write triangles (t, 3, 3) [m] as an STL file in text form."""
+    lines = [f"solid {name}"]
+    for corners in triangles:
+        normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+        normal = normal / np.linalg.norm(normal)
+        lines += [f"facet normal {_row(normal)}", "  outer loop"]
+        lines += [f"    vertex {_row(corner)}" for corner in corners]
+        lines += ["  endloop", "endfacet"]
+    lines.append(f"endsolid {name}")
+    path.write_text("\n".join(lines) + "\n", encoding="ascii")
+
+
+def _row(values: Array) -> str:
+    return " ".join(f"{value:.12g}" for value in values)

@@ -23,7 +23,7 @@ HEADER = 9
 
 
 @dataclass(frozen=True)
-class Frame:
+class SphereFrame:
     """All spheres of one moment (n of them), in order of their number."""
 
     step: int
@@ -40,7 +40,7 @@ class Frame:
 
 
 @dataclass(frozen=True)
-class Motion:
+class BodyFrame:
     """Bodies of one moment (n of them), in order of entry."""
 
     position: Array
@@ -53,7 +53,7 @@ class Motion:
     """In the world's frame [rad/s], shape (n, 3)."""
 
 
-def read_frames(path: Path) -> Iterator[Frame]:
+def read_frames(path: Path) -> Iterator[SphereFrame]:
     """Frames of a dump, in the order of the file."""
     lines = path.read_text(encoding="ascii").splitlines()
     start = 0
@@ -62,16 +62,16 @@ def read_frames(path: Path) -> Iterator[Frame]:
         rows = lines[start + HEADER : start + HEADER + count]
         table = np.array([row.split() for row in rows], dtype=float).reshape(count, 11)
         table = table[np.argsort(table[:, 0], kind="stable")]
-        yield Frame(step, table[:, 0].astype(np.int64), table[:, 1], table[:, 2:5], table[:, 5:8], table[:, 8:11])
+        yield SphereFrame(step, table[:, 0].astype(np.int64), table[:, 1], table[:, 2:5], table[:, 5:8], table[:, 8:11])
         start += HEADER + count
 
 
-def final_frame(folder: Path) -> Frame:
+def final_frame(folder: Path) -> SphereFrame:
     """The last moment of a run in ``folder``; OSError if it wrote none."""
     return next(read_frames(folder / FINAL))
 
 
-def motion(deck: Deck, frame: Frame) -> Motion:
+def motion(deck: Deck, frame: SphereFrame) -> BodyFrame:
     """Bodies behind the spheres of ``frame``: those that have entered by then, as far as their spheres go."""
     places, turns, velocities, spins, first = [], [], [], [], 0
     for body in range(deck.bodies):
@@ -88,7 +88,7 @@ def motion(deck: Deck, frame: Frame) -> Motion:
         velocities.append((frame.velocity[chosen] - np.cross(spin, arms)).mean(axis=0))
         first += len(local)
     rows = [np.array(values).reshape(len(places), -1) for values in (places, turns, velocities, spins)]
-    return Motion(rows[0], rows[1].reshape(-1, 3, 3), rows[2], rows[3])
+    return BodyFrame(rows[0], rows[1].reshape(-1, 3, 3), rows[2], rows[3])
 
 
 def rigid_fit(local: Array, world: Array) -> tuple[Array, Array]:

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from explorer.errors import CommandError
-from explorer.export.frames import Frame
+from explorer.export.frames import SphereFrame
 from explorer.export.liggghts import (
     INPUT,
     WRITE_FINAL,
@@ -188,8 +188,8 @@ def _spin(impacts: Sequence[Impact]) -> Array:
     return np.array([(0.0, -i.surface_speed / i.radius, 0.0) for i in impacts])
 
 
-def _part(frame: Frame, rows: slice) -> Frame:
-    return Frame(
+def _part(frame: SphereFrame, rows: slice) -> SphereFrame:
+    return SphereFrame(
         frame.step, frame.id[rows], frame.radius[rows], frame.position[rows], frame.velocity[rows], frame.spin[rows]
     )
 

@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 
 from explorer.errors import CommandError
-from explorer.export.deck import Clump, Deck, DeckTarget, write_deck, write_stl
+from explorer.export.deck import Deck, DeckClump, DeckTarget, write_deck, write_stl
 from explorer.export.frames import FINAL, TRAJECTORY
 from explorer.export.readme import write_readme
 from solver.effects.rolling_resistance import RollingResistance
@@ -281,7 +281,7 @@ def _confirmations(moduli: list[float]) -> list[str]:
     return soft + ([f"hard_particles yes  # a modulus above {HARD:g} Pa"] if max(moduli) > HARD else [])
 
 
-def _template_lines(k: int, clump: Clump) -> list[str]:
+def _template_lines(k: int, clump: DeckClump) -> list[str]:
     x, y, z = map(float, clump.inertia)
     return [
         f"fix clump{k} all particletemplate/multisphere {SEEDS[0]} atom_type {k} volume_limit 1e-30 "

@@ -57,7 +57,7 @@ surfaces   {surfaces}
 
 
 @dataclass(frozen=True)
-class Moment:
+class PourState:
     """Bodies, their member spheres and contacts at one time, and where the rig's surfaces are then."""
 
     time: float
@@ -71,7 +71,7 @@ class Moment:
     """Whether the rig is still being filled."""
 
 
-def moments(scene: Scene, seed: int, every: float | None) -> tuple[tuple[Moment, ...], Record]:
+def moments(scene: Scene, seed: int, every: float | None) -> tuple[tuple[PourState, ...], Record]:
     """Run a pour to its end: a moment each ``every`` s (to the next sample of its curves), and the last one.
 
     Only the last one for None. Raises CommandError for more than ``MOST`` moments.
@@ -83,8 +83,8 @@ def moments(scene: Scene, seed: int, every: float | None) -> tuple[tuple[Moment,
     # Imported here: it loads Taichi, and a target can be named without.
     from solver import Job, run_queue
 
-    found: list[Moment] = []
-    last: list[Moment] = []
+    found: list[PourState] = []
+    last: list[PourState] = []
 
     def look(_: Job, pour: Pour) -> None:
         due = every is not None and pour.time >= len(found) * every - 1e-9
@@ -97,10 +97,10 @@ def moments(scene: Scene, seed: int, every: float | None) -> tuple[tuple[Moment,
     return (*found, *last), record
 
 
-def _moment(pour: Pour) -> Moment:
+def _moment(pour: Pour) -> PourState:
     bodies = pour.bodies()
     spheres = member_spheres(pour.scene, bodies)
-    return Moment(pour.time, bodies, spheres, pour.contacts(), pour.surface_poses().copy(), pour.gate_shut)
+    return PourState(pour.time, bodies, spheres, pour.contacts(), pour.surface_poses().copy(), pour.gate_shut)
 
 
 class Paraview(ExportTarget):
@@ -124,7 +124,7 @@ class Paraview(ExportTarget):
 PARAVIEW = Paraview()
 
 
-def write_paraview(folder: Path, scene: Scene, seen: tuple[Moment, ...], seed: int, outcome: str) -> None:
+def write_paraview(folder: Path, scene: Scene, seen: tuple[PourState, ...], seed: int, outcome: str) -> None:
     """Write the files of all moments, collections of them if there are several, and a README into a folder."""
     names: dict[str, list[tuple[float, str]]] = {}
     for k, moment in enumerate(seen):
@@ -159,7 +159,7 @@ def collection(files: list[tuple[float, str]]) -> str:
     return '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
 
 
-def body_grid(scene: Scene, moment: Moment) -> Grid:
+def body_grid(scene: Scene, moment: PourState) -> Grid:
     """A point per body in the domain."""
     bodies = moment.bodies
     inside = np.flatnonzero(bodies.inside)
@@ -176,7 +176,7 @@ def body_grid(scene: Scene, moment: Moment) -> Grid:
     return bodies.position[inside], "vertex", _vertices(len(inside)), numbers, {}
 
 
-def shape_grid(scene: Scene, moment: Moment) -> Grid:
+def shape_grid(scene: Scene, moment: PourState) -> Grid:
     """Triangles of the true shapes of all bodies in the domain, where they are."""
     shapes = [body_triangles(body) for body in scene.bodies]
     bodies = moment.bodies
@@ -189,7 +189,7 @@ def shape_grid(scene: Scene, moment: Moment) -> Grid:
     return points, "triangle", faces, {}, {"body": owners, "component": bodies.component[owners]}
 
 
-def sphere_grid(scene: Scene, moment: Moment) -> Grid:
+def sphere_grid(scene: Scene, moment: PourState) -> Grid:
     """A point per member sphere."""
     spheres = moment.spheres
     owner = moment.bodies.component[spheres.body]
@@ -197,7 +197,7 @@ def sphere_grid(scene: Scene, moment: Moment) -> Grid:
     return spheres.centre, "vertex", _vertices(len(spheres.radius)), numbers, {}
 
 
-def contact_grid(scene: Scene, moment: Moment) -> Grid:
+def contact_grid(scene: Scene, moment: PourState) -> Grid:
     """A point per contact."""
     contacts = moment.contacts
     numbers: Numbers = {
@@ -211,7 +211,7 @@ def contact_grid(scene: Scene, moment: Moment) -> Grid:
     return contacts.point, "vertex", _vertices(len(contacts.body)), numbers, {}
 
 
-def rig_grid(scene: Scene, moment: Moment) -> Grid:
+def rig_grid(scene: Scene, moment: PourState) -> Grid:
     """Triangles of the rig's surfaces where they stand, without an open gate; infinite planes end beside the rest."""
     rig: Rig = scene.rig
     surfaces, parts = rig_triangles(rig), []
@@ -224,7 +224,7 @@ def rig_grid(scene: Scene, moment: Moment) -> Grid:
     return points, "triangle", faces, {}, {"surface": owners}
 
 
-KINDS: dict[str, Callable[[Scene, Moment], Grid]] = {
+KINDS: dict[str, Callable[[Scene, PourState], Grid]] = {
     "bodies": body_grid,
     "shapes": shape_grid,
     "spheres": sphere_grid,

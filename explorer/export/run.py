@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from explorer.errors import CommandError
-from explorer.export.frames import FINAL, Frame, final_frame
+from explorer.export.frames import FINAL, SphereFrame, final_frame
 from explorer.export.liggghts import INPUT
 
 LOOP = re.compile(r"Loop time of ([\d.eE+-]+) (?:s |on \d+ procs )?for (\d+) steps")
@@ -33,7 +33,7 @@ class PeerRun:
     """Of the stepping loop, as the engine reports it [s]."""
     setup_s: float
     """The rest: start, reading, setting up, writing [s]."""
-    final: Frame
+    final: SphereFrame
 
 
 def run_liggghts(folder: Path, dump_every: int = 0, limit: float | None = None) -> PeerRun:

@@ -1,6 +1,6 @@
-"""What was measured as curves in the picture of a pile: silhouettes of scans, height profiles, free surfaces.
+"""What was measured as curves in the picture of a pile: those of a data set, or of one file that a browser sent.
 
-One measured file as a curve in the picture of a pile: a scan (.npz), the points of an outline (.csv), a photograph.
+A data set gives silhouettes of scans, height profiles and free surfaces. One file gives one curve:
 
 .npz   xyz (n, 3) [m], radius (n,) [m]: spheres of the bodies on the plate, as in a measured data set
 .csv   a line u_m,z_m, then one point per line: to the right and above the plate [m]; # starts a comment;
@@ -35,6 +35,13 @@ from solver.rigs.rotating_drum import RotatingDrum
 Array = npt.NDArray[np.float64]
 
 NO_FLANKS: Flanks = (None, None)
+PICTURES = (".jpg", ".jpeg", ".png")
+SUFFIXES = (".npz", ".csv", *PICTURES)
+MOST_BYTES = 50_000_000
+MOST_SPHERES, MOST_POINTS = 1_000_000, 100_000
+FARTHEST = 2.0
+"""No coordinate of a pile is further from the axis than this [m]: the image of a silhouette has pixels of 0.25 mm."""
+COLUMNS = ["u_m", "z_m"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,21 +97,6 @@ def _observed(condition: Condition) -> Iterator[MeasuredCurve]:
             yield MeasuredCurve(f"{condition.name}: free surface", place, height + condition.scene.rig.radius)
 
 
-PICTURES = (".jpg", ".jpeg", ".png")
-
-SUFFIXES = (".npz", ".csv", *PICTURES)
-
-MOST_BYTES = 50_000_000
-
-MOST_SPHERES, MOST_POINTS = 1_000_000, 100_000
-
-FARTHEST = 2.0
-
-"""No coordinate of a pile is further from the axis than this [m]: the image of a silhouette has pixels of 0.25 mm."""
-
-COLUMNS = ["u_m", "z_m"]
-
-
 def measured_file(name: str, content: bytes, pixel: float | None = None) -> MeasuredCurve:
     """The curve in the file ``content`` that is called ``name``; CommandError in one line for a bad file.
 
@@ -120,22 +112,6 @@ def measured_file(name: str, content: bytes, pixel: float | None = None) -> Meas
         return read(name[:80], content)
     except CommandError as error:
         raise CommandError(f"{name[:80]}: {error}") from None
-
-
-def _photograph(name: str, content: bytes, pixel: float | None) -> MeasuredCurve:
-    if pixel is None:
-        raise CommandError("a photograph needs its scale: give the millimetres per pixel, then upload it again")
-    with NamedTemporaryFile(suffix=Path(name).suffix) as file:
-        file.write(content)
-        file.flush()
-        try:
-            seen = read_photograph(open_picture(Path(file.name)), pixel)
-        except PhotographError as error:
-            raise CommandError(str(error).replace(f"{file.name}: ", "")) from None
-    if isinstance(seen, Refusal):
-        raise CommandError(f"{seen.reason}: {seen.detail}")
-    angle = seen.angles.mean.value_deg
-    return MeasuredCurve(f"{name}: {angle:.1f}°", seen.outline.u, seen.outline.top, seen.outline.flanks)
 
 
 def _scan(name: str, content: bytes) -> MeasuredCurve:
@@ -193,6 +169,22 @@ def _point(table: CellTable, line: int, cells: list[str]) -> list[float]:
         if np.isnan(value):
             raise CommandError(f"line {line}, column {column}: {cell[:40]!r}; allowed: a finite number in m")
     return point
+
+
+def _photograph(name: str, content: bytes, pixel: float | None) -> MeasuredCurve:
+    if pixel is None:
+        raise CommandError("a photograph needs its scale: give the millimetres per pixel, then upload it again")
+    with NamedTemporaryFile(suffix=Path(name).suffix) as file:
+        file.write(content)
+        file.flush()
+        try:
+            seen = read_photograph(open_picture(Path(file.name)), pixel)
+        except PhotographError as error:
+            raise CommandError(str(error).replace(f"{file.name}: ", "")) from None
+    if isinstance(seen, Refusal):
+        raise CommandError(f"{seen.reason}: {seen.detail}")
+    angle = seen.angles.mean.value_deg
+    return MeasuredCurve(f"{name}: {angle:.1f}°", seen.outline.u, seen.outline.top, seen.outline.flanks)
 
 
 def _check_places(numbers: Array, what: str) -> None:

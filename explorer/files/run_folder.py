@@ -1,11 +1,11 @@
-"""The folder that a simulation leaves behind. It appears at once and complete, or not at all.
+"""What a simulation leaves behind: a folder that is there complete or not at all, and a checkpoint to go on from.
 
 result.json            as in `explorer.files.run_result`
 parameters.toml        every parameter, SI
 trace_<seed>.csv       curves over time
 pile_<seed>.npz        xyz (n, 3) [m], radius (n,) [m], body (n,): the spheres on the plate
 
-Keeps a pour's newest checkpoint in a file, so that a run that is cut off can be gone on with.
+The checkpoint is a file of its own: a pour's newest state, so that a run that is cut off can be gone on with.
 """
 
 from __future__ import annotations
@@ -42,7 +42,6 @@ TRACE_COLUMNS = {
     "taken_out_energy_J": "taken_out_energy",
     "supplied_energy_J": "supplied_energy",
 }
-
 """Columns of a trace file → curves of ``solver.Trace``; ``max_overlap`` is in radii of the sphere."""
 
 
@@ -76,6 +75,12 @@ def appearing(folder: Path, option: str = "--out") -> Iterator[Path]:
         shutil.rmtree(temporary, ignore_errors=True)
 
 
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
 def write_run(folder: Path, result: dict[str, Any], records: Sequence[Record]) -> None:
     """Write the files of a simulation into an existing ``folder``."""
     (folder / "result.json").write_text(json_text(result) + "\n", encoding="utf-8")
@@ -86,6 +91,14 @@ def write_run(folder: Path, result: dict[str, Any], records: Sequence[Record]) -
         np.savez_compressed(
             folder / f"pile_{record.seed}.npz", xyz=spheres.centre, radius=spheres.radius, body=spheres.body
         )
+
+
+def _write_trace(path: Path, record: Record) -> None:
+    columns = [getattr(record.trace, curve).tolist() for curve in TRACE_COLUMNS.values()]
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(TRACE_COLUMNS)
+        writer.writerows(zip(*columns, strict=True))
 
 
 def json_text(result: dict[str, Any]) -> str:
@@ -100,20 +113,6 @@ def parameters_text(values: dict[str, dict[str, Any]]) -> str:
         unit = "" if entry["unit"] == "1" else f"   # [{entry['unit']}]"
         lines.append(f"{json.dumps(path)} = {json.dumps(entry['value'])}{unit}")
     return "\n".join(lines) + "\n"
-
-
-def _write_trace(path: Path, record: Record) -> None:
-    columns = [getattr(record.trace, curve).tolist() for curve in TRACE_COLUMNS.values()]
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(TRACE_COLUMNS)
-        writer.writerows(zip(*columns, strict=True))
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 class CheckpointWriter:

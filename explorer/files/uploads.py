@@ -1,10 +1,8 @@
 """Files that a browser sent: checked, kept in a folder under a name of our own, or refused in one line.
 
-A name from a browser is only ever a label; where a file is put is decided here, by its contents.
-
-Meshes that a browser sent, as the shape of a body or as the funnel: tried, and kept with a material of the scene.
-
-What cannot be poured is refused in one line before the present pour is given up, with nothing left behind.
+A name from a browser is only ever a label; where a file is put is decided here, by its contents. A mesh is tried as the
+shape of a body or as the funnel and kept with a material of that scene: what cannot be poured is refused before the
+present pour is given up, with nothing left behind.
 """
 
 from __future__ import annotations
@@ -34,14 +32,14 @@ from solver.shapes.mesh_file import SUFFIXES
 from solver.shapes.solid import Solid, surface_mesh
 
 MOST_FILE_BYTES = 30_000_000
-
 MOST_ZIP_BYTES, MOST_UNPACKED_BYTES, MOST_MEMBERS = 50_000_000, 200_000_000, 1000
-
 LABEL = re.compile(r"[^A-Za-z0-9_-]+")
-
 PART = re.compile(r"[A-Za-z0-9_. -]+")
-
 """What a part of a path in an archive may consist of."""
+KEPT_IN_FUNNEL = ("mass", "outlet_height", "domain_half_width")
+"""Parameters of the rig of before that the funnel has as well."""
+FEED_SHARE = 0.8
+"""Radius of the feed over that of a mesh funnel's opening, where the usual feed would be wider."""
 
 
 def kept_file(name: str, content: bytes, folder: Path, suffixes: Sequence[str]) -> Path:
@@ -57,6 +55,11 @@ def unpacked_measurement(name: str, content: bytes, folder: Path) -> Path:
     Raises CommandError in one line, with nothing left behind.
     """
     return unpacked_folder(name, content, folder, MEASUREMENT_FILE, load_measurement)
+
+
+def kept_measurements(folder: Path) -> dict[str, Path]:
+    """Name → folder of every data set that :func:`unpacked_measurement` has kept in ``folder``."""
+    return {file.parent.name: file.parent for file in sorted(folder.glob(f"[!.]*/{MEASUREMENT_FILE}"))}
 
 
 def unpacked_folder(name: str, content: bytes, folder: Path, marker: str, read: Callable[[Path], object]) -> Path:
@@ -79,16 +82,6 @@ def unpacked_folder(name: str, content: bytes, folder: Path, marker: str, read: 
     finally:
         shutil.rmtree(apart, ignore_errors=True)
     return kept
-
-
-def kept_measurements(folder: Path) -> dict[str, Path]:
-    """Name → folder of every data set that :func:`unpacked_measurement` has kept in ``folder``."""
-    return {file.parent.name: file.parent for file in sorted(folder.glob(f"[!.]*/{MEASUREMENT_FILE}"))}
-
-
-def label(text: str) -> str:
-    """``text`` from outside as a part of a file's name."""
-    return LABEL.sub("_", text)[:40].strip("_") or "unnamed"
 
 
 def _unpack(content: bytes, folder: Path, marker: str) -> None:
@@ -132,40 +125,6 @@ def _top(members: list[zipfile.ZipInfo], marker: str) -> PurePosixPath:
     return found[0].parent
 
 
-def place(name: str, content: bytes, folder: Path, suffixes: Sequence[str]) -> Path:
-    """Where an upload is put in ``folder``, which is there afterwards; CommandError for another kind or size."""
-    suffix = Path(name).suffix.lower()
-    if suffix not in suffixes:
-        raise CommandError(f"{label(name)}: allowed are files ending in {', '.join(suffixes)}")
-    if not 0 < len(content) <= MOST_FILE_BYTES:
-        raise CommandError(f"{name[:80]}: {len(content)} bytes; allowed: up to {MOST_FILE_BYTES}")
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder / f"{label(Path(name).stem)}-{_digest(content)}{suffix}"
-
-
-def _digest(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()[:12]
-
-
-@contextmanager
-def named(name: str, path: Path) -> Iterator[None]:
-    """Errors with the name that the person knows in place of ``path``."""
-    try:
-        yield
-    except ValueError as error:
-        text = " ".join(str(error).split()).replace(f"{path}/", "").replace(str(path), "").lstrip(": ")
-        raise CommandError(f"{name[:80]}: {text}") from None
-
-
-KEPT = ("mass", "outlet_height", "domain_half_width")
-
-"""Parameters of the rig of before that the funnel has as well."""
-
-FEED_SHARE = 0.8
-
-"""Radius of the feed over that of a mesh's opening, where the usual feed would be wider."""
-
-
 def shaped_source(present: Scene, body: str, name: str, content: bytes, unit: str | None, folder: Path) -> SceneSource:
     """``present`` with the mesh ``content`` as the shape of its component ``body``.
 
@@ -194,6 +153,15 @@ def shaped_source(present: Scene, body: str, name: str, content: bytes, unit: st
     return _kept(name, content, folder, body, shaped)
 
 
+def _check_faces(solid: Solid) -> None:
+    faces = len(surface_mesh(solid).faces)
+    if faces > MOST_FACES_DRAWN:
+        raise CommandError(
+            f"{faces} faces; the page draws up to {MOST_FACES_DRAWN}: reduce the mesh, or make a body file of it with "
+            "`explorer shape`"
+        )
+
+
 def funnel_source(present: Scene, name: str, content: bytes, unit: str | None, folder: Path) -> SceneSource:
     """``present`` poured through the mesh ``content``; the rest is as in :func:`shaped_source`.
 
@@ -204,7 +172,7 @@ def funnel_source(present: Scene, name: str, content: bytes, unit: str | None, f
         given = unit or FIXED_UNIT.get(mesh.suffix.lower(), USUAL_UNIT)
         rig = MeshFunnel(mesh=str(mesh.absolute()), unit=given, wall=present.rig.wall)
         feed = min(present.insertion.region_radius, FEED_SHARE * rig.placed.inlet.nearest)
-        own = {f"rig.{name}": getattr(present.rig, name) for name in KEPT if hasattr(present.rig, name)}
+        own = {f"rig.{name}": getattr(present.rig, name) for name in KEPT_IN_FUNNEL if hasattr(present.rig, name)}
         placed = with_rig(present, rig.name)
         # What suited the rig of before may not suit a funnel.
         fed = present.insertion if present.insertion.protocol in rig.protocols else placed.insertion
@@ -232,10 +200,31 @@ def _kept(name: str, content: bytes, folder: Path, what: str, make: Callable[[Pa
     return material_source(str(material))
 
 
-def _check_faces(solid: Solid) -> None:
-    faces = len(surface_mesh(solid).faces)
-    if faces > MOST_FACES_DRAWN:
-        raise CommandError(
-            f"{faces} faces; the page draws up to {MOST_FACES_DRAWN}: reduce the mesh, or make a body file of it with "
-            "`explorer shape`"
-        )
+def place(name: str, content: bytes, folder: Path, suffixes: Sequence[str]) -> Path:
+    """Where an upload is put in ``folder``, which is there afterwards; CommandError for another kind or size."""
+    suffix = Path(name).suffix.lower()
+    if suffix not in suffixes:
+        raise CommandError(f"{label(name)}: allowed are files ending in {', '.join(suffixes)}")
+    if not 0 < len(content) <= MOST_FILE_BYTES:
+        raise CommandError(f"{name[:80]}: {len(content)} bytes; allowed: up to {MOST_FILE_BYTES}")
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder / f"{label(Path(name).stem)}-{_digest(content)}{suffix}"
+
+
+def label(text: str) -> str:
+    """``text`` from outside as a part of a file's name."""
+    return LABEL.sub("_", text)[:40].strip("_") or "unnamed"
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()[:12]
+
+
+@contextmanager
+def named(name: str, path: Path) -> Iterator[None]:
+    """Errors with the name that the person knows in place of ``path``."""
+    try:
+        yield
+    except ValueError as error:
+        text = " ".join(str(error).split()).replace(f"{path}/", "").replace(str(path), "").lstrip(": ")
+        raise CommandError(f"{name[:80]}: {text}") from None

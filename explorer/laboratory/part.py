@@ -1,11 +1,7 @@
 """Part of a material (:class:`PartFile`): measured parameters with their origin, as `explorer lab --out` writes it.
 
-`explorer new material NAME --like MATERIAL --part FILE` lays parts over a material; by hand, the tables can be copied
-into a material file as they are, ``[measured]`` included.
-
-A material of one's own from another one and the parts that a laboratory measured.
-
-A pour's material with what a bench test gave, as a material file of its own.
+`explorer new material NAME --like MATERIAL --part FILE` lays parts over a material, the page those of a bench test over
+the pour's; by hand, the tables can be copied into a material file as they are, ``[measured]`` included.
 """
 
 from __future__ import annotations
@@ -31,14 +27,13 @@ from solver import ParameterError, Scene, asset_path, load_material, read_toml, 
 from solver.scenes.material_file import scene_from
 from solver.toml_file import Number, Scalar, TomlTable, checked
 
-SIZES = ("size_distribution", "size_spread")
+Table = dict[str, Any]
 
+SIZES = ("size_distribution", "size_spread")
 SCATTER = "log_normal"
 """Distribution of a measured spread, which acts only with one; as of measured diameters in a material file."""
-
 ELASTIC = ("youngs_modulus", "shear_modulus", "poisson_ratio")
-
-Table = dict[str, Any]
+STARTER = "the starter material"
 
 
 class PartBody(TomlTable):
@@ -88,11 +83,6 @@ def part_text(table: Table, heading: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def measured_text(measured: Mapping[str, Any]) -> str:
-    """The tables ``[measured.…]`` alone."""
-    return "\n".join(_tables(("measured",), measured)) + "\n" if measured else ""
-
-
 def read_part(path: Path) -> Table:
     """The tables of a part; ParameterError in one line for a bad one."""
     table = read_toml(path)
@@ -101,6 +91,51 @@ def read_part(path: Path) -> Table:
     except ParameterError as error:
         raise ParameterError(f"{path}: {error}") from None
     return table
+
+
+def write_measured_material(folder: Path, name: str, like: str | None, parts: Sequence[Path]) -> Path:
+    """Write ``NAME.toml``: ``like`` (name or file; None: the starter material) with ``parts``, of two the later.
+
+    Raises CommandError where it exists already or a part does not fit.
+    """
+    path = new_path(folder, name)
+    scene, measured = _base(path, like)
+    for part in parts:
+        table = read_part(part)
+        try:
+            scene = with_part(scene, table)
+        except ParameterError as error:
+            raise CommandError(f"{part}: does not fit {like or STARTER}: {error}") from None
+        measured = merged(measured, table.get("measured", {}))
+    names = ", ".join(part.name for part in parts) or "nothing"
+    heading = f"{path.stem}: {like or STARTER}, with measured: {names}. SI; where numbers come from: [measured] below."
+    text = material_toml(scene, heading) + measured_text(measured)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("x", encoding="utf-8") as file:
+        file.write(text)
+    return path
+
+
+def _base(path: Path, like: str | None) -> tuple[Scene, dict[str, Any]]:
+    """The scene to start from, and what its file says was measured."""
+    if like is None:
+        return scene_from(tomllib.loads(material_text(path)), path), {}
+    return load_material(like), read_toml(asset_path("materials", like)).get("measured", {})
+
+
+def measured_source(present: Scene, result: LabResult, folder: Path) -> SceneSource:
+    """``present`` with the parameters of ``result``, kept in ``folder``; where each comes from stands in the file.
+
+    Raises CommandError where nothing in it is a parameter, and ParameterError where one does not fit the material.
+    """
+    part = part_table(result)
+    if not set(part) - {"format", "measured"}:
+        raise CommandError(f"{result.test}: gives no parameter of a material")
+    scene = with_part(present, part)
+    text = material_toml(scene, f"{present.title}, with {result.test} measured. SI; origins: [measured] below.")
+    text += measured_text(part.get("measured", {}))
+    path = kept_file(f"{present.title[:20]}-{result.test}.toml", text.encode(), folder, (".toml",))
+    return material_source(str(path))
 
 
 def with_part(scene: Scene, table: Table) -> Scene:
@@ -122,15 +157,6 @@ def with_part(scene: Scene, table: Table) -> Scene:
     struck |= set(of_bodies)
     scene = with_values(_with_fractions(scene, fractions), settings)
     return dataclasses.replace(scene, assumed=tuple(path for path in scene.assumed if path not in struck))
-
-
-def merged(one: Mapping[str, Any], other: Mapping[str, Any]) -> Table:
-    """Tables of both; where both have a value, that of ``other``."""
-    both = dict(one)
-    for key, value in other.items():
-        old = both.get(key)
-        both[key] = merged(old, value) if isinstance(old, dict) and isinstance(value, dict) else value
-    return both
 
 
 def _of_material(scene: Scene, name: str, entry: Table) -> dict[str, Any]:
@@ -182,6 +208,20 @@ def _with_fractions(scene: Scene, fractions: Mapping[str, float]) -> Scene:
     return dataclasses.replace(scene, bodies=bodies)
 
 
+def merged(one: Mapping[str, Any], other: Mapping[str, Any]) -> Table:
+    """Tables of both; where both have a value, that of ``other``."""
+    both = dict(one)
+    for key, value in other.items():
+        old = both.get(key)
+        both[key] = merged(old, value) if isinstance(old, dict) and isinstance(value, dict) else value
+    return both
+
+
+def measured_text(measured: Mapping[str, Any]) -> str:
+    """The tables ``[measured.…]`` alone."""
+    return "\n".join(_tables(("measured",), measured)) + "\n" if measured else ""
+
+
 def _put(table: Table, parameter: str, value: float) -> None:
     kind, *names, key = parameter.split(".")
     if kind == "body":
@@ -215,13 +255,13 @@ def _origin(files: Sequence[str]) -> Table:
     return {"source": ", ".join(path.name for path in paths), "sha256": ", ".join(map(_digest, paths))}
 
 
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
 def _finite(numbers: Mapping[str, Any]) -> Table:
     """Without what a single replicate does not have."""
     return {key: value for key, value in numbers.items() if isinstance(value, str) or math.isfinite(value)}
-
-
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def _tables(keys: tuple[str, ...], table: Mapping[str, Any]) -> list[str]:
@@ -236,51 +276,3 @@ def _tables(keys: tuple[str, ...], table: Mapping[str, Any]) -> list[str]:
 
 def _entries(entries: Mapping[str, Any]) -> list[str]:
     return [f"{toml_key(key)} = {toml_value(value)}" for key, value in entries.items()]
-
-
-STARTER = "the starter material"
-
-
-def write_measured_material(folder: Path, name: str, like: str | None, parts: Sequence[Path]) -> Path:
-    """Write ``NAME.toml``: ``like`` (name or file; None: the starter material) with ``parts``, of two the later.
-
-    Raises CommandError where it exists already or a part does not fit.
-    """
-    path = new_path(folder, name)
-    scene, measured = _base(path, like)
-    for part in parts:
-        table = read_part(part)
-        try:
-            scene = with_part(scene, table)
-        except ParameterError as error:
-            raise CommandError(f"{part}: does not fit {like or STARTER}: {error}") from None
-        measured = merged(measured, table.get("measured", {}))
-    names = ", ".join(part.name for part in parts) or "nothing"
-    heading = f"{path.stem}: {like or STARTER}, with measured: {names}. SI; where numbers come from: [measured] below."
-    text = material_toml(scene, heading) + measured_text(measured)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("x", encoding="utf-8") as file:
-        file.write(text)
-    return path
-
-
-def _base(path: Path, like: str | None) -> tuple[Scene, dict[str, Any]]:
-    """The scene to start from, and what its file says was measured."""
-    if like is None:
-        return scene_from(tomllib.loads(material_text(path)), path), {}
-    return load_material(like), read_toml(asset_path("materials", like)).get("measured", {})
-
-
-def measured_source(present: Scene, result: LabResult, folder: Path) -> SceneSource:
-    """``present`` with the parameters of ``result``, kept in ``folder``; where each comes from stands in the file.
-
-    Raises CommandError where nothing in it is a parameter, and ParameterError where one does not fit the material.
-    """
-    part = part_table(result)
-    if not set(part) - {"format", "measured"}:
-        raise CommandError(f"{result.test}: gives no parameter of a material")
-    scene = with_part(present, part)
-    text = material_toml(scene, f"{present.title}, with {result.test} measured. SI; origins: [measured] below.")
-    text += measured_text(part.get("measured", {}))
-    path = kept_file(f"{present.title[:20]}-{result.test}.toml", text.encode(), folder, (".toml",))
-    return material_source(str(path))

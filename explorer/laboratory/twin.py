@@ -8,10 +8,8 @@ A round trip closes where what comes out is within ``CLOSES`` of what was put in
                           1/E* = (1 − ν²)/E + (1 − ν_w²)/E_w,  1/G* = (2 − ν)/G + (2 − ν_w)/G_w
 
 Where the paper's formula is applied to the same simulated test (L/2H, Equation 1), what it misses by is shown and
-closes nothing. From the drop, the twin also finds the e with which a ball of the body's mass lands where the
-laboratory's bodies did.
-
-The paper's formulas applied to simulated bench tests, beside their closed forms (``doe/laboratory/bias.py``).
+closes nothing; :func:`simulated_bias` puts it beside its closed form (``doe/laboratory/bias.py``). From the drop, the
+twin also finds the e with which a ball of the body's mass lands where the laboratory's bodies did.
 """
 
 from __future__ import annotations
@@ -34,12 +32,11 @@ from solver.scenes.material import Material
 from solver.single_body import BenchResult, run_bench_test
 
 TILT_RATE = 5.0
-
 """Of the inclined plane [°/s]; the angle moves by less than a hundredth of a degree against the rig's own 1 °/s."""
-
 LOWEST, HIGHEST = 0.05, 1.0
-
 """Restitutions that the solver takes."""
+FIRST_READING = 0.02
+"""The twin's squeezing is shown from this share of its largest strain on: before, few steps fell into a reading."""
 
 
 def twins(result: LabResult, scene: Scene) -> Iterator[TwinRow]:
@@ -52,28 +49,6 @@ def twins(result: LabResult, scene: Scene) -> Iterator[TwinRow]:
             yield from _restitution(of, own, scene)
         else:
             yield from _moduli(of, own, scene)
-
-
-def bench_scene(scene: Scene, test: str, of: tuple[str, ...]) -> Scene:
-    """``scene`` with the rig of ``test``, the specimen of ``of`` on it, and the partner's material as its surface."""
-    body, wall = specimen(scene, of)
-    # A ball, or a body that slides without turning: what is measured does not hang on how many spheres stand for it.
-    rig_scene = with_rig(with_values(scene, {"body.spheres": "coarse"}), RIGS[test])
-    return dataclasses.replace(rig_scene, rig=dataclasses.replace(rig_scene.rig, body=body.name, wall=wall))  # type: ignore[type-var]
-
-
-def specimen(scene: Scene, of: tuple[str, ...]) -> tuple[Body, str]:
-    """The body that is tested and the material that it lies on; of one component alone, the wall's."""
-    bodies = {name: body for body in reversed(scene.bodies) for name in (body.material, body.name)}
-    one, other = of if len(of) == 2 else (of[0], scene.rig.wall)
-    if not {*of} & {*bodies}:
-        raise CommandError(f"--simulate: {'-'.join(of)}: no body of that name; there are {', '.join(bodies)}")
-    if one not in bodies:
-        one, other = other, one
-    wall = other if other in {m.name for m in scene.materials} else bodies[other].material
-    if len(of) == 2 and scene.contact_pair(bodies[one], wall) is not scene.pair(*of):
-        raise CommandError(f"--simulate: {'-'.join(of)}: a plate of {wall} would touch by another pair of the material")
-    return bodies[one], wall
 
 
 def _friction(of: tuple[str, ...], own: dict[str, Derived], scene: Scene) -> Iterator[TwinRow]:
@@ -90,12 +65,12 @@ def _restitution(of: tuple[str, ...], own: dict[str, Derived], scene: Scene) -> 
     found = run_bench_test(bench)
     yield _closing(of, "restitution", "1", own["restitution"], found)
     paper = found.quantity("restitution_paper_L_over_2H")
-    flight = own.get("restitution_paper_L_over_2H", own["restitution"])
-    if flight.formula != "L/(2H)":
+    measured = own.get("restitution_paper_L_over_2H", own["restitution"])
+    if measured.formula != "L/(2H)":
         yield TwinRow(of, "L_over_2H", "1", None, own["restitution"].summary.mean, paper.value, None)
         return
-    yield TwinRow(of, "L_over_2H", "1", flight.summary.mean, None, paper.value, None)
-    landing = restitution_that_lands(bench, flight.summary.mean)
+    yield TwinRow(of, "L_over_2H", "1", measured.summary.mean, None, paper.value, None)
+    landing = restitution_that_lands(bench, measured.summary.mean)
     if landing is not None:
         yield TwinRow(of, "restitution_that_lands_there", "1", None, own["restitution"].summary.mean, landing, None)
 
@@ -155,22 +130,17 @@ def _closing(of: tuple[str, ...], name: str, unit: str, own: Derived | None, fou
     return TwinRow(of, name, unit, measured, quantity.reference, quantity.value, closes)
 
 
-FIRST_READING = 0.02
-
-"""The twin's squeezing is shown from this share of its largest strain on: before, few steps fell into a reading."""
-
-
 def simulated_bias(test: str, scene: Scene, of: tuple[str, ...]) -> BiasTable:
     """What the formula of ``test`` gives on the solver for one component or pair; CommandError where none is built."""
     if test == "drop":
-        return _drop(run_bench_test(bench_scene(scene, test, of)), "-".join(of))
+        return _drop_bias(run_bench_test(bench_scene(scene, test, of)), "-".join(of))
     if test == "compression":
         bench = with_values(bench_scene(scene, test, of), {"rig.strain": STRAINS[-1]})
-        return _compression(run_bench_test(bench), scene, of)
+        return _compression_bias(run_bench_test(bench), scene, of)
     raise CommandError(f"--bias --simulate: {test}; allowed: drop, compression")
 
 
-def _drop(found: BenchResult, name: str) -> BiasTable:
+def _drop_bias(found: BenchResult, name: str) -> BiasTable:
     table = dict(found.table)
     columns = (table[key] for key in ("static_friction", "restitution", "tracked", "paper_L_over_2H"))
     rows = [
@@ -185,14 +155,17 @@ def _drop(found: BenchResult, name: str) -> BiasTable:
     )
 
 
-def _compression(found: BenchResult, scene: Scene, of: tuple[str, ...]) -> BiasTable:
+def _compression_bias(found: BenchResult, scene: Scene, of: tuple[str, ...]) -> BiasTable:
     series = {key: np.array(values) for key, values in found.series}
     material = scene.material(next(b for b in scene.bodies if of[0] in (b.name, b.material)).material)
     # The largest approach belongs to the largest strain: their ratio is the thickness, also of a last step too many.
     strain = series["approach_m"] * (STRAINS[-1] / series["approach_m"][-1])
     ratio = series["youngs_modulus_paper_equation_1_Pa"] / material.youngs_modulus
     shown = [wanted for wanted in STRAINS if wanted >= FIRST_READING * STRAINS[-1]]
-    rows = [(wanted, compression_ratio(wanted, material.poisson_ratio), _at(wanted, strain, ratio)) for wanted in shown]
+    simulated = np.interp(shown, strain, ratio).tolist()
+    rows = [
+        (at, compression_ratio(at, material.poisson_ratio), seen) for at, seen in zip(shown, simulated, strict=True)
+    ]
     return BiasTable(
         title=f"{found.body} between plates of {found.wall}: E by Equation (1) over the E of its material",
         columns=("strain", "ratio", "simulated"),
@@ -201,5 +174,23 @@ def _compression(found: BenchResult, scene: Scene, of: tuple[str, ...]) -> BiasT
     )
 
 
-def _at(wanted: float, strain: np.ndarray, ratio: np.ndarray) -> float:
-    return float(np.interp(wanted, strain, ratio))
+def bench_scene(scene: Scene, test: str, of: tuple[str, ...]) -> Scene:
+    """``scene`` with the rig of ``test``, the specimen of ``of`` on it, and the partner's material as its surface."""
+    body, wall = specimen(scene, of)
+    # A ball, or a body that slides without turning: what is measured does not hang on how many spheres stand for it.
+    rig_scene = with_rig(with_values(scene, {"body.spheres": "coarse"}), RIGS[test])
+    return dataclasses.replace(rig_scene, rig=dataclasses.replace(rig_scene.rig, body=body.name, wall=wall))  # type: ignore[type-var]
+
+
+def specimen(scene: Scene, of: tuple[str, ...]) -> tuple[Body, str]:
+    """The body that is tested and the material that it lies on; of one component alone, the wall's."""
+    bodies = {name: body for body in reversed(scene.bodies) for name in (body.material, body.name)}
+    one, other = of if len(of) == 2 else (of[0], scene.rig.wall)
+    if not {*of} & {*bodies}:
+        raise CommandError(f"--simulate: {'-'.join(of)}: no body of that name; there are {', '.join(bodies)}")
+    if one not in bodies:
+        one, other = other, one
+    wall = other if other in {m.name for m in scene.materials} else bodies[other].material
+    if len(of) == 2 and scene.contact_pair(bodies[one], wall) is not scene.pair(*of):
+        raise CommandError(f"--simulate: {'-'.join(of)}: a plate of {wall} would touch by another pair of the material")
+    return bodies[one], wall

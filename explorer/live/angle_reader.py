@@ -1,11 +1,7 @@
-"""The angle of repose of a pour that still moves: when to read it, and what was read last.
+"""The angle of repose of a pour that still moves: when to read it, what was read last, and the process that reads it.
 
-A reading takes some 25 ms, for which the pour would stand still: while it runs, another process reads
-(``explorer/live/angle_reader.py``). What stands still is read here, so that its angle is that of what is seen.
-
-The process that reads angles while the solver goes on: piles in, angles out, until the line is cut.
-
-The parent imports this file, so what reads is imported inside :func:`run` only.
+A reading takes some 25 ms, for which the pour would stand still: while it runs, another process reads (piles in, angles
+out, until the line is cut). What stands still is read here, so that its angle is that of what is seen.
 """
 
 from __future__ import annotations
@@ -24,17 +20,11 @@ from solver.observables.repose import Outline
 from solver.pours.record import Pile
 
 LEAST_SHARE_BELOW = 0.25
-
 """Share of the poured mass that has to lie below the outlet: the first few bodies are no pile that has an angle."""
-
 SIMULATED_INTERVAL, WALL_INTERVAL = 0.1, 0.5
-
 """The angle is read anew after this long of simulated or of wall time [s], whichever comes first."""
-
 WALL_SHARE = 0.15
-
 """Largest share of the wall time that reading may take; a big pile is read less often."""
-
 ANGLES: Mapping[str, Callable[[PileReading], Value]] = {
     "angle_of_repose_deg": angle_of_repose,
     "angle_of_repose_left_deg": angle_of_repose_left,
@@ -43,8 +33,8 @@ ANGLES: Mapping[str, Callable[[PileReading], Value]] = {
 
 
 @dataclass(frozen=True)
-class Angles:
-    """What was read of a pile."""
+class PileAngles:
+    """The angles of repose read off a pile."""
 
     observables: Mapping[str, Value] = field(default_factory=dict)
     """The angles by name; empty before there was a pile."""
@@ -52,10 +42,12 @@ class Angles:
     """The view that the left and the right angle were read from, with the lines of its flanks."""
 
 
-def read_angles(pile: Pile) -> Angles:
+def read_angles(pile: Pile) -> PileAngles:
     """What ``pile`` is read as."""
     reading = PileReading(pile)
-    return Angles({name: angle(reading) for name, angle in ANGLES.items()}, reading.front if reading.is_pile else None)
+    return PileAngles(
+        {name: angle(reading) for name, angle in ANGLES.items()}, reading.front if reading.is_pile else None
+    )
 
 
 class AngleReader:
@@ -70,9 +62,9 @@ class AngleReader:
         self._unheard = 0
         self.forget()
 
-    def forget(self, angles: Angles | None = None) -> None:
+    def forget(self, angles: PileAngles | None = None) -> None:
         """Begin anew: another pour, or an earlier moment of this one, of which ``angles`` had been read."""
-        self.newest = angles or Angles()
+        self.newest = angles or PileAngles()
         self._forgotten = self._unheard
         self._read_at = self._wall_due = self._wall_earliest = -math.inf
 
@@ -140,8 +132,6 @@ def run(line: Connection) -> None:
     """Main function of the process. It ends with the solver's process, whose end of the line closes with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     give_way(LIVE)
-    from explorer.live.angle_reader import read_angles
-
     try:
         while True:
             line.send(read_angles(line.recv()))

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from explorer.live.angle_reader import Angles
+from explorer.live.angle_reader import PileAngles
 from solver.pours.checkpoint import Kept
 from solver.scenes.scene import Scene
 
@@ -31,7 +31,7 @@ class Moment:
     kept: Kept
     scene: Scene
     """As the person sees it, with the parameters in force."""
-    angles: Angles
+    angles: PileAngles
     """What was read last."""
     retuned: bool
     """Parameters had been changed since the pour began."""

@@ -1,8 +1,7 @@
-"""One pour that obeys commands: the part of the solver process that owns Taichi's objects.
+"""One pour that obeys commands and shows itself: the part of the solver's process that owns Taichi's objects.
 
-A pour alone in its batch: begun with everything compiled that it will need, and let run.
-
-What a live pour shows: frames, and details of its contacts while somebody looks at them, by shared memory.
+The pour is alone in its batch, and begun with everything compiled that it will need. Frames go to shared memory, and
+details of its contacts while somebody looks at them.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ from explorer.live.messages import (
     StepBack,
     Watch,
 )
-from explorer.live.throttle import Pace
+from explorer.live.throttle import Throttle
 from explorer.outcomes import outcome_text
 from explorer.scene.source import changes
 from solver.effects.columns import kernel_effects
@@ -50,12 +49,224 @@ from solver.scenes.scene import Scene, with_values
 from solver.scenes.time_step import stability_limit
 
 FRAME_INTERVAL = 1.0 / 60.0
-
 """Wall time [s] between published frames."""
-
 DETAIL_INTERVAL = 0.1
-
 """Wall time [s] between details, while they are looked at."""
+KEPT_EVERY = 0.02
+"""Simulated time [s] between two moments that can be come back to at once; those between are run again."""
+STATUS_INTERVAL = 0.1
+"""Wall time [s] between reports."""
+BEFORE_FIRST_SAMPLE = {"entered": 0.0, "discharged": 0.0, "kinetic": 0.0, "touching": 0.0}
+"""Sums over all bodies while none has been sampled yet."""
+
+
+class LivePour:
+    """A pour with play and pause, live parameters, frames and reports. One thread only (the one with Taichi)."""
+
+    def __init__(
+        self, start: Start, screen: Publisher, report: Callable[[Report], None], reading: Connection | None = None
+    ) -> None:
+        """``reading``: a line to a process that reads angles; without it they are read between two launches."""
+        self._screen, self._report = screen, report
+        self._angles = AngleReader(reading, clock.perf_counter)
+        self._throttle = Throttle(speed=1.0)
+        self._reported = 0.0
+        self._begin(start)
+
+    def obey(self, command: Command) -> None:
+        """Carry out ``command``; parameters that are refused become an event, never an exception."""
+        match command:
+            case Start():
+                self._begin(command)
+            case Play():
+                self._paused = False
+                self._throttle.restart(clock.perf_counter(), self._pour.time)
+            case Pause():
+                self._paused, self._run_until = True, -math.inf
+                self._keep()
+                # What stands on the screen is the moment that is told, not the last frame that was due before it.
+                self._observe()
+                self._publish()
+            case Step(duration=duration):
+                # Steps that are asked for while one runs are added to it.
+                self._paused, self._run_until = True, max(self._run_until, self._pour.time) + duration
+                self._throttle.restart(clock.perf_counter(), self._pour.time)
+            case StepBack(duration=duration):
+                self._go_back(self._pour.time - duration)
+            case SetSpeed(factor=factor):
+                self._throttle.speed = factor
+                self._throttle.restart(clock.perf_counter(), self._pour.time)
+            case SetParameters(values=values):
+                self._set_parameters(values)
+            case Watch():
+                self._screen.watch(command)
+                self._publish()
+        self._report(self.status())
+
+    def seconds_to_wait(self) -> float | None:
+        """Wall time until the next launch is due; None while nothing is to be done."""
+        if self._pour.steps_due(1) == 0 or self._stepped:
+            return None
+        return max(0.0, self._throttle.wait(clock.perf_counter(), self._pour.time))
+
+    def advance(self) -> None:
+        """Run one short launch, then publish and report what is due."""
+        steps = self._pour.steps_due(min(self._throttle.steps(self._pour.dt), self._steps_to_stop()))
+        before = clock.perf_counter()
+        decided = launch(self._pour, steps)
+        if (decided and self._history.since(self._pour.time) >= KEPT_EVERY) or self._stepped:
+            self._keep()
+        now = clock.perf_counter()
+        self._throttle.launched(steps, now - before, now, self._pour.time)
+        over = self._pour.outcome != Outcome.RUNNING
+        if over:
+            self._event(outcome_text(self._pour.outcome, self._pour.message))
+        self._angles.hear()
+        if over or self._angles.due(self._pour.time):
+            self._observe()
+        # The status goes first: who sees the last frame of a pour can know that it was the last.
+        if over or self._paused or now - self._reported >= STATUS_INTERVAL:
+            self._reported = now
+            self._report(self.status())
+        if over or self._paused:
+            self._publish()
+        else:
+            self._screen.publish_due(self._pour, self._generation, now)
+
+    def status(self) -> Status:
+        """What the page is told."""
+        pour = self._pour
+        state = SessionState.RUNNING
+        if pour.outcome != Outcome.RUNNING:
+            state = SessionState.ENDED
+        elif self._paused:
+            state = SessionState.PAUSED
+        sample = self._sample()
+        return Status(
+            state=state,
+            message=pour.message,
+            scene=self._scene,
+            seed=pour.seed,
+            generation=self._generation,
+            speed=self._throttle.speed,
+            capped=state == SessionState.RUNNING and self._throttle.capped,
+            real_time_factor=self._throttle.real_time_factor if state == SessionState.RUNNING else 0.0,
+            phase=pour.phase,
+            outcome=pour.outcome,
+            time=pour.time,
+            dt=pour.dt,
+            dt_limit=self._dt_limit,
+            earliest=self._history.earliest,
+            bodies=pour.entered,
+            bodies_planned=len(pour.supply.order),
+            entered_mass=sample["entered"],
+            discharged_mass=sample["discharged"],
+            poured_mass=pour.supply.mass,
+            kinetic_energy=sample["kinetic"],
+            contacts=round(sample["touching"]),
+            gate_shut=pour.gate_shut,
+            energy_put_in=pour.energy_put_in if self._retuned else None,
+            observables=self._angles.newest.observables,
+            outline=self._angles.newest.outline,
+        )
+
+    def _begin(self, start: Start) -> None:
+        self._scene, self._generation = start.scene, start.generation
+        self._pour = begun(start.scene, start.seed, partial(self._announce, start))
+        self._history = History()
+        self._angles.forget()
+        self._dt_limit = stability_limit(self._pour.scene)
+        self._paused, self._run_until, self._retuned = False, -math.inf, False
+        self._keep()
+        self._publish()
+        self._throttle.restart(clock.perf_counter(), self._pour.time)
+        self._report(self.status())
+
+    def _announce(self, start: Start, message: str) -> None:
+        self._report(
+            Status(SessionState.STARTING, message, start.scene, start.seed, start.generation, self._throttle.speed)
+        )
+
+    def _keep(self) -> None:
+        """Keep the present moment, so that the person at the screen can come back to it."""
+        if self._pour.outcome != Outcome.NON_FINITE:
+            self._history.add(Moment(keep(self._pour), self._scene, self._angles.newest, self._retuned))
+
+    def _go_back(self, time: float) -> None:
+        """Bring everything back to how it was at ``time`` [s], or as early as is kept, and pause."""
+        self._paused, self._run_until = True, -math.inf
+        found = self._history.back_to(time, self._pour.time)
+        if found is None:
+            self._event("this is the earliest moment that is kept")
+            return
+        moment, until = found
+        before, self._scene = self._scene, moment.scene
+        put_back(self._pour, moment.kept)
+        self._angles.forget(moment.angles)
+        self._retuned = moment.retuned
+        self._dt_limit = stability_limit(self._pour.scene)
+        # What was thinned out of the history is run again: the same bits, up to the next change that a person made.
+        while (left := self._whole_steps(until)) > 0 and (steps := self._pour.steps_due(left)) > 0:
+            launch(self._pour, steps)
+        self._keep()
+        for line in changes(before, self._scene):
+            self._event(line)
+        self._publish()
+
+    def _set_parameters(self, values: Mapping[str, float | str]) -> None:
+        try:
+            changed = with_values(self._scene, dict(values))
+        except ParameterError as error:
+            self._event(f"refused: {error}")
+            return
+        for line in changes(self._scene, changed):
+            self._report(Event(self._generation, self._pour.time, line, is_change=True))
+        if changed == self._scene:
+            return
+        capacity = self._pour.batch.capacity
+        if kernel_effects(changed) and not capacity.effects:
+            self._event("compiling the effects; the pour goes on when that is done")
+            self._pour.move_to(Batch(dataclasses.replace(capacity, effects=True)))
+        self._scene = changed
+        self._pour.ramp_to(endless(changed))
+        self._dt_limit = stability_limit(self._pour.scene)
+        self._retuned = True
+        self._history.changed(self._pour.time)
+        self._keep()
+        self._throttle.restart(clock.perf_counter(), self._pour.time)
+
+    def _publish(self) -> None:
+        self._screen.publish(self._pour, self._generation, clock.perf_counter())
+
+    def _observe(self) -> None:
+        pour = self._pour
+        if pour.outcome != Outcome.NON_FINITE:
+            share_below = self._sample()["discharged"] / pour.supply.mass
+            running = pour.outcome == Outcome.RUNNING and not self._paused
+            read = self._angles.ask if running else self._angles.read
+            read(pour.record().pile, share_below, pour.time)
+
+    def _sample(self) -> Mapping[str, float]:
+        return self._pour.samples[-1] if self._pour.samples else BEFORE_FIRST_SAMPLE
+
+    @property
+    def _stepped(self) -> bool:
+        """Whether the end of a step of the person at the screen is reached."""
+        return self._paused and self._pour.time >= self._run_until
+
+    def _steps_to_stop(self) -> int:
+        """Steps to the first that reaches the end of a step of the person at the screen; without end while playing."""
+        if not self._paused:
+            return sys.maxsize
+        # Less a hair: a sum of steps must not miss its end by rounding and take one more.
+        return max(1, math.ceil((self._run_until - self._pour.time) / self._pour.dt - 1e-6))
+
+    def _whole_steps(self, time: float) -> int:
+        """Steps that end at or before ``time`` [s], but for rounding."""
+        return math.floor((time - self._pour.time) / self._pour.dt + 1e-6)
+
+    def _event(self, text: str) -> None:
+        self._report(Event(self._generation, self._pour.time, text))
 
 
 class Publisher:
@@ -108,6 +319,14 @@ def begun(scene: Scene, seed: int, announce: Callable[[str], None]) -> Pour:
     return pour
 
 
+def _compile(pour: Pour) -> None:
+    """Compile every kernel now, those of a change of stiffness too, so that the first slider does not stall."""
+    launch(pour, pour.steps_due(1))
+    kinds = pour.batch.capacity.kinds
+    pour.batch.scale_springs(0, np.ones((kinds, kinds)))
+    pour.batch.measure(0)
+
+
 def endless(scene: Scene) -> Scene:
     """``scene`` without the limit on simulated time: in the live view the person at the screen ends a pour."""
     return dataclasses.replace(scene, numerics=dataclasses.replace(scene.numerics, max_time=math.inf))
@@ -120,233 +339,3 @@ def launch(pour: Pour, steps: int) -> bool:
         pour.batch.run(launched)
         return pour.after(steps)
     return pour.after(steps, pour.batch.advance(launched)[0])
-
-
-def _compile(pour: Pour) -> None:
-    """Compile every kernel now, those of a change of stiffness too, so that the first slider does not stall."""
-    launch(pour, pour.steps_due(1))
-    kinds = pour.batch.capacity.kinds
-    pour.batch.scale_springs(0, np.ones((kinds, kinds)))
-    pour.batch.measure(0)
-
-
-KEPT_EVERY = 0.02
-
-"""Simulated time [s] between two moments that can be come back to at once; those between are run again."""
-
-STATUS_INTERVAL = 0.1
-
-"""Wall time [s] between reports."""
-
-BEFORE_FIRST_SAMPLE = {"entered": 0.0, "discharged": 0.0, "kinetic": 0.0, "touching": 0.0}
-
-"""Sums over all bodies while none has been sampled yet."""
-
-
-class LivePour:
-    """A pour with play and pause, live parameters, frames and reports. One thread only (the one with Taichi)."""
-
-    def __init__(
-        self, start: Start, screen: Publisher, report: Callable[[Report], None], reading: Connection | None = None
-    ) -> None:
-        """``reading``: a line to a process that reads angles; without it they are read between two launches."""
-        self._screen, self._report = screen, report
-        self._angles = AngleReader(reading, clock.perf_counter)
-        self._pace = Pace(speed=1.0)
-        self._reported = 0.0
-        self._begin(start)
-
-    def obey(self, command: Command) -> None:
-        """Carry out ``command``; parameters that are refused become an event, never an exception."""
-        match command:
-            case Start():
-                self._begin(command)
-            case Play():
-                self._paused = False
-                self._pace.restart(clock.perf_counter(), self._pour.time)
-            case Pause():
-                self._paused, self._run_until = True, -math.inf
-                self._keep()
-                # What stands on the screen is the moment that is told, not the last frame that was due before it.
-                self._observe()
-                self._publish()
-            case Step(duration=duration):
-                # Steps that are asked for while one runs are added to it.
-                self._paused, self._run_until = True, max(self._run_until, self._pour.time) + duration
-                self._pace.restart(clock.perf_counter(), self._pour.time)
-            case StepBack(duration=duration):
-                self._go_back(self._pour.time - duration)
-            case SetSpeed(factor=factor):
-                self._pace.speed = factor
-                self._pace.restart(clock.perf_counter(), self._pour.time)
-            case SetParameters(values=values):
-                self._set_parameters(values)
-            case Watch():
-                self._screen.watch(command)
-                self._publish()
-        self._report(self.status())
-
-    def seconds_to_wait(self) -> float | None:
-        """Wall time until the next launch is due; None while nothing is to be done."""
-        if self._pour.steps_due(1) == 0 or self._stepped:
-            return None
-        return max(0.0, self._pace.wait(clock.perf_counter(), self._pour.time))
-
-    def advance(self) -> None:
-        """Run one short launch, then publish and report what is due."""
-        steps = self._pour.steps_due(min(self._pace.steps(self._pour.dt), self._steps_to_stop()))
-        before = clock.perf_counter()
-        decided = launch(self._pour, steps)
-        if (decided and self._history.since(self._pour.time) >= KEPT_EVERY) or self._stepped:
-            self._keep()
-        now = clock.perf_counter()
-        self._pace.launched(steps, now - before, now, self._pour.time)
-        over = self._pour.outcome != Outcome.RUNNING
-        if over:
-            self._event(outcome_text(self._pour.outcome, self._pour.message))
-        self._angles.hear()
-        if over or self._angles.due(self._pour.time):
-            self._observe()
-        # The status goes first: who sees the last frame of a pour can know that it was the last.
-        if over or self._paused or now - self._reported >= STATUS_INTERVAL:
-            self._reported = now
-            self._report(self.status())
-        if over or self._paused:
-            self._publish()
-        else:
-            self._screen.publish_due(self._pour, self._generation, now)
-
-    def status(self) -> Status:
-        """What the page is told."""
-        pour = self._pour
-        state = SessionState.RUNNING
-        if pour.outcome != Outcome.RUNNING:
-            state = SessionState.ENDED
-        elif self._paused:
-            state = SessionState.PAUSED
-        sample = self._sample()
-        return Status(
-            state=state,
-            message=pour.message,
-            scene=self._scene,
-            seed=pour.seed,
-            generation=self._generation,
-            speed=self._pace.speed,
-            capped=state == SessionState.RUNNING and self._pace.capped,
-            real_time_factor=self._pace.real_time_factor if state == SessionState.RUNNING else 0.0,
-            phase=pour.phase,
-            outcome=pour.outcome,
-            time=pour.time,
-            dt=pour.dt,
-            dt_limit=self._dt_limit,
-            earliest=self._history.earliest,
-            bodies=pour.entered,
-            bodies_planned=len(pour.supply.order),
-            entered_mass=sample["entered"],
-            discharged_mass=sample["discharged"],
-            poured_mass=pour.supply.mass,
-            kinetic_energy=sample["kinetic"],
-            contacts=round(sample["touching"]),
-            gate_shut=pour.gate_shut,
-            energy_put_in=pour.energy_put_in if self._retuned else None,
-            observables=self._angles.newest.observables,
-            outline=self._angles.newest.outline,
-        )
-
-    def _begin(self, start: Start) -> None:
-        self._scene, self._generation = start.scene, start.generation
-        self._pour = begun(start.scene, start.seed, partial(self._announce, start))
-        self._history = History()
-        self._angles.forget()
-        self._dt_limit = stability_limit(self._pour.scene)
-        self._paused, self._run_until, self._retuned = False, -math.inf, False
-        self._keep()
-        self._publish()
-        self._pace.restart(clock.perf_counter(), self._pour.time)
-        self._report(self.status())
-
-    def _announce(self, start: Start, message: str) -> None:
-        self._report(
-            Status(SessionState.STARTING, message, start.scene, start.seed, start.generation, self._pace.speed)
-        )
-
-    def _keep(self) -> None:
-        """Keep the present moment, so that the person at the screen can come back to it."""
-        if self._pour.outcome != Outcome.NON_FINITE:
-            self._history.add(Moment(keep(self._pour), self._scene, self._angles.newest, self._retuned))
-
-    def _go_back(self, time: float) -> None:
-        """Bring everything back to how it was at ``time`` [s], or as early as is kept, and pause."""
-        self._paused, self._run_until = True, -math.inf
-        found = self._history.back_to(time, self._pour.time)
-        if found is None:
-            self._event("this is the earliest moment that is kept")
-            return
-        moment, until = found
-        before, self._scene = self._scene, moment.scene
-        put_back(self._pour, moment.kept)
-        self._angles.forget(moment.angles)
-        self._retuned = moment.retuned
-        self._dt_limit = stability_limit(self._pour.scene)
-        # What was thinned out of the history is run again: the same bits, up to the next change that a person made.
-        while (left := self._whole_steps(until)) > 0 and (steps := self._pour.steps_due(left)) > 0:
-            launch(self._pour, steps)
-        self._keep()
-        for line in changes(before, self._scene):
-            self._event(line)
-        self._publish()
-
-    def _set_parameters(self, values: Mapping[str, float | str]) -> None:
-        try:
-            changed = with_values(self._scene, dict(values))
-        except ParameterError as error:
-            self._event(f"refused: {error}")
-            return
-        for line in changes(self._scene, changed):
-            self._report(Event(self._generation, self._pour.time, line, is_change=True))
-        if changed == self._scene:
-            return
-        capacity = self._pour.batch.capacity
-        if kernel_effects(changed) and not capacity.effects:
-            self._event("compiling the effects; the pour goes on when that is done")
-            self._pour.move_to(Batch(dataclasses.replace(capacity, effects=True)))
-        self._scene = changed
-        self._pour.ramp_to(endless(changed))
-        self._dt_limit = stability_limit(self._pour.scene)
-        self._retuned = True
-        self._history.changed(self._pour.time)
-        self._keep()
-        self._pace.restart(clock.perf_counter(), self._pour.time)
-
-    def _publish(self) -> None:
-        self._screen.publish(self._pour, self._generation, clock.perf_counter())
-
-    def _observe(self) -> None:
-        pour = self._pour
-        if pour.outcome != Outcome.NON_FINITE:
-            share_below = self._sample()["discharged"] / pour.supply.mass
-            running = pour.outcome == Outcome.RUNNING and not self._paused
-            read = self._angles.ask if running else self._angles.read
-            read(pour.record().pile, share_below, pour.time)
-
-    def _sample(self) -> Mapping[str, float]:
-        return self._pour.samples[-1] if self._pour.samples else BEFORE_FIRST_SAMPLE
-
-    @property
-    def _stepped(self) -> bool:
-        """Whether the end of a step of the person at the screen is reached."""
-        return self._paused and self._pour.time >= self._run_until
-
-    def _steps_to_stop(self) -> int:
-        """Steps to the first that reaches the end of a step of the person at the screen; without end while playing."""
-        if not self._paused:
-            return sys.maxsize
-        # Less a hair: a sum of steps must not miss its end by rounding and take one more.
-        return max(1, math.ceil((self._run_until - self._pour.time) / self._pour.dt - 1e-6))
-
-    def _whole_steps(self, time: float) -> int:
-        """Steps that end at or before ``time`` [s], but for rounding."""
-        return math.floor((time - self._pour.time) / self._pour.dt + 1e-6)
-
-    def _event(self, text: str) -> None:
-        self._report(Event(self._generation, self._pour.time, text))

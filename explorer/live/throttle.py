@@ -6,40 +6,25 @@ import math
 from collections import deque
 
 LAUNCH_WALL = 6e-3
-
 """Wall time [s] that one launch of steps aims at: less than a frame, so that a slider acts at the next one. Each launch
 costs some tenths of a millisecond of its own."""
-
 FRAME_WALL = 1.0 / 60.0
-
 """A launch never covers more simulated time than this times the speed: motion on the screen stays smooth."""
-
 FIRST_STEPS = 20
-
 """Steps of a launch while nothing is known about their cost."""
-
 MEMORY = 0.7
-
 """Weight of the past in the running mean of the cost of a step."""
-
 FORGET_DEBT = 0.1
-
 """A pour that is further behind the clock than this [s] does not try to catch up."""
-
 CAPPED = 0.9
-
 """A pour that stays below this share of the wanted speed cannot keep it."""
-
 CAPPED_WINDOW = 0.5
-
 """Wall time [s] before which nothing is said about that."""
-
 WINDOW = 1.0
-
 """Wall time [s] over which the real-time factor is measured."""
 
 
-class Pace:
+class Throttle:
     """Keeps a pour at up to ``speed`` seconds of simulated time per second. Times are in seconds throughout."""
 
     def __init__(self, speed: float) -> None:

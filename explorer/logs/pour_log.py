@@ -5,11 +5,9 @@
     world/plate, world/cone …   the rig, and where its surfaces are when they move; world/gate while it is shut
     curves/<plot>/<name>        scalars, the unit in the name
     log                         events
-    parameters, outcome         Markdown
+    parameters, outcome         Markdown: what was poured, and what came out
 
 Timelines: ``sim_time`` [s] and ``step``. Poses are single precision: an f32 position of 0.1 m resolves 7 nm.
-
-The two Markdown pages of a recording: what was poured, and what came out.
 """
 
 from __future__ import annotations
@@ -42,47 +40,12 @@ from explorer.viewer.style import BODY_COLOURS, GLASS, PLATE
 from solver import Scene
 from solver.observables import Value
 
-
-def parameters_document(scene: Scene, seed: int) -> str:
-    """Title, seed, versions, and every parameter in SI."""
-    made_with = ", ".join(f"{name} {version or '(not installed)'}" for name, version in versions().items())
-    lines = [
-        f"# {scene.title}",
-        "",
-        f"Seed {seed}; {made_with}.",
-        "",
-        "| parameter | value | unit |",
-        "|-|-|-|",
-    ]
-    for path, entry in parameter_values(scene).items():
-        number = entry["value"]
-        shown = number if isinstance(number, str) else f"{number:.6g}"
-        lines.append(f"| {path} | {shown} | {entry['unit']} |")
-    return "\n".join(lines)
-
-
-def outcome_document(text: str, observed: Mapping[str, Value]) -> str:
-    """The outcome, and every observable that could be measured; spread: within the pile."""
-    lines = [f"# {text}", "", "| observable | value | spread | unit |", "|-|-|-|-|"]
-    for name, entry in observed.items():
-        if math.isfinite(entry.value):
-            spread = "" if entry.spread is None else f"{entry.spread:.3g}"
-            lines.append(f"| {name} | {entry.value:.5g} | {spread} | {entry.unit} |")
-    return "\n".join(lines)
-
-
 APPLICATION = "repose-explorer"
-
 FLUSH_INTERVAL = 1.0
-
 """Wall time [s] after which what was logged is written out: a killed program loses no more than this."""
-
 PLATE_COLOUR, CONE_COLOUR = (*PLATE, 255), (*GLASS, 70)
-
 """RGBA, 0 … 255; the colours of the page, all but the plate as if of glass."""
-
 IN_PLACE = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-
 """Pose of a surface that nobody has placed."""
 
 
@@ -269,3 +232,31 @@ def _mesh(triangles: Triangles, colour: tuple[int, int, int, int]) -> rr.Mesh3D:
         triangle_indices=triangles.faces,
         albedo_factor=colour,
     )
+
+
+def parameters_document(scene: Scene, seed: int) -> str:
+    """Title, seed, versions, and every parameter in SI."""
+    made_with = ", ".join(f"{name} {version or '(not installed)'}" for name, version in versions().items())
+    lines = [
+        f"# {scene.title}",
+        "",
+        f"Seed {seed}; {made_with}.",
+        "",
+        "| parameter | value | unit |",
+        "|-|-|-|",
+    ]
+    for path, entry in parameter_values(scene).items():
+        number = entry["value"]
+        shown = number if isinstance(number, str) else f"{number:.6g}"
+        lines.append(f"| {path} | {shown} | {entry['unit']} |")
+    return "\n".join(lines)
+
+
+def outcome_document(text: str, observed: Mapping[str, Value]) -> str:
+    """The outcome, and every observable that could be measured; spread: within the pile."""
+    lines = [f"# {text}", "", "| observable | value | spread | unit |", "|-|-|-|-|"]
+    for name, entry in observed.items():
+        if math.isfinite(entry.value):
+            spread = "" if entry.spread is None else f"{entry.spread:.3g}"
+            lines.append(f"| {name} | {entry.value:.5g} | {spread} | {entry.unit} |")
+    return "\n".join(lines)

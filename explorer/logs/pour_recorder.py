@@ -1,6 +1,6 @@
-"""Recordings of pours that run in this process: one file per pour, fed from ``run_pours(on_sample=…)``.
+"""Recordings of pours that run in this process, one file per pour; of a study, those of its verification.
 
-Recordings of a study: the verification pours, one file per seed.
+They are fed from ``run_pours(on_sample=…)``.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from solver.pours.pour import Pour
 
 ANGLE_INTERVAL = 0.1
-
 """Simulated time [s] between readings of the angle."""
+RECORDED_STAGE = "verification"
 
 
 def recorder_of(path: Path, seeds: Sequence[int]) -> PourRecorder:
@@ -122,9 +122,6 @@ def _angle_deg(pour: Pour) -> float:
     bodies = pour.bodies()
     pile = pile_of(bodies, member_spheres(pour.scene, bodies), lying(pour.container, bodies))
     return angle_of_repose(PileReading(pile)).value
-
-
-RECORDED_STAGE = "verification"
 
 
 class StudyRecorder:

@@ -1,6 +1,4 @@
-"""What a recording holds: shapes, what moved when, curves, events and texts; and which files it consists of.
-
-A recording read back, as `pour_log` wrote it.
+"""A recording read back, as `pour_log` wrote it: shapes, what moved when, curves, events and texts; and its files.
 
 A file of a killed writer is read up to the last frame that was written out.
 """
@@ -23,16 +21,14 @@ from explorer.logs.blueprint import CURVES, TIMELINE, curve_entity
 from explorer.logs.replay import check_recording
 
 Array = npt.NDArray[np.float64]
-
 Floats = npt.NDArray[np.float32]
 
 SAME_TIME = 1e-6
-
 """[s]; recorded times are whole nanoseconds, those of a slider rounded to this."""
-
 FRAME_INTERVAL = 0.02
-
 """Simulated time [s] between frames that are kept."""
+BODIES = "/world/bodies/"
+WORLD = "/world/"
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +78,7 @@ class Component:
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class RecordedSurface:
     """One surface of the rig: poses (k, 7), origin [m] and orientation wxyz, from ``times`` on; seen or not."""
 
     shape: Shape
@@ -108,7 +104,7 @@ class Recording:
 
     times: Array
     components: tuple[Component, ...]
-    surfaces: tuple[Surface, ...]
+    surfaces: tuple[RecordedSurface, ...]
     curves: Mapping[str, tuple[Array, Array]]
     """Name → times [s] and values."""
     events: tuple[tuple[float, str], ...]
@@ -156,11 +152,6 @@ def index_at(times: Array, time: float) -> int | None:
     """Index of the last entry that is not later than ``time`` [s]; None before the first."""
     k = int(np.searchsorted(times, time + SAME_TIME, side="right")) - 1
     return None if k < 0 else k
-
-
-BODIES = "/world/bodies/"
-
-WORLD = "/world/"
 
 
 @dataclass(frozen=True)
@@ -277,7 +268,7 @@ def _places(
     return [np.delete(np.arange(len(size) + len(away)), away) for size, away in zip(sizes, gone, strict=True)]
 
 
-def _surface(entity: str, columns: Mapping[str, _Rows]) -> Surface:
+def _surface(entity: str, columns: Mapping[str, _Rows]) -> RecordedSurface:
     there, gone = columns["Mesh3D:vertex_positions"].times, columns.get("Clear:is_recursive")
     switches = sorted([(t, True) for t in there] + [(t, False) for t in (() if gone is None else gone.times)])
     placed = columns.get("Transform3D:translation")
@@ -286,7 +277,7 @@ def _surface(entity: str, columns: Mapping[str, _Rows]) -> Surface:
         turned = np.concatenate(_blocks(columns["Transform3D:quaternion"], 4))
         times = placed.times
         poses = np.concatenate([np.concatenate(_blocks(placed, 3)), turned[:, [3, 0, 1, 2]]], axis=1)
-    return Surface(
+    return RecordedSurface(
         _shape(entity.removeprefix(WORLD), columns),
         times,
         poses.astype(np.float64),

@@ -1,10 +1,7 @@
-"""Look at a recording: a page on 127.0.0.1, or rerun's native viewer.
+"""Look at a recording: a page on 127.0.0.1, a folder that any web server can show, or rerun's native viewer.
 
-A folder that any web server can show: rerun's web viewer beside the recording.
-
-The viewer is part of the rerun package and is handed out only by its own server, so that is started for the
-moment it takes to copy three files. Its page asks other hosts for fonts, news and statistics; the copy is not
-allowed to.
+The web viewer is part of the rerun package and is handed out only by its own server, so that is started for the moment
+it takes to copy three files. Its page asks other hosts for fonts, news and statistics; the copy is not allowed to.
 """
 
 from __future__ import annotations
@@ -30,25 +27,65 @@ import rerun_cli  # type: ignore[import-untyped]
 from explorer.errors import CommandError
 
 RECORDING_NAME = "recording.rrd"
-
 VIEWER_FILES = ("re_viewer.js", "re_viewer_bg.wasm")
-
 START_LIMIT = 20.0
-
 """Wall time [s] that the viewer's server may take to answer."""
-
 # The viewer is WebAssembly and starts from an inline script; everything comes from the folder itself.
 POLICY = (
     "default-src 'self' data: blob:; script-src 'self' 'unsafe-inline' 'wasm-unsafe-eval'; "
     "style-src 'self' 'unsafe-inline'; connect-src 'self' data: blob:"
 )
-
 OPENING = f"""<meta http-equiv="Content-Security-Policy" content="{POLICY}">
     <script>
       if (!new URLSearchParams(location.search).has("url")) {{
         location.replace("?url=" + encodeURIComponent(new URL("{RECORDING_NAME}", location.href)));
       }}
     </script>"""
+HOST = "127.0.0.1"
+MAGIC = (b"RRF", b"RRIO")
+"""First bytes of a recording: "RRF2" and its successors, and the container of rerun from 0.20 on."""
+
+
+def check_recording(path: Path) -> None:
+    """Raise :class:`CommandError` unless ``path`` is a recording."""
+    if not path.is_file():
+        raise CommandError(f"{path}: {'is a folder' if path.is_dir() else 'no such file'}; a .rrd recording is needed")
+    with path.open("rb") as file:
+        start = file.read(4)
+    if not start.startswith(MAGIC):
+        raise CommandError(f"{path}: is not a rerun recording (.rrd)")
+
+
+def serve_replay(recording: Path, *, port: int, open_browser: bool, announce: Callable[[str], None]) -> None:
+    """Serve the recording on 127.0.0.1 until Ctrl-C; ``port`` 0 takes a free one.
+
+    Raises :class:`CommandError` where the port is taken.
+    """
+    with (
+        tempfile.TemporaryDirectory(prefix="explorer-replay-") as folder,
+        replay_server(Path(folder), port) as server,
+    ):
+        write_static_replay(recording, Path(folder))
+        address = f"http://{HOST}:{server.server_address[1]}/"
+        announce(f"{address}  (Ctrl-C ends it)")
+        if open_browser:
+            webbrowser.open(address)
+        server.serve_forever()
+
+
+def replay_server(folder: Path, port: int) -> ThreadingHTTPServer:
+    """A web server for ``folder`` on 127.0.0.1, not yet running."""
+    try:
+        return ThreadingHTTPServer((HOST, port), partial(_QuietHandler, directory=str(folder)))
+    except OSError as error:
+        raise CommandError(f"--port {port}: {error.strerror}; choose another or 0 for a free one") from None
+
+
+class _QuietHandler(SimpleHTTPRequestHandler):
+    """Serves a folder without a line per request."""
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Say nothing."""
 
 
 def write_static_replay(recording: Path, folder: Path) -> None:
@@ -69,21 +106,6 @@ def replay_page(viewer_page: str) -> str:
     if viewer_page.count("<head>") != 1:
         raise CommandError("rerun's viewer page has no <head>: this version of rerun-sdk is not supported")
     return viewer_page.replace("<head>", f"<head>\n    {OPENING}")
-
-
-def viewer_program() -> str:
-    """Path of rerun's own binary. The script `rerun` is a wrapper that leaves it running when it is ended."""
-    name = "rerun.exe" if os.name == "nt" else "rerun"
-    return str(Path(rerun_cli.__file__).with_name(name))
-
-
-def quiet_environment() -> dict[str, str]:
-    """This process's environment with rerun's statistics switched off, for one child only.
-
-    rerun sends none where ``CI`` is set ("Analytics disabled on CI", 0.41). Its other switch is a file among
-    the user's settings, which are not ours to change.
-    """
-    return {**os.environ, "CI": "1"}
 
 
 @contextmanager
@@ -128,48 +150,6 @@ def _free_port() -> int:
     return port
 
 
-HOST = "127.0.0.1"
-
-MAGIC = (b"RRF", b"RRIO")
-
-"""First bytes of a recording: "RRF2" and its successors, and the container of rerun from 0.20 on."""
-
-
-def check_recording(path: Path) -> None:
-    """Raise :class:`CommandError` unless ``path`` is a recording."""
-    if not path.is_file():
-        raise CommandError(f"{path}: {'is a folder' if path.is_dir() else 'no such file'}; a .rrd recording is needed")
-    with path.open("rb") as file:
-        start = file.read(4)
-    if not start.startswith(MAGIC):
-        raise CommandError(f"{path}: is not a rerun recording (.rrd)")
-
-
-def serve_replay(recording: Path, *, port: int, open_browser: bool, announce: Callable[[str], None]) -> None:
-    """Serve the recording on 127.0.0.1 until Ctrl-C; ``port`` 0 takes a free one.
-
-    Raises :class:`CommandError` where the port is taken.
-    """
-    with (
-        tempfile.TemporaryDirectory(prefix="explorer-replay-") as folder,
-        replay_server(Path(folder), port) as server,
-    ):
-        write_static_replay(recording, Path(folder))
-        address = f"http://{HOST}:{server.server_address[1]}/"
-        announce(f"{address}  (Ctrl-C ends it)")
-        if open_browser:
-            webbrowser.open(address)
-        server.serve_forever()
-
-
-def replay_server(folder: Path, port: int) -> ThreadingHTTPServer:
-    """A web server for ``folder`` on 127.0.0.1, not yet running."""
-    try:
-        return ThreadingHTTPServer((HOST, port), partial(_QuietHandler, directory=str(folder)))
-    except OSError as error:
-        raise CommandError(f"--port {port}: {error.strerror}; choose another or 0 for a free one") from None
-
-
 def open_native(recording: Path) -> None:
     """Open rerun's native viewer, its statistics off, and wait until it is closed.
 
@@ -183,8 +163,16 @@ def open_native(recording: Path) -> None:
         )
 
 
-class _QuietHandler(SimpleHTTPRequestHandler):
-    """Serves a folder without a line per request."""
+def viewer_program() -> str:
+    """Path of rerun's own binary. The script `rerun` is a wrapper that leaves it running when it is ended."""
+    name = "rerun.exe" if os.name == "nt" else "rerun"
+    return str(Path(rerun_cli.__file__).with_name(name))
 
-    def log_message(self, format: str, *args: Any) -> None:
-        """Say nothing."""
+
+def quiet_environment() -> dict[str, str]:
+    """This process's environment with rerun's statistics switched off, for one child only.
+
+    rerun sends none where ``CI`` is set ("Analytics disabled on CI", 0.41). Its other switch is a file among
+    the user's settings, which are not ours to change.
+    """
+    return {**os.environ, "CI": "1"}

@@ -17,25 +17,16 @@ from solver.observables.repose import flank_feet
 from solver.photograph import PhotographedPile, Picture, Refusal
 
 Array = npt.NDArray[np.float64]
-
 Colour = tuple[int, int, int]
 
 WIDTH = 960
-
 MOST_PANELS = 24
-
 MARGIN = 12
-
 TEXT = 18
-
 OUTLINE: Colour = (255, 255, 255)
-
 FLANK: Colour = (230, 159, 0)
-
 BASE: Colour = (86, 180, 233)
-
 RIM: Colour = (20, 24, 28)
-
 GROUND: Colour = (240, 240, 238)
 
 

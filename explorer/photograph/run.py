@@ -1,8 +1,6 @@
-"""`explorer measure`: read the pictures, find their scale, put a simulation beside them, write what was asked for.
+"""`explorer measure`: from options, checked before any picture is opened, to a reading per picture and its files.
 
-What `explorer measure` was asked for, checked before any picture is opened.
-
-What `explorer measure` finds: a reading per picture, and the simulated piles beside them.
+Pictures are read, their scale is found, a simulation is put beside them, and what was asked for is written.
 """
 
 from __future__ import annotations
@@ -10,7 +8,6 @@ from __future__ import annotations
 import io
 import math
 from dataclasses import dataclass
-from math import dist
 from pathlib import Path
 
 from explorer.errors import CommandError
@@ -29,7 +26,6 @@ from solver.photograph import (
 )
 
 FARTHEST = 1e5
-
 """Largest coordinate that a picture may be asked about [px]."""
 
 
@@ -105,7 +101,7 @@ def _numbers(text: str, option: str, form: str) -> tuple[float, ...]:
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MeasuredPhotographs:
     """What came out, in the order of the pictures."""
 
     readings: tuple[PhotographedPile | Refusal, ...]
@@ -122,13 +118,13 @@ class Measured:
         return tuple(reading for reading in self.readings if isinstance(reading, Refusal))
 
 
-def run_measure(order: MeasureOrder) -> Measured:
+def run_measure(order: MeasureOrder) -> MeasuredPhotographs:
     """Every picture is opened before the first is measured, so that a bad file ends the command at once.
 
     Raises PhotographError for a file that is no picture, and whatever the simulated source raises.
     """
     pictures = [open_picture(path) for path in order.pictures]
-    measured = Measured(
+    measured = MeasuredPhotographs(
         tuple(_reading(picture, order) for picture in pictures),
         None if order.simulation is None else simulated_piles(order.simulation),
     )
@@ -139,12 +135,6 @@ def run_measure(order: MeasureOrder) -> Measured:
     if order.outline is not None and measured.piles:
         write_whole(order.outline, outline_text(measured.piles[0]))
     return measured
-
-
-def outline_text(pile: PhotographedPile) -> str:
-    """A measured outline as the page lays it over a simulated pile (`explorer/files/measured_curves.py`)."""
-    rows = (f"{u:.6g},{z:.6g}\n" for u, z in zip(pile.outline.u, pile.outline.top, strict=True))
-    return f"# {' '.join(pile.name.split())}\nu_m,z_m\n" + "".join(rows)
 
 
 def _reading(picture: Picture, order: MeasureOrder) -> PhotographedPile | Refusal:
@@ -159,4 +149,10 @@ def _metres_per_pixel(picture: Picture, order: MeasureOrder) -> float | None:
     if order.reference_length is None:
         return order.metres_per_pixel
     ends = order.reference_ends
-    return order.reference_length / (dist(ends[:2], ends[2:]) if ends else reference_pixels(picture))
+    return order.reference_length / (math.dist(ends[:2], ends[2:]) if ends else reference_pixels(picture))
+
+
+def outline_text(pile: PhotographedPile) -> str:
+    """A measured outline as the page lays it over a simulated pile (`explorer/files/measured_curves.py`)."""
+    rows = (f"{u:.6g},{z:.6g}\n" for u, z in zip(pile.outline.u, pile.outline.top, strict=True))
+    return f"# {' '.join(pile.name.split())}\nu_m,z_m\n" + "".join(rows)

@@ -1,6 +1,6 @@
 """Sections as one HTML page that needs nothing else: plotly.js stands in it, and no request leaves it.
 
-Style and script of the page: calm, readable, light or dark as the reader's system is.
+It is calm, readable, and light or dark as the reader's system is.
 """
 
 from __future__ import annotations
@@ -79,13 +79,9 @@ dark.addEventListener("change", () => charts.forEach(place => Plotly.relayout(pl
 """
 
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
-
 """Content security policy: what would load something from elsewhere is refused by the browser."""
-
 NUMBER = re.compile(r"^(± )?[−+<>]?\d[\d.e−+]*( ?(°|%|σ|mm|1/mm|cm²|cm³|MPa|g|s|min|g/s|m/s|kg/m³))?( ± [\d.]+°?)?$")
-
 LONGEST_LINE = 60
-
 """Characters of a table's cell beyond which its column is broken into lines."""
 
 

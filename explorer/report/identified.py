@@ -19,7 +19,7 @@ GIVES_TARGET = "range that gives the target"
 
 
 @dataclass(frozen=True)
-class Setting:
+class FactorSetting:
     """One factor at the optimum, in words.
 
     ``chosen``: the value. ``confidence_set``: its 95 % set, a dash where the factor is not identified. ``feasible``:
@@ -56,7 +56,7 @@ class Setting:
         return self.value if self.feasible == MISSING else f"{self.feasible} ({BY_RULE}: {self.chosen})"
 
 
-def settings(optimum: OptimumResult) -> tuple[Setting, ...]:
+def settings(optimum: OptimumResult) -> tuple[FactorSetting, ...]:
     """Every factor of an optimum, in its order."""
     return tuple(_setting(optimum, k) for k in range(len(optimum.factors)))
 
@@ -92,11 +92,11 @@ def cloud_caution(optimum: OptimumResult) -> str:
     return f"The target does not identify {enumeration(open_)}: there the scatter is that of the rule's choice."
 
 
-def _setting(optimum: OptimumResult, k: int) -> Setting:
+def _setting(optimum: OptimumResult, k: int) -> FactorSetting:
     single, factor = optimum.single, optimum.factors[k]
     path, identified = factor.path, is_identified(single, k)
     low, high = float(single.solution_low[k]), float(single.solution_high[k])
-    return Setting(
+    return FactorSetting(
         name=factor.name,
         label=parameter_label(path),
         identified=identified,

@@ -1,7 +1,4 @@
-"""The charts that a study's result, or what there is of it so far, has something for.
-
-A chart that a person can choose by its title, drawn when it is chosen.
-"""
+"""The charts that a study's result, or what there is of it so far, has something for: chosen by title, drawn then."""
 
 from __future__ import annotations
 

@@ -1,10 +1,9 @@
-"""From what a person names on the command line to a scene: a rig, a material or a study, and settings on top.
+"""From what a person names on the command line to a scene: a rig, material, study or calibration, settings on top.
 
 A file with ``material`` but neither targets nor factors is a set-up: its tables ``[rig]``, ``[insertion]``,
 ``[numerics]`` and ``[effect.<name>]`` lie over the material (``solver/scenes/material_file.py``), as they may in a
-material file itself. With targets or factors it is a study and is read as `explorer calibrate` does.
-
-What a finished calibration found, as a scene: its study's set-up with the factors at the optimum.
+material file itself. With targets or factors it is a study and is read as `explorer calibrate` does. The folder of a
+finished calibration means its study's set-up with the factors at the optimum.
 """
 
 from __future__ import annotations
@@ -28,18 +27,15 @@ from solver.scenes.scene import with_rig
 from solver.shapes.solid import ShapeError
 
 DEFAULT_MATERIAL = "sunflower_extract"
-
 DEFAULT_STUDY = "sunflower_extract"
-
 SHIPPED: tuple[AssetKind, ...] = ("materials", "studies", "benchmarks")
-
 """Where a shipped name is looked for, in this order."""
 
 SET_UP_KEYS = ("format", "title", "material", *SET_UP)
 
 SOURCES = (*RIGS, *BENCH_RIGS)
-
 """Rigs that can be named on the command line."""
+RESULT = "result.json"
 
 
 def load_scene(source: str, material: str | None = None) -> Scene:
@@ -69,32 +65,6 @@ def load_scene(source: str, material: str | None = None) -> Scene:
         return study_scene(path)
     with _naming(path):
         return _set_up_scene(table, path)
-
-
-def study_scene(path: Path) -> Scene:
-    """The scene of a study file: its material and set-up with every factor at its reference."""
-    with _naming(path):
-        return load_study(str(path)).scene
-
-
-def with_settings(scene: Scene, settings: Sequence[str]) -> Scene:
-    """``scene`` with settings ``path=value`` (``rig.mass=12g``); of two for one path the last counts."""
-    values: dict[str, Any] = {}
-    for setting in settings:
-        path, equals, value = setting.partition("=")
-        if not equals or not path.strip():
-            raise ParameterError(f"--set {setting}: write path=value, such as rig.outlet_height=65mm")
-        values.pop(path.strip(), None)
-        values[path.strip()] = value.strip()
-    try:
-        return with_values_and_rig(scene, values)
-    except ParameterError as error:
-        raise ParameterError(f"--set: {error}") from None
-
-
-def study_path(study: str) -> Path:
-    """The file of a study, by its path or shipped name."""
-    return asset_path("studies", study)
 
 
 def _file_of(source: str) -> Path:
@@ -131,6 +101,17 @@ def _set_up_scene(table: dict[str, Any], path: Path) -> Scene:
     return with_set_up(material_scene(material, path.parent), table, path.parent)
 
 
+def study_scene(path: Path) -> Scene:
+    """The scene of a study file: its material and set-up with every factor at its reference."""
+    with _naming(path):
+        return load_study(str(path)).scene
+
+
+def study_path(study: str) -> Path:
+    """The file of a study, by its path or shipped name."""
+    return asset_path("studies", study)
+
+
 @contextmanager
 def _naming(path: Path) -> Iterator[None]:
     """Put the name of the file in front of an error about its contents."""
@@ -141,7 +122,19 @@ def _naming(path: Path) -> Iterator[None]:
         raise ParameterError(text if text.startswith(str(path)) else f"{path}: {text}") from None
 
 
-RESULT = "result.json"
+def with_settings(scene: Scene, settings: Sequence[str]) -> Scene:
+    """``scene`` with settings ``path=value`` (``rig.mass=12g``); of two for one path the last counts."""
+    values: dict[str, Any] = {}
+    for setting in settings:
+        path, equals, value = setting.partition("=")
+        if not equals or not path.strip():
+            raise ParameterError(f"--set {setting}: write path=value, such as rig.outlet_height=65mm")
+        values.pop(path.strip(), None)
+        values[path.strip()] = value.strip()
+    try:
+        return with_values_and_rig(scene, values)
+    except ParameterError as error:
+        raise ParameterError(f"--set: {error}") from None
 
 
 def is_calibration(source: str) -> bool:

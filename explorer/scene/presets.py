@@ -20,10 +20,8 @@ from solver.scenes.scene import Scene, canonical, parameters
 from solver.toml_file import TomlTable, checked, read_toml
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _-]{0,39}")
-
 OWN_MARK = " (own)"
 """Behind the name of a user's preset in a list."""
-
 MOST_BYTES = 100_000
 
 

@@ -1,7 +1,4 @@
-"""Where a scene came from, and the command line that repeats what it has become since.
-
-What differs between two scenes, as lines for a person.
-"""
+"""Where a scene came from, what it has become since, and the command line that repeats it."""
 
 from __future__ import annotations
 
@@ -12,50 +9,11 @@ from pathlib import Path
 
 from explorer.errors import CommandError
 from explorer.scene.file import load_scene, material_scene, study_scene
-from explorer.units import SCREEN_UNIT, quantity
-from solver.params import UNITS, ParameterError, parse_quantity
+from explorer.units import entry_unit, quantity
+from solver.params import ParameterError, parse_quantity
 from solver.scenes.material_file import with_settings
 from solver.scenes.scene import Scene, parameters, values, with_rig
 from solver.toml_file import read_toml
-
-
-@dataclass(frozen=True)
-class Difference:
-    """A parameter that has two values, SI or the names of choices."""
-
-    path: str
-    before: float | str
-    now: float | str
-    unit: str
-    live: bool
-    """Whether a running pour takes a new value at once."""
-
-    def __str__(self) -> str:
-        """``path: before → now`` with the units of the screen."""
-        before, now = shown(self.before, self.unit), shown(self.now, self.unit)
-        if before == now:  # alike to the digits of the screen
-            before, now = str(self.before), f"{self.now} {'' if self.unit == '1' else self.unit}".strip()
-        return f"{self.path}: {before} → {now}"
-
-
-def differences(before: Scene, now: Scene) -> Iterator[Difference]:
-    """Parameters that both scenes have and that differ, in the order of ``now``."""
-    old = values(before)
-    declared = parameters(now)
-    for path, new in values(now).items():
-        if path in old and old[path] != new:
-            yield Difference(path, old[path], new, declared[path].unit, declared[path].live)
-
-
-def changes(before: Scene, now: Scene) -> Iterator[str]:
-    """Parameters that differ between two scenes of the same materials and bodies, with both values and their unit."""
-    return map(str, differences(before, now))
-
-
-def shown(number: float | str, unit: str) -> str:
-    """A value with the unit of the screen, or the name of a choice."""
-    return number if isinstance(number, str) else quantity(number, unit)
-
 
 PROGRAM = ("explorer", "simulate")
 
@@ -136,8 +94,8 @@ def setting_text(change: Difference) -> str:
     """``path=value``, in the unit of the screen where that gives back every bit, otherwise in SI with all digits."""
     if isinstance(change.now, str):
         return f"{change.path}={change.now}"
-    number, unit = float(change.now), SCREEN_UNIT.get(change.unit, "" if change.unit == "1" else change.unit)
-    short = f"{number / UNITS.get(change.unit, {}).get(unit, 1.0):.6g}{unit}"
+    number, unit = float(change.now), entry_unit(change.unit)
+    short = f"{unit.of(number):.6g}{unit.symbol}"
     exact = parse_quantity(short, change.unit, change.path) == number
     return f"{change.path}={short if exact else repr(number)}"
 
@@ -155,3 +113,41 @@ def _applied(base: Scene, texts: Sequence[str]) -> Scene | None:
         return with_settings(base, dict(text.split("=", 1) for text in texts))
     except ParameterError:
         return None
+
+
+@dataclass(frozen=True)
+class Difference:
+    """A parameter that has two values, SI or the names of choices."""
+
+    path: str
+    before: float | str
+    now: float | str
+    unit: str
+    live: bool
+    """Whether a running pour takes a new value at once."""
+
+    def __str__(self) -> str:
+        """``path: before → now`` with the units of the screen."""
+        before, now = shown(self.before, self.unit), shown(self.now, self.unit)
+        if before == now:  # alike to the digits of the screen
+            before, now = str(self.before), f"{self.now} {'' if self.unit == '1' else self.unit}".strip()
+        return f"{self.path}: {before} → {now}"
+
+
+def differences(before: Scene, now: Scene) -> Iterator[Difference]:
+    """Parameters that both scenes have and that differ, in the order of ``now``."""
+    old = values(before)
+    declared = parameters(now)
+    for path, new in values(now).items():
+        if path in old and old[path] != new:
+            yield Difference(path, old[path], new, declared[path].unit, declared[path].live)
+
+
+def changes(before: Scene, now: Scene) -> Iterator[str]:
+    """Parameters that differ between two scenes of the same materials and bodies, with both values and their unit."""
+    return map(str, differences(before, now))
+
+
+def shown(number: float | str, unit: str) -> str:
+    """A value with the unit of the screen, or the name of a choice."""
+    return number if isinstance(number, str) else quantity(number, unit)

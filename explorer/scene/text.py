@@ -1,9 +1,8 @@
-"""A scene as the text of a material file that `solver.scenes.material_file` reads back as the same scene.
+"""A scene as the text of a material file, and a body as that of a body file: both are read back as they were.
 
-Everything is written out in SI: materials, bodies, pairs, rig, insertion, numerics and the effects that are on. Numbers
-keep all their digits; meshes are named by their full path.
-
-The file of a body that is declared by its spheres: what `explorer shape` writes and a material file takes in.
+A material file (`solver.scenes.material_file`) has everything in SI: materials, bodies, pairs, rig, insertion, numerics
+and the effects that are on. Numbers keep all their digits; meshes are named by their full path. A body file, which
+`explorer shape` writes and a material file takes in, declares one body by its spheres.
 """
 
 from __future__ import annotations
@@ -21,7 +20,11 @@ from solver.scenes.body import Body, Members
 from solver.shapes.clump_error import measured_fit
 from solver.shapes.solid import Solid, mass_properties
 
+Array = npt.NDArray[np.float64]
+
 SET_UP = ("rig", "insertion", "numerics")
+DIGITS = 9
+"""Significant digits: a nanometre on a metre."""
 
 
 def material_toml(scene: Scene, heading: str = "") -> str:
@@ -103,33 +106,6 @@ def _lines(entries: Mapping[str, Any]) -> str:
     return "".join(f"{toml_key(key)} = {toml_value(entry)}\n" for key, entry in entries.items())
 
 
-def toml_key(name: str) -> str:
-    """``name`` as a key, quoted where it has to be."""
-    return name if name.replace("_", "").replace("-", "").isalnum() and name.isascii() else json.dumps(name)
-
-
-def toml_value(entry: Any) -> str:
-    """A value of a plain type; every float in the digits that give it back."""
-    if isinstance(entry, Mapping):
-        return "{ " + ", ".join(f"{toml_key(key)} = {toml_value(item)}" for key, item in entry.items()) + " }"
-    if isinstance(entry, list | tuple):
-        return "[" + ", ".join(toml_value(item) for item in entry) + "]"
-    if isinstance(entry, str):
-        return json.dumps(entry, ensure_ascii=False)
-    if isinstance(entry, bool):
-        return "true" if entry else "false"
-    if isinstance(entry, int):
-        return str(entry)
-    return repr(float(entry))
-
-
-Array = npt.NDArray[np.float64]
-
-DIGITS = 9
-
-"""Significant digits: a nanometre on a metre."""
-
-
 def body_text(
     name: str,
     file: str,
@@ -188,3 +164,23 @@ sphere_radii = [{_numbers(radii)}]   # [m]
 
 def _numbers(values: Iterable[float]) -> str:
     return ", ".join(f"{value:.{DIGITS}g}" for value in values)
+
+
+def toml_key(name: str) -> str:
+    """``name`` as a key, quoted where it has to be."""
+    return name if name.replace("_", "").replace("-", "").isalnum() and name.isascii() else json.dumps(name)
+
+
+def toml_value(entry: Any) -> str:
+    """A value of a plain type; every float in the digits that give it back."""
+    if isinstance(entry, Mapping):
+        return "{ " + ", ".join(f"{toml_key(key)} = {toml_value(item)}" for key, item in entry.items()) + " }"
+    if isinstance(entry, list | tuple):
+        return "[" + ", ".join(toml_value(item) for item in entry) + "]"
+    if isinstance(entry, str):
+        return json.dumps(entry, ensure_ascii=False)
+    if isinstance(entry, bool):
+        return "true" if entry else "false"
+    if isinstance(entry, int):
+        return str(entry)
+    return repr(float(entry))

@@ -70,7 +70,7 @@ class StudyProcess(Protocol):
 
 
 @dataclass(frozen=True)
-class Order:
+class QueuedStudy:
     """One study that was asked for."""
 
     profile: str
@@ -95,7 +95,7 @@ class CalibrationProcess:
         self.study_file, self._folder, self._store = study_file, folder, store
         self._process = CommandProcess("study", ENDINGS, program)
         self._profile, self._tries = "", TRIES
-        self._line: WaitingLine[Order] = WaitingLine(self._process, self._begin, "studies")
+        self._line: WaitingLine[QueuedStudy] = WaitingLine(self._process, self._begin, "studies")
         self.status, self.clear_queue = self._line.status, self._line.clear
         self.cancel, self.pause, self.go_on = self._process.cancel, self._process.pause, self._process.go_on
 
@@ -145,12 +145,12 @@ class CalibrationProcess:
         """Output folders of finished studies, of any study file, newest first."""
         return finished(self._folder, RESULT)
 
-    def _order(self, profile: str, edits: StudyEdits) -> Order:
+    def _order(self, profile: str, edits: StudyEdits) -> QueuedStudy:
         text, study = edited_study(self.study_file, edits) if edits else ("", load_study(str(self.study_file)))
         with_profile(study, profile)
-        return Order(profile, edits, text)
+        return QueuedStudy(profile, edits, text)
 
-    def _begin(self, order: Order) -> None:
+    def _begin(self, order: QueuedStudy) -> None:
         self._profile, self._tries = order.profile, TRIES
         out = new_folder(self._folder, self._stem(order.profile))
         if order.text:

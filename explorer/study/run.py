@@ -1,9 +1,8 @@
 """A calibration from its order to its files: the study is read, run, and written as result.json and reports.
 
-``partial.json``: what a study that still runs has found so far (`doe.studies.study_result.PartialStudy`).
-
-Stages that have ended are there as in ``result.json``; ``partial`` names the stage that runs, whose own key, if there,
-holds its analysis of the runs so far, and ``line`` says it in words. The file is gone once ``result.json`` is written.
+While it runs, ``partial.json`` holds what it has found so far (`doe.studies.study_result.PartialStudy`): stages that
+have ended as in ``result.json``, and under ``partial`` the name of the stage that runs, whose own key, if there, holds
+its analysis of the runs so far, and ``line`` says it in words. The file is gone once ``result.json`` is written.
 """
 
 from __future__ import annotations
@@ -45,32 +44,6 @@ from solver.observables.made_up import estimator_bias
 
 if TYPE_CHECKING:
     from explorer.logs.pour_recorder import StudyRecorder
-
-
-class PartialResult:
-    """The file in the output folder of one study."""
-
-    def __init__(self, folder: Path, study: StudyDescription) -> None:
-        self._file, self._found = folder / PARTIAL, PartialStudy(study=study)
-        self.remove()
-
-    def show(self, stage: str, result: StageResult) -> None:
-        """``result`` is what ``stage`` found so far."""
-        # A mean that no run has given yet is no finding.
-        line = "" if re.search(r"\bnan\b", result.line) else result.line
-        self._write(replace(self._found.with_result(stage, result), partial=stage, line=line))
-
-    def keep(self, stage: str, result: StageResult | None) -> None:
-        """``stage`` has ended with ``result``, None where the study has no such stage."""
-        self._found = self._found.with_result(stage, result)
-        self._write(self._found)
-
-    def remove(self) -> None:
-        """Take the file away."""
-        self._file.unlink(missing_ok=True)
-
-    def _write(self, content: PartialStudy) -> None:
-        write_whole(self._file, json.dumps(content.to_dict(), ensure_ascii=False, allow_nan=False) + "\n")
 
 
 @dataclass(frozen=True)
@@ -143,6 +116,39 @@ def holds_more_than(folder: Path, study_file: Path) -> bool:
     return folder.is_dir() and any(entry.resolve() != study_file.resolve() for entry in folder.iterdir())
 
 
+def _recorder(folder: Path) -> StudyRecorder:
+    # rerun takes a second to import; only those who record pay for it.
+    from explorer.logs.pour_recorder import StudyRecorder
+
+    return StudyRecorder(folder)
+
+
+class PartialResult:
+    """The file in the output folder of one study."""
+
+    def __init__(self, folder: Path, study: StudyDescription) -> None:
+        self._file, self._found = folder / PARTIAL, PartialStudy(study=study)
+        self.remove()
+
+    def show(self, stage: str, result: StageResult) -> None:
+        """``result`` is what ``stage`` found so far."""
+        # A mean that no run has given yet is no finding.
+        line = "" if re.search(r"\bnan\b", result.line) else result.line
+        self._write(replace(self._found.with_result(stage, result), partial=stage, line=line))
+
+    def keep(self, stage: str, result: StageResult | None) -> None:
+        """``stage`` has ended with ``result``, None where the study has no such stage."""
+        self._found = self._found.with_result(stage, result)
+        self._write(self._found)
+
+    def remove(self) -> None:
+        """Take the file away."""
+        self._file.unlink(missing_ok=True)
+
+    def _write(self, content: PartialStudy) -> None:
+        write_whole(self._file, json.dumps(content.to_dict(), ensure_ascii=False, allow_nan=False) + "\n")
+
+
 def result_of(study: Study, profile: Profile, found: Campaign, total_s: float, tries: int = TRIES) -> StudyResult:
     """The content of ``result.json``."""
     runs = list(found.stages.all_runs())
@@ -159,10 +165,3 @@ def result_of(study: Study, profile: Profile, found: Campaign, total_s: float, t
         versions=versions(),
         shapes=tuple(PouredBody(body.name, body.mass, body.spheres, body.clump.fit) for body in study.scene.bodies),
     )
-
-
-def _recorder(folder: Path) -> StudyRecorder:
-    # rerun takes a second to import; only those who record pay for it.
-    from explorer.logs.pour_recorder import StudyRecorder
-
-    return StudyRecorder(folder)

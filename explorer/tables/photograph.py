@@ -14,7 +14,7 @@ from solver.photograph import PhotographedPile, Refusal
 from solver.photograph.reading_error import COVERAGE, Angle
 
 if TYPE_CHECKING:
-    from explorer.photograph.run import Measured
+    from explorer.photograph.run import MeasuredPhotographs
     from explorer.photograph.simulated import SimulatedPiles
 
 Array = npt.NDArray[np.float64]
@@ -23,7 +23,7 @@ MOST_POINTS = 400
 BASES = {"plate": "the plate beside the pile", "foot": "the foot of the pile", "given": "--baseline"}
 
 
-def measure_text(measured: Measured) -> str:
+def measure_text(measured: MeasuredPhotographs) -> str:
     """A table of the pictures, of the simulation below it, and what the numbers mean."""
     rows = [_row(pile) for pile in measured.piles]
     if measured.simulated is not None:
@@ -65,7 +65,7 @@ def angle_text(angle: Angle) -> str:
     return f"{angle.value_deg:.2f} ± {COVERAGE * angle.error_deg:.2f}"
 
 
-def measure_result(measured: Measured) -> dict[str, Any]:
+def measure_result(measured: MeasuredPhotographs) -> dict[str, Any]:
     """The same as JSON types, with the profiles."""
     return {
         "pictures": [
@@ -135,7 +135,7 @@ def _over_result(piles: Sequence[PhotographedPile]) -> dict[str, Any] | None:
     return {"n": means.size, "mean_deg": mean, "sd_deg": sd, "interval_deg": [mean - reach, mean + reach]}
 
 
-def _comparison(measured: Measured) -> str:
+def _comparison(measured: MeasuredPhotographs) -> str:
     assert measured.simulated is not None
     simulated = 0.5 * (measured.simulated.left_deg + measured.simulated.right_deg)
     if not measured.piles:

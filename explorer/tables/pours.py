@@ -1,10 +1,8 @@
-"""The table that a simulation prints: one line per pour as it finishes, then the means.
+"""What ``explorer simulate`` prints: a line per pour as it finishes, then the means; of a bench test, its quantities.
 
-What ``explorer simulate`` prints and keeps of a bench test: the measured value beside the one that was put in.
-
-Plain data: ``test``, ``body``, ``wall``, ``note``; ``quantities`` name → value, reference, error (value/reference − 1),
-spread, unit; ``series`` and ``table`` name → list of numbers; ``parameters`` path → value in SI, unit; ``versions``. A
-number that could not be measured is null.
+A bench test is kept as plain data: ``test``, ``body``, ``wall``, ``note``; ``quantities`` name → value, reference (what
+was put in), error (value/reference − 1), spread, unit; ``series`` and ``table`` name → list of numbers; ``parameters``
+path → value in SI, unit; ``versions``. A number that could not be measured is null.
 """
 
 from __future__ import annotations
@@ -36,7 +34,6 @@ COLUMNS = {
     "in rig g": -8,
     "wall s": -6,
 }
-
 """Heading → width, negative for a column of numbers.
 
 "angle" is the first observable of the rig, "within" its standard deviation over the views of one pile (the flanks, the
@@ -100,10 +97,6 @@ def energy_line(accounts: Sequence[dict[str, float | None]]) -> str:
     )
 
 
-def _number(number: float | None, form: str) -> str:
-    return "-" if number is None or not math.isfinite(number) else format(number, form)
-
-
 def bench_data(scene: Scene, result: BenchResult) -> dict[str, Any]:
     """All about one bench test as plain data."""
     return {
@@ -129,13 +122,17 @@ def bench_data(scene: Scene, result: BenchResult) -> dict[str, Any]:
     }
 
 
+def _finite(number: float | None) -> float | None:
+    return None if number is None or not math.isfinite(number) else float(number)
+
+
 def bench_text(data: dict[str, Any]) -> str:
     """The same for people: quantities, then the table where there is one."""
     rows = [
         (
             name,
-            _cell(entry["value"]),
-            _cell(entry["reference"]),
+            _number(entry["value"], ".5g"),
+            _number(entry["reference"], ".5g"),
             _percent(entry["error"]),
             entry["unit"],
         )
@@ -147,9 +144,13 @@ def bench_text(data: dict[str, Any]) -> str:
     ]
     if data["table"]:
         columns = data["table"]
-        lines = [tuple(_cell(number) for number in row) for row in zip(*columns.values(), strict=True)]
+        lines = [tuple(_number(number, ".5g") for number in row) for row in zip(*columns.values(), strict=True)]
         parts.append(text_table(tuple(columns), lines))
     return "\n\n".join([*parts, data["note"]] if data["note"] else parts)
+
+
+def _percent(error: float | None) -> str:
+    return "-" if error is None else f"{100.0 * error:+.3f}"
 
 
 def write_bench(folder: Path, data: dict[str, Any]) -> None:
@@ -158,13 +159,5 @@ def write_bench(folder: Path, data: dict[str, Any]) -> None:
     (folder / "parameters.toml").write_text(parameters_text(data["parameters"]), encoding="utf-8")
 
 
-def _finite(number: float | None) -> float | None:
-    return None if number is None or not math.isfinite(number) else float(number)
-
-
-def _cell(number: float | None) -> str:
-    return "-" if number is None else f"{number:.5g}"
-
-
-def _percent(error: float | None) -> str:
-    return "-" if error is None else f"{100.0 * error:+.3f}"
+def _number(number: float | None, form: str) -> str:
+    return "-" if number is None or not math.isfinite(number) else format(number, form)

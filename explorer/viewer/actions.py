@@ -1,18 +1,12 @@
-"""From callbacks to the page's loop.
+"""From what a person does at the page to its loop: actions, buttons, keys, work off the loop, and the loop's clock.
 
-viser calls back on many threads. A callback only leaves an action here; the one thread that owns session and
-page carries it out, and shows the one line of whatever was refused, by us or by the machine.
+viser calls back on many threads. A callback only leaves an action here; the one thread that owns session and page
+carries it out, and shows the one line of whatever was refused, by us or by the machine. What the program itself sets
+is no click. Work that takes seconds (reading scans, fitting spheres) is done off the loop, one thing at a time.
 
-Buttons and keys that leave an action for the page's loop; what the program itself sets is no click.
-
-Work that takes seconds (reading scans, fitting spheres), off the page's loop: one thing at a time.
-
-An even clock for the page's loop.
-
-Arrow keys that a slider takes for itself: the browser sends them as the page's command as well.
-
-viser keeps a command's key from acting in a text field, but a slider's thumb is none. A browser tells a slider's new
-value up to a tenth of a second after the key, so a command waits for that before it is carried out, or dropped.
+Arrow keys that a slider takes for itself reach the page as a command as well: viser keeps a command's key from acting
+in a text field, but a slider's thumb is none. A browser tells a slider's new value up to a tenth of a second after the
+key, so a command waits for that before it is carried out, or dropped.
 """
 
 from __future__ import annotations
@@ -31,8 +25,13 @@ from viser import _messages
 from explorer.errors import CommandError
 
 Action = Callable[[], None]
-
 Post = Callable[[Action], None]
+ClientAction = Callable[[Any], None]
+"""Something that is done to one browser."""
+Found = TypeVar("Found")
+
+ARROW_WAIT = 0.2
+"""How long an arrow key waits [s], and how near to it in time a slider's new value is the slider's own answer."""
 
 
 class Actions:
@@ -62,9 +61,16 @@ class Actions:
                 notice = f"{error.filename or 'file'}: {error.strerror or error}"
 
 
-ClientAction = Callable[[Any], None]
+class FrameClock:
+    """Frames every ``interval`` [s], counted from when the last one was due: what waits too long does not add up."""
 
-"""Something that is done to one browser."""
+    def __init__(self, interval: float) -> None:
+        self._interval, self._due = interval, time.monotonic()
+
+    def wait(self, stop: threading.Event) -> None:
+        """Wait until the next frame is due, or ``stop`` is set; not at all where it is due already."""
+        self._due = max(self._due + self._interval, time.monotonic())
+        stop.wait(self._due - time.monotonic())
 
 
 def button_group(gui: viser.GuiApi, title: str, acts: Mapping[str, Action], post: Post, hint: str | None = None) -> Any:
@@ -92,6 +98,12 @@ def client_buttons(
             post(partial(acts[event.target.value], event.client))
 
 
+def add_keys(gui: viser.GuiApi, acts: Mapping[str, Action], keys: Mapping[str, Any], post: Post) -> None:
+    """A command per entry of ``keys`` (label → key), which posts the action of that label; in viser's palette too."""
+    for label, key in keys.items():
+        gui.add_command(label, hotkey=key).on_trigger(_posting(acts[label], post))
+
+
 def add_client_key(gui: viser.GuiApi, label: str, key: Any, act: ClientAction, post: Post) -> None:
     """A command with a key, which posts ``act`` with the browser in which it was pressed."""
 
@@ -102,10 +114,40 @@ def add_client_key(gui: viser.GuiApi, label: str, key: Any, act: ClientAction, p
     gui.add_command(label, hotkey=key).on_trigger(pressed)
 
 
-def add_keys(gui: viser.GuiApi, acts: Mapping[str, Action], keys: Mapping[str, Any], post: Post) -> None:
-    """A command per entry of ``keys`` (label → key), which posts the action of that label; in viser's palette too."""
-    for label, key in keys.items():
-        gui.add_command(label, hotkey=key).on_trigger(_posting(acts[label], post))
+def _posting(action: Action, post: Post) -> Any:
+    def pressed(event: object) -> None:
+        post(action)
+
+    return pressed
+
+
+class SliderHands:
+    """Notes when a browser last moved a slider of ``server``."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._moved = -math.inf
+        server._websock_server.register_handler(_messages.GuiUpdateMessage, self._note)
+
+    def unless_on_a_slider(self, post: Post) -> Post:
+        """``post`` for arrow keys: a moment later, or not at all if a slider was moved about then."""
+
+        def later(action: Action) -> None:
+            pressed = time.monotonic()
+
+            def decide() -> None:
+                if abs(self._moved - pressed) > ARROW_WAIT:
+                    post(action)
+
+            timer = threading.Timer(ARROW_WAIT, decide)
+            timer.daemon = True
+            timer.start()
+
+        return later
+
+    def _note(self, client_id: int, message: Any) -> None:
+        value = message.updates.get("value")
+        if isinstance(value, int | float) and not isinstance(value, bool):
+            self._moved = time.monotonic()
 
 
 def on_upload(button: viser.GuiUploadButtonHandle, take: Callable[[str, bytes], None], post: Post) -> None:
@@ -116,16 +158,6 @@ def on_upload(button: viser.GuiUploadButtonHandle, take: Callable[[str, bytes], 
         if event.client_id is not None:
             sent = event.target.value
             post(lambda: take(str(sent.name), bytes(sent.content)))
-
-
-def _posting(action: Action, post: Post) -> Any:
-    def pressed(event: object) -> None:
-        post(action)
-
-    return pressed
-
-
-Found = TypeVar("Found")
 
 
 class BackgroundWork:
@@ -168,49 +200,3 @@ class BackgroundWork:
     def _refuse(self, error: Exception) -> None:
         self._busy_with = ""
         raise error
-
-
-class FrameClock:
-    """Frames every ``interval`` [s], counted from when the last one was due: what waits too long does not add up."""
-
-    def __init__(self, interval: float) -> None:
-        self._interval, self._due = interval, time.monotonic()
-
-    def wait(self, stop: threading.Event) -> None:
-        """Wait until the next frame is due, or ``stop`` is set; not at all where it is due already."""
-        self._due = max(self._due + self._interval, time.monotonic())
-        stop.wait(self._due - time.monotonic())
-
-
-WAIT = 0.2
-
-"""How long an arrow key waits [s], and how near to it in time a slider's new value is the slider's own answer."""
-
-
-class SliderHands:
-    """Notes when a browser last moved a slider of ``server``."""
-
-    def __init__(self, server: viser.ViserServer) -> None:
-        self._moved = -math.inf
-        server._websock_server.register_handler(_messages.GuiUpdateMessage, self._note)
-
-    def unless_on_a_slider(self, post: Post) -> Post:
-        """``post`` for arrow keys: a moment later, or not at all if a slider was moved about then."""
-
-        def later(action: Action) -> None:
-            pressed = time.monotonic()
-
-            def decide() -> None:
-                if abs(self._moved - pressed) > WAIT:
-                    post(action)
-
-            timer = threading.Timer(WAIT, decide)
-            timer.daemon = True
-            timer.start()
-
-        return later
-
-    def _note(self, client_id: int, message: Any) -> None:
-        value = message.updates.get("value")
-        if isinstance(value, int | float) and not isinstance(value, bool):
-            self._moved = time.monotonic()

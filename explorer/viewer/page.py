@@ -1,12 +1,9 @@
 """The page: one loop that takes actions, asks the session, and shows the panels what there is. They do the rest.
 
-Who is at the page, and whose hand was on it last: several browsers share one pour.
-
-viser tells a callback who moved a control, but a change comes back from the solver's process later; so every message of
-a browser is noted as it arrives, and a change is signed by the browser that sent one last. The handlers are private
-names of viser, which is why it is pinned and a test watches them.
-
-What people asked for beside parameters, as events that every browser sees: another pour, a study, a diagnosis.
+Several browsers share one pour. viser tells a callback who moved a control, but a change comes back from the solver's
+process later; so every message of a browser is noted as it arrives, and a change is signed by the browser that sent one
+last. What people asked for beside parameters (another pour, a study, a diagnosis) becomes an event that every browser
+sees. The handlers are private names of viser, which is why it is pinned and a test watches them.
 """
 
 from __future__ import annotations
@@ -39,92 +36,13 @@ from explorer.viewer.tour import Tour
 from explorer.viewer.view import light
 
 ACTED_WITHIN = 2.0
-
 """A change that comes back within this time [s] of a browser's message is taken for that browser's."""
-
 ACTS = (_messages.GuiUpdateMessage, _messages.CommandTriggerMessage)
-
 """Messages by which a person acts."""
-
-
-class People:
-    """Browsers, numbered from 1 in the order in which they came; a number is never given twice."""
-
-    def __init__(self, server: viser.ViserServer) -> None:
-        self._server = server
-        self._last, self._at = 0, -math.inf
-        for kind in ACTS:
-            server._websock_server.register_handler(kind, self._acted)
-
-        @server.on_client_connect
-        def _(client: viser.ClientHandle) -> None:
-            if self.present > 1:
-                client.add_notification(
-                    f"You are browser {number(client.client_id)}",
-                    f"{self.present} browsers are at this page, with the same pour.",
-                    auto_close_seconds=8.0,
-                )
-
-    @property
-    def present(self) -> int:
-        """How many browsers are at the page."""
-        return len(self._server.get_clients())
-
-    def signed(self, event: Event) -> Event:
-        """``event``, a change or an order with the browser behind its text where there are several."""
-        if not (event.is_change or event.is_order) or self.present < 2 or time.monotonic() > self._at + ACTED_WITHIN:
-            return event
-        return replace(event, text=f"{event.text} · browser {self._last}")
-
-    def _acted(self, client_id: int, message: Any) -> None:
-        self._last, self._at = number(client_id), time.monotonic()
-
-
-def number(client_id: int) -> int:
-    """What a browser is called."""
-    return client_id + 1
-
-
 ASKED_FOR = ("running", "paused", "cancelled")
-
 """States of a command that somebody's hand brings about; it ends in the others by itself."""
-
-
-class Command(Protocol):
-    """A study, or a diagnosis."""
-
-    def status(self) -> CommandStatus:
-        """State and progress."""
-
-
-class Orders:
-    """Compares what there is with what there was; ``commands``: name → what runs in the background."""
-
-    def __init__(self, commands: Mapping[str, Command]) -> None:
-        self._commands = dict(commands)
-        self._states = {name: command.status().state for name, command in self._commands.items()}
-        self._generation: int | None = None
-
-    def of_the_pour(self, status: Status) -> Iterator[Event]:
-        """A pour other than the last time; the first one is nobody's order."""
-        before, self._generation = self._generation, status.generation
-        if before not in (None, status.generation):
-            text = f"poured anew: {status.scene.rig.name}, seed {status.seed}"
-            yield Event(status.generation, 0.0, text, is_order=True)
-
-    def in_the_background(self, status: Status) -> Iterator[Event]:
-        """Commands that are in another state than the last time."""
-        for name, command in self._commands.items():
-            before, now = self._states[name], command.status().state
-            self._states[name] = now
-            if now != before:
-                yield Event(status.generation, status.time, f"{name}: {now}", is_order=now in ASKED_FOR)
-
-
 EVENTS_REMEMBERED = 1000
-
 FRAME_INTERVAL = 1.0 / 36.0
-
 """Seconds between two looks at the newest frame: 30 a second are promised, and some come late or bring nothing new."""
 
 
@@ -142,7 +60,7 @@ class Page:
         self._server, self._session, self._recorder = server, session, recorder
         self._events: deque[Event] = deque(maxlen=EVENTS_REMEMBERED)
         self._actions, self._people = Actions(), People(server)
-        self._orders = Orders({"diagnosis": diagnosis} | ({} if study is None else {"study": study}))
+        self._orders = OrderEvents({"diagnosis": diagnosis} | ({} if study is None else {"study": study}))
         self._notice, self._time = "", session.status().time
         light(server)
         apply_theme(server, DARK)
@@ -215,3 +133,72 @@ class Page:
             for panel in panels:
                 if panel.every == every:
                     panel.show(now)
+
+
+class People:
+    """Browsers, numbered from 1 in the order in which they came; a number is never given twice."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        self._last, self._at = 0, -math.inf
+        for kind in ACTS:
+            server._websock_server.register_handler(kind, self._acted)
+
+        @server.on_client_connect
+        def _(client: viser.ClientHandle) -> None:
+            if self.present > 1:
+                client.add_notification(
+                    f"You are browser {browser_number(client.client_id)}",
+                    f"{self.present} browsers are at this page, with the same pour.",
+                    auto_close_seconds=8.0,
+                )
+
+    @property
+    def present(self) -> int:
+        """How many browsers are at the page."""
+        return len(self._server.get_clients())
+
+    def signed(self, event: Event) -> Event:
+        """``event``, a change or an order with the browser behind its text where there are several."""
+        if not (event.is_change or event.is_order) or self.present < 2 or time.monotonic() > self._at + ACTED_WITHIN:
+            return event
+        return replace(event, text=f"{event.text} · browser {self._last}")
+
+    def _acted(self, client_id: int, message: Any) -> None:
+        self._last, self._at = browser_number(client_id), time.monotonic()
+
+
+def browser_number(client_id: int) -> int:
+    """What a browser is called."""
+    return client_id + 1
+
+
+class OrderEvents:
+    """Tells of what is there and was not the last time; ``commands``: name → what runs in the background."""
+
+    def __init__(self, commands: Mapping[str, BackgroundCommand]) -> None:
+        self._commands = dict(commands)
+        self._states = {name: command.status().state for name, command in self._commands.items()}
+        self._generation: int | None = None
+
+    def of_the_pour(self, status: Status) -> Iterator[Event]:
+        """A pour other than the last time; the first one is nobody's order."""
+        before, self._generation = self._generation, status.generation
+        if before not in (None, status.generation):
+            text = f"poured anew: {status.scene.rig.name}, seed {status.seed}"
+            yield Event(status.generation, 0.0, text, is_order=True)
+
+    def in_the_background(self, status: Status) -> Iterator[Event]:
+        """Commands that are in another state than the last time."""
+        for name, command in self._commands.items():
+            before, now = self._states[name], command.status().state
+            self._states[name] = now
+            if now != before:
+                yield Event(status.generation, status.time, f"{name}: {now}", is_order=now in ASKED_FOR)
+
+
+class BackgroundCommand(Protocol):
+    """A study, or a diagnosis."""
+
+    def status(self) -> CommandStatus:
+        """State and progress."""

@@ -1,6 +1,6 @@
-"""The pour in 3-D: bodies as batched meshes (one node per component), funnel, gate and plate.
+"""The pour in 3-D: bodies as batched meshes (one node per component), and the rig's surfaces, gate and plate.
 
-Bodies in 3-D as batched meshes, one node per component; the same for a live pour and a recording.
+The bodies' nodes serve a live pour and a recording alike.
 """
 
 from __future__ import annotations
@@ -18,157 +18,19 @@ from explorer.scene.meshes import GATE_NAME, PLATE_NAME, body_triangles, rig_pos
 from explorer.viewer.style import BODY_COLOURS, GLASS, PLATE, RIM, RING, Colour, linear
 from solver.scenes.scene import Scene, body_counts
 
-FINE = 2000
-
-"""Bodies up to which each is drawn with all its faces, however far it is."""
-
-
-@dataclass(frozen=True)
-class Poses:
-    """Instances of one component as viser wants them; bodies that are not in the scene have scale 0."""
-
-    position: npt.NDArray[np.float32]
-    """[m], shape (n, 3)."""
-    quaternion: npt.NDArray[np.float32]
-    """wxyz, shape (n, 4)."""
-    scale: npt.NDArray[np.float32]
-    """Size of a body relative to its mesh, or 0, shape (n,)."""
-
-
-class Mesh(Protocol):
-    """Surface of a body in its own frame."""
-
-    @property
-    def vertices(self) -> npt.NDArray[Any]:
-        """[m], shape (v, 3)."""
-
-    @property
-    def faces(self) -> npt.NDArray[Any]:
-        """Indices of vertices, shape (f, 3)."""
-
-
-@dataclass(frozen=True, eq=False)
-class Kind:
-    """One component: its mesh, its colour, and how many of it there can be."""
-
-    mesh: Mesh
-    colour: Colour
-    most: int
-
-
-class BodyNodes:
-    """Nodes of all bodies, below the node ``root``; none for a component without bodies."""
-
-    def __init__(self, server: viser.ViserServer, kinds: Sequence[Kind], root: str = "") -> None:
-        self._kinds = tuple(kinds)
-        self._colours = np.array([linear(kind.colour) for kind in kinds], dtype=np.uint8).reshape(-1, 3)
-        self.nodes: list[Any] = [
-            _batch(server, f"{root}/bodies/{k}", kind) if kind.most > 0 else None for k, kind in enumerate(kinds)
-        ]
-
-    def show(self, frame: Frame, seen: npt.NDArray[np.bool_] | None = None) -> None:
-        """Move the bodies to where ``frame`` has them; ``seen`` as in :func:`component_poses`."""
-        for k, node, kind in self._there():
-            _place(node, component_poses(frame, k, kind.most, seen))
-
-    def plain(self, frame: Frame) -> npt.NDArray[np.uint8]:
-        """Colours by component of the bodies of ``frame``, as :meth:`paint` wants them, shape (n, 3)."""
-        # The last frame of the scene before may hold more components than this one has.
-        return self._colours[frame.component % len(self._colours)]
-
-    def paint(self, frame: Frame, colours: npt.NDArray[np.uint8]) -> None:
-        """Give the bodies of ``frame`` their ``colours`` (n, 3), those of batched meshes (``palette.linear``)."""
-        for k, node, kind in self._there():
-            chosen = np.flatnonzero(frame.component == k)[: kind.most]
-            painted = _plain(kind)
-            painted[: len(chosen)] = colours[chosen]
-            node.batched_colors = painted
-
-    def fade(self, opacity: float | None) -> None:
-        """Opacity of the bodies; None: opaque."""
-        for _, node, _ in self._there():
-            node.opacity = opacity
-
-    def clear(self) -> None:
-        """Hide all bodies."""
-        for _, node, kind in self._there():
-            _place(node, nowhere(kind.most))
-
-    def remove(self) -> None:
-        """Take all nodes off the page."""
-        for _, node, _ in self._there():
-            node.remove()
-
-    def _there(self) -> list[tuple[int, Any, Kind]]:
-        pairs = enumerate(zip(self.nodes, self._kinds, strict=True))
-        return [(k, node, kind) for k, (node, kind) in pairs if node is not None]
-
-
-def _batch(server: viser.ViserServer, name: str, kind: Kind) -> Any:
-    none = nowhere(kind.most)
-    return server.scene.add_batched_meshes_simple(
-        name,
-        kind.mesh.vertices,
-        kind.mesh.faces,
-        batched_wxyzs=none.quaternion,
-        batched_positions=none.position,
-        batched_scales=none.scale,
-        batched_colors=_plain(kind),
-        lod="off" if kind.most <= FINE else "auto",
-    )
-
-
-def _plain(kind: Kind) -> npt.NDArray[np.uint8]:
-    return np.tile(np.array(linear(kind.colour), dtype=np.uint8), (kind.most, 1))
-
-
-def _place(node: Any, poses: Poses) -> None:
-    node.batched_positions = poses.position
-    node.batched_wxyzs = poses.quaternion
-    node.batched_scales = poses.scale
-
-
-def component_poses(frame: Frame, component: int, n: int, seen: npt.NDArray[np.bool_] | None = None) -> Poses:
-    """Poses of the bodies of one component, ``n`` of which will enter in all, in order of entry.
-
-    Those that are not ``seen``, shape (bodies of the frame,), are hidden; by default those that have left the domain.
-    """
-    seen = frame.inside if seen is None else seen
-    poses = nowhere(n)
-    chosen = np.flatnonzero(frame.component == component)[:n]
-    poses.position[: len(chosen)] = frame.position[chosen]
-    poses.quaternion[: len(chosen)] = frame.quaternion[chosen]
-    poses.scale[: len(chosen)] = np.where(seen[chosen], frame.scale[chosen], 0.0)
-    return poses
-
-
-def nowhere(n: int) -> Poses:
-    """``n`` hidden instances."""
-    quaternion = np.zeros((n, 4), dtype=np.float32)
-    quaternion[:, 0] = 1.0
-    return Poses(np.zeros((n, 3), dtype=np.float32), quaternion, np.zeros(n, dtype=np.float32))
-
-
 Array = npt.NDArray[np.float64]
 
+FINE = 2000
+"""Bodies of a component up to which each is drawn with all its faces, however far it is."""
 RING_SPACING = 0.05
-
 """Circles on the plate, a scale for the eye [m]."""
-
 PLATE_RADIUS = 0.2
-
 """Radius of the disc that stands for the infinite plate [m]."""
-
 CORNERS = 72
-
-"""Corners of such a circle."""
-
+"""Corners of a circle on the plate and of a rim."""
 LINE = 8e-4
-
 """Thickness of lines [m]."""
-
 CLEAR, OPACITY = 0.16, {GATE_NAME: 0.5}
-
 """Opacity of what one has to look through: all surfaces but the plate."""
 
 
@@ -181,7 +43,10 @@ class SceneNodes:
         numbers = body_counts(scene)
         self.bodies = BodyNodes(
             server,
-            [Kind(mesh, component_colour(k), n) for k, (mesh, n) in enumerate(zip(self.meshes, numbers, strict=True))],
+            [
+                DrawnComponent(mesh, component_colour(k), n)
+                for k, (mesh, n) in enumerate(zip(self.meshes, numbers, strict=True))
+            ],
             root,
         )
         self._rig = rig_nodes(server, scene, root)
@@ -232,20 +97,130 @@ def component_colour(k: int) -> Colour:
     return BODY_COLOURS[k % len(BODY_COLOURS)]
 
 
-def seen_through(name: str) -> bool:
-    """Whether a surface of the rig fades as a person wants it: all but the plate, and those with their own opacity."""
-    return name != PLATE_NAME and name not in OPACITY
+class BodyNodes:
+    """Nodes of all bodies, below the node ``root``; none for a component without bodies."""
+
+    def __init__(self, server: viser.ViserServer, kinds: Sequence[DrawnComponent], root: str = "") -> None:
+        self._kinds = tuple(kinds)
+        self._colours = np.array([linear(kind.colour) for kind in kinds], dtype=np.uint8).reshape(-1, 3)
+        self.nodes: list[Any] = [
+            _batch(server, f"{root}/bodies/{k}", kind) if kind.most > 0 else None for k, kind in enumerate(kinds)
+        ]
+
+    def show(self, frame: Frame, seen: npt.NDArray[np.bool_] | None = None) -> None:
+        """Move the bodies to where ``frame`` has them; ``seen`` as in :func:`component_poses`."""
+        for k, node, kind in self._there():
+            _place(node, component_poses(frame, k, kind.most, seen))
+
+    def plain(self, frame: Frame) -> npt.NDArray[np.uint8]:
+        """Colours by component of the bodies of ``frame``, as :meth:`paint` wants them, shape (n, 3)."""
+        # The last frame of the scene before may hold more components than this one has.
+        return self._colours[frame.component % len(self._colours)]
+
+    def paint(self, frame: Frame, colours: npt.NDArray[np.uint8]) -> None:
+        """Give the bodies of ``frame`` their ``colours`` (n, 3), those of batched meshes (``style.linear``)."""
+        for k, node, kind in self._there():
+            chosen = np.flatnonzero(frame.component == k)[: kind.most]
+            painted = _plain(kind)
+            painted[: len(chosen)] = colours[chosen]
+            node.batched_colors = painted
+
+    def fade(self, opacity: float | None) -> None:
+        """Opacity of the bodies; None: opaque."""
+        for _, node, _ in self._there():
+            node.opacity = opacity
+
+    def clear(self) -> None:
+        """Hide all bodies."""
+        for _, node, kind in self._there():
+            _place(node, hidden_poses(kind.most))
+
+    def remove(self) -> None:
+        """Take all nodes off the page."""
+        for _, node, _ in self._there():
+            node.remove()
+
+    def _there(self) -> list[tuple[int, Any, DrawnComponent]]:
+        pairs = enumerate(zip(self.nodes, self._kinds, strict=True))
+        return [(k, node, kind) for k, (node, kind) in pairs if node is not None]
 
 
-def drawn(name: str) -> dict[str, Any]:
-    """How a surface of the rig is drawn.
+@dataclass(frozen=True, eq=False)
+class DrawnComponent:
+    """One component: its mesh, its colour, and how many of it there can be."""
 
-    The plate fills much of the picture; without a graphics card it would take more time than all the rest. So only its
-    upper side is drawn, evenly lit.
+    mesh: BodyMesh
+    colour: Colour
+    most: int
+
+
+class BodyMesh(Protocol):
+    """Surface of a body in its own frame."""
+
+    @property
+    def vertices(self) -> npt.NDArray[Any]:
+        """[m], shape (v, 3)."""
+
+    @property
+    def faces(self) -> npt.NDArray[Any]:
+        """Indices of vertices, shape (f, 3)."""
+
+
+def _batch(server: viser.ViserServer, name: str, kind: DrawnComponent) -> Any:
+    none = hidden_poses(kind.most)
+    return server.scene.add_batched_meshes_simple(
+        name,
+        kind.mesh.vertices,
+        kind.mesh.faces,
+        batched_wxyzs=none.quaternion,
+        batched_positions=none.position,
+        batched_scales=none.scale,
+        batched_colors=_plain(kind),
+        lod="off" if kind.most <= FINE else "auto",
+    )
+
+
+def _plain(kind: DrawnComponent) -> npt.NDArray[np.uint8]:
+    return np.tile(np.array(linear(kind.colour), dtype=np.uint8), (kind.most, 1))
+
+
+def _place(node: Any, poses: InstancePoses) -> None:
+    node.batched_positions = poses.position
+    node.batched_wxyzs = poses.quaternion
+    node.batched_scales = poses.scale
+
+
+@dataclass(frozen=True)
+class InstancePoses:
+    """Instances of one component as viser wants them; bodies that are not in the scene have scale 0."""
+
+    position: npt.NDArray[np.float32]
+    """[m], shape (n, 3)."""
+    quaternion: npt.NDArray[np.float32]
+    """wxyz, shape (n, 4)."""
+    scale: npt.NDArray[np.float32]
+    """Size of a body relative to its mesh, or 0, shape (n,)."""
+
+
+def component_poses(frame: Frame, component: int, n: int, seen: npt.NDArray[np.bool_] | None = None) -> InstancePoses:
+    """Poses of the bodies of one component, ``n`` of which will enter in all, in order of entry.
+
+    Those that are not ``seen``, shape (bodies of the frame,), are hidden; by default those that have left the domain.
     """
-    if name == PLATE_NAME:
-        return {"side": "front", "material": "toon3", "cast_shadow": False, "receive_shadow": True}
-    return {"side": "double", "cast_shadow": False, "receive_shadow": False}
+    seen = frame.inside if seen is None else seen
+    poses = hidden_poses(n)
+    chosen = np.flatnonzero(frame.component == component)[:n]
+    poses.position[: len(chosen)] = frame.position[chosen]
+    poses.quaternion[: len(chosen)] = frame.quaternion[chosen]
+    poses.scale[: len(chosen)] = np.where(seen[chosen], frame.scale[chosen], 0.0)
+    return poses
+
+
+def hidden_poses(n: int) -> InstancePoses:
+    """``n`` hidden instances."""
+    quaternion = np.zeros((n, 4), dtype=np.float32)
+    quaternion[:, 0] = 1.0
+    return InstancePoses(np.zeros((n, 3), dtype=np.float32), quaternion, np.zeros(n, dtype=np.float32))
 
 
 def rig_nodes(server: viser.ViserServer, scene: Scene, root: str = "") -> dict[str, Any]:
@@ -272,6 +247,22 @@ def rig_nodes(server: viser.ViserServer, scene: Scene, root: str = "") -> dict[s
             # Below the surface's node: it moves, and goes, with that.
             server.scene.add_line_segments(f"{root}/rig/{name}/rims", ends, RIM, thickness=LINE)
     return nodes | (_scale(server, root) if PLATE_NAME in nodes else {})
+
+
+def drawn(name: str) -> dict[str, Any]:
+    """How a surface of the rig is drawn.
+
+    The plate fills much of the picture; without a graphics card it would take more time than all the rest. So only its
+    upper side is drawn, evenly lit.
+    """
+    if name == PLATE_NAME:
+        return {"side": "front", "material": "toon3", "cast_shadow": False, "receive_shadow": True}
+    return {"side": "double", "cast_shadow": False, "receive_shadow": False}
+
+
+def seen_through(name: str) -> bool:
+    """Whether a surface of the rig fades as a person wants it: all but the plate, and those with their own opacity."""
+    return name != PLATE_NAME and name not in OPACITY
 
 
 def _scale(server: viser.ViserServer, root: str) -> dict[str, Any]:

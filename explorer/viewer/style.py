@@ -1,12 +1,10 @@
-"""Colours of the page. Those of bodies and of lines begin with Okabe & Ito (2008).
+"""How the page looks: its colours, dark or light, and small text below a control, in line with its label.
 
-Their seven are nearer to each other than one would like (two of them 16 in CIELAB for tritanopes), and two are too pale
-for lines on white. They are moved as little as it takes: any two are told apart with every common form of colour
-blindness, and lines are seen on a light and on a dark page (a test holds both).
-
-Text below a control: smaller than its label, and in line with it.
-
-Dark or light, for the page as a whole: viser's own parts, and the charts, which follow no theme by themselves.
+Colours of bodies and of lines begin with Okabe & Ito (2008). Their seven are nearer to each other than one would like
+(two of them 16 in CIELAB for tritanopes), and two are too pale for lines on white. They are moved as little as it
+takes: any two are told apart with every common form of colour blindness, and lines are seen on a light and on a dark
+page (a test holds both). Dark or light is set for viser's own parts, and for the charts, which follow no theme by
+themselves.
 """
 
 from __future__ import annotations
@@ -33,15 +31,10 @@ BODY_COLOURS: tuple[Colour, ...] = (
 )
 
 GLASS: Colour = (190, 210, 225)
-
 RIM: Colour = (150, 170, 185)
-
 PLATE: Colour = (74, 82, 92)
-
 RING: Colour = (110, 122, 135)
-
 BRAND: Colour = (86, 150, 200)
-
 VIRIDIS: tuple[Colour, ...] = (
     (68, 1, 84),
     (72, 40, 120),
@@ -54,38 +47,24 @@ VIRIDIS: tuple[Colour, ...] = (
     (181, 222, 43),
     (253, 231, 37),
 )
-
 """Ten even steps of viridis (van der Walt & Smith 2015): its lightness alone tells the order."""
-
 SELECTED: Colour = (255, 255, 255)
-
 CHAINS: tuple[Colour, ...] = ((150, 190, 230), (240, 228, 66), (213, 94, 0))
-
 """Lines of weak, middling and strong contacts; their thickness tells them apart as well."""
-
 SRGB_GAMMA = 2.2
-
 FLANK: Colour = (220, 140, 2)
-
 MEASURED: Colour = (182, 119, 160)
-
 ANGLE_LINE = "rgb(220, 140, 2)"
-
 ANGLE_SPREAD_LINE = "rgba(220, 140, 2, 0.45)"
-
 ANGLE_SPREAD_BAND = "rgba(220, 140, 2, 0.18)"
-
 MASS_LINE = "rgb(46, 166, 234)"
-
 ENERGY_LINE = "rgb(182, 119, 160)"
-
 CONTACTS_LINE = "rgb(3, 120, 79)"
-
 MARK_LINE = "rgb(178, 66, 0)"
-
 AXIS_TEXT = "#9aa4ae"
-
 GRID_LINE = "rgba(160, 170, 180, 0.15)"
+DARK = True
+"""How the page begins."""
 
 
 def linear(colour: Colour) -> Colour:
@@ -114,11 +93,6 @@ def mapped(share: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 def small_html(contents: str) -> str:
     """``contents`` (HTML) in the size and margin of such a text; long words are broken."""
     return f"<div style='padding:0 0.75em; font-size:0.8em; overflow-wrap:anywhere'>{contents}</div>"
-
-
-DARK = True
-
-"""How the page begins."""
 
 
 def apply_theme(server: viser.ViserServer, dark: bool) -> None:

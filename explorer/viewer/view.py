@@ -22,18 +22,18 @@ SKY = 0.7
 
 
 @dataclass(frozen=True)
-class View:
+class CameraView:
     """A place of the camera [m] and what it looks at [m]."""
 
     position: npt.NDArray[np.float64]
     look_at: npt.NDArray[np.float64]
 
 
-def view_from(direction: tuple[float, float, float], height: float) -> View:
+def view_from(direction: tuple[float, float, float], height: float) -> CameraView:
     """From ``direction`` (pile to camera), with everything up to ``height`` [m] in one picture."""
     distance = height / FILL / (2.0 * math.tan(VIEW_FIELD / 2.0))
     middle = np.array([0.0, 0.0, MIDDLE * height])
-    return View(middle + distance * np.array(direction), middle)
+    return CameraView(middle + distance * np.array(direction), middle)
 
 
 def light(server: viser.ViserServer, shadows: bool = True) -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from tests.browser.test_page import FLAGS, PATIENCE, wait_for
 from tests.browser.test_study_page import TRACES, address, choose, data, opened  # noqa: F401
-from tests.explorer.test_charts_stay_private import PAGES
+from tests.explorer.report.test_charts_stay_private import PAGES
 
 pytestmark = pytest.mark.browser
 

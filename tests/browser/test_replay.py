@@ -10,7 +10,7 @@ from explorer.logs.pour_log import PourLog
 from explorer.scene.file import load_scene
 from tests.browser.test_look import colours, press
 from tests.browser.test_page import FLAGS, PATIENCE, positions, slider, wait_for
-from tests.explorer.test_logs import poses
+from tests.explorer.logs.test_pour_log import poses
 
 pytestmark = pytest.mark.browser
 

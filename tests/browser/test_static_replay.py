@@ -19,7 +19,7 @@ from explorer.logs.pour_log import PourLog
 from explorer.logs.replay import replay_server
 from explorer.scene.file import load_scene
 from tests.browser.test_page import FLAGS, PATIENCE
-from tests.explorer.test_logs import poses
+from tests.explorer.logs.test_pour_log import poses
 
 pytestmark = pytest.mark.browser
 

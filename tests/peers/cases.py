@@ -8,7 +8,7 @@ import numpy as np
 
 from explorer.export import EXPORTS
 from explorer.export.deck import assembled
-from explorer.export.frames import TRAJECTORY, Motion, motion, read_frames
+from explorer.export.frames import TRAJECTORY, BodyFrame, motion, read_frames
 from explorer.export.liggghts import INPUT
 from explorer.export.run import run_liggghts, run_yade
 from explorer.export.yade import LAW
@@ -68,7 +68,7 @@ class Case:
 
 
 def ours(case):
-    """Step → :class:`Motion` from our solver."""
+    """Step → :class:`BodyFrame` from our solver."""
     lab = FreeWorld(case.scene, len(case.position), dt=case.dt, active=(case.plate, False, False))
     if not case.tangential_damping:
         table = law_table(case.scene)
@@ -82,12 +82,12 @@ def ours(case):
         rows = lab.state()
         turn = rotation_matrix(rows[:, 3:7])
         spin = np.einsum("bij,bj->bi", turn, rows[:, 10:13])
-        found[step] = Motion(rows[:, 0:3], turn, rows[:, 7:10], spin)
+        found[step] = BodyFrame(rows[:, 0:3], turn, rows[:, 7:10], spin)
     return found
 
 
 def theirs(case, engine, folder):
-    """Step → :class:`Motion` from the deck of the case, run by ``engine``.
+    """Step → :class:`BodyFrame` from the deck of the case, run by ``engine``.
 
     LIGGGHTS's step k is our k − 1 and its velocities are half a step younger: v dt and g dt, far below 1 %.
     """

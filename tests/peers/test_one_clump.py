@@ -7,7 +7,7 @@ within 1 %. The tangential laws differ; there the other engine is compared with 
 import numpy as np
 import pytest
 
-from explorer.export.frames import Motion
+from explorer.export.frames import BodyFrame
 from solver.laws import LinearSpringDashpot
 from tests.peers.cases import Case, deviation, impact_ends, ours, theirs
 from tests.peers.reference import drop
@@ -41,7 +41,7 @@ def reference(case, law):
     place, velocity, spin = drop(case.scene, case.dt, case.steps, case.every, *start, law)
     turn = np.eye(3)[None]
     return {
-        k * case.every: Motion(place[k][None], turn, velocity[k][None], spin[k][None]) for k in range(1, len(place))
+        k * case.every: BodyFrame(place[k][None], turn, velocity[k][None], spin[k][None]) for k in range(1, len(place))
     }
 
 

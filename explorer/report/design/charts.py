@@ -1,7 +1,4 @@
-"""Charts of an analysed design beside those of a study's surface: single runs, Box–Cox profile, path of extremes.
-
-The charts of an analysed design, one at a time, as the page offers them.
-"""
+"""Charts of an analysed design beside those of a study's surface: single runs, Box–Cox profile, path of extremes."""
 
 from __future__ import annotations
 
@@ -41,8 +38,25 @@ from explorer.report.study_charts import Plot, Plots, optimum_plots, surface_plo
 from explorer.units import observable_title, parameter_label
 
 COLOURS = (FACTOR, CHOSEN, ASSUMPTION)
-
 DASHES = ("solid", "dash", "dot")
+
+
+def design_plots(result: DesignResult) -> Plots:
+    """Those of a study's surface, then single runs, Box–Cox profile and ridge; none where there is no model."""
+    model, fitted = result.analysis.model, result.fitted
+    if model is None or fitted is None:
+        return {}
+    plots = dict(surface_plots(fitted))
+    if fitted.optimum is not None:
+        plots |= optimum_plots(fitted, fitted.optimum)
+    limits = "Dashed: limits beyond which a run stands out."
+    plots["Single runs"] = Plot(partial(stacked, single_runs(model.diagnostics, result.labels)), limits, 2.0)
+    if box_cox_profile(model.box_cox) is not None:
+        caption = "Band: 95 % interval of the power."
+        plots["Power of the response"] = Plot(partial(box_cox_profile, model.box_cox), caption)
+    caption = "Highest and lowest response at a distance from the centre, 95 % bands; below: where the highest is."
+    plots["Ridge"] = Plot(partial(stacked, ridge(result, model)), caption, 1.6)
+    return plots
 
 
 def single_runs(found: Diagnostics, names: Sequence[str]) -> Spec:
@@ -117,21 +131,3 @@ def ridge(result: DesignResult, model: FittedModel) -> Spec:
         "yaxis2": axis("coded level where it is highest", anchor="x2"),
     }
     return chart(traces, layout, 360)
-
-
-def design_plots(result: DesignResult) -> Plots:
-    """Those of a study's surface, then single runs, Box–Cox profile and ridge; none where there is no model."""
-    model, fitted = result.analysis.model, result.fitted
-    if model is None or fitted is None:
-        return {}
-    plots = dict(surface_plots(fitted))
-    if fitted.optimum is not None:
-        plots |= optimum_plots(fitted, fitted.optimum)
-    limits = "Dashed: limits beyond which a run stands out."
-    plots["Single runs"] = Plot(partial(stacked, single_runs(model.diagnostics, result.labels)), limits, 2.0)
-    if box_cox_profile(model.box_cox) is not None:
-        caption = "Band: 95 % interval of the power."
-        plots["Power of the response"] = Plot(partial(box_cox_profile, model.box_cox), caption)
-    caption = "Highest and lowest response at a distance from the centre, 95 % bands; below: where the highest is."
-    plots["Ridge"] = Plot(partial(stacked, ridge(result, model)), caption, 1.6)
-    return plots

@@ -15,7 +15,6 @@ from explorer.report.identified import GIVES_TARGET, cloud_caution, rule, settin
 from explorer.units import enumeration, number, observed, parameter_value, percent
 
 MOST_PANELS = 3
-
 """Factors up to which every pair of them has a panel."""
 
 

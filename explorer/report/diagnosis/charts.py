@@ -1,6 +1,6 @@
-"""Charts of a diagnosis: probabilities, errors over the noise floor, residuals with bands, the pile.
+"""Charts of a diagnosis, those that its result has something for: probabilities, errors, residuals, piles, maps.
 
-The charts that a diagnosis' result has something for.
+Errors are shown over the noise floor, residuals with the bands that a right model keeps to.
 """
 
 from __future__ import annotations
@@ -38,22 +38,33 @@ from explorer.report.figures.style import (
 from explorer.report.study_charts import Plot, Plots
 
 BEFORE, AFTER, MEASURED = ASSUMPTION, FACTOR, TARGET
-
 ROW_HEIGHT = 30
-
 """Height of one row with two bars [px]."""
-
 BAND = {TARGET: "rgba(77, 173, 112, 0.18)", FACTOR: "rgba(76, 93, 209, 0.18)", ASSUMPTION: "rgba(212, 126, 44, 0.18)"}
-
 MM = 1e3
-
 FEWEST, LEAST = 3, 0.005
-
 """Answers that are drawn or listed: so many at least, and all of this probability."""
-
 MOST_RESIDUALS = 40
-
 """Features that are drawn; the table holds all."""
+ROLES: dict[Role, str] = {"holdout": "held-out", "fit": "fitted"}
+
+
+def diagnosis_plots(result: DiagnosisResult) -> Plots:
+    """Title → plot: probabilities of the answers, residuals before and after, errors, piles."""
+    caption = "Dashed: from here on an effect is named."
+    plots: Plots = {"Probability of each answer": Plot(partial(probability_chart, result), caption, 0.8)}
+    if result.residuals:
+        caption = "Dashed: 95 % for one feature; solid: for all of them. The farthest off, where there are many."
+        plots["Residuals before and after"] = Plot(partial(residual_chart, result), caption, 1.5)
+    for role, words in ROLES.items():
+        if any(row.noise_floor > 0.0 for row in result.error.of(role)):
+            caption = "Errors over what noise alone would leave; dashed: no worse than noise."
+            plots[f"Error on {words} data"] = Plot(partial(error_chart, result, role), caption, 1.0)
+    for picture in sorted(result.piles, key=lambda row: row.role != "holdout"):
+        words = ROLES[picture.role]
+        caption = "Mean height from the pile's own middle, mirrored; a band is one standard deviation between pours."
+        plots[f"Pile, {picture.condition} ({words})"] = Plot(partial(pile_chart, picture), caption, 0.6)
+    return plots
 
 
 def likely(result: DiagnosisResult) -> list[tuple[str, float]]:
@@ -190,6 +201,10 @@ def pile_chart(picture: PileProfiles) -> Spec:
     return chart(traces, layout, 320)
 
 
+def _mirrored(values: npt.NDArray[np.float64]) -> list[float]:
+    return [*reversed(values.tolist()), *values.tolist()]
+
+
 def map_chart(picture: ResidualMap) -> Spec:
     """Measured minus poured height over the plate [mm], before and after, with lines of the measured height."""
     measured = MM * picture.measured
@@ -226,28 +241,3 @@ def map_chart(picture: ResidualMap) -> Spec:
         layout[f"xaxis{suffix(panel)}"] = axis(title, domain=side_by_side(2, 0.1)[panel], anchor=f"y{suffix(panel)}")
         layout[f"yaxis{suffix(panel)}"] = axis("y [mm]", scaleanchor=f"x{suffix(panel)}", anchor=f"x{suffix(panel)}")
     return chart(traces, layout, 380)
-
-
-def _mirrored(values: npt.NDArray[np.float64]) -> list[float]:
-    return [*reversed(values.tolist()), *values.tolist()]
-
-
-ROLES: dict[Role, str] = {"holdout": "held-out", "fit": "fitted"}
-
-
-def diagnosis_plots(result: DiagnosisResult) -> Plots:
-    """Title → plot: probabilities of the answers, residuals before and after, errors, piles."""
-    caption = "Dashed: from here on an effect is named."
-    plots: Plots = {"Probability of each answer": Plot(partial(probability_chart, result), caption, 0.8)}
-    if result.residuals:
-        caption = "Dashed: 95 % for one feature; solid: for all of them. The farthest off, where there are many."
-        plots["Residuals before and after"] = Plot(partial(residual_chart, result), caption, 1.5)
-    for role, words in ROLES.items():
-        if any(row.noise_floor > 0.0 for row in result.error.of(role)):
-            caption = "Errors over what noise alone would leave; dashed: no worse than noise."
-            plots[f"Error on {words} data"] = Plot(partial(error_chart, result, role), caption, 1.0)
-    for picture in sorted(result.piles, key=lambda row: row.role != "holdout"):
-        words = ROLES[picture.role]
-        caption = "Mean height from the pile's own middle, mirrored; a band is one standard deviation between pours."
-        plots[f"Pile, {picture.condition} ({words})"] = Plot(partial(pile_chart, picture), caption, 0.6)
-    return plots

@@ -1,6 +1,7 @@
-"""Figure of a laboratory's force–displacement curves: every replicate, and the part that was taken as straight.
+"""Charts of a bench test: a laboratory's force–displacement curves, and what the solver's instrument read.
 
-Curves of a bench test on the solver: every column against the first.
+Of the laboratory every replicate, with the part that was taken as straight; of the solver every column against the
+first.
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from explorer.report.figures.style import CHOSEN, FACTOR, Json, axis, chart, lab
 from explorer.report.html import page
 
 PANEL_HEIGHT = 420
+LEAST_POINTS = 3
+"""Fewer readings of the solver's instrument are a few numbers, which the table has, and no curve."""
 
 
 def write_curves(path: Path, result: LabResult) -> None:
@@ -74,11 +77,6 @@ def force_displacement(curves: list[CurveFit], title: str) -> Spec:
         "margin": {"l": 60, "r": 24, "t": 80, "b": 52},
     }
     return chart(traces, layout, PANEL_HEIGHT)
-
-
-LEAST_POINTS = 3
-
-"""Below that a column is a few numbers, which the table has, and no curve."""
 
 
 def bench_charts(data: dict[str, Any]) -> dict[str, Spec]:

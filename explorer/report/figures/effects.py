@@ -1,6 +1,7 @@
-"""Charts of a screening: Pareto of |t|, half-normal plot, and all effects of factors and assumptions side by side.
+"""Charts of a two-level design: Pareto of |t|, half-normal plot, main effects, and all effects side by side.
 
-Main effects: the mean of the response at the low and at the high level of each factor.
+Main effects are the mean of the response at the low and at the high level of each factor; all effects are those of
+factors and of assumptions about the set-up.
 """
 
 from __future__ import annotations
@@ -35,12 +36,15 @@ from explorer.report.figures.style import (
 from explorer.units import fixed, number, observable_title, parameter_label, unit_of_observable
 
 ROW_HEIGHT = 19
-
 """Height of one bar or interval [px]."""
-
 LABELLED = 12
-
 """Effects that carry their name in the half-normal plot; the smaller ones overlap and tell it by hover."""
+MOST = 8
+"""Factors that are drawn, those with the largest effects."""
+ACROSS = 4
+"""Of them side by side."""
+GAP, ROW_GAP = 0.03, 0.16
+"""Space between them [share of the width, of the height]."""
 
 
 class EffectsOf(Protocol):
@@ -156,6 +160,50 @@ def half_normal(screening: EffectsOf) -> Spec:
     return chart(traces, layout, 420)
 
 
+def main_effects(screening: EffectsOf) -> Spec | None:
+    """Small charts with one axis, the largest effects first; None where no effect could be estimated.
+
+    The interval of a level's mean follows from that of the effect e = ȳ(high) − ȳ(low) of a balanced design: its half
+    width is that of e divided by √2.
+    """
+    analysis, unit = screening.analysis, unit_of_observable(screening.response)
+    effects = analysis.factor_effects()[:MOST]
+    if not effects or math.isnan(analysis.mean):
+        return None
+    titles = _titles(screening)
+    middle = unit.of(analysis.mean)
+    traces: list[Json] = []
+    layout: Json = {"showlegend": False, "shapes": [], "annotations": []}
+    rows = -(-len(effects) // ACROSS)
+    for k, effect in enumerate(effects):
+        shift = 0.5 * unit.of(effect.effect)
+        width = unit.of(analysis.half_width(effect)) / 2**0.5
+        place = {"xaxis": f"x{suffix(k)}", "yaxis": f"y{suffix(k)}"}
+        drawn = {"mode": "lines+markers", "line": line(FACTOR), "error_y": error_bars([width, width], FACTOR)}
+        name = effect.name
+        hover = {"hovertemplate": label(name) + " %{x}: %{y:.2f}" + unit.symbol + "<extra></extra>"}
+        traces.append(
+            points(["low", "high"], [middle - shift, middle + shift], name, FACTOR, **drawn, **place, **hover)
+        )
+        layout |= _place(k, rows, titles[name])
+        layout["shapes"].append(
+            {"type": "line", "xref": f"x{suffix(k)} domain", "yref": f"y{suffix(k)}", "x0": 0, "x1": 1}
+            | {"y0": middle, "y1": middle, "line": line(DUMMY, "dot")}
+        )
+    layout["yaxis"]["title"] = {"text": observable_title(screening.response)}
+    return chart(traces, layout, 230 * rows)
+
+
+def _place(k: int, rows: int, title: str) -> Json:
+    width, height = (1.0 - GAP * (ACROSS - 1)) / ACROSS, (1.0 - ROW_GAP * (rows - 1)) / rows
+    column, row = k % ACROSS, k // ACROSS
+    left, top = column * (width + GAP), 1.0 - row * (height + ROW_GAP)
+    x = axis(title, domain=[left, left + width], anchor=f"y{suffix(k)}", range=[-0.4, 1.4])
+    x["title"]["font"] = {"size": 10}
+    y = axis("", domain=[max(0.0, top - height), top], anchor=f"x{suffix(k)}", showticklabels=column == 0)
+    return {f"xaxis{suffix(k)}": x, f"yaxis{suffix(k)}": y | ({"matches": "y"} if k else {})}
+
+
 def all_effects(screening: ScreeningResult, assumptions: ScreeningResult | None) -> Spec:
     """Effects of factors and assumptions with 95 % intervals in one chart, sorted by size."""
     response = screening.response
@@ -213,60 +261,3 @@ def _t(effect: FactorEffect, source: ErrorSource) -> float:
     """|t| of an effect against an error; NaN where it was not tested."""
     test = effect.test_by(source)
     return math.nan if test is None else abs(test.t)
-
-
-MOST = 8
-
-"""Factors that are drawn, those with the largest effects."""
-
-ACROSS = 4
-
-GAP = 0.03
-
-ROW_GAP = 0.16
-
-
-def main_effects(screening: EffectsOf) -> Spec | None:
-    """Small charts with one axis, the largest effects first; None where no effect could be estimated.
-
-    The interval of a level's mean follows from that of the effect e = ȳ(high) − ȳ(low) of a balanced design: its half
-    width is that of e divided by √2.
-    """
-    analysis, unit = screening.analysis, unit_of_observable(screening.response)
-    effects = analysis.factor_effects()[:MOST]
-    if not effects or math.isnan(analysis.mean):
-        return None
-    words = {factor.name: parameter_label(factor.path) for factor in screening.factors}
-    middle = unit.of(analysis.mean)
-    traces: list[Json] = []
-    layout: Json = {"showlegend": False, "shapes": [], "annotations": []}
-    rows = -(-len(effects) // ACROSS)
-    for k, effect in enumerate(effects):
-        shift = 0.5 * unit.of(effect.effect)
-        width = unit.of(analysis.half_width(effect)) / 2**0.5
-        place = {"xaxis": f"x{suffix(k)}", "yaxis": f"y{suffix(k)}"}
-        drawn = {"mode": "lines+markers", "line": line(FACTOR), "error_y": error_bars([width, width], FACTOR)}
-        name = effect.name
-        # A name that spells its parameter out needs no second wording.
-        title = name.replace("_", " ") if "_" in name else f"{name} · {words[name]}"
-        hover = {"hovertemplate": label(name) + " %{x}: %{y:.2f}" + unit.symbol + "<extra></extra>"}
-        traces.append(
-            points(["low", "high"], [middle - shift, middle + shift], name, FACTOR, **drawn, **place, **hover)
-        )
-        layout |= _place(k, rows, title)
-        layout["shapes"].append(
-            {"type": "line", "xref": f"x{suffix(k)} domain", "yref": f"y{suffix(k)}", "x0": 0, "x1": 1}
-            | {"y0": middle, "y1": middle, "line": line(DUMMY, "dot")}
-        )
-    layout["yaxis"]["title"] = {"text": observable_title(screening.response)}
-    return chart(traces, layout, 230 * rows)
-
-
-def _place(k: int, rows: int, title: str) -> Json:
-    width, height = (1.0 - GAP * (ACROSS - 1)) / ACROSS, (1.0 - ROW_GAP * (rows - 1)) / rows
-    column, row = k % ACROSS, k // ACROSS
-    left, top = column * (width + GAP), 1.0 - row * (height + ROW_GAP)
-    x = axis(title, domain=[left, left + width], anchor=f"y{suffix(k)}", range=[-0.4, 1.4])
-    x["title"]["font"] = {"size": 10}
-    y = axis("", domain=[max(0.0, top - height), top], anchor=f"x{suffix(k)}", showticklabels=column == 0)
-    return {f"xaxis{suffix(k)}": x, f"yaxis{suffix(k)}": y | ({"matches": "y"} if k else {})}

@@ -1,8 +1,7 @@
-"""The response surface of one target with what the charts mark on it: the runs, the target, the reference, the optimum.
+"""The response surface of one target with what charts mark on it (runs, target, reference, optimum), and its profiler.
 
 A study's surface and that of a design from any laboratory are drawn by the same charts; both come as `FittedTarget`.
-
-The profiler: the model along each factor through one point, with its interval, and the target.
+The profiler is the model along each factor through one point, with its interval, and the target.
 """
 
 from __future__ import annotations
@@ -37,6 +36,11 @@ from explorer.report.identified import BY_RULE, all_identified
 from explorer.units import axis_title, observable_title, unit_of_observable, unit_of_parameter
 
 Array = npt.NDArray[np.float64]
+
+TRACE_POINTS = 31
+"""Points along each factor of the profiler."""
+ROW_GAP = 0.13
+"""Space between two rows of the profiler, for the title of the axis [share of the height]."""
 
 
 @dataclass(frozen=True)
@@ -101,13 +105,6 @@ def _fitted(surface: SurfaceResult, k: int, target: Target, optimum: OptimumResu
     )
 
 
-TRACE_POINTS = 31
-
-ROW_GAP = 0.13
-
-"""Space between two rows, for the title of the axis [share of the height]."""
-
-
 def profiler(fitted: FittedTarget, natural: Sequence[float]) -> Spec:
     """One row per factor: the mean of the target over its range, the others at ``natural`` (SI), band 95 %."""
     factors, unit = fitted.factors, unit_of_observable(fitted.observable)
@@ -146,10 +143,14 @@ def profiler(fitted: FittedTarget, natural: Sequence[float]) -> Spec:
     return chart(traces, layout, 170 * k)
 
 
-def prediction(fitted: FittedTarget, natural: Sequence[float]) -> tuple[float, float]:
-    """Mean of the model at ``natural`` (SI) and half its 95 % interval, in the unit of the screen."""
-    here, unit = fitted.model.region.coded(natural), unit_of_observable(fitted.observable)
-    return unit.of(float(fitted.model.predict(here))), unit.of(float(fitted.model.half_width(here)))
+def _row(row: int, rows: int, title: str, limits: list[float]) -> Json:
+    gap = min(ROW_GAP, 0.5 / rows)  # the rows keep at least half of the height, however many
+    height = (1.0 - gap * (rows - 1)) / rows
+    top = 1.0 - row * (height + gap)
+    return {
+        f"xaxis{suffix(row)}": axis(title, anchor=f"y{suffix(row)}"),
+        f"yaxis{suffix(row)}": axis("", anchor=f"x{suffix(row)}", domain=[max(0.0, top - height), top], range=limits),
+    }
 
 
 def _goal(row: int, goal: float, margin: float) -> list[Json]:
@@ -162,11 +163,7 @@ def _goal(row: int, goal: float, margin: float) -> list[Json]:
     ]
 
 
-def _row(row: int, rows: int, title: str, limits: list[float]) -> Json:
-    gap = min(ROW_GAP, 0.5 / rows)  # the rows keep at least half of the height, however many
-    height = (1.0 - gap * (rows - 1)) / rows
-    top = 1.0 - row * (height + gap)
-    return {
-        f"xaxis{suffix(row)}": axis(title, anchor=f"y{suffix(row)}"),
-        f"yaxis{suffix(row)}": axis("", anchor=f"x{suffix(row)}", domain=[max(0.0, top - height), top], range=limits),
-    }
+def prediction(fitted: FittedTarget, natural: Sequence[float]) -> tuple[float, float]:
+    """Mean of the model at ``natural`` (SI) and half its 95 % interval, in the unit of the screen."""
+    here, unit = fitted.model.region.coded(natural), unit_of_observable(fitted.observable)
+    return unit.of(float(fitted.model.predict(here))), unit.of(float(fitted.model.half_width(here)))

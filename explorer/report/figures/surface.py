@@ -1,6 +1,6 @@
-"""Charts of a response surface: contours through the optimum, predicted against observed, residuals.
+"""Charts of a response surface: contours through the optimum, the fit and its residuals, and the surface in space.
 
-The response surface in space: as a height over two factors, and the settings that give the target among three.
+In space it is a height over two factors, and the settings that give the target among three.
 """
 
 from __future__ import annotations
@@ -34,7 +34,8 @@ from explorer.report.figures.style import (
 )
 from explorer.units import axis_title, observable_title, unit_of_observable, unit_of_parameter
 
-GRID = 41
+GRID, SOLID_GRID, CUBE = 41, 25, 17
+"""Points along each side of the grids: in a plane, of a height in space, of a body in space."""
 
 
 def contours(fitted: FittedTarget) -> Spec:
@@ -45,7 +46,7 @@ def contours(fitted: FittedTarget) -> Spec:
     """
     unit, factors, region = unit_of_observable(fitted.observable), fitted.factors, fitted.model.region
     pairs = list(combinations(range(len(factors)), 2))
-    grids = [_slice(fitted, i, j) / unit.size for i, j in pairs]
+    grids = [_slice(fitted, i, j, GRID) / unit.size for i, j in pairs]
     level = float(np.mean(grids)) if fitted.target is None else unit.of(fitted.target)
     reach = max(float(np.abs(grid - level).max()) for grid in grids) or 1.0
     domains = side_by_side(len(pairs), 0.1)
@@ -82,6 +83,38 @@ def contours(fitted: FittedTarget) -> Spec:
         )
         layout[f"yaxis{suffix(panel)}"] = axis(axis_title(factors[j].path, factors[j].name), anchor=f"x{suffix(panel)}")
     return chart(traces, layout, 420)
+
+
+def _slice(fitted: FittedTarget, i: int, j: int, side: int) -> Array:
+    """The model on a grid over factors i (columns) and j (rows), ``side`` points each, the others at the section."""
+    fixed = fitted.model.region.coded(fitted.section_point)
+    coded = np.broadcast_to(fixed, (side, side, fixed.size)).copy()
+    coded[..., i], coded[..., j] = np.meshgrid(np.linspace(-1, 1, side), np.linspace(-1, 1, side))
+    return fitted.model.predict(coded)
+
+
+def _marks(fitted: FittedTarget, pair: tuple[int, int], scale: list[float], axes: Json, in_legend: bool) -> list[Json]:
+    """Runs of the design, the measured parameters where they lie in the region, and the optimum if there is one."""
+    natural = fitted.design[:, pair] / scale
+    reference = np.array([float(fitted.factors[k].reference) for k in pair]) / scale
+    low, high = fitted.low[list(pair)] / scale, fitted.high[list(pair)] / scale
+    runs = {"size": 7, "color": "#ffffff", "line": {"color": INK, "width": 1.2}}
+    star = {"size": 13, "symbol": "star", "line": {"color": "#ffffff", "width": 1}}
+    diamond = {"size": 10, "symbol": "diamond", "color": "#ffffff", "line": {"color": INK, "width": 1.5}}
+    shown: Json = {"showlegend": in_legend, **axes}
+    marks = [points(natural[:, 0].tolist(), natural[:, 1].tolist(), "points of the design", INK, marker=runs, **shown)]
+    if ((low <= reference) & (reference <= high)).all():
+        x, y = (float(value) for value in reference)
+        marks.append(points([x], [y], fitted.reference_name, INK, marker=diamond, **shown))
+    if fitted.chosen is None:
+        return marks
+    at = np.array(fitted.chosen)[list(pair)] / scale
+    return [*marks, points([float(at[0])], [float(at[1])], fitted.chosen_name, CHOSEN, marker=star, **shown)]
+
+
+def _colours(level: float, reach: float, title: str) -> Json:
+    bar = {"title": {"text": title, "side": "right"}, "thickness": 12, "outlinewidth": 0}
+    return {"colorscale": BELOW_TO_ABOVE, "cmin": level - reach, "cmax": level + reach, "colorbar": bar}
 
 
 def fit(fitted: FittedTarget) -> Spec:
@@ -133,53 +166,11 @@ def residual_quantiles(fitted: FittedTarget) -> Spec:
     return chart(traces, layout, 380)
 
 
-def _slice(fitted: FittedTarget, i: int, j: int) -> Array:
-    """The model on a grid over factors i (columns) and j (rows), the others at the point of the sections."""
-    across, up = np.meshgrid(np.linspace(-1, 1, GRID), np.linspace(-1, 1, GRID))
-    fixed = fitted.model.region.coded(fitted.section_point)
-    coded = np.broadcast_to(fixed, (GRID, GRID, fixed.size)).copy()
-    coded[..., i], coded[..., j] = across, up
-    return fitted.model.predict(coded)
-
-
-def _marks(fitted: FittedTarget, pair: tuple[int, int], scale: list[float], axes: Json, in_legend: bool) -> list[Json]:
-    """Runs of the design, the measured parameters where they lie in the region, and the optimum if there is one."""
-    natural = fitted.design[:, pair] / scale
-    reference = np.array([float(fitted.factors[k].reference) for k in pair]) / scale
-    low, high = fitted.low[list(pair)] / scale, fitted.high[list(pair)] / scale
-    runs = {"size": 7, "color": "#ffffff", "line": {"color": INK, "width": 1.2}}
-    star = {"size": 13, "symbol": "star", "line": {"color": "#ffffff", "width": 1}}
-    diamond = {"size": 10, "symbol": "diamond", "color": "#ffffff", "line": {"color": INK, "width": 1.5}}
-    shown: Json = {"showlegend": in_legend, **axes}
-    marks = [points(natural[:, 0].tolist(), natural[:, 1].tolist(), "points of the design", INK, marker=runs, **shown)]
-    if ((low <= reference) & (reference <= high)).all():
-        x, y = (float(value) for value in reference)
-        marks.append(points([x], [y], fitted.reference_name, INK, marker=diamond, **shown))
-    if fitted.chosen is None:
-        return marks
-    at = np.array(fitted.chosen)[list(pair)] / scale
-    return [*marks, points([float(at[0])], [float(at[1])], fitted.chosen_name, CHOSEN, marker=star, **shown)]
-
-
-def _colours(level: float, reach: float, title: str) -> Json:
-    bar = {"title": {"text": title, "side": "right"}, "thickness": 12, "outlinewidth": 0}
-    return {"colorscale": BELOW_TO_ABOVE, "cmin": level - reach, "cmax": level + reach, "colorbar": bar}
-
-
-SOLID_GRID = 25
-
-CUBE = 17
-
-"""Points along each side of the grids."""
-
-
 def height_over(fitted: FittedTarget, pair: tuple[int, int]) -> Spec:
     """The model over two factors, the others at the optimum, with the observed runs above it."""
     model, region, unit, (i, j) = fitted.model, fitted.model.region, unit_of_observable(fitted.observable), pair
     sides = np.linspace(-1.0, 1.0, SOLID_GRID)
-    coded = np.broadcast_to(region.coded(fitted.section_point), (SOLID_GRID, SOLID_GRID, region.centre.size)).copy()
-    coded[..., i], coded[..., j] = np.meshgrid(sides, sides)
-    heights = model.predict(coded) / unit.size
+    heights = _slice(fitted, i, j, SOLID_GRID) / unit.size
     level = float(heights.mean()) if fitted.target is None else unit.of(fitted.target)
     reach = max(float(np.abs(heights - level).max()), 1e-9)
     sizes = [unit_of_parameter(fitted.factors[k].path).size for k in pair]
@@ -222,7 +213,12 @@ def solutions(fitted: FittedTarget) -> Spec | None:
     sizes = np.array([unit_of_parameter(factor.path).size for factor in factors])
     x, y, z = (fitted.model.region.natural(coded) / sizes).T
     heights = fitted.model.predict(coded).round(6).tolist()
-    same = {"isomin": target, "isomax": target, "surface": {"count": 1}, "caps": _no_caps()}
+    same = {
+        "isomin": target,
+        "isomax": target,
+        "surface": {"count": 1},
+        "caps": {edge: {"show": False} for edge in "xyz"},
+    }
     colour = [[0.0, TARGET], [1.0, TARGET]]
     traces: list[Json] = [
         {"type": "isosurface", "x": x.tolist(), "y": y.tolist(), "z": z.tolist(), "name": "model = target"}
@@ -257,7 +253,3 @@ def _in_space(traces: list[Json], titles: list[str]) -> Spec:
         one["title"]["font"] = {"size": 11}
     camera = {"eye": {"x": 1.5, "y": -1.6, "z": 0.9}}
     return chart(traces, {"scene": scene | {"camera": camera}, "margin": {"l": 4, "r": 4, "t": 28, "b": 4}}, 460)
-
-
-def _no_caps() -> Json:
-    return {side: {"show": False} for side in "xyz"}

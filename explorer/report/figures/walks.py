@@ -1,7 +1,4 @@
-"""Charts of the response along a path: the steepest ascent, and an assumption in steps.
-
-Chart of the verification: fresh pours against the measurement.
-"""
+"""Charts of pours beside the target: along the steepest ascent, over an assumption in steps, in the verification."""
 
 from __future__ import annotations
 
@@ -35,8 +32,9 @@ from explorer.report.figures.style import (
 from explorer.units import observable_title, parameter_label, parameter_value, unit_of_observable, unit_of_parameter
 
 NORMAL_95 = 1.96
-
 FAINT = 0.45
+MEASURED = 1.0
+SIMULATED = 2.0
 
 
 def ascent_path(walk: AscentResult, target: Target) -> Spec:
@@ -100,32 +98,6 @@ def scan(scanned: ScanResult, target: Target) -> Spec:
     return chart(traces, layout | _target_marks(target), 380)
 
 
-def _single_runs(x: Sequence[float], rows: Sequence[Sequence[Run]], observable: str, colour: str) -> Json:
-    unit = unit_of_observable(observable)
-    found = [
-        (place, unit.of(value)) for place, runs in zip(x, rows, strict=True) for value in valid_values(runs, observable)
-    ]
-    faint = {"size": 6, "opacity": FAINT}
-    return points([place for place, _ in found], [value for _, value in found], "single pours", colour, marker=faint)
-
-
-def _target_marks(target: Target) -> Json:
-    unit = unit_of_observable(target.observable)
-    mean, margin = unit.of(target.mean), unit.of(target.margin)
-    return {
-        "shapes": [horizontal_band(mean - margin, mean + margin, MARGIN_BAND), horizontal_line(mean, TARGET)],
-        "annotations": [
-            note(f"target {mean:.2f} ± margin {margin:.2f}", 0.995, mean, xanchor="right", yanchor="bottom")
-            | {"xref": "x domain", "yref": "y"}
-        ],
-    }
-
-
-MEASURED = 1.0
-
-SIMULATED = 2.0
-
-
 def verification(stage: VerificationResult, index: int) -> Spec:
     """Fresh pours as points, their mean and the measured mean with 95 % intervals, the margin as a band."""
     target, tests = stage.targets[index], stage.tests[index]
@@ -149,3 +121,24 @@ def verification(stage: VerificationResult, index: int) -> Spec:
         "shapes": [horizontal_band(mean - margin, mean + margin, MARGIN_BAND)],
     }
     return chart(traces, layout, 400)
+
+
+def _single_runs(x: Sequence[float], rows: Sequence[Sequence[Run]], observable: str, colour: str) -> Json:
+    unit = unit_of_observable(observable)
+    found = [
+        (place, unit.of(value)) for place, runs in zip(x, rows, strict=True) for value in valid_values(runs, observable)
+    ]
+    faint = {"size": 6, "opacity": FAINT}
+    return points([place for place, _ in found], [value for _, value in found], "single pours", colour, marker=faint)
+
+
+def _target_marks(target: Target) -> Json:
+    unit = unit_of_observable(target.observable)
+    mean, margin = unit.of(target.mean), unit.of(target.margin)
+    return {
+        "shapes": [horizontal_band(mean - margin, mean + margin, MARGIN_BAND), horizontal_line(mean, TARGET)],
+        "annotations": [
+            note(f"target {mean:.2f} ± margin {margin:.2f}", 0.995, mean, xanchor="right", yanchor="bottom")
+            | {"xref": "x domain", "yref": "y"}
+        ],
+    }

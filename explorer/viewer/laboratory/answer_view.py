@@ -8,7 +8,7 @@ from typing import Any
 import viser
 
 from explorer.errors import CommandError
-from explorer.laboratory.answers import Answer
+from explorer.laboratory.command_results import CommandResult
 from explorer.viewer.actions import Post
 from explorer.viewer.output.send_file import send_file
 from explorer.viewer.study.plot_view import PlotView
@@ -18,11 +18,11 @@ NO_CHARTS = "Charts come with an answer that has any."
 
 
 class AnswerView:
-    """Shows one :class:`Answer` at a time; ``waiting`` (plain text) stands there before the first."""
+    """Shows one :class:`CommandResult` at a time; ``waiting`` (plain text) stands there before the first."""
 
     def __init__(self, server: viser.ViserServer, waiting: str, post: Post, charts: bool = False) -> None:
         self._gui, self._versions = server.gui, 0
-        self._answer: Answer | None = None
+        self._answer: CommandResult | None = None
         self._text = server.gui.add_html(small_html(escape(waiting)))
         self._place = server.gui.add_folder(None)
         self._picture: Any = None
@@ -37,7 +37,7 @@ class AnswerView:
                 client = event.client
                 post(lambda: self._send(client))
 
-    def show(self, answer: Answer) -> None:
+    def show(self, answer: CommandResult) -> None:
         """Show ``answer`` in place of the one before."""
         self._answer = answer
         self._versions += 1
@@ -64,7 +64,7 @@ class AnswerView:
             send_file(client, name, content)
 
 
-def answer_html(answer: Answer) -> str:
+def answer_html(answer: CommandResult) -> str:
     """Text in columns, which a narrow panel scrolls, and the command line, which one click selects as a whole."""
     box = "padding:0.4em; margin:0.3em 0; background:rgba(128,150,170,0.14)"
     return small_html(

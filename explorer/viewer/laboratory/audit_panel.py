@@ -5,7 +5,7 @@ from __future__ import annotations
 from explorer.audit.entries import FILE
 from explorer.audit.read_study import read_study
 from explorer.files.uploads import unpacked_folder
-from explorer.laboratory.answers import audit_answer
+from explorer.laboratory.command_results import audit_result
 from explorer.viewer.actions import on_upload
 from explorer.viewer.laboratory.answer_view import AnswerView
 from explorer.viewer.panel import LABORATORY, PageContext, Panel
@@ -27,7 +27,7 @@ class AuditPanel(Panel):
         )
         self.view = AnswerView(server, WAITING, post)
         audit.on_click(
-            lambda _: post(lambda: self._background.start("auditing", lambda: audit_answer(None), self.view.show))
+            lambda _: post(lambda: self._background.start("auditing", lambda: audit_result(None), self.view.show))
         )
 
         on_upload(upload, self._audit, post)
@@ -36,6 +36,6 @@ class AuditPanel(Panel):
         folder = self._folder
         self._background.start(
             "auditing",
-            lambda: audit_answer(unpacked_folder(name, content, folder, FILE, read_study)),
+            lambda: audit_result(unpacked_folder(name, content, folder, FILE, read_study)),
             self.view.show,
         )

@@ -8,7 +8,7 @@ from typing import Any
 import viser
 
 from doe.table_file import SUFFIXES
-from explorer.laboratory.answers import bench_answer, twin_answer
+from explorer.laboratory.command_results import bench_result, twin_result
 from explorer.laboratory.part import measured_source
 from explorer.laboratory.run import LabOrder, analysed
 from explorer.scene.source import SceneSource
@@ -83,11 +83,11 @@ class BenchPanel(Panel):
     def _evaluate(self) -> None:
         order, twin, bias = self._order(), bool(self._twin.value), bool(self._bias.value)
         if not (twin or bias):
-            self._background.start("evaluating the readings", lambda: bench_answer(order), self.view.show)
+            self._background.start("evaluating the readings", lambda: bench_result(order), self.view.show)
             return
         material = self._session.source.material if twin else ""
         asked = replace(order, simulate=twin, bias=bias, material=material or None)
-        self._background.start("running the test on the solver", lambda: twin_answer(asked), self.view.show)
+        self._background.start("running the test on the solver", lambda: twin_result(asked), self.view.show)
 
     def _pour(self) -> None:
         order, present, folder = self._order(), self._session.status().scene, self._folder

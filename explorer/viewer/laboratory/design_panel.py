@@ -5,8 +5,8 @@ from __future__ import annotations
 from doe.designs import DESIGNS
 from doe.table_file import SUFFIXES
 from explorer.design.analysis import AnalyseOrder
-from explorer.design.plan import PlanOrder
-from explorer.laboratory.answers import analysis_answer, sheet_answer
+from explorer.design.run_plan import DesignOrder
+from explorer.laboratory.command_results import analysis_result, sheet_result
 from explorer.viewer.laboratory.answer_view import AnswerView
 from explorer.viewer.laboratory.inputs import UploadSlot, number_or_none, positive
 from explorer.viewer.panel import LABORATORY, PageContext, Panel
@@ -62,7 +62,7 @@ class DesignPanel(Panel):
         self.analysis.set_dark(dark)
 
     def _make(self) -> None:
-        order = PlanOrder(
+        order = DesignOrder(
             str(self._kind.value),
             runs=int(self._size.value) or None,
             replicates=int(self._replicates.value),
@@ -71,9 +71,9 @@ class DesignPanel(Panel):
         )
         factors = self._factors.chosen
         known = positive(self._sigma.value)
-        self._background.start("making the sheet", lambda: sheet_answer(order, factors, known), self.sheet.show)
+        self._background.start("making the sheet", lambda: sheet_result(order, factors, known), self.sheet.show)
 
     def _analyse(self) -> None:
         target = number_or_none(str(self._target.value), "target")
         order = AnalyseOrder(self._filled.chosen, str(self._response.value).strip(), target)
-        self._background.start("analysing the sheet", lambda: analysis_answer(order), self.analysis.show)
+        self._background.start("analysing the sheet", lambda: analysis_result(order), self.analysis.show)

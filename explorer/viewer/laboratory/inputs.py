@@ -1,7 +1,4 @@
-"""A place for one file: a shipped example by name, or what a browser sent in its stead.
-
-Numbers that a person enters, or leaves out.
-"""
+"""What a person gives to a test of the laboratory: a file (a shipped example, or an upload), and numbers or none."""
 
 from __future__ import annotations
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from explorer.files.measured_curves import PICTURES
-from explorer.laboratory.answers import Answer, Ruler, compared_answer, photograph_answer
+from explorer.laboratory.command_results import CommandResult, Ruler, compared_result, photograph_result
 from explorer.viewer.laboratory.answer_view import AnswerView
 from explorer.viewer.laboratory.inputs import UploadSlot, positive
 from explorer.viewer.panel import LABORATORY, PageContext, Panel
@@ -47,13 +47,13 @@ class PhotographPanel(Panel):
 
     def _read(self) -> None:
         photo, ruler = self._photo.chosen, self._ruler()
-        self._answer("reading the photograph", lambda: photograph_answer(photo, ruler))
+        self._answer("reading the photograph", lambda: photograph_result(photo, ruler))
 
     def _compare(self) -> None:
         photo, ruler, scene, folder = self._photo.chosen, self._ruler(), self._session.status().scene, self._folder
-        self._answer("pouring beside the photograph", lambda: compared_answer(photo, ruler, scene, folder))
+        self._answer("pouring beside the photograph", lambda: compared_result(photo, ruler, scene, folder))
 
-    def _answer(self, what: str, find: Callable[[], Answer]) -> None:
+    def _answer(self, what: str, find: Callable[[], CommandResult]) -> None:
         self._background.start(what, find, self.view.show)
 
     def _ruler(self) -> Ruler:

@@ -7,7 +7,7 @@ from typing import Any
 import viser
 
 from explorer.errors import CommandError
-from explorer.laboratory.answers import rig_answer
+from explorer.laboratory.command_results import rig_result
 from explorer.viewer.laboratory.answer_view import AnswerView
 from explorer.viewer.panel import LABORATORY, Now, PageContext, Panel
 from explorer.viewer.pour.restart_panel import entered, parameter_input
@@ -74,6 +74,6 @@ class RigPanel(Panel):
         values = {path: entered(one, self._inputs[path].value) for path, one in self._declared.items()}
         self._background.start(
             f"running {rig} on the solver",
-            lambda: rig_answer(status.scene, rig, values, status.seed, folder),
+            lambda: rig_result(status.scene, rig, values, status.seed, folder),
             self.view.show,
         )

@@ -1,7 +1,4 @@
-"""Where the camera of a browser stands: presets, a link that leads back to a view, and going along with a body.
-
-Controls of the camera: presets with their keys, and a link to the view.
-"""
+"""Where the camera of a browser stands: presets with their keys, a link that leads back to a view, following a body."""
 
 from __future__ import annotations
 
@@ -15,7 +12,7 @@ import viser
 
 from explorer.viewer.actions import ClientAction, Post, add_client_key, client_buttons
 from explorer.viewer.guarded_server import address
-from explorer.viewer.view import VIEW_DIRECTION, VIEW_FIELD, View, view_from
+from explorer.viewer.view import VIEW_DIRECTION, VIEW_FIELD, CameraView, view_from
 
 Array = npt.NDArray[np.float64]
 
@@ -26,59 +23,10 @@ DIRECTIONS: Mapping[str, tuple[float, float, float]] = {
     # Not quite from above: straight down, the camera would not know which way is up.
     "Top": (0.0, -1e-3, 1.0),
 }
-
 """From the pile to the camera."""
-
 STILL = 1e-5
-
 """A body that has moved by less than this [m] does not move the camera."""
-
-
-def view_of(height: float, name: str) -> View:
-    """The preset ``name``: everything up to ``height`` [m] in one picture."""
-    return view_from(DIRECTIONS[name], height)
-
-
-def go_to(client: Any, view: View) -> None:
-    """Put the camera of a browser to ``view``, and its field of view to that of new clients."""
-    go_to_place(client, view)
-    client.camera.fov = VIEW_FIELD
-
-
-def go_along(clients: Iterable[Any], target: Array) -> None:
-    """Let the cameras of browsers look at ``target`` [m] from the side and distance from which they look now."""
-    for client in clients:
-        camera = client.camera
-        offset = camera.position - camera.look_at
-        if np.linalg.norm(camera.look_at - target) > STILL:
-            go_to_place(client, View(target + offset, target))
-
-
-def go_to_place(client: Any, view: View) -> None:
-    """Put the camera of a browser to ``view`` and leave its field of view alone."""
-    with client.atomic():
-        # In this order: a new position takes the point that is looked at along.
-        client.camera.position = view.position
-        client.camera.look_at = view.look_at
-
-
-def link_to(server: viser.ViserServer, camera: Any) -> str:
-    """Address of the page that opens with the view of ``camera``."""
-    numbers = {
-        "initialCameraPosition": camera.position,
-        "initialCameraLookAt": camera.look_at,
-        "initialCameraUp": camera.up_direction,
-        "initialCameraFov": [camera.fov],
-    }
-    # Rounded to a tenth of a millimetre; + 0.0 takes the sign from a zero.
-    query = "&".join(
-        f"{name}={','.join(f'{round(float(x), 4) + 0.0:g}' for x in values)}" for name, values in numbers.items()
-    )
-    return f"http://{address(server.get_host())}:{server.get_port()}/?{query}"
-
-
 LINK = "Link to this view"
-
 VIEW_KEYS: dict[str, Any] = dict(zip(DIRECTIONS, ("1", "2", "3", "4"), strict=True))
 
 
@@ -116,3 +64,46 @@ class CameraPanel:
 
     def _show_link(self, client: Any) -> None:
         self._link.value = link_to(self._server, client.camera)
+
+
+def view_of(height: float, name: str) -> CameraView:
+    """The preset ``name``: everything up to ``height`` [m] in one picture."""
+    return view_from(DIRECTIONS[name], height)
+
+
+def go_to(client: Any, view: CameraView) -> None:
+    """Put the camera of a browser to ``view``, and its field of view to that of new clients."""
+    go_to_place(client, view)
+    client.camera.fov = VIEW_FIELD
+
+
+def go_along(clients: Iterable[Any], target: Array) -> None:
+    """Let the cameras of browsers look at ``target`` [m] from the side and distance from which they look now."""
+    for client in clients:
+        camera = client.camera
+        offset = camera.position - camera.look_at
+        if np.linalg.norm(camera.look_at - target) > STILL:
+            go_to_place(client, CameraView(target + offset, target))
+
+
+def go_to_place(client: Any, view: CameraView) -> None:
+    """Put the camera of a browser to ``view`` and leave its field of view alone."""
+    with client.atomic():
+        # In this order: a new position takes the point that is looked at along.
+        client.camera.position = view.position
+        client.camera.look_at = view.look_at
+
+
+def link_to(server: viser.ViserServer, camera: Any) -> str:
+    """Address of the page that opens with the view of ``camera``."""
+    numbers = {
+        "initialCameraPosition": camera.position,
+        "initialCameraLookAt": camera.look_at,
+        "initialCameraUp": camera.up_direction,
+        "initialCameraFov": [camera.fov],
+    }
+    # Rounded to a tenth of a millimetre; + 0.0 takes the sign from a zero.
+    query = "&".join(
+        f"{name}={','.join(f'{round(float(x), 4) + 0.0:g}' for x in values)}" for name, values in numbers.items()
+    )
+    return f"http://{address(server.get_host())}:{server.get_port()}/?{query}"

@@ -1,7 +1,4 @@
-"""Colours of bodies by what they do: quantities, their range, and the bar that explains them.
-
-Controls of the colours: by which quantity, in which range; and the bar that explains them.
-"""
+"""Colours of bodies by what they do: quantities, their range, the bar that explains them, and the controls of it."""
 
 from __future__ import annotations
 
@@ -24,10 +21,13 @@ from explorer.viewer.style import SELECTED, VIRIDIS, css, linear, linear_all, ma
 Array = npt.NDArray[np.float64]
 
 TOP_PERCENTILE = 99.0
-
 """An automatic range reaches to here: a single fast body must not make all others look the same."""
-
 NICE = (1.0, 2.0, 5.0, 10.0)
+COLOUR_KEY, NEXT_COLOUR = "C", "Colour by the next quantity"
+LARGEST = 1e6
+"""Largest end of a fixed range of colours, in the unit of the screen."""
+STEP = 1e-3
+"""Step of these ends; viser rounds what a box shows to this, and by itself to whole numbers."""
 
 
 class Numbered(Protocol):
@@ -39,7 +39,7 @@ class Numbered(Protocol):
 
 
 @dataclass(frozen=True)
-class Quantity:
+class ColourQuantity:
     """Something that bodies can be coloured by."""
 
     unit: str
@@ -64,13 +64,14 @@ def _residence(details: Details) -> npt.NDArray[Any]:
     return details.time - details.entered
 
 
-QUANTITIES: Mapping[str, Quantity] = {
-    "speed": Quantity("m/s", 1.0, _speed),
-    "contact force": Quantity("mN", 1e3, lambda details: details.load, "sum of the normal forces on a body"),
-    "coordination number": Quantity("", 1.0, lambda details: details.neighbours, "other bodies that a body touches"),
-    "residence time": Quantity("s", 1.0, _residence, "time since a body entered"),
+QUANTITIES: Mapping[str, ColourQuantity] = {
+    "speed": ColourQuantity("m/s", 1.0, _speed),
+    "contact force": ColourQuantity("mN", 1e3, lambda details: details.load, "sum of the normal forces on a body"),
+    "coordination number": ColourQuantity(
+        "", 1.0, lambda details: details.neighbours, "other bodies that a body touches"
+    ),
+    "residence time": ColourQuantity("s", 1.0, _residence, "time since a body entered"),
 }
-
 """Of a live pour."""
 
 
@@ -91,7 +92,11 @@ def nice_top(values: Array) -> float:
 
 
 def body_colours(
-    plain: npt.NDArray[np.uint8], look: Look, quantity: Quantity | None, details: Numbered | None, selected: int | None
+    plain: npt.NDArray[np.uint8],
+    look: Look,
+    quantity: ColourQuantity | None,
+    details: Numbered | None,
+    selected: int | None,
 ) -> npt.NDArray[np.uint8]:
     """Colours of the n bodies of a frame for batched meshes, shape (n, 3).
 
@@ -113,7 +118,7 @@ def body_colours(
     return painted
 
 
-def bar_html(look: Look, quantity: Quantity | None, details: Numbered | None) -> str:
+def bar_html(look: Look, quantity: ColourQuantity | None, details: Numbered | None) -> str:
     """The bar below the choice of colours: the map, its ends, the quantity with its unit."""
     if quantity is None:
         return ""
@@ -132,17 +137,6 @@ def bar_html(look: Look, quantity: Quantity | None, details: Numbered | None) ->
     )
 
 
-COLOUR_KEY, NEXT_COLOUR = "C", "Colour by the next quantity"
-
-LARGEST = 1e6
-
-"""Largest end of a fixed range of colours, in the unit of the screen."""
-
-STEP = 1e-3
-
-"""Of its ends; viser rounds what a box shows to this, and by itself to whole numbers."""
-
-
 class ColourPanel:
     """Changes ``settings``; ``bar`` is where the colours are explained, ``quantities`` what there is to choose from.
 
@@ -154,7 +148,7 @@ class ColourPanel:
         server: viser.ViserServer,
         bar: viser.GuiHtmlHandle,
         settings: LookSettings,
-        quantities: Mapping[str, Quantity],
+        quantities: Mapping[str, ColourQuantity],
         post: Post,
         note: str = "",
     ) -> None:
@@ -181,7 +175,7 @@ class ColourPanel:
         add_keys(gui, {NEXT_COLOUR: lambda: settings.next("colour_by", choices)}, {NEXT_COLOUR: COLOUR_KEY}, post)
 
     @property
-    def quantity(self) -> Quantity | None:
+    def quantity(self) -> ColourQuantity | None:
         """What the colours tell; None: the component."""
         return self._quantities.get(self._settings.look.colour_by)
 

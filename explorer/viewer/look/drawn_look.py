@@ -9,7 +9,7 @@ import numpy.typing as npt
 import viser
 
 from explorer.live.frames import Frame
-from explorer.viewer.look.colours import Numbered, Quantity, body_colours
+from explorer.viewer.look.colours import ColourQuantity, Numbered, body_colours
 from explorer.viewer.look.look import Look
 from explorer.viewer.scene_nodes import BodyNodes
 from explorer.viewer.view import light
@@ -54,7 +54,7 @@ class DrawnLook:
         nodes: DrawnNodes,
         frame: Frame,
         look: Look,
-        quantity: Quantity | None,
+        quantity: ColourQuantity | None,
         details: Numbered | None,
         selected: int | None = None,
     ) -> None:

@@ -1,7 +1,4 @@
-"""Force chains: lines from centre to centre through the contacts that press hardest.
-
-Controls of the force chains.
-"""
+"""Force chains: lines from centre to centre through the contacts that press hardest, and their controls."""
 
 from __future__ import annotations
 
@@ -20,19 +17,17 @@ from explorer.viewer.look.look import Look
 from explorer.viewer.look.look_settings import LookSettings
 from explorer.viewer.style import CHAINS
 
-STRONGER = (1.0, 2.0, 4.0)
-
-"""Where the classes begin, as multiples of the threshold."""
-
-THICKNESS = (6e-4, 1.2e-3, 2.4e-3)
-
-"""Thickness of their lines [m]."""
-
-LEAST_SHARE = 1e-9
-
-"""Contacts that do not press at all are no part of a chain, even with a threshold of 0 (share of the mean force)."""
-
 Segments = npt.NDArray[np.float32]
+
+STRONGER = (1.0, 2.0, 4.0)
+"""Where the classes of force begin, as multiples of the threshold."""
+THICKNESS = (6e-4, 1.2e-3, 2.4e-3)
+"""Thickness of the lines of each class [m]."""
+LEAST_SHARE = 1e-9
+"""Contacts that do not press at all are no part of a chain, even with a threshold of 0 (share of the mean force)."""
+CHAINS_KEY, FORCE_CHAINS = "K", "Force chains"
+MOST_TIMES_MEAN = 5.0
+"""Largest threshold that can be chosen, in mean forces."""
 
 
 class ForceChains:
@@ -99,11 +94,6 @@ def chain_text(details: Details | None, look: Look) -> str:
         f"Lines: normal force from {1e3 * low:.3g} mN on; thicker from {2e3 * low:.3g} and {4e3 * low:.3g} mN. "
         f"{drawn} of {details.touching} contacts; their mean is {1e3 * details.mean_force:.3g} mN."
     )
-
-
-CHAINS_KEY, FORCE_CHAINS = "K", "Force chains"
-
-MOST_TIMES_MEAN = 5.0
 
 
 class ForcePanel:

@@ -1,9 +1,8 @@
-"""One body as text: what it is, where it is, what it touches and how hard.
-
-Which body a click meets: the ray of the click against the surfaces as they are drawn.
+"""One body under inspection: which one a click meets, and what it is, where it is, what it touches and how hard.
 
 viser can tell the instance of a mesh that was clicked, but draws a hull of ten pixels around whatever the mouse is
-over, which hides small bodies, and says nothing of clicks beside them. So the ray is followed here.
+over, which hides small bodies, and says nothing of clicks beside them. So the ray of the click is followed here,
+against the surfaces as they are drawn.
 """
 
 from __future__ import annotations
@@ -20,8 +19,9 @@ from explorer.scene.meshes import Triangles
 from solver.scenes.insertion import rotation_matrix
 from solver.scenes.scene import Scene
 
-NOBODY = "Click a body, or press N, to see what it is, where it goes and what it touches."
+Array = npt.NDArray[np.float64]
 
+NOBODY = "Click a body, or press N, to see what it is, where it goes and what it touches."
 CONTACTS_SHOWN = 12
 
 STYLE = """<style>
@@ -101,9 +101,6 @@ def name_of(scene: Scene, frame: Frame, body: int) -> str:
 def vector(numbers: npt.NDArray[np.floating], form: str) -> str:
     """Three numbers in a row."""
     return ", ".join(f"{float(number):{form}}" for number in numbers)
-
-
-Array = npt.NDArray[np.float64]
 
 
 def nearest_hit(

@@ -1,6 +1,6 @@
 """The settings of how things are drawn: handles on the page show a :class:`Look`, and change it.
 
-Controls of what one looks past: bodies that are cut away, a rig that is seen through, shadows.
+Those of what one looks past stand here as well: bodies that are cut away, a rig that is seen through, shadows.
 """
 
 from __future__ import annotations
@@ -16,8 +16,12 @@ from explorer.viewer.actions import Post, add_keys
 from explorer.viewer.look.look import CUTS, NOTHING, Look
 
 Take = Callable[[object], Mapping[str, Any]]
-
 """From what a browser sent to settings of :class:`Look`; raises InputError for what may not be sent."""
+
+CUT_KEY, NEXT_CUT = "X", "Cut away the next side"
+CUT_CHOICES = (NOTHING, *CUTS)
+REACH_MM = 200.0
+"""The cut can be moved as far as this from the axis and above the plate [mm]."""
 
 
 class LookSettings:
@@ -64,15 +68,6 @@ def one_of(value: object, choices: tuple[str, ...], name: str) -> str:
         if value == choice:
             return choice
     raise InputError(f"{name}: {str(value)[:40]!r} is not one of {', '.join(choices)}")
-
-
-CUT_KEY, NEXT_CUT = "X", "Cut away the next side"
-
-CUT_CHOICES = (NOTHING, *CUTS)
-
-REACH_MM = 200.0
-
-"""The cut can be moved as far as this from the axis and above the plate [mm]."""
 
 
 class CutPanel:

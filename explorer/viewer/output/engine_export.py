@@ -1,7 +1,4 @@
-"""The pour for another program.
-
-What `explorer export` writes, in one file that a browser takes along.
-"""
+"""The pour for another program: what `explorer export` writes, in one file that a browser takes along."""
 
 from __future__ import annotations
 
@@ -12,25 +9,13 @@ from typing import Any
 
 import viser
 
-from explorer.background.printed import kept_scene, printed
+from explorer.background.command_output import command_output, kept_scene
 from explorer.errors import CommandError
 from explorer.export import OWN, names
 from explorer.files.exports import zipped
 from explorer.viewer.output.send_file import send_file
 from explorer.viewer.panel import TAKE_ALONG, PageContext, Panel
 from solver.plugins import origin
-
-
-def packed_export(scene: Path, program: str, seed: int) -> bytes:
-    """A .zip of the folder that ``explorer export scene DIR --to program --seed seed`` makes, in a process of its own.
-
-    Raises CommandError where that command refuses.
-    """
-    with tempfile.TemporaryDirectory() as apart:
-        folder = Path(apart) / f"{scene.stem}_{program}"
-        printed(["export", str(scene), str(folder), "--to", program, "--seed", str(seed)])
-        written = sorted(one for one in folder.rglob("*") if one.is_file())
-        return zipped({str(path.relative_to(apart)): path for path in written})
 
 
 class EngineExport(Panel):
@@ -71,3 +56,15 @@ def programs_text() -> str:
     own = groupby(OWN, key=lambda target: target.what)
     lines = [f"{', '.join(target.name for target in alike)}: {what}." for what, alike in own]
     return " ".join([*lines, *(f"{name}: of {origin('export', name)}." for name in names()[len(OWN) :])])
+
+
+def packed_export(scene: Path, program: str, seed: int) -> bytes:
+    """A .zip of the folder that ``explorer export scene DIR --to program --seed seed`` makes, in a process of its own.
+
+    Raises CommandError where that command refuses.
+    """
+    with tempfile.TemporaryDirectory() as apart:
+        folder = Path(apart) / f"{scene.stem}_{program}"
+        command_output(["export", str(scene), str(folder), "--to", program, "--seed", str(seed)])
+        written = sorted(one for one in folder.rglob("*") if one.is_file())
+        return zipped({str(path.relative_to(apart)): path for path in written})

@@ -1,8 +1,7 @@
 """Angle of repose with its spread over the flanks, and discharged mass, over simulated time, as they come in.
 
-Changes of parameters as marks on a chart over time.
-
-uPlot draws lines only, as viser hands it on: a mark is a spike of one series, up and down at one moment.
+Changes of parameters are marks on a chart over time. uPlot draws lines only, as viser hands it on: a mark is a spike of
+one series, up and down at one moment.
 """
 
 from __future__ import annotations
@@ -35,20 +34,166 @@ from solver.observables.observable import Value
 Array = npt.NDArray[np.float64]
 
 MOST_MARKS = 40
-
 """Moments that are marked; the oldest are given up."""
-
 HALF_WIDTH = 1e-5
-
-"""Half the foot of a spike [s]."""
-
+"""Half the foot of a spike, which is a mark [s]."""
 MOST_LETTERS = 64
-
+"""Of the legend of the marks."""
 NO_MARKS = "no change yet"
-
 LEGEND_INTERVAL = 1.0
-
 """Wall time [s] between two texts of a legend: with every one of them the browser makes the chart anew."""
+MOST_POINTS = 300
+"""Points kept of each curve; when there are more, every other one is dropped."""
+LEAST_TOP_DEG = 50.0
+"""The axis of the angle reaches at least to here [°]."""
+SPREAD = (2, 1)
+"""Places of the upper and the lower end of the angle's spread among the series."""
+
+
+class Chart(Panel):
+    """The chart on the page."""
+
+    name, tab = "chart", POUR
+
+    def __init__(self, page: PageContext) -> None:
+        self._history, self._top_deg = PourCurves(), LEAST_TOP_DEG
+        self._marks = Marks()
+        self._plot = page.server.gui.add_uplot(
+            self._history.drawn(()),
+            _series(NO_MARKS),
+            bands=(viser.uplot.Band(series=SPREAD, fill=ANGLE_SPREAD_BAND),),
+            scales=_scales(LEAST_TOP_DEG),
+            axes=(axis("x", 2), axis("angle", 3, "angle [°]"), axis("mass", 1, "mass [g]")),
+            aspect=2.5,
+            padding=(12, 8, 0, 0),
+        )
+
+    def show(self, now: Now) -> None:
+        """Draw what is new, and mark the changes."""
+        status, events = now.status, now.events
+        marked = self._marks.take(events, status.generation)
+        if self._history.add(status) or marked:
+            columns = self._history.drawn(self._marks.times)
+            self._plot.data = columns
+            self._reach(columns[2])
+        label = self._marks.new_label(events, status.generation, time.monotonic())
+        if label is not None:
+            self._plot.series = _series(label)
+
+    def _reach(self, angle_deg: Array) -> None:
+        """Let the axis reach the greatest angle."""
+        top = max(LEAST_TOP_DEG, 10.0 * math.ceil(np.max(angle_deg, initial=0.0, where=np.isfinite(angle_deg)) / 10.0))
+        if top != self._top_deg:
+            self._top_deg = top
+            self._plot.scales = _scales(top)
+
+
+def _series(mark: str) -> tuple[viser.uplot.Series, ...]:
+    return (
+        viser.uplot.Series(label="time [s]"),
+        line("− spread over flanks", ANGLE_SPREAD_LINE, "angle", width=1),
+        line("+ spread", ANGLE_SPREAD_LINE, "angle", width=1),
+        line("angle [°]", ANGLE_LINE, "angle"),
+        line("mass below [g]", MASS_LINE, "mass"),
+        line(mark, MARK_LINE, "mark", width=1),
+    )
+
+
+def _scales(top_deg: float) -> dict[str, viser.uplot.Scale]:
+    # The range of the angle is set, since uPlot finds none among numbers that include NaN.
+    return {
+        "x": viser.uplot.Scale(time=False),
+        "angle": viser.uplot.Scale(range=(0.0, top_deg)),
+        "mark": viser.uplot.Scale(range=(0.0, 1.0)),
+    }
+
+
+def line(label: str, colour: str, scale: str, width: float = 2) -> viser.uplot.Series:
+    """A series without points."""
+    return viser.uplot.Series(label=label, stroke=colour, width=width, points={"show": False}, scale=scale)
+
+
+def axis(scale: str, side: Any, label: str = "") -> viser.uplot.Axis:
+    """An axis; ``side`` is uPlot's: 1 right, 2 bottom, 3 left."""
+    grid = {"show": side != 1, "stroke": GRID_LINE}
+    made: Any = {"scale": scale, "side": side, "stroke": AXIS_TEXT, "grid": grid, "size": 38}
+    return made if not label else made | {"label": label, "labelSize": 18}
+
+
+class PourCurves:
+    """Angle of repose and mass below the outlet of one pour. The angle is read less often, and begins later."""
+
+    def __init__(self) -> None:
+        self._generation, self._time = 0, 0.0
+        self._angle, self._spread, self._mass = ThinnedCurve(), ThinnedCurve(), ThinnedCurve()
+        self._observed: Mapping[str, Value] = {}
+
+    def add(self, status: Status) -> bool:
+        """Take note of ``status``; True if there is something new to draw."""
+        fresh = status.generation != self._generation
+        if fresh:
+            self._generation, self._observed = status.generation, {}
+            self._angle, self._spread, self._mass = ThinnedCurve(), ThinnedCurve(), ThinnedCurve()
+        back = not fresh and status.time < self._time
+        self._time = status.time
+        if back:
+            # What the status tells of the angle was read before, and is on the curve already.
+            self._observed = status.observables
+            self._angle.cut(status.time)
+            self._spread.cut(status.time)
+            self._mass.cut(status.time)
+        angle_deg = angle_of_repose_deg(status)
+        # What was not read anew is no point: the chart would draw steps.
+        if status.observables != self._observed and math.isfinite(angle_deg):
+            self._observed = status.observables
+            self._angle.add(status.time, angle_deg)
+            self._spread.add(status.time, status.observables["angle_of_repose_deg"].spread or 0.0)
+        return self._mass.add(status.time, 1e3 * status.discharged_mass) or fresh or back
+
+    def columns(self) -> tuple[Array, Array, Array]:
+        """Time [s], angle [°], mass [g]; shape (n,) each.
+
+        Between its points a curve is what a line through them is; before the first and after the last angle there is
+        NaN, which the chart leaves out.
+        """
+        (angle_time, angle), (mass_time, mass) = self._angle.columns(), self._mass.columns()
+        if not len(mass_time):
+            return np.zeros(1), np.full(1, math.nan), np.zeros(1)
+        time = np.union1d(angle_time, mass_time)
+        inside = np.interp(time, angle_time, angle, math.nan, math.nan) if len(angle_time) else time * math.nan
+        return time, inside, np.interp(time, mass_time, mass)
+
+    def drawn(self, marks: Sequence[float]) -> tuple[Array, ...]:
+        """Time [s], angle ∓ spread and angle [°], mass [g], and 1 at the ``marks`` [s]; shape (n,) each."""
+        moments, angle, mass = self.columns()
+        spread_time, spread = self._spread.columns()
+        around = np.interp(moments, spread_time, spread) if len(spread_time) else np.zeros_like(moments)
+        return with_marks((moments, np.maximum(angle - around, 0.0), angle + around, angle, mass), marks)
+
+
+class ThinnedCurve:
+    """Values over simulated time [s], thinned out when they become many."""
+
+    def __init__(self) -> None:
+        self._points: list[tuple[float, float]] = []
+
+    def add(self, time: float, value: float) -> bool:
+        """Add a point, unless it is not later than the last one; True if it was added."""
+        if self._points and time <= self._points[-1][0]:
+            return False
+        self._points.append((time, value))
+        if len(self._points) > MOST_POINTS:
+            self._points = self._points[::2]
+        return True
+
+    def cut(self, time: float) -> None:
+        """Forget what is later than ``time``."""
+        self._points = [point for point in self._points if point[0] <= time]
+
+    def columns(self) -> tuple[Array, Array]:
+        """Times and values, shape (n,) each."""
+        points = np.array(self._points, dtype=np.float64).reshape(-1, 2)
+        return points[:, 0], points[:, 1]
 
 
 class Marks:
@@ -114,162 +259,3 @@ def _between(moments: Array, time: Array, curve: Array) -> Array:
     beyond = None if known.all() else math.nan
     found: Array = np.interp(moments, time[known], curve[known], beyond, beyond)
     return found
-
-
-MOST_POINTS = 300
-
-"""Points kept of each curve; when there are more, every other one is dropped."""
-
-LEAST_TOP_DEG = 50.0
-
-"""The axis of the angle reaches at least to here [°]."""
-
-SPREAD = (2, 1)
-
-"""Places of the upper and the lower end of the angle's spread among the series."""
-
-
-class Curve:
-    """Values over simulated time [s], thinned out when they become many."""
-
-    def __init__(self) -> None:
-        self._points: list[tuple[float, float]] = []
-
-    def add(self, time: float, value: float) -> bool:
-        """Add a point, unless it is not later than the last one; True if it was added."""
-        if self._points and time <= self._points[-1][0]:
-            return False
-        self._points.append((time, value))
-        if len(self._points) > MOST_POINTS:
-            self._points = self._points[::2]
-        return True
-
-    def cut(self, time: float) -> None:
-        """Forget what is later than ``time``."""
-        self._points = [point for point in self._points if point[0] <= time]
-
-    def columns(self) -> tuple[Array, Array]:
-        """Times and values, shape (n,) each."""
-        points = np.array(self._points, dtype=np.float64).reshape(-1, 2)
-        return points[:, 0], points[:, 1]
-
-
-class History:
-    """Angle of repose and mass below the outlet of one pour. The angle is read less often, and begins later."""
-
-    def __init__(self) -> None:
-        self._generation, self._time = 0, 0.0
-        self._angle, self._spread, self._mass = Curve(), Curve(), Curve()
-        self._observed: Mapping[str, Value] = {}
-
-    def add(self, status: Status) -> bool:
-        """Take note of ``status``; True if there is something new to draw."""
-        fresh = status.generation != self._generation
-        if fresh:
-            self._generation, self._observed = status.generation, {}
-            self._angle, self._spread, self._mass = Curve(), Curve(), Curve()
-        back = not fresh and status.time < self._time
-        self._time = status.time
-        if back:
-            # What the status tells of the angle was read before, and is on the curve already.
-            self._observed = status.observables
-            self._angle.cut(status.time)
-            self._spread.cut(status.time)
-            self._mass.cut(status.time)
-        angle_deg = angle_of_repose_deg(status)
-        # What was not read anew is no point: the chart would draw steps.
-        if status.observables != self._observed and math.isfinite(angle_deg):
-            self._observed = status.observables
-            self._angle.add(status.time, angle_deg)
-            self._spread.add(status.time, status.observables["angle_of_repose_deg"].spread or 0.0)
-        return self._mass.add(status.time, 1e3 * status.discharged_mass) or fresh or back
-
-    def columns(self) -> tuple[Array, Array, Array]:
-        """Time [s], angle [°], mass [g]; shape (n,) each.
-
-        Between its points a curve is what a line through them is; before the first and after the last angle there is
-        NaN, which the chart leaves out.
-        """
-        (angle_time, angle), (mass_time, mass) = self._angle.columns(), self._mass.columns()
-        if not len(mass_time):
-            return np.zeros(1), np.full(1, math.nan), np.zeros(1)
-        time = np.union1d(angle_time, mass_time)
-        inside = np.interp(time, angle_time, angle, math.nan, math.nan) if len(angle_time) else time * math.nan
-        return time, inside, np.interp(time, mass_time, mass)
-
-    def drawn(self, marks: Sequence[float]) -> tuple[Array, ...]:
-        """Time [s], angle ∓ spread and angle [°], mass [g], and 1 at the ``marks`` [s]; shape (n,) each."""
-        moments, angle, mass = self.columns()
-        spread_time, spread = self._spread.columns()
-        around = np.interp(moments, spread_time, spread) if len(spread_time) else np.zeros_like(moments)
-        return with_marks((moments, np.maximum(angle - around, 0.0), angle + around, angle, mass), marks)
-
-
-class Chart(Panel):
-    """The chart on the page."""
-
-    name, tab = "chart", POUR
-
-    def __init__(self, page: PageContext) -> None:
-        self._history, self._top_deg = History(), LEAST_TOP_DEG
-        self._marks = Marks()
-        self._plot = page.server.gui.add_uplot(
-            self._history.drawn(()),
-            _series(NO_MARKS),
-            bands=(viser.uplot.Band(series=SPREAD, fill=ANGLE_SPREAD_BAND),),
-            scales=_scales(LEAST_TOP_DEG),
-            axes=(axis("x", 2), axis("angle", 3, "angle [°]"), axis("mass", 1, "mass [g]")),
-            aspect=2.5,
-            padding=(12, 8, 0, 0),
-        )
-
-    def show(self, now: Now) -> None:
-        """Draw what is new, and mark the changes."""
-        status, events = now.status, now.events
-        marked = self._marks.take(events, status.generation)
-        if self._history.add(status) or marked:
-            columns = self._history.drawn(self._marks.times)
-            self._plot.data = columns
-            self._reach(columns[2])
-        label = self._marks.new_label(events, status.generation, time.monotonic())
-        if label is not None:
-            self._plot.series = _series(label)
-
-    def _reach(self, angle_deg: Array) -> None:
-        """Let the axis reach the greatest angle."""
-        top = max(LEAST_TOP_DEG, 10.0 * math.ceil(np.max(angle_deg, initial=0.0, where=np.isfinite(angle_deg)) / 10.0))
-        if top != self._top_deg:
-            self._top_deg = top
-            self._plot.scales = _scales(top)
-
-
-def _series(mark: str) -> tuple[viser.uplot.Series, ...]:
-    return (
-        viser.uplot.Series(label="time [s]"),
-        line("− spread over flanks", ANGLE_SPREAD_LINE, "angle", width=1),
-        line("+ spread", ANGLE_SPREAD_LINE, "angle", width=1),
-        line("angle [°]", ANGLE_LINE, "angle"),
-        line("mass below [g]", MASS_LINE, "mass"),
-        line(mark, MARK_LINE, "mark", width=1),
-    )
-
-
-def line(label: str, colour: str, scale: str, width: float = 2) -> viser.uplot.Series:
-    """A series without points."""
-    return viser.uplot.Series(label=label, stroke=colour, width=width, points={"show": False}, scale=scale)
-
-
-def _scales(top_deg: float) -> dict[str, viser.uplot.Scale]:
-    # The range of the angle is set, since uPlot finds none among numbers that include NaN.
-    return {
-        "x": viser.uplot.Scale(time=False),
-        "angle": viser.uplot.Scale(range=(0.0, top_deg)),
-        "mark": viser.uplot.Scale(range=(0.0, 1.0)),
-    }
-
-
-def axis(scale: str, side: Any, label: str = "") -> viser.uplot.Axis:
-    """An axis; ``side`` is uPlot's: 1 right, 2 bottom, 3 left."""
-    grid = {"show": side != 1, "stroke": GRID_LINE}
-    made: Any = {"scale": scale, "side": side, "stroke": AXIS_TEXT, "grid": grid, "size": 38}
-    return made if not label else made | {"label": label, "labelSize": 18}

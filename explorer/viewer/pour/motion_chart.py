@@ -13,7 +13,7 @@ import viser.uplot
 
 from explorer.live.messages import SessionState, Status
 from explorer.viewer.panel import POUR, Now, PageContext, Panel
-from explorer.viewer.pour.chart import NO_MARKS, Curve, Marks, axis, line, with_marks
+from explorer.viewer.pour.chart import NO_MARKS, Marks, ThinnedCurve, axis, line, with_marks
 from explorer.viewer.style import CONTACTS_LINE, ENERGY_LINE, MARK_LINE
 
 Array = npt.NDArray[np.float64]
@@ -24,14 +24,14 @@ class MotionHistory:
 
     def __init__(self) -> None:
         self._generation, self._last = 0, -math.inf
-        self._energy, self._contacts = Curve(), Curve()
+        self._energy, self._contacts = ThinnedCurve(), ThinnedCurve()
 
     def add(self, status: Status) -> bool:
         """Take note of ``status``; True if there is something new to draw."""
         fresh = status.generation != self._generation
         if fresh:
             self._generation, self._last = status.generation, -math.inf
-            self._energy, self._contacts = Curve(), Curve()
+            self._energy, self._contacts = ThinnedCurve(), ThinnedCurve()
         if status.state == SessionState.STARTING:
             return fresh
         gone_back = status.time < self._last

@@ -1,6 +1,6 @@
-"""A pile from the side as a drawing: silhouette, lines of the flanks, and what was measured. Text → SVG in HTML.
+"""A pile from the side: silhouette, lines of the flanks, and what was measured, as SVG in HTML and in the 3-D view.
 
-The lines of the flanks, and a measured curve, in 3-D: in the upright plane through the axis that the view shows.
+In 3-D the lines of the flanks and the measured curve lie in the upright plane through the axis that the view shows.
 """
 
 from __future__ import annotations
@@ -20,20 +20,16 @@ from solver.observables.repose import AZIMUTHS_DEG, FlankLine, Flanks, Outline
 Array = npt.NDArray[np.float64]
 
 MM = 1e3
-
 MARGIN = 4.0
-
 """Around the drawing [mm]."""
-
 LEAST_WIDTH, LEAST_HEIGHT = 60.0, 15.0
-
 """Of what is drawn [mm], so that one body alone is not drawn large."""
-
 SCALE_BAR = 20.0
-
 """Length of the scale bar [mm]."""
-
 WAITING = "The silhouette is drawn once there is a pile below the outlet."
+THICKNESS = 1.5e-3
+"""Of the lines in 3-D [m]."""
+NOWHERE: Array = np.zeros((1, 2, 3))
 
 
 def outline_html(outline: Outline | None, measured: MeasuredCurve | None) -> str:
@@ -109,13 +105,6 @@ def _scale_bar(reach: float, top: float) -> str:
         f"stroke='currentColor' stroke-width='0.5'/><text x='{left:.1f}' y='{height - 0.8:.1f}' "
         f"font-size='3' fill='currentColor'>{SCALE_BAR:g} mm</text>"
     )
-
-
-THICKNESS = 1.5e-3
-
-"""Of the lines [m]."""
-
-NOWHERE: Array = np.zeros((1, 2, 3))
 
 
 class OutlineNodes:

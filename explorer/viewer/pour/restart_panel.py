@@ -11,7 +11,7 @@ from explorer.session import Session
 from explorer.units import checked, screen_unit, title
 from explorer.viewer.actions import Post
 from explorer.viewer.panel import POUR
-from explorer.viewer.pour.scene_bound import SceneBound
+from explorer.viewer.pour.rebuilt_panel import RebuiltPanel
 from explorer.viewer.tour import Stop
 from solver.effects import set_up_effects
 from solver.params import Parameter, declared
@@ -51,7 +51,7 @@ def effect_paths() -> tuple[str, ...]:
     return tuple(path for kind in set_up_effects() for path in declared(kind, f"effect.{kind.name}"))
 
 
-class RestartPanel(SceneBound["SetUpInputs"]):
+class RestartPanel(RebuiltPanel["SetUpInputs"]):
     """What acts on the next pour."""
 
     name, tab = "set_up", POUR
@@ -151,7 +151,7 @@ def parameter_input(gui: viser.GuiApi, parameter: Parameter, scene: Scene) -> An
         present,
         min=unit.to_screen(parameter.low),
         max=unit.to_screen(parameter.high),
-        step=SIGNIFICANT_STEP.get(unit.name),
+        step=SIGNIFICANT_STEP.get(unit.symbol),
         hint=parameter.doc,
     )
 

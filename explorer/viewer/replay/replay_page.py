@@ -1,10 +1,7 @@
 """``explorer serve --replay``: a recording on the page, with a time slider, keys, curves, the log and the look.
 
-Where a replay stands: it plays at a speed, stops at the end, and steps from frame to frame.
-
-The tab "Look" of a recording: the live page's controls of colours, cut, rig and cameras.
-
-A recording in 3-D: the bodies and surfaces that are in the file, in its own meshes and colours.
+A replay plays at a speed, stops at the end, and steps from frame to frame. Its bodies and surfaces are those in the
+file, in their own meshes and colours; colours, cut, rig and cameras have the live page's controls.
 """
 
 from __future__ import annotations
@@ -32,155 +29,28 @@ from explorer.viewer.look.look import in_sight
 from explorer.viewer.look.look_settings import CutPanel, LookSettings
 from explorer.viewer.pour.chart import LEAST_TOP_DEG, axis
 from explorer.viewer.pour.run_panel import FASTEST, SLOWEST
-from explorer.viewer.replay.recorded_frames import Motion, RecordedFrames
-from explorer.viewer.scene_nodes import BodyNodes, Kind, drawn, seen_through
+from explorer.viewer.replay.recorded_frames import RecordedFrames, RecordedMotion
+from explorer.viewer.scene_nodes import BodyNodes, DrawnComponent, drawn, seen_through
 from explorer.viewer.style import ANGLE_LINE, CONTACTS_LINE, DARK, ENERGY_LINE, MASS_LINE, ThemeSwitch, apply_theme
 from explorer.viewer.view import light, look_at_height
 
-
-class Timeline:
-    """A moment within ``times`` [s], ascending, at least one."""
-
-    def __init__(self, times: npt.NDArray[np.float64]) -> None:
-        self.times = times
-        self.time = float(times[0])
-        self.playing = len(times) > 1
-        self.speed = 1.0
-
-    @property
-    def first(self) -> float:
-        """Time of the first frame [s]."""
-        return float(self.times[0])
-
-    @property
-    def last(self) -> float:
-        """Time of the last frame [s]."""
-        return float(self.times[-1])
-
-    def pass_by(self, wall: float) -> None:
-        """Go on by ``wall`` seconds of the clock while playing; at the end, stop."""
-        if self.playing:
-            self.go_to(self.time + self.speed * wall)
-            self.playing = self.time < self.last
-
-    def go_to(self, time: float) -> None:
-        """Stand at ``time`` [s], or at the end that it is beyond."""
-        self.time = min(max(time, self.first), self.last)
-
-    def toggle(self) -> None:
-        """Play or pause; at the end, play from the beginning."""
-        if not self.playing and self.time >= self.last:
-            self.time = self.first
-        self.playing = not self.playing
-
-    def step(self, frames: int) -> None:
-        """Pause, and go on by so many frames (back if negative)."""
-        self.playing = False
-        here = int(np.searchsorted(self.times, self.time + 1e-9, side="right")) - 1
-        between = self.times[here] < self.time - 1e-9
-        target = here + frames + (1 if frames < 0 and between else 0)
-        self.time = float(self.times[min(max(target, 0), len(self.times) - 1)])
-
-
-class ReplayNodes:
-    """Nodes of one recording."""
-
-    def __init__(self, server: viser.ViserServer, recording: Recording) -> None:
-        self.bodies = BodyNodes(server, [Kind(c.shape, c.shape.colour, c.most) for c in recording.components])
-        self._surfaces = [
-            (
-                surface,
-                server.scene.add_mesh_simple(
-                    f"/rig/{surface.shape.name}",
-                    surface.shape.vertices,
-                    surface.shape.faces,
-                    color=surface.shape.colour,
-                    opacity=surface.shape.opacity if surface.shape.opacity < 1.0 else None,
-                    **drawn(surface.shape.name),
-                ),
-            )
-            for surface in recording.surfaces
-        ]
-
-    def show(self, frame: Frame, seen: npt.NDArray[np.bool_] | None = None) -> None:
-        """Draw the state of ``frame``; ``seen`` says which bodies are drawn. Call it inside ``server.atomic()``."""
-        self.bodies.show(frame, seen)
-        for surface, node in self._surfaces:
-            node.visible = surface.seen_at(frame.time)
-            pose = surface.pose_at(frame.time)
-            if pose is not None:
-                node.position, node.wxyz = pose[:3], pose[3:]
-
-    def fade(self, opacity: float) -> None:
-        """Opacity of the surfaces that one has to look through."""
-        for surface, node in self._surfaces:
-            if seen_through(surface.shape.name):
-                node.opacity = opacity
-
-
-def highest(recording: Recording) -> float:
-    """Height of the rig [m], or of the bodies where there is none but a plate."""
-    tops = [float(s.shape.vertices[:, 2].max()) for s in recording.surfaces]
-    tops += [float(f.position[:, 2].max()) for c in recording.components for f in c.frames if len(f.scale)]
-    return max(float(np.max(tops)), 1e-3)
-
-
-class ReplayLook:
-    """Draws the frames of ``recording`` as a person wants to see them; ``bar`` explains the colours."""
-
-    def __init__(self, server: viser.ViserServer, recording: Recording, bar: viser.GuiHtmlHandle, post: Post) -> None:
-        self._frames, self._nodes = RecordedFrames(recording), ReplayNodes(server, recording)
-        self._settings, self._on_page = LookSettings(post), DrawnLook(server)
-        self._colours = ColourPanel(server, bar, self._settings, self._frames.quantities, post, self._frames.note)
-        CutPanel(server, self._settings, post)
-        height = highest(recording)
-        CameraPanel(server, post, lambda: height)
-        self._frame = self._frames.frame(1)
-        self._motion: Motion | None = None
-        self._told_for: object = None
-
-    def show(self, time: float) -> None:
-        """Draw the moment ``time`` [s]; call it inside ``server.atomic()``, as often as the page is looked at."""
-        number = self._frames.number_at(time)
-        if number != self._frame.number:
-            self._frame = self._frames.frame(number)
-        if self._colours.quantity is None:
-            self._motion = None
-        elif self._motion is None or self._motion.number != number:
-            self._motion = self._frames.motion(number)
-        look = self._settings.look
-        self._on_page.move(self._nodes, self._frame, look, in_sight(self._frame, look))
-        self._on_page.paint(self._nodes, self._frame, look, self._colours.quantity, self._motion)
-        told = (look, number)
-        if told != self._told_for:
-            self._told_for = told
-            self._colours.show(self._motion)
-
+Array = npt.NDArray[np.float64]
 
 FRAME_INTERVAL = 1.0 / 30.0
-
+"""Wall time [s] between two looks at the replay."""
 EVENTS_SHOWN = 6
-
 PLAY_PAUSE, TO_START, BACK, STEP = "Play / pause (space)", "To start (R)", "◀ frame (←)", "frame ▶ (→)"
-
 HAIR = 1e-6
-
 """Time [s] by which the end of a chart moves to and fro."""
-
 SLIDER_STEP = 1e-3
-
-"""[s]; about as fine as frames lie."""
-
+"""Step of the time slider [s]; about as fine as frames lie."""
 CURVES = (
     ("angle_of_repose_deg", "angle [°]", ANGLE_LINE),
     ("discharged_mass_g", "mass [g]", MASS_LINE),
     ("kinetic_energy_mJ", "energy [mJ]", ENERGY_LINE),
     ("contacts", "contacts", CONTACTS_LINE),
 )
-
 """Recorded curve, label, colour."""
-
-Array = npt.NDArray[np.float64]
 
 
 class ReplayPage:
@@ -309,3 +179,122 @@ def moment_html(recording: Recording, time: float, playing: bool, notice: str = 
     happened = [f"{when:.3f} s  {text}" for when, text in recording.events if when <= time + 1e-9]
     lines += [notice] * bool(notice) + happened[: -EVENTS_SHOWN - 1 : -1]
     return "<div style='padding:0 0.75em; font-size:0.82em'>" + "<br>".join(map(escape, lines)) + "</div>"
+
+
+class Timeline:
+    """A moment within ``times`` [s], ascending, at least one."""
+
+    def __init__(self, times: npt.NDArray[np.float64]) -> None:
+        self.times = times
+        self.time = float(times[0])
+        self.playing = len(times) > 1
+        self.speed = 1.0
+
+    @property
+    def first(self) -> float:
+        """Time of the first frame [s]."""
+        return float(self.times[0])
+
+    @property
+    def last(self) -> float:
+        """Time of the last frame [s]."""
+        return float(self.times[-1])
+
+    def pass_by(self, wall: float) -> None:
+        """Go on by ``wall`` seconds of the clock while playing; at the end, stop."""
+        if self.playing:
+            self.go_to(self.time + self.speed * wall)
+            self.playing = self.time < self.last
+
+    def go_to(self, time: float) -> None:
+        """Stand at ``time`` [s], or at the end that it is beyond."""
+        self.time = min(max(time, self.first), self.last)
+
+    def toggle(self) -> None:
+        """Play or pause; at the end, play from the beginning."""
+        if not self.playing and self.time >= self.last:
+            self.time = self.first
+        self.playing = not self.playing
+
+    def step(self, frames: int) -> None:
+        """Pause, and go on by so many frames (back if negative)."""
+        self.playing = False
+        here = int(np.searchsorted(self.times, self.time + 1e-9, side="right")) - 1
+        between = self.times[here] < self.time - 1e-9
+        target = here + frames + (1 if frames < 0 and between else 0)
+        self.time = float(self.times[min(max(target, 0), len(self.times) - 1)])
+
+
+class ReplayLook:
+    """Draws the frames of ``recording`` as a person wants to see them; ``bar`` explains the colours."""
+
+    def __init__(self, server: viser.ViserServer, recording: Recording, bar: viser.GuiHtmlHandle, post: Post) -> None:
+        self._frames, self._nodes = RecordedFrames(recording), ReplayNodes(server, recording)
+        self._settings, self._on_page = LookSettings(post), DrawnLook(server)
+        self._colours = ColourPanel(server, bar, self._settings, self._frames.quantities, post, self._frames.note)
+        CutPanel(server, self._settings, post)
+        height = highest(recording)
+        CameraPanel(server, post, lambda: height)
+        self._frame = self._frames.frame(1)
+        self._motion: RecordedMotion | None = None
+        self._told_for: object = None
+
+    def show(self, time: float) -> None:
+        """Draw the moment ``time`` [s]; call it inside ``server.atomic()``, as often as the page is looked at."""
+        number = self._frames.number_at(time)
+        if number != self._frame.number:
+            self._frame = self._frames.frame(number)
+        if self._colours.quantity is None:
+            self._motion = None
+        elif self._motion is None or self._motion.number != number:
+            self._motion = self._frames.motion(number)
+        look = self._settings.look
+        self._on_page.move(self._nodes, self._frame, look, in_sight(self._frame, look))
+        self._on_page.paint(self._nodes, self._frame, look, self._colours.quantity, self._motion)
+        told = (look, number)
+        if told != self._told_for:
+            self._told_for = told
+            self._colours.show(self._motion)
+
+
+class ReplayNodes:
+    """Nodes of one recording."""
+
+    def __init__(self, server: viser.ViserServer, recording: Recording) -> None:
+        self.bodies = BodyNodes(server, [DrawnComponent(c.shape, c.shape.colour, c.most) for c in recording.components])
+        self._surfaces = [
+            (
+                surface,
+                server.scene.add_mesh_simple(
+                    f"/rig/{surface.shape.name}",
+                    surface.shape.vertices,
+                    surface.shape.faces,
+                    color=surface.shape.colour,
+                    opacity=surface.shape.opacity if surface.shape.opacity < 1.0 else None,
+                    **drawn(surface.shape.name),
+                ),
+            )
+            for surface in recording.surfaces
+        ]
+
+    def show(self, frame: Frame, seen: npt.NDArray[np.bool_] | None = None) -> None:
+        """Draw the state of ``frame``; ``seen`` says which bodies are drawn. Call it inside ``server.atomic()``."""
+        self.bodies.show(frame, seen)
+        for surface, node in self._surfaces:
+            node.visible = surface.seen_at(frame.time)
+            pose = surface.pose_at(frame.time)
+            if pose is not None:
+                node.position, node.wxyz = pose[:3], pose[3:]
+
+    def fade(self, opacity: float) -> None:
+        """Opacity of the surfaces that one has to look through."""
+        for surface, node in self._surfaces:
+            if seen_through(surface.shape.name):
+                node.opacity = opacity
+
+
+def highest(recording: Recording) -> float:
+    """Height of the rig [m], or of the bodies where there is none but a plate."""
+    tops = [float(s.shape.vertices[:, 2].max()) for s in recording.surfaces]
+    tops += [float(f.position[:, 2].max()) for c in recording.components for f in c.frames if len(f.scale)]
+    return max(float(np.max(tops)), 1e-3)

@@ -1,7 +1,4 @@
-"""The diagnosis on the page: choose measured data, start, watch, pause, resume; the answer, its charts, others.
-
-Which effects a diagnosis asks about, and how many pours it may take for them.
-"""
+"""The diagnosis on the page: choose data and effects, start, watch, pause, resume; the answer, its charts, others."""
 
 from __future__ import annotations
 
@@ -27,58 +24,18 @@ from explorer.viewer.tour import Stop
 from solver import EFFECTS
 from solver.assets import shipped_measurements
 
-MOST = 100_000
-
+MOST_POURS = 100_000
 BY_ITSELF = (
     f"As many pours as the program takes by itself: {Budget().base} of the declared model, {Budget().screening} of "
     f"every direction of an effect, then {Budget().more} at a time of what stays in question."
 )
-
-
-class Candidates:
-    """A check box per effect, all set at first, and the number of pours; both are read when a diagnosis starts."""
-
-    def __init__(self, server: viser.ViserServer) -> None:
-        gui = server.gui
-        gui.add_markdown(
-            "An effect that is not asked about can never be the answer, and another one may take its place: leave out "
-            "only what your set-up cannot have."
-        )
-        self._boxes = {
-            name: gui.add_checkbox(name.replace("_", " "), True, hint=f"What reveals it: {kind.lever}.")
-            for name, kind in EFFECTS.items()
-        }
-        self._pours = gui.add_number("Pours (0: by itself)", 0, min=0, max=MOST, step=10, hint=BY_ITSELF)
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """The effects that are asked about, () for all. Raises ValueError where none is left."""
-        chosen = tuple(name for name, box in self._boxes.items() if box.value)
-        if not chosen:
-            raise ValueError("effects: none is chosen; without a candidate there is nothing to ask")
-        return () if len(chosen) == len(self._boxes) else chosen
-
-    @property
-    def budget(self) -> int | None:
-        """About so many pours before the first closer look; None: as many as the program takes by itself."""
-        pours = checked(self._pours.value, 0, MOST, "pours")
-        return round(pours) or None
-
-
 FIRST = "trefoil_2"
-
 """Chosen at first, where it is shipped: the data set of `make diagnose`."""
-
 OWN = "folder below"
-
 """Choice of the list that takes the folder in the text field."""
-
 ANSWERS = 5
-
 """Of the most probable ones, that stand beside the verdict."""
-
 PRESENT = "present or newest diagnosis"
-
 EMPTY = (
     "No charts yet: they come with the answer of a diagnosis. Choose measured data above and press *Start*, or add a "
     "folder with a finished diagnosis below."
@@ -115,7 +72,7 @@ class DiagnosisPanel(Panel):
             "Folder", "", hint="Folder with measurement.toml, on the machine that serves this page."
         )
         with gui.add_folder("Effects in question, and how much is poured", expand_by_default=False):
-            self._candidates = Candidates(server)
+            self._candidates = CandidateEffects(server)
         acts = {"Start": self._start, "Pause / go on": self._pause, "Cancel": diagnosis.cancel}
         more = {"Resume": self._resume, "Queue": self._queue, "Clear queue": diagnosis.clear_queue}
         self._view = ProcessView(server, "Diagnosis", acts, post, more)
@@ -190,7 +147,7 @@ def answer_markdown(result: DiagnosisResult) -> str:
     """The verdict in a sentence, the likely answers, and the errors before, after, and by noise alone."""
     verdict, sentence = escaped(result.verdict), escaped(verdict_sentence(result).replace("`", ""))
     odds = "\n".join(
-        f"| {escaped(spelled(one).replace('`', ''))} | {escaped(chance(p))} |" for one, p in _first(result)
+        f"| {escaped(spelled(one).replace('`', ''))} | {escaped(chance(p))} |" for one, p in likely(result)[:ANSWERS]
     )
     errors, words = result.error.told()
     rows = "\n".join(
@@ -205,5 +162,31 @@ def answer_markdown(result: DiagnosisResult) -> str:
     return f"**{verdict}** — {sentence}\n\n| Answer | Probability |\n|:--|--:|\n{odds}\n\n{head}\n{rows}"
 
 
-def _first(result: DiagnosisResult) -> list[tuple[str, float]]:
-    return likely(result)[:ANSWERS]
+class CandidateEffects:
+    """A check box per effect, all set at first, and the number of pours; both are read when a diagnosis starts."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        gui = server.gui
+        gui.add_markdown(
+            "An effect that is not asked about can never be the answer, and another one may take its place: leave out "
+            "only what your set-up cannot have."
+        )
+        self._boxes = {
+            name: gui.add_checkbox(name.replace("_", " "), True, hint=f"What reveals it: {kind.lever}.")
+            for name, kind in EFFECTS.items()
+        }
+        self._pours = gui.add_number("Pours (0: by itself)", 0, min=0, max=MOST_POURS, step=10, hint=BY_ITSELF)
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The effects that are asked about, () for all. Raises ValueError where none is left."""
+        chosen = tuple(name for name, box in self._boxes.items() if box.value)
+        if not chosen:
+            raise ValueError("effects: none is chosen; without a candidate there is nothing to ask")
+        return () if len(chosen) == len(self._boxes) else chosen
+
+    @property
+    def budget(self) -> int | None:
+        """About so many pours before the first closer look; None: as many as the program takes by itself."""
+        pours = checked(self._pours.value, 0, MOST_POURS, "pours")
+        return round(pours) or None

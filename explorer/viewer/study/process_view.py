@@ -1,6 +1,6 @@
-"""Buttons, bar and text of a command that runs in the background; what stands in the text is the panel's own.
+"""A command that runs in the background: buttons, bar and text, with its stages and its runs without a pile as tables.
 
-The stages of a command in the background as a table, and its runs without a pile, as markdown.
+What stands in the text is the panel's own; the tables are markdown.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 import viser
 
 from explorer.background.command_process import CommandStatus
-from explorer.background.progress import Failure, StageProgress, failures
+from explorer.background.progress import FailedRun, StageProgress, failures
 from explorer.viewer.actions import Action, Post, button_group
 
 MARKDOWN_MARKS = re.compile(r"([\\`*_{}\[\]<>()#+!|~&])")
@@ -23,6 +23,9 @@ STATE_WORDS = {
     "finished": "Finished.",
     "failed": "Failed.",
 }
+
+FAILURES_SHOWN = 6
+DONE, AT_WORK, TO_COME = "done", "▶", "–"
 
 
 class ProcessView:
@@ -57,29 +60,6 @@ def progress(status: CommandStatus) -> float:
     return min(1.0, max(0.0, status.done / status.planned)) if status.planned > 0 else 0.0
 
 
-def time_left(eta_s: float | None) -> str:
-    """Seconds as "2 min 05 s"; a dash where nobody knows."""
-    if eta_s is None or not 0.0 <= eta_s < 1e6:
-        return "–"
-    minutes, seconds = divmod(round(eta_s), 60)
-    return f"{minutes} min {seconds:02d} s" if minutes else f"{seconds} s"
-
-
-def waiting_markdown(waiting: Sequence[str]) -> str:
-    """A paragraph with the orders that wait, next one first; empty where none does."""
-    return f"\n\nWaiting: {escaped('; '.join(waiting))}." if waiting else ""
-
-
-def escaped(text: str) -> str:
-    """``text`` as one line that markdown shows as it is."""
-    return MARKDOWN_MARKS.sub(r"\\\1", " ".join(text.split()))
-
-
-FAILURES_SHOWN = 6
-
-DONE, AT_WORK, TO_COME = "done", "▶", "–"
-
-
 def stages_markdown(
     status: CommandStatus, what: str, runs: str, notice: str = "", so_far: str = "", counted: str = ""
 ) -> str:
@@ -109,18 +89,6 @@ def stages_markdown(
     return "\n\n".join(parts)
 
 
-def failures_markdown(lost: tuple[Failure, ...]) -> str:
-    """The newest runs that gave no pile, and what took their places."""
-    rows = "\n".join(
-        f"| {escaped(one.run.stage)} | {escaped(one.run.label)} | {_outcome(one)} | {one.run.seed} | {_next(one)} |"
-        for one in lost[:FAILURES_SHOWN]
-    )
-    head = f"**{len(lost)} without a valid result**" + (
-        f", the newest {FAILURES_SHOWN}:" if len(lost) > FAILURES_SHOWN else ":"
-    )
-    return f"{head}\n\n| Stage | Setting | Outcome | Seed | Next seed |\n|:--|:--|:--|--:|:--|\n{rows}"
-
-
 def _table(status: CommandStatus, runs: str, so_far: str) -> str:
     rows = "\n".join(_row(stage, status, so_far) for stage in status.stages)
     return f"| Stage | {runs} | | Found |\n|:--|--:|:-:|:--|\n{rows}"
@@ -135,12 +103,42 @@ def _row(stage: StageProgress, status: CommandStatus, so_far: str) -> str:
     return f"| {escaped(stage.name)} | {count} | {mark} | {escaped(found)} |"
 
 
-def _outcome(one: Failure) -> str:
+def failures_markdown(lost: tuple[FailedRun, ...]) -> str:
+    """The newest runs that gave no pile, and what took their places."""
+    rows = "\n".join(
+        f"| {escaped(one.run.stage)} | {escaped(one.run.label)} | {_outcome(one)} | {one.run.seed} | {_next(one)} |"
+        for one in lost[:FAILURES_SHOWN]
+    )
+    head = f"**{len(lost)} without a valid result**" + (
+        f", the newest {FAILURES_SHOWN}:" if len(lost) > FAILURES_SHOWN else ":"
+    )
+    return f"{head}\n\n| Stage | Setting | Outcome | Seed | Next seed |\n|:--|:--|:--|--:|:--|\n{rows}"
+
+
+def _outcome(one: FailedRun) -> str:
     text = one.run.outcome.replace("_", " ")
     return escaped(f"{text}: {one.run.message}" if one.run.message else text)
 
 
-def _next(one: Failure) -> str:
+def _next(one: FailedRun) -> str:
     if one.replaced_by is None:
         return "none"
     return escaped(f"{one.replaced_by.seed}: {one.replaced_by.outcome.replace('_', ' ')}")
+
+
+def waiting_markdown(waiting: Sequence[str]) -> str:
+    """A paragraph with the orders that wait, next one first; empty where none does."""
+    return f"\n\nWaiting: {escaped('; '.join(waiting))}." if waiting else ""
+
+
+def time_left(eta_s: float | None) -> str:
+    """Seconds as "2 min 05 s"; a dash where nobody knows."""
+    if eta_s is None or not 0.0 <= eta_s < 1e6:
+        return "–"
+    minutes, seconds = divmod(round(eta_s), 60)
+    return f"{minutes} min {seconds:02d} s" if minutes else f"{seconds} s"
+
+
+def escaped(text: str) -> str:
+    """``text`` as one line that markdown shows as it is."""
+    return MARKDOWN_MARKS.sub(r"\\\1", " ".join(text.split()))

@@ -1,0 +1,53 @@
+"""What a command of the command line prints, for a page that waits for it in a thread while the solver runs beside it.
+
+A scene of the page reaches such a command as a material file.
+"""
+
+from __future__ import annotations
+
+import atexit
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+
+from explorer.background.command_process import PROGRAM
+from explorer.errors import CommandError
+from explorer.files.uploads import kept_file
+from explorer.priority import BACKGROUND, lowered, session_gives_way
+from explorer.scene.text import material_toml
+from solver import Scene
+
+FAILURE = 1
+"""Exit code of a command that has done its work and has no good news."""
+LONGEST_LINE = 300
+TITLE_LETTERS = 20
+
+
+def command_output(arguments: Sequence[str], program: Sequence[str] = PROGRAM) -> str:
+    """Standard output of ``program arguments``, which gives way to everything that a person looks at.
+
+    A command that ends with ``FAILURE`` and has printed something has an answer too. Raises CommandError with the last
+    line of any other that does not end well. The command does not outlive this process.
+    """
+    with subprocess.Popen(
+        lowered((*program, *arguments), BACKGROUND),
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as process:
+        atexit.register(process.kill)
+        session_gives_way(process.pid, BACKGROUND)
+        said, refused = process.communicate()
+        atexit.unregister(process.kill)
+    if process.returncode == 0 or (process.returncode == FAILURE and said.strip()):
+        return said.strip()
+    lines = refused.strip().splitlines() or [f"{arguments[0]} ended with exit code {process.returncode}"]
+    raise CommandError(lines[-1].removeprefix("error: ")[:LONGEST_LINE])
+
+
+def kept_scene(scene: Scene, folder: Path) -> Path:
+    """``scene`` as a material file in ``folder``, under a name of its contents."""
+    text = material_toml(scene, f"{scene.title}, as it was poured on the page. SI.")
+    return kept_file(f"{scene.title[:TITLE_LETTERS]}.toml", text.encode(), folder, (".toml",))

@@ -1,0 +1,188 @@
+"""What the laboratory's commands give on the page: the text of the terminal, the line that repeats it, charts, files.
+
+Each function does what the command of its name does, and none of them knows the page. What takes the solver (a bench
+test run on it, a pour beside a photograph) is a command in a child: the page's own process never loads the solver.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import shlex
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image
+
+from doe.audit import audit_study
+from explorer.audit.read_study import read_study, shipped_study
+from explorer.audit.report import audit_html, audit_text
+from explorer.background.command_output import command_output, kept_scene
+from explorer.design.analysis import AnalyseOrder, run_analyse
+from explorer.design.factors_file import read_factors
+from explorer.design.run_plan import DesignOrder, make_plan, sheet_text
+from explorer.design.text import analysis_text, plan_text
+from explorer.files.run_folder import json_text
+from explorer.laboratory.part import part_table
+from explorer.laboratory.run import LabOrder, analysed, part_file
+from explorer.photograph.annotated import sheet
+from explorer.photograph.run import measure_order, outline_text, run_measure
+from explorer.report.design import design_html
+from explorer.report.design.charts import design_plots
+from explorer.report.figures.bench import bench_charts, curve_charts
+from explorer.report.study_charts import Plot, Plots
+from explorer.scene.source import command_line, rig_source
+from explorer.tables.laboratory import lab_text
+from explorer.tables.photograph import measure_text, refusal_lines
+from explorer.tables.pours import bench_text
+from solver import Scene, with_values
+from solver.assets import asset_path
+from solver.photograph import open_picture
+
+STRAIGHT = "Points of every replicate; the line is the part taken as straight, drawn on to zero force."
+ON_THE_SOLVER = "What the solver's own instrument read in the course of the test."
+PLOT = "beside.png"
+"""File of the photograph beside the pour."""
+
+
+@dataclass(frozen=True)
+class CommandResult:
+    """What a command gives.
+
+    ``files``: name → content, to be taken along. ``picture``: RGB, (height, width, 3), where there is one.
+    """
+
+    text: str
+    command: str
+    plots: Plots = field(default_factory=dict)
+    files: Mapping[str, bytes] = field(default_factory=dict)
+    picture: npt.NDArray[np.uint8] | None = None
+
+
+@dataclass(frozen=True)
+class Ruler:
+    """What tells lengths on a photograph: mm of a pixel, or mm of the one straight bar in it; neither: in pixels."""
+
+    scale_mm: float | None = None
+    reference_mm: float | None = None
+
+    @property
+    def known(self) -> bool:
+        """Whether lengths are in millimetres."""
+        return self.scale_mm is not None or self.reference_mm is not None
+
+
+def bench_result(order: LabOrder) -> CommandResult:
+    """`explorer lab`: readings → parameters."""
+    result = analysed(order)
+    plots: Plots = {title: Plot(partial(dict, spec), STRAIGHT) for title, spec in curve_charts(result).items()}
+    part = part_file(result, part_table(result)).encode()
+    return CommandResult(
+        lab_text(result), shlex.join(["explorer", *lab_words(order)]), plots, {f"{order.test}.toml": part}
+    )
+
+
+def twin_result(order: LabOrder) -> CommandResult:
+    """`explorer lab --simulate` and `--bias`: beside what the readings give, what the test gives on the solver."""
+    words = lab_words(order)
+    said = command_output(words)
+    return replace(bench_result(order), text=said, command=shlex.join(["explorer", *words]))
+
+
+def lab_words(order: LabOrder) -> list[str]:
+    """The command line of ``order``, without the program's name."""
+    words = ["lab", order.test, str(order.file)]
+    words += ["--compression", order.compression] if order.compression else []
+    words += [word for name in order.left_out for word in ("--leave-out", name)]
+    words += ["--simulate"] if order.simulate else []
+    words += ["--material", order.material] if order.material else []
+    return [*words, "--bias"] if order.bias else words
+
+
+def rig_result(scene: Scene, rig: str, values: Mapping[str, float | str], seed: int, folder: Path) -> CommandResult:
+    """`explorer simulate RIG`: a bench test of one body of ``scene``; its parameters are kept as a file in ``folder``.
+
+    ``values``: path → value (SI) of the rig's own parameters. Raises ParameterError before anything is run.
+    """
+    source = rig_source(rig, str(kept_scene(scene, folder)))
+    line = command_line(source, with_values(source.scene, dict(values)), seed)
+    data: dict[str, Any] = json.loads(command_output([*shlex.split(line)[1:], "--json"]))
+    plots: Plots = {title: Plot(partial(dict, spec), ON_THE_SOLVER) for title, spec in bench_charts(data).items()}
+    files = {f"{rig}.json": f"{json_text(data)}\n".encode()}
+    return CommandResult(bench_text(data), line, plots, files)
+
+
+def photograph_result(photo: str, ruler: Ruler) -> CommandResult:
+    """`explorer measure`: the angle of repose on a photograph (file, or a shipped one's name), or why there is none."""
+    order = measure_order([photo], ruler.scale_mm, ruler.reference_mm, None, "auto", None, None, None)
+    measured = run_measure(order)
+    words = ["explorer", *measure_words(photo, ruler)]
+    drawn = sheet([open_picture(order.pictures[0])], measured.readings, None)
+    file = io.BytesIO()
+    drawn.save(file, "PNG")
+    stem = order.pictures[0].stem
+    files = {f"{stem}_read.png": file.getvalue()}
+    if measured.piles and ruler.known:
+        files[f"{stem}_outline.csv"] = outline_text(measured.piles[0]).encode()
+    text = "\n".join([measure_text(measured), *refusal_lines(measured.refusals)]).strip()
+    return CommandResult(text, shlex.join(words), {}, files, np.asarray(drawn, dtype=np.uint8))
+
+
+def compared_result(photo: str, ruler: Ruler, scene: Scene, folder: Path) -> CommandResult:
+    """`explorer measure --from-simulation`: the photograph, and beside it a pour of ``scene`` read by the same fit."""
+    words = [*measure_words(photo, ruler), "--from-simulation", str(kept_scene(scene, folder))]
+    with tempfile.TemporaryDirectory() as apart:
+        drawn = Path(apart) / PLOT
+        said = command_output([*words, "--plot", str(drawn)])
+        content = drawn.read_bytes()
+        with Image.open(drawn) as picture:
+            pixels = np.asarray(picture.convert("RGB"), dtype=np.uint8)
+    return CommandResult(said, shlex.join(["explorer", *words]), {}, {PLOT: content}, pixels)
+
+
+def measure_words(photo: str, ruler: Ruler) -> list[str]:
+    """The command line that reads ``photo``, without the program's name."""
+    words = ["measure", photo]
+    for option, length in (("--scale", ruler.scale_mm), ("--reference-length", ruler.reference_mm)):
+        words += [] if length is None else [option, f"{length:g}"]
+    return words
+
+
+def sheet_result(order: DesignOrder, factors: str, sigma: float | None) -> CommandResult:
+    """`explorer design`: the runs of a design as a sheet to fill in."""
+    file = read_factors(asset_path("designs", factors))
+    plan = make_plan(order, file)
+    words = ["explorer", "design", order.design, "--factors", factors, "--out", "runs.csv"]
+    numbers = (
+        ("--runs", order.runs),
+        ("--replicates", order.replicates),
+        ("--centre", order.centre),
+        ("--sigma", sigma),
+    )
+    for option, number in numbers:
+        words += [] if number is None else [option, f"{number:g}"]
+    words += ["--fold"] if order.fold else []
+    words += [word for generator in order.generators for word in ("--generator", generator)]
+    return CommandResult(
+        plan_text(plan, file, sigma, None), shlex.join(words), {}, {"runs.csv": sheet_text(plan, file).encode()}
+    )
+
+
+def analysis_result(order: AnalyseOrder) -> CommandResult:
+    """`explorer analyse`: what a filled sheet says."""
+    result = run_analyse(order)
+    files = {"report.html": design_html(result).encode()}
+    return CommandResult(analysis_text(result), shlex.join(result.command), design_plots(result), files)
+
+
+def audit_result(folder: Path | None) -> CommandResult:
+    """`explorer audit`: a published study recomputed from its own tables; None: the shipped article."""
+    found = audit_study(read_study(folder or shipped_study()))
+    words = ["explorer", "audit", *([str(folder)] if folder else [])]
+    return CommandResult(audit_text(found), shlex.join(words), {}, {"audit.html": audit_html(found).encode()})

@@ -1,0 +1,309 @@
+"""A diagnosis in the background and its panel, with a small program in place of the command line."""
+
+import json
+import os
+import shutil
+import sys
+
+import pytest
+
+from explorer.background.command_process import BackgroundError, CommandStatus
+from explorer.background.progress import StageProgress
+from explorer.diagnosis.process import DiagnoseProcess, Question
+from explorer.diagnosis.result import DiagnosisResult
+from explorer.priority import BACKGROUND
+from explorer.viewer.actions import Actions
+from explorer.viewer.panel import Now
+from explorer.viewer.study.diagnosis_panel import OWN, DiagnosisPanel, answer_markdown
+from explorer.viewer.study.plot_view import NOTHING
+from solver import EFFECTS, AssetNotFoundError
+from solver.assets import measurement_folder
+from tests.explorer.background.waiting import only_folder, wait_for
+from tests.explorer.diagnosed import result_of_case, typed
+from tests.explorer.viewer.page_session import page_context
+
+PROGRAM = """
+import json, os, pathlib, sys, time
+arguments = sys.argv[1:]
+out = pathlib.Path(arguments[arguments.index("--out") + 1])
+out.mkdir(parents=True, exist_ok="--resume" in arguments)
+(out / "arguments.json").write_text(json.dumps(arguments))
+(out / "niceness").write_text(str(os.nice(0)))
+with (out / "progress.jsonl").open("a") as progress:
+    for left in (2, 1, 0):
+        line = "base model: 3 settings" if left == 0 else None
+        event = {"time": 1, "stage": "base model", "done": 3 - left, "planned": 3, "eta_s": left, "line": line}
+        progress.write(json.dumps(event) + "\\n")
+        progress.flush()
+BEHAVIOUR
+(out / "diagnosis.json").write_text('{"verdict": "no_missing_effect"}')
+"""
+
+
+def diagnosis(tmp_path, behaviour=""):
+    program = tmp_path / "program.py"
+    program.write_text(PROGRAM.replace("BEHAVIOUR", behaviour))
+    return DiagnoseProcess(tmp_path / "out", tmp_path / "runs.sqlite", (sys.executable, str(program)))
+
+
+def test_a_diagnosis_runs_to_its_end_at_lower_priority(tmp_path):
+    process = diagnosis(tmp_path)
+    assert process.status() == CommandStatus("idle")
+    assert process.out is None
+    assert process.finished() == ()
+    process.start(Question("trefoil_1"))
+    wait_for(lambda: process.status().state != "running")
+    status = process.status()
+    assert (status.state, status.stage, status.done, status.planned) == ("finished", "base model", 3, 3)
+    assert status.lines == ("base model: 3 settings",)
+    folder = only_folder(tmp_path)
+    assert status.message == f"report: {folder}/report.html"
+    assert process.out == folder
+    assert process.finished() == (folder,)
+    data = str(measurement_folder("trefoil_1").absolute())
+    arguments = json.loads((folder / "arguments.json").read_text())
+    assert arguments == ["diagnose", data, "--out", str(folder), "--apply", "--store", str(tmp_path / "runs.sqlite")]
+    assert folder.name.startswith("trefoil_1-")
+    assert int((folder / "niceness").read_text()) == min(19, os.nice(0) + BACKGROUND)
+
+
+def test_cancel_and_resume_also_from_a_later_page(tmp_path):
+    process = diagnosis(tmp_path, "time.sleep(0 if '--resume' in arguments else 60)")
+    process.start(Question("trefoil_1"))
+    wait_for(lambda: process.status().done == 3)
+    with pytest.raises(BackgroundError, match="a diagnosis is running already"):
+        process.start(Question("trefoil_1"))
+    with pytest.raises(BackgroundError, match="a diagnosis is running already"):
+        process.resume(Question("trefoil_1"))
+    process.cancel()
+    wait_for(lambda: process.status().state != "running")
+    assert process.status().state == "cancelled"
+    assert process.finished() == ()
+    later = diagnosis(tmp_path)
+    with pytest.raises(BackgroundError, match="no diagnosis of trefoil_2 has been stopped"):
+        later.resume(Question("trefoil_2"))
+    later.resume(Question("trefoil_1"))
+    wait_for(lambda: later.status().state != "running")
+    assert later.status().state == "finished"
+    assert json.loads((only_folder(tmp_path) / "arguments.json").read_text())[-1] == "--resume"
+    with pytest.raises(BackgroundError, match="no diagnosis of trefoil_1 has been stopped"):
+        later.resume(Question("trefoil_1"))
+
+
+def test_a_diagnosis_that_fails_says_why(tmp_path):
+    process = diagnosis(tmp_path, "sys.exit('error: condition fit: rate: -1')")
+    process.start(Question(str(measurement_folder("trefoil_2"))))
+    wait_for(lambda: process.status().state != "running")
+    assert process.status().state == "failed"
+    assert process.status().message == "diagnose ended with exit code 1: error: condition fit: rate: -1"
+
+
+def test_data_that_are_not_there_are_refused_before_a_start(tmp_path):
+    process = diagnosis(tmp_path)
+    with pytest.raises(AssetNotFoundError, match=r"shipped: .*trefoil_1"):
+        process.start(Question("no such data"))
+    with pytest.raises(BackgroundError, match="choose measured data"):
+        process.start(Question("  "))
+    assert process.status().state == "idle"
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("question", "trouble"),
+    [
+        (Question("trefoil_1", ("drag",)), "effects: 'drag' is not one of rolling_resistance"),
+        (
+            Question("trefoil_1", budget=20),
+            "budget: 20 pours; 23 directions of effects in 1 fitted conditions take at least 58",
+        ),
+    ],
+)
+def test_a_question_that_cannot_be_asked_is_refused(tmp_path, question, trouble):
+    process = diagnosis(tmp_path)
+    for ask in (process.start, process.queue, process.resume):
+        with pytest.raises(ValueError, match=trouble):
+            ask(question)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_queued_diagnosis_starts_after_the_one_before_with_its_own_effects(tmp_path):
+    process = diagnosis(tmp_path, "time.sleep(3.0 if '--budget' not in arguments else 0.0)")
+    process.queue(Question("trefoil_1"))  # nothing runs: at once
+    process.queue(Question("trefoil_2", ("air_drag", "twisting"), 300))
+    process.queue(Question("trefoil_1", budget=190))
+    assert process.waiting() == ("trefoil_2, 2 effects, about 300 pours", "trefoil_1, about 190 pours")
+    wait_for(lambda: process.status().state == "finished" and not process.waiting() and len(process.finished()) == 3)
+    asked = [json.loads((folder / "arguments.json").read_text()) for folder in reversed(process.finished())]
+    assert [one[one.index("--apply") + 1 : one.index("--store")] for one in asked] == [
+        [],
+        ["--effects", "air_drag,twisting", "--budget", "300"],
+        ["--budget", "190"],
+    ]
+    process.queue(Question("trefoil_1"))
+    process.queue(Question("trefoil_2"))
+    process.clear_queue()
+    assert process.waiting() == ()
+    process.close()
+
+
+class FakeDiagnosis:
+    """Keeps what it was asked; its status and its folder are what the test says."""
+
+    def __init__(self):
+        self.asked, self.now, self.out = [], CommandStatus("idle"), None
+
+    def start(self, question):
+        self.asked.append(("start", question))
+
+    def queue(self, question):
+        self.asked.append(("queue", question))
+
+    def clear_queue(self):
+        self.asked.append("clear queue")
+
+    def waiting(self):
+        return ("trefoil_1, 2 effects",)
+
+    def cancel(self):
+        self.asked.append("cancel")
+
+    def pause(self):
+        self.asked.append("pause")
+
+    def go_on(self):
+        self.asked.append("go on")
+
+    def resume(self, question):
+        self.asked.append(("resume", question))
+
+    def status(self):
+        return self.now
+
+    def finished(self):
+        return ()
+
+
+def press(panel, button):
+    click = type("Event", (), {"client_id": 0, "target": type("Group", (), {"value": button})})
+    for row in panel._view._buttons:
+        for callback in row._impl.update_cb:
+            callback(click)
+
+
+def test_the_panel_asks_and_shows(server, tmp_path):
+    process, actions = FakeDiagnosis(), Actions()
+    panel = DiagnosisPanel(page_context(server, post=actions.post, data=tmp_path, diagnosis=process))
+    panel._data.value = "trefoil_2"
+    for button in ("Start", "Pause / go on", "Cancel", "Delete everything"):
+        press(panel, button)
+    actions.carry_out()
+    panel._data.value = OWN
+    panel._folder.value = "/home/me/my data"
+    process.now = CommandStatus("paused")
+    press(panel, "Resume")
+    press(panel, "Pause / go on")
+    actions.carry_out()
+    mine = Question("/home/me/my data")
+    assert process.asked == [("start", Question("trefoil_2")), "pause", "cancel", ("resume", mine), "go on"]
+    stages = (StageProgress("base model", 30, 30, "*64* settings"), StageProgress("screening", 5, 20))
+    process.now = CommandStatus("running", "screening", 5, 20, 125.0, stages=stages)
+    panel.show(Now(None, notice="no such folder"))
+    assert panel._view._bar.value == 25.0
+    text = panel._view._text.content
+    assert "Known of this stage: 5 of 20 pours, time left 2 min 05 s" in text
+    assert r"| base model | 30 of 30 | done | \*64\* settings |" in text
+    assert "| screening | 5 of 20 | ▶ |" in text
+    assert "no such folder" in text
+    assert "Choose measured data above and press *Start*" in panel._plots._caption.content
+    process.now = CommandStatus("finished", message="report: /home/me/out/report.html")
+    process.out = tmp_path
+    (tmp_path / "diagnosis.json").write_text(json.dumps(result_of_case("effect")))
+    panel.show(Now(None))
+    assert panel._answer.content.startswith(r"**effect:adhesion\_sjkr**")
+    assert "/home/me/out/report.html" in panel._view._text.content
+    assert "Residuals before and after" in panel._plots._choice.options
+    shown = json.loads(panel._plots._chart._plotly_json_str)
+    assert shown["layout"]["xaxis"]["title"]["text"] == "probability [%]"
+
+
+def test_an_uploaded_data_set_can_be_diagnosed(server, tmp_path):
+    process, actions = FakeDiagnosis(), Actions()
+    panel = DiagnosisPanel(page_context(server, post=actions.post, data=tmp_path, diagnosis=process))
+    kept = tmp_path / "uploads" / "mine-0123456789ab"
+    shutil.copytree(measurement_folder("trefoil_1"), kept)
+    panel.show(Now(None))
+    assert "mine-0123456789ab" in panel._data.options
+    panel._data.value = "mine-0123456789ab"
+    press(panel, "Start")
+    actions.carry_out()
+    assert process.asked == [("start", Question(str(kept)))]
+
+
+def test_effects_budget_and_queue_are_asked_for_on_the_page(server, tmp_path):
+    process, actions = FakeDiagnosis(), Actions()
+    panel = DiagnosisPanel(page_context(server, post=actions.post, data=tmp_path, diagnosis=process))
+    boxes = panel._candidates._boxes
+    assert tuple(boxes) == tuple(EFFECTS)
+    for name in EFFECTS:
+        boxes[name].value = name in ("air_drag", "twisting")
+    panel._candidates._pours.value = 300
+    press(panel, "Queue")
+    press(panel, "Clear queue")
+    actions.carry_out()
+    assert process.asked == [("queue", Question("trefoil_2", ("air_drag", "twisting"), 300)), "clear queue"]
+    panel.show(Now(None))
+    assert "Waiting: trefoil" in panel._view._text.content
+    for box in boxes.values():
+        box.value = False
+    with pytest.raises(ValueError, match="none is chosen"):
+        panel._question()
+
+
+def test_a_file_that_is_no_diagnosis_is_one_line(server, tmp_path):
+    process, actions = FakeDiagnosis(), Actions()
+    panel = DiagnosisPanel(page_context(server, post=actions.post, data=tmp_path, diagnosis=process))
+    (tmp_path / "diagnosis.json").write_text(json.dumps({"schema": DiagnosisResult.SCHEMA, "verdict": "<script>"}))
+    process.out = tmp_path
+    panel.show(Now(None))
+    assert panel._answer.content.endswith("diagnosis.json: statement: is missing")
+    content = result_of_case("effect")
+    content["names"] = []
+    (tmp_path / "diagnosis.json").write_text(json.dumps(content))
+    panel.show(Now(None))
+    assert "cannot be shown" in panel._answer.content
+    assert "<script>" not in panel._answer.content
+    assert panel._plots._choice.options == (NOTHING,)
+
+
+def test_a_diagnosis_of_an_older_version_is_one_line(server, tmp_path):
+    process, actions = FakeDiagnosis(), Actions()
+    panel = DiagnosisPanel(page_context(server, post=actions.post, data=tmp_path, diagnosis=process))
+    (tmp_path / "diagnosis.json").write_text('{"schema": 1, "verdict": "no_missing_effect", "gates": []}')
+    process.out = tmp_path
+    panel.show(Now(None))
+    assert "made by an older version of the program" in panel._answer.content
+    assert "\n" not in panel._answer.content
+    assert panel._plots._choice.options == (NOTHING,)
+
+
+def test_the_answer_holds_probabilities_and_errors_before_after_and_by_noise_alone():
+    for case, role in (("effect", "holdout"), ("no holdout", "fit")):
+        result = result_of_case(case)
+        odds, _, errors = answer_markdown(typed(result)).partition("| Error on")
+        shown = [line.strip("| ").split(" | ") for line in odds.splitlines() if line.startswith("| ")]
+        assert shown[0] == ["Answer", "Probability"]
+        first = result["effects"][0]
+        assert (first["name"], result["verdict"]) == ("adhesion_sjkr", "effect:adhesion_sjkr")
+        assert shown[1] == [r"adhesion\_sjkr", f"{100.0 * first['probability']:.1f} %"]
+        assert 4 <= len(shown) <= 6
+        rows = [line.split(" | ") for line in f"| Error on{errors}".splitlines() if line.startswith("| ")]
+        assert rows[0] == [
+            f"| Error on {'held-out' if role == 'holdout' else 'fitted'} data",
+            "Before",
+            "After",
+            "Noise floor |",
+        ]
+        assert len(rows) == 1 + len(result["error"][role])
+        overall = result["error"][role][-1]
+        for cell, key in zip(rows[-1][1:], ("before", "after", "noise_floor"), strict=True):
+            assert float(cell.split()[0]) == pytest.approx(overall[key], rel=6e-3)  # three printed digits

@@ -1,0 +1,135 @@
+"""What the tab "Laboratory" tells: the words of the terminal, by the command line that it says repeats them."""
+
+import shlex
+
+import numpy as np
+import pytest
+
+from doe.laboratory import TESTS
+from explorer.design.analysis import AnalyseOrder
+from explorer.design.run_plan import DesignOrder
+from explorer.errors import CommandError
+from explorer.laboratory.command_results import (
+    Ruler,
+    analysis_result,
+    audit_result,
+    bench_result,
+    photograph_result,
+    sheet_result,
+)
+from explorer.laboratory.part import measured_source, read_part
+from explorer.laboratory.run import LabOrder, analysed
+from solver import ParameterError, load_material, value
+from solver.assets import asset_path
+from tests.explorer.command_line import explorer
+
+
+def told(answer, *more):
+    """What the terminal says to the answer's own command line."""
+    result = explorer(*shlex.split(answer.command)[1:], *more)
+    assert result.exit_code == 0, result.output
+    return result.stdout.strip()
+
+
+@pytest.mark.parametrize("test", TESTS)
+def test_a_bench_test_is_told_as_in_the_terminal_and_its_part_can_be_read(test, tmp_path):
+    answer = bench_result(LabOrder(test, test))
+    assert answer.text.strip() == told(answer)
+    (name, content), *_ = answer.files.items()
+    (tmp_path / name).write_bytes(content)
+    assert read_part(tmp_path / name)["format"] == 1
+    assert all(plot.make()["data"] for plot in answer.plots.values())
+    assert bool(answer.plots) == (test in ("compression", "shear"))
+
+
+def test_options_are_part_of_the_command_line():
+    shear = bench_result(LabOrder("shear", "shear", compression="compression"))
+    assert shear.text.strip() == told(shear)
+    rest = bench_result(LabOrder("composition", "composition", left_out=("light_impurity",)))
+    assert rest.text.strip() == told(rest)
+    assert rest.text != bench_result(LabOrder("composition", "composition")).text
+
+
+def test_a_photograph_is_read_and_drawn():
+    answer = photograph_result("cone_25_30", Ruler(scale_mm=0.2))
+    assert answer.text == told(answer)
+    assert answer.picture.ndim == 3
+    assert np.ptp(answer.picture) > 100
+    assert {name.split(".")[-1] for name in answer.files} == {"png", "csv"}
+    assert "outline" not in "".join(photograph_result(str(asset_path("photographs", "cone_25_30")), Ruler()).files)
+
+
+def test_a_bar_in_the_picture_gives_lengths_too():
+    answer = photograph_result("cone_25_30", Ruler(reference_mm=100.0))
+    assert answer.text == told(answer)
+    assert "--reference-length 100" in answer.command
+    assert "cone_25_30_outline.csv" in answer.files
+
+
+def test_a_picture_of_nothing_says_so(tmp_path):
+    from PIL import Image
+
+    Image.new("L", (640, 480), 128).save(tmp_path / "nothing.png")
+    answer = photograph_result(str(tmp_path / "nothing.png"), Ruler())
+    assert answer.text.startswith("nothing.png: no angle: ")
+
+
+def test_a_sheet_is_that_of_the_command(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    answer = sheet_result(DesignOrder("box-behnken", replicates=2), "sunflower_extract", 0.5)
+    assert told(answer).startswith(answer.text.strip())
+    assert (tmp_path / "runs.csv").read_bytes() == answer.files["runs.csv"]
+
+
+@pytest.mark.parametrize(
+    ("order", "said"),
+    [
+        (DesignOrder("plackett-burman", runs=12, fold=True), "--runs 12 --fold"),
+        (DesignOrder("factorial", generators=("C=AB",)), "--generator C=AB"),
+    ],
+)
+def test_options_of_a_design_are_part_of_its_command_line(order, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    answer = sheet_result(order, "sunflower_extract", None)
+    assert said in answer.command
+    assert told(answer).startswith(answer.text.strip())
+    assert (tmp_path / "runs.csv").read_bytes() == answer.files["runs.csv"]
+
+
+def test_an_analysis_has_its_words_its_charts_and_its_report():
+    answer = analysis_result(AnalyseOrder("sunflower_extract", target=24.68))
+    assert answer.text.strip() == told(answer)
+    assert {"Contours", "Predicted and observed", "Single runs", "Ridge", "Solution surface"} <= set(answer.plots)
+    drawn = {title: plot.make() for title, plot in answer.plots.items()}
+    assert all(spec and spec["data"] for spec in drawn.values()), drawn.keys()
+    assert b"</html>" in answer.files["report.html"]
+
+
+def test_an_audit_is_that_of_the_command():
+    answer = audit_result(None)
+    assert answer.text.strip() == told(answer)
+    assert "142 reproduced" in answer.text
+    assert b"</html>" in answer.files["audit.html"]
+
+
+def test_a_pour_gets_what_was_measured_in_a_file_that_says_where_it_is_from(tmp_path):
+    present = load_material("sunflower_extract")
+    source = measured_source(present, analysed(LabOrder("inclined_plane", "inclined_plane")), tmp_path)
+    friction = "pair.seed.seed.static_friction"
+    # Angles are given to 0.01°.
+    assert value(source.scene, friction) == pytest.approx(value(present, friction), rel=1e-3)
+    (file,) = tmp_path.iterdir()
+    assert load_material(str(file)) == source.scene
+    assert "[measured.pair.seed.seed.static_friction]" in file.read_text()
+    assert value(source.scene, "pair.seed.seed.restitution") == value(present, "pair.seed.seed.restitution")
+
+
+def test_readings_without_a_parameter_or_of_another_material_pour_nothing(tmp_path):
+    present = load_material("sunflower_extract")
+    with pytest.raises(CommandError, match="moisture: gives no parameter"):
+        measured_source(present, analysed(LabOrder("moisture", "moisture")), tmp_path)
+    path = tmp_path / "other.csv"
+    path.write_text("a,b,replicate,angle_deg\n" + "".join(f"maize,steel,r{k},{20 + k / 10}\n" for k in range(5)))
+    with pytest.raises(ParameterError, match="maize"):
+        measured_source(present, analysed(LabOrder("inclined_plane", str(path))), tmp_path / "kept")
+    assert not (tmp_path / "kept").exists()

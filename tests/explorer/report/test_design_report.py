@@ -1,0 +1,139 @@
+"""The report of a design: every chart is one that plotly reads, for designs of every kind and for poor results."""
+
+import json
+import math
+
+import numpy as np
+import plotly.graph_objects as go
+import pytest
+
+from doe.designs import box_behnken, central_composite, factorial, latin_hypercube, plackett_burman
+from explorer.design.analysis import AnalyseOrder, analyse_runs
+from explorer.design.factors_file import DesignFactor
+from explorer.design.filled_sheet import Runs
+from explorer.design.result import DesignResult
+from explorer.design.text import analysis_text
+from explorer.report.content import Figure, Folded, Table
+from explorer.report.design import design_html, design_markdown
+from explorer.report.design.sections import sections_of
+
+
+def runs(design, values, design_name=""):
+    """A sheet of factors f1, f2, … between 10 and 20 mm."""
+    k = np.shape(design)[1]
+    responses = np.atleast_2d(np.asarray(values, dtype=float).T).T
+    return Runs(
+        design=design_name,
+        factors=tuple(DesignFactor(f"f{j + 1}", 10.0, 20.0, "mm", 14.0) for j in range(k)),
+        response="load",
+        unit="N",
+        coded=np.asarray(design, dtype=float),
+        responses=responses,
+        labels=tuple(tuple(f"{i + 1}.{r + 1}" for r in range(responses.shape[1])) for i in range(len(responses))),
+        missing=int(np.isnan(responses).sum()),
+    )
+
+
+def noise(shape, seed=0):
+    return np.random.default_rng(seed).standard_normal(shape)
+
+
+def with_gap():
+    values = 10 + factorial(3) @ [[1.0], [2.0], [0.0]] + noise((8, 2))
+    values[2] = math.nan
+    values[4, 1] = math.nan
+    return runs(factorial(3), values)
+
+
+CASES = {
+    "one factor": (runs(np.array([[-1.0], [-0.5], [0], [0.5], [1], [1]]), 5 + noise(6)), 5.0),
+    "two factors": (runs(central_composite(2, 4), 5 + noise(12)), 5.1),
+    "three factors": (runs(box_behnken(3, 5), 9 + box_behnken(3, 5) @ [1, 2, 0] + 0.1 * noise(17)), 10.0),
+    "without a target": (runs(box_behnken(3, 5), 9 + noise(17)), None),
+    "target out of reach": (runs(factorial(2), 9 + noise((4, 3))), 1e6),
+    "five factors": (runs(factorial(5, ["E=ABCD"]), 9 + noise(16)), 9.0),
+    "four factors": (runs(central_composite(4, 3, "face-centred"), 9 + noise(27)), None),
+    "fifteen factors": (runs(latin_hypercube(15, 40, 1), 9 + noise(40)), None),
+    "screening": (runs(plackett_burman(12)[:, :8], 9 + noise(12), "plackett-burman"), None),
+    "saturated": (runs(plackett_burman(8), 9 + noise(8), "plackett-burman"), 9.0),
+    "hypercube": (
+        runs(latin_hypercube(3, 30, 1), np.exp(latin_hypercube(3, 30, 1) @ [1, 0.5, 0] + 0.1 * noise(30))),
+        None,
+    ),
+    "missing runs": (with_gap(), 10.0),
+    "constant": (runs(box_behnken(3, 5), np.full(17, 4.0)), 4.0),
+    "constant replicates": (runs(factorial(2), np.full((4, 2), 4.0)), None),
+    "one centre run": (runs(box_behnken(3, 1), 9 + noise(13)), None),
+    "negative response": (runs(box_behnken(3, 5), noise(17)), None),
+    "no noise at all": (runs(box_behnken(3, 5), box_behnken(3, 5) @ [1.0, 2.0, 3.0]), 1.0),
+}
+
+
+@pytest.fixture(scope="module", params=CASES, ids=str)
+def result(request):
+    sheet, target = CASES[request.param]
+    return analyse_runs(sheet, AnalyseOrder("runs.csv", "load", target))
+
+
+def figures(blocks):
+    for block in blocks:
+        if isinstance(block, Figure):
+            yield block
+        if isinstance(block, Folded):
+            yield from figures(block.blocks)
+
+
+def tables(blocks):
+    for block in blocks:
+        if isinstance(block, Table):
+            yield block
+        if isinstance(block, Folded):
+            yield from tables(block.blocks)
+
+
+def test_every_chart_is_one_that_plotly_reads(result):
+    found = [figure for section in sections_of(result) for figure in figures(section.blocks)]
+    assert found
+    assert len({figure.name for figure in found}) == len(found)
+    for figure in found:
+        go.Figure(figure.spec)  # raises for a property or a value that plotly does not know
+
+
+def test_every_row_has_as_many_cells_as_its_header_and_none_is_none_or_nan(result):
+    for section in sections_of(result):
+        for table in tables(section.blocks):
+            for row in table.rows:
+                assert len(row) == len(table.header)
+                assert not {"None", "nan", ""} & set(row)
+
+
+def test_page_markdown_and_terminal_are_made_and_show_no_hole(result):
+    page, markdown, text = design_html(result), design_markdown(result), analysis_text(result)
+    assert page.endswith("</html>\n")
+    for words in (markdown, text):
+        for hole in ("None", "nan", "inf ", "own:"):
+            assert hole not in words
+
+
+def test_what_acts_and_where_the_target_lies_are_in_short(result):
+    first = sections_of(result)[0]
+    assert first.title == "In short"
+    facts = dict(next(block for block in first.blocks if hasattr(block, "pairs")).pairs)
+    assert ("Target" in facts) == (result.optimum is not None)
+    assert ("Equation, coded" in facts) == (result.fitted is not None)
+    assert ("Factors that act" in facts) == (result.effects is not None)
+
+
+def test_the_result_survives_json(result):
+    kept = json.loads(json.dumps(result.to_dict(), allow_nan=False))
+    assert DesignResult.from_dict(kept).to_dict() == kept
+
+
+def test_names_from_outside_are_escaped():
+    sheet, _ = CASES["two factors"]
+    labels = tuple(("<script>alert(1)</script>",) for _ in sheet.labels)
+    made = analyse_runs(Runs(**{**sheet.__dict__, "labels": labels}), AnalyseOrder("<img src=x>.csv", "load", None))
+    page = design_html(made)
+    assert "<script>alert(1)" not in page
+    assert "<img src=x>" not in page
+    assert "&lt;script&gt;alert(1)" in page

@@ -1,0 +1,144 @@
+"""A calibration from the command line to its files, with a formula in place of the pours."""
+
+import dataclasses
+import json
+
+import pytest
+
+from doe.runner import TRIES
+from doe.studies.study_result import OWN_STAGES
+from explorer.study import run as study_run
+from solver import asset_path
+from tests.doe.formula_runner import FormulaRunner
+from tests.doe.studies.test_campaign import planted
+from tests.explorer.command_line import explorer
+from tests.explorer.viewer.study_panel_at_hand import study_with_own_profiles
+
+
+class Formula(FormulaRunner):
+    """Takes the arguments of a PourRunner and tells its progress in the same way."""
+
+    def __init__(self, scene, store, study, seed, threads, on_run, observer, pours, tries):
+        super().__init__(planted, sigma=0.5)
+        self._on_run = on_run
+        Formula.tries = tries
+
+    def run(self, stage, settings):
+        rows = super().run(stage, settings)
+        left = sum(setting.replicates for setting in settings)
+        for runs in rows:
+            for one in runs:
+                left -= 1
+                self._on_run(stage, one, left)
+        return rows
+
+
+@pytest.fixture
+def formula(monkeypatch):
+    monkeypatch.setattr(study_run, "PourRunner", Formula)
+
+
+def calibrate(tmp_path, *options):
+    store = ("--store", str(tmp_path / "runs.sqlite"))
+    return explorer("calibrate", "--headless", "--profile", "quick", "--out", str(tmp_path / "out"), *store, *options)
+
+
+@pytest.mark.usefixtures("formula")
+def test_a_study_leaves_result_and_reports(tmp_path):
+    done = calibrate(tmp_path)
+    assert done.exit_code == 0, done.output
+    result = json.loads((tmp_path / "out" / "result.json").read_text())
+    keys = {"screening", "ascent", "surface", "optimum", "verification", "assumptions", "runs", "timing", "versions"}
+    assert keys <= set(result)
+    assert len(result["screening"]["runs"]) == 28
+    assert len(result["surface"]["runs"]) == 17
+    assert result["runs"]["total"] == len(result["runs"]["list"])
+    for name in ("report.html", "report.md"):
+        assert (tmp_path / "out" / name).stat().st_size > 1000
+    events = [json.loads(line) for line in (tmp_path / "out" / "progress.jsonl").read_text().splitlines()]
+    assert [event["stage"] for event in events if event["line"]] == list(OWN_STAGES)
+    assert events[-1]["done"] == events[-1]["planned"] == result["runs"]["total"]
+    assert list(events[0]["stages"]) == list(OWN_STAGES)
+    assert {name: done for name, (done, _) in events[-1]["stages"].items() if done} == result["runs"]["by_stage"]
+    assert sum(event["run"] is not None for event in events) == result["runs"]["total"]
+    assert not (tmp_path / "out" / "partial.json").exists()
+    assert Formula.tries == TRIES
+
+
+@pytest.mark.usefixtures("formula")
+def test_a_folder_that_is_not_empty_needs_resume(tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "notes.txt").write_text("mine")
+    refused = calibrate(tmp_path)
+    assert refused.exit_code == 2
+    assert "not empty" in refused.stderr
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["notes.txt"]
+    assert calibrate(tmp_path, "--resume").exit_code == 0
+    assert (tmp_path / "out" / "notes.txt").read_text() == "mine"
+
+
+@pytest.mark.usefixtures("formula")
+def test_a_folder_with_nothing_but_its_own_study_file_is_new(tmp_path):
+    own = tmp_path / "out" / "changed.toml"
+    own.parent.mkdir()
+    own.write_text(asset_path("studies", "sunflower_extract").read_text())
+    assert calibrate(tmp_path).exit_code == 2
+    done = calibrate(tmp_path, "--study", str(own), "--tries", "6")
+    assert done.exit_code == 0, done.output
+    assert json.loads((tmp_path / "out" / "result.json").read_text())["study"]["file"] == str(own)
+    assert Formula.tries == 6
+
+
+@pytest.mark.usefixtures("formula")
+def test_an_error_above_the_limit_is_exit_code_3_with_the_files_there(tmp_path):
+    done = calibrate(tmp_path, "--fail-above", "0")
+    assert done.exit_code == 3
+    assert "above the limit" in done.stderr
+    assert (tmp_path / "out" / "result.json").is_file()
+
+
+def test_a_study_that_cannot_be_analysed_ends_in_one_line(tmp_path, monkeypatch):
+    class NoSurface(Formula):
+        def _once(self, stage, row, setting, replicate, attempt):
+            run = super()._once(stage, row, setting, replicate, attempt)
+            return dataclasses.replace(run, outcome="jammed") if stage == "surface" else run
+
+    monkeypatch.setattr(study_run, "PourRunner", NoSurface)
+    stopped = calibrate(tmp_path)
+    assert stopped.exit_code == 1
+    assert stopped.stderr.startswith("error: stopped in the surface stage: ")
+    assert stopped.stderr.count("\n") == 1
+    assert "--resume" in stopped.stderr
+    assert not (tmp_path / "out" / "result.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (("--profile", "huge"), "sunflower_extract.toml: profile: 'huge' is not one of quick, standard, full\n"),
+        (("--study", "nowhere.toml"), "sunflower_extract"),
+        (("--fail-above", "-1"), "fail-above"),
+    ],
+)
+def test_bad_orders_are_one_line_and_leave_nothing(tmp_path, options, says):
+    refused = calibrate(tmp_path, *options)
+    assert refused.exit_code == 2
+    assert says in refused.stderr
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.usefixtures("formula")
+def test_a_study_with_its_own_profiles_is_asked_for_by_their_names(tmp_path):
+    file = study_with_own_profiles(tmp_path)
+    options = ("--study", str(file), "--store", str(tmp_path / "runs.sqlite"), "--out", str(tmp_path / "out"))
+    refused = explorer("calibrate", "--headless", *options)
+    assert refused.exit_code == 2
+    assert refused.stderr == f"error: {file}: profile: 'standard' is not one of first look, thesis-2, fine\n"
+    assert explorer("calibrate", "--headless", "--profile", "first look", *options).exit_code == 0
+    assert json.loads((tmp_path / "out" / "result.json").read_text())["study"]["profile"]["name"] == "first look"
+
+
+def test_without_headless_it_says_where_to_go(tmp_path):
+    refused = explorer("calibrate", "--out", str(tmp_path / "out"))
+    assert refused.exit_code == 2
+    assert "--headless" in refused.stderr

@@ -1,0 +1,92 @@
+"""A session without a solver process: takes over at once what it is asked for, for tests of panels."""
+
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from explorer.live.frames import Frame
+from explorer.live.messages import Event, SessionState, Status
+from explorer.scene.source import SceneSource, changes
+from explorer.viewer.actions import Actions, BackgroundWork
+from explorer.viewer.panel import PageContext
+from solver.scenes.scene import Scene, with_values
+
+
+class PageSession:
+    """What panels ask of a :class:`explorer.session.Session`; ``asked`` are the calls, in order."""
+
+    def __init__(self, source: SceneSource) -> None:
+        self.source = source
+        self.asked: list[str] = []
+        self.events: list[Event] = []
+        self.now = Status(SessionState.RUNNING, "", source.scene, seed=1, generation=1, speed=1.0)
+        self.newest: Frame | None = None
+
+    def status(self) -> Status:
+        return self.now
+
+    def frame(self) -> Frame | None:
+        return self.newest
+
+    def set_parameters(self, values: Mapping[str, float | str]) -> None:
+        self.asked.append("set_parameters")
+        changed = with_values(self.now.scene, dict(values))
+        self.events += [
+            Event(self.now.generation, self.now.time, line, True) for line in changes(self.now.scene, changed)
+        ]
+        self.now = replace(self.now, scene=changed)
+
+    def start(self, scene: Scene, seed: int, source: SceneSource | None = None) -> None:
+        self.asked.append("start")
+        self.source = source or self.source
+        self.newest = None
+        self.now = replace(self.now, scene=scene, seed=seed, generation=self.now.generation + 1, time=0.0)
+
+    def restart(self, scene: Scene | None = None, seed: int | None = None) -> None:
+        self.start(scene or self.now.scene, self.now.seed if seed is None else seed)
+
+
+def page_context(server, session=None, post=None, data=Path("nowhere"), study=None, diagnosis=None):
+    """What panels are made with; without ``post`` an action is carried out at once."""
+    post = post or (lambda action: action())
+    return PageContext(server, session, post, study, diagnosis, data, server.gui.add_html("", visible=False))
+
+
+def finished(actions: Actions, background: BackgroundWork, patience: float = 30.0) -> str:
+    """Carry out what waits, what is done in the background, and what comes of it; the line of a refusal, or ""."""
+    end, notice = time.monotonic() + patience, ""
+    while True:
+        notice = actions.carry_out() or notice
+        if not background.busy_with:
+            return notice
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.005)
+
+
+def frame_of(component: list[int], position: object, inside: list[bool] | None = None, generation: int = 1) -> Frame:
+    """A frame of bodies at ``position`` (n, 3) [m], none of them turned."""
+    n = len(component)
+    return Frame(
+        number=1,
+        generation=generation,
+        time=1.25,
+        position=np.asarray(position, dtype=np.float32).reshape(n, 3),
+        quaternion=np.tile(np.float32([1, 0, 0, 0]), (n, 1)),
+        component=np.array(component, dtype=np.int32),
+        inside=np.array([True] * n if inside is None else inside),
+        scale=np.ones(n, dtype=np.float32),
+    )
+
+
+def event(handle, number, client_id=0, client=None):
+    """What viser hands to a callback when a browser has sent ``number``."""
+
+    class Event:
+        target = type("Handle", (), {"value": number})
+
+    Event.client_id, Event.client = client_id, client
+    for callback in handle._impl.update_cb:
+        callback(Event)

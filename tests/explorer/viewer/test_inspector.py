@@ -1,0 +1,283 @@
+"""One body under inspection: clicked, told, followed and let go; and where cameras stand."""
+
+import math
+from contextlib import contextmanager
+from dataclasses import replace
+from types import SimpleNamespace
+from urllib.parse import parse_qs, urlparse
+
+import numpy as np
+import pytest
+
+from explorer.live.messages import SessionState, Status
+from explorer.scene.meshes import body_triangles, scene_height
+from explorer.units import InputError
+from explorer.viewer.actions import Actions
+from explorer.viewer.look.camera import DIRECTIONS, go_along, go_to, link_to, view_of
+from explorer.viewer.look.inspector import NOBODY, body_html, first_crossing, nearest_hit
+from explorer.viewer.look.look_panel import LookPanel
+from explorer.viewer.panel import Now
+from explorer.viewer.style import SELECTED, linear
+from explorer.viewer.view import VIEW_FIELD
+from tests.explorer.beads import RADIUS, bead_scene
+from tests.explorer.viewer.page_session import page_context
+from tests.explorer.viewer.test_look import DETAILS, FRAME
+
+SCENE = bead_scene()
+BEADS = replace(
+    FRAME,
+    component=np.zeros(4, dtype=np.int32),
+    position=np.float32([[0, 0, 0.1], [0.05, 0, 0.1], [0, 0, 0.05], [0, 0.05, 0.1]]),
+)
+DOWN = np.array([0.0, 0.0, -1.0])
+
+
+def hit(x, y, z=1.0, direction=DOWN, seen=BEADS.inside, frame=BEADS):
+    return nearest_hit([body_triangles(SCENE.bodies[0])], frame, seen, np.array([x, y, z]), np.array(direction))
+
+
+def test_a_ray_meets_the_nearest_body_in_sight():
+    assert hit(0.0, 0.0) == 0
+    assert hit(0.0, 0.0, seen=np.array([False, True, True, True])) == 2
+    assert hit(0.0, 0.0, z=-1.0, direction=(0, 0, 5.0)) == 2
+    assert hit(0.05 + 0.9 * RADIUS, 0.0) == 1
+    assert hit(0.05 + 1.1 * RADIUS, 0.0) is None
+    # One that has left the domain, and one behind the camera.
+    assert hit(0.0, 0.05) is None
+    assert hit(0.0, 0.0, z=0.075) == 2
+
+
+def test_size_and_turn_of_a_body_count():
+    large = replace(BEADS, scale=np.float32([2, 1, 1, 1]))
+    assert hit(1.9 * RADIUS, 0.0, frame=large) == 0
+    plate = SimpleNamespace(
+        vertices=np.float32([[-1, -0.1, 0], [1, -0.1, 0], [1, 0.1, 0], [-1, 0.1, 0]]) * 0.01,
+        faces=np.array([[0, 1, 2], [0, 2, 3]]),
+    )
+    turned = replace(BEADS, quaternion=np.tile(np.float32([math.sqrt(0.5), 0, 0, math.sqrt(0.5)]), (4, 1)))
+    for frame, along_x in ((BEADS, 0), (turned, None)):
+        assert nearest_hit([plate], frame, BEADS.inside, np.array([0.008, 0, 1.0]), DOWN) == along_x
+        at_y = nearest_hit([plate], frame, BEADS.inside, np.array([0, 0.008, 1.0]), DOWN)
+        assert at_y == (None if along_x == 0 else 0)
+
+
+@pytest.mark.parametrize("ray", [((math.nan, 0, 1), DOWN), ((0, 0, 1), (0, 0, 0)), ((0, 0, 1), (math.inf, 0, 0))])
+def test_a_ray_that_is_none_meets_nothing(ray):
+    assert nearest_hit([body_triangles(SCENE.bodies[0])], BEADS, BEADS.inside, *map(np.array, ray)) is None
+
+
+def test_a_crossing_is_at_its_distance():
+    triangle = np.array([[[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]])
+    assert first_crossing(triangle, np.array([0.2, 0.2, 3.0]), np.array([0, 0, -2.0])) == pytest.approx(1.5)
+    assert first_crossing(triangle, np.array([0.8, 0.8, 3.0]), DOWN) == math.inf
+
+
+def test_a_body_is_told_with_its_contacts():
+    evil = "<img src=x onerror=alert(1)>"
+    scene = replace(SCENE, bodies=(replace(SCENE.bodies[0], name=evil),))
+    text = body_html(scene, BEADS, DETAILS, 0)
+    assert "<img" not in text
+    for part in ("no. 1 of 4", "1 g", "0.0, 0.0, 100.0 mm", "0.000, 0.000, 0.000 m/s", "0.500 s", "5 mN"):
+        assert part in text
+    # Of contacts the strongest comes first: 5 mN with body 2, then 1.5 mN with the plate (surface 0).
+    assert text.index("no. 2</td><td>5</td><td>1</td>") < text.index("<td>plate</td><td>1.5</td><td>0</td>")
+    assert "no. 3</td>" not in text
+    assert NOBODY in body_html(scene, BEADS, DETAILS, None)
+
+
+def test_a_body_that_has_just_entered_is_told_without_what_is_not_known_yet():
+    text = body_html(SCENE, BEADS, DETAILS, 3)
+    assert "no. 4 of 4" in text
+    assert "Mass" not in text
+    assert "Mass" not in body_html(SCENE, BEADS, None, 0)
+
+
+@pytest.mark.parametrize("name", DIRECTIONS)
+def test_presets_have_rig_and_feed_in_the_picture(name):
+    height = scene_height(SCENE)
+    view = view_of(height, name)
+    away = view.position - view.look_at
+    assert away / np.linalg.norm(away) == pytest.approx(np.array(DIRECTIONS[name]) / np.linalg.norm(DIRECTIONS[name]))
+    # Half the picture at that distance is more than the part of the height above the middle.
+    assert np.linalg.norm(away) * math.tan(VIEW_FIELD / 2) > 0.58 * height
+
+
+class FakeCamera:
+    """As viser's: a new position takes the point that is looked at along."""
+
+    def __init__(self):
+        self._position, self.look_at = np.array([1.0, 0.0, 0.0]), np.zeros(3)
+        self.up_direction, self.fov = np.array([0.0, 0.0, 1.0]), 1.0
+
+    @property
+    def position(self):
+        return self._position
+
+    @position.setter
+    def position(self, position):
+        self.look_at = self.look_at + (position - self._position)
+        self._position = np.array(position)
+
+
+class FakeClient:
+    def __init__(self, number=1):
+        self.client_id, self.camera, self.groups = number, FakeCamera(), 0
+
+    @contextmanager
+    def atomic(self):
+        self.groups += 1
+        yield
+
+
+def test_a_camera_goes_to_a_preset():
+    client = FakeClient()
+    go_to(client, view_of(scene_height(SCENE), "Front"))
+    assert client.camera.position == pytest.approx(view_of(scene_height(SCENE), "Front").position)
+    assert client.camera.look_at == pytest.approx(view_of(scene_height(SCENE), "Front").look_at)
+
+
+def test_a_camera_goes_along_and_keeps_its_distance_and_side():
+    client, target = FakeClient(), np.array([0.1, 0.2, 0.3])
+    go_along([client], target)
+    assert client.camera.look_at == pytest.approx(target)
+    assert client.camera.position - client.camera.look_at == pytest.approx([1.0, 0.0, 0.0])
+    groups = client.groups
+    go_along([client], target + 1e-7)
+    assert client.groups == groups
+
+
+def test_a_link_holds_the_whole_view(server):
+    camera = FakeCamera()
+    camera.position = np.array([0.25, -1.0, 0.123456])
+    url = urlparse(link_to(server, camera))
+    assert url.netloc == f"127.0.0.1:{server.get_port()}"
+    assert parse_qs(url.query) == {
+        "initialCameraPosition": ["0.25,-1,0.1235"],
+        "initialCameraLookAt": ["-0.75,-1,0.1235"],
+        "initialCameraUp": ["0,0,1"],
+        "initialCameraFov": ["1"],
+    }
+
+
+class FakeSession:
+    def __init__(self):
+        self.found, self.watched = None, None
+
+    def details(self):
+        return self.found
+
+    def watch(self, wanted, body=None):
+        self.watched = (wanted, body)
+
+    def status(self):
+        return Status(SessionState.RUNNING, "", SCENE, seed=1, generation=1, speed=1.0)
+
+
+@pytest.fixture
+def tab(server):
+    session, actions = FakeSession(), Actions()
+    tab = LookPanel(page_context(server, session, actions.post))
+    tab.draw(Now(session.status(), BEADS))
+    yield SimpleNamespace(tab=tab, session=session, actions=actions, nodes=tab._nodes)
+    tab._nodes.remove()
+
+
+def click(tab, x, y):
+    tab.tab.click(np.array([x, y, 1.0]), DOWN)
+    tab.tab.draw(Now(tab.session.status(), BEADS))
+
+
+def test_a_click_inspects_a_body_and_another_beside_lets_it_go(tab):
+    assert tab.session.watched == (False, None)
+    click(tab, 0.05, 0.0)
+    assert tab.session.watched == (True, 1)
+    assert tab.nodes.bodies.nodes[0].batched_colors[1].tolist() == list(linear(SELECTED))
+    assert "bead no. 2 of 4" in tab.tab._text.content
+    click(tab, 0.5, 0.5)
+    assert tab.session.watched == (False, None)
+    assert NOBODY in tab.tab._text.content
+    assert tab.nodes.bodies.nodes[0].batched_colors[1].tolist() != list(linear(SELECTED))
+
+
+def test_a_body_that_is_cut_away_cannot_be_clicked(tab):
+    tab.tab._settings.change(cut_away="z above", cut_at=0.07)
+    click(tab, 0.0, 0.0)
+    assert tab.session.watched == (True, 2)
+    assert tab.nodes.bodies.nodes[0].batched_scales.tolist()[:4] == [0, 0, 1, 0]
+
+
+def test_keys_go_from_body_to_body_among_those_in_sight(tab):
+    def step(by):
+        tab.tab._step(by)
+        tab.tab.draw(Now(tab.session.status(), BEADS))
+        return tab.session.watched[1]
+
+    assert step(1) == int(np.argmax(BEADS.position[:, 2]))  # at first the topmost
+    seen = np.flatnonzero(BEADS.inside).tolist()
+    assert 1 < len(seen) < len(BEADS.component)
+    tab.tab._release()
+    click(tab, 0.05, 0.0)  # no. 2, counted from 1
+    place = seen.index(1)
+    assert [step(1) for _ in seen] == [*seen[place + 1 :], *seen[: place + 1]]
+    assert step(-1) == seen[place - 1]
+    tab.tab._settings.change(cut_away="z above", cut_at=-1.0)
+    with pytest.raises(InputError, match="no body is in sight"):
+        tab.tab._step(1)
+
+
+def test_a_camera_follows_until_the_body_is_let_go(tab, monkeypatch):
+    one, other = FakeClient(1), FakeClient(2)
+    monkeypatch.setattr(tab.tab._server, "get_clients", lambda: {1: one, 2: other})
+    with pytest.raises(InputError, match="click a body"):
+        tab.tab._follow(one)
+    click(tab, 0.05, 0.0)
+    tab.tab._follow(one)
+    assert one.camera.look_at == pytest.approx(BEADS.position[1])
+    moved = replace(BEADS, number=2, position=BEADS.position + np.float32([0, 0.01, 0]))
+    tab.tab.draw(Now(tab.session.status(), moved))
+    assert one.camera.look_at == pytest.approx(moved.position[1])
+    assert other.groups == 0
+    tab.tab._release()
+    tab.tab.draw(Now(tab.session.status(), replace(BEADS, number=3)))
+    assert one.camera.look_at == pytest.approx(moved.position[1])
+
+
+def test_a_follower_that_has_gone_is_forgotten(tab, monkeypatch):
+    client = FakeClient(1)
+    monkeypatch.setattr(tab.tab._server, "get_clients", lambda: {1: client})
+    click(tab, 0.05, 0.0)
+    tab.tab._follow(client)
+    monkeypatch.setattr(tab.tab._server, "get_clients", dict)
+    tab.tab.draw(Now(tab.session.status(), replace(BEADS, number=2)))
+    assert tab.tab._followers == set()
+
+
+def test_another_pour_or_a_time_before_its_entry_lets_a_body_go(tab):
+    click(tab, 0.05, 0.0)
+    tab.tab.draw(Now(tab.session.status(), replace(BEADS, number=2, generation=2)))
+    assert tab.session.watched == (False, None)
+    click(tab, 0.05, 0.0)
+    click(tab, 0.05, 0.0)
+    assert tab.session.watched == (True, 1)
+    early = replace(
+        BEADS, number=3, component=BEADS.component[:1], position=BEADS.position[:1], inside=BEADS.inside[:1]
+    )
+    tab.tab.draw(Now(tab.session.status(), replace(early, quaternion=BEADS.quaternion[:1], scale=BEADS.scale[:1])))
+    assert tab.session.watched == (False, None)
+
+
+def test_what_is_asked_for_is_drawn_when_it_comes(tab):
+    tab.tab._settings.change(colour_by="speed", chains=True)
+    tab.tab.draw(Now(tab.session.status(), BEADS))
+    assert tab.session.watched == (True, None)
+    assert not any(node.visible for node in tab.tab._chains._nodes)
+    before = tab.nodes.bodies.nodes[0].batched_colors.copy()
+    tab.session.found = DETAILS
+    tab.tab.draw(Now(tab.session.status(), BEADS))
+    assert any(node.visible for node in tab.tab._chains._nodes)
+    assert (tab.nodes.bodies.nodes[0].batched_colors != before).any()
+    assert tab.nodes.bodies.nodes[0].opacity < 1.0
+    tab.tab._settings.change(colour_by="component", chains=False)
+    tab.tab.draw(Now(tab.session.status(), BEADS))
+    assert not any(node.visible for node in tab.tab._chains._nodes)
+    assert tab.nodes.bodies.nodes[0].opacity is None

@@ -1,0 +1,223 @@
+"""The tab "Laboratory": a press shows the answer, uploads are offered and kept, what is wrong is one line."""
+
+import io
+import zipfile
+
+import pytest
+from viser import UploadedFile
+
+from explorer.laboratory.command_results import CommandResult
+from explorer.scene.source import material_source
+from explorer.viewer.actions import Actions
+from explorer.viewer.laboratory.answer_view import answer_html
+from explorer.viewer.laboratory.audit_panel import AuditPanel
+from explorer.viewer.laboratory.bench_panel import BenchPanel
+from explorer.viewer.laboratory.design_panel import DesignPanel
+from explorer.viewer.laboratory.inputs import positive
+from explorer.viewer.laboratory.laboratory_panel import LaboratoryPanel
+from explorer.viewer.laboratory.photograph_panel import PhotographPanel
+from explorer.viewer.laboratory.rig_panel import RigPanel
+from explorer.viewer.panel import Now
+from solver.assets import asset_path
+from tests.explorer.viewer.page_session import PageSession, event, finished, page_context
+
+
+class Bench:
+    """Panels over one background, as in the tab."""
+
+    def __init__(self, server, folder):
+        self.actions, self.folder = Actions(), folder
+        self.session = PageSession(material_source("sunflower_extract"))
+        page = page_context(server, self.session, self.actions.post, folder)
+        self.background = page.bench_work
+        self.bench, self.rig, self.photograph = BenchPanel(page), RigPanel(page), PhotographPanel(page)
+        self.design, self.audit = DesignPanel(page), AuditPanel(page)
+
+    def do(self, act):
+        self.actions.post(act)
+        return finished(self.actions, self.background)
+
+    def choose_rig(self, name):
+        self.rig._rig.value = name
+        event(self.rig._rig, name)
+        finished(self.actions, self.background)
+
+
+@pytest.fixture
+def bench(server, tmp_path):
+    return Bench(server, tmp_path / "uploads")
+
+
+def text_of(view):
+    return view._text.content
+
+
+def test_every_shipped_bench_test_is_a_choice_and_an_answer(bench):
+    for test in bench.bench._test.options:
+        bench.bench._test.value = test
+        bench.bench._readings.offer((test,))
+        assert bench.do(bench.bench._evaluate) == ""
+        assert f"explorer lab {test} {test}" in text_of(bench.bench.view)
+        assert not bench.bench.view._take.disabled
+
+
+def test_a_pour_starts_with_what_was_measured(bench):
+    bench.bench._test.value = "inclined_plane"
+    bench.bench._readings.offer(("inclined_plane",))
+    assert bench.do(bench.bench._pour) == ""
+    assert bench.session.asked == ["start"]
+    assert bench.session.source.material.endswith(".toml")
+
+
+def test_bad_readings_are_one_line_and_the_pour_stays(bench):
+    slot = bench.bench._readings
+    bench.actions.post(lambda: slot._take("mine.csv", b"a,b,replicate,angle_deg\nx,y,1,steep\n"))
+    assert finished(bench.actions, bench.background) == ""
+    bench.bench._test.value = "inclined_plane"
+    for act in (bench.bench._evaluate, bench.bench._pour):
+        notice = bench.do(act)
+        assert "steep" in notice
+        assert "\n" not in notice
+    assert bench.session.asked == []
+
+
+@pytest.mark.parametrize(("name", "content"), [("readings.exe", b"x"), ("readings.csv", b"")])
+def test_what_cannot_be_kept_is_refused(bench, name, content):
+    notice = bench.do(lambda: bench.bench._readings._take(name, content))
+    assert "allowed" in notice
+    assert not bench.folder.exists() or not list(bench.folder.iterdir())
+
+
+def test_a_photograph_from_the_browser_is_read_and_shown(bench):
+    content = asset_path("photographs", "cone_25_30").read_bytes()
+    assert bench.do(lambda: bench.photograph._photo._take("my pile.JPG", content)) == ""
+    assert bench.do(bench.photograph._read) == ""
+    assert "explorer measure" in text_of(bench.photograph.view)
+    assert bench.photograph.view._picture is not None
+    assert bench.do(lambda: bench.photograph._photo._take("text.jpg", b"no picture")) == ""
+    assert "text" in bench.do(bench.photograph._read)
+
+
+def test_a_rig_shows_its_own_parameters_and_the_bodies_that_are_poured(bench):
+    panel = bench.rig
+    assert {"rig.tilt_rate", "rig.body"} == set(panel._inputs)
+    bench.choose_rig("drop_plate_45")
+    assert {"rig.drop_height", "rig.specimen", "rig.drops", "rig.body"} == set(panel._inputs)
+    other = material_source("nine_sphere_seed")
+    bench.session.start(other.scene, 1, other)
+    panel.show(Now(bench.session.now))
+    assert panel._inputs["rig.body"].options == tuple(body.name for body in other.scene.bodies)
+
+
+def test_a_rig_is_run_with_what_is_on_the_screen(bench, monkeypatch):
+    asked = {}
+
+    def answered(scene, rig, values, seed, folder):
+        asked.update(values, scene=scene, rig=rig)
+        return CommandResult("0.62 for 0.62", "explorer simulate drop_plate_45")
+
+    monkeypatch.setattr("explorer.viewer.laboratory.rig_panel.rig_result", answered)
+    bench.choose_rig("drop_plate_45")
+    bench.rig._inputs["rig.drop_height"].value = 300.0
+    bench.rig._inputs["rig.body"].value = "petiole"
+    assert bench.do(bench.rig._run) == ""
+    assert (asked["rig"], asked["rig.body"], asked["scene"]) == ("drop_plate_45", "petiole", bench.session.now.scene)
+    assert asked["rig.drop_height"] == pytest.approx(0.3)
+    assert "0.62 for 0.62" in text_of(bench.rig.view)
+
+
+def test_a_bench_test_is_repeated_on_the_solver_with_the_material_that_is_poured(bench, monkeypatch):
+    asked = []
+    monkeypatch.setattr(
+        "explorer.viewer.laboratory.bench_panel.twin_result", lambda order: asked.append(order) or CommandResult("", "")
+    )
+    bench.bench._test.value = "drop"
+    bench.bench._readings.offer(("drop",))
+    bench.bench._twin.value = True
+    assert bench.do(bench.bench._evaluate) == ""
+    bench.bench._twin.value, bench.bench._bias.value = False, True
+    assert bench.do(bench.bench._evaluate) == ""
+    assert [(one.simulate, one.bias, one.material) for one in asked] == [
+        (True, False, "sunflower_extract"),
+        (False, True, None),
+    ]
+
+
+def test_a_photograph_is_compared_with_what_is_poured(bench, monkeypatch):
+    asked = []
+
+    def answered(photo, ruler, scene, folder):
+        asked.append((photo, ruler.reference_mm, scene))
+        return CommandResult("beside", "explorer measure")
+
+    monkeypatch.setattr("explorer.viewer.laboratory.photograph_panel.compared_result", answered)
+    bench.photograph._bar.value = 100.0
+    assert bench.do(bench.photograph._compare) == ""
+    assert asked == [(bench.photograph._photo.chosen, 100.0, bench.session.now.scene)]
+
+
+@pytest.mark.parametrize(("entered", "length"), [(0.0, None), (0.2, 0.2), (float("nan"), None), ("wide", None)])
+def test_a_length_of_nothing_is_none(entered, length):
+    assert positive(entered) == length
+
+
+def test_a_sheet_is_made_and_a_filled_one_analysed(bench):
+    assert bench.do(bench.design._make) == ""
+    assert "explorer design box-behnken" in text_of(bench.design.sheet)
+    bench.design._target.value = "24.68"
+    assert bench.do(bench.design._analyse) == ""
+    assert "--target 24.68" in text_of(bench.design.analysis)
+    assert "Contours" in bench.design.analysis._plots._choice.options
+    bench.design._target.value = "steep"
+    assert "target 'steep'" in bench.do(bench.design._analyse)
+
+
+def test_an_audit_of_the_shipped_article_and_of_an_archive(bench):
+    folder = asset_path("source_tables", "table1_physical").parent
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w") as archive:
+        for file in folder.iterdir():
+            archive.write(file, f"mine/{file.name}")
+    assert bench.do(lambda: bench.audit._audit("mine.zip", packed.getvalue())) == ""
+    assert "142 reproduced" in text_of(bench.audit.view)
+    assert "cannot be unpacked" in bench.do(lambda: bench.audit._audit("mine.zip", b"nothing"))
+    assert "142 reproduced" in text_of(bench.audit.view)
+
+
+def test_text_from_files_is_shown_as_text(bench):
+    slot = bench.bench._readings
+    readings = b"a,b,replicate,angle_deg\n" + b"".join(b"<b>x</b>,y,%d,%d.0\n" % (k, 20 + k) for k in range(4))
+    assert bench.do(lambda: slot._take("mine.csv", readings)) == ""
+    bench.bench._test.value = "inclined_plane"
+    bench.do(bench.bench._evaluate)
+    assert "<b>x" not in text_of(bench.bench.view)
+
+
+def test_the_tab_tells_what_is_done_and_what_was_refused(server, tmp_path):
+    actions = Actions()
+    session = PageSession(material_source("sunflower_extract"))
+    tab = LaboratoryPanel(page_context(server, session, actions.post, tmp_path))
+    tab.show(Now(session.now, notice="mine.csv: line 2: <steep>"))
+    assert "&lt;steep&gt;" in tab._state.content
+    tab._background.start("auditing", lambda: None, lambda _: None)
+    tab.show(Now(session.now))
+    assert "Busy auditing" in tab._state.content
+    finished(actions, tab._background)
+
+
+def test_a_command_line_is_selected_as_a_whole():
+    html = answer_html(CommandResult("one & two", "explorer audit"))
+    assert "one &amp; two" in html
+    assert "user-select:all" in html
+
+
+def test_another_test_offers_its_own_example(bench):
+    event(bench.bench._test, "drop")
+    assert finished(bench.actions, bench.background) == ""
+    assert bench.bench._readings.chosen == "drop"
+    event(bench.bench._readings.upload, UploadedFile("mine.csv", b"x"))
+    finished(bench.actions, bench.background)
+    assert bench.bench._readings.chosen.endswith(".csv")
+    event(bench.bench._test, "shear")
+    finished(bench.actions, bench.background)
+    assert bench.bench._readings.chosen.endswith(".csv")  # what was sent stays chosen

@@ -1,0 +1,232 @@
+"""What the page makes of parameters, and what it takes from a browser."""
+
+import math
+
+import pytest
+
+from explorer.live.messages import SessionState, Status
+from explorer.units import InputError, checked, quantity, screen_unit, title
+from explorer.viewer.actions import Actions
+from explorer.viewer.pour.live_panel import (
+    LiveControl,
+    decade_mark,
+    decades_around,
+    echo_html,
+    effect_targets,
+    live_parameters,
+    material_targets,
+    mean_value,
+    pair_targets,
+)
+from explorer.viewer.pour.restart_panel import PATHS, SetUpInputs, entered, size_paths
+from solver import load_material, parameters, with_values
+from solver.rigs import RIGS
+from solver.scenes.scene import value, with_rig
+from solver.scenes.sizes import SizeDistribution
+from tests.explorer.viewer.page_session import event
+
+SCENE = load_material("sunflower_extract")
+KNOWN = parameters(SCENE)
+
+
+@pytest.mark.parametrize(("number", "taken"), [(0.4, 0.4), (7.5, 3.0), (-1, 0.0), (2, 2.0)])
+def test_numbers_from_a_browser_are_clamped(number, taken):
+    assert checked(number, 0.0, 3.0, "friction") == taken
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, None, "0.5", [0.5], True, {"a": 1}])
+def test_what_is_no_finite_number_is_refused(number):
+    with pytest.raises(InputError, match=r"friction: .* is not a finite number"):
+        checked(number, 0.0, 3.0, "friction")
+
+
+@pytest.mark.parametrize("path", sorted(path for path in KNOWN if not KNOWN[path].choices))
+def test_the_screen_shows_a_value_that_leads_back_to_it(path):
+    unit, number = screen_unit(KNOWN[path]), value(SCENE, path)
+    # Six digits are shown.
+    assert unit.to_si(unit.to_screen(number)) == pytest.approx(number, rel=5e-6)
+
+
+def test_units_are_those_that_a_person_reads():
+    assert title(KNOWN["material.seed.shear_modulus"]) == "Shear modulus [MPa]"
+    assert title(KNOWN["rig.outlet_height"]) == "Outlet height [mm]"
+    assert title(KNOWN["pair.seed.seed.static_friction"]) == "Static friction"
+    assert screen_unit(KNOWN["material.seed.shear_modulus"]).to_screen(56.3e6) == 56.3
+    assert quantity(0.03, "kg") == "30 g"
+    assert quantity(math.nan, "Pa") == "–"
+
+
+def test_sliders_are_made_from_what_is_declared_live():
+    choices = (material_targets(SCENE), pair_targets(SCENE), effect_targets())
+    shown = [
+        p.path for targets in choices for prefixes in targets.values() for p, _ in live_parameters(SCENE, prefixes)
+    ]
+    assert set(shown) == {path for path, parameter in KNOWN.items() if parameter.live}
+
+
+def test_all_pairs_means_every_pair_and_all_bodies_leaves_the_wall_alone():
+    pairs = dict(live_parameters_by_name(pair_targets(SCENE)["all pairs"]))
+    assert len(pairs["static_friction"]) == len(SCENE.pairs) == 9
+    moduli = dict(live_parameters_by_name(material_targets(SCENE)["all bodies"]))["shear_modulus"]
+    assert [path.split(".")[1] for path in moduli] == ["seed", "plate", "petiole"]
+
+
+def live_parameters_by_name(prefixes):
+    return [(p.path.split(".")[-1], paths) for p, paths in live_parameters(SCENE, prefixes)]
+
+
+def test_what_acts_on_restart_is_declared_so():
+    assert [path for path in PATHS if path in KNOWN and KNOWN[path].live] == []
+
+
+def test_sizes_of_every_component_are_in_the_set_up(server):
+    first = Status(SessionState.RUNNING, "", SCENE, seed=1, generation=1, speed=1.0)
+    started = []
+    session = type(
+        "Session", (), {"status": lambda _: first, "restart": lambda _, scene, seed: started.append(scene)}
+    )()
+    panel = SetUpInputs(server, session, SCENE, 1, lambda action: action())
+    assert [path for path in size_paths(SCENE) if KNOWN[path].live] == []
+    panel._inputs["body.plate.size_distribution"].value = "log_normal"
+    panel._inputs["body.plate.size_spread"].value = 0.2
+    panel._restart()
+    assert [body.sizes for body in started[0].bodies] == [
+        SizeDistribution(),
+        SizeDistribution("log_normal", 0.2),
+        SizeDistribution(),
+    ]
+    # a number of spheres that was set elsewhere is offered beside the names
+    other = with_values(SCENE, {"body.spheres": 12})
+    panel.show(Status(SessionState.RUNNING, "", other, seed=1, generation=2, speed=1.0))
+    assert panel._inputs["body.spheres"].value == "12"
+
+
+@pytest.mark.parametrize("rig", RIGS)
+def test_all_of_rig_and_feed_is_in_the_set_up(server, rig):
+    scene, started = with_rig(SCENE, rig), []
+    first = Status(SessionState.RUNNING, "", scene, seed=1, generation=1, speed=1.0)
+    session = type("Session", (), {"status": lambda _: first, "restart": lambda _, made, seed: started.append(made)})()
+    panel = SetUpInputs(server, session, scene, 1, lambda action: action())
+    known = parameters(scene).items()
+    # A file is chosen or uploaded elsewhere (`scene_panel`).
+    declared = {path for path, entry in known if path.startswith(("rig.", "insertion.")) and not entry.files}
+    assert declared <= set(panel._inputs)
+    # What nobody touched stays as it is, to the last bit.
+    panel._restart()
+    assert started == [scene]
+
+
+def test_settings_of_the_next_pour_are_clamped_and_choices_checked():
+    assert entered(KNOWN["rig.outlet_height"], 80.0) == pytest.approx(0.08)
+    assert entered(KNOWN["rig.mass"], 1e9) == KNOWN["rig.mass"].high
+    with pytest.raises(InputError, match="Mass"):
+        entered(KNOWN["rig.mass"], math.nan)
+    with pytest.raises(ValueError, match=r"body\.spheres"):
+        with_values(SCENE, {"body.spheres": entered(KNOWN["body.spheres"], "<script>")})
+
+
+def test_the_set_up_follows_a_pour_that_somebody_else_started(server):
+    first = Status(SessionState.RUNNING, "", SCENE, seed=1, generation=1, speed=1.0)
+    session = type("Session", (), {"status": lambda _: first})()
+    panel = SetUpInputs(server, session, SCENE, 1, lambda action: action())
+    panel._inputs["rig.mass"].value = 12.0
+    panel.show(first)
+    assert panel._inputs["rig.mass"].value == 12.0  # typed, and not yet asked for
+    other = with_values(SCENE, {"rig.mass": "20g", "body.spheres": "coarse"})
+    panel.show(Status(SessionState.RUNNING, "", other, seed=7, generation=2, speed=1.0))
+    assert panel._inputs["rig.mass"].value == 20.0
+    assert panel._inputs["body.spheres"].value == "coarse"
+    assert panel._seed.value == 7
+
+
+def test_the_solvers_values_are_shown_as_a_range_where_they_differ():
+    text = echo_html(SCENE, pair_targets(SCENE)["all pairs"])
+    # Table 3 of the article: static friction between 0.54 and 0.83.
+    assert "0.54 … 0.83" in text
+    assert "0.57 … " not in echo_html(SCENE, pair_targets(SCENE)["seed – seed"])
+
+
+def test_a_slider_for_many_stands_at_their_mean():
+    paths = [f"material.{name}.shear_modulus" for name in ("seed", "plate")]
+    # Geometric mean of 56.3 and 35.5 MPa: 44.706 MPa; three digits.
+    assert mean_value(SCENE, paths, geometric=True) == 44.7e6
+    assert mean_value(SCENE, paths[:1]) == 56.3e6
+
+
+def test_a_logarithmic_slider_spans_whole_decades_within_the_range():
+    assert decades_around(56.3, 0.01, 1e6) == (0, 3)
+    assert decades_around(0.02, 0.01, 1e6) == (-2, 0)
+    assert [decade_mark(power, "MPa") for power in (-1, 0, 2, 3, 4)] == ["0.1", "1", "100", "1 GPa", "10 GPa"]
+
+
+def control(server, name, prefix="material.seed"):
+    sent = []
+    path = f"{prefix}.{name}"
+    made = LiveControl(server.gui, KNOWN[path], [path], SCENE, lambda action: action(), sent.append)
+    return made, sent, path
+
+
+def test_moving_the_box_and_the_logarithmic_slider_sends_pascals(server):
+    made, sent, path = control(server, "shear_modulus")
+    box, slider = (face.handle for face in made._faces)
+    event(box, 80.0)
+    event(slider, 2.0)
+    event(slider, 99.0)
+    assert [values[path] for values in sent] == pytest.approx([80e6, 100e6, 1e9])
+    made.remove()
+
+
+def test_a_power_of_ten_is_shown_with_the_digits_that_its_box_holds(server):
+    made, _, _ = control(server, "shear_modulus")
+    # log10(56.3) = 1.7505
+    assert made._faces[1].handle.value == 1.75
+    made.follow(with_values(SCENE, {"material.seed.shear_modulus": 47.3e6}))
+    assert made._faces[1].handle.value == 1.67
+    assert made._faces[0].handle.value == 47.3
+    made.remove()
+
+
+def test_what_the_program_sets_itself_is_not_sent_back(server):
+    made, sent, _ = control(server, "static_friction", "pair.seed.seed")
+    event(made._faces[0].handle, 0.1, client_id=None)
+    assert sent == []
+    made.remove()
+
+
+def test_a_control_follows_the_solver_unless_a_person_is_at_it(server):
+    made, _, path = control(server, "static_friction", "pair.seed.seed")
+    changed = with_values(SCENE, {path: 0.2})
+    made.follow(changed)
+    assert made._faces[0].handle.value == 0.2
+    event(made._faces[0].handle, 1.5)
+    made.follow(SCENE)
+    assert made._faces[0].handle.value == 0.2
+    made.remove()
+
+
+def test_actions_run_in_order_and_a_refusal_becomes_the_notice():
+    actions, done = Actions(), []
+
+    def refuse():
+        raise InputError("friction: 'nan' is not a finite number")
+
+    assert actions.carry_out() is None
+    for action in (lambda: done.append(1), refuse, lambda: done.append(2)):
+        actions.post(action)
+    assert actions.carry_out() == "friction: 'nan' is not a finite number"
+    assert done == [1, 2]
+    actions.post(lambda: done.append(3))
+    assert actions.carry_out() == ""
+
+
+def test_a_file_that_cannot_be_written_is_told_too(tmp_path):
+    actions = Actions()
+    actions.post(lambda: (tmp_path / "none" / "file").write_text(""))
+    assert actions.carry_out() == f"{tmp_path / 'none' / 'file'}: No such file or directory"
+
+
+def test_a_mistake_in_the_program_is_not_taken_for_bad_input():
+    actions = Actions()
+    actions.post(lambda: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        actions.carry_out()

@@ -1,0 +1,268 @@
+"""How the pour is drawn: colours and their bar, force chains, cuts, and the controls that set them."""
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from explorer.live.details import Details
+from explorer.live.frames import Frame
+from explorer.units import InputError
+from explorer.viewer.actions import Actions
+from explorer.viewer.look.colours import QUANTITIES, ColourPanel, bar_html, body_colours, colour_range, nice_top
+from explorer.viewer.look.force_chains import ForceChains, ForcePanel, chain_segments, chain_text
+from explorer.viewer.look.look import COMPONENT, CUTS, NOTHING, Look, in_sight
+from explorer.viewer.look.look_settings import CutPanel, LookSettings
+from explorer.viewer.scene_nodes import SceneNodes, component_colour
+from explorer.viewer.style import SELECTED, VIRIDIS, linear, linear_all, mapped
+from tests.explorer.beads import bead_scene
+
+FRAME = Frame(
+    number=1,
+    generation=1,
+    time=2.0,
+    position=np.float32([[0, 0, 0], [0.01, 0, 0], [0.02, 0, 0.01], [0.03, 0, 0]]),
+    quaternion=np.tile(np.float32([1, 0, 0, 0]), (4, 1)),
+    component=np.int32([0, 0, 1, 0]),
+    inside=np.array([True, True, True, False]),
+    scale=np.ones(4, dtype=np.float32),
+)
+DETAILS = Details(
+    number=1,
+    generation=1,
+    time=2.0,
+    mass=np.float32([1e-3] * 3),
+    velocity=np.float32([[0, 0, 0], [0.3, 0.4, 0], [0, 0, -1]]),
+    load=np.float32([5e-3, 1e-3, 0]),
+    neighbours=np.int32([1, 2, 0]),
+    entered=np.float32([0.5, 1.0, 1.5]),
+    touching=40,
+    mean_force=1e-3,
+    body=np.int32([0, 0, 1, 2]),
+    partner=np.int32([1, -1, 2, 3]),
+    point=np.float32([[0.005, 0, 0], [0, 0, -0.006], [0.015, 0, 0.005], [0.025, 0, 0]]),
+    normal_force=np.float32([5e-3, 1.5e-3, 0.5e-3, 3e-3]),
+    tangential_force=np.float32([1e-3, 0, 0, 0]),
+)
+
+
+@pytest.fixture
+def panel(server):
+    actions = Actions()
+    settings = LookSettings(actions.post)
+    colours = ColourPanel(server, server.gui.add_html(""), settings, QUANTITIES, actions.post)
+    forces, cut = ForcePanel(server, settings, actions.post), CutPanel(server, settings, actions.post)
+    handles = {**vars(colours), **vars(forces), **vars(cut)}
+    return SimpleNamespace(settings=settings, colours=colours, handles=handles, actions=actions)
+
+
+def enter(handle, value, client_id=0):
+    """What viser hands to a callback when a browser has sent ``value``."""
+    for callback in handle._impl.update_cb:
+        callback(SimpleNamespace(client_id=client_id, target=SimpleNamespace(value=value)))
+
+
+def test_quantities_are_what_their_names_say():
+    shown = {name: quantity.shown(DETAILS).tolist() for name, quantity in QUANTITIES.items()}
+    assert shown["speed"] == pytest.approx([0.0, 0.5, 1.0])
+    assert shown["contact force"] == pytest.approx([5.0, 1.0, 0.0])  # mN
+    assert shown["coordination number"] == [1, 2, 0]
+    assert shown["residence time"] == pytest.approx([1.5, 1.0, 0.5])
+
+
+@pytest.mark.parametrize(
+    ("values", "top"), [([0.0, 0.3], 0.5), ([0.11], 0.2), ([7.0], 10.0), ([0.5], 0.5), ([0.0], 1.0), ([], 1.0)]
+)
+def test_an_automatic_range_ends_at_a_round_number(values, top):
+    assert nice_top(np.array(values)) == pytest.approx(top)
+
+
+def test_one_fast_body_does_not_stretch_the_range():
+    assert nice_top(np.append(np.full(1000, 0.9), 50.0)) == 1.0
+
+
+def test_a_fixed_range_stays():
+    assert colour_range(Look(automatic=False, low=1.0, high=4.0), np.array([9.0])) == (1.0, 4.0)
+
+
+def test_viridis_gets_lighter_all_the_way():
+    colours = mapped(np.linspace(-0.2, 1.2, 100))
+    # Luminance of sRGB (ITU-R BT.709 weights, on linear light).
+    luminance = (colours / 255.0) ** 2.2 @ [0.2126, 0.7152, 0.0722]
+    assert (np.diff(luminance) >= 0.0).all()
+    assert colours[0].tolist() == list(VIRIDIS[0])
+    assert colours[-1].tolist() == list(VIRIDIS[-1])
+    assert linear_all(np.array([[10.0, 128.0, 255.0]])).tolist() == [list(linear((10, 128, 255)))]
+
+
+PLAIN = np.array([linear(component_colour(k)) for k in FRAME.component], dtype=np.uint8)
+SPEED = QUANTITIES["speed"]
+
+
+def test_bodies_have_the_colour_of_their_value_and_newcomers_that_of_their_component():
+    painted = body_colours(PLAIN, Look(colour_by="speed"), SPEED, DETAILS, selected=None)
+    assert painted[0].tolist() == list(linear(VIRIDIS[0]))
+    assert painted[2].tolist() == list(linear(VIRIDIS[-1]))
+    assert painted[3].tolist() == list(linear(component_colour(0)))
+    plain = body_colours(PLAIN, Look(), None, DETAILS, selected=1)
+    assert plain[2].tolist() == list(linear(component_colour(1)))
+    assert plain[1].tolist() == list(linear(SELECTED))
+
+
+def test_a_body_without_a_number_keeps_the_colour_of_its_component():
+    some = replace(DETAILS, velocity=np.float32([[math.nan, 0, 0], [0, 1, 0], [0, 0, 0]]))
+    painted = body_colours(PLAIN, Look(colour_by="speed"), SPEED, some, selected=None)
+    assert painted[0].tolist() == PLAIN[0].tolist()
+    assert painted[1].tolist() == list(linear(VIRIDIS[-1]))
+
+
+def test_a_pour_that_was_brought_back_has_fewer_bodies_than_its_last_details():
+    early = replace(FRAME, component=FRAME.component[:1], position=FRAME.position[:1], inside=FRAME.inside[:1])
+    assert body_colours(PLAIN[:1], Look(colour_by="speed"), SPEED, DETAILS, 2).shape == (1, 3)
+    segments = chain_segments(early, early.inside, DETAILS, 0.0)
+    # Of the four contacts only that with the plate is between things that are there.
+    assert sum(len(one) for one in segments) == 1
+
+
+def test_before_the_first_body_there_is_nothing_to_paint():
+    assert body_colours(PLAIN[:0], Look(colour_by="speed"), SPEED, None, None).shape == (0, 3)
+
+
+def test_the_bar_tells_quantity_unit_and_ends():
+    text = bar_html(Look(colour_by="contact force"), QUANTITIES["contact force"], DETAILS)
+    for part in (
+        "contact force [mN]: sum of the normal forces",
+        "<span>0</span>",
+        "<span>2.5</span>",
+        "<span>5</span>",
+    ):
+        assert part in text
+    assert "<span>7</span>" in bar_html(Look(colour_by="speed", automatic=False, low=1, high=7), SPEED, DETAILS)
+    assert bar_html(Look(), None, DETAILS) == ""
+
+
+def test_chains_go_from_centre_to_centre_and_are_thicker_where_they_press_harder():
+    weak, middling, strong = chain_segments(FRAME, np.ones(4, dtype=bool), DETAILS, threshold=1.0)
+    # 1.5 mN with the plate: one line, from the bead to the point. 3 mN: two lines. 5 mN: two lines. 0.5 mN: none.
+    np.testing.assert_allclose(weak, [[[0, 0, 0], [0, 0, -0.006]]])
+    assert len(middling) == 2
+    np.testing.assert_allclose(strong, [[[0, 0, 0], [0.005, 0, 0]], [[0.005, 0, 0], [0.01, 0, 0]]])
+    text = chain_text(DETAILS, Look(chains=True))
+    assert "from 1 mN on; thicker from 2 and 4 mN. 3 of 40 contacts; their mean is 1 mN" in text
+
+
+def test_chains_of_bodies_that_are_cut_away_are_not_drawn():
+    classes = chain_segments(FRAME, FRAME.inside, DETAILS, threshold=1.0)
+    assert [len(one) for one in classes] == [1, 0, 2]
+
+
+def test_a_threshold_of_nothing_leaves_out_contacts_that_do_not_press():
+    idle = replace(DETAILS, normal_force=np.float32([0, 0, 0, 1e-3]))
+    assert sum(len(one) for one in chain_segments(FRAME, np.ones(4, dtype=bool), idle, 0.0)) == 2
+
+
+def test_chains_that_are_not_there_are_not_shown(server):
+    chains = ForceChains(server)
+    chains.show(FRAME, FRAME.inside, DETAILS, 1.0)
+    assert [node.visible for node in chains._nodes] == [True, False, True]
+    chains.hide()
+    assert not any(node.visible for node in chains._nodes)
+
+
+def test_a_cut_hides_one_side_and_nothing_else():
+    assert in_sight(FRAME, Look()).tolist() == [True, True, True, False]
+    assert in_sight(FRAME, Look(cut_away="x above", cut_at=0.015)).tolist() == [True, True, False, False]
+    assert in_sight(FRAME, Look(cut_away="x below", cut_at=0.015)).tolist() == [False, False, True, False]
+    assert in_sight(FRAME, Look(cut_away="z above", cut_at=0.005)).tolist() == [True, True, False, False]
+    assert len(CUTS) == 6
+
+
+def test_only_what_frames_do_not_carry_is_asked_for():
+    assert not Look(cut_away="x above", rig_opacity=0.5).needs_details
+    assert Look(chains=True).needs_details
+    assert all(Look(colour_by=name).needs_details for name in QUANTITIES)
+
+
+def test_nodes_are_painted_faded_and_hidden(server):
+    scene = bead_scene()
+    nodes = SceneNodes(server, scene)
+    beads = replace(FRAME, component=np.zeros(4, dtype=np.int32))
+    nodes.show(beads, np.array([True, False, True, False]))
+    (node,) = nodes.bodies.nodes
+    assert node.batched_scales.tolist() == [1, 0, 1, 0, 0, 0]
+    nodes.bodies.paint(beads, np.arange(12, dtype=np.uint8).reshape(4, 3))
+    assert node.batched_colors[1].tolist() == [3, 4, 5]
+    assert node.batched_colors[5].tolist() == list(linear(component_colour(0)))
+    nodes.bodies.fade(0.3)
+    nodes.fade(0.7)
+    assert node.opacity == 0.3
+    assert nodes._rig["cone"].opacity == 0.7
+    assert nodes._rig["plate"].opacity is None
+    assert nodes._rig["gate"].opacity == 0.5
+    nodes.remove()
+
+
+def test_controls_make_a_look(panel):
+    handles, actions = panel.handles, panel.actions
+    enter(handles["_colour"], "speed")
+    enter(handles["_chains"], True)
+    enter(handles["_threshold"], 99.0)
+    enter(handles["_cut"], "y below")
+    enter(handles["_cut_at"], -20.0)
+    enter(handles["_opacity"], 0.5)
+    enter(handles["_shadows"], False)
+    assert actions.carry_out() == ""
+    assert panel.settings.look == Look(
+        colour_by="speed", chains=True, threshold=5.0, cut_away="y below", cut_at=-0.02, rig_opacity=0.5, shadows=False
+    )
+
+
+@pytest.mark.parametrize(
+    ("control", "value"),
+    [
+        ("_colour", "<script>"),
+        ("_colour", ["speed"]),
+        ("_cut", 3),
+        ("_cut_at", math.nan),
+        ("_threshold", "much"),
+        ("_opacity", None),
+        ("_low", math.inf),
+    ],
+)
+def test_what_a_browser_may_not_send_is_refused_in_a_line(panel, control, value):
+    before = panel.settings.look
+    enter(panel.handles[control], value)
+    assert panel.actions.carry_out()
+    assert panel.settings.look == before
+
+
+def test_what_the_page_writes_itself_is_no_input(panel):
+    enter(panel.handles["_colour"], "speed", client_id=None)
+    assert panel.actions.carry_out() is None
+
+
+def test_an_entered_end_fixes_the_range_at_what_is_on_the_screen(panel):
+    settings, handles = panel.settings, panel.handles
+    settings.change(colour_by="speed")
+    panel.colours.show(DETAILS)
+    assert (handles["_low"].value, handles["_high"].value) == (0.0, 1.0)
+    enter(handles["_low"], 0.25)
+    panel.actions.carry_out()
+    assert (settings.look.automatic, settings.look.low, settings.look.high) == (False, 0.25, 1.0)
+    assert handles["_automatic"].value is False
+    enter(handles["_low"], 3.0)
+    assert "not above" in panel.actions.carry_out()
+    with pytest.raises(InputError, match="colour range"):
+        settings.change(low=1.0, high=1.0)
+
+
+def test_keys_walk_through_the_choices(panel):
+    settings, choices = panel.settings, (COMPONENT, *QUANTITIES)
+    for _ in choices[1:]:
+        settings.next("colour_by", choices)
+    assert (settings.look.colour_by, panel.handles["_colour"].value) == (choices[-1], choices[-1])
+    settings.next("colour_by", choices)
+    assert settings.look.colour_by == COMPONENT
+    assert settings.look.cut_away == NOTHING

@@ -1,0 +1,200 @@
+"""The page of a recording: what is drawn at a moment is what was recorded, whoever moves the slider."""
+
+import threading
+import time
+from contextlib import nullcontext
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from explorer.logs.pour_log import PourLog
+from explorer.logs.recording import read_recording
+from explorer.scene.file import load_scene
+from explorer.viewer.guarded_server import guarded_server
+from explorer.viewer.look import drawn_look
+from explorer.viewer.look.camera import view_of
+from explorer.viewer.look.look import COMPONENT
+from explorer.viewer.replay.replay_page import ReplayPage, columns, highest, moment_html
+from explorer.viewer.style import VIRIDIS, linear, linear_all, mapped
+from tests.explorer.logs.test_pour_log import poses
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    path = tmp_path_factory.mktemp("replay") / "pour.rrd"
+    with PourLog(path, load_scene("funnel"), seed=1) as log:
+        log.event(0.0, "phase: fill")
+        for k in range(4):
+            curves = {"angle_of_repose_deg": 20.0 + k, "discharged_mass_g": float(k)}
+            log.frame(0.02 * k, poses(*[0] * (k + 1)), curves, gate_shut=k < 2)
+        log.event(0.05, "<b>friction</b>: 0.5 → 0.6")
+    return read_recording(path)
+
+
+@pytest.fixture
+def page(recording):
+    server = guarded_server("127.0.0.1", 0, "test")
+    yield ReplayPage(server, recording, "pour.rrd")
+    server.stop()
+
+
+def drawn(page):
+    """Positions of the seeds that are not hidden."""
+    (node,) = page._look._nodes.bodies.nodes
+    return node.batched_positions[node.batched_scales > 0]
+
+
+def gate(page):
+    return next(node for surface, node in page._look._nodes._surfaces if surface.shape.name == "gate")
+
+
+def test_a_moment_is_drawn_as_it_was_recorded(page, recording):
+    page._timeline.go_to(0.03)
+    page.show()
+    assert np.array_equal(drawn(page), recording.components[0].at(0.02).position)
+    assert page._look._nodes._surfaces
+    assert gate(page).visible
+    page._timeline.go_to(0.06)
+    page.show()
+    assert len(drawn(page)) == 4
+    assert not gate(page).visible
+    assert page._slider.value == pytest.approx(0.06)
+
+
+def entered(slider, value):
+    """What viser does when a browser moves a slider."""
+    for callback in slider._impl.update_cb:
+        callback(SimpleNamespace(client_id=0, client=None, target=SimpleNamespace(value=value)))
+
+
+def test_the_slider_moves_the_recording_and_bad_input_does_not(page):
+    page._timeline.playing = False
+    entered(page._slider, 0.04)
+    page._actions.carry_out()
+    page.show()
+    assert len(drawn(page)) == 3
+    for bad in (float("nan"), None, "text"):
+        entered(page._slider, bad)
+        assert "is not a finite number" in page._actions.carry_out()
+        assert page._timeline.time == pytest.approx(0.04)
+    entered(page._slider, 1e9)
+    page._actions.carry_out()
+    assert page._timeline.time == pytest.approx(0.06)
+
+
+def test_it_plays_by_itself_to_the_end(page):
+    stop = threading.Event()
+    loop = threading.Thread(target=page.run, args=(stop,))
+    loop.start()
+    deadline = time.monotonic() + 20.0
+    while page._timeline.playing and time.monotonic() < deadline:
+        time.sleep(0.02)
+    time.sleep(0.1)
+    stop.set()
+    loop.join()
+    assert page._timeline.time == pytest.approx(0.06)
+    assert len(drawn(page)) == 4
+
+
+def settle(page, **settings):
+    page._timeline.playing = False
+    page._look._settings.change(**settings)
+    page.show()
+
+
+def test_colours_are_of_the_component_of_speed_and_of_residence_time(page, recording):
+    (node,) = page._look._nodes.bodies.nodes
+    page._timeline.go_to(0.04)
+    settle(page)
+    colour = list(linear(recording.components[0].shape.colour))
+    assert node.batched_colors[:3].tolist() == [colour] * 3
+    # A body enters with every frame: 40, 20 and 0 ms ago, in a range up to 50 ms.
+    settle(page, colour_by="residence time")
+    expected = linear_all(mapped(np.array([0.8, 0.4, 0.0])))
+    assert node.batched_colors[:3].tolist() == expected.tolist()
+    assert "residence time [s]: time since a body is first in the recording" in page._look._colours._bar.content
+    assert page._look._colours._bar.visible
+    # None of them moves.
+    settle(page, colour_by="speed")
+    assert node.batched_colors[:3].tolist() == [list(linear(VIRIDIS[0]))] * 3
+    settle(page, colour_by=COMPONENT)
+    assert node.batched_colors[:3].tolist() == [colour] * 3
+    assert not page._look._colours._bar.visible
+
+
+def test_what_is_not_recorded_is_not_offered_and_the_hint_says_so(page):
+    chooser = page._look._colours._colour
+    assert chooser.options == (COMPONENT, "speed", "residence time")
+    assert "no contact forces" in chooser._impl.props.hint
+
+
+def test_a_cut_hides_bodies_and_the_rig_fades(page):
+    page._timeline.go_to(0.06)
+    settle(page, cut_away="x above", cut_at=0.15)
+    assert drawn(page)[:, 0] == pytest.approx([0.0, 0.1])
+    settle(page, rig_opacity=0.5)
+    opacities = {surface.shape.name: node.opacity for surface, node in page._look._nodes._surfaces}
+    assert opacities["cone"] == 0.5
+    assert opacities["plate"] is None
+    assert opacities["gate"] != 0.5
+
+
+def test_shadows_are_switched_off(page, monkeypatch):
+    lit = []
+    monkeypatch.setattr(drawn_look, "light", lambda server, shadows: lit.append(shadows))
+    settle(page, shadows=False)
+    assert lit == [False]
+
+
+def trigger(page, label):
+    """Trigger the command that the key of ``label`` triggers, as the browser that has pressed it."""
+    client = SimpleNamespace(client_id=1, atomic=nullcontext, camera=SimpleNamespace())
+    commands = page._server.gui._command_handle_from_uuid.values()
+    (command,) = [one for one in commands if one._impl.props.label == label]
+    for callback in command._impl.trigger_cb:
+        callback(SimpleNamespace(client=client, client_id=1))
+    page._actions.carry_out()
+    return client
+
+
+def test_keys_are_those_of_the_live_page(page, recording):
+    trigger(page, "Colour by the next quantity")
+    assert page._look._settings.look.colour_by == "speed"
+    trigger(page, "Cut away the next side")
+    assert page._look._settings.look.cut_away == "x below"
+    camera, expected = trigger(page, "View: side").camera, view_of(highest(recording), "Side")
+    assert camera.position == pytest.approx(expected.position)
+    assert camera.look_at == pytest.approx(expected.look_at)
+
+
+def test_what_is_refused_is_told(page):
+    stop = threading.Event()
+    loop = threading.Thread(target=page.run, args=(stop,))
+    loop.start()
+    entered(page._look._colours._high, -1.0)
+    deadline = time.monotonic() + 20.0
+    while "is not above" not in page._text.content and time.monotonic() < deadline:
+        time.sleep(0.02)
+    stop.set()
+    loop.join()
+    assert "colour range: its end -1 is not above its beginning 0" in page._text.content
+
+
+def test_the_moment_is_told_and_texts_of_the_file_are_escaped(recording):
+    early, late = (moment_html(recording, time, playing=False) for time in (0.03, 0.06))
+    assert "paused · 0.030 of 0.060 s · 2 bodies" in early
+    assert "friction" not in early
+    assert "&lt;b&gt;friction&lt;/b&gt;" in late
+
+
+def test_the_curve_is_marked_where_time_stands():
+    moments, angles = np.array([0.0, 0.1, 0.2]), np.array([1.0, 2.0, 3.0])
+    times, values, marked = columns(moments, angles, 0.15)
+    assert values[:3].tolist() == [1.0, 2.0, 3.0]
+    assert np.nansum(marked) == 2.0
+    assert np.isnan(columns(moments, angles, -1.0)[2]).all()
+    # The row behind the curve: no point of it, and never at the same place twice running.
+    assert np.isnan([values[3], marked[3]]).all()
+    assert times[2] < times[3] < times[2] + 1e-5
+    assert columns(moments, angles, 0.15, turn=1)[0][3] != times[3]

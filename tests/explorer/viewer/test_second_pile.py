@@ -1,0 +1,169 @@
+"""The second pile: poured as the first is, drawn beside it, in step with it, and gone when it is taken away."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from explorer.live.frames import Frame
+from explorer.live.messages import SessionState, Status
+from explorer.scene.file import load_scene
+from explorer.viewer.guarded_server import guarded_server
+from explorer.viewer.panel import Now
+from explorer.viewer.pour.second_pile import BESIDE, NONE, ROOT, SecondPile, comparison_markdown
+from solver import Outcome, with_values
+from solver.observables import Value
+from tests.explorer.viewer.page_session import page_context
+
+SCENE = with_values(load_scene("funnel"), {"rig.mass": 2e-3, "body.spheres": "coarse"})
+
+
+class FakeSession:
+    """A session that does as it is told, and remembers what that was."""
+
+    def __init__(self, scene=SCENE):
+        self.now = Status(SessionState.RUNNING, "", scene, seed=4, generation=1, speed=1.0)
+        self.told = []
+        self.newest = None
+
+    def start(self, scene, seed):
+        self.told.append(("start", scene, seed))
+        self.now = replace(self.now, scene=scene, seed=seed, generation=self.now.generation + 1)
+
+    def status(self):
+        return self.now
+
+    def frame(self):
+        return self.newest
+
+    def pause(self):
+        self.told.append("pause")
+
+    def play(self):
+        self.told.append("play")
+
+    def step_back(self, duration):
+        self.told.append(("back", pytest.approx(duration)))
+
+    def set_speed(self, factor):
+        self.told.append(("speed", factor))
+
+    def close(self):
+        self.told.append("close")
+
+
+def frame(number):
+    return Frame(
+        number,
+        1,
+        0.1,
+        np.full((1, 3), 0.05, dtype=np.float32),
+        np.array([[1.0, 0.0, 0.0, 0.0]], dtype=np.float32),
+        np.zeros(1, dtype=np.int32),
+        np.ones(1, dtype=bool),
+        np.ones(1, dtype=np.float32),
+    )
+
+
+@pytest.fixture
+def bench():
+    """Server, first session, second session, and the panel; actions are carried out at once."""
+    server = guarded_server("127.0.0.1", 0, "test")
+    first, second = FakeSession(), FakeSession()
+    panel = SecondPile(page_context(server, first), lambda: second)
+    yield SimpleNamespace(server=server, first=first, second=second, panel=panel)
+    server.stop()
+
+
+def nodes(server):
+    # The empty parents that viser makes by itself draw nothing.
+    made = {f"{ROOT}/bodies", f"{ROOT}/rig"}
+    return {name for name in server.scene._handle_from_node_name if name.startswith(f"{ROOT}/")} - made
+
+
+def test_it_is_poured_with_the_first_one_s_scene_and_seed_and_drawn_beside_it(bench):
+    assert bench.panel._text.content == NONE
+    bench.panel._pour()
+    assert bench.second.told == [("start", SCENE, 4)]
+    bench.second.newest = frame(1)
+    bench.panel.draw(Now(bench.first.now))
+    assert f"{ROOT}/rig/cone" in nodes(bench.server)
+    seeds = bench.server.scene._handle_from_node_name[f"{ROOT}/bodies/0"]
+    assert seeds.batched_positions[0] == pytest.approx([0.05] * 3)
+    assert bench.server.scene._handle_from_node_name[ROOT].position[0] == BESIDE
+
+
+def test_it_stays_as_it_was_while_the_first_is_changed_and_the_difference_is_told(bench):
+    bench.panel._pour()
+    rougher = with_values(SCENE, {"pair.seed.seed.static_friction": 0.9})
+    bench.first.now = replace(bench.first.now, scene=rougher)
+    bench.panel.show(Now(bench.first.now))
+    assert "pair.seed.seed.static_friction: 0.57 → 0.9" in bench.panel._text.content
+    assert bench.second.now.scene == SCENE
+
+
+def test_it_pauses_plays_and_keeps_speed_with_the_first(bench):
+    bench.panel._pour()
+    bench.second.told.clear()
+    bench.first.now = replace(bench.first.now, state=SessionState.PAUSED, speed=0.5)
+    bench.panel.show(Now(bench.first.now))
+    assert bench.second.told == ["pause", ("speed", 0.5)]
+    bench.second.told.clear()
+    bench.second.now = replace(bench.second.now, state=SessionState.PAUSED, speed=0.5)
+    bench.panel.show(Now(bench.first.now))
+    assert bench.second.told == []
+    bench.panel.show(Now(replace(bench.first.now, state=SessionState.RUNNING)))
+    assert bench.second.told == ["play"]
+
+
+def test_where_the_first_stands_still_the_second_comes_to_its_moment(bench):
+    bench.panel._pour()
+    bench.second.told.clear()
+    first = replace(bench.first.now, state=SessionState.PAUSED, time=0.5)
+    for time, state, asked in (
+        (0.7, SessionState.RUNNING, "pause"),
+        (0.7, SessionState.PAUSED, ("back", 0.2)),
+        (0.7, SessionState.ENDED, ("back", 0.2)),
+        (0.3, SessionState.PAUSED, "play"),
+        (0.3, SessionState.RUNNING, None),
+        (0.502, SessionState.PAUSED, None),
+    ):
+        bench.second.now = replace(bench.second.now, state=state, time=time, earliest=0.0)
+        bench.panel.show(Now(first))
+        assert bench.second.told == ([] if asked is None else [asked]), (time, state)
+        bench.second.told.clear()
+    bench.second.now = replace(bench.second.now, state=SessionState.PAUSED, time=0.7, earliest=0.6)
+    bench.panel.show(Now(first))
+    assert bench.second.told == []  # so far back nothing is kept
+
+
+def test_taken_away_it_leaves_nothing(bench):
+    bench.panel._pour()
+    bench.second.newest = frame(1)
+    bench.panel.draw(Now(bench.first.now))
+    bench.panel.close()
+    bench.panel.show(Now(bench.first.now))
+    assert bench.second.told[-1] == "close"
+    assert nodes(bench.server) == set()
+    assert bench.panel._text.content == NONE
+    bench.panel.close()
+
+
+def test_both_results_stand_side_by_side():
+    rest = {"angle_of_repose_deg": Value(24.0, "deg", 3.0)}
+    first = Status(
+        SessionState.ENDED, "", SCENE, 1, 1, 1.0, outcome=Outcome.AT_REST, observables=rest, discharged_mass=2e-3
+    )
+    second = replace(first, observables={"angle_of_repose_deg": Value(20.5, "deg")}, outcome=Outcome.JAMMED)
+    text = comparison_markdown(first, second)
+    assert "| angle of repose | 24.0° ± 3.0° | 20.5° |" in text
+    assert "| state | at rest: a valid pile | jammed: material stays in the rig |" in text
+    assert "**+3.5°**" in text
+    assert "Same parameters." in text
+
+
+def test_a_solver_that_died_says_so_without_markup():
+    first = Status(SessionState.RUNNING, "", SCENE, 1, 1, 1.0)
+    text = comparison_markdown(first, replace(first, state=SessionState.DIED, message="<b>killed</b>"))
+    assert "&lt;b&gt;killed&lt;/b&gt;" in text

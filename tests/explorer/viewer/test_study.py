@@ -1,0 +1,240 @@
+"""The panel of a study: what it asks for, what it tells, and its charts."""
+
+import json
+import math
+
+import plotly.io
+import pytest
+
+from doe.stages import planned_runs
+from doe.studies.study import load_study
+from explorer.background.command_process import CommandStatus
+from explorer.background.progress import StageProgress, TriedRun
+from explorer.report.study_charts import Plot
+from explorer.units import InputError
+from explorer.viewer.actions import Actions
+from explorer.viewer.panel import Now
+from explorer.viewer.study.order_panel import number_on_screen
+from explorer.viewer.study.plot_view import NOTHING, Drawn, PlotView
+from explorer.viewer.study.process_view import stages_markdown
+from explorer.viewer.study.profiler_panel import TITLE as PROFILER
+from explorer.viewer.study.study_panel import NONE, StudyPanel
+from explorer.viewer.style import ThemeSwitch
+from tests.explorer.viewer.page_session import page_context
+from tests.explorer.viewer.study_panel_at_hand import (
+    OWN_PROFILES,
+    FakeSession,
+    FakeStudy,
+    PanelAtHand,
+    drawn,
+    study_with_own_profiles,
+    written,
+)
+
+EVIL = "<img src=x> *bold* | `code`"
+
+
+def test_the_buttons_ask_for_what_they_say(table):
+    for button in ("Start", "Pause / go on", "Cancel", "Resume", "Retry", "Queue", "Clear queue", "Delete everything"):
+        assert table.press(button) in ("", None)
+    table.study.now = CommandStatus("paused")
+    table.press("Pause / go on")
+    asked = [one if isinstance(one, str) else one[:2] for one in table.study.asked]
+    assert asked == [
+        *(("start", "quick"), "pause", "cancel", "resume", "retry", ("queue", "quick"), "clear_queue", "go_on"),
+    ]
+    assert not table.study.asked[0][2]
+
+
+def test_the_profiles_of_the_study_file_are_offered_and_started(server, tmp_path, monkeypatch):
+    monkeypatch.setattr(FakeStudy, "study_file", study_with_own_profiles(tmp_path))
+    table = PanelAtHand(server)
+    chosen = table.panel._profile
+    assert chosen.options == OWN_PROFILES
+    study = load_study(str(table.study.study_file))
+    runs = sum(planned_runs(study, study.profiles["first look"]).values())
+    assert chosen.hint.startswith(f"first look: coarse shapes, {runs} runs; thesis-2: standard shapes, ")
+    assert "fine: standard shapes, as many runs as the pilot asks for" in chosen.hint
+    table.press("Start")
+    chosen.value = "thesis-2"
+    table.press("Queue")
+    assert [one[:2] for one in table.study.asked] == [("start", "first look"), ("queue", "thesis-2")]
+
+
+def test_an_empty_page_says_what_to_do(table):
+    table.show()
+    assert "Press *Start*" in table.panel._plots._caption.content
+    assert table.panel._plots._choice.options == (NOTHING,)
+    assert table.panel._plots._chart is None  # plotly.js is not sent for nothing
+    assert "comes with the response surface" in table.panel._profiler._words.content
+    table.panel._profiler._hand_on()
+    assert table.session.asked == []
+
+
+def test_stages_failed_runs_and_the_queue_are_told(table):
+    jam = TriedRun("screening", "row 3", 0, 0, 7, "jammed", EVIL, False)
+    table.study.now = CommandStatus(
+        "running",
+        "screening",
+        28,
+        112,
+        125.0,
+        ("22.0 ± 3",),
+        stages=(StageProgress("pilot", 20, 20, f"22 ± 3 {EVIL}"), StageProgress("screening", 8, 28)),
+        tried=(jam, TriedRun("screening", "row 3", 0, 1, 9, "at_rest", "", True)),
+    )
+    table.study.queued = ("standard", "full, changed")
+    table.show("no")
+    text = table.panel._view._text.content
+    assert "28 of 112 runs, time left 2 min 05 s" in text
+    assert "| pilot | 20 of 20 | done | 22 ± 3" in text
+    assert "| screening | 8 of 28 | ▶ |" in text
+    assert "**1 without a valid result**" in text
+    assert "| 7 | 9: at rest |" in text
+    assert "Waiting: standard; full, changed." in text
+    assert "<img" not in text.replace(r"\<", "")
+    assert "*bold*" not in text.replace(r"\*bold\*", "")
+    assert table.panel._view._bar.value == 25.0
+
+
+def test_a_paused_command_and_one_that_found_no_replacement_say_so():
+    lost = tuple(TriedRun("scan", "a", 0, k, k, "jammed", "", False) for k in range(9))
+    text = stages_markdown(CommandStatus("paused", tried=lost), "study", "Runs")
+    assert text.startswith("Paused")
+    assert "**9 without a valid result**, the newest 6:" in text
+    assert "| jammed | 8 | none |" in text
+
+
+def test_a_finished_study_is_drawn_and_stays_while_nothing_changes(table, result, tmp_path):
+    table.study.out = written(tmp_path / "study-1", result)
+    table.show()
+    plots = table.panel._plots
+    assert plots._choice.options[-1] == PROFILER
+    assert drawn(plots)["layout"]["xaxis"]["title"]["text"] == "noise σ of one pour [°]"
+    table.enter(plots._choice, "Scan of an assumption")
+    first = drawn(plots)
+    assert first["layout"]["xaxis"]["title"]["text"] == "outlet height [mm]"
+    assert plots._caption.content.startswith("Band: the target")
+    before = plots._chart.figure
+    table.show()
+    assert plots._chart.figure is before
+    (tmp_path / "study-1" / "result.json").write_text(json.dumps(result | {"scan": None}))
+    table.show()
+    assert "Scan of an assumption" not in plots._choice.options
+    assert drawn(plots) != first
+
+
+def test_dark_and_light(table, result, tmp_path):
+    table.study.out = written(tmp_path / "study-1", result)
+    table.show()
+    dark = drawn(table.panel._plots)["layout"]["template"]["layout"]
+    table.panel.set_dark(False)
+    light = drawn(table.panel._plots)["layout"]["template"]["layout"]
+    # plotly_dark writes light text, plotly_white dark text
+    assert (dark["font"]["color"], light["font"]["color"]) == ("#f2f5fa", "#2a3f5f")
+    assert set(light) == set(plotly.io.templates["plotly_white"].to_plotly_json()["layout"])
+
+
+def test_the_switch_of_the_page_turns_viser_and_the_charts(server, monkeypatch):
+    themes, told, actions = [], [], Actions()
+    monkeypatch.setattr(server.gui, "configure_theme", lambda **theme: themes.append(theme["dark_mode"]))
+    switch = ThemeSwitch(server, actions.post, told.append)
+    for sent in (False, True):
+        switch._dark.value = sent
+        for callback in switch._dark._impl.update_cb:
+            callback(type("Event", (), {"client_id": 0}))
+        assert actions.carry_out() == ""
+    assert themes == told == [False, True]
+
+
+def test_zoom_belongs_to_one_chart():
+    spec = {"data": [], "layout": {"height": 400, "xaxis": {"title": "t"}, "xaxis2": {}, "scene": {}}}
+    layout = json.loads(Drawn(spec, True, "this one").to_json())["layout"]
+    assert [layout[key]["uirevision"] for key in ("xaxis", "xaxis2", "scene")] == ["this one"] * 3
+    assert "height" not in layout
+    assert spec["layout"]["xaxis"] == {"title": "t"}
+
+
+def test_what_a_browser_sends_for_the_list_may_be_anything(server):
+    actions, made = Actions(), []
+    view = PlotView(server, "Chart", "empty", actions.post)
+    view.offer({"a": Plot(lambda: made.append(1) or {"data": [], "layout": {}}, "caption")}, 1)
+    for sent in ("no such title", ["a"], None, 3):
+        view._choice.value = sent
+        view._draw()
+        assert view._caption.content == "empty"
+    view.offer({"bad": Plot(lambda: {}["gone"], "caption")}, 2)
+    view._choice.value = "bad"
+    view._draw()
+    assert "cannot be drawn" in view._caption.content
+    assert made == [1]
+
+
+def test_a_study_that_runs_shows_what_it_has(table, result, tmp_path):
+    partial = {key: result[key] for key in ("schema", "study", "pilot", "screening")} | {
+        "partial": "screening",
+        "line": "X7 *acts*",
+    }
+    table.study.out = written(tmp_path / "study-1", partial, "partial.json")
+    table.study.now = CommandStatus("running", "screening", 40, 100, stages=(StageProgress("screening", 20, 84),))
+    table.show()
+    table.show()
+    assert r"| screening | 20 of 84 | ▶ | so far: X7 \*acts\* |" in table.panel._view._text.content
+    assert "Half-normal" in table.panel._plots._choice.options
+    assert "Ascent path" not in table.panel._plots._choice.options
+    assert table.panel._runs._stage.options == ("pilot", "screening")
+    # finished: the result counts, and a partial one that was left behind does not
+    written(tmp_path / "study-1", result)
+    table.study.now = CommandStatus("finished")
+    table.show()
+    assert "Ascent path" in table.panel._plots._choice.options
+
+
+def test_ranges_and_target_are_asked_for_as_entered(table):
+    order = table.panel._order
+    assert not order.edits
+    table.enter(order._choice, next(text for text in order._factors if text.startswith("X4 ")))
+    assert order._inputs["low"].label == "Low [MPa]"
+    assert [order._inputs[key].value for key in ("low", "high", "reference")] == [40.1, 70.5, 56.3]
+    table.enter(order._inputs["low"], 30.0)
+    table.enter(order._goal["mean"], 26.0)
+    assert dict(order.edits.factors) == {"X4": {"low": 30e6}}
+    assert dict(order.edits.target) == {"mean": 26.0}
+    assert "| X4 low | 40.1 MPa | 30 MPa |" in order._told.content
+    table.press("Start")
+    assert table.study.asked[0][2] == order.edits
+    # another factor and back: the change is still there
+    table.enter(order._choice, next(text for text in order._factors if text.startswith("X7 ")))
+    assert order._inputs["low"].label == "Low"
+    assert order._inputs["low"].value == 0.47
+    table.enter(order._choice, next(text for text in order._factors if text.startswith("X4 ")))
+    assert order._inputs["low"].value == 30.0
+    table.enter(order._inputs["low"], 90.0)
+    assert "**This study cannot start:** " in order._told.content
+    assert "is not below high" in order._told.content
+    order._inputs["low"].value = math.nan
+    with pytest.raises(InputError, match="X4 low"):
+        order._take()
+    order._forget()
+    assert not order.edits
+    assert order._inputs["low"].value == 40.1
+    assert order._goal["mean"].value == 24.68
+
+
+def test_what_is_shown_as_in_the_file_is_no_change(table):
+    order = table.panel._order
+    for text in order._factors:
+        table.enter(order._choice, text)
+        order._take()
+    assert not order.edits
+    assert number_on_screen(1 / 3) == 0.333333
+
+
+def test_a_study_file_that_cannot_be_read_leaves_the_page_standing(server, tmp_path):
+    table = FakeStudy()
+    table.study_file = tmp_path / "gone.toml"
+    panel = StudyPanel(page_context(server, FakeSession(), Actions().post, study=table))
+    assert "cannot be read" in panel._order._told.content
+    assert panel._profile.options == (NONE,)
+    assert not panel._order.edits
+    panel.show(Now(FakeSession().status()))
