@@ -13,7 +13,8 @@ from doe.analysis.analyse import Target, analyse_design
 from doe.analysis.models import ORDERS, Order
 from doe.designs import DESIGNS, factor_letters
 from doe.errors import StatisticsError
-from explorer.design.factors_file import ModelOrder, read_factors, region_of
+from explorer.design.choices import ModelOrder
+from explorer.design.factors_file import read_factors, region_of
 from explorer.design.filled_sheet import Runs, read_sheet, runs_of
 from explorer.design.result import DesignResult, Response, RunCount, SheetFactor
 from explorer.errors import CommandError

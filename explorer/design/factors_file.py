@@ -1,4 +1,4 @@
-"""The factors file of a design, TOML, and the names in it and on the command line that are allowed.
+"""The factors file of a design, TOML.
 
 title = "…"                       what is studied
 responses = ["strength_MPa"]      columns to fill in (one called "response" if not given)
@@ -17,7 +17,6 @@ from __future__ import annotations
 import re
 import tomllib
 from dataclasses import dataclass
-from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
@@ -37,22 +36,6 @@ RESERVED = ("row", "replicate", "run", "seed")
 MOST_FACTORS = 47
 TOP_KEYS = ("title", "responses", "replicates", "centre", "seed", "first_seed", "factor")
 FACTOR_KEYS = ("name", "low", "high", "unit", "reference")
-
-
-class Alpha(StrEnum):
-    """Where the axial points of a central composite design stand."""
-
-    ROTATABLE = "rotatable"
-    FACE_CENTRED = "face-centred"
-    INSCRIBED = "inscribed"
-
-
-class ModelOrder(StrEnum):
-    """Orders of the polynomial."""
-
-    LINEAR = "linear"
-    INTERACTIONS = "interactions"
-    QUADRATIC = "quadratic"
 
 
 @dataclass(frozen=True)

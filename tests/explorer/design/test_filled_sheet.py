@@ -5,7 +5,8 @@ import pytest
 
 from doe.designs import box_behnken
 from doe.errors import StatisticsError
-from explorer.design.factors_file import Alpha, read_factors, region_of
+from explorer.design.choices import Alpha
+from explorer.design.factors_file import read_factors, region_of
 from explorer.design.filled_sheet import read_sheet, runs_of
 from explorer.design.run_plan import DesignOrder, make_plan, sheet_text
 from explorer.errors import CommandError

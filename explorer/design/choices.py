@@ -1,0 +1,22 @@
+"""Names that the command line of a design offers: axial points, orders of the model.
+
+In a file without NumPy, so that `--help` does not wait for it.
+"""
+
+from enum import StrEnum
+
+
+class Alpha(StrEnum):
+    """Where the axial points of a central composite design stand."""
+
+    ROTATABLE = "rotatable"
+    FACE_CENTRED = "face-centred"
+    INSCRIBED = "inscribed"
+
+
+class ModelOrder(StrEnum):
+    """Orders of the polynomial."""
+
+    LINEAR = "linear"
+    INTERACTIONS = "interactions"
+    QUADRATIC = "quadratic"
