@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from explorer.design.kinds import ModelOrder
+from explorer.design.choices import ModelOrder
 
 
 def analyse(

@@ -8,7 +8,7 @@ from pathlib import Path
 import typer
 
 from explorer.commands.listing import Listing
-from explorer.design.kinds import Alpha
+from explorer.design.choices import Alpha
 
 
 class Designs(Listing):

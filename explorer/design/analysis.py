@@ -13,9 +13,9 @@ from doe.analysis.analyse import ResponseTarget, analyse_design
 from doe.analysis.models import ORDERS, Order
 from doe.designs import DESIGNS, factor_letters
 from doe.errors import StatisticsError
+from explorer.design.choices import ModelOrder
 from explorer.design.factors_file import read_factors, region_of
 from explorer.design.filled_sheet import Runs, read_sheet, runs_of
-from explorer.design.kinds import ModelOrder
 from explorer.design.result import DesignResult, Response, RunCount, SheetFactor
 from explorer.errors import CommandError
 from explorer.files.run_folder import appearing, json_text

@@ -19,8 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.designs import DESIGNS, Design, DesignOptions, Points
+from explorer.design.choices import Alpha
 from explorer.design.factors_file import FactorsFile, region_of
-from explorer.design.kinds import Alpha
 from explorer.errors import CommandError
 
 Array = npt.NDArray[np.float64]

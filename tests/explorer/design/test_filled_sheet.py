@@ -5,9 +5,9 @@ import pytest
 
 from doe.designs import box_behnken
 from doe.errors import StatisticsError
+from explorer.design.choices import Alpha
 from explorer.design.factors_file import read_factors, region_of
 from explorer.design.filled_sheet import read_sheet, runs_of
-from explorer.design.kinds import Alpha
 from explorer.design.run_plan import DesignOrder, make_plan, sheet_text
 from explorer.errors import CommandError
 from solver.assets import asset_path

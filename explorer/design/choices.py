@@ -1,4 +1,7 @@
-"""Names that the command line offers: axial points, orders of the model. Loads nothing, for help is made from it."""
+"""Names that the command line of a design offers: axial points, orders of the model.
+
+In a file without NumPy, so that `--help` does not wait for it.
+"""
 
 from enum import StrEnum
 
