@@ -16,21 +16,18 @@ from functools import cached_property
 from html import escape
 from itertools import product
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from doe.runner import PourRunner
-from doe.runs import Run, Setting
 from doe.store import Store, default_store
 from explorer.background.progress import Bar
-from explorer.files.run_folder import TRACE_COLUMNS
 from explorer.outcomes import outcome_text
 from explorer.scene.file import named_scene
 from solver import (
     OBSERVABLES,
-    Crew,
     Outcome,
     ParameterError,
     Record,
@@ -40,7 +37,6 @@ from solver import (
     observe,
     packed,
     pour_rig,
-    run_pour,
     unpacked,
     value,
     with_settings,
@@ -48,7 +44,11 @@ from solver import (
 )
 from solver import parameters as declared
 from solver.arch import chosen
+from solver.observables import COMPONENT_OBSERVABLES, ComponentObservable, Observable
 from solver.observables.reading import PileReading
+
+if TYPE_CHECKING:
+    from doe.runs import Run
 
 Array = npt.NDArray[np.float64]
 
@@ -130,9 +130,15 @@ def parameters(source: Source) -> pd.DataFrame:
 
 def observables(source: Source) -> pd.DataFrame:
     """What a pour of a scene gives: index ``name``; columns ``unit``, ``doc``. ``source``: see :func:`load`."""
-    names = observable_names(load(source))
-    rows = [(name, OBSERVABLES[name].unit, OBSERVABLES[name].doc) for name in names]
+    rows = [(name, one.unit, one.doc) for name, one in _observed(load(source)).items()]
     return pd.DataFrame(rows, columns=["name", "unit", "doc"]).set_index("name")
+
+
+def _observed(scene: Scene) -> dict[str, Observable | ComponentObservable]:
+    found: dict[str, Observable | ComponentObservable] = {name: OBSERVABLES[name] for name in observable_names(scene)}
+    if len(scene.bodies) > 1 and any(OBSERVABLES[name].needs == "pile" for name in found):
+        found |= {f"{one.name}.{body.name}": one for one in COMPONENT_OBSERVABLES for body in scene.bodies}
+    return found
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -193,6 +199,8 @@ class Poured:
 
         One row per ``numerics.sample_interval``; the columns are those of the ``trace_<seed>.csv`` of a result folder.
         """
+        from explorer.files.run_folder import TRACE_COLUMNS
+
         trace = self.record.trace
         columns = {name: getattr(trace, curve) for name, curve in TRACE_COLUMNS.items()}
         return pd.DataFrame(columns).set_index("time_s")
@@ -245,6 +253,8 @@ def pour(source: Source, settings: Settings | None = None, *, seed: int = 1) -> 
     ValueError
         One line, as from :func:`load`; also for a bench test, into which nothing is poured.
     """
+    from solver import run_pour  # imports Taichi, as do pours of a sweep: to look at a scene takes neither
+
     scene = load(source, settings)
     pour_rig(scene)
     return Poured(run_pour(scene, seed, threads=1))
@@ -295,9 +305,13 @@ def sweep(
     ValueError
         One line about a path, a value, an observable or the store, before anything is poured.
     """
+    from doe.runner import PourRunner
+    from doe.runs import Setting
+    from solver import Crew
+
     scene = load(source)
-    given = observable_names(scene)
-    names = given if observables is None else tuple(observables)
+    given = _observed(scene)
+    names = tuple(given if observables is None else observables)
     for name in names:
         if name not in given:
             raise ParameterError(f"observables: {name!r} is not one of {', '.join(given)}")
@@ -341,5 +355,5 @@ def sweep(
     table = pd.DataFrame(rows, columns=[*values, "seed", "outcome", "valid", *names, "message"])
     table = table.astype(dict.fromkeys(names, np.float64))
     units = {path: declared(scene)[canonical(scene, path)].unit for path in values}
-    table.attrs["units"] = units | {name: OBSERVABLES[name].unit for name in names}
+    table.attrs["units"] = units | {name: given[name].unit for name in names}
     return table
