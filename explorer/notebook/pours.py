@@ -230,7 +230,7 @@ class Poured:
 
         pile = PileReading(self._kept.pile)
         drawn = outline_html(pile.front, None) if pile.is_pile else ""
-        return f"<div style='max-width:40em'>{escape(repr(self))}{drawn}{self.observables.to_html()}</div>"
+        return f"<div style='max-width:40em'>{escape(repr(self))}{drawn}{self.observables._repr_html_()}</div>"
 
 
 def pour(source: Source, settings: Settings | None = None, *, seed: int = 1) -> Poured:
