@@ -74,8 +74,9 @@ def stored_run(
 class PourRunner:
     """Runs settings as pours and keeps every run in the store.
 
-    ``tries`` seeds are tried for one replicate. Pours run in this process, where ``observer`` can watch them, or as
-    ``pours`` says (``solver.WorkerPool.run_queue``).
+    ``tries`` seeds are tried for one replicate. ``seeds`` are those of the replicates, of which then none is replaced;
+    None: a stream of its own for every run (:func:`seed_of`). Pours run in this process, where ``observer`` can watch
+    them, or as ``pours`` says (``solver.WorkerPool.run_queue``).
     """
 
     def __init__(
@@ -89,10 +90,12 @@ class PourRunner:
         observer: PourObserver | None = None,
         pours: Pours | None = None,
         tries: int = TRIES,
+        seeds: Sequence[int] | None = None,
     ) -> None:
         self._scene, self._store, self._study, self._seed = scene, store, study, study_seed
         self._threads, self._on_run, self._observer = threads, on_run, observer
-        self._pours, self._tries = pours, tries
+        self._pours, self._seeds = pours, seeds
+        self._tries = tries if seeds is None else 1
 
     def run(self, stage: str, settings: Sequence[Setting]) -> list[list[Run]]:
         """See :class:`Runner`. Runs found in the store are taken from there."""
@@ -112,7 +115,9 @@ class PourRunner:
                 request(row, run.replicate, run.attempt + 1)
 
         def request(row: int, replicate: int, attempt: int) -> None:
-            seed = seed_of(self._seed, stage, row, replicate, attempt)
+            seed = (
+                seed_of(self._seed, stage, row, replicate, attempt) if self._seeds is None else self._seeds[replicate]
+            )
             key = pour_key(scenes[row], seed)
             stored = self._store.find(key)
             if stored is not None:

@@ -17,9 +17,15 @@ import threading
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import pytest
+
+from explorer.diagnosis import run as diagnosis_run
+from explorer.study import run as study_run
+from tests.explorer import diagnosed
+from tests.explorer.test_study_run import Formula
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = sorted(
@@ -44,6 +50,8 @@ NEVER_WHOLE = (*(command for command in BEGUN if "serve" in command), *(c for c 
 """Commands without an end, and a second calibration, which takes as long as `make calibrate`."""
 AFTER = {"explorer simulate results/diagnosis/corrected.toml --replicates 10": "make diagnose"}
 """Commands that need what one of ``BEGUN`` leaves at its end."""
+SCRIPTS = ("README.md", "docs/python.md")
+"""Documents whose Python blocks, one after the other, are a script; those of others only name what there is."""
 PATIENCE = 300.0
 """[s] after which a command that has said nothing is given up."""
 
@@ -76,6 +84,7 @@ def blocks() -> Iterator[Block]:
 
 ALL = list(blocks())
 TYPED = [block for block in ALL if block.commands]
+PYTHON = [block for block in ALL if block.language == "python"]
 LONG = [block for block in TYPED if any(command in BEGUN and command not in NEVER_WHOLE for command in block.commands)]
 
 
@@ -189,7 +198,22 @@ def test_tables_are_toml(block):
     assert tomllib.loads(block.text)
 
 
-@pytest.mark.parametrize("block", [block for block in ALL if block.language == "python"], ids=str)
+@pytest.mark.usefixtures("taichi")
+@pytest.mark.parametrize("document", SCRIPTS)
+def test_python_runs_as_it_is_written(document, checkout, monkeypatch):
+    """Pours are poured; the study and the diagnosis, which take long, get theirs from formulas."""
+    blocks = [block.text for block in PYTHON if block.document == document]
+    assert blocks
+    case = cache(lambda: diagnosed.diagnosed(**diagnosed.CASES["effect"]))
+    monkeypatch.setattr(study_run, "PourRunner", Formula)
+    monkeypatch.setattr(diagnosis_run, "load_measurement", lambda folder: case()[0])
+    monkeypatch.setattr(diagnosis_run, "run_diagnosis", lambda *given: case()[1])
+    monkeypatch.setenv("REPOSE_STORE", str(checkout / "pours.sqlite"))
+    monkeypatch.chdir(checkout)
+    exec(compile("\n".join(blocks), document, "exec"), {})
+
+
+@pytest.mark.parametrize("block", [block for block in PYTHON if block.document not in SCRIPTS], ids=str)
 def test_python_calls_what_there_is(block):
     """Every function that is called is a public one of doe or solver, or of Python."""
     tree = ast.parse(block.text)

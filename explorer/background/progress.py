@@ -86,7 +86,7 @@ class ProgressWriter:
     ) -> None:
         self._file, self._say, self._clock = file, say, clock
         self._started, self._said = clock(), 0.0
-        self._bar = _Bar() if terminal else None
+        self._bar = Bar() if terminal else None
 
     @property
     def elapsed(self) -> float:
@@ -111,14 +111,18 @@ class ProgressWriter:
             self._bar.close()
 
 
-class _Bar:
-    """A bar in the last line of a terminal; what is printed meanwhile stands above it."""
+class Bar:
+    """A bar in the last line of a terminal, or below a notebook's cell; what is printed meanwhile stands above it."""
 
     def __init__(self) -> None:
         # Imported where it is used: the page reads progress, and has no terminal.
+        from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn
 
-        self._progress = Progress(TextColumn("{task.description}"), BarColumn(), transient=True)
+        console = Console()
+        shown = console.is_terminal or console.is_jupyter
+        columns = TextColumn("{task.description}"), BarColumn()
+        self._progress = Progress(*columns, console=console, transient=True, disable=not shown)
         self._task = self._progress.add_task("", total=None)
 
     def show(self, state: str, done: int, planned: int) -> None:

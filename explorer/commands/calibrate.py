@@ -35,10 +35,11 @@ def calibrate(
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     order = StudyOrder(study, profile, out, resume, store, record, threads, tries)
     try:
-        error_percent = run_study(order, typer.echo)
+        result = run_study(order, typer.echo)
     except StudyStopped as stopped:
         typer.echo(f"error: {' '.join(str(stopped).split())}", err=True)
         raise typer.Exit(FAILURE) from None
+    error_percent = result.verification.tests[0].relative_error_percent
     if fail_above is not None and not error_percent <= fail_above:
         typer.echo(f"relative error {error_percent:.2f} % is above the limit of {fail_above:g} %", err=True)
         raise typer.Exit(ABOVE_LIMIT)

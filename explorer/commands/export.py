@@ -48,7 +48,7 @@ def export(
     from explorer.export import EXPORTS
     from explorer.export.target import ExportOrder
     from explorer.files.run_folder import appearing
-    from explorer.scene.file import calibrated_scene, is_calibration, load_scene, with_settings
+    from explorer.scene.file import named_scene, with_settings
     from solver import value
 
     if to not in EXPORTS:
@@ -57,12 +57,9 @@ def export(
     if every is not None and "every" not in target.options:
         takers = " or ".join(name for name, one in EXPORTS.items() if "every" in one.options)
         raise CommandError(f"--every: belongs to --to {takers}, not to {to}")
-    if material is None and is_calibration(source):
-        scene, caution = calibrated_scene(source)
-        if caution:
-            typer.echo(f"note: {caution}", err=True)
-    else:
-        scene = load_scene(source, material)
+    scene, caution = named_scene(source, material)
+    if caution:
+        typer.echo(f"note: {caution}", err=True)
     scene = with_settings(scene, set_)
     if time is not None and time < float(value(scene, "numerics.max_time")):
         scene = with_settings(scene, [f"numerics.max_time={time!r}"])

@@ -80,8 +80,11 @@ class DiagnoseOrder:
     follow_up: Path | None = None
 
 
-def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> Diagnosis:
-    """Run the loop and write the files. Finished pours are kept in the store, so an interrupted one goes on."""
+def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> DiagnosisResult:
+    """Run the loop and write the files; returns the content of ``diagnosis.json``.
+
+    Finished pours are kept in the store, so an interrupted one goes on.
+    """
     unknown = [name for name in order.effects if name not in EFFECTS]
     if unknown:
         raise CommandError(f"--effects: {unknown[0]!r} is not one of {', '.join(EFFECTS)}")
@@ -128,7 +131,7 @@ def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> Diagnosis:
             say(f"{path}: its calibration, the effect among the factors: explorer calibrate --headless --study {path}")
     for line in error_lines(result):
         say(line)
-    return found
+    return result
 
 
 def result_of(measurement: Measurement, order: DiagnoseOrder, found: Diagnosis, total_s: float) -> DiagnosisResult:

@@ -10,7 +10,7 @@ from explorer.report.html import page
 from explorer.report.markdown import document
 from explorer.report.sections import sections_of
 
-__all__ = ["report_html", "report_markdown", "write_report"]
+__all__ = ["headings_of", "report_html", "report_markdown", "write_report"]
 
 
 def write_report(result: StudyResult, folder: Path) -> None:
@@ -22,14 +22,15 @@ def write_report(result: StudyResult, folder: Path) -> None:
 
 def report_html(result: StudyResult) -> str:
     """The page: self-contained, with charts."""
-    return page(*_headings(result), sections_of(result))
+    return page(*headings_of(result), sections_of(result))
 
 
 def report_markdown(result: StudyResult) -> str:
     """The same facts without charts."""
-    return document(*_headings(result), sections_of(result))
+    return document(*headings_of(result), sections_of(result))
 
 
-def _headings(result: StudyResult) -> tuple[str, str]:
+def headings_of(result: StudyResult) -> tuple[str, str]:
+    """Title and subtitle of the report."""
     study = result.study
     return study.title or study.name, f"Calibration report of the study {study.name}, profile {study.profile.name}"

@@ -67,6 +67,13 @@ def load_scene(source: str, material: str | None = None) -> Scene:
         return _set_up_scene(table, path)
 
 
+def named_scene(source: str, material: str | None = None) -> tuple[Scene, str]:
+    """The scene of :func:`load_scene`, or of the folder of a calibration with its caution: :func:`calibrated_scene`."""
+    if material is None and is_calibration(source):
+        return calibrated_scene(source)
+    return load_scene(source, material), ""
+
+
 def _file_of(source: str) -> Path:
     own = Path(source).expanduser()
     if own.is_file():

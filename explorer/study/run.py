@@ -60,8 +60,8 @@ class StudyOrder:
     tries: int = TRIES
 
 
-def run_study(order: StudyOrder, say: Callable[[str], None]) -> float:
-    """Run the whole chain and write the files; returns the relative error of the verification in percent.
+def run_study(order: StudyOrder, say: Callable[[str], None]) -> StudyResult:
+    """Run the whole chain and write the files; returns the content of ``result.json``.
 
     Finished runs are kept in the store, so a study that was interrupted goes on where it stopped.
     """
@@ -108,7 +108,7 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> float:
     write_report(result, order.out)
     partial.remove()
     say(f"{order.out}/report.html, report.md, result.json")
-    return result.verification.tests[0].relative_error_percent
+    return result
 
 
 def holds_more_than(folder: Path, study_file: Path) -> bool:

@@ -20,6 +20,7 @@ from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from time import perf_counter
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -136,7 +137,7 @@ def warm_up(rooms: Sequence[Sequence[Scene]], workers: int | None = None) -> Ite
 def _worker() -> tuple[BaseProcess, Connection]:
     ours, theirs = mp.Pipe()
     process = mp.get_context("spawn").Process(target=_work, args=(theirs,), name="pours")
-    with deaf_to_interrupts():
+    with deaf_to_interrupts(), script_left_alone():
         process.start()
     theirs.close()
     return process, ours
@@ -176,6 +177,20 @@ def deaf_to_interrupts() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def script_left_alone() -> Iterator[None]:
+    """Processes that are spawned within do not import the script that runs here, as multiprocessing has them do.
+
+    It would begin again in each of them, unless its author guards it by ``if __name__ == "__main__"``.
+    """
+    script = sys.modules["__main__"]
+    sys.modules["__main__"] = ModuleType("__main__")
+    try:
+        yield
+    finally:
+        sys.modules["__main__"] = script
 
 
 def begin_worker() -> None:

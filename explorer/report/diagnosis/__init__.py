@@ -14,7 +14,7 @@ from explorer.report.diagnosis.method import data, for_a_paper, how_reached, rep
 from explorer.report.html import page
 from explorer.report.markdown import document
 
-__all__ = ["diagnosis_html", "diagnosis_markdown", "sections_of", "write_diagnosis_report"]
+__all__ = ["diagnosis_html", "diagnosis_markdown", "headings_of", "sections_of", "write_diagnosis_report"]
 
 SECTIONS: tuple[Callable[[DiagnosisResult], Section | None], ...] = (
     in_short,
@@ -43,12 +43,12 @@ def write_diagnosis_report(result: DiagnosisResult, folder: Path) -> None:
 
 def diagnosis_html(result: DiagnosisResult) -> str:
     """The page: self-contained, with charts."""
-    return page(*_headings(result), sections_of(result))
+    return page(*headings_of(result), sections_of(result))
 
 
 def diagnosis_markdown(result: DiagnosisResult) -> str:
     """The same facts without charts."""
-    return document(*_headings(result), sections_of(result))
+    return document(*headings_of(result), sections_of(result))
 
 
 def sections_of(result: DiagnosisResult) -> tuple[Section, ...]:
@@ -57,6 +57,7 @@ def sections_of(result: DiagnosisResult) -> tuple[Section, ...]:
     return tuple(section for section in found if section is not None)
 
 
-def _headings(result: DiagnosisResult) -> tuple[str, str]:
+def headings_of(result: DiagnosisResult) -> tuple[str, str]:
+    """Title and subtitle of the report."""
     found = result.data
     return found.title or Path(found.folder).name, f"Diagnosis of the measured data in {found.folder}"

@@ -31,7 +31,7 @@ RENDERERS = {
     r"\bget_plotlyjs\(": ["explorer/report/html.py"],
     r"\bPlotly\.(newPlot|react)\(": ["explorer/report/html.py"],
     r"\badd_plotly\(": ["explorer/viewer/study/plot_view.py"],
-    r"\bplotly\.(io|graph_objects|express)\b|\b(to|write)_html\(|\bwrite_image\(": [],
+    r"\bplotly\.(io|graph_objects|express)\b|\b(to|write)_html\(|\bwrite_image\(": ["explorer/notebook/results.py"],
 }
 """Ways to draw a chart, and the one place for each: no second one may forget CONFIG."""
 
