@@ -25,7 +25,7 @@ import pytest
 from explorer.diagnosis import run as diagnosis_run
 from explorer.study import run as study_run
 from tests.explorer import diagnosed
-from tests.explorer.test_study_run import Formula
+from tests.explorer.study.test_run import Formula
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = sorted(
@@ -44,6 +44,8 @@ BEGUN = {
     "make diagnose": r"trefoil_2: 1 fitted and 1 held-out conditions; store ",
     "explorer calibrate --headless --study lentil_study.toml --out results/lentil": r"lentil_study, profile standard: ",
     "explorer serve --study lentil_study.toml": r"The page is at http://127\.0\.0\.1:\d+",
+    "explorer simulate own.toml --replicates 10": r" 1 +at_rest ",
+    "explorer simulate lentil.toml --replicates 5": r" 1 +at_rest ",
 }
 """What each says once it is at work."""
 NEVER_WHOLE = (*(command for command in BEGUN if "serve" in command), *(c for c in BEGUN if "results/lentil" in c))

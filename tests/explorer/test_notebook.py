@@ -11,8 +11,8 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 from plotly.offline import get_plotlyjs
-from tests.explorer.test_charts_stay_private import ADDRESS
-from tests.explorer.test_study_run import Formula
+from tests.explorer.report.test_charts_stay_private import ADDRESS
+from tests.explorer.study.test_run import Formula
 
 import explorer
 from doe.store import Store
