@@ -282,7 +282,7 @@ def sweep(
     values
         Path → values, as in :func:`load`; several paths make a full grid, and none at all replicates the scene.
     seeds
-        Seeds, or their number N for 1 … N; the same for every combination, which makes differences less noisy.
+        Seeds, or their number N for 1 … N; the same for every combination.
     observables
         Names to be listed; all of the rig if not given.
     store
@@ -315,13 +315,13 @@ def sweep(
     for name in names:
         if name not in given:
             raise ParameterError(f"observables: {name!r} is not one of {', '.join(given)}")
-    numbers = tuple(range(1, seeds + 1)) if isinstance(seeds, int) else tuple(map(int, seeds))
+    numbers = tuple(range(1, seeds + 1)) if isinstance(seeds, int | np.integer) else tuple(map(int, seeds))
     levels = [[one] if isinstance(one, str | int | float) else one for one in values.values()]
-    settings = []
-    for row in product(*levels):
-        changed = with_values(scene, dict(zip(values, row, strict=True)))
-        si = {path: value(changed, path) for path in values}
-        settings.append(Setting(", ".join(f"{path}={one}" for path, one in si.items()), si, len(numbers)))
+    grid = [dict(zip(values, row, strict=True)) for row in product(*levels)]
+    # As they are in the scene: in SI, and a mass fraction after those that were set behind it.
+    poured = [{path: value(changed, path) for path in values} for changed in (with_values(scene, row) for row in grid)]
+    labels = [", ".join(f"{path}={one}" for path, one in row.items()) for row in poured]
+    settings = [Setting(label, row, len(numbers)) for label, row in zip(labels, grid, strict=True)]
     total = len(settings) * len(numbers)
     with ExitStack() as stack:
         kept = Store(default_store() if store is None else Path(store))
@@ -342,14 +342,14 @@ def sweep(
         found = runner.run("sweep", settings)
     rows = [
         {
-            **setting.values,
+            **row,
             "seed": run.seed,
             "outcome": run.outcome,
             "valid": run.valid,
             **{name: run.observables.get(name) for name in names},
             "message": run.message,
         }
-        for setting, runs in zip(settings, found, strict=True)
+        for row, runs in zip(poured, found, strict=True)
         for run in runs
     ]
     table = pd.DataFrame(rows, columns=[*values, "seed", "outcome", "valid", *names, "message"])

@@ -211,6 +211,19 @@ def test_a_sweep_is_the_grid_in_order_and_every_row_a_pour(swept, scene, taichi)
     assert row[names].to_dict() == pytest.approx(one.observables.value.to_dict(), nan_ok=True)
 
 
+def test_mass_fractions_of_a_sweep_are_those_that_are_poured(scene, monkeypatch, tmp_path):
+    """A fraction that is set scales the others, those set before it too."""
+    fractions = {"body.seed.mass_fraction": [0.5], "body.plate.mass_fraction": [0.3]}
+    queued = []
+    monkeypatch.setattr(Crew, "run_queue", lambda self, queue, room: queued.extend(queue) or [])
+    table = explorer.sweep(scene, fractions, np.int64(1), store=tmp_path / "pours.sqlite", progress=False)
+    assert table.empty  # no pour came back
+    changed = with_values(scene, {path: one for path, (one,) in fractions.items()})
+    assert [job.scene for job in queued] == [changed]
+    assert sum(value(changed, f"body.{body.name}.mass_fraction") for body in scene.bodies) == pytest.approx(1.0)
+    assert value(changed, "body.seed.mass_fraction") != 0.5
+
+
 def test_what_is_in_the_store_is_not_poured_again(swept, scene, monkeypatch):
     table, store = swept
 
