@@ -243,12 +243,12 @@ import dataclasses
 import json
 from solver import backend
 from solver.scenes.contact_model import ContactModel
-from solver.single_body.free_world import RADIUS, Laboratory, bench
+from solver.single_body.free_world import RADIUS, FreeWorld, grain_on_plate
 backend.init(threads=1)
 lasted = []
 for name in ("linear_spring_dashpot", "soft_springs"):
-    scene = dataclasses.replace(bench(restitution=1.0), contact=ContactModel(law=name))
-    lab = Laboratory(scene, 1, dt=1e-7)
+    scene = dataclasses.replace(grain_on_plate(restitution=1.0), contact=ContactModel(law=name))
+    lab = FreeWorld(scene, 1, dt=1e-7)
     lab.put(0, (0.0, 0.0, RADIUS), velocity=(0.0, 0.0, -0.5))
     steps = 0
     while steps == 0 or lab.state()[0][2] < RADIUS:

@@ -68,7 +68,7 @@ def load_world(s: ti.template(), w: ti.i32, settings: Settings):
 
 @ti.kernel
 def load_bodies(s: ti.template(), w: ti.i32, numbers: Table, places: IntTable, spheres: Table, owner: IntTable):
-    """All bodies that will enter, by the columns of ``layout.Layout``: numbers, places, spheres (x y z r), owner."""
+    """All bodies that will enter, columns as in ``tables.BodyTables``: numbers, places, spheres (x y z r), owner."""
     s.world.loaded[w] = numbers.shape[0]
     ti.loop_config(serialize=ti.static(serial()))
     for b in range(numbers.shape[0]):
