@@ -34,7 +34,6 @@ class Plot:
 
 
 Plots = dict[str, Plot]
-
 """Title → plot, in the order of the list to choose from."""
 
 Named = Iterator[tuple[str, Plot]]

@@ -11,8 +11,6 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 from plotly.offline import get_plotlyjs
-from tests.explorer.report.test_charts_stay_private import ADDRESS
-from tests.explorer.study.test_run import Formula
 
 import explorer
 from doe.store import Store
@@ -36,6 +34,8 @@ from solver import (
 )
 from tests.explorer import diagnosed, reported_studies
 from tests.explorer.command_line import explorer as command
+from tests.explorer.report.test_charts_stay_private import ADDRESS
+from tests.explorer.study.test_run import Formula
 
 ROOT = Path(__file__).parents[2]
 FRICTION = "pair.seed.seed.static_friction"
