@@ -215,7 +215,7 @@ def test_mass_fractions_of_a_sweep_are_those_that_are_poured(scene, monkeypatch,
     """A fraction that is set scales the others, those set before it too."""
     fractions = {"body.seed.mass_fraction": [0.5], "body.plate.mass_fraction": [0.3]}
     queued = []
-    monkeypatch.setattr(Crew, "run_queue", lambda self, queue, room: queued.extend(queue) or [])
+    monkeypatch.setattr(WorkerPool, "run_queue", lambda self, queue, room: queued.extend(queue) or [])
     table = explorer.sweep(scene, fractions, np.int64(1), store=tmp_path / "pours.sqlite", progress=False)
     assert table.empty  # no pour came back
     changed = with_values(scene, {path: one for path, (one,) in fractions.items()})
