@@ -15,7 +15,7 @@ from doe.declared.model import effect_values
 from doe.declared.points import AS_IT_IS, Point, View
 from doe.measurement.features import feature_set, features_of_record
 from doe.measurement.measurement import Condition, Observation
-from doe.runner import Pours, seed_of, stored_run
+from doe.pour_runner import Pours, seed_of, stored_run
 from doe.store import Reader, Store, StoredRun
 from solver import EFFECTS, Job, Outcome, ParameterError, Record, Scene, observe_named, pour_key, unpacked, with_values
 

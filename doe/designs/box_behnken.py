@@ -21,9 +21,11 @@ TRIPLES = {
     7: ((3, 4, 5), (0, 5, 6), (1, 4, 6), (0, 1, 3), (2, 3, 6), (0, 2, 4), (1, 2, 5)),
 }
 """Number of factors → the factors that are moved together."""
+CENTRE_RUNS = 5
+"""Where nothing else is asked for."""
 
 
-def box_behnken(factors: int = 3, centre: int = 5) -> npt.NDArray[np.int64]:
+def box_behnken(factors: int = 3, centre: int = CENTRE_RUNS) -> npt.NDArray[np.int64]:
     """Return the design as levels -1, 0, +1, shape (edges + centre, factors); centre runs come last.
 
     12, 24, 40, 48 and 56 edge points for 3 to 7 factors. Raises StatisticsError for factors outside 3..7 or
@@ -51,6 +53,6 @@ class BoxBehnken(Design):
     options = ("centre",)
 
     def points(self, factors: int, options: DesignOptions) -> Points:
-        """Edges, then centre runs, 5 by default."""
-        design = box_behnken(factors, 5 if options.centre is None else options.centre)
+        """Edges, then centre runs."""
+        design = box_behnken(factors, CENTRE_RUNS if options.centre is None else options.centre)
         return Points(design.astype(np.float64))

@@ -15,9 +15,11 @@ from doe.errors import StatisticsError
 
 FACTORS = range(2, 8)
 HALVED_FROM = 5
+CENTRE_RUNS = 5
+"""Where nothing else is asked for."""
 
 
-def central_composite(factors: int, centre: int = 5, alpha: Alpha = "rotatable") -> FloatArray:
+def central_composite(factors: int, centre: int = CENTRE_RUNS, alpha: Alpha = "rotatable") -> FloatArray:
     """Return the design in coded units, shape (F + 2 factors + centre, factors): factorial, axial, centre points.
 
     alpha: "rotatable" puts the axial points at F^(1/4), outside the cube; "face-centred" on its faces; "inscribed" is
@@ -46,6 +48,6 @@ class CentralComposite(Design):
     options = ("centre", "alpha")
 
     def points(self, factors: int, options: DesignOptions) -> Points:
-        """Corners, axial points, centre runs, 5 by default."""
-        design = central_composite(factors, 5 if options.centre is None else options.centre, options.alpha)
+        """Corners, axial points, centre runs."""
+        design = central_composite(factors, CENTRE_RUNS if options.centre is None else options.centre, options.alpha)
         return Points(design, traits=(f"{options.alpha}, axial points at ±{np.abs(design).max():.4g}",))

@@ -20,9 +20,11 @@ from doe.errors import StatisticsError
 IntArray = npt.NDArray[np.int64]
 ORDERS = {4: 3, 6: 5, 8: 7, 10: 9, 12: 11, 14: 13, 18: 17, 20: 19, 24: 23, 26: 25, 30: 29}
 """Order of a conference matrix → q. None exists of order 22; Paley's construction gives none of 16 and 28 here."""
+CENTRE_RUNS = 1
+"""Where nothing else is asked for."""
 
 
-def definitive_screening(factors: int, centre: int = 1) -> IntArray:
+def definitive_screening(factors: int, centre: int = CENTRE_RUNS) -> IntArray:
     """Return the design as levels -1, 0, +1, shape (2 m + centre, m): m ≥ factors columns, centre runs last.
 
     Raises StatisticsError for factors outside 3..30 or centre < 1 (without it the squares are not apart from the mean).
@@ -79,7 +81,7 @@ class DefinitiveScreening(Design):
 
     def points(self, factors: int, options: DesignOptions) -> Points:
         """Rows of C, of −C and of zeros."""
-        table = definitive_screening(factors, 1 if options.centre is None else options.centre)
+        table = definitive_screening(factors, CENTRE_RUNS if options.centre is None else options.centre)
         rows, columns = table.shape
         coded = table.astype(np.float64)
         spare = columns - factors

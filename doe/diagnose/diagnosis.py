@@ -32,7 +32,7 @@ from doe.measurement.features import SCAN, feature_set
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.residual_map import ResidualMap
 from doe.measurement.summaries import summaries_of_data, summary_names
-from doe.runner import Pours
+from doe.pour_runner import Pours
 from doe.store import Store
 
 FloatArray = npt.NDArray[np.float64]

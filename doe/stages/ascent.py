@@ -12,7 +12,7 @@ from doe.analysis.power import smallest_effect
 from doe.analysis.screening import SIGNIFICANT
 from doe.analysis.steepest_ascent import AscentFactor, AscentPath, Bracket, Region, ascent_path, bracket, region_around
 from doe.record import Record
-from doe.runs import FloatArray, Run, Runner, Setting, responses
+from doe.run_records import FloatArray, Run, Runner, Setting, responses
 from doe.stages.screening import ScreeningResult
 from doe.stages.stage import Chain, Stage, ended
 from doe.studies.profile import Profile

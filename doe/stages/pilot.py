@@ -36,7 +36,7 @@ from doe.analysis.power import (
 from doe.designs import ChosenDesign
 from doe.errors import StatisticsError
 from doe.record import Record
-from doe.runs import FloatArray, Run, Runner, Setting, responses
+from doe.run_records import FloatArray, Run, Runner, Setting, responses
 from doe.stages.stage import Bias, Chain, Stage
 from doe.studies.profile import Profile
 from doe.studies.study import CALIBRATED, Study

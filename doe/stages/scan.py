@@ -10,7 +10,7 @@ import numpy as np
 from doe.analysis.pilot import Noise, replicate_noise
 from doe.analysis.power import smallest_effect
 from doe.record import Record
-from doe.runs import FloatArray, Run, Runner, Setting, no_pile_shares, responses
+from doe.run_records import FloatArray, Run, Runner, Setting, no_pile_shares, responses
 from doe.stages.stage import Chain, Stage, ended
 from doe.studies.profile import Profile
 from doe.studies.study import Study

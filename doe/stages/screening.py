@@ -13,7 +13,7 @@ from doe.analysis.screening import Screening, Selected, analyse_screening, selec
 from doe.designs import ChosenDesign
 from doe.errors import StatisticsError
 from doe.record import Record
-from doe.runs import FloatArray, Run, Runner, Setting, no_pile_shares, responses
+from doe.run_records import FloatArray, Run, Runner, Setting, no_pile_shares, responses
 from doe.stages.stage import Chain, Stage, ended
 from doe.studies.factors import MIN_BODIES, bodies_touched
 from doe.studies.profile import Profile

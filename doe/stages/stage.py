@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from doe.errors import StudyFileError
 from doe.record import Record
-from doe.runs import Run, Runner, Setting
+from doe.run_records import Run, Runner, Setting
 from doe.studies.profile import Profile
 from doe.studies.study import Study
 

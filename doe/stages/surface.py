@@ -14,7 +14,7 @@ from doe.analysis.steepest_ascent import Region
 from doe.analysis.surface import Surface, fit_surface
 from doe.analysis.surface_anova import SurfaceAnova, analyse_surface
 from doe.record import Record
-from doe.runs import FloatArray, Run, Runner, Setting, no_pile_shares, responses
+from doe.run_records import FloatArray, Run, Runner, Setting, no_pile_shares, responses
 from doe.stages.stage import Chain, Stage, ended
 from doe.studies.profile import Profile
 from doe.studies.study import CALIBRATED, Factor, Study

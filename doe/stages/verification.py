@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from doe.analysis.power import smallest_effect
 from doe.analysis.verification import Verification, verify
 from doe.record import Record
-from doe.runs import Run, Runner, Setting, no_pile_shares, responses
+from doe.run_records import Run, Runner, Setting, no_pile_shares, responses
 from doe.stages.stage import Chain, Stage, ended
 from doe.studies.profile import Profile
 from doe.studies.study import Study

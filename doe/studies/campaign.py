@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from doe.errors import StatisticsError, StudyStopped
-from doe.runs import Run, Runner, Setting
+from doe.run_records import Run, Runner, Setting
 from doe.stages import stages_of
 from doe.stages.stage import Bias, Chain
 from doe.studies.profile import Profile
@@ -83,7 +83,7 @@ class CountingRunner:
         """Outcome → number of the stage that ran last."""
 
     def run(self, stage: str, settings: Sequence[Setting]) -> list[list[Run]]:
-        """See :class:`doe.runs.Runner`."""
+        """See :class:`doe.run_records.Runner`."""
         rows = self._runner.run(stage, settings)
         self.runs += sum(len(runs) for runs in rows)
         self.outcomes = Counter(run.outcome for runs in rows for run in runs)
@@ -130,5 +130,5 @@ class KnownRuns:
         self._runs = sorted(runs, key=lambda run: (run.replicate, run.attempt))
 
     def run(self, stage: str, settings: Sequence[Setting]) -> list[list[Run]]:
-        """See :class:`doe.runs.Runner`; the runs of a setting are those with its label."""
+        """See :class:`doe.run_records.Runner`; the runs of a setting are those with its label."""
         return [[run for run in self._runs if run.label == setting.label] for setting in settings]

@@ -20,7 +20,7 @@ from scipy import stats
 
 from doe.analysis.t_tests import Sample, equivalence_test, welch_test
 from doe.record import Record
-from doe.runs import Run, Runner, Setting, responses
+from doe.run_records import Run, Runner, Setting, responses
 from doe.studies.study import Study
 from solver import Scene, observable_names, parameters, value, with_values
 

@@ -1,6 +1,6 @@
 """A study: what is varied, against which measurement, with how many runs. Read from a TOML file (:class:`StudyFile`).
 
-The designs of the stages are Plackett–Burman of 28 and of 12 runs and Box–Behnken with 5 centre runs, unless
+The designs of the stages are Plackett–Burman of 28 and of 12 runs and Box–Behnken, unless
 ``[screening]``, ``[assumptions]`` or ``[surface]`` names another one of ``doe/designs``.
 """
 
@@ -59,7 +59,7 @@ SCREENING = ChosenDesign(PlackettBurman(), replace(IN_STUDIES, runs=28))
 
 ASSUMPTIONS = ChosenDesign(PlackettBurman(), replace(IN_STUDIES, runs=12))
 
-SURFACE = ChosenDesign(BoxBehnken(), replace(IN_STUDIES, centre=5))
+SURFACE = ChosenDesign(BoxBehnken(), IN_STUDIES)
 
 
 def main_effect_design(

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any, ClassVar, Self
 
 from doe.record import Document, Record
-from doe.runs import Run, Setting
+from doe.run_records import Run, Setting
 from doe.stages.ascent import AscentResult
 from doe.stages.pilot import PilotResult
 from doe.stages.scan import ScanResult

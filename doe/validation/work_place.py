@@ -14,7 +14,7 @@ from multiprocessing.pool import Pool
 from typing import Any
 
 from doe.measurement import Condition, readings_of_record
-from doe.runner import stored_run
+from doe.pour_runner import stored_run
 from doe.store import Store
 from doe.validation.laboratory import LaboratoryPour
 from doe.validation.outside import AMPLITUDE, ON_BENCH, OUTSIDE, magnified, outside_pour

@@ -18,7 +18,7 @@ from doe.record import Record
 
 if TYPE_CHECKING:
     from doe.declared.pours import Ended
-    from doe.runs import Run
+    from doe.run_records import Run
 
 PROGRESS = "progress.jsonl"
 """In the output folder of the command."""

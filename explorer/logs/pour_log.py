@@ -36,7 +36,7 @@ from explorer.scene.meshes import (
     rig_triangles,
     scene_height,
 )
-from explorer.viewer.style import BODY_COLOURS, GLASS, PLATE
+from explorer.viewer.palette import GLASS, PLATE, component_colour
 from solver import Scene
 from solver.observables import Value
 
@@ -182,7 +182,7 @@ class PourLog:
                 self._shown.remove(k)
             return
         if k not in self._shown:
-            colour = BODY_COLOURS[k % len(BODY_COLOURS)]
+            colour = component_colour(k)
             self._stream.log(entity, _mesh(body_triangles(body), (*colour, 255)))
             self._shown.add(k)
         self._departed(k, entity, np.flatnonzero(~poses.inside[mine]).astype(np.int32))

@@ -48,7 +48,7 @@ from solver.observables import COMPONENT_OBSERVABLES, ComponentObservable, Obser
 from solver.observables.reading import PileReading
 
 if TYPE_CHECKING:
-    from doe.runs import Run
+    from doe.run_records import Run
 
 Array = npt.NDArray[np.float64]
 
@@ -305,8 +305,8 @@ def sweep(
     ValueError
         One line about a path, a value, an observable or the store, before anything is poured.
     """
-    from doe.runner import PourRunner
-    from doe.runs import Setting
+    from doe.pour_runner import PourRunner
+    from doe.run_records import Setting
     from solver import WorkerPool
 
     scene = load(source)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from doe.runner import PourRunner
+from doe.pour_runner import PourRunner
 from doe.store import Store, default_store
 from doe.studies.economy import ALPHA, ECONOMIES, MARGIN, POWER, EconomyTest, compare, pours_needed, rows_of
 from doe.studies.study import load_study, with_profile

@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from doe.runner import PourRunner
-from doe.runs import Run
+from doe.pour_runner import PourRunner
+from doe.run_records import Run
 from doe.stages import planned_runs
 from doe.store import Store, default_store
 from doe.studies.campaign import Campaign, PartialStages, run_campaign

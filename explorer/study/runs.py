@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from doe.runs import Run
+from doe.run_records import Run
 from doe.studies.study import Values, load_study, with_profile
 from doe.studies.study_result import AnyStudy
 from explorer.errors import CommandError

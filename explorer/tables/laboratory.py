@@ -11,9 +11,8 @@ from doe.laboratory.bias import BiasTable
 from doe.laboratory.result import CONDITIONS
 from explorer.laboratory.twin_row import CLOSES, TwinRow
 from explorer.tables.text_table import text_table
+from explorer.units import entry_unit
 
-PEOPLE = {"Pa": ("MPa", 1e-6), "rad": ("deg", 180.0 / math.pi), "m": ("mm", 1e3), "N": ("N", 1.0)}
-"""Units on the screen and the factor to them from SI."""
 PERCENT = ("moisture_wet_basis", "moisture_dry_basis")
 NORMALITY_LEVEL = 0.05
 
@@ -147,7 +146,12 @@ def _name(of: tuple[str, ...]) -> str:
 
 
 def _screen(unit: str, name: str = "") -> tuple[str, float]:
-    return ("%", 100.0) if name in PERCENT else PEOPLE.get(unit, (unit, 1.0))
+    if name in PERCENT:
+        return "%", 100.0
+    if unit == "rad":
+        return "deg", 180.0 / math.pi
+    shown = entry_unit(unit)
+    return shown.symbol or unit, 1.0 / shown.size
 
 
 def _number(value: float | None, unit: str) -> str:

@@ -31,9 +31,8 @@ from explorer.viewer.output.recording_switch import Recorder
 from explorer.viewer.panel import OFTEN, SELDOM, TABS, Now, PageContext, Panel
 from explorer.viewer.panels import PANELS
 from explorer.viewer.pour.readout import not_later
-from explorer.viewer.style import DARK, ThemeSwitch, apply_theme
 from explorer.viewer.tour import Tour
-from explorer.viewer.view import light
+from explorer.viewer.view import DARK, ThemeSwitch, apply_theme, light
 
 ACTED_WITHIN = 2.0
 """A change that comes back within this time [s] of a browser's message is taken for that browser's."""

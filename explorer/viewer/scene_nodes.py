@@ -15,7 +15,7 @@ import viser
 
 from explorer.live.frames import Frame
 from explorer.scene.meshes import GATE_NAME, PLATE_NAME, body_triangles, rig_poses, rig_triangles, rim_circles
-from explorer.viewer.style import BODY_COLOURS, GLASS, PLATE, RIM, RING, Colour, linear
+from explorer.viewer.palette import GLASS, PLATE, RIM, RING, Colour, component_colour, linear
 from solver.scenes.scene import Scene, body_counts
 
 Array = npt.NDArray[np.float64]
@@ -90,11 +90,6 @@ class SceneNodes:
         self.bodies.remove()
         for node in self._rig.values():
             node.remove()
-
-
-def component_colour(k: int) -> Colour:
-    """Colour of component ``k``."""
-    return BODY_COLOURS[k % len(BODY_COLOURS)]
 
 
 class BodyNodes:

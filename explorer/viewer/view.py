@@ -1,14 +1,24 @@
-"""Lamps and the camera that new clients start with; the same for the live page and a replay."""
+"""How the page begins: lamps, camera, dark or light, and small text in a panel; the same live and in a replay.
+
+Dark or light is set for viser's own parts, and for the charts, which follow no theme by themselves.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import viser
 
+from explorer.viewer.actions import Post
+from explorer.viewer.palette import BRAND
+
+DARK = True
+"""How the page begins."""
 VIEW_DIRECTION = (0.62, -0.75, 0.24)
 """From the pile to the camera."""
 VIEW_FIELD = 0.6
@@ -49,3 +59,33 @@ def look_at_height(server: viser.ViserServer, height: float) -> None:
     camera.position, camera.look_at = view.position, view.look_at
     camera.fov = VIEW_FIELD
     camera.near = 0.01
+
+
+def apply_theme(server: viser.ViserServer, dark: bool) -> None:
+    """Set viser's theme."""
+    server.gui.configure_theme(
+        dark_mode=dark, show_share_button=False, show_logo=False, brand_color=BRAND, control_width="large"
+    )
+
+
+class ThemeSwitch:
+    """A switch for all browsers; ``follow`` is called with True for dark."""
+
+    def __init__(self, server: viser.ViserServer, post: Post, follow: Callable[[bool], None]) -> None:
+        self._server, self._follow = server, follow
+        self._dark = server.gui.add_checkbox("Dark page", DARK, hint="Dark or light, charts included.")
+
+        @self._dark.on_update
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None:
+                post(self._switch)
+
+    def _switch(self) -> None:
+        dark = self._dark.value is True  # what a browser sent may be anything
+        apply_theme(self._server, dark)
+        self._follow(dark)
+
+
+def small_html(contents: str) -> str:
+    """``contents`` (HTML) in the size and margin of such a text; long words are broken."""
+    return f"<div style='padding:0 0.75em; font-size:0.8em; overflow-wrap:anywhere'>{contents}</div>"

@@ -53,7 +53,7 @@ def member_spheres(scene: Scene, bodies: Bodies) -> Spheres:
 def rolling_away(scene: Scene, container: Container, state: Array) -> npt.NDArray[np.bool_]:
     """Bodies that still roll outward on the plate, alone and beyond the container's radius.
 
-    The rule of ``kernels/summary.rolls_away``, for bodies that also move faster than ``numerics.rest_speed``.
+    ``rolls_away`` of ``engine/kernels/batch.py``, for bodies that also move faster than ``numerics.rest_speed``.
     ``state``: rows of ``Batch.bodies``. Nothing brakes them, so where they are is a matter of when one looks.
     """
     x, v, touching = state[:, 0:3], state[:, 7:10], state[:, 14]

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from solver.params import param
 
+REST_SPEED = 2e-3
+"""Below it [m/s] a body counts as lying still, where nothing else is asked for."""
 ROLLING_SLOPE = 0.01
 """A single body on the plate whose path is no steeper than this rolls, for ever; others tumble and come to rest."""
 
@@ -20,7 +22,7 @@ class Numerics:
     )
     skin: float = param(1.0e-3, unit="m", low=1e-5, high=2e-2, doc="Reach of the contact list beyond touching.")
     rest_speed: float = param(
-        2e-3,
+        REST_SPEED,
         unit="m/s",
         low=1e-5,
         high=0.1,
@@ -28,7 +30,7 @@ class Numerics:
     )
     rest_time: float = param(0.1, unit="s", low=0.01, high=5.0, doc="How long it has to stay that slow.")
     sleep_speed: float = param(
-        2e-3,  # as rest_speed: nothing in a pile at rest rolls on
+        REST_SPEED,  # nothing in a pile at rest rolls on
         unit="m/s",
         low=0.0,
         high=0.1,

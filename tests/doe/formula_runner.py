@@ -4,8 +4,8 @@ import hashlib
 
 import numpy as np
 
-from doe.runner import TRIES, seed_of
-from doe.runs import Run
+from doe.pour_runner import TRIES, seed_of
+from doe.run_records import Run
 from solver import OBSERVABLES
 
 

@@ -11,7 +11,7 @@ from scipy import stats
 from doe.analysis.screening import analyse_screening
 from doe.analysis.t_tests import Sample
 from doe.designs import factorial
-from doe.runs import sample_of
+from doe.run_records import sample_of
 from explorer.units import code, number, p_value, parameter_label, parameter_range, parameter_value, percent
 
 

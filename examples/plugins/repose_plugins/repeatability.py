@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from doe.errors import StudyFileError
-from doe.runs import Runner, Setting, responses
+from doe.run_records import Runner, Setting, responses
 from doe.stages.stage import Chain, FurtherResult, Stage, ended
 from doe.studies.profile import Profile
 from doe.studies.study import Study

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from doe.runs import Run, valid_values
+from doe.run_records import Run, valid_values
 from doe.stages.ascent import AscentResult
 from doe.stages.scan import ScanResult
 from doe.stages.verification import VerificationResult

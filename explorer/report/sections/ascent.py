@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from doe.runs import valid_values
+from doe.run_records import valid_values
 from doe.stages.ascent import AscentResult
 from doe.studies.study_result import StudyResult
 from explorer.report.content import Block, Bullets, Figure, Section, Table, Text

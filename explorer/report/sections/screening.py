@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from doe.analysis.screening import Adjustment, ErrorSource
-from doe.runs import sample_of
+from doe.run_records import sample_of
 from doe.stages.screening import ScreeningResult
 from doe.studies.factors import MIN_BODIES
 from doe.studies.study_result import StudyResult

@@ -10,7 +10,7 @@ import numpy as np
 from doe.analysis.canonical import Canonical
 from doe.analysis.surface import Surface
 from doe.analysis.surface_anova import SurfaceAnova
-from doe.runs import sample_of
+from doe.run_records import sample_of
 from doe.stages.surface import SurfaceResult
 from doe.studies.study import Factor
 from doe.studies.study_result import StudyResult

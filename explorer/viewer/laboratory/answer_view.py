@@ -12,7 +12,7 @@ from explorer.laboratory.command_results import CommandResult
 from explorer.viewer.actions import Post
 from explorer.viewer.output.send_file import send_file
 from explorer.viewer.study.plot_view import PlotView
-from explorer.viewer.style import small_html
+from explorer.viewer.view import small_html
 
 NO_CHARTS = "Charts come with an answer that has any."
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from html import escape
 
 from explorer.viewer.panel import LABORATORY, Now, PageContext, Panel
-from explorer.viewer.style import small_html
 from explorer.viewer.tour import Stop
+from explorer.viewer.view import small_html
 
 
 class LaboratoryPanel(Panel):

@@ -9,7 +9,7 @@ import numpy.typing as npt
 import viser
 
 from explorer.live.frames import Frame
-from explorer.viewer.look.colours import ColourQuantity, Numbered, body_colours
+from explorer.viewer.look.colour_by import ColourQuantity, Numbered, body_colours
 from explorer.viewer.look.look import Look
 from explorer.viewer.scene_nodes import BodyNodes
 from explorer.viewer.view import light

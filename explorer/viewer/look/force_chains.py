@@ -15,7 +15,7 @@ from explorer.units import checked
 from explorer.viewer.actions import Post, add_keys
 from explorer.viewer.look.look import Look
 from explorer.viewer.look.look_settings import LookSettings
-from explorer.viewer.style import CHAINS
+from explorer.viewer.palette import CHAINS
 
 Segments = npt.NDArray[np.float32]
 

@@ -13,7 +13,7 @@ from explorer.scene.meshes import scene_height
 from explorer.units import InputError
 from explorer.viewer.actions import ClientAction, Post, add_client_key, client_buttons
 from explorer.viewer.look.camera import CameraPanel, go_along
-from explorer.viewer.look.colours import QUANTITIES, ColourPanel
+from explorer.viewer.look.colour_by import QUANTITIES, ColourPanel
 from explorer.viewer.look.drawn_look import DrawnLook
 from explorer.viewer.look.force_chains import ForceChains, ForcePanel
 from explorer.viewer.look.inspector import body_html, nearest_hit

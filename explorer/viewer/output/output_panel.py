@@ -15,7 +15,7 @@ from explorer.scene.source import SceneSource, command_line
 from explorer.scene.text import material_toml
 from explorer.viewer.output.send_file import send_file
 from explorer.viewer.panel import TAKE_ALONG, Now, PageContext, Panel
-from explorer.viewer.style import small_html
+from explorer.viewer.view import small_html
 from solver.scenes.scene import Scene
 
 LARGEST_PICTURE = (1440, 2560)

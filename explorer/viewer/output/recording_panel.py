@@ -13,7 +13,7 @@ from explorer.logs.recording import recorded_lines
 from explorer.viewer.output.recording_switch import HTML, RRD, RecordingSwitch
 from explorer.viewer.output.send_file import send_file
 from explorer.viewer.panel import TAKE_ALONG, Now, PageContext, Panel
-from explorer.viewer.style import small_html
+from explorer.viewer.view import small_html
 
 MOST_SENT = 200_000_000
 """Bytes of a recording that are sent to a browser."""

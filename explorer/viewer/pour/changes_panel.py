@@ -20,7 +20,7 @@ from explorer.scene.source import Difference, differences, shown
 from explorer.session import Session
 from explorer.viewer.actions import add_keys, button_group
 from explorer.viewer.panel import POUR, Now, PageContext, Panel
-from explorer.viewer.style import small_html
+from explorer.viewer.view import small_html
 from solver.scenes.scene import Scene, parameters, values, with_values
 
 LiveValues = Mapping[str, Any]

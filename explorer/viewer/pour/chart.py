@@ -18,9 +18,7 @@ import viser
 import viser.uplot
 
 from explorer.live.messages import Event, Status
-from explorer.viewer.panel import POUR, Now, PageContext, Panel
-from explorer.viewer.pour.readout import angle_of_repose_deg
-from explorer.viewer.style import (
+from explorer.viewer.palette import (
     ANGLE_LINE,
     ANGLE_SPREAD_BAND,
     ANGLE_SPREAD_LINE,
@@ -29,6 +27,8 @@ from explorer.viewer.style import (
     MARK_LINE,
     MASS_LINE,
 )
+from explorer.viewer.panel import POUR, Now, PageContext, Panel
+from explorer.viewer.pour.readout import angle_of_repose_deg
 from solver.observables.observable import Value
 
 Array = npt.NDArray[np.float64]

@@ -22,8 +22,8 @@ from explorer.units import InputError, checked, quantity, screen_unit, title
 from explorer.viewer.actions import Post
 from explorer.viewer.panel import POUR
 from explorer.viewer.pour.rebuilt_panel import RebuiltPanel
-from explorer.viewer.style import small_html
 from explorer.viewer.tour import Stop
+from explorer.viewer.view import small_html
 from solver.effects import EFFECTS, SetUpEffect
 from solver.params import Parameter, declared
 from solver.scenes.material import Pair

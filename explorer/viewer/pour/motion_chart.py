@@ -12,9 +12,9 @@ import viser
 import viser.uplot
 
 from explorer.live.messages import SessionState, Status
+from explorer.viewer.palette import CONTACTS_LINE, ENERGY_LINE, MARK_LINE
 from explorer.viewer.panel import POUR, Now, PageContext, Panel
 from explorer.viewer.pour.chart import NO_MARKS, Marks, ThinnedCurve, axis, line, with_marks
-from explorer.viewer.style import CONTACTS_LINE, ENERGY_LINE, MARK_LINE
 
 Array = npt.NDArray[np.float64]
 

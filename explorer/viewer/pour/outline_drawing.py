@@ -14,7 +14,8 @@ import numpy.typing as npt
 import viser
 
 from explorer.files.measured_curves import MeasuredCurve
-from explorer.viewer.style import FLANK, MEASURED, Colour, css, small_html
+from explorer.viewer.palette import FLANK, MEASURED, Colour, css
+from explorer.viewer.view import small_html
 from solver.observables.repose import AZIMUTHS_DEG, FlankLine, Flanks, Outline
 
 Array = npt.NDArray[np.float64]

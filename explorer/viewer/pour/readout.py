@@ -9,11 +9,11 @@ from itertools import groupby
 
 from explorer.live.angle_reader import LEAST_SHARE_BELOW
 from explorer.live.messages import Event, SessionState, Status
+from explorer.outcomes import OUTCOME_SENTENCES, OUTCOME_WORDS, WARNINGS
 from explorer.viewer.look.look import COMPONENT
+from explorer.viewer.palette import component_colour, css
 from explorer.viewer.panel import POUR, Now, PageContext, Panel
-from explorer.viewer.scene_nodes import component_colour
-from explorer.viewer.style import css
-from solver.pours.record import Outcome, Phase
+from solver.pours.record import Phase
 from solver.scenes.scene import Scene
 
 EVENTS_SHOWN = 3
@@ -25,19 +25,6 @@ PHASE_WORDS = {
     Phase.RUN: "turning",
     Phase.AT_REST: "at rest",
 }
-OUTCOME_WORDS = {
-    Outcome.RUNNING: "still running",
-    Outcome.AT_REST: "at rest: a valid pile",
-    Outcome.MEASURED: "measured: the run lasted its time",
-    Outcome.NO_HEAP: "at rest: no heap, a flat layer or a few grains",
-    Outcome.JAMMED: "jammed: material stays in the rig",
-    Outcome.OBSTRUCTED: "obstructed: a body lies across the outlet",
-    Outcome.TIME_LIMIT: "cut off: still moving at the time limit",
-    Outcome.LOST_BODY: "lost a body through the plate",
-    Outcome.NON_FINITE: "diverged: a number is not finite",
-    Outcome.OVERLAP_LIMIT: "stopped: bodies overlap too far",
-    Outcome.BUFFER_OVERFLOW: "stopped: the contact list is full",
-}
 STATE_WORDS = {
     SessionState.STARTING: "starting",
     SessionState.RUNNING: "running",
@@ -47,16 +34,6 @@ STATE_WORDS = {
     SessionState.DIED: "solver gone",
     SessionState.CLOSED: "closed",
 }
-CONDITIONS = {
-    Outcome.AT_REST: "at rest",
-    Outcome.NO_HEAP: "no heap",
-    Outcome.JAMMED: "jammed",
-    Outcome.OBSTRUCTED: "obstructed",
-    Outcome.NON_FINITE: "unstable",
-    Outcome.OVERLAP_LIMIT: "unstable",
-}
-"""In a word or two how a pour stands, beside what the solver does."""
-WARNINGS = ("no heap", "jammed", "obstructed", "unstable")
 TROUBLE = (SessionState.FAILED, SessionState.DIED)
 
 STYLE = """<style>
@@ -123,7 +100,7 @@ def long_readings(status: Status) -> list[tuple[str, str]]:
     found = [
         ("Real-time factor", pace),
         ("Time step", "–" if starting else time_step_text(status)),
-        ("Outcome", "–" if starting else OUTCOME_WORDS[status.outcome]),
+        ("Outcome", "–" if starting else OUTCOME_SENTENCES[status.outcome]),
         ("Mass below the outlet", "–" if starting else mass),
     ]
     if status.energy_put_in is not None:
@@ -140,8 +117,8 @@ def time_step_text(status: Status) -> str:
 
 
 def condition(status: Status) -> str:
-    """How the pour stands, in a word of ``CONDITIONS``, or capped (slower than wanted), or nothing special."""
-    return CONDITIONS.get(status.outcome, "capped" if status.capped else "")
+    """How the pour stands, in a word of ``OUTCOME_WORDS``, or capped (slower than wanted), or nothing special."""
+    return OUTCOME_WORDS.get(status.outcome, "capped" if status.capped else "")
 
 
 def not_later(events: Iterable[Event], status: Status) -> list[Event]:

@@ -9,7 +9,7 @@ from explorer.files.uploads import funnel_source, shaped_source
 from explorer.scene.source import SceneSource, rig_source
 from explorer.viewer.actions import on_upload
 from explorer.viewer.panel import POUR, Now, PageContext, Panel
-from explorer.viewer.style import small_html
+from explorer.viewer.view import small_html
 from solver.assets import shipped_assets
 from solver.rigs import RIGS
 from solver.scenes.scene import Scene, check

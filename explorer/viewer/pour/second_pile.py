@@ -14,12 +14,13 @@ import numpy as np
 import viser
 
 from explorer.live.messages import SessionState, Status
+from explorer.outcomes import OUTCOME_SENTENCES
 from explorer.scene.meshes import scene_height
 from explorer.scene.source import changes
 from explorer.session import Session
 from explorer.viewer.actions import button_group
 from explorer.viewer.panel import POUR, Now, PageContext, Panel
-from explorer.viewer.pour.readout import OUTCOME_WORDS, STATE_WORDS, angle_of_repose_deg
+from explorer.viewer.pour.readout import STATE_WORDS, angle_of_repose_deg
 from explorer.viewer.scene_nodes import PLATE_RADIUS, SceneNodes
 from explorer.viewer.view import MIDDLE
 from solver.pours.record import Outcome
@@ -162,7 +163,7 @@ def step_aside(server: viser.ViserServer, scene: Scene) -> None:
 
 
 def _state(status: Status) -> str:
-    return STATE_WORDS[status.state] if status.outcome == Outcome.RUNNING else OUTCOME_WORDS[status.outcome]
+    return STATE_WORDS[status.state] if status.outcome == Outcome.RUNNING else OUTCOME_SENTENCES[status.outcome]
 
 
 def _angle(status: Status) -> str:

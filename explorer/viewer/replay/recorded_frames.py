@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from explorer.live.frames import Frame
 from explorer.logs.recording import SAME_TIME, Component, Instances, Recording, index_at
-from explorer.viewer.look.colours import ColourQuantity
+from explorer.viewer.look.colour_by import ColourQuantity
 
 Array = npt.NDArray[np.float64]
 

@@ -23,16 +23,16 @@ from explorer.logs.recording import Recording
 from explorer.units import checked
 from explorer.viewer.actions import Action, Actions, FrameClock, Post, SliderHands, add_keys, button_group
 from explorer.viewer.look.camera import CameraPanel
-from explorer.viewer.look.colours import ColourPanel
+from explorer.viewer.look.colour_by import ColourPanel
 from explorer.viewer.look.drawn_look import DrawnLook
 from explorer.viewer.look.look import in_sight
 from explorer.viewer.look.look_settings import CutPanel, LookSettings
+from explorer.viewer.palette import ANGLE_LINE, CONTACTS_LINE, ENERGY_LINE, MASS_LINE
 from explorer.viewer.pour.chart import LEAST_TOP_DEG, axis
 from explorer.viewer.pour.run_panel import FASTEST, SLOWEST
 from explorer.viewer.replay.recorded_frames import RecordedFrames, RecordedMotion
 from explorer.viewer.scene_nodes import BodyNodes, DrawnComponent, drawn, seen_through
-from explorer.viewer.style import ANGLE_LINE, CONTACTS_LINE, DARK, ENERGY_LINE, MASS_LINE, ThemeSwitch, apply_theme
-from explorer.viewer.view import light, look_at_height
+from explorer.viewer.view import DARK, ThemeSwitch, apply_theme, light, look_at_height
 
 Array = npt.NDArray[np.float64]
 

@@ -12,6 +12,7 @@ import viser
 
 from explorer.background.command_process import CommandStatus
 from explorer.background.progress import FailedRun, StageProgress, failures
+from explorer.outcomes import outcome_text
 from explorer.viewer.actions import Action, Post, button_group
 
 MARKDOWN_MARKS = re.compile(r"([\\`*_{}\[\]<>()#+!|~&])")
@@ -116,14 +117,13 @@ def failures_markdown(lost: tuple[FailedRun, ...]) -> str:
 
 
 def _outcome(one: FailedRun) -> str:
-    text = one.run.outcome.replace("_", " ")
-    return escaped(f"{text}: {one.run.message}" if one.run.message else text)
+    return escaped(outcome_text(one.run.outcome, one.run.message))
 
 
 def _next(one: FailedRun) -> str:
     if one.replaced_by is None:
         return "none"
-    return escaped(f"{one.replaced_by.seed}: {one.replaced_by.outcome.replace('_', ' ')}")
+    return escaped(f"{one.replaced_by.seed}: {outcome_text(one.replaced_by.outcome)}")
 
 
 def waiting_markdown(waiting: Sequence[str]) -> str:

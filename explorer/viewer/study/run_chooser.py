@@ -6,9 +6,10 @@ from typing import Any
 
 import viser
 
-from doe.runs import Run
+from doe.run_records import Run
 from doe.studies.study_result import AnyStudy
 from explorer.errors import CommandError
+from explorer.outcomes import outcome_text
 from explorer.session import Session
 from explorer.study.runs import scene_of, settings_of, stages_with_runs
 from explorer.units import observable_label, observed, parameter_label, parameter_value
@@ -79,7 +80,7 @@ def run_text(run: Run, observable: str) -> str:
     """One run in a line, e.g. "row 3 · 24.3° · seed 17"."""
     value = run.observables.get(observable)
     seen = observed(observable, value) if value is not None and run.valid else ""
-    return " · ".join(part for part in (run.label, seen or run.outcome.replace("_", " "), f"seed {run.seed}") if part)
+    return " · ".join(part for part in (run.label, seen or outcome_text(run.outcome), f"seed {run.seed}") if part)
 
 
 def run_markdown(result: AnyStudy, stage: str, run: Run) -> str:
@@ -90,7 +91,7 @@ def run_markdown(result: AnyStudy, stage: str, run: Run) -> str:
     more = f" and {len(parts) - CHANGES_SHOWN} more" if len(parts) > CHANGES_SHOWN else ""
     setting = f"{', '.join(parts[:CHANGES_SHOWN])}{more}" if parts else "everything at the reference values"
     seen = f"{escaped(observable_label(name))} {escaped(observed(name, run.observables.get(name)))}"
-    return f"{escaped(run.outcome.replace('_', ' '))}; {seen}. Set: {setting}."
+    return f"{escaped(outcome_text(run.outcome))}; {seen}. Set: {setting}."
 
 
 def _offer(dropdown: Any, options: tuple[str, ...]) -> None:

@@ -5,7 +5,7 @@ import dataclasses
 import pytest
 
 from doe.errors import StatisticsError
-from doe.runs import Setting
+from doe.run_records import Setting
 from doe.studies.campaign import LEAST_INTERVAL, KnownRuns, PartialStages, run_campaign
 from tests.doe.formula_runner import FormulaRunner
 from tests.explorer.reported_studies import BIAS, PROFILE, STUDY, planted

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from doe.runs import Run
+from doe.run_records import Run
 from doe.studies.economy import COMPARED, ECONOMIES, compare, judged, pours_needed, rows_of, settings_of
 from doe.studies.study import load_study
 from solver import value, with_values

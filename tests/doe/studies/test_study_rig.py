@@ -6,7 +6,7 @@ import dataclasses
 import pytest
 
 from doe.errors import StudyFileError
-from doe.runs import Run
+from doe.run_records import Run
 from doe.studies.study import study_from, with_profile
 from solver import ParameterError, pour_key, value
 from tests.doe.studies.test_study import PATH, TABLE

@@ -6,7 +6,7 @@ import signal
 
 import pytest
 
-from doe.runs import Setting
+from doe.run_records import Setting
 from explorer.background.progress import RunProgress, told_of_pauses
 from tests.doe.formula_runner import FormulaRunner
 

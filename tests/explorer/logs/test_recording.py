@@ -8,7 +8,7 @@ from explorer.logs.pour_log import PourLog
 from explorer.logs.recording import read_recording
 from explorer.scene.file import load_scene, with_settings
 from explorer.scene.meshes import body_triangles, rig_poses
-from explorer.viewer.style import BODY_COLOURS
+from explorer.viewer.palette import BODY_COLOURS
 from solver import with_values
 from solver.observables import Value
 from tests.explorer.logs.test_pour_log import QUARTER_TURN, poses

@@ -3,8 +3,8 @@
 import pytest
 from rerun.chunk import RrdReader
 
-from doe.runner import PourRunner
-from doe.runs import Setting
+from doe.pour_runner import PourRunner
+from doe.run_records import Setting
 from doe.store import Store
 from explorer.logs.pour_recorder import StudyRecorder
 from solver import load_material, with_values

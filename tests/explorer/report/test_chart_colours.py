@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from explorer.report.figures.style import ASSUMPTION, CHOSEN, DUMMY, FACTOR, TARGET
-from explorer.viewer import style
+from explorer.viewer import palette
 
 
 def written(colour):
@@ -20,11 +20,11 @@ REPORT = (FACTOR, ASSUMPTION, DUMMY, TARGET, CHOSEN)
 LIVE = tuple(
     map(
         written,
-        (style.ANGLE_LINE, style.MASS_LINE, style.ENERGY_LINE, style.CONTACTS_LINE, style.MARK_LINE),
+        (palette.ANGLE_LINE, palette.MASS_LINE, palette.ENERGY_LINE, palette.CONTACTS_LINE, palette.MARK_LINE),
     )
 )
-OUTLINES = (written(style.FLANK), written(style.MEASURED))
-BODIES = tuple(map(written, style.BODY_COLOURS))
+OUTLINES = (written(palette.FLANK), written(palette.MEASURED))
+BODIES = tuple(map(written, palette.BODY_COLOURS))
 TOGETHER = {"report": REPORT, "live charts": LIVE, "outlines": OUTLINES, "bodies": BODIES}
 """What may be seen side by side."""
 # Machado, Oliveira and Fernandes 2009, IEEE Trans. Vis. Comput. Graph. 15:1291, severity 1, on linear RGB.
@@ -85,5 +85,5 @@ def test_every_line_is_seen_on_light_and_dark(place, page):
 
 
 def test_the_spread_has_the_colour_of_its_angle():
-    spreads = (style.ANGLE_SPREAD_LINE, style.ANGLE_SPREAD_BAND)
-    assert {written(colour) for colour in spreads} == {written(style.ANGLE_LINE)}
+    spreads = (palette.ANGLE_SPREAD_LINE, palette.ANGLE_SPREAD_BAND)
+    assert {written(colour) for colour in spreads} == {written(palette.ANGLE_LINE)}

@@ -11,7 +11,7 @@ import plotly.graph_objects as go
 import pytest
 
 from doe.record import RecordError
-from doe.runs import valid_values
+from doe.run_records import valid_values
 from explorer.report import report_html, report_markdown, write_report
 from explorer.report.content import Figure, Folded, Table
 from explorer.report.html import embedded

@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from doe.runner import TRIES
+from doe.pour_runner import TRIES
 from doe.studies.study_result import OWN_STAGES
 from explorer.study import run as study_run
 from solver import asset_path

@@ -4,7 +4,7 @@ import dataclasses
 
 import pytest
 
-from doe.runs import Setting
+from doe.run_records import Setting
 from doe.studies.campaign import run_campaign
 from doe.studies.study import load_study, with_profile
 from doe.studies.study_result import PartialStudy, StudyResult

@@ -16,8 +16,8 @@ from explorer.viewer.actions import Actions
 from explorer.viewer.look.camera import DIRECTIONS, go_along, go_to, link_to, view_of
 from explorer.viewer.look.inspector import NOBODY, body_html, first_crossing, nearest_hit
 from explorer.viewer.look.look_panel import LookPanel
+from explorer.viewer.palette import SELECTED, linear
 from explorer.viewer.panel import Now
-from explorer.viewer.style import SELECTED, linear
 from explorer.viewer.view import VIEW_FIELD
 from tests.explorer.beads import RADIUS, bead_scene
 from tests.explorer.viewer.page_session import page_context

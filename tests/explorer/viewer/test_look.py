@@ -11,12 +11,12 @@ from explorer.live.details import Details
 from explorer.live.frames import Frame
 from explorer.units import InputError
 from explorer.viewer.actions import Actions
-from explorer.viewer.look.colours import QUANTITIES, ColourPanel, bar_html, body_colours, colour_range, nice_top
+from explorer.viewer.look.colour_by import QUANTITIES, ColourPanel, bar_html, body_colours, colour_range, nice_top
 from explorer.viewer.look.force_chains import ForceChains, ForcePanel, chain_segments, chain_text
 from explorer.viewer.look.look import COMPONENT, CUTS, NOTHING, Look, in_sight
 from explorer.viewer.look.look_settings import CutPanel, LookSettings
-from explorer.viewer.scene_nodes import SceneNodes, component_colour
-from explorer.viewer.style import SELECTED, VIRIDIS, linear, linear_all, mapped
+from explorer.viewer.palette import SELECTED, VIRIDIS, component_colour, linear, linear_all, mapped
+from explorer.viewer.scene_nodes import SceneNodes
 from tests.explorer.beads import bead_scene
 
 FRAME = Frame(

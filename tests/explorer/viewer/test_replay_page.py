@@ -15,8 +15,8 @@ from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.look import drawn_look
 from explorer.viewer.look.camera import view_of
 from explorer.viewer.look.look import COMPONENT
+from explorer.viewer.palette import VIRIDIS, linear, linear_all, mapped
 from explorer.viewer.replay.replay_page import ReplayPage, columns, highest, moment_html
-from explorer.viewer.style import VIRIDIS, linear, linear_all, mapped
 from tests.explorer.logs.test_pour_log import poses
 
 

@@ -19,7 +19,7 @@ from explorer.viewer.study.plot_view import NOTHING, Drawn, PlotView
 from explorer.viewer.study.process_view import stages_markdown
 from explorer.viewer.study.profiler_panel import TITLE as PROFILER
 from explorer.viewer.study.study_panel import NONE, StudyPanel
-from explorer.viewer.style import ThemeSwitch
+from explorer.viewer.view import ThemeSwitch
 from tests.explorer.viewer.page_session import page_context
 from tests.explorer.viewer.study_panel_at_hand import (
     OWN_PROFILES,

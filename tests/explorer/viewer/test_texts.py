@@ -9,9 +9,10 @@ import pytest
 from explorer.background.command_process import CommandStatus
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, SessionState, Status
+from explorer.outcomes import OUTCOME_SENTENCES
+from explorer.viewer.palette import BODY_COLOURS, linear
 from explorer.viewer.pour.chart import MOST_POINTS, PourCurves
 from explorer.viewer.pour.readout import (
-    OUTCOME_WORDS,
     PHASE_WORDS,
     STATE_WORDS,
     condition,
@@ -23,7 +24,6 @@ from explorer.viewer.pour.readout import (
 )
 from explorer.viewer.scene_nodes import component_poses
 from explorer.viewer.study.process_view import escaped, progress, time_left
-from explorer.viewer.style import BODY_COLOURS, linear
 from solver.observables.observable import Value
 from solver.pours.record import Outcome, Phase
 from tests.explorer.beads import bead_scene
@@ -97,7 +97,7 @@ def test_what_has_not_happened_yet_is_not_told():
 def test_every_state_phase_and_outcome_has_words():
     assert set(STATE_WORDS) == set(SessionState)
     assert set(PHASE_WORDS) == set(Phase)
-    assert set(OUTCOME_WORDS) == set(Outcome)
+    assert set(OUTCOME_SENTENCES) == set(Outcome)
 
 
 def test_texts_from_outside_cannot_bring_html():
@@ -123,7 +123,7 @@ def test_a_number_that_means_nothing_yet_is_not_shown():
     assert "0 µJ" in readout_html(replace(STATUS, energy_put_in=0.0), [], "")
     starting = readout_html(replace(before, state=SessionState.STARTING), [], "")
     assert "µs" not in starting
-    assert OUTCOME_WORDS[Outcome.RUNNING] not in starting
+    assert OUTCOME_SENTENCES[Outcome.RUNNING] not in starting
 
 
 def test_nothing_is_said_twice():

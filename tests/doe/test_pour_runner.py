@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from doe.runner import TRIES, PourRunner, seed_of
-from doe.runs import Run, Setting, no_pile_shares, responses
+from doe.pour_runner import TRIES, PourRunner, seed_of
+from doe.run_records import Run, Setting, no_pile_shares, responses
 from doe.store import Store, StoreError
 from solver import load_material, with_values
 from solver.observables import OBSERVABLES, Observable, Value

@@ -1,4 +1,4 @@
-"""From settings of parameters to finished runs: seeds, replicates, replacement of failed runs, and the store."""
+"""From settings of parameters to finished runs: seeds, replicates, replacement of failed runs, resume by the store."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from doe.runs import Run, Setting
+from doe.run_records import Run, Setting
 from doe.store import READINGS, RIG, Reader, Store, StoredRun, StoreError, observables_of, read_off
 from doe.studies.study import TRIES
 from solver import PHYSICS, Job, Scene, observable_names, packed, parameters, pour_key, run_queue, value, with_values
@@ -28,6 +28,7 @@ class PourObserver(Protocol):
 
 
 OnRun = Callable[[str, Run, int], None]
+
 """Called with (stage, run, replicates of this stage that are still to come)."""
 
 
@@ -38,6 +39,7 @@ def seed_of(study_seed: int, stage: str, row: int, replicate: int, attempt: int)
 
 
 Pours = Callable[[deque[Job], Sequence[Scene]], Iterable[tuple[Job, PourRecord]]]
+
 """Runs the jobs of a queue, to which more may be added meanwhile, with room for the scenes named."""
 
 

@@ -16,17 +16,24 @@ from explorer.units import checked
 from explorer.viewer.actions import Post, add_keys
 from explorer.viewer.look.look import COMPONENT, Look
 from explorer.viewer.look.look_settings import LookSettings, one_of
-from explorer.viewer.style import SELECTED, VIRIDIS, css, linear, linear_all, mapped
+from explorer.viewer.palette import SELECTED, VIRIDIS, css, linear, linear_all, mapped
 
 Array = npt.NDArray[np.float64]
 
 TOP_PERCENTILE = 99.0
+
 """An automatic range reaches to here: a single fast body must not make all others look the same."""
+
 NICE = (1.0, 2.0, 5.0, 10.0)
+
 COLOUR_KEY, NEXT_COLOUR = "C", "Colour by the next quantity"
+
 LARGEST = 1e6
+
 """Largest end of a fixed range of colours, in the unit of the screen."""
+
 STEP = 1e-3
+
 """Step of these ends; viser rounds what a box shows to this, and by itself to whole numbers."""
 
 
@@ -72,6 +79,7 @@ QUANTITIES: Mapping[str, ColourQuantity] = {
     ),
     "residence time": ColourQuantity("s", 1.0, _residence, "time since a body entered"),
 }
+
 """Of a live pour."""
 
 

@@ -1,22 +1,15 @@
-"""How the page looks: its colours, dark or light, and small text below a control, in line with its label.
+"""Colours of the page: of components, of lines, of charts.
 
-Colours of bodies and of lines begin with Okabe & Ito (2008). Their seven are nearer to each other than one would like
+Those of bodies and of lines begin with Okabe & Ito (2008). Their seven are nearer to each other than one would like
 (two of them 16 in CIELAB for tritanopes), and two are too pale for lines on white. They are moved as little as it
 takes: any two are told apart with every common form of colour blindness, and lines are seen on a light and on a dark
-page (a test holds both). Dark or light is set for viser's own parts, and for the charts, which follow no theme by
-themselves.
+page (a test holds both).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
-import viser
-
-from explorer.viewer.actions import Post
 
 Colour = tuple[int, int, int]
 
@@ -31,10 +24,15 @@ BODY_COLOURS: tuple[Colour, ...] = (
 )
 
 GLASS: Colour = (190, 210, 225)
+
 RIM: Colour = (150, 170, 185)
+
 PLATE: Colour = (74, 82, 92)
+
 RING: Colour = (110, 122, 135)
+
 BRAND: Colour = (86, 150, 200)
+
 VIRIDIS: tuple[Colour, ...] = (
     (68, 1, 84),
     (72, 40, 120),
@@ -47,24 +45,47 @@ VIRIDIS: tuple[Colour, ...] = (
     (181, 222, 43),
     (253, 231, 37),
 )
+
 """Ten even steps of viridis (van der Walt & Smith 2015): its lightness alone tells the order."""
+
 SELECTED: Colour = (255, 255, 255)
+
 CHAINS: tuple[Colour, ...] = ((150, 190, 230), (240, 228, 66), (213, 94, 0))
+
 """Lines of weak, middling and strong contacts; their thickness tells them apart as well."""
+
 SRGB_GAMMA = 2.2
+
 FLANK: Colour = (220, 140, 2)
+
 MEASURED: Colour = (182, 119, 160)
+
 ANGLE_LINE = "rgb(220, 140, 2)"
+
 ANGLE_SPREAD_LINE = "rgba(220, 140, 2, 0.45)"
+
 ANGLE_SPREAD_BAND = "rgba(220, 140, 2, 0.18)"
+
 MASS_LINE = "rgb(46, 166, 234)"
+
 ENERGY_LINE = "rgb(182, 119, 160)"
+
 CONTACTS_LINE = "rgb(3, 120, 79)"
+
 MARK_LINE = "rgb(178, 66, 0)"
+
 AXIS_TEXT = "#9aa4ae"
+
 GRID_LINE = "rgba(160, 170, 180, 0.15)"
+
 DARK = True
+
 """How the page begins."""
+
+
+def component_colour(k: int) -> Colour:
+    """Colour of component ``k`` of a mixture."""
+    return BODY_COLOURS[k % len(BODY_COLOURS)]
 
 
 def linear(colour: Colour) -> Colour:
@@ -88,33 +109,3 @@ def mapped(share: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
     stops = np.linspace(0.0, 1.0, len(VIRIDIS))
     channels = np.array(VIRIDIS, dtype=float).T
     return np.column_stack([np.interp(share, stops, channel) for channel in channels])
-
-
-def small_html(contents: str) -> str:
-    """``contents`` (HTML) in the size and margin of such a text; long words are broken."""
-    return f"<div style='padding:0 0.75em; font-size:0.8em; overflow-wrap:anywhere'>{contents}</div>"
-
-
-def apply_theme(server: viser.ViserServer, dark: bool) -> None:
-    """Set viser's theme."""
-    server.gui.configure_theme(
-        dark_mode=dark, show_share_button=False, show_logo=False, brand_color=BRAND, control_width="large"
-    )
-
-
-class ThemeSwitch:
-    """A switch for all browsers; ``follow`` is called with True for dark."""
-
-    def __init__(self, server: viser.ViserServer, post: Post, follow: Callable[[bool], None]) -> None:
-        self._server, self._follow = server, follow
-        self._dark = server.gui.add_checkbox("Dark page", DARK, hint="Dark or light, charts included.")
-
-        @self._dark.on_update
-        def _(event: viser.GuiEvent[Any]) -> None:
-            if event.client_id is not None:
-                post(self._switch)
-
-    def _switch(self) -> None:
-        dark = self._dark.value is True  # what a browser sent may be anything
-        apply_theme(self._server, dark)
-        self._follow(dark)
