@@ -63,7 +63,8 @@ def simulate(
     from time import perf_counter
 
     from explorer.errors import CommandError
-    from explorer.files.run_folder import CheckpointWriter, appearing, json_text, write_run
+    from explorer.files.checkpoint_writer import CheckpointWriter
+    from explorer.files.run_folder import appearing, json_text, write_run
     from explorer.files.run_result import result_of
     from explorer.scene.file import load_scene, with_settings
     from explorer.tables.pours import RunTable, bench_data, bench_text, write_bench

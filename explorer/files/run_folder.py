@@ -1,11 +1,9 @@
-"""What a simulation leaves behind: a folder that is there complete or not at all, and a checkpoint to go on from.
+"""The folder that a simulation leaves behind. It appears at once and complete, or not at all.
 
 result.json            as in `explorer.files.run_result`
 parameters.toml        every parameter, SI
 trace_<seed>.csv       curves over time
 pile_<seed>.npz        xyz (n, 3) [m], radius (n,) [m], body (n,): the spheres on the plate
-
-The checkpoint is a file of its own: a pour's newest state, so that a run that is cut off can be gone on with.
 """
 
 from __future__ import annotations
@@ -23,10 +21,7 @@ from typing import Any
 import numpy as np
 
 from explorer.errors import CommandError
-from explorer.files.output_file import write_whole_bytes
 from solver import Record
-from solver.pours.checkpoint import checkpoint_bytes, checkpoint_of
-from solver.pours.pour import Pour
 
 TRACE_COLUMNS = {
     "time_s": "time",
@@ -113,17 +108,3 @@ def parameters_text(values: dict[str, dict[str, Any]]) -> str:
         unit = "" if entry["unit"] == "1" else f"   # [{entry['unit']}]"
         lines.append(f"{json.dumps(path)} = {json.dumps(entry['value'])}{unit}")
     return "\n".join(lines) + "\n"
-
-
-class CheckpointWriter:
-    """Writes ``path`` at every ``interval`` [s] of simulated time; the file is always a whole one."""
-
-    def __init__(self, path: Path, interval: float) -> None:
-        self._path, self._interval = path, interval
-        self._written = 0.0
-
-    def sample(self, _: int, pour: Pour) -> None:
-        """To be called at the moments of decision of a pour."""
-        if pour.time >= self._written + self._interval:
-            self._written = pour.time
-            write_whole_bytes(self._path, checkpoint_bytes(checkpoint_of(pour)))
