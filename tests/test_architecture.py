@@ -387,6 +387,19 @@ def test_a_piece_of_a_neighbour_is_found_and_a_plug_in_is_not():
     assert pieces_of_a_neighbour(sources) == ["doe/fit_text.py: a piece of doe/fit.py"]
 
 
+def test_text_names_only_files_that_there_are():
+    """A document or docstring that names a file of the packages, by its name or its path from any folder."""
+    paths = [
+        path.relative_to(ROOT).as_posix() for folder in (*PACKAGES, "tests") for path in (ROOT / folder).rglob("*.py")
+    ]
+    ends = {"/".join(parts[k:]) for path in paths for parts in [path.split("/")] for k in range(len(parts))}
+    documents = [*ROOT.glob("*.md"), *(path for f in (*PACKAGES, "docs") for path in (ROOT / f).rglob("*.md"))]
+    texts = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in documents}
+    texts |= {source.path: source.text for source in repository_sources(*PACKAGES)}
+    named = {(path, name) for path, text in texts.items() for name in re.findall(r"(?<![\w/.*}])[\w/]+\.py\b", text)}
+    assert sorted((path, name) for path, name in named if name not in ends | {"solver.py"}) == []
+
+
 def test_tests_start_taichi_only_through_the_backend():
     sources = repository_sources("tests")
     assert [line for source in sources for line in only_the_backend_starts_taichi(source)] == []
