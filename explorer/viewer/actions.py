@@ -30,8 +30,12 @@ ClientAction = Callable[[Any], None]
 """Something that is done to one browser."""
 Found = TypeVar("Found")
 
-ARROW_WAIT = 0.2
-"""How long an arrow key waits [s], and how near to it in time a slider's new value is the slider's own answer."""
+ARROW_WAIT, AT_A_SLIDER_WAIT = 0.2, 0.6
+"""How long an arrow key waits [s], and how near to it in time a slider's new value is the slider's own answer: usually,
+and where a slider was moved not long before, whose thumb then probably still has the keys. A browser that draws without
+a graphics card may take half a second to tell its value."""
+AT_A_SLIDER = 60.0
+"""Time [s] that counts as not long before."""
 
 
 class Actions:
@@ -133,12 +137,13 @@ class SliderHands:
 
         def later(action: Action) -> None:
             pressed = time.monotonic()
+            wait = AT_A_SLIDER_WAIT if pressed - self._moved < AT_A_SLIDER else ARROW_WAIT
 
             def decide() -> None:
-                if abs(self._moved - pressed) > ARROW_WAIT:
+                if not -ARROW_WAIT <= self._moved - pressed <= wait:
                     post(action)
 
-            timer = threading.Timer(ARROW_WAIT, decide)
+            timer = threading.Timer(wait, decide)
             timer.daemon = True
             timer.start()
 
