@@ -28,7 +28,6 @@ class PourObserver(Protocol):
 
 
 OnRun = Callable[[str, Run, int], None]
-
 """Called with (stage, run, replicates of this stage that are still to come)."""
 
 
@@ -39,7 +38,6 @@ def seed_of(study_seed: int, stage: str, row: int, replicate: int, attempt: int)
 
 
 Pours = Callable[[deque[Job], Sequence[Scene]], Iterable[tuple[Job, PourRecord]]]
-
 """Runs the jobs of a queue, to which more may be added meanwhile, with room for the scenes named."""
 
 

@@ -45,13 +45,11 @@ VIRIDIS: tuple[Colour, ...] = (
     (181, 222, 43),
     (253, 231, 37),
 )
-
 """Ten even steps of viridis (van der Walt & Smith 2015): its lightness alone tells the order."""
 
 SELECTED: Colour = (255, 255, 255)
 
 CHAINS: tuple[Colour, ...] = ((150, 190, 230), (240, 228, 66), (213, 94, 0))
-
 """Lines of weak, middling and strong contacts; their thickness tells them apart as well."""
 
 SRGB_GAMMA = 2.2
@@ -79,7 +77,6 @@ AXIS_TEXT = "#9aa4ae"
 GRID_LINE = "rgba(160, 170, 180, 0.15)"
 
 DARK = True
-
 """How the page begins."""
 
 

@@ -21,7 +21,6 @@ from explorer.viewer.palette import SELECTED, VIRIDIS, css, linear, linear_all, 
 Array = npt.NDArray[np.float64]
 
 TOP_PERCENTILE = 99.0
-
 """An automatic range reaches to here: a single fast body must not make all others look the same."""
 
 NICE = (1.0, 2.0, 5.0, 10.0)
@@ -29,11 +28,9 @@ NICE = (1.0, 2.0, 5.0, 10.0)
 COLOUR_KEY, NEXT_COLOUR = "C", "Colour by the next quantity"
 
 LARGEST = 1e6
-
 """Largest end of a fixed range of colours, in the unit of the screen."""
 
 STEP = 1e-3
-
 """Step of these ends; viser rounds what a box shows to this, and by itself to whole numbers."""
 
 
@@ -79,7 +76,6 @@ QUANTITIES: Mapping[str, ColourQuantity] = {
     ),
     "residence time": ColourQuantity("s", 1.0, _residence, "time since a body entered"),
 }
-
 """Of a live pour."""
 
 
