@@ -89,7 +89,7 @@ def replay(
         PortError: the port is busy or the host is not of this machine.
     """
     # Imported here: rerun takes a second to load, and a live page needs none of it.
-    from explorer.logs.recording import read_recording
+    from explorer.logs.recording_reader import read_recording
     from explorer.viewer.replay.replay_page import ReplayPage
 
     read = read_recording(recording)

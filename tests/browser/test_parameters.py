@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from explorer.logs.recording import read_recording
+from explorer.logs.recording_reader import read_recording
 from tests.browser import test_page as shared
 from tests.browser.test_page import SMALL_POUR, positions, simulated_time, slider, state, wait_for
 

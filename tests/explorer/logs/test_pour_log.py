@@ -15,7 +15,8 @@ from explorer.live.frames import Frame
 from explorer.live.messages import SessionState, Status
 from explorer.logs.pour_log import PourLog
 from explorer.logs.pour_recorder import recorder_of
-from explorer.logs.recording import RecordedPour, read_recording, recorded_lines
+from explorer.logs.recording import RecordedPour, recorded_lines
+from explorer.logs.recording_reader import read_recording
 from explorer.logs.session_recorder import SessionRecorder
 from explorer.scene.file import load_scene, with_settings
 from explorer.scene.meshes import rig_poses

@@ -5,7 +5,7 @@ import pytest
 
 from explorer.errors import CommandError
 from explorer.logs.pour_log import PourLog
-from explorer.logs.recording import read_recording
+from explorer.logs.recording_reader import read_recording
 from explorer.scene.file import load_scene, with_settings
 from explorer.scene.meshes import body_triangles, rig_poses
 from explorer.viewer.palette import BODY_COLOURS

@@ -10,7 +10,8 @@ import pytest
 
 from explorer.errors import CommandError
 from explorer.live.messages import SessionState
-from explorer.logs.recording import RecordedPour, read_recording
+from explorer.logs.recording import RecordedPour
+from explorer.logs.recording_reader import read_recording
 from explorer.scene.file import load_scene
 from explorer.scene.source import SceneSource, material_source
 from explorer.viewer.actions import Actions

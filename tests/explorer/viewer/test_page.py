@@ -9,7 +9,7 @@ import viser
 
 from explorer.diagnosis.process import DiagnoseProcess
 from explorer.live.messages import Event, SessionState, Status
-from explorer.logs.recording import read_recording
+from explorer.logs.recording_reader import read_recording
 from explorer.scene.source import material_source, rig_source
 from explorer.viewer.app import serve
 from explorer.viewer.guarded_server import guarded_server

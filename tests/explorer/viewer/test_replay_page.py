@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from explorer.logs.pour_log import PourLog
-from explorer.logs.recording import read_recording
+from explorer.logs.recording_reader import read_recording
 from explorer.scene.file import load_scene
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.look import drawn_look
