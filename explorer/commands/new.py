@@ -1,4 +1,4 @@
-"""``explorer new``: start a material or a study of one's own."""
+"""``explorer new``: start a material, a study or a project of one's own."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ class StarterKind(StrEnum):
 
     MATERIAL = "material"
     STUDY = "study"
+    PROJECT = "project"
 
 
 def new(
     kind: StarterKind = typer.Argument(help="What to start."),
-    name: str = typer.Argument(metavar="NAME", help="Its name: letters, digits, - and _."),
+    name: str = typer.Argument(metavar="NAME", help="Its name: letters, digits, - and _; of a project, a folder."),
     out: Path = typer.Option(Path(), help="Folder to write into."),
     material: str | None = typer.Option(
         None,
@@ -31,7 +32,8 @@ def new(
     """Write a commented file that runs as it is.
 
     NAME.toml for a material, NAME_study.toml for a study (and NAME.toml beside it, where that is missing; a NAME
-    that ends in _study means the same). Files that are there are never overwritten.
+    that ends in _study means the same); for a project, a folder NAME with both and project.toml. Files that are there
+    are never overwritten.
     """
     import shlex
 
@@ -39,13 +41,17 @@ def new(
     from explorer.scene.starter_files import STUDY_ENDING, write_material, write_study
 
     if kind == StarterKind.MATERIAL and material is not None:
-        raise CommandError("--material: belongs to `new study`")
-    if kind == StarterKind.STUDY and (like is not None or part):
+        raise CommandError("--material: belongs to `new study` and `new project`")
+    if kind != StarterKind.MATERIAL and (like is not None or part):
         raise CommandError("--like, --part: belong to `new material`")
     if like is not None or part:
         from explorer.laboratory.part import write_measured_material
 
         written = [write_measured_material(out, name, like, part)]
+    elif kind == StarterKind.PROJECT:
+        from explorer.project.project import new_project
+
+        written = new_project(out / name, material)
     else:
         written = [write_material(out, name)] if kind == StarterKind.MATERIAL else write_study(out, name, material)
     for path in written:
@@ -55,4 +61,6 @@ def new(
     if kind == StarterKind.STUDY:
         results = Path("results") / written[-1].stem.removesuffix(STUDY_ENDING)
         command = ["calibrate", "--headless", "--study", file, "--profile", "quick", "--out", str(results)]
+    if kind == StarterKind.PROJECT:
+        command = ["serve", str(out / name)]
     typer.echo(f"try it: explorer {shlex.join(command)}")

@@ -8,10 +8,11 @@ import typer
 
 
 def serve(
+    project: Path | None = typer.Argument(None, help="Folder of a project, as `explorer new project` makes it."),
     port: int = typer.Option(8080, min=0, max=65535, help="Port of the page; 0 takes a free one."),
     host: str = typer.Option("127.0.0.1", help="Address to listen on."),
     study: str | None = typer.Option(None, help="Study for the page's calibration: file or shipped name."),
-    material: str | None = typer.Option(None, help="Material to pour, without a calibration: file or shipped name."),
+    material: str | None = typer.Option(None, help="Material to pour and calibrate: file or shipped name."),
     set_: list[str] = typer.Option([], "--set", metavar="PATH=VALUE", help="Set a parameter; may be repeated."),
     seed: int = typer.Option(1, min=0, help="Seed of the first pour."),
     store: Path | None = typer.Option(None, help="SQLite file that keeps the runs of the page's calibration."),
@@ -24,24 +25,25 @@ def serve(
 ) -> None:
     """Open the page: watch a pour, turn its parameters, calibrate; or play a recording."""
     from explorer.errors import CommandError
-    from explorer.scene.file import (
-        DEFAULT_MATERIAL,
-        DEFAULT_STUDY,
-        study_path,
-        with_settings,
-    )
-    from explorer.scene.source import material_source, study_source
+    from explorer.project.project import load_project, material_project, study_project
+    from explorer.scene.file import DEFAULT_STUDY, with_settings
     from explorer.viewer.app import replay as replay_page
     from explorer.viewer.app import serve as serve_page
 
-    if replay and (study or material or set_ or record):
+    if replay and (project or study or material or set_ or record):
         raise CommandError(f"--replay {replay}: a recording has its own material and parameters; leave the others out")
     if replay:
         replay_page(replay, host=host, port=port)
         return
     if study and material:
         raise CommandError(f"--material {material}: the study {study} has a material of its own; name one of the two")
-    file = None if material else study_path(study or DEFAULT_STUDY)
-    source = study_source(file) if file else material_source(material or DEFAULT_MATERIAL)
-    scene = with_settings(source.scene, set_)
-    serve_page(scene, host=host, port=port, seed=seed, study_file=file, store=store, record_path=record, source=source)
+    if project and (study or material):
+        raise CommandError(f"{project}: a project names its study and material itself; leave --study, --material out")
+    if project:
+        opened = load_project(project)
+    elif material:
+        opened = material_project(material)
+    else:
+        opened = study_project(study or DEFAULT_STUDY)
+    scene = with_settings(opened.source.scene, set_)
+    serve_page(opened, scene, host=host, port=port, seed=seed, store=store, record_path=record)

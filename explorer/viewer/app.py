@@ -11,13 +11,14 @@ from types import FrameType
 
 from explorer.diagnosis.process import DiagnoseProcess
 from explorer.logs.recording import recorded_lines
-from explorer.scene.presets import data_folder
-from explorer.scene.source import SceneSource
+from explorer.project.project import Project
 from explorer.session import Session
 from explorer.study.process import CalibrationProcess
 from explorer.viewer.guarded_server import address, guarded_server
 from explorer.viewer.output.recording_switch import session_recorder
 from explorer.viewer.page import Page
+from explorer.viewer.shell.channel import ShellChannel
+from explorer.viewer.shell.web_pages import WebPages
 from solver.scenes.scene import Scene
 
 LABEL = "Granular material explorer"
@@ -29,29 +30,27 @@ def print_address(url: str) -> None:
 
 
 def serve(
+    project: Project,
     scene: Scene,
     *,
     host: str = "127.0.0.1",
     port: int = 8080,
     seed: int = 1,
-    study_file: Path | None = None,
     store: Path | None = None,
     record_path: Path | None = None,
-    source: SceneSource | None = None,
     ready: Callable[[str], None] = print_address,
 ) -> None:
     """Serve the page of a live pour of ``scene``; blocks until SIGINT or SIGTERM (main thread only).
 
     Args:
+        project: what the page works on.
         scene: what is poured first.
         host: address to listen on.
         port: port to listen on; 0 takes a free one.
         seed: seed of the first pour.
-        study_file: the study that the page can run, None for a page without.
         store: file of the runs of study and diagnosis; None for the default store.
         record_path: new file (``.rrd``) that the session is recorded into; a restart begins another beside
             it. All of them are named on the terminal at the end.
-        source: where ``scene`` came from, for the command line that repeats it.
         ready: called with the address once the page can be opened.
 
     Raises:
@@ -65,16 +64,17 @@ def serve(
         if recorder:
             ending.callback(lambda: print("\n".join(recorded_lines(recorder.pours)), flush=True))
             ending.enter_context(closing(recorder))
-        server = guarded_server(host, port, LABEL)
+        pages, channel = WebPages(f"{project.title} · {LABEL}"), ShellChannel()
+        server = guarded_server(host, port, LABEL, pages, channel)
         ending.callback(server.stop)
-        study = _study(study_file, store)
-        if study is not None:
-            ending.callback(study.close)
-        diagnosis = DiagnoseProcess(diagnoses_folder(), store)
+        study = CalibrationProcess(project.study, project.studies, store)
+        ending.callback(study.close)
+        diagnosis = DiagnoseProcess(project.diagnoses, store)
         ending.callback(diagnosis.close)
         session = ending.enter_context(closing(Session()))
-        session.start(scene, seed, source)
-        page = ending.enter_context(closing(Page(server, session, study, diagnosis, recorder)))
+        session.start(scene, seed, project.source)
+        page = Page(server, session, project, study, diagnosis, channel, pages, recorder)
+        ending.enter_context(closing(page))
         ready(f"http://{address(host)}:{server.get_port()}")
         page.run(stop)
 
@@ -99,20 +99,6 @@ def replay(
         page = ReplayPage(server, read, recording.name)
         ready(f"http://{address(host)}:{server.get_port()}")
         page.run(stop)
-
-
-def _study(file: Path | None, store: Path | None) -> CalibrationProcess | None:
-    return None if file is None else CalibrationProcess(file, studies_folder(), store)
-
-
-def studies_folder() -> Path:
-    """Where studies that the page starts put their results."""
-    return data_folder() / "studies"
-
-
-def diagnoses_folder() -> Path:
-    """Where diagnoses that the page starts put their results."""
-    return data_folder() / "diagnoses"
 
 
 @contextmanager

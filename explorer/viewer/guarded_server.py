@@ -21,6 +21,8 @@ import websockets.asyncio.server
 from viser import _messages
 
 from explorer.errors import CommandError
+from explorer.viewer.shell.channel import PATH, ShellChannel
+from explorer.viewer.shell.web_pages import WebPages
 
 LOCAL_NAMES = ("127.0.0.1", "localhost", "[::1]")
 ANY_ADDRESS = ("0.0.0.0", "::", "")
@@ -32,9 +34,13 @@ class PortError(CommandError):
     """A host or port that the server cannot listen on; one line, fit for a user."""
 
 
-def guarded_server(host: str, port: int, label: str) -> viser.ViserServer:
+def guarded_server(
+    host: str, port: int, label: str, pages: WebPages | None = None, channel: ShellChannel | None = None
+) -> viser.ViserServer:
     """Server on ``host`` and ``port`` (0: a free one) that accepts pages which it served itself, and no
     other.
+
+    ``pages`` are served beside viser's, ``channel`` talks to what stands around its page; both under the same rules.
 
     Raises PortError for a port that is busy or not allowed, and for a host that is not of this machine.
     """
@@ -44,8 +50,12 @@ def guarded_server(host: str, port: int, label: str) -> viser.ViserServer:
     real_serve = websockets.asyncio.server.serve
 
     def serve(handler: Any, serve_host: str, serve_port: int, **options: Any) -> Any:
-        options["process_request"] = _for_hosts(hosts, options["process_request"])
-        return real_serve(handler, serve_host, serve_port, origins=origins, **options)
+        async def either(connection: Any) -> None:
+            ours = channel is not None and connection.request.path == PATH
+            await (channel.handle if ours and channel is not None else handler)(connection)
+
+        options["process_request"] = _for_hosts(hosts, pages, options["process_request"])
+        return real_serve(either, serve_host, serve_port, origins=origins, **options)
 
     websockets.asyncio.server.serve = serve  # type: ignore[assignment, misc]
     try:
@@ -83,14 +93,16 @@ def address(host: str) -> str:
     return f"[{host}]" if ":" in host else host
 
 
-def _for_hosts(hosts: Sequence[str], answer: Any) -> Any:
-    """``answer`` (viser's, to an HTTP request or the opening of a WebSocket) for ``hosts``; 421 for others."""
+def _for_hosts(hosts: Sequence[str], pages: WebPages | None, answer: Any) -> Any:
+    """The answer of ``pages``, or viser's ``answer`` (to an HTTP request or the opening of a WebSocket), for ``hosts``;
+    421 for others."""
 
     def process_request(connection: Any, request: Any) -> Any:
         named = [name.lower() for name in request.headers.get_all("Host")]
         if len(named) != 1 or named[0] not in hosts:
             return connection.respond(HTTPStatus.MISDIRECTED_REQUEST, "This server has another name.\n")
-        return answer(connection, request)
+        own = None if pages is None else pages.answer(request)
+        return answer(connection, request) if own is None else own
 
     return process_request
 

@@ -23,16 +23,19 @@ from viser import _messages
 from explorer.background.command_process import CommandStatus
 from explorer.diagnosis.process import DiagnosisProcess
 from explorer.live.messages import Event, Status
+from explorer.project.project import Project
 from explorer.scene.presets import data_folder
 from explorer.session import Session
 from explorer.study.process import StudyProcess
 from explorer.viewer.actions import Actions, FrameClock
 from explorer.viewer.output.recording_switch import Recorder
-from explorer.viewer.panel import OFTEN, SELDOM, TABS, Now, PageContext, Panel
+from explorer.viewer.panel import OFTEN, SELDOM, TABS, Now, PageContext, Panel, Place
 from explorer.viewer.panels import PANELS
 from explorer.viewer.pour.readout import not_later
+from explorer.viewer.shell.channel import ShellChannel
+from explorer.viewer.shell.web_pages import WebPages
 from explorer.viewer.tour import Tour
-from explorer.viewer.view import DARK, ThemeSwitch, apply_theme, light
+from explorer.viewer.view import DARK, apply_theme, light
 
 ACTED_WITHIN = 2.0
 """A change that comes back within this time [s] of a browser's message is taken for that browser's."""
@@ -41,6 +44,8 @@ ACTS = (_messages.GuiUpdateMessage, _messages.CommandTriggerMessage)
 ASKED_FOR = ("running", "paused", "cancelled")
 """States of a command that somebody's hand brings about; it ends in the others by itself."""
 EVENTS_REMEMBERED = 1000
+CONTROLS_WIDTH, STUDY_WIDTH = 320, 560
+"""Of the panels right and left of the scene [px]; a browser may draw them wider."""
 FRAME_INTERVAL = 1.0 / 36.0
 """Seconds between two looks at the newest frame: 30 a second are promised, and some come late or bring nothing new."""
 
@@ -52,41 +57,56 @@ class Page:
         self,
         server: viser.ViserServer,
         session: Session,
-        study: StudyProcess | None,
+        project: Project,
+        study: StudyProcess,
         diagnosis: DiagnosisProcess,
+        channel: ShellChannel,
+        pages: WebPages,
         recorder: Recorder | None = None,
     ) -> None:
         self._server, self._session, self._recorder = server, session, recorder
         self._events: deque[Event] = deque(maxlen=EVENTS_REMEMBERED)
         self._actions, self._people = Actions(), People(server)
-        self._orders = OrderEvents({"diagnosis": diagnosis} | ({} if study is None else {"study": study}))
+        self._orders = OrderEvents({"diagnosis": diagnosis, "study": study})
         self._notice, self._time = "", session.status().time
         light(server)
-        apply_theme(server, DARK)
-        server.gui.main_panel.dock_right()
-        Tour(server, [kind.stop for kind in PANELS.values() if kind.stop is not None])
         bar = server.gui.add_html("", visible=False)
         post = self._actions.post
-        self._context = PageContext(server, session, post, study, diagnosis, data_folder(), bar)
+        self._channel = channel
+        self._context = PageContext(
+            server, session, post, study, diagnosis, data_folder(), bar, project, channel, pages
+        )
         self.panels = {panel.name: panel for panel in self._made()}
         """By name, in their order on the page."""
         self._due = dict.fromkeys((OFTEN, SELDOM, *(panel.every for panel in self.panels.values())), 0.0)
-        ThemeSwitch(server, post, self._follow_theme)
+        Tour(server, [kind.stop for kind in PANELS.values() if kind.stop is not None])
+        channel.offer("theme", lambda _: post(self._switch_theme))
+        self._dark = not DARK
+        self._switch_theme()
 
     def _made(self) -> Iterator[Panel]:
         """Make the panels that this page has, each in its place."""
         gui, kinds = self._server.gui, [kind for kind in PANELS.values() if kind.offered(self._context)]
-        group = gui.add_tab_group()
+        controls, study = gui.add_tab_group(), gui.add_panel()
+        gui.main_panel.dock_right()
+        gui.main_panel.set_width(CONTROLS_WIDTH)
+        study.dock_left()
+        study.set_width(STUDY_WIDTH)
+        study.minimize()
         for tab in dict.fromkeys((*TABS, *(kind.tab for kind in kinds))):
             mine = [kind for kind in kinds if kind.tab == tab]
-            with group.add_tab(tab.name, tab.icon) if mine else nullcontext():
+            place = {Place.CONTROLS: controls, Place.STUDY: study}.get(tab.place)
+            with place.add_tab(tab.name) if place is not None and mine else nullcontext():
                 for kind in mine:
                     with gui.add_folder(kind.title, expand_by_default=not kind.folded) if kind.title else nullcontext():
                         yield kind(self._context)
 
-    def _follow_theme(self, dark: bool) -> None:
+    def _switch_theme(self) -> None:
+        self._dark = not self._dark
+        apply_theme(self._server, self._dark)
+        self._channel.tell("theme", {"dark": self._dark})
         for panel in self.panels.values():
-            panel.set_dark(dark)
+            panel.set_dark(self._dark)
 
     def close(self) -> None:
         """End what panels have started: a second pour, and a recording, with its file whole."""

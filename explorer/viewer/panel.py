@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum, auto
 from functools import cached_property
 from pathlib import Path
 
@@ -15,32 +16,48 @@ import viser
 from explorer.diagnosis.process import DiagnosisProcess
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, Status
+from explorer.project.project import Project
+from explorer.project.steps import Room
 from explorer.session import Session
 from explorer.study.process import StudyProcess
 from explorer.viewer.actions import BackgroundWork, Post
 from explorer.viewer.look.look_settings import LookSettings
 from explorer.viewer.output.recording_switch import RecordingSwitch
+from explorer.viewer.shell.channel import ShellChannel
+from explorer.viewer.shell.web_pages import WebPages
 from explorer.viewer.tour import Stop
 
 OFTEN, SELDOM = 0.2, 0.5
 """Seconds between two looks of a panel: at the pour, and at what runs in the background."""
 
 
+class Place(Enum):
+    """Where a tab stands on the page."""
+
+    CONTROLS = auto()
+    """Right of the scene, narrow: what acts on the pour and on how it is drawn."""
+    STUDY = auto()
+    """Left of the scene, wide, folded away at first: measurement, studies, reports."""
+    AROUND = auto()
+    """No tab: the state line above the page and the timeline below it."""
+
+
 @dataclass(frozen=True)
 class Tab:
-    """A tab of the page; those of the same name and icon are one."""
+    """A tab of the page; those of the same name and place are one."""
 
     name: str
-    icon: viser.IconName
+    place: Place = Place.STUDY
 
 
-POUR = Tab("Pour", viser.Icon.PLAYER_PLAY)
-LOOK = Tab("Look", viser.Icon.EYE)
-TAKE_ALONG = Tab("Take along", viser.Icon.DOWNLOAD)
-CALIBRATE = Tab("Calibrate", viser.Icon.TARGET)
-DIAGNOSE = Tab("Diagnose", viser.Icon.STETHOSCOPE)
-LABORATORY = Tab("Laboratory", viser.Icon.FLASK)
-TABS = (POUR, LOOK, TAKE_ALONG, CALIBRATE, DIAGNOSE, LABORATORY)
+AROUND = Tab("", Place.AROUND)
+CONTROLS, SET_UP, LOOK, EXPORT = (
+    Tab(room, Place.CONTROLS) for room in (Room.CONTROLS, Room.SET_UP, Room.LOOK, Room.EXPORT)
+)
+POUR, CALIBRATE, DIAGNOSE, LABORATORY, REPORTS = (
+    Tab(room) for room in (Room.POUR, Room.CALIBRATE, Room.DIAGNOSE, Room.LABORATORY, Room.REPORTS)
+)
+TABS = (CONTROLS, SET_UP, LOOK, EXPORT, POUR, CALIBRATE, DIAGNOSE, LABORATORY, REPORTS)
 """In order; another one that a panel names comes after them."""
 
 
@@ -51,13 +68,18 @@ class PageContext:
     server: viser.ViserServer
     session: Session
     post: Post
-    study: StudyProcess | None
-    """None: the page has no study."""
+    study: StudyProcess
     diagnosis: DiagnosisProcess
     data: Path
     """Folder of what the user made: presets, uploads, recordings."""
     colour_bar: viser.GuiHtmlHandle
     """Explains the colours of bodies, beside every tab."""
+    project: Project
+    """What the page works on."""
+    channel: ShellChannel
+    """To the state line and the timeline."""
+    pages: WebPages
+    """Pages beside this one."""
 
     @property
     def uploads(self) -> Path:

@@ -15,14 +15,16 @@ from explorer.viewer.output.recording_panel import RecordingPanel
 from explorer.viewer.panel import Panel
 from explorer.viewer.pour.changes_panel import ChangesPanel
 from explorer.viewer.pour.chart import Chart
+from explorer.viewer.pour.controls_panel import ControlsPanel
 from explorer.viewer.pour.live_panel import LivePanel
 from explorer.viewer.pour.motion_chart import MotionChart
 from explorer.viewer.pour.outline_panel import OutlinePanel
 from explorer.viewer.pour.readout import Readout
 from explorer.viewer.pour.restart_panel import RestartPanel
-from explorer.viewer.pour.run_panel import RunPanel
 from explorer.viewer.pour.scene_panel import ScenePanel
 from explorer.viewer.pour.second_pile import SecondPile
+from explorer.viewer.shell.state_line import StateLine
+from explorer.viewer.shell.timeline import Timeline
 from explorer.viewer.study.diagnosis_panel import DiagnosisPanel
 from explorer.viewer.study.study_panel import StudyPanel
 from solver.plugins import Registry, derived_from
@@ -30,8 +32,10 @@ from solver.plugins import Registry, derived_from
 PANELS: Registry[type[Panel]] = Registry(
     "panel",
     (
-        RunPanel,
+        StateLine,
+        Timeline,
         Readout,
+        ControlsPanel,
         Chart,
         MotionChart,
         OutlinePanel,

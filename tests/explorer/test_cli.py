@@ -149,12 +149,14 @@ def test_serve_passes_on_what_was_asked(monkeypatch):
     from solver import value
 
     seen: dict[str, Any] = {}
-    monkeypatch.setattr("explorer.viewer.app.serve", lambda scene, **others: seen.update(others, scene=scene))
+    monkeypatch.setattr(
+        "explorer.viewer.app.serve", lambda project, scene, **others: seen.update(others, project=project, scene=scene)
+    )
     result = explorer("serve", "--port", 0, "--seed", 7, "--set", "rig.outlet_height=70mm")
     assert result.exit_code == 0, result.output
     assert (seen["port"], seen["host"], seen["seed"]) == (0, "127.0.0.1", 7)
     assert value(seen["scene"], "rig.outlet_height") == 0.07
-    assert seen["study_file"].name == "sunflower_extract.toml"
+    assert seen["project"].study.name == "sunflower_extract.toml"
 
 
 def test_serve_refuses_two_materials():
@@ -162,11 +164,37 @@ def test_serve_refuses_two_materials():
     assert "name one of the two" in line
 
 
-def test_serve_without_a_study_for_a_material_of_one_s_own(monkeypatch):
+def test_a_material_of_one_s_own_is_served_with_a_study_of_its_own_factors(monkeypatch, tmp_path):
+    from doe.studies.study import load_study
+
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
+    assert explorer("new", "material", "bean", "--out", tmp_path).exit_code == 0
     seen: dict[str, Any] = {}
-    monkeypatch.setattr("explorer.viewer.app.serve", lambda scene, **others: seen.update(others))
-    assert explorer("serve", "--material", "sunflower_extract").exit_code == 0
-    assert seen["study_file"] is None
+    monkeypatch.setattr("explorer.viewer.app.serve", lambda project, scene, **others: seen.update(project=project))
+    result = explorer("serve", "--material", tmp_path / "bean.toml")
+    assert result.exit_code == 0, result.output
+    study = load_study(str(seen["project"].study))
+    assert "pair.grain.grain.static_friction" in [factor.path for factor in study.factors]
+    assert study.scene.bodies == seen["project"].source.scene.bodies
+
+
+def test_a_project_is_made_and_served(monkeypatch, tmp_path):
+    folder = tmp_path / "lentil"
+    made = explorer("new", "project", folder)
+    assert made.exit_code == 0, made.output
+    assert f"try it: explorer serve {folder}" in made.stdout
+    seen: dict[str, Any] = {}
+    monkeypatch.setattr("explorer.viewer.app.serve", lambda project, scene, **others: seen.update(project=project))
+    assert explorer("serve", folder).exit_code == 0
+    project = seen["project"]
+    assert (project.title, project.study.name) == ("lentil", "lentil_study.toml")
+    assert project.studies.is_relative_to(folder)
+    assert "exists already" in refused(explorer("new", "project", folder))
+    (folder / "project.toml").write_text('format = 1\nstudy = "gone.toml"\n', encoding="utf-8")
+    assert f"{folder / 'project.toml'}: study: {folder / 'gone.toml'} does not exist" in refused(
+        explorer("serve", folder)
+    )
+    assert "no such file" in refused(explorer("serve", tmp_path / "nowhere"))
 
 
 def test_a_bug_keeps_its_traceback(monkeypatch):

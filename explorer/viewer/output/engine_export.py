@@ -14,14 +14,14 @@ from explorer.errors import CommandError
 from explorer.export import OWN, names
 from explorer.files.exports import zipped
 from explorer.viewer.output.send_file import send_file
-from explorer.viewer.panel import TAKE_ALONG, PageContext, Panel
+from explorer.viewer.panel import EXPORT, PageContext, Panel
 from solver.plugins import origin
 
 
 class EngineExport(Panel):
     """List of programs and a button."""
 
-    name, tab = "engine", TAKE_ALONG
+    name, tab = "engine", EXPORT
 
     def __init__(self, page: PageContext) -> None:
         self._session, self._folder, self._background = page.session, page.uploads, page.background

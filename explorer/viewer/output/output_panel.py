@@ -14,7 +14,7 @@ from explorer.live.frames import Frame
 from explorer.scene.source import SceneSource, command_line
 from explorer.scene.text import material_toml
 from explorer.viewer.output.send_file import send_file
-from explorer.viewer.panel import TAKE_ALONG, Now, PageContext, Panel
+from explorer.viewer.panel import EXPORT, Now, PageContext, Panel
 from explorer.viewer.view import small_html
 from solver.scenes.scene import Scene
 
@@ -27,7 +27,7 @@ RENDER_WAIT = 30.0
 class OutputPanel(Panel):
     """Command line, and exports."""
 
-    name, tab = "output", TAKE_ALONG
+    name, tab = "output", EXPORT
 
     def __init__(self, page: PageContext) -> None:
         self._session, self._background, self._post = page.session, page.background, page.post

@@ -12,7 +12,7 @@ from explorer.files.exports import zipped
 from explorer.logs.recording import recorded_lines
 from explorer.viewer.output.recording_switch import HTML, RRD, RecordingSwitch
 from explorer.viewer.output.send_file import send_file
-from explorer.viewer.panel import TAKE_ALONG, Now, PageContext, Panel
+from explorer.viewer.panel import EXPORT, Now, PageContext, Panel
 from explorer.viewer.view import small_html
 
 MOST_SENT = 200_000_000
@@ -23,7 +23,7 @@ START, STOP, DOWNLOAD = "Start", "Stop", "Download"
 class RecordingPanel(Panel):
     """Kind, buttons, and where the files are; the page hands its frames to the recording itself."""
 
-    name, tab = "recording", TAKE_ALONG
+    name, tab = "recording", EXPORT
 
     def __init__(self, page: PageContext) -> None:
         self._recording, self._background, gui = page.recording, page.background, page.server.gui

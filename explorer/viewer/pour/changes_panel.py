@@ -19,7 +19,7 @@ from explorer.scene.presets import Preset, preset_names, preset_path, preset_val
 from explorer.scene.source import Difference, differences, shown
 from explorer.session import Session
 from explorer.viewer.actions import add_keys, button_group
-from explorer.viewer.panel import POUR, Now, PageContext, Panel
+from explorer.viewer.panel import SET_UP, Now, PageContext, Panel
 from explorer.viewer.view import small_html
 from solver.scenes.scene import Scene, parameters, values, with_values
 
@@ -41,7 +41,7 @@ NO_PRESET = "choose …"
 class ChangesPanel(Panel):
     """Buttons, list and presets."""
 
-    name, tab, title, folded = "changes", POUR, "Changes and presets", False
+    name, tab, title, folded = "changes", SET_UP, "Changes and presets", False
 
     def __init__(self, page: PageContext) -> None:
         gui, post = page.server.gui, page.post

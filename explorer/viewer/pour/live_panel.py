@@ -20,7 +20,7 @@ from explorer.live.messages import Status
 from explorer.session import Session
 from explorer.units import InputError, checked, quantity, screen_unit, title
 from explorer.viewer.actions import Post
-from explorer.viewer.panel import POUR
+from explorer.viewer.panel import SET_UP
 from explorer.viewer.pour.rebuilt_panel import RebuiltPanel
 from explorer.viewer.tour import Stop
 from explorer.viewer.view import small_html
@@ -48,7 +48,7 @@ BOXES = 3
 class LivePanel(RebuiltPanel["LiveSections"]):
     """What acts on the running pour."""
 
-    name, tab = "live", POUR
+    name, tab = "live", SET_UP
     stop = Stop(
         "Turn a parameter",
         "Everything under *acts now* changes the pile that lies there. Take **Pair → all pairs → Static friction** to "
@@ -173,11 +173,12 @@ class LiveControl:
         scene: Scene,
         post: Post,
         apply: Apply,
+        label: str = "",
     ) -> None:
         self._parameter, self._paths = parameter, tuple(paths)
         self._touched = -math.inf
         faces = log_faces if parameter.scale == "log" else linear_faces
-        self._faces = faces(gui, parameter, self._number(scene))
+        self._faces = faces(gui, parameter, self._number(scene), label)
         for face in self._faces:
             self._listen(face, post, apply)
 
@@ -226,16 +227,16 @@ class Face:
     """Value that came from a browser → number within the range; raises InputError."""
 
 
-def linear_faces(gui: viser.GuiApi, parameter: Parameter, start: float) -> tuple[Face, ...]:
-    """A slider over the declared range."""
-    name, (low, high) = title(parameter), screen_range(parameter)
+def linear_faces(gui: viser.GuiApi, parameter: Parameter, start: float, label: str = "") -> tuple[Face, ...]:
+    """A slider over the declared range, called ``label`` or as the parameter is."""
+    name, (low, high) = titled(parameter, label), screen_range(parameter)
     slider = gui.add_slider(name, low, high, LINEAR_STEP, start, hint=parameter.doc)
     return (Face(slider, lambda number: number, lambda entered: checked(entered, low, high, name)),)
 
 
-def log_faces(gui: viser.GuiApi, parameter: Parameter, start: float) -> tuple[Face, ...]:
+def log_faces(gui: viser.GuiApi, parameter: Parameter, start: float, label: str = "") -> tuple[Face, ...]:
     """A number box in the unit of the screen, and below it a slider over its power of ten."""
-    name, (low, high) = title(parameter), screen_range(parameter)
+    name, (low, high) = titled(parameter, label), screen_range(parameter)
     unit = screen_unit(parameter).symbol
     bottom, top = decades_around(start, low, high)
 
@@ -260,6 +261,12 @@ def log_faces(gui: viser.GuiApi, parameter: Parameter, start: float) -> tuple[Fa
         Face(box, lambda number: number, lambda entered: checked(entered, low, high, name)),
         Face(slider, power_of, number_from),
     )
+
+
+def titled(parameter: Parameter, label: str) -> str:
+    """``label`` with the unit of ``parameter``; its own title where there is none."""
+    unit = screen_unit(parameter).symbol
+    return title(parameter) if not label else f"{label} [{unit}]" if unit else label
 
 
 def screen_range(parameter: Parameter) -> tuple[float, float]:

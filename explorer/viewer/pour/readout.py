@@ -12,7 +12,7 @@ from explorer.live.messages import Event, SessionState, Status
 from explorer.outcomes import OUTCOME_SENTENCES, OUTCOME_WORDS, WARNINGS
 from explorer.viewer.look.look import COMPONENT
 from explorer.viewer.palette import component_colour, css
-from explorer.viewer.panel import POUR, Now, PageContext, Panel
+from explorer.viewer.panel import CONTROLS, Now, PageContext, Panel
 from solver.pours.record import Phase
 from solver.scenes.scene import Scene
 
@@ -56,7 +56,7 @@ STYLE = """<style>
 class Readout(Panel):
     """The readout on the page."""
 
-    name, tab = "readout", POUR
+    name, tab = "readout", CONTROLS
 
     def __init__(self, page: PageContext) -> None:
         self._look, self._html = page.look, page.server.gui.add_html("")

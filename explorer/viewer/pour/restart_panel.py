@@ -10,7 +10,7 @@ from explorer.live.messages import Status
 from explorer.session import Session
 from explorer.units import checked, screen_unit, title
 from explorer.viewer.actions import Post
-from explorer.viewer.panel import POUR
+from explorer.viewer.panel import SET_UP
 from explorer.viewer.pour.rebuilt_panel import RebuiltPanel
 from explorer.viewer.tour import Stop
 from solver.effects import set_up_effects
@@ -54,7 +54,7 @@ def effect_paths() -> tuple[str, ...]:
 class RestartPanel(RebuiltPanel["SetUpInputs"]):
     """What acts on the next pour."""
 
-    name, tab = "set_up", POUR
+    name, tab = "set_up", SET_UP
     stop = Stop(
         "Change the set-up",
         "What stands under *on restart* (mass, outlet, feed, sizes) waits for **Restart with this set-up**. The same "

@@ -8,7 +8,7 @@ from explorer.errors import CommandError
 from explorer.files.uploads import funnel_source, shaped_source
 from explorer.scene.source import SceneSource, rig_source
 from explorer.viewer.actions import on_upload
-from explorer.viewer.panel import POUR, Now, PageContext, Panel
+from explorer.viewer.panel import SET_UP, Now, PageContext, Panel
 from explorer.viewer.view import small_html
 from solver.assets import shipped_assets
 from solver.rigs import RIGS
@@ -26,7 +26,7 @@ WORKING = "Reading what was asked for; the pour goes on until that is done."
 class ScenePanel(Panel):
     """Choices of rig and material with a button, uploads of a body's shape and of a funnel."""
 
-    name, tab, title = "scene", POUR, "Rig and material"
+    name, tab, title = "scene", SET_UP, "Rig and material"
 
     def __init__(self, page: PageContext) -> None:
         gui, post = page.server.gui, page.post

@@ -29,9 +29,9 @@ from explorer.viewer.look.look import in_sight
 from explorer.viewer.look.look_settings import CutPanel, LookSettings
 from explorer.viewer.palette import ANGLE_LINE, CONTACTS_LINE, ENERGY_LINE, MASS_LINE
 from explorer.viewer.pour.chart import LEAST_TOP_DEG, axis
-from explorer.viewer.pour.run_panel import FASTEST, SLOWEST
 from explorer.viewer.replay.recorded_frames import RecordedFrames, RecordedMotion
 from explorer.viewer.scene_nodes import BodyNodes, DrawnComponent, drawn, seen_through
+from explorer.viewer.shell.timeline import FASTEST, SLOWEST
 from explorer.viewer.view import DARK, ThemeSwitch, apply_theme, light, look_at_height
 
 Array = npt.NDArray[np.float64]

@@ -42,13 +42,7 @@ class StudyPanel(Panel):
         "optimum, verification. The pour goes on meanwhile, and a cancelled study resumes where it stopped.",
     )
 
-    @classmethod
-    def offered(cls, page: PageContext) -> bool:
-        """Where the page has a study."""
-        return page.study is not None
-
     def __init__(self, page: PageContext) -> None:
-        assert page.study is not None
         server, gui, study, post = page.server, page.server.gui, page.study, page.post
         self._study, self._session = study, page.session
         loaded = _loaded(study.study_file)

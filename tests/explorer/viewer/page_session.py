@@ -9,10 +9,17 @@ import numpy as np
 
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, SessionState, Status
+from explorer.project.project import study_project
 from explorer.scene.source import SceneSource, changes
+from explorer.study.process import CalibrationProcess
 from explorer.viewer.actions import Actions, BackgroundWork
+from explorer.viewer.page import Page
 from explorer.viewer.panel import PageContext
+from explorer.viewer.shell.channel import ShellChannel
+from explorer.viewer.shell.web_pages import WebPages
 from solver.scenes.scene import Scene, with_values
+
+PROJECT = study_project("sunflower_extract")
 
 
 class PageSession:
@@ -52,7 +59,14 @@ class PageSession:
 def page_context(server, session=None, post=None, data=Path("nowhere"), study=None, diagnosis=None):
     """What panels are made with; without ``post`` an action is carried out at once."""
     post = post or (lambda action: action())
-    return PageContext(server, session, post, study, diagnosis, data, server.gui.add_html("", visible=False))
+    bar = server.gui.add_html("", visible=False)
+    return PageContext(server, session, post, study, diagnosis, data, bar, PROJECT, ShellChannel(), WebPages("test"))
+
+
+def page_of(server, session, diagnosis, data):
+    """The page of the shipped study, with results in the folder ``data``."""
+    study = CalibrationProcess(PROJECT.study, data / "studies", data / "runs.sqlite")
+    return Page(server, session, PROJECT, study, diagnosis, ShellChannel(), WebPages("test"))
 
 
 def finished(actions: Actions, background: BackgroundWork, patience: float = 30.0) -> str:

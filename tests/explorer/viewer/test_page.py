@@ -5,19 +5,18 @@ import time
 from dataclasses import replace
 
 import pytest
-import viser
 
 from explorer.diagnosis.process import DiagnoseProcess
 from explorer.live.messages import Event, SessionState, Status
 from explorer.logs.recording_reader import read_recording
+from explorer.project.project import study_project
 from explorer.scene.source import material_source, rig_source
 from explorer.viewer.app import serve
 from explorer.viewer.guarded_server import guarded_server
-from explorer.viewer.page import Page
 from explorer.viewer.panel import LOOK, SELDOM, Panel, Tab
 from explorer.viewer.panels import PANELS
 from solver.scenes.scene import value
-from tests.explorer.viewer.page_session import PageSession, frame_of
+from tests.explorer.viewer.page_session import PageSession, frame_of, page_of
 
 SOURCE = material_source("sunflower_extract")
 FRICTION = "pair.seed.seed.static_friction"
@@ -57,7 +56,7 @@ def running(tmp_path, monkeypatch):
     monkeypatch.setattr("explorer.viewer.page.data_folder", lambda: tmp_path)
     server, session, stop = guarded_server("127.0.0.1", 0, "test"), Session(SOURCE), threading.Event()
     diagnosis = DiagnoseProcess(tmp_path / "diagnoses", tmp_path / "runs.sqlite")
-    page = Page(server, session, None, diagnosis)
+    page = page_of(server, session, diagnosis, tmp_path)
     loop = threading.Thread(target=page.run, args=(stop,))
     loop.start()
     yield page, session
@@ -121,8 +120,8 @@ def test_a_recording_of_the_page_holds_the_changes(running, tmp_path):
 class RestartedPage:
     """Stands in for the page: it hands its recorder two pours, and ends."""
 
-    def __init__(self, server, session, study, diagnosis, recorder):
-        self._recorder = recorder
+    def __init__(self, *others):
+        self._recorder = others[-1]
 
     def run(self, stop):
         for generation, times in ((1, (1.0,)), (2, (0.0, 0.5))):
@@ -140,7 +139,7 @@ def test_the_end_of_serve_names_every_file_that_it_recorded(tmp_path, monkeypatc
     monkeypatch.setattr("explorer.viewer.app.Page", RestartedPage)
     monkeypatch.setattr("explorer.viewer.app.Session", lambda: ClosableSession(SOURCE))
     path = tmp_path / "live.rrd"
-    serve(SOURCE.scene, port=0, record_path=path, ready=lambda address: None)
+    serve(study_project("sunflower_extract"), SOURCE.scene, port=0, record_path=path, ready=lambda address: None)
     assert capsys.readouterr().out.splitlines()[-3:] == [
         "2 pours recorded:",
         f"{path}: a single moment, at 1.000 s",
@@ -152,7 +151,7 @@ def test_the_end_of_serve_names_every_file_that_it_recorded(tmp_path, monkeypatc
 class Magnets(Panel):
     """A made-up panel, in a folder of a tab of its own."""
 
-    name, tab, title = "magnets", Tab("Magnets", viser.Icon.MAGNET), "Pull"
+    name, tab, title = "magnets", Tab("Magnets"), "Pull"
 
     def __init__(self, page):
         self.text, self.drawn, self.dark, self.closed = page.server.gui.add_markdown(""), 0, True, False
@@ -179,11 +178,11 @@ class Poles(Magnets):
 class Absent(Magnets):
     """One that this page has not, and so no tab for it."""
 
-    name, tab = "absent", Tab("Absent", viser.Icon.MAGNET)
+    name, tab = "absent", Tab("Absent")
 
     @classmethod
     def offered(cls, page):
-        return page.study is not None
+        return False
 
 
 @pytest.fixture
@@ -195,18 +194,20 @@ def plugged_in(monkeypatch):
 def test_a_panel_of_a_plug_in_stands_in_its_tab_and_follows_the_page(plugged_in, running):
     page, _ = running
     gui, magnets, poles = page._server.gui, page.panels["magnets"], page.panels["poles"]
-    tabs = next(handle._parent for handle in gui._container_handle_from_uuid.values() if hasattr(handle, "_parent"))
-    names = [tab._label for tab in tabs._tab_handles]
-    assert names == ["Pour", "Look", "Take along", "Diagnose", "Laboratory", "Magnets"]
-    (folder,) = tabs._tab_handles[-1]._children.values()
+    containers = gui._container_handle_from_uuid.values()
+    groups = {id(one._parent): one._parent._tab_handles for one in containers if hasattr(one, "_parent")}
+    controls, study = groups.values()
+    assert [tab._label for tab in controls] == ["Controls", "Set-up", "Look", "Export"]
+    assert [tab._label for tab in study] == ["Pour", "Calibrate", "Diagnose", "Laboratory", "Magnets"]
+    (folder,) = study[-1]._children.values()
     assert (folder.label, list(folder._children.values())) == ("Pull", [magnets.text])
-    assert list(tabs._tab_handles[1]._children.values())[-1] is poles.text
-    assert not {"absent", "study"} & page.panels.keys()
+    assert list(controls[2]._children.values())[-1] is poles.text
+    assert "absent" not in page.panels
     page._actions.post(lambda: float("strong"))
     for panel in (magnets, poles):
         wait_for(lambda panel=panel: panel.text.content == "funnel: could not convert string to float: 'strong'")
         wait_for(lambda panel=panel: panel.drawn > 3)
-    page._actions.post(lambda: page._follow_theme(False))
+    page._actions.post(lambda: page._switch_theme())
     wait_for(lambda: not magnets.dark)
     page.close()
     assert magnets.closed

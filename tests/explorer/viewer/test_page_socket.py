@@ -20,10 +20,10 @@ from explorer.session import Session
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.look import drawn_look
 from explorer.viewer.look.camera import view_of
-from explorer.viewer.page import Page
-from explorer.viewer.pour.run_panel import BACK, PLAY_PAUSE, STEP
+from explorer.viewer.shell.timeline import BACK, PLAY_PAUSE, STEP
 from tests.explorer.beads import bead_scene
 from tests.explorer.test_session import wait_for
+from tests.explorer.viewer.page_session import page_of
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +31,8 @@ def page(tmp_path_factory):
     """A page in a thread of its own, and the session behind it; no one else uses that while the thread runs."""
     server, session, stop = guarded_server("127.0.0.1", 0, "test"), Session(), threading.Event()
     session.start(bead_scene(), 1)
-    page = Page(server, session, None, DiagnoseProcess(tmp_path_factory.mktemp("diagnoses"), None))
+    data = tmp_path_factory.mktemp("data")
+    page = page_of(server, session, DiagnoseProcess(data / "diagnoses", None), data)
     thread = threading.Thread(target=page.run, args=(stop,))
     thread.start()
     yield SimpleNamespace(server=server, page=page, look=page.panels["look"])

@@ -1,0 +1,137 @@
+"""A project as a folder: ``project.toml`` names its study and its measured data; results stand beside it.
+
+format = 1
+title = "Lentils, lot 7"
+study = "lentil_study.toml"     # relative to this file; it names the material
+measured = "measured"           # folder with measurement.toml, for the diagnosis; may be left out
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from explorer.errors import CommandError
+from explorer.files.output_file import write_whole
+from explorer.scene.file import load_scene, study_path
+from explorer.scene.presets import data_folder
+from explorer.scene.source import SceneSource, material_source, study_source
+from explorer.scene.starter_files import STUDY_ENDING, study_text, write_study
+from solver import ParameterError
+from solver.toml_file import TomlTable, checked, read_toml
+
+FILE = "project.toml"
+FORMAT = 1
+RESULTS = "results"
+
+
+class ProjectFile(TomlTable):
+    """Content of ``project.toml``."""
+
+    format: int
+    """Of the file: 1."""
+    title: str = ""
+    """What the page calls the project; without one, the folder's name."""
+    study: str
+    """Study file, relative to this file; it names the material."""
+    measured: str = ""
+    """Folder of measured data (``measurement.toml``), relative to this file."""
+
+
+@dataclass(frozen=True)
+class Project:
+    """What the page works on."""
+
+    title: str
+    study: Path
+    """The study file, which names the material."""
+    source: SceneSource
+    """What is poured first."""
+    results: Path
+    """Folder in which studies and diagnoses leave their results."""
+    measured: Path | None = None
+    """Folder of measured data for the diagnosis."""
+    folder: Path | None = None
+    """Of ``project.toml``; None for a material or a study without one."""
+
+    @property
+    def studies(self) -> Path:
+        """Output folders of the project's studies are made in here."""
+        return self.results / "studies"
+
+    @property
+    def diagnoses(self) -> Path:
+        """Output folders of the project's diagnoses are made in here."""
+        return self.results / "diagnoses"
+
+
+def new_project(folder: Path, material: str | None = None) -> list[Path]:
+    """Write a project into the new ``folder``: a starter material (or ``material``, by path or shipped name) and study.
+
+    Returns what was written, ``project.toml`` last. Raises CommandError where the folder holds a project already.
+    """
+    file = folder / FILE
+    if file.exists():
+        raise CommandError(f"{file}: exists already; choose another folder")
+    written = write_study(folder, folder.name, material)
+    lines = (
+        f"format = {FORMAT}",
+        f'title = "{folder.name}"',
+        f'study = "{written[-1].name}"',
+        '# measured = "measured"   # folder with measurement.toml, for the diagnosis',
+    )
+    write_whole(file, "\n".join(lines) + "\n")
+    return [*written, file]
+
+
+def load_project(folder: Path) -> Project:
+    """The project in ``folder``. Raises a ValueError with one line that names file and key."""
+    file = folder / FILE
+    try:
+        table = checked(ProjectFile, read_toml(file))
+        if table.format != FORMAT:
+            raise ParameterError(f"format: {table.format!r} is not {FORMAT}")
+        for key, name in (("study", table.study), ("measured", table.measured)):
+            if name and not (folder / name).exists():
+                raise ParameterError(f"{key}: {folder / name} does not exist")
+    except ParameterError as error:
+        text = str(error)
+        raise ParameterError(text if text.startswith(str(file)) else f"{file}: {text}") from None
+    study = folder / table.study
+    return Project(
+        title=table.title or folder.absolute().name,
+        study=study,
+        source=study_source(study),
+        results=folder / RESULTS,
+        measured=folder / table.measured if table.measured else None,
+        folder=folder,
+    )
+
+
+def study_project(study: str) -> Project:
+    """A project of a study alone, by its path or shipped name; results go into the user's data folder."""
+    file = study_path(study)
+    return Project(_words(file.stem.removesuffix(STUDY_ENDING)), file, study_source(file), data_folder())
+
+
+def material_project(material: str) -> Project:
+    """A project of a material alone, by its path or shipped name.
+
+    Its study is ``<material>_study.toml`` beside it where there is one; otherwise one with an example target is written
+    into the user's data folder, anew each time, since its factors are read off the material.
+    """
+    source = material_source(material)
+    own = Path(source.material)
+    beside = own.with_name(f"{own.stem}{STUDY_ENDING}.toml")
+    if own.is_file() and beside.is_file():
+        study = beside
+    else:
+        study = data_folder() / "starter_studies" / f"{own.stem}{STUDY_ENDING}.toml"
+        study.parent.mkdir(parents=True, exist_ok=True)
+        named = str(own.absolute()) if own.is_file() else source.material
+        write_whole(study, study_text(study, named, load_scene("funnel", named)))
+    return Project(_words(own.stem), study, source, data_folder())
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ").strip().capitalize()

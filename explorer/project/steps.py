@@ -1,0 +1,142 @@
+"""How far a project is, step by step from the material to the report, and what is next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from doe.target import Target
+from explorer.background.command_process import CommandStatus
+from explorer.live.messages import SessionState, Status
+from explorer.outcomes import OUTCOME_WORDS
+from explorer.units import observed
+from solver.pours.record import Outcome
+from solver.scenes.scene import Scene
+
+
+class StepState(StrEnum):
+    """How far a step is."""
+
+    EMPTY = "empty"
+    ASSUMED = "assumed"
+    """It rests on values that nobody measured."""
+    MEASURED = "measured"
+    RUNNING = "running"
+    DONE = "done"
+    FAILED = "failed"
+
+
+class Room(StrEnum):
+    """Tabs of the page that a step leads to."""
+
+    CONTROLS = "Controls"
+    SET_UP = "Set-up"
+    LOOK = "Look"
+    EXPORT = "Export"
+    POUR = "Pour"
+    CALIBRATE = "Calibrate"
+    DIAGNOSE = "Diagnose"
+    LABORATORY = "Laboratory"
+    REPORTS = "Reports"
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of a project."""
+
+    name: str
+    state: StepState
+    said: str
+    """A word or a number about it, such as "25.1 ± 1.2°"; may be empty."""
+    hint: str
+    """What the step is, in a sentence."""
+    room: Room
+    """Where it is done."""
+
+
+@dataclass(frozen=True)
+class Finished:
+    """The newest finished study or diagnosis of a project."""
+
+    said: str
+    """Its verdict in a few words."""
+    succeeded: bool
+    report: bool
+    """Whether a report was written."""
+
+
+def material_step(scene: Scene) -> Step:
+    """Of the material: how many of its values are assumed."""
+    n = len(scene.assumed)
+    state, said = (StepState.ASSUMED, f"{n} assumed") if n else (StepState.MEASURED, "")
+    return Step(
+        "Material", state, said, "Parameters of the material: density, stiffness, friction, shape.", Room.SET_UP
+    )
+
+
+def measured_step(targets: Sequence[Target]) -> Step:
+    """Of the measured pile: the first target of the study."""
+    hint = "What was measured in the laboratory: the target of the calibration."
+    if not targets:
+        return Step("Measured", StepState.EMPTY, "", hint, Room.LABORATORY)
+    target = targets[0]
+    spread = "" if target.sd is None else f" ± {observed(target.observable, target.sd)}"
+    measured = target.sd is not None and target.sd_source == "measured"
+    state = StepState.MEASURED if measured else StepState.ASSUMED
+    return Step("Measured", state, f"{observed(target.observable, target.mean)}{spread}", hint, Room.LABORATORY)
+
+
+def pour_step(status: Status) -> Step:
+    """Of the live pour."""
+    hint = "The pour in the scene: one pile of this material."
+    if status.state in (SessionState.FAILED, SessionState.DIED):
+        return Step("Pour", StepState.FAILED, "solver stopped", hint, Room.POUR)
+    if status.outcome == Outcome.RUNNING:
+        said = "starting" if status.state == SessionState.STARTING else ""
+        return Step("Pour", StepState.RUNNING, said, hint, Room.POUR)
+    if not status.outcome.valid:
+        return Step("Pour", StepState.FAILED, OUTCOME_WORDS.get(status.outcome, str(status.outcome)), hint, Room.POUR)
+    angle = status.observables.get("angle_of_repose_deg")
+    return Step("Pour", StepState.DONE, "" if angle is None else f"{angle.value:.1f}°", hint, Room.POUR)
+
+
+def command_step(name: str, hint: str, room: Room, status: CommandStatus, finished: Finished | None) -> Step:
+    """Of a calibration or a diagnosis, whose process is in ``status``; ``finished``: the newest result."""
+    if status.alive:
+        share = f"{status.done / status.planned:.0%}" if status.planned else ""
+        return Step(name, StepState.RUNNING, "paused" if status.state == "paused" else share, hint, room)
+    if status.state == "failed":
+        return Step(name, StepState.FAILED, "stopped with an error", hint, room)
+    if finished is None:
+        return Step(name, StepState.EMPTY, "", hint, room)
+    return Step(name, StepState.DONE if finished.succeeded else StepState.FAILED, finished.said, hint, room)
+
+
+def report_step(results: Sequence[Finished | None]) -> Step:
+    """Of the report: there is one where a result has left it."""
+    n = sum(1 for one in results if one is not None and one.report)
+    state = StepState.DONE if n else StepState.EMPTY
+    return Step("Report", state, "", "What was done and found, as a page to read, print and send.", Room.REPORTS)
+
+
+def next_step(steps: Sequence[Step]) -> str:
+    """What to do next, in a sentence."""
+    by_name = {step.name: step for step in steps}
+    measured, calibrate, diagnose = (by_name[name] for name in ("Measured", "Calibrate", "Diagnose"))
+    for name in ("Calibrate", "Diagnose"):
+        if by_name[name].state == StepState.RUNNING:
+            return f"wait for {name.lower()}, or look at what it has found so far"
+    if by_name["Pour"].state == StepState.FAILED:
+        return "see under Pour why there is no pile, and pour again"
+    if measured.state == StepState.EMPTY:
+        return "measure a pile: read its angle from photographs under Laboratory"
+    if calibrate.state == StepState.EMPTY:
+        if measured.state == StepState.ASSUMED:
+            return "measure a pile, or start a calibration with the assumed target"
+        return "start the calibration"
+    if calibrate.state == StepState.FAILED and diagnose.state == StepState.EMPTY:
+        return "ask under Diagnose which effect the model lacks"
+    if diagnose.state == StepState.EMPTY:
+        return "read the report, or test the model against measured data under Diagnose"
+    return "read the report"

@@ -1,0 +1,105 @@
+"""The controls that stay in sight: six sliders, *Pour again*, and *Keep beside* for a second pile.
+
+Five act on the running pour; the feed rate acts on the next one. Each stands for one physical quantity, wherever in the
+scene it occurs; what one slider moves together is set apart under Set-up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from explorer.live.messages import Status
+from explorer.units import checked, screen_unit
+from explorer.viewer.actions import button_group
+from explorer.viewer.panel import CONTROLS, PageContext
+from explorer.viewer.pour.live_panel import LiveControl, screen_range
+from explorer.viewer.pour.rebuilt_panel import RebuiltPanel
+from solver.scenes.material import Pair
+from solver.scenes.scene import Scene, parameters, value, with_values
+
+AGAIN, SAME_SEED = "Pour again", "Same seed"
+FEED_RATE = "insertion.rate"
+LARGEST_SEED = 2**31 - 1
+
+
+class ControlsPanel(RebuiltPanel["Controls"]):
+    """What is always in sight."""
+
+    name, tab = "controls", CONTROLS
+
+    def build(self, scene: Scene) -> Controls:
+        """Make the sliders for ``scene``."""
+        return Controls(self._page, scene)
+
+
+class Controls:
+    """Sliders for the quantities that ``scene`` has."""
+
+    def __init__(self, page: PageContext, scene: Scene) -> None:
+        gui, session, post = page.server.gui, page.session, page.post
+        self._session = session
+        known = parameters(scene)
+        self._live = [
+            LiveControl(gui, known[paths[0]], paths, scene, post, session.set_parameters, label)
+            for label, paths in quantities(scene).items()
+        ]
+        self._feed = None
+        if FEED_RATE in known:
+            low, high = screen_range(known[FEED_RATE])
+            unit = screen_unit(known[FEED_RATE])
+            shown = unit.to_screen(float(value(scene, FEED_RATE)))
+            self._feed = gui.add_number(
+                f"Feed rate [{unit.symbol}]",
+                shown,
+                min=low,
+                max=high,
+                hint=f"Acts on the next pour. {known[FEED_RATE].doc}",
+            )
+        button_group(
+            gui,
+            AGAIN,
+            {"New seed": lambda: self._pour(1), SAME_SEED: lambda: self._pour(0)},
+            post,
+            hint="Pours anew with the parameters as they are now. The same seed gives the same pile, to the last bit; "
+            "a new one shows how piles of the same parameters scatter.",
+        )
+
+    def show(self, status: Status) -> None:
+        """Follow the solver's values."""
+        for control in self._live:
+            control.follow(status.scene)
+
+    def _pour(self, step: int) -> None:
+        status = self._session.status()
+        scene = status.scene
+        if self._feed is not None:
+            parameter = parameters(scene)[FEED_RATE]
+            low, high = screen_range(parameter)
+            wanted = screen_unit(parameter).to_si(checked(self._feed.value, low, high, "feed rate"))
+            if abs(wanted - float(value(scene, FEED_RATE))) > 1e-6 * wanted:
+                scene = with_values(scene, {FEED_RATE: wanted})
+        self._session.restart(scene, (status.seed + step) % LARGEST_SEED)
+
+
+def quantities(scene: Scene) -> Mapping[str, tuple[str, ...]]:
+    """Label of a slider → the paths that it moves together, of live parameters that ``scene`` has."""
+    bodies = tuple(dict.fromkeys(body.material for body in scene.bodies))
+    among = [pair for pair in scene.pairs if pair.a != scene.rig.wall and pair.b != scene.rig.wall]
+    at_wall = [pair for pair in scene.pairs if scene.rig.wall in (pair.a, pair.b) and pair.a != pair.b]
+    grain = scene.bodies[0].name.replace("_", " ") if len(scene.bodies) == 1 else "particles"
+
+    def of(pairs: list[Pair], name: str) -> tuple[str, ...]:
+        return tuple(f"pair.{pair.a}.{pair.b}.{name}" for pair in pairs)
+
+    found = {
+        f"Friction, {grain}": of(among, "static_friction"),
+        "Friction, wall": of(at_wall, "static_friction"),
+        "Restitution": of([*among, *at_wall], "restitution"),
+        "Shear modulus": tuple(f"material.{name}.shear_modulus" for name in bodies),
+        "Rolling friction": ("effect.rolling_resistance.rolling_friction",),
+    }
+    known = parameters(scene)
+    live = {
+        label: tuple(path for path in paths if path in known and known[path].live) for label, paths in found.items()
+    }
+    return {label: paths for label, paths in live.items() if paths}

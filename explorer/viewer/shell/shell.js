@@ -1,0 +1,118 @@
+// What stands around viser's page: the state line on top, the timeline at the bottom. States come by a WebSocket of
+// their own; what is clicked goes back as a named command. Rooms are viser's own tabs, opened in this browser only.
+"use strict";
+
+const MARKS = { empty: "○", assumed: "◌", measured: "●", running: "◐", done: "✓", failed: "✕" };
+const RECONNECT_MS = 1000;
+let channel = null;
+
+function send(command) {
+  if (channel && channel.readyState === WebSocket.OPEN) channel.send(JSON.stringify(command));
+}
+
+function element(tag, attributes = {}, ...children) {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
+    else if (name === "class") made.className = value;
+    else made.setAttribute(name, value);
+  }
+  made.append(...children);
+  return made;
+}
+
+// A tab by its name: in a panel that is open, folded to the edge of the window, or in a small window's bottom sheet.
+function openRoom(name) {
+  const found = () => [...document.querySelectorAll("#root [role=tab]")].find(tab => tab.textContent.trim() === name);
+  const tab = found();
+  if (tab) { tab.click(); tab.focus(); return; }
+  const sheet = [...document.querySelectorAll("#root [role=button]")].find(
+    one => (one.getAttribute("aria-label") || "").startsWith("Expand panel") && one.textContent.includes(name));
+  if (!sheet) return;
+  sheet.click();
+  requestAnimationFrame(() => found()?.click());
+}
+
+const name = element("h1", { class: "name" });
+const steps = element("ol");
+const next = element("span", { class: "next", role: "status" });
+const shade = element("button", { title: "Dark or light page", "aria-label": "Dark or light page",
+  onclick: () => send({ do: "theme" }) }, "◑");
+document.body.append(element("header", { id: "state-line" }, name,
+  element("nav", { "aria-label": "Steps of the project" }, steps), next, shade));
+
+function showSteps(project) {
+  name.textContent = project.name;
+  const items = project.steps.map(step => element("li", {},
+    element("button", { class: step.state, "aria-label": `${step.name}: ${step.said || step.state}`,
+      title: step.hint, onclick: () => openRoom(step.room) },
+      element("span", { class: "mark", "aria-hidden": "true" }, MARKS[step.state]), step.name,
+      ...(step.said ? [element("span", { class: "said" }, " " + step.said)] : []))));
+  const focused = [...steps.querySelectorAll("button")].indexOf(document.activeElement);
+  steps.replaceChildren(...items);
+  if (focused >= 0) steps.querySelectorAll("button")[focused]?.focus();
+  next.replaceChildren("Next: ", element("b", {}, project.next));
+  next.title = project.next;
+}
+
+const act = (label, title, command, kind = "") =>
+  element("button", { title, "aria-label": title, class: kind, onclick: () => send({ do: command }) }, label);
+const toggle = act("▶ Play", "Play or pause (space)", "toggle", "main");
+const seek = element("input", { type: "range", min: "0", max: "1", step: "any", value: "0", "aria-label": "Time" });
+const events = element("div", { "aria-hidden": "true" });
+const clock = element("output", { class: "time" });
+const speed = element("select", { "aria-label": "Speed", title: "Simulated seconds per second aimed at", class: "seldom",
+  onchange: () => send({ do: "speed", factor: Number(speed.value) }) });
+const condition = element("span", { class: "chip", role: "status" });
+const recording = element("span", { class: "recording", role: "status" });
+const lastEvent = element("span", { class: "event-text" });
+let seeking = false;
+seek.addEventListener("pointerdown", () => { seeking = true; });
+seek.addEventListener("pointerup", () => { seeking = false; });
+seek.addEventListener("change", () => { seeking = false; send({ do: "seek", time: Number(seek.value) }); });
+document.body.append(element("footer", { id: "timeline", "aria-label": "Timeline" },
+  act("↻", "Pour again with the same seed (R)", "restart"), act("◀", "Back by one sample interval (←)", "back"), toggle,
+  act("▶|", "On by one sample interval (→)", "step"), clock, element("div", { class: "track" }, events, seek),
+  condition, speed, recording, lastEvent));
+
+function showTimeline(now) {
+  toggle.textContent = now.playing ? "❚❚ Pause" : "▶ Play";
+  clock.textContent = `${now.time.toFixed(3)} s`;
+  seek.min = now.earliest; seek.max = Math.max(now.end, now.earliest + 1e-3);
+  seek.setAttribute("aria-valuetext", clock.textContent);
+  if (!seeking) seek.value = now.time;
+  const span = seek.max - seek.min;
+  events.replaceChildren(...now.events.filter(one => one.time >= now.earliest).map(one => {
+    const mark = element("span", { class: "event", title: `${one.time.toFixed(3)} s  ${one.text}` });
+    mark.style.left = `${100 * (one.time - now.earliest) / span}%`;
+    return mark;
+  }));
+  lastEvent.textContent = now.events.length ? now.events[now.events.length - 1].text : "";
+  lastEvent.title = lastEvent.textContent;
+  if (speed.dataset.choices !== String(now.speeds)) {
+    speed.dataset.choices = String(now.speeds);
+    speed.replaceChildren(...now.speeds.map(one => element("option", { value: one }, `× ${one}`)));
+  }
+  if (document.activeElement !== speed) speed.value = now.speed;
+  condition.textContent = now.condition;
+  condition.classList.toggle("trouble", now.trouble);
+  recording.textContent = now.recording ? `● REC ${now.recording}` : "";
+}
+
+const show = {
+  project: showSteps,
+  timeline: showTimeline,
+  theme: theme => document.documentElement.classList.toggle("light", !theme.dark),
+};
+
+function connect() {
+  channel = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/shell/channel`);
+  channel.onmessage = message => {
+    for (const [key, value] of Object.entries(JSON.parse(message.data))) show[key]?.(value);
+  };
+  channel.onclose = () => setTimeout(connect, RECONNECT_MS);
+}
+connect();
+
+// For the boards in the study panel, which are pages of this server and of the same origin.
+window.explorer = { send, openRoom };

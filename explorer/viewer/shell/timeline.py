@@ -1,0 +1,116 @@
+"""The timeline below the page: play, pause, step, go to a moment, pour again, speed; what happened when; by key too."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+from explorer.live.messages import SessionState
+from explorer.units import checked
+from explorer.viewer.actions import SliderHands, add_keys
+from explorer.viewer.panel import AROUND, Now, PageContext, Panel
+from explorer.viewer.pour.readout import PHASE_WORDS, STATE_WORDS, TROUBLE, condition
+from explorer.viewer.tour import Stop
+
+PLAY_PAUSE, BACK, STEP, RESTART = "Play / pause (space)", "◀ Back (←)", "Step ▶ (→)", "Pour again (R)"
+KEYS: dict[str, Any] = {PLAY_PAUSE: "space", RESTART: "R"}
+ARROWS: dict[str, Any] = {BACK: "arrowleft", STEP: "arrowright"}
+SLOWEST, FASTEST = 0.05, 2.0
+"""Range of the speed: simulated seconds per second."""
+SPEEDS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0)
+MOST_EVENTS = 60
+"""Events on the timeline; older ones are left out."""
+LONGEST_EVENT = 120
+"""Characters."""
+
+
+class Timeline(Panel):
+    """Talks to the session; what it shows is told to the browsers as one small object."""
+
+    name, tab = "timeline", AROUND
+    stop = Stop(
+        "The pour",
+        "Bodies fall through the funnel and pile up, computed while you watch. **Space** pauses and plays, the **right "
+        "arrow** goes on by 10 ms and the **left arrow** back, **R** pours anew. Drag to turn the view, scroll to come "
+        "closer.\n\n"
+        "The big number is the angle of repose of the pile as it lies, ± its spread over the flanks. The timeline "
+        "below the scene goes back to any moment that is kept, with everything as it was.",
+    )
+
+    def __init__(self, page: PageContext) -> None:
+        session, post = page.session, page.post
+        self._page, self._session = page, session
+        self._recording_since: float | None = None
+        acts = {PLAY_PAUSE: self._toggle, BACK: session.step_back, STEP: session.step, RESTART: session.restart}
+        page.channel.offer("toggle", lambda _: post(self._toggle))
+        page.channel.offer("back", lambda _: post(session.step_back))
+        page.channel.offer("step", lambda _: post(session.step))
+        page.channel.offer("restart", lambda _: post(session.restart))
+        page.channel.offer("seek", lambda command: post(partial(self._seek, command.get("time"))))
+        page.channel.offer("speed", lambda command: post(partial(self._set_speed, command.get("factor"))))
+        add_keys(page.server.gui, acts, KEYS, post)
+        add_keys(page.server.gui, acts, ARROWS, SliderHands(page.server).unless_on_a_slider(post))
+
+    def show(self, now: Now) -> None:
+        """Tell the browsers where the pour is."""
+        self._page.channel.tell("timeline", timeline_state(now, self._recorded()))
+
+    def _recorded(self) -> str:
+        """How long the page has been recording, such as "0:12"; empty where it is not."""
+        if not self._page.recording.running:
+            self._recording_since = None
+            return ""
+        self._recording_since = self._recording_since or time.monotonic()
+        minutes, seconds = divmod(int(time.monotonic() - self._recording_since), 60)
+        return f"{minutes}:{seconds:02d}"
+
+    def _toggle(self) -> None:
+        if self._session.status().state == SessionState.PAUSED:
+            self._session.play()
+        else:
+            self._session.pause()
+
+    def _seek(self, wanted: object) -> None:
+        """Go back to ``wanted`` [s], with the parameters of that moment; a later moment has to be computed first."""
+        status = self._session.status()
+        if math.isfinite(status.earliest):
+            moment = checked(wanted, 0.0, math.inf, "time")
+            if moment < status.time:
+                self._session.step_back(status.time - max(moment, status.earliest))
+
+    def _set_speed(self, factor: object) -> None:
+        self._session.set_speed(checked(factor, SLOWEST, FASTEST, "speed"))
+
+
+def timeline_state(now: Now, recording: str) -> Mapping[str, Any]:
+    """What the timeline shows; ``recording``: what is recorded, in a few words, empty if nothing is."""
+    status = now.status
+    moving = status.state in (SessionState.RUNNING, SessionState.STARTING)
+    earliest = status.earliest if math.isfinite(status.earliest) else 0.0
+    mine = [event for event in now.events if event.generation == status.generation and event.time <= status.time]
+    return {
+        "time": status.time,
+        "earliest": min(earliest, status.time),
+        "end": status.time,
+        "playing": moving,
+        "speed": status.speed,
+        "speeds": SPEEDS,
+        "condition": condition_words(now),
+        "trouble": status.state in TROUBLE,
+        "recording": recording,
+        "events": [{"time": event.time, "text": event.text[:LONGEST_EVENT]} for event in mine[-MOST_EVENTS:]],
+    }
+
+
+def condition_words(now: Now) -> str:
+    """State, phase and pace of the pour, such as "discharging · 0.42 × real time"."""
+    status = now.status
+    words = [STATE_WORDS[status.state] if status.state != SessionState.RUNNING else PHASE_WORDS[status.phase]]
+    if word := condition(status):
+        words.append(word)
+    if status.state == SessionState.RUNNING:
+        words.append(f"{status.real_time_factor:.2f} × real time")
+    return " · ".join(words)

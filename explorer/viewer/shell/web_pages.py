@@ -1,0 +1,172 @@
+"""Pages beside viser's own on its port: reports, boards of studies, and the first page with what stands around it.
+
+An address names an entry that this program made; no path of a file comes from a browser. All of it is read only.
+"""
+
+from __future__ import annotations
+
+import gzip
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from hashlib import sha256
+from html import escape
+from http import HTTPStatus
+from pathlib import Path
+
+import viser
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
+
+from explorer.errors import CommandError
+
+HERE = Path(__file__).parent
+TITLE = "<title>Viser</title>"
+"""Of viser's first page; in its place come our title, style and script."""
+OWN = """<title>{title}</title>
+    <link rel="stylesheet" href="/shell/shell.css" />
+    <script src="/shell/shell.js" defer></script>"""
+HTML, JSON = "text/html; charset=utf-8", "application/json"
+KINDS: Mapping[str, str] = {
+    ".html": HTML,
+    ".css": "text/css; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".json": JSON,
+    ".md": "text/plain; charset=utf-8",
+    ".csv": "text/csv; charset=utf-8",
+    ".bib": "text/plain; charset=utf-8",
+    ".svg": "image/svg+xml",
+    ".pdf": "application/pdf",
+    ".png": "image/png",
+    ".rrd": "application/octet-stream",
+}
+"""Ending of a file's name → what a browser is told that it is; others are not served."""
+FOREIGN = ("cross-site", "same-site")
+"""What a browser says of a request (`Sec-Fetch-Site`) that comes from another page than ours."""
+GUARD = {
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "SAMEORIGIN",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+}
+LETTERS = 12
+"""Of the id of a folder."""
+
+
+@dataclass(frozen=True)
+class WebPage:
+    """What is sent for an address."""
+
+    kind: str
+    """Media type."""
+    body: bytes
+    lasting: bool = False
+    """Whether a browser may keep it as long as this program's version is the same."""
+
+
+class WebPages:
+    """Addresses and what makes their pages; ``title`` is that of the first page."""
+
+    def __init__(self, title: str) -> None:
+        self._title = title
+        self._pages: dict[str, Callable[[], WebPage]] = {
+            "/": self._first,
+            "/index.html": self._first,
+            "/shell/shell.js": lambda: _shipped("shell.js"),
+            "/shell/shell.css": lambda: _shipped("shell.css"),
+            "/shell/plotly.js": _plotly,
+        }
+
+    def publish(self, address: str, page: WebPage) -> None:
+        """Serve ``page`` at ``address`` from now on, in place of one before it."""
+        self._pages[address] = lambda: page
+
+    def publish_folder(self, folder: Path) -> str:
+        """Serve the files that ``folder`` and its folders hold now, of known kinds; returns their common address."""
+        address = f"/reports/{folder_id(folder)}/"
+        for file in folder.glob("**/*"):
+            if file.is_file() and file.suffix in KINDS and not file.is_symlink():
+                name = file.relative_to(folder).as_posix()
+                self._pages[address + name] = _reading(file)
+        return address
+
+    def answer(self, request: Request) -> Response | None:
+        """What is sent for ``request``; None where it is for viser."""
+        path = request.path.partition("?")[0]
+        make = self._pages.get(path)
+        if make is None:
+            ours = path.startswith(("/reports/", "/study/", "/diagnosis/", "/shell/"))
+            # The channel is a WebSocket, which the server's handler takes.
+            return _refusal(HTTPStatus.NOT_FOUND) if ours and "Upgrade" not in request.headers else None
+        if path not in ("/", "/index.html") and request.headers.get("Sec-Fetch-Site") in FOREIGN:
+            return _refusal(HTTPStatus.FORBIDDEN)
+        if "Upgrade" in request.headers:  # viser's WebSocket is at the first page's address
+            return None
+        try:
+            return _response(make(), "gzip" in request.headers.get("Accept-Encoding", ""))
+        except OSError:  # a file that is not there any more
+            return _refusal(HTTPStatus.NOT_FOUND)
+
+    def _first(self) -> WebPage:
+        return WebPage(HTML, _first_page(self._title))
+
+
+def folder_id(folder: Path) -> str:
+    """Id of a folder in an address: the same each time, and without its name."""
+    return sha256(str(folder.absolute()).encode()).hexdigest()[:LETTERS]
+
+
+def first_page(title: str, viser_page: str) -> str:
+    """viser's first page with our title, style and script. Raises CommandError where it is not the page known here."""
+    if viser_page.count(TITLE) != 1:
+        raise CommandError(f"viser {viser.__version__}: its first page has no {TITLE}, another version is needed")
+    return viser_page.replace(TITLE, OWN.format(title=escape(title)))
+
+
+@cache
+def _first_page(title: str) -> bytes:
+    file = Path(viser.__file__).parent / "client" / "build" / "index.html"
+    return first_page(title, file.read_text(encoding="utf-8")).encode()
+
+
+@cache
+def _shipped(name: str) -> WebPage:
+    return WebPage(KINDS[Path(name).suffix], (HERE / name).read_bytes())
+
+
+@cache
+def _plotly() -> WebPage:
+    import plotly
+
+    file = Path(plotly.__file__).parent / "package_data" / "plotly.min.js"
+    return WebPage(KINDS[".js"], file.read_bytes(), lasting=True)
+
+
+def _reading(file: Path) -> Callable[[], WebPage]:
+    return lambda: WebPage(KINDS[file.suffix], file.read_bytes())
+
+
+def _response(page: WebPage, may_zip: bool) -> Response:
+    body = _zipped(page.body) if may_zip and len(page.body) > 100_000 else page.body
+    headers = Headers(
+        {
+            "Content-Type": page.kind,
+            "Content-Length": str(len(body)),
+            "Cache-Control": "max-age=86400" if page.lasting else "no-store",
+            **GUARD,
+        }
+    )
+    if body is not page.body:
+        headers["Content-Encoding"] = "gzip"
+    return Response(HTTPStatus.OK, "OK", headers, body)
+
+
+@lru_cache(maxsize=4)
+def _zipped(body: bytes) -> bytes:
+    return gzip.compress(body, 5)
+
+
+def _refusal(status: HTTPStatus) -> Response:
+    body = f"{status.phrase}\n".encode()
+    headers = Headers({"Content-Type": "text/plain", "Content-Length": str(len(body)), **GUARD})
+    return Response(status, status.phrase, headers, body)
