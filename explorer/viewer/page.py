@@ -22,7 +22,9 @@ from viser import _messages
 
 from explorer.background.command_process import CommandStatus
 from explorer.diagnosis.process import DiagnosisProcess
-from explorer.live.messages import Event, Status
+from explorer.live.frames import Frame
+from explorer.live.messages import Event, SessionState, Status
+from explorer.live.preview import load_preview
 from explorer.project.project import Project
 from explorer.scene.presets import data_folder
 from explorer.session import Session
@@ -34,7 +36,6 @@ from explorer.viewer.panels import PANELS
 from explorer.viewer.pour.readout import not_later
 from explorer.viewer.shell.channel import ShellChannel
 from explorer.viewer.shell.web_pages import WebPages
-from explorer.viewer.tour import Tour
 from explorer.viewer.view import DARK, apply_theme, light
 
 ACTED_WITHIN = 2.0
@@ -68,7 +69,10 @@ class Page:
         self._events: deque[Event] = deque(maxlen=EVENTS_REMEMBERED)
         self._actions, self._people = Actions(), People(server)
         self._orders = OrderEvents({"diagnosis": diagnosis, "study": study})
-        self._notice, self._time = "", session.status().time
+        begun = session.status()
+        self._notice, self._time = "", begun.time
+        self._preview = load_preview(begun.scene, begun.seed)
+        self._preview_since: float | None = None
         light(server)
         bar = server.gui.add_html("", visible=False)
         post = self._actions.post
@@ -79,7 +83,7 @@ class Page:
         self.panels = {panel.name: panel for panel in self._made()}
         """By name, in their order on the page."""
         self._due = dict.fromkeys((OFTEN, SELDOM, *(panel.every for panel in self.panels.values())), 0.0)
-        Tour(server, [kind.stop for kind in PANELS.values() if kind.stop is not None])
+        channel.tell("keys", named_keys(server.gui))
         channel.offer("theme", lambda _: post(self._switch_theme))
         self._dark = not DARK
         self._switch_theme()
@@ -124,13 +128,24 @@ class Page:
             happened = (*self._session.new_events(), *self._orders.of_the_pour(status))
             self._events.extend(map(self._people.signed, happened))
             self._forget_what_comes_later(status)
+            preview = None if frame is not None else self._previewed(status)
             if frame is not None:
                 # Before it is drawn: a playback keeps the messages to browsers, and the time between them.
                 for recorder in filter(None, (self._recorder, self._context.recording)):
                     recorder.take(frame, status)
             with self._server.atomic():
-                self._show(Now(status, frame, self._events, self._notice), notice is not None or bool(happened))
+                now = Now(status, frame or preview, self._events, self._notice, preview is not None)
+                self._show(now, notice is not None or bool(happened))
             frames.wait(stop)
+
+    def _previewed(self, status: Status) -> Frame | None:
+        """A frame of the recording of this very pour, while the solver loads."""
+        if self._preview is None or status.state != SessionState.STARTING or status.generation != 1:
+            return None
+        if self._preview_since is None and not self._server.get_clients():
+            return None  # it begins when somebody looks
+        self._preview_since = self._preview_since or time.monotonic()
+        return self._preview.frame(time.monotonic() - self._preview_since, status.generation)
 
     def _forget_what_comes_later(self, status: Status) -> None:
         if status.time < self._time:  # brought back, or another pour
@@ -152,6 +167,12 @@ class Page:
             for panel in panels:
                 if panel.every == every:
                     panel.show(now)
+
+
+def named_keys(gui: viser.GuiApi) -> list[tuple[str, str]]:
+    """Keys of the page's commands with what they do; a key stands in its label already where it is one of the pour's."""
+    commands = [handle._impl.props for handle in gui._command_handle_from_uuid.values()]
+    return [("+".join(key if isinstance(key, tuple) else (key,)), one.label) for one in commands if (key := one.hotkey)]
 
 
 class People:

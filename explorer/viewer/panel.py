@@ -25,7 +25,6 @@ from explorer.viewer.look.look_settings import LookSettings
 from explorer.viewer.output.recording_switch import RecordingSwitch
 from explorer.viewer.shell.channel import ShellChannel
 from explorer.viewer.shell.web_pages import WebPages
-from explorer.viewer.tour import Stop
 
 OFTEN, SELDOM = 0.2, 0.5
 """Seconds between two looks of a panel: at the pour, and at what runs in the background."""
@@ -117,6 +116,8 @@ class Now:
     events: Sequence[Event] = ()
     notice: str = ""
     """The page's own last message, such as a refused click."""
+    previewed: bool = False
+    """Whether ``frame`` is of a recording that is shown while the solver loads."""
 
 
 class Panel:
@@ -130,8 +131,6 @@ class Panel:
     """Whether that folder is closed at first."""
     every: float = OFTEN
     """Seconds between two calls of :meth:`show`; where they are no more than ``OFTEN``, also after every change."""
-    stop: Stop | None = None
-    """Window of the guided tour that leads to it."""
 
     def __init__(self, page: PageContext) -> None:
         """Make the controls; tab and folder are open."""

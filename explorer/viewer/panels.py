@@ -26,6 +26,7 @@ from explorer.viewer.pour.second_pile import SecondPile
 from explorer.viewer.shell.state_line import StateLine
 from explorer.viewer.shell.timeline import Timeline
 from explorer.viewer.study.diagnosis_panel import DiagnosisPanel
+from explorer.viewer.study.reports_panel import ReportsPanel
 from explorer.viewer.study.study_panel import StudyPanel
 from solver.plugins import Registry, derived_from
 
@@ -56,6 +57,7 @@ PANELS: Registry[type[Panel]] = Registry(
         PhotographPanel,
         DesignPanel,
         AuditPanel,
+        ReportsPanel,
     ),
     derived_from(Panel),
 )

@@ -5,7 +5,6 @@ from __future__ import annotations
 from html import escape
 
 from explorer.viewer.panel import LABORATORY, Now, PageContext, Panel
-from explorer.viewer.tour import Stop
 from explorer.viewer.view import small_html
 
 
@@ -13,11 +12,6 @@ class LaboratoryPanel(Panel):
     """What the tab is for, and what is being done in it."""
 
     name, tab = "laboratory", LABORATORY
-    stop = Stop(
-        "Laboratory",
-        "The tab **Laboratory** works on what you have measured: readings of bench tests, photographs of a pile, a "
-        "filled sheet of runs, the tables of a publication. Shipped examples stand in each list.",
-    )
 
     def __init__(self, page: PageContext) -> None:
         self._background = page.bench_work

@@ -21,7 +21,6 @@ from explorer.viewer.look.look import in_sight
 from explorer.viewer.look.look_settings import CutPanel
 from explorer.viewer.panel import LOOK, Now, PageContext, Panel
 from explorer.viewer.scene_nodes import SceneNodes
-from explorer.viewer.tour import Stop
 from explorer.viewer.view import look_at_height
 from solver.scenes.scene import Scene
 
@@ -37,12 +36,6 @@ class LookPanel(Panel):
     """Draws the newest frame as the person wants to see it, and holds all that is set of that."""
 
     name, tab = "look", LOOK
-    stop = Stop(
-        "Look closer, and take along",
-        "The tab **Look** colours the bodies by speed, force or neighbours (**C**), draws force chains (**K**), cuts "
-        "the pile open, and tells about a body that you click. **Take along** has the command that repeats what you "
-        "see, tables, pictures, meshes and recordings.",
-    )
 
     def __init__(self, page: PageContext) -> None:
         server, session, post = page.server, page.session, page.post

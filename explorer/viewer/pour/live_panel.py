@@ -22,7 +22,6 @@ from explorer.units import InputError, checked, quantity, screen_unit, title
 from explorer.viewer.actions import Post
 from explorer.viewer.panel import SET_UP
 from explorer.viewer.pour.rebuilt_panel import RebuiltPanel
-from explorer.viewer.tour import Stop
 from explorer.viewer.view import small_html
 from solver.effects import EFFECTS, SetUpEffect
 from solver.params import Parameter, declared
@@ -49,11 +48,6 @@ class LivePanel(RebuiltPanel["LiveSections"]):
     """What acts on the running pour."""
 
     name, tab = "live", SET_UP
-    stop = Stop(
-        "Turn a parameter",
-        "Everything under *acts now* changes the pile that lies there. Take **Pair → all pairs → Static friction** to "
-        "zero, and it flows apart. The line *In the solver* tells what is in force, not what the slider shows.",
-    )
 
     def build(self, scene: Scene) -> LiveSections:
         """Make the sections for ``scene``."""

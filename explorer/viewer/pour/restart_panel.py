@@ -12,7 +12,6 @@ from explorer.units import checked, screen_unit, title
 from explorer.viewer.actions import Post
 from explorer.viewer.panel import SET_UP
 from explorer.viewer.pour.rebuilt_panel import RebuiltPanel
-from explorer.viewer.tour import Stop
 from solver.effects import set_up_effects
 from solver.params import Parameter, declared
 from solver.scenes.scene import Scene, parameters, value, with_values
@@ -55,11 +54,6 @@ class RestartPanel(RebuiltPanel["SetUpInputs"]):
     """What acts on the next pour."""
 
     name, tab = "set_up", SET_UP
-    stop = Stop(
-        "Change the set-up",
-        "What stands under *on restart* (mass, outlet, feed, sizes) waits for **Restart with this set-up**. The same "
-        "seed gives the same pour, to the last bit.",
-    )
 
     def build(self, scene: Scene) -> SetUpInputs:
         """Make the inputs for ``scene``."""

@@ -36,10 +36,12 @@ function openRoom(name) {
 const name = element("h1", { class: "name" });
 const steps = element("ol");
 const next = element("span", { class: "next", role: "status" });
+const help = element("button", { title: "Where to begin, and keys (?)", "aria-label": "Where to begin, and keys",
+  onclick: () => beginning.showModal() }, "?");
 const shade = element("button", { title: "Dark or light page", "aria-label": "Dark or light page",
   onclick: () => send({ do: "theme" }) }, "◑");
 document.body.append(element("header", { id: "state-line" }, name,
-  element("nav", { "aria-label": "Steps of the project" }, steps), next, shade));
+  element("nav", { "aria-label": "Steps of the project" }, steps), next, help, shade));
 
 function showSteps(project) {
   name.textContent = project.name;
@@ -53,6 +55,34 @@ function showSteps(project) {
   if (focused >= 0) steps.querySelectorAll("button")[focused]?.focus();
   next.replaceChildren("Next: ", element("b", {}, project.next));
   next.title = project.next;
+}
+
+// The first visit of a browser begins with four ways to begin; later they are behind "?".
+const WAYS = [
+  ["I have a grain and a photograph", "Give the grain's shape and sizes, read the angle off photographs of your pile, " +
+    "and calibrate against it.", "Laboratory"],
+  ["Just play", "Watch a pile of sunflower seeds form, and move its friction, stiffness and restitution.", "Controls"],
+  ["Plan an experiment", "A screening or response-surface design as a sheet to fill in, with its power told before you " +
+    "measure.", "Laboratory"],
+  ["Let a hidden effect be found", "Measured data of trefoil bodies with an effect that their model lacks: start the " +
+    "diagnosis, and see it named.", "Diagnose"],
+];
+const keys = element("ul", { class: "keys" });
+const beginning = element("dialog", { id: "beginning", "aria-labelledby": "beginning-title" },
+  element("form", { method: "dialog" }, element("h2", { id: "beginning-title" }, "Where do you want to begin?"),
+    element("div", { class: "cards" }, ...WAYS.map(([title, text, room]) => element("button",
+      { class: "card", value: title, onclick: () => requestAnimationFrame(() => openRoom(room)) },
+      element("b", {}, title), element("span", {}, text)))),
+    element("details", {}, element("summary", {}, "Keys"), keys),
+    element("button", { class: "close", value: "close" }, "Close")));
+document.body.append(beginning);
+beginning.addEventListener("close", () => localStorage.setItem("explorer-begun", "yes"));
+document.addEventListener("keydown", event => {
+  const typing = /^(INPUT|TEXTAREA|SELECT)$/.test(event.target.tagName);
+  if (event.key === "?" && !typing && !beginning.open) beginning.showModal();
+});
+function showKeys(all) {
+  keys.replaceChildren(...all.map(([key, label]) => element("li", {}, element("kbd", {}, key), " ", label)));
 }
 
 const act = (label, title, command, kind = "") =>
@@ -102,6 +132,7 @@ function showTimeline(now) {
 const show = {
   project: showSteps,
   timeline: showTimeline,
+  keys: showKeys,
   theme: theme => document.documentElement.classList.toggle("light", !theme.dark),
 };
 
@@ -113,6 +144,7 @@ function connect() {
   channel.onclose = () => setTimeout(connect, RECONNECT_MS);
 }
 connect();
+if (!localStorage.getItem("explorer-begun")) beginning.showModal();
 
 // For the boards in the study panel, which are pages of this server and of the same origin.
 window.explorer = { send, openRoom };

@@ -13,7 +13,6 @@ from explorer.units import checked
 from explorer.viewer.actions import SliderHands, add_keys
 from explorer.viewer.panel import AROUND, Now, PageContext, Panel
 from explorer.viewer.pour.readout import PHASE_WORDS, STATE_WORDS, TROUBLE, condition
-from explorer.viewer.tour import Stop
 
 PLAY_PAUSE, BACK, STEP, RESTART = "Play / pause (space)", "◀ Back (←)", "Step ▶ (→)", "Pour again (R)"
 KEYS: dict[str, Any] = {PLAY_PAUSE: "space", RESTART: "R"}
@@ -23,6 +22,7 @@ SLOWEST, FASTEST = 0.05, 2.0
 SPEEDS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0)
 MOST_EVENTS = 60
 """Events on the timeline; older ones are left out."""
+PREVIEWED = "recording of this pour, while the solver loads"
 LONGEST_EVENT = 120
 """Characters."""
 
@@ -31,14 +31,6 @@ class Timeline(Panel):
     """Talks to the session; what it shows is told to the browsers as one small object."""
 
     name, tab = "timeline", AROUND
-    stop = Stop(
-        "The pour",
-        "Bodies fall through the funnel and pile up, computed while you watch. **Space** pauses and plays, the **right "
-        "arrow** goes on by 10 ms and the **left arrow** back, **R** pours anew. Drag to turn the view, scroll to come "
-        "closer.\n\n"
-        "The big number is the angle of repose of the pile as it lies, ± its spread over the flanks. The timeline "
-        "below the scene goes back to any moment that is kept, with everything as it was.",
-    )
 
     def __init__(self, page: PageContext) -> None:
         session, post = page.session, page.post
@@ -108,6 +100,8 @@ def timeline_state(now: Now, recording: str) -> Mapping[str, Any]:
 def condition_words(now: Now) -> str:
     """State, phase and pace of the pour, such as "discharging · 0.42 × real time"."""
     status = now.status
+    if now.previewed:
+        return PREVIEWED
     words = [STATE_WORDS[status.state] if status.state != SessionState.RUNNING else PHASE_WORDS[status.phase]]
     if word := condition(status):
         words.append(word)

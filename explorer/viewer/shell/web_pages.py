@@ -8,7 +8,7 @@ from __future__ import annotations
 import gzip
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache, cached_property, lru_cache
 from hashlib import sha256
 from html import escape
 from http import HTTPStatus
@@ -61,7 +61,12 @@ class WebPage:
     """Media type."""
     body: bytes
     lasting: bool = False
-    """Whether a browser may keep it as long as this program's version is the same."""
+    """Whether a browser may keep it for a day."""
+
+    @cached_property
+    def tag(self) -> str:
+        """Changes whenever the body does."""
+        return f'"{sha256(self.body).hexdigest()[:16]}"'
 
 
 class WebPages:
@@ -74,6 +79,9 @@ class WebPages:
             "/index.html": self._first,
             "/shell/shell.js": lambda: _shipped("shell.js"),
             "/shell/shell.css": lambda: _shipped("shell.css"),
+            "/shell/board.html": lambda: _shipped("board.html"),
+            "/shell/board.js": lambda: _shipped("board.js"),
+            "/shell/board.css": lambda: _shipped("board.css"),
             "/shell/plotly.js": _plotly,
         }
 
@@ -103,7 +111,10 @@ class WebPages:
         if "Upgrade" in request.headers:  # viser's WebSocket is at the first page's address
             return None
         try:
-            return _response(make(), "gzip" in request.headers.get("Accept-Encoding", ""))
+            page = make()
+            if request.headers.get("If-None-Match") == page.tag:
+                return Response(HTTPStatus.NOT_MODIFIED, "Not Modified", Headers({"ETag": page.tag, **GUARD}))
+            return _response(page, "gzip" in request.headers.get("Accept-Encoding", ""))
         except OSError:  # a file that is not there any more
             return _refusal(HTTPStatus.NOT_FOUND)
 
@@ -152,7 +163,8 @@ def _response(page: WebPage, may_zip: bool) -> Response:
         {
             "Content-Type": page.kind,
             "Content-Length": str(len(body)),
-            "Cache-Control": "max-age=86400" if page.lasting else "no-store",
+            "Cache-Control": "max-age=86400" if page.lasting else "no-cache",
+            "ETag": page.tag,
             **GUARD,
         }
     )

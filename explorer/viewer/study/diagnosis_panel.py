@@ -12,15 +12,12 @@ from explorer.background.output_folder import ResultFile
 from explorer.diagnosis.process import RESULT, Question
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.files.uploads import kept_measurements
-from explorer.report.diagnosis.answer import verdict_sentence
-from explorer.report.diagnosis.charts import diagnosis_plots, likely
-from explorer.report.diagnosis.wording import chance, feature_label, feature_value, spelled
 from explorer.units import checked
+from explorer.viewer.board.board_view import BoardView
+from explorer.viewer.board.diagnosis_board import diagnosis_board
 from explorer.viewer.panel import DIAGNOSE, SELDOM, Now, PageContext, Panel
-from explorer.viewer.study.plot_view import PlotView
 from explorer.viewer.study.process_view import ProcessView, escaped, stages_markdown, waiting_markdown
 from explorer.viewer.study.result_chooser import ResultChooser
-from explorer.viewer.tour import Stop
 from solver import EFFECTS
 from solver.assets import shipped_measurements
 
@@ -33,24 +30,14 @@ FIRST = "trefoil_2"
 """Chosen at first, where it is shipped: the data set of `make diagnose`."""
 OWN = "folder below"
 """Choice of the list that takes the folder in the text field."""
-ANSWERS = 5
-"""Of the most probable ones, that stand beside the verdict."""
+REPORT = "report.html"
 PRESENT = "present or newest diagnosis"
-EMPTY = (
-    "No charts yet: they come with the answer of a diagnosis. Choose measured data above and press *Start*, or add a "
-    "folder with a finished diagnosis below."
-)
 
 
 class DiagnosisPanel(Panel):
     """Talks to a :class:`DiagnosisProcess`; data sets to choose from are those shipped, and those uploaded."""
 
     name, tab, every = "diagnosis", DIAGNOSE, SELDOM
-    stop = Stop(
-        "Diagnose",
-        "The tab **Diagnose** takes measured data and asks which physical effect the declared model lacks, or whether "
-        "nothing is missing. The answer comes with the error on data that were not fitted, before and after.",
-    )
 
     def __init__(self, page: PageContext) -> None:
         server, gui, diagnosis, post = page.server, page.server.gui, page.diagnosis, page.post
@@ -76,13 +63,11 @@ class DiagnosisPanel(Panel):
         acts = {"Start": self._start, "Pause / go on": self._pause, "Cancel": diagnosis.cancel}
         more = {"Resume": self._resume, "Queue": self._queue, "Clear queue": diagnosis.clear_queue}
         self._view = ProcessView(server, "Diagnosis", acts, post, more)
-        self._answer = gui.add_markdown("")
-        self._plots = PlotView(server, "Chart", EMPTY, post)
         self._chooser = ResultChooser(server, "Result", PRESENT, RESULT, post, self._follow)
-
-    def set_dark(self, dark: bool) -> None:
-        """Charts for a dark page, or a light one."""
-        self._plots.dark = dark
+        self._trouble = gui.add_markdown("")
+        self._pages = page.pages
+        self._result: DiagnosisResult | None = None
+        self._board = BoardView(server, page.pages, "/diagnosis/page.json", "Diagnosis")
 
     def _start(self) -> None:
         self._diagnosis.start(self._question())
@@ -119,6 +104,7 @@ class DiagnosisPanel(Panel):
         self._view.show(status, text + waiting_markdown(self._diagnosis.waiting()))
         self._chooser.offer(self._diagnosis.finished())
         self._follow()
+        self._show_board()
 
     def _follow(self) -> None:
         """Show the chosen result where it is another one than before."""
@@ -130,36 +116,25 @@ class DiagnosisPanel(Panel):
         if shown == self._shown:
             return
         self._shown = shown
+        trouble = ""
         try:
-            result = None if content is None else DiagnosisResult.from_dict(content)
-            answer = "" if result is None else answer_markdown(result)
-            plots = {} if result is None else diagnosis_plots(result)
+            self._result = None if content is None else DiagnosisResult.from_dict(content)
         except RecordError as error:
-            answer, plots = escaped(f"{folder}: {error}"), {}
-        except (AssertionError, LookupError, ValueError) as error:
-            # A folder that somebody named may hold names of effects, answers and conditions that are none.
-            answer, plots = f"{escaped(str(folder))}: cannot be shown ({escaped(repr(error))})", {}
-        self._answer.content = answer
-        self._plots.offer(plots, shown)
+            # A folder that somebody named may hold any JSON, also that of another version.
+            self._result, trouble = None, escaped(f"{folder}: {error}")
+        self._trouble.content = trouble
 
-
-def answer_markdown(result: DiagnosisResult) -> str:
-    """The verdict in a sentence, the likely answers, and the errors before, after, and by noise alone."""
-    verdict, sentence = escaped(result.verdict), escaped(verdict_sentence(result).replace("`", ""))
-    odds = "\n".join(
-        f"| {escaped(spelled(one).replace('`', ''))} | {escaped(chance(p))} |" for one, p in likely(result)[:ANSWERS]
-    )
-    errors, words = result.error.told()
-    rows = "\n".join(
-        f"| {escaped(feature_label(row.observable))} | "
-        + " | ".join(
-            escaped(feature_value(result, row.observable, one)) for one in (row.before, row.after, row.noise_floor)
-        )
-        + " |"
-        for row in errors
-    )
-    head = f"| Error on {words} data | Before | After | Noise floor |\n|:--|--:|--:|--:|"
-    return f"**{verdict}** — {sentence}\n\n| Answer | Probability |\n|:--|--:|\n{odds}\n\n{head}\n{rows}"
+    def _show_board(self) -> None:
+        """The board of what is chosen, anew where result or progress is another."""
+        chosen = self._chooser.folder
+        status = self._diagnosis.status() if chosen is None else None
+        alive = status is not None and status.alive
+        progress = (status.state, status.stage, status.done) if status is not None and alive else None
+        result = None if alive else self._result
+        folder, report = chosen or self._diagnosis.out or next(iter(self._diagnosis.finished()), None), ""
+        if folder is not None and not alive and (folder / REPORT).is_file():
+            report = self._pages.publish_folder(folder) + REPORT
+        self._board.offer((self._shown, progress, report), lambda: diagnosis_board(result, status, report))
 
 
 class CandidateEffects:

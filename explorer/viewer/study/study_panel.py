@@ -10,9 +10,12 @@ from doe.stages import planned_runs
 from doe.studies.study import Study, load_study
 from doe.studies.study_result import AnyStudy, PartialStudy, study_from
 from explorer.background.output_folder import ResultFile
-from explorer.report.study_charts import study_plots
+from explorer.errors import CommandError
 from explorer.session import Session
 from explorer.study.process import PARTIAL, RESULT
+from explorer.study.runs import scene_of
+from explorer.viewer.board.board_view import BoardView
+from explorer.viewer.board.study_board import listed_runs, study_board
 from explorer.viewer.panel import CALIBRATE, SELDOM, Now, PageContext, Panel
 from explorer.viewer.study.comparison_panel import ComparisonPanel
 from explorer.viewer.study.order_panel import OrderPanel
@@ -20,27 +23,18 @@ from explorer.viewer.study.plot_view import PlotView
 from explorer.viewer.study.process_view import ProcessView, escaped, stages_markdown, waiting_markdown
 from explorer.viewer.study.profiler_panel import ProfilerPanel
 from explorer.viewer.study.result_chooser import ResultChooser, title
-from explorer.viewer.study.run_chooser import RunChooser
-from explorer.viewer.tour import Stop
 from solver import Scene, canonical, parameters, with_values
 
 PRESENT = "present or newest study"
 NONE = "(the study cannot be read)"
-EMPTY = (
-    "No charts yet: they come as soon as a stage can be analysed. Press *Start*, or add a "
-    "folder with a finished study below."
-)
+REPORT = "report.html"
+PROFILED = "Move a slider: the charts follow."
 
 
 class StudyPanel(Panel):
     """Talks to a :class:`StudyProcess`; what a result says is read and drawn by `explorer.report`."""
 
     name, tab, every = "study", CALIBRATE, SELDOM
-    stop = Stop(
-        "Calibrate",
-        "The tab **Calibrate** runs a whole study in the background: screening, steepest ascent, response surface, "
-        "optimum, verification. The pour goes on meanwhile, and a cancelled study resumes where it stopped.",
-    )
 
     def __init__(self, page: PageContext) -> None:
         server, gui, study, post = page.server, page.server.gui, page.study, page.post
@@ -48,6 +42,7 @@ class StudyPanel(Panel):
         loaded = _loaded(study.study_file)
         self._alive, self._over = ResultFile(PARTIAL, RESULT), ResultFile(RESULT, PARTIAL)
         self._shown: Hashable = None
+        self._result: AnyStudy | None = None
         self._trouble = ""
         self._so_far = ("", "")
         name = escaped(study.study_file.stem)
@@ -62,12 +57,13 @@ class StudyPanel(Panel):
         acts = {"Start": self._start, "Pause / go on": self._pause, "Cancel": study.cancel}
         more = {"Resume": study.resume, "Retry": study.retry, "Queue": self._queue, "Clear queue": study.clear_queue}
         self._view = ProcessView(server, "Study", acts, post, more)
-        self._plots = PlotView(server, "Chart", EMPTY, post)
         self._chooser = ResultChooser(server, "Result", PRESENT, RESULT, post, self._follow)
+        self._pages = page.pages
+        self._board = BoardView(server, page.pages, "/study/page.json", "Study")
+        page.channel.offer("open_run", lambda asked: post(lambda: self._open_run(asked)))
         with gui.add_folder("Profiler", expand_by_default=False):
+            self._plots = PlotView(server, "Chart", PROFILED, post)
             self._profiler = ProfilerPanel(server, post, self._plots.show_anew, self._set_live)
-        with gui.add_folder("Runs, poured again", expand_by_default=False):
-            self._runs = RunChooser(server, page.session, post)
         with gui.add_folder("Compare two studies", expand_by_default=False):
             self._comparison = ComparisonPanel(server, post)
 
@@ -88,6 +84,7 @@ class StudyPanel(Panel):
         self._chooser.offer(folders)
         self._comparison.offer(folders)
         self._follow()
+        self._show_board()
 
     def _start(self) -> None:
         self._study.start(str(self._profile.value), self._order.edits)
@@ -123,11 +120,34 @@ class StudyPanel(Panel):
             self._show_result(None, "", None)
 
     def _show_result(self, result: AnyStudy | None, name: str, version: Hashable) -> None:
+        self._result = result
         self._profiler.show(result)
-        plots = {} if result is None else study_plots(result) | self._profiler.plots()
-        self._plots.offer(plots, version)
-        self._runs.show(result)
+        self._plots.offer(self._profiler.plots(), version)
         self._comparison.show(result, name, version)
+
+    def _show_board(self) -> None:
+        """The board of what is chosen, anew where result or progress is another."""
+        status = self._study.status() if self._chooser.folder is None else None
+        alive = status is not None and status.alive
+        progress = (status.state, status.stage, status.done) if status is not None and alive else None
+        result, folder = self._result, self._chooser.folder or self._present()
+        report = ""
+        if folder is not None and not alive and (folder / REPORT).is_file():
+            report = self._pages.publish_folder(folder) + REPORT
+        self._board.offer((self._shown, progress, report), lambda: study_board(result, status, report))
+
+    def _open_run(self, asked: Mapping[str, object]) -> None:
+        """Pour a run of the result in the scene, as its row of the board asks."""
+        result = self._result
+        runs = [] if result is None else listed_runs(result)
+        wanted = (asked.get("stage"), asked.get("label"), asked.get("seed"))
+        found = next(((stage, run) for stage, run in runs if (stage, run.label, run.seed) == wanted), None)
+        if result is None or found is None:
+            raise CommandError("this run is not in the study that is shown")
+        scene, same = scene_of(result, *found)
+        self._session.restart(scene, found[1].seed)
+        if not same:
+            raise CommandError("program, study file or material have changed since that run: this pour may differ")
 
     def _present(self) -> Path | None:
         """Folder of the study that was started last, or before any the newest finished one."""

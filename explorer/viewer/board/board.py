@@ -1,0 +1,104 @@
+"""What a board shows, as typed values, and as the JSON that the page ``/shell/board.html`` draws."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from explorer.report.content import Banner, Spec, Table
+from explorer.report.study_charts import Plots
+
+WIDE = 1.0
+"""Height by width from which on a chart of several panels gets the board's whole width on a wide screen."""
+CODE = re.compile(r"`([^`]*)`")
+
+
+@dataclass(frozen=True)
+class BoardChart:
+    """One chart: ``aspect`` is its height by its width."""
+
+    title: str
+    spec: Spec
+    caption: str
+    aspect: float
+
+
+@dataclass(frozen=True)
+class BoardTable:
+    """A table that a reader sorts and filters; ``opens`` has a command per row that opens it in the scene, or none."""
+
+    title: str
+    table: Table
+    opens: tuple[Mapping[str, Any], ...] = ()
+    folded: bool = True
+
+
+@dataclass(frozen=True)
+class Stage:
+    """How far one stage is: "12 of 28", and what it found."""
+
+    name: str
+    count: str
+    mark: str
+    found: str
+
+
+@dataclass(frozen=True)
+class Board:
+    """All of a board."""
+
+    title: str
+    subtitle: str
+    banner: Banner | None = None
+    lead: str = ""
+    """A sentence above all else, such as what is missing and how sure that is."""
+    facts: tuple[tuple[str, str], ...] = ()
+    stages: tuple[Stage, ...] = ()
+    charts: tuple[BoardChart, ...] = ()
+    tables: tuple[BoardTable, ...] = ()
+    report: str = ""
+    """Address of the report; empty where there is none."""
+
+
+def made_charts(plots: Plots) -> tuple[BoardChart, ...]:
+    """The charts of ``plots`` that have something to draw."""
+    made = ((title, plot, plot.make()) for title, plot in plots.items())
+    return tuple(BoardChart(title, spec, plot.caption, plot.aspect) for title, plot, spec in made if spec is not None)
+
+
+def board_json(board: Board) -> bytes:
+    """The board for its page; texts are plain, without code marks."""
+    content = {
+        "title": board.title,
+        "subtitle": board.subtitle,
+        "banner": None if board.banner is None else _banner(board.banner),
+        "lead": _plain(board.lead),
+        "facts": [[name, _plain(value)] for name, value in board.facts],
+        "stages": [vars(stage) for stage in board.stages],
+        "charts": [vars(chart) for chart in board.charts],
+        "tables": [
+            {
+                "title": one.title,
+                "header": one.table.header,
+                "rows": [[_plain(cell) for cell in row] for row in one.table.rows],
+                "caption": _plain(one.table.caption),
+                "opens": one.opens,
+                "folded": one.folded,
+            }
+            for one in board.tables
+        ],
+        "report": board.report,
+    }
+    return json.dumps(content, allow_nan=False, ensure_ascii=False, separators=(",", ":")).encode()
+
+
+def _banner(banner: Banner) -> dict[str, str]:
+    texts = {"headline": banner.headline, "why": banner.why, "then": banner.then}
+    return {"tone": banner.word.tone} | {name: _plain(text) for name, text in texts.items()}
+
+
+def _plain(text: str) -> str:
+    return CODE.sub(r"\1", text)

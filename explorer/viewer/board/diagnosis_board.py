@@ -1,0 +1,60 @@
+"""The board of a diagnosis: one screen that says what is missing, how sure that is, and shows before and after."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from explorer.background.command_process import CommandStatus
+from explorer.diagnosis.result import DiagnosisResult
+from explorer.report.content import Table
+from explorer.report.diagnosis.answer import banner, verdict_sentence
+from explorer.report.diagnosis.charts import diagnosis_plots, likely, map_chart
+from explorer.report.diagnosis.wording import chance, feature_label, feature_value, spelled
+from explorer.report.study_charts import Plot
+from explorer.viewer.board.board import Board, BoardTable, made_charts
+from explorer.viewer.board.study_board import stages_of, working
+
+
+def diagnosis_board(result: DiagnosisResult | None, status: CommandStatus | None, report: str = "") -> Board:
+    """The board of ``result``; ``status`` of the process that works, None where none does."""
+    alive = status is not None and status.alive
+    subtitle = working(status) if status is not None and alive else ""
+    if result is None:
+        return Board("", subtitle, stages=stages_of(status))
+    plots = diagnosis_plots(result)
+    first = {title: plot for title, plot in plots.items() if title.startswith("Pile")}
+    maps = {
+        f"Where the pile is off, {one.condition}": Plot(
+            partial(map_chart, one), "Measured minus model over the plate; lines: measured height.", 0.55
+        )
+        for one in sorted(result.maps, key=lambda one: one.role != "holdout")
+    }
+    rest = {title: plot for title, plot in plots.items() if title not in first}
+    return Board(
+        title=result.data.title or result.data.folder,
+        subtitle=subtitle,
+        banner=banner(result),
+        lead=verdict_sentence(result),
+        stages=stages_of(status) if alive else (),
+        charts=made_charts(first | maps | rest),
+        tables=(_answers(result), _errors(result)),
+        report=report,
+    )
+
+
+def _answers(result: DiagnosisResult) -> BoardTable:
+    rows = tuple((spelled(answer), chance(p)) for answer, p in likely(result))
+    return BoardTable("Answers", Table(("Answer", "Probability"), rows), folded=False)
+
+
+def _errors(result: DiagnosisResult) -> BoardTable:
+    errors, words = result.error.told()
+    rows = tuple(
+        (
+            feature_label(row.observable),
+            *(feature_value(result, row.observable, one) for one in (row.before, row.after, row.noise_floor)),
+        )
+        for row in errors
+    )
+    table = Table(("Observable", "Before", "After", "Noise floor"), rows)
+    return BoardTable(f"Error on {words} data", table, folded=False)

@@ -1,0 +1,96 @@
+"""The board of a study: its verdict, its stages, all charts that there are so far, the answers and every run."""
+
+from __future__ import annotations
+
+from doe.run_records import Run
+from doe.studies.study_result import AnyStudy, StudyResult
+from explorer.background.command_process import CommandStatus
+from explorer.outcomes import outcome_text
+from explorer.report.content import Table
+from explorer.report.identified import settings
+from explorer.report.sections.answer import banner
+from explorer.report.study_charts import study_plots
+from explorer.study.runs import stages_with_runs
+from explorer.units import MISSING, observable_label, observed
+from explorer.viewer.board.board import Board, BoardTable, Stage, made_charts
+from explorer.viewer.study.process_view import AT_WORK, DONE, TO_COME, time_left
+
+RUN_HEADER = ("Stage", "Setting", "Seed", "Outcome", "Value")
+
+
+def study_board(result: AnyStudy | None, status: CommandStatus | None, report: str = "") -> Board:
+    """The board of ``result``; ``status`` of the process that works on it, None where none does."""
+    alive = status is not None and status.alive
+    if result is None:
+        return Board("", working(status) if status is not None and alive else "", stages=stages_of(status))
+    study, finished = result.study, isinstance(result, StudyResult)
+    return Board(
+        title=study.title or study.name,
+        subtitle=working(status) if status is not None and alive else f"profile {study.profile.name}",
+        banner=banner(result) if isinstance(result, StudyResult) else None,
+        stages=stages_of(status) if alive else (),
+        charts=made_charts(study_plots(result))[:: -1 if finished else 1],
+        tables=(*_answers(result), _runs(result)),
+        report=report,
+    )
+
+
+def working(status: CommandStatus) -> str:
+    """Where a command is, in a line."""
+    words = "Paused" if status.state == "paused" else "Running"
+    if not status.planned:
+        return f"{words}: {status.stage}"
+    return f"{words}: {status.stage}, {status.done} of {status.planned}, time left {time_left(status.eta_s)}"
+
+
+def stages_of(status: CommandStatus | None) -> tuple[Stage, ...]:
+    """The stages of a command with how far each is."""
+    if status is None:
+        return ()
+    return tuple(
+        Stage(
+            one.name,
+            f"{one.done} of {one.planned}" if one.planned else TO_COME,
+            DONE
+            if one.finding is not None or 0 < one.planned <= one.done
+            else AT_WORK
+            if status.alive and one.name == status.stage
+            else TO_COME,
+            one.finding or "",
+        )
+        for one in status.stages
+    )
+
+
+def _answers(result: AnyStudy) -> tuple[BoardTable, ...]:
+    """The parameters that the study leaves, where it has come so far."""
+    if result.optimum is None:
+        return ()
+    rows = tuple(
+        (one.name, one.label, one.chosen if one.identified else one.answer, "yes" if one.identified else "no")
+        for one in settings(result.optimum)
+    )
+    caption = "Where a factor is not identified, the range that gives the target is the answer."
+    table = Table(("Factor", "Parameter", "Answer", "Identified"), rows, caption)
+    return (BoardTable("Parameters", table, folded=False),)
+
+
+def listed_runs(result: AnyStudy) -> list[tuple[str, Run]]:
+    """Every run with its stage, in running order."""
+    return [(stage, run) for stage in stages_with_runs(result) for runs in result.runs_of(stage) for run in runs]
+
+
+def _runs(result: AnyStudy) -> BoardTable:
+    observable = result.study.targets[0].observable
+    runs = listed_runs(result)
+    rows = tuple(
+        (stage, run.label, str(run.seed), outcome_text(run.outcome), _value(run, observable)) for stage, run in runs
+    )
+    opens = tuple({"do": "open_run", "stage": stage, "label": run.label, "seed": run.seed} for stage, run in runs)
+    caption = f"Value: {observable_label(observable)}. A click on a row pours that run in the scene."
+    return BoardTable(f"Runs ({len(rows)})", Table(RUN_HEADER, rows, caption), opens)
+
+
+def _value(run: Run, observable: str) -> str:
+    value = run.observables.get(observable)
+    return observed(observable, value) if value is not None and run.valid else MISSING

@@ -1,0 +1,60 @@
+"""The reports of the project's finished studies and diagnoses, read beside the scene or in a tab of their own."""
+
+from __future__ import annotations
+
+from html import escape
+from pathlib import Path
+
+from explorer.viewer.board.board_view import HEIGHT
+from explorer.viewer.panel import REPORTS, SELDOM, Now, PageContext, Panel
+from explorer.viewer.study.result_chooser import title
+
+REPORT = "report.html"
+NONE = "(no report yet)"
+EMPTY = (
+    "A report is written at the end of a calibration and of a diagnosis. It is one file that needs nothing else: "
+    "verdict, figures, tables, and a paragraph of methods."
+)
+
+
+class ReportsPanel(Panel):
+    """A list of reports, newest first; the chosen one in a frame."""
+
+    name, tab, every = "reports", REPORTS, SELDOM
+
+    def __init__(self, page: PageContext) -> None:
+        gui = page.server.gui
+        self._page = page
+        self._list = gui.add_dropdown("Report", (NONE,), hint="Of finished studies and diagnoses, newest first.")
+        self._frame = gui.add_html("")
+        self._text = gui.add_markdown(EMPTY)
+        self._folders: dict[str, Path] = {}
+        self._shown: Path | None = None
+        self._list.on_update(lambda event: page.post(self._show) if event.client_id is not None else None)
+
+    def show(self, now: Now) -> None:
+        """Offer what there is."""
+        found = [*self._page.study.finished(), *self._page.diagnosis.finished()]
+        reports = [folder for folder in found if (folder / REPORT).is_file()]
+        reports.sort(key=lambda folder: (folder / REPORT).stat().st_mtime, reverse=True)
+        self._folders = {title(folder): folder for folder in reports}
+        options = tuple(self._folders) or (NONE,)
+        if tuple(self._list.options) != options:
+            self._list.options = options
+        self._show()
+
+    def _show(self) -> None:
+        folder = self._folders.get(str(self._list.value))
+        if folder == self._shown:
+            return
+        self._shown = folder
+        self._text.visible = folder is None
+        if folder is None:
+            self._frame.content = ""
+            return
+        address = self._page.pages.publish_folder(folder) + REPORT
+        self._frame.content = (
+            f'<p style="padding:0 0.75em; font-size:13px"><a href="{address}" target="_blank" rel="noopener">'
+            f'Open {escape(title(folder))} in a tab of its own</a></p><iframe title="Report" src="{address}" '
+            f'style="width:100%; height:{HEIGHT}; min-height:320px; border:0; background:white"></iframe>'
+        )
