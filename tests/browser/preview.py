@@ -16,8 +16,8 @@ SEED = 1
 """Of the first pour of ``explorer serve``."""
 
 
-def preview_of(recording):
-    """Frames of all bodies, component by component in order of entry; the last second of rest is left out."""
+def preview_of(recording, bodies):
+    """Frames of all bodies, component by component of the recording; ``bodies``: the components' names in the scene."""
     times = np.asarray(recording.times)
     most = [component.most for component in recording.components]
     n = sum(most)
@@ -32,7 +32,8 @@ def preview_of(recording):
             inside[k, rows] = True
             position[k, rows], quaternion[k, rows] = there.position, there.quaternion
             scale[rows] = there.scale
-    component = np.repeat(np.arange(len(most)), most)
+    kinds = [bodies.index(one.shape.name) for one in recording.components]
+    component = np.repeat(kinds, most)
     return Preview(times - times[0], component, inside, position, quaternion, scale)
 
 
@@ -45,7 +46,7 @@ def main():
         file = Path(folder) / "pour.rrd"
         command = [sys.executable, "-m", "explorer", "simulate", str(project.study), "--seed", str(SEED)]
         subprocess.run([*command, "--record", str(file)], check=True)
-        print(save_preview(preview_of(read_recording(file)), scene, SEED))
+        print(save_preview(preview_of(read_recording(file), [body.name for body in scene.bodies]), scene, SEED))
 
 
 if __name__ == "__main__":

@@ -25,12 +25,19 @@ function element(tag, attributes = {}, ...children) {
 function openRoom(name) {
   const found = () => [...document.querySelectorAll("#root [role=tab]")].find(tab => tab.textContent.trim() === name);
   const tab = found();
-  if (tab) { tab.click(); tab.focus(); return; }
+  if (tab) { press(tab); return; }
   const sheet = [...document.querySelectorAll("#root [role=button]")].find(
     one => (one.getAttribute("aria-label") || "").startsWith("Expand panel") && one.textContent.includes(name));
   if (!sheet) return;
-  sheet.click();
-  requestAnimationFrame(() => found()?.click());
+  press(sheet);
+  requestAnimationFrame(() => { const opened = found(); if (opened) press(opened); });
+}
+
+// viser's movable tabs answer to a key, those inside a panel to a click.
+function press(target) {
+  target.focus();
+  if (target.dataset.dockTab === undefined) target.click();
+  else target.dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", code: "Enter", bubbles: true, cancelable: true }));
 }
 
 const name = element("h1", { class: "name" });
