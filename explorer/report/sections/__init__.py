@@ -6,18 +6,10 @@ from collections.abc import Callable
 
 from doe.studies.study_result import StudyResult
 from explorer.report.content import Section
-from explorer.report.sections.ascent import ascent
-from explorer.report.sections.assumptions import assumptions, scan
-from explorer.report.sections.effects import effects
-from explorer.report.sections.further import further
-from explorer.report.sections.noise import noise
-from explorer.report.sections.optimum import optimum
-from explorer.report.sections.overview import overview
-from explorer.report.sections.paper import paper
-from explorer.report.sections.repeat import repeat, runs
-from explorer.report.sections.screening import screening
-from explorer.report.sections.surface import surface
-from explorer.report.sections.verification import verification
+from explorer.report.sections.answer import effects, optimum, overview, verification
+from explorer.report.sections.closing import further, paper, repeat, runs
+from explorer.report.sections.designs import assumptions, noise, scan, screening
+from explorer.report.sections.surface import ascent, surface
 
 STAGES_FOUND: tuple[Callable[[StudyResult], Section | None], ...] = (
     overview,
