@@ -36,15 +36,21 @@ def effects(result: DesignResult) -> Section | None:
         ),
         Facts(tuple(_errors(part))),
     ]
+    n = f"n = {result.runs.valid} runs in {result.runs.rows} rows"
     bars = pareto(drawn)
     if bars is not None:
-        lines = "Lines: the |t| at which p = 0.05 for one effect (dashed) and for all (solid)."
+        lines = f"{n}. Lines: the |t| at which p = 0.05 for one effect (dashed) and for all (solid, Bonferroni)."
         blocks.append(Figure("pareto", bars, lines))
-    caption = "Noise alone would follow a straight line through the origin; what stands above it acts."
+    caption = (
+        f"{n}. Noise alone would follow a straight line through the origin; what stands above it acts. Lines: Lenth’s "
+        "margins, 95 %."
+    )
     blocks.append(Figure("half-normal", half_normal(drawn), caption))
     chart = main_effects(_only(part, _of_factors(part)))
     if chart is not None:
-        blocks.append(Figure("main-effects", chart, "The largest ones; whiskers: 95 %; dotted: mean."))
+        blocks.append(
+            Figure("main-effects", chart, f"{n}. The largest ones; whiskers: 95 % intervals (t); dotted: mean.")
+        )
     blocks.append(effect_table(part))
     if part.curvature is not None:
         blocks.append(Text(curvature(part.curvature, part.response)))
@@ -89,7 +95,7 @@ def curvature(found: Curvature, response: str) -> str:
     """The test of the centre runs, in a sentence."""
     return (
         f"Curvature: the corners lie {observed(response, found.difference)} from the centre runs "
-        f"(F = {number(found.f, 4)} on 1 and {found.df_error} degrees of freedom, p = {p_value(found.p)})."
+        f"(F = {number(found.f)} on 1 and {found.df_error} degrees of freedom, p = {p_value(found.p)})."
     )
 
 
@@ -216,6 +222,7 @@ def diagnostics(result: DesignResult) -> Section | None:
     if model is None or fitted is None:
         return None
     found, labels = model.diagnostics, result.labels
+    n = f"n = {result.runs.valid} runs"
     facts = [
         ("Outliers", _which(found.outliers, labels, f"|studentised residual| > {number(found.outlier_limit)}, "
                                                        "p = 0.05 for the largest of all")),
@@ -226,13 +233,18 @@ def diagnostics(result: DesignResult) -> Section | None:
     ]  # fmt: skip
     blocks: list[Block] = [
         Facts(tuple(facts)),
-        Figure("fit", fit(fitted), ""),
-        Figure("residual-quantiles", residual_quantiles(fitted), "A right model's residuals follow the line."),
-        Figure("single-runs", single_runs(found, labels), "Dashed: the limits named above."),
+        Figure("fit", fit(fitted), f"{n}, one mark each; residuals are studentized externally."),
+        Figure(
+            "residual-quantiles",
+            residual_quantiles(fitted),
+            f"{n}. Ordered studentized residuals against Student’s t: those of a right model with normal noise follow "
+            "the line.",
+        ),
+        Figure("single-runs", single_runs(found, labels), f"{n}, by row of the sheet. Dashed: the limits named above."),
     ]
     profile = box_cox_profile(model.box_cox)
     if profile is not None:
-        caption = "Band: 95 % interval; red: the best power; dashed: no transformation."
+        caption = f"{n}. Box–Cox profile; band: 95 % interval; red: the best power; dashed: no transformation."
         blocks.append(Figure("box-cox", profile, caption))
     return Section("Diagnostics", (*blocks, Folded("All runs against the model", (run_table(result, model),))))
 
@@ -278,12 +290,19 @@ def box_cox_words(found: BoxCox) -> str:
 
 def _charts(fitted: FittedTarget) -> list[Block]:
     where = "the middle" if fitted.optimum is None else "the chosen setting"
-    caption = f"Along each factor through {where}; band: 95 % of the mean."
+    n = f"n = {len(fitted.model.observed)} runs"
+    caption = f"{n}. Fitted model along each factor through {where}; band: 95 % of the mean (t)."
     blocks: list[Block] = [Figure("profiler", profiler(fitted, fitted.section_point), caption)]
     if 2 <= len(fitted.factors) <= MOST_PANELS:
-        caption = f"Through {where}; the points of the design are projected on each panel."
+        caption = f"{n}. Fitted model through {where}; the points of the design are projected on each panel."
         blocks.append(Figure("contours", contours(fitted), caption))
-        blocks.append(Figure("surface", height_over(fitted, (0, 1)), f"Over A and B through {where}."))
+        blocks.append(
+            Figure(
+                "surface",
+                height_over(fitted, (0, 1)),
+                f"{n}, drawn at their own height. Fitted model over A and B through {where}.",
+            )
+        )
     elif len(fitted.factors) > MOST_PANELS:
         blocks.append(Text(f"Contours are drawn for up to {MOST_PANELS} factors; `--only` keeps the ones that act."))
     return blocks

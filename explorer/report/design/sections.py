@@ -14,15 +14,18 @@ from doe.analysis.surface_anova import SurfaceAnova
 from doe.analysis.t_tests import Sample
 from doe.stages.surface import OptimumResult
 from explorer.design.result import DesignResult
-from explorer.report.content import Block, Caution, Code, Facts, Figure, Section, Table, Text
+from explorer.report.content import Banner, Block, Caution, Code, Facts, Figure, Section, Table, Text, Word
 from explorer.report.design.charts import ridge
 from explorer.report.design.model import diagnostics, effects, model, units_of_factors
 from explorer.report.figures.model import cloud, ranges
 from explorer.report.figures.surface import solutions
 from explorer.report.identified import GIVES_TARGET, cloud_caution, rule, settings
+from explorer.report.sections.answer import ranges_caption
 from explorer.report.sections.surface import equation
 from explorer.units import MISSING, enumeration, fixed, number, observed, parameter_label, parameter_value, percent
 
+WHOLE = ("model", "residual", "lack_of_fit", "pure_error", "total")
+"""Rows of an analysis of variance that are no terms."""
 MOST_PANELS = 3
 """Factors up to which every pair of them has a panel."""
 
@@ -47,13 +50,19 @@ def target(result: DesignResult) -> Section | None:
     if not found.target_standard_error:
         facts.append(("The target itself", "taken as exact; `--target-error` states its standard error"))
     blocks: list[Block] = [Facts(tuple(facts)), settings_table(result, optimum)]
+    n = f"n = {result.runs.valid} runs in {result.runs.rows} rows"
     surface = solutions(fitted)
     if surface is not None:
-        blocks.append(Figure("solutions", surface, "Every setting on the green surface gives the target."))
-    blocks.append(Figure("ranges", ranges(fitted), "Thin inside thick: the narrower the bar, the better known."))
+        blocks.append(
+            Figure(
+                "solutions", surface, f"{n}. Every setting on the green surface gives the target in the fitted model."
+            )
+        )
+    blocks.append(Figure("ranges", ranges(fitted), ranges_caption(optimum)))
     if 1 < len(result.factors) <= MOST_PANELS:
         caption = (
-            f"{len(found.bootstrap_points)} refits to resampled {found.resampling}; each dot is the solution "
+            f"n = {len(found.bootstrap_points)} refits to resampled {found.resampling} (bootstrap); each dot is the "
+            "solution "
             f"nearest the reference. {percent(found.share_reached)} of the refits reach the target. "
             + cloud_caution(optimum)
         )
@@ -85,7 +94,11 @@ def shape(result: DesignResult) -> Section | None:
         blocks += [Facts(tuple(_stationary(result, canonical))), axes_table(result, canonical)]
     for path, words in ((model.highest, "highest"), (model.lowest, "lowest")):
         blocks.append(path_table(result, path, words, response))
-    caption = "Band: 95 % of the mean. The path ends at the distance of the furthest run and may leave low … high."
+    caption = (
+        f"n = {result.runs.valid} runs. Band: 95 % of the mean (t). The path ends at the distance of the furthest run "
+        "and "
+        "may leave low … high."
+    )
     return Section("Shape and ridge", (*blocks, Figure("ridge", ridge(result, model), caption)))
 
 
@@ -138,6 +151,74 @@ def sections_of(result: DesignResult) -> tuple[Section, ...]:
     return tuple(section for section in found if section is not None)
 
 
+def banner(result: DesignResult) -> Banner:
+    """The target's settings if one was asked for, else what acts."""
+    found, response = result.analysis, result.response.path
+    optimum = result.optimum
+    if optimum is not None:
+        open_ = [one.name for one in settings(optimum) if not one.identified]
+        single = optimum.single
+        if not single.reached:
+            reach = f"{observed(response, single.reachable_low)} … {observed(response, single.reachable_high)}"
+            return Banner(
+                Word.OUT_OF_REACH,
+                "",
+                f"No setting of the region gives {observed(response, single.target)}: the model reaches {reach}.",
+                "Make runs beyond low … high of the factors that act, or look for a factor that is missing.",
+            )
+        if found.model is not None and not found.model.anova.better_than_noise:
+            return Banner(
+                Word.NO_ANSWER,
+                "",
+                "The model is not better than noise, so the setting for the target is a point and no answer.",
+                "Repeat runs: replicates or centre runs show how large the noise is.",
+            )
+        return Banner(
+            Word.TARGET_REACHED,
+            observed(response, single.target),
+            single.statement,
+            f"Take the ranges of {enumeration(open_)} as the answer; a second response, or more runs, would fix them."
+            if open_
+            else "Run the setting found, a few times, and compare.",
+        )
+    acts = _acting_names(result)
+    if acts:
+        return Banner(
+            Word.EFFECT_FOUND,
+            enumeration(acts),
+            f"Of {result.runs.valid} runs: {acting_words(result)}.",
+            "Ask for the settings of a value: `explorer analyse … --target`.",
+        )
+    return Banner(
+        Word.NO_EFFECT,
+        "",
+        f"Of {result.runs.valid} runs: {acting_words(result)}.",
+        "Add replicates or widen low … high; `explorer design --sigma` says what a design will see.",
+    )
+
+
+def acting_words(result: DesignResult) -> str:
+    """What acts by the tests of a two-level design, or by the terms of the model."""
+    found = result.analysis
+    if found.effects is not None:
+        return acting(found.effects.screening)
+    return "no model could be fitted" if found.model is None else terms_that_act(found.model.anova)
+
+
+def _acting_names(result: DesignResult) -> list[str]:
+    found = result.analysis
+    if found.effects is not None:
+        screening = found.effects.screening
+        tests = {e.name: test for e in screening.effects if not e.is_dummy and (test := screening.deciding_test(e))}
+        if any(math.isfinite(test.p) for test in tests.values()):
+            return [name for name, test in tests.items() if test.p_holm < 0.05]
+        return [e.name for e in screening.effects if not e.is_dummy and abs(e.effect) > screening.lenth.margin]
+    if found.model is None:
+        return []
+    rows = [row for row in found.model.anova.rows if row.source not in WHOLE]
+    return [row.source.replace("*", " × ").replace("^2", "²") for row in rows if row.p < 0.05]
+
+
 def in_short(result: DesignResult) -> Section:
     """The answer in a few lines, and what the letters stand for."""
     runs, response, found = result.runs, result.response.path, result.analysis
@@ -181,8 +262,7 @@ def acting(analysis: Screening) -> str:
 
 def terms_that_act(anova: SurfaceAnova) -> str:
     """Terms of the model with p < 0.05, each alone."""
-    whole = ("model", "residual", "lack_of_fit", "pure_error", "total")
-    terms = [row for row in anova.rows if row.source not in whole]
+    terms = [row for row in anova.rows if row.source not in WHOLE]
     acting = [row.source.replace("*", " × ").replace("^2", "²") for row in terms if row.p < 0.05]
     if all(math.isnan(row.p) for row in terms):
         return "cannot be told without scatter"

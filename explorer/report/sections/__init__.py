@@ -6,13 +6,28 @@ from collections.abc import Callable
 
 from doe.studies.study_result import StudyResult
 from explorer.report.content import Section
-from explorer.report.sections.answer import effects, optimum, overview, verification
+from explorer.report.methods import study_methods
+from explorer.report.sections.answer import effects, optimum, overview, parameters, verification
 from explorer.report.sections.closing import further, paper, repeat, runs
 from explorer.report.sections.designs import assumptions, noise, scan, screening
 from explorer.report.sections.surface import ascent, surface
+from explorer.report.set_up import set_up
+
+
+def materials(result: StudyResult) -> Section | None:
+    """What was poured into what."""
+    return set_up(result.set_up, result.study.assumed)
+
+
+def methods(result: StudyResult) -> Section:
+    """The paragraph for a paper."""
+    return study_methods(result)[0]
+
 
 STAGES_FOUND: tuple[Callable[[StudyResult], Section | None], ...] = (
+    parameters,
     overview,
+    materials,
     verification,
     effects,
     noise,
@@ -24,7 +39,7 @@ STAGES_FOUND: tuple[Callable[[StudyResult], Section | None], ...] = (
     optimum,
 )
 """In the order of the page: what was found, then how."""
-AT_THE_END: tuple[Callable[[StudyResult], Section | None], ...] = (paper, runs, repeat)
+AT_THE_END: tuple[Callable[[StudyResult], Section | None], ...] = (paper, methods, runs, repeat)
 
 
 def sections_of(result: StudyResult) -> tuple[Section, ...]:

@@ -14,11 +14,11 @@ from doe.stages.verification import VerificationResult
 from doe.studies.factors import MIN_BODIES
 from doe.studies.study_result import StudyResult, valid_runs
 from doe.target import Target
-from explorer.report.content import Block, Caution, Facts, Figure, Section, Table, Text
+from explorer.report.content import Banner, Block, Caution, Facts, Figure, Section, Strong, Struck, Table, Text, Word
 from explorer.report.figures.effects import all_effects
 from explorer.report.figures.model import cloud, fitted_targets, ranges
 from explorer.report.figures.pours import verification as verification_chart
-from explorer.report.identified import GIVES_TARGET, cloud_caution, is_identified, rule, settings
+from explorer.report.identified import BY_RULE, GIVES_TARGET, cloud_caution, is_identified, rule, settings
 from explorer.units import (
     MISSING,
     code,
@@ -36,6 +36,89 @@ from explorer.units import (
     signed,
     unit_of_observable,
 )
+
+
+def banner(result: StudyResult) -> Banner:
+    """Whether the material is calibrated: fresh pours decide, and a surface that is mere noise decides nothing."""
+    target, test, single = result.study.targets[0], result.verification.tests[0], result.optimum.single
+    name = target.observable
+    poured = (
+        f"{test.simulated.n} fresh pours at the chosen setting gave {observed(name, test.simulated.mean)} against "
+        f"{observed(name, target.mean)} measured"
+    )
+    verdicts = {one.verdict for one in result.verification.tests}
+    reach = f"{observed(name, single.reachable_low)} … {observed(name, single.reachable_high)}"
+    if not single.reached and verdicts != {"equivalent"}:
+        return Banner(
+            Word.OUT_OF_REACH,
+            "",
+            f"No setting of the region gives {observed(name, target.mean)}: the model reaches {reach}, and {poured}.",
+            "Widen the ranges of the factors that act, or add a factor that is missing: for round bodies rolling "
+            "resistance, `effect.rolling_resistance.rolling_friction`.",
+        )
+    if not single.better_than_noise:
+        return Banner(
+            Word.NOT_CALIBRATED,
+            "",
+            f"The response surface is not better than noise, so the chosen point is no calibration, although {poured}."
+            if verdicts == {"equivalent"}
+            else f"The response surface is not better than noise, and {poured}.",
+            "Pour more replicates per point, or widen the ranges until the factors show above the noise of one pour, "
+            f"σ = {observed(name, result.pilot.noise[name].sigma)}.",
+        )
+    if "different" in verdicts:
+        return Banner(
+            Word.NOT_CALIBRATED,
+            "",
+            f"{poured[0].upper()}{poured[1:]}: {verdict(target, test)}",
+            "Start again around the point found, with narrower ranges; if it stays, ask `explorer diagnose` whether "
+            "the "
+            "model lacks an effect.",
+        )
+    if verdicts != {"equivalent"}:
+        return Banner(
+            Word.NO_ANSWER,
+            "",
+            f"{poured[0].upper()}{poured[1:]}: {verdict(target, test)}",
+            f"Pour more than {test.simulated.n} times in the verification, or state a margin that this noise can show.",
+        )
+    margins = " and ".join(f"± {observed(one.observable, one.margin)}" for one in result.study.targets)
+    open_ = [one.name for one in settings(result.optimum) if not one.identified]
+    return Banner(
+        Word.CALIBRATED,
+        margins,
+        f"{poured[0].upper()}{poured[1:]}: {verdict(target, test)}",
+        f"Take the ranges of {enumeration(open_)} as the answer, and add a second measurement (another rig or "
+        "observable) to fix them."
+        if open_
+        else "Use these values, and check them on a test that was not fitted.",
+    )
+
+
+ANSWER = 3
+"""Cells of a setting's row before its numbers: name, label, whether it is identified."""
+
+
+def holds(result: StudyResult) -> bool:
+    """Whether the parameters found may be used: the material is calibrated."""
+    return banner(result).word is Word.CALIBRATED
+
+
+def parameters(result: StudyResult) -> Section:
+    """The calibrated parameters; struck out where the verdict says that they are none."""
+    good = holds(result)
+    rows = []
+    for one in settings(result.optimum):
+        known = f"95 % set {one.confidence_set}" if one.identified else f"not identified; {BY_RULE}: {one.chosen}"
+        value = one.chosen if one.identified or one.feasible == MISSING else one.feasible
+        rows.append(
+            (one.name, one.label, Strong(value), known) if good else (one.name, one.label, Struck(value), known)
+        )
+    how = "Bold: the answer; of a factor that the target does not identify it is the range that gives the target."
+    caption = how if good else "Struck out: these values do not calibrate the material."
+    return Section(
+        "Parameters", (Table(("factor", "parameter", "value", "how well it is known"), tuple(rows), caption),)
+    )
 
 
 def overview(result: StudyResult) -> Section:
@@ -124,7 +207,7 @@ def _facts(result: StudyResult) -> list[tuple[str, str]]:
         ),
         ("Significant factors", f"{enumeration(analysis.significant())} (Holm, against the {analysis.error_source})"),
         ("Largest unknown", assumption_statement(result)),
-        ("Optimum", "; ".join(chosen)),
+        ("Optimum", "; ".join(chosen) if holds(result) else Struck("; ".join(chosen))),
         (
             "Verification",
             f"{observed(observable, test.simulated.mean)} over {test.simulated.n} fresh pours against "
@@ -213,7 +296,11 @@ def verification(result: StudyResult) -> Section:
 def _of_target(stage: VerificationResult, index: int, target: Target, test: Verification) -> list[Block]:
     name = target.observable
     words = observable_label(name)
-    caption = "Band: target ± equivalence margin, fixed before any run."
+    caption = (
+        f"n = {test.simulated.n} valid fresh pours, one point each; diamonds: means with 95 % intervals (t); band: "
+        "target ± "
+        "equivalence margin, fixed before any run."
+    )
     return [
         Text(f"{words[0].upper()}{words[1:]}: {verdict(target, test)}"),
         Figure(f"verification-{index + 1}", verification_chart(stage, index), caption),
@@ -316,7 +403,10 @@ def effects(result: StudyResult) -> Section:
     if result.assumptions is not None:
         statement = assumption_statement(result)
         blocks.append(Text(f"What the calibration hangs on: {statement}."))
-    caption = "Effect = mean at the high level − mean at the low level; valid pours only."
+    caption = (
+        f"Effect = mean at the high level − mean at the low level, with its 95 % interval (t); n = "
+        f"{result.screening.analysis.runs} valid pours in {result.screening.analysis.rows} rows."
+    )
     if any(part is not None and part.not_testable for part in (result.screening, result.assumptions)):
         caption += f" Not testable: acts on fewer than {MIN_BODIES} bodies."
     return Section(title, (*blocks, Figure("effects", all_effects(result.screening, result.assumptions), caption)))
@@ -325,20 +415,30 @@ def effects(result: StudyResult) -> Section:
 def optimum(result: StudyResult) -> Section:
     """Chosen setting, the 95 % sets of identified parameters and the ranges that give the target."""
     found, single, first = result.optimum, result.optimum.single, fitted_targets(result)[0]
-    blocks: list[Block] = [Text(_statement(result)), _settings(found, first.reference_name)]
+    blocks: list[Block] = [Text(_statement(result)), _settings(result, first.reference_name)]
     if found.compromise is not None:
         blocks += _compromise(result, found.compromise)
     blocks += [
-        Figure("ranges", ranges(first), "Thin inside thick: the narrower the bar, the better a factor is known."),
+        Figure("ranges", ranges(first), ranges_caption(found)),
         Figure(
             "cloud",
             cloud(first),
-            f"{len(single.bootstrap_points)} refits to resampled {single.resampling}; each dot is the solution "
+            f"n = {len(single.bootstrap_points)} refits to resampled {single.resampling} (bootstrap); each dot is the "
+            "solution "
             f"nearest the measured parameters. {percent(single.share_reached)} of the refits reach the target. "
             f"{cloud_caution(found)}".rstrip(),
         ),
     ]
     return Section("Optimum", tuple(blocks))
+
+
+def ranges_caption(found: OptimumResult) -> str:
+    """What the bars of the ranges are."""
+    return (
+        "The narrower a bar, the better a factor is known: wide, the region of the surface; middle, where the fitted "
+        "model "
+        f"gives the target; narrow, the 95 % set over n = {len(found.single.bootstrap_points)} bootstrap refits."
+    )
 
 
 def _statement(result: StudyResult) -> str:
@@ -378,10 +478,11 @@ def _statement(result: StudyResult) -> str:
     return text
 
 
-def _settings(found: OptimumResult, reference_name: str) -> Table:
+def _settings(result: StudyResult, reference_name: str) -> Table:
+    found, good = result.optimum, holds(result)
     rows = tuple(
         (
-            *setting.cells,
+            *(cell if good or k < ANSWER else Struck(cell) for k, cell in enumerate(setting.cells)),
             parameter_value(factor.path, factor.reference),
             parameter_range(factor.path, factor.low, factor.high),
         )

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from doe.analysis.pilot import BIAS_LIMIT_DEG, EstimatorChoice, Separation
 from doe.analysis.screening import Adjustment, ErrorSource
-from doe.run_records import sample_of
+from doe.run_records import sample_of, valid_values
 from doe.stages.pilot import PilotResult, StageSize
 from doe.stages.screening import ScreeningResult
 from doe.studies.factors import MIN_BODIES
@@ -47,8 +47,9 @@ def noise(result: StudyResult) -> Section:
         Figure(
             "noise",
             noise_of_estimators(pilot),
-            "Whiskers: 95 % intervals; bias: the range over the ways to fill a cone with bodies. Red: read by the "
-            "screening.",
+            f"n = {pilot.noise[target].runs} seeds at the reference setting; whiskers: 95 % intervals (χ² of σ, "
+            "bootstrap "
+            "of d′); bias: the range over the ways to fill a synthetic cone with bodies. Red: read by the screening.",
         ),
         _estimators(pilot),
         Table(
@@ -161,14 +162,22 @@ def screening(result: StudyResult) -> Section:
         ),
         Facts(tuple(_verdicts(part))),
     ]
+    n = f"n = {analysis.runs} valid pours in {analysis.rows} rows"
     chart = pareto(part)
     if chart is None:
         blocks.append(Text("No error could be estimated, so no |t| is shown."))
     else:
         blocks.append(
-            Figure("pareto", chart, "Lines: the |t| at which p = 0.05 for one factor (dashed) and for all (solid).")
+            Figure(
+                "pareto",
+                chart,
+                f"{n}. Lines: the |t| at which p = 0.05 for one factor (dashed) and for all (solid, Bonferroni).",
+            )
         )
-    caption = "Noise alone would follow a straight line through the origin; what stands above it acts."
+    caption = (
+        f"{n}. Noise alone would follow a straight line through the origin; what stands above it acts. Lines: Lenth’s "
+        "margins, 95 %."
+    )
     blocks += [Figure("half-normal", half_normal(part), caption), effect_table(part)]
     notes = (*analysis.notes, _no_pile_note(part))
     blocks.append(Bullets(notes))
@@ -338,8 +347,13 @@ def scan(result: StudyResult) -> Section | None:
     )
     if all(noise is None for noise in scanned.noise):
         text += " One pour per value: no interval can be drawn."
+    n = sum(len(valid_values(runs, observable)) for runs in scanned.runs)
+    caption = (
+        f"n = {n} valid pours, one faint point each; means with 95 % intervals (t); band: the target and its margin of "
+        "equivalence."
+    )
     table = Table((parameter_label(path), "mean", "95 %", "sd of one pour", "not valid"), tuple(rows))
     return Section(
         f"Over the {parameter_label(path)}",
-        (Text(text), Figure("scan", scan_chart(scanned, result.study.targets[0]), ""), table),
+        (Text(text), Figure("scan", scan_chart(scanned, result.study.targets[0]), caption), table),
     )

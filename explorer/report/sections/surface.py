@@ -47,7 +47,11 @@ def ascent(result: StudyResult) -> Section:
         Figure(
             "ascent",
             ascent_path(walk, result.study.targets[0]),
-            "Intervals use the pilot's σ and the number of valid pours of a step.",
+            f"n = {sum(len(valid_values(runs, observable)) for runs in walk.runs)} valid pours, one faint point each; "
+            "means "
+            "with 95 % intervals (z) from the pilot’s σ and the number of valid pours of a step; band: the target and "
+            "its "
+            "margin.",
         ),
         _steps(walk),
     ]
@@ -118,7 +122,7 @@ def anova_table(anova: SurfaceAnova) -> Table:
             number(row.sum_of_squares, 4),
             str(row.df),
             number(row.mean_square, 4),
-            number(row.f, 4),
+            number(row.f),
             p_value(row.p),
         )
         for row in anova.rows
@@ -148,9 +152,14 @@ def _of_target(place: int, fitted: FittedTarget, canonical: Canonical) -> list[B
             )
         )
     ]  # fmt: skip
-    caption = "Through the optimum; the points of the design are projected on each panel."
+    n = f"n = {len(fitted.model.observed)} valid pours at {len(fitted.design)} points of the design"
+    caption = (
+        f"{n}; second-order model by least squares, cut through the optimum; the points of the design are projected on "
+        "each "
+        "panel. Thick line: model = target."
+    )
     blocks.append(Figure(f"contours-{place}", contours(fitted), caption))
-    blocks.append(Figure(f"fit-{place}", fit(fitted), ""))
+    blocks.append(Figure(f"fit-{place}", fit(fitted), f"{n}, one mark each; residuals are studentized externally."))
     blocks.append(anova_table(anova))
     if anova.notes:
         blocks.append(Bullets(anova.notes))
