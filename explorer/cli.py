@@ -27,6 +27,7 @@ from explorer.commands import (
     new,
     parameters,
     replay,
+    report,
     runs,
     schema,
     serve,
@@ -131,6 +132,7 @@ app.command()(audit.audit)
 app.command()(measure.measure)
 app.command(cls=export.Programs)(export.export)
 app.command()(replay.replay)
+app.command()(report.report)
 app.command()(verify.verify)
 app.command()(bench.bench)
 app.command()(warm_up.warm_up)

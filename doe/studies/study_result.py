@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, ClassVar, Self
 
+from doe.provenance import About, SetUp
 from doe.record import Document, Record
 from doe.run_records import Run, Setting
 from doe.stages.ascent import AscentResult
@@ -232,6 +233,9 @@ class StudyResult(AllStages, Described):
     timing: Timing
     versions: dict[str, str | None]
     shapes: tuple[PouredBody, ...]
+    about: About = field(default_factory=About)
+    set_up: SetUp | None = None
+    """None in results of before there was one."""
 
 
 AnyStudy = PartialStudy | StudyResult

@@ -10,11 +10,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from doe.audit import Audit, Figure, Status
-from explorer.files.output_file import write_whole
+from doe.provenance import About
 from explorer.files.run_folder import json_text
-from explorer.report.content import Block, Bullets, Facts, Folded, Section, Table, Text
+from explorer.report.content import Banner, Block, Bullets, DataTable, Facts, Folded, Report, Section, Table, Text, Word
+from explorer.report.folder import write_report
 from explorer.report.html import page
-from explorer.report.markdown import document
 from explorer.tables.text_table import text_table
 from explorer.units import MISSING
 
@@ -23,6 +23,7 @@ HEADINGS: dict[Status, str] = {
     "cannot be checked": "cannot be checked",
     "reproduced": "reproduced",
 }
+NOBODY = About()
 WHAT = (
     "A figure is reproduced if the recomputed value rounds to the print, allowing for the rounding of the printed "
     "numbers it is computed from. Everything is recomputed from the publication's own tables; nothing is simulated."
@@ -54,24 +55,50 @@ def _listed(heading: str, lines: list[str]) -> str:
     return "\n".join((heading, *(f"- {line}" for line in lines))) if lines else ""
 
 
-def write_audit(audit: Audit, folder: Path) -> None:
-    """Write ``audit.json``, ``report.html`` and ``report.md`` into ``folder``; each appears complete or not at all."""
-    texts = {
-        "audit.json": json_text(audit.to_dict()) + "\n",
-        "report.html": audit_html(audit),
-        "report.md": document(*_headings(audit), audit_sections(audit)),
-    }
-    for name, text in texts.items():
-        write_whole(folder / name, text)
+def write_audit(audit: Audit, folder: Path, about: About = NOBODY) -> None:
+    """Write ``audit.json`` and the report into ``folder``; each appears complete or not at all."""
+    content = audit.to_dict() | {"about": about.to_dict()}
+    write_report(audit_report(audit, about), folder, {"audit.json": json_text(content) + "\n"})
 
 
 def audit_html(audit: Audit) -> str:
     """The page."""
-    return page(*_headings(audit), audit_sections(audit))
+    return page(audit_report(audit))
 
 
-def _headings(audit: Audit) -> tuple[str, str]:
-    return f"Audit: {audit.title}", audit.source or "A published study, recomputed from its own tables"
+def audit_report(audit: Audit, about: About = NOBODY) -> Report:
+    """The report of an audit."""
+    figures = DataTable(
+        "figures",
+        ("where", "figure", "status", "printed", "recomputed", "how"),
+        tuple((f.where, f.quantity, f.status, f.printed, recomputed_text(f), f.how) for f in audit.figures),
+    )
+    return Report(
+        f"Audit: {audit.title}",
+        audit.source or "A published study, recomputed from its own tables",
+        banner(audit),
+        audit_sections(audit),
+        about,
+        (figures,),
+    )
+
+
+def banner(audit: Audit) -> Banner:
+    """Whether the study's own tables give what it prints."""
+    wrong, right = len(audit.having("differs")), len(audit.having("reproduced"))
+    why = f"Of {len(audit.figures)} printed figures, {counted(audit)}."
+    if wrong:
+        return Banner(
+            Word.DIFFERS, f"in {wrong}", why, "Read what differs, first below, before any of these numbers is used."
+        )
+    if right:
+        return Banner(
+            Word.REPRODUCED,
+            "",
+            why,
+            "The study’s numbers follow from its tables; whether these hold is another question.",
+        )
+    return Banner(Word.NO_ANSWER, "", why, "Type in the tables that the checks need; the last section says which.")
 
 
 def audit_sections(audit: Audit) -> tuple[Section, ...]:

@@ -18,7 +18,11 @@ def analyse(
     terms: str = typer.Option("", metavar="A,B,A*B,…", help="Instead of an order, the terms; what they need is added."),
     only: str = typer.Option("", metavar="NAME,…", help="Only these factors; the others count as scatter."),
     factors: str | None = typer.Option(None, metavar="FILE", help="Factors file, for a sheet that declares none."),
-    out: Path | None = typer.Option(None, metavar="DIR", help="New folder for report.html, report.md and result.json."),
+    out: Path | None = typer.Option(
+        None, metavar="DIR", help="New folder for result.json, the report, its figures and data."
+    ),
+    author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
+    notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
     json: bool = typer.Option(False, "--json", help="Print the result as JSON, and nothing else."),
 ) -> None:
     """Effects, model, analysis of variance, diagnostics, canonical analysis, and the settings that give a target."""
@@ -42,6 +46,8 @@ def analyse(
         terms=_names(terms),
         only=_names(only),
         out=out,
+        author=author,
+        notes=notes,
     )
     result = run_analyse(order)
     typer.echo(json_text(result.to_dict()) if json else analysis_text(result))

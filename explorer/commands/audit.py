@@ -15,6 +15,8 @@ def audit(
         show_default=False,
     ),
     json: bool = typer.Option(False, "--json", help="Print every finding as plain data."),
+    author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
+    notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
     out: Path | None = typer.Option(None, metavar="DIR", help="Folder for report.html, report.md and audit.json."),
 ) -> None:
     """Recompute every figure of a published calibration study that can be recomputed.
@@ -26,11 +28,12 @@ def audit(
     from explorer.audit.read_study import read_study, shipped_study
     from explorer.audit.report import audit_text, write_audit
     from explorer.files.run_folder import appearing, json_text
+    from explorer.files.run_result import made_today
 
     found = audit_study(read_study(shipped_study() if folder is None else folder))
     if out is not None:
         with appearing(out) as temporary:
-            write_audit(found, temporary)
+            write_audit(found, temporary, made_today(author, notes))
     typer.echo(json_text(found.to_dict()) if json else audit_text(found))
     if out is not None:
         typer.echo(f"{out}/report.html, report.md, audit.json", err=True)

@@ -16,12 +16,14 @@ def calibrate(
     ),
     study: str = typer.Option("sunflower_extract", help="A shipped study or the path of a study file."),
     profile: str = typer.Option("standard", help="Size of the study: a [profile.NAME] of the study file."),
-    out: Path = typer.Option(Path("results"), help="Folder for result.json, report.html and report.md."),
+    out: Path = typer.Option(Path("results"), help="Folder for result.json, the report, its figures and data."),
     resume: bool = typer.Option(False, "--resume", help="Go on in a folder that is not empty."),
     store: Path | None = typer.Option(None, help="SQLite file that keeps every run."),
     record: Path | None = typer.Option(None, help="Folder for .rrd recordings of the verification pours."),
     threads: int | None = typer.Option(None, min=1, help="CPU threads; all if not given."),
     tries: int = typer.Option(3, min=1, max=20, help="Seeds tried for one replicate that gives no valid pour."),
+    author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
+    notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
     fail_above: float | None = typer.Option(None, min=0.0, help="Exit with 3 above this relative error in percent."),
 ) -> None:
     """Calibrate a material: pilot, screening, ascent, response surface, optimum, verification, report."""
@@ -33,7 +35,7 @@ def calibrate(
         raise CommandError("calibrate: add --headless to run here, or start it from the panel of `explorer serve`")
     # The page cancels with SIGTERM; that has to end like Ctrl-C, with the store closed and finished runs kept.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    order = StudyOrder(study, profile, out, resume, store, record, threads, tries)
+    order = StudyOrder(study, profile, out, resume, store, record, threads, tries, author, notes)
     try:
         result = run_study(order, typer.echo)
     except StudyStopped as stopped:

@@ -12,7 +12,7 @@ def diagnose(
     folder: str = typer.Argument(
         ..., metavar="DIR", help="Folder with measurement.toml, or a shipped data set's name."
     ),
-    out: Path = typer.Option(Path("diagnosis"), help="Folder for diagnosis.json, report.html and report.md."),
+    out: Path = typer.Option(Path("diagnosis"), help="Folder for diagnosis.json, the report, its figures and data."),
     effects: str = typer.Option("", metavar="A,B,…", help="Candidates; all effects if not given."),
     budget: int | None = typer.Option(None, min=1, metavar="POURS", help="About so many pours for the emulator."),
     resume: bool = typer.Option(False, "--resume", help="Go on in a folder that is not empty."),
@@ -22,6 +22,8 @@ def diagnose(
     follow_up: Path | None = typer.Option(
         None, "--follow-up", metavar="DIR", help="The folder OUT/next of an ambiguous answer, filled in."
     ),
+    author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
+    notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
     apply: bool = typer.Option(False, "--apply", help="Also write the corrected material as OUT/corrected.toml."),
 ) -> None:
     """Calibrate the declared model, test what is left, name the missing effect, confirm it by fresh pours."""
@@ -42,5 +44,7 @@ def diagnose(
         apply=apply,
         seed=seed,
         follow_up=follow_up,
+        author=author,
+        notes=notes,
     )
     run_diagnose(order, typer.echo)

@@ -34,8 +34,13 @@ def lab(
     leave_out: list[str] = typer.Option([], metavar="NAME", help="With composition: a component that is not poured."),
     out: Path | None = typer.Option(None, metavar="PART.toml", help="New file with the parameters and their origin."),
     plot: Path | None = typer.Option(
-        None, metavar="FILE.html", help="New figure of the curves and their straight part."
+        None, metavar="FILE.html", help="New page: parameters, and the curves with their straight part."
     ),
+    report: Path | None = typer.Option(
+        None, metavar="DIR", help="New folder for the report of any test, its figures and data."
+    ),
+    author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
+    notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
     simulate: bool = typer.Option(False, "--simulate", help="Run the bench test on the solver with what was derived."),
     material: str | None = typer.Option(None, help="Material of --simulate: file or shipped name."),
     bias: bool = typer.Option(False, "--bias", help="Show where the test's usual formula misses what was put in."),
@@ -58,6 +63,9 @@ def lab(
         simulate=simulate,
         bias=bias,
         json=json,
+        report=report,
+        author=author,
+        notes=notes,
     )
     if not run_lab(order, typer.echo):
         raise typer.Exit(1)

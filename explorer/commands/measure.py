@@ -28,6 +28,9 @@ def measure(
     outline: Path | None = typer.Option(
         None, metavar="FILE.csv", help="New file: the outline, for the page to lay over a simulated pile."
     ),
+    report: Path | None = typer.Option(None, metavar="DIR", help="New folder for the report, its figures and data."),
+    author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
+    notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
     from_simulation: str | None = typer.Option(
         None,
         metavar="SOURCE",
@@ -38,12 +41,22 @@ def measure(
 
     Exit code 1 where a picture shows no pile that could be read; the line says why.
     """
-    from explorer.files.run_folder import json_text
+    from explorer.files.run_folder import appearing, check_vacant, json_text
     from explorer.photograph.run import measure_order, run_measure
     from explorer.tables.photograph import measure_result, measure_text, refusal_lines
 
     order = measure_order(photos, scale, reference_length, reference, baseline, plot, outline, from_simulation)
+    if report is not None:
+        check_vacant(report, "--report")
     measured = run_measure(order)
+    if report is not None:
+        from explorer.report.folder import write_report
+        from explorer.report.photograph import photograph_report, photograph_result, read_picture
+
+        result = photograph_result(measured, author, notes)
+        text = json_text(result.to_dict()) + "\n"
+        with appearing(report, "--report") as folder:
+            write_report(photograph_report(result, read_picture(order, measured)), folder, {result.NAME: text})
     if json:
         typer.echo(json_text(measure_result(measured)))
     else:

@@ -19,7 +19,7 @@ from explorer.design.filled_sheet import Runs, read_sheet, runs_of
 from explorer.design.result import DesignResult, Response, RunCount, SheetFactor
 from explorer.errors import CommandError
 from explorer.files.run_folder import appearing, json_text
-from explorer.files.run_result import versions
+from explorer.files.run_result import made_today, versions
 from explorer.units import own_path
 from solver.assets import asset_path
 
@@ -37,11 +37,14 @@ class AnalyseOrder:
     terms: tuple[str, ...] = ()
     only: tuple[str, ...] = ()
     out: Path | None = field(default=None)
+    author: str = ""
+    notes: str = ""
 
 
 def run_analyse(order: AnalyseOrder) -> DesignResult:
     """Read, analyse and, with ``out``, write result.json, report.html and report.md. Returns the result."""
-    from explorer.report.design import write_design_report
+    from explorer.report.design import design_report
+    from explorer.report.folder import write_report
 
     path = asset_path("runs", order.sheet)
     factors = read_factors(asset_path("designs", order.factors)).factors if order.factors else ()
@@ -50,8 +53,7 @@ def run_analyse(order: AnalyseOrder) -> DesignResult:
     result = analyse_runs(runs, order)
     if order.out is not None:
         with appearing(order.out) as folder:
-            (folder / "result.json").write_text(json_text(result.to_dict()) + "\n", encoding="utf-8")
-            write_design_report(result, folder)
+            write_report(design_report(result), folder, {"result.json": json_text(result.to_dict()) + "\n"})
     return result
 
 
@@ -78,6 +80,7 @@ def analyse_runs(runs: Runs, order: AnalyseOrder) -> DesignResult:
         analysis=found,
         command=_command(order),
         versions=versions(),
+        about=made_today(order.author, order.notes),
     )
 
 

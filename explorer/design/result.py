@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy.typing as npt
 from doe.analysis.analyse import DesignAnalysis
 from doe.analysis.contrasts import Curvature
 from doe.analysis.screening import Screening
+from doe.provenance import About
 from doe.record import Document, Record
 from doe.stages.surface import OptimumResult
 from doe.studies.study import Factor
@@ -81,6 +82,7 @@ class DesignResult(Document):
     analysis: DesignAnalysis
     command: tuple[str, ...]
     versions: dict[str, str | None]
+    about: About = field(default_factory=About)
 
     @property
     def effects(self) -> DrawnEffects | None:

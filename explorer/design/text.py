@@ -18,10 +18,8 @@ from explorer.design.factors_file import FactorsFile, region_of
 from explorer.design.result import DesignResult
 from explorer.design.run_plan import RunPlan
 from explorer.report.content import Facts, Table
-from explorer.report.design.effects import curvature, effect_table
-from explorer.report.design.model import diagnostics, fit_summary
-from explorer.report.design.sections import factor_table, in_short
-from explorer.report.design.target import settings_table, shape, target
+from explorer.report.design.model import curvature, diagnostics, effect_table, fit_summary
+from explorer.report.design.sections import factor_table, in_short, settings_table, shape, target
 from explorer.report.sections.surface import anova_table
 from explorer.tables.text_table import text_table
 from explorer.units import enumeration, number

@@ -27,6 +27,7 @@ from doe.diagnose.result import (
 from doe.holdout import OVERALL, HoldoutError
 from doe.measurement.measurement import Role
 from doe.measurement.residual_map import ResidualMap
+from doe.provenance import About
 from doe.record import Document, Record
 
 FloatArray = npt.NDArray[np.float64]
@@ -233,6 +234,7 @@ class DiagnosisResult(Document):
     pours: PourCounts
     timing: Duration
     versions: dict[str, str | None]
+    about: About = field(default_factory=About)
 
     @property
     def kind(self) -> Kind:

@@ -47,8 +47,9 @@ from explorer.diagnosis.result import (
 )
 from explorer.errors import CommandError
 from explorer.files.output_file import write_whole
-from explorer.files.run_result import versions
-from explorer.report.diagnosis import write_diagnosis_report
+from explorer.files.run_result import made_today, versions
+from explorer.report.diagnosis import diagnosis_report
+from explorer.report.folder import write_report
 from solver import EFFECTS, WorkerPool
 
 RULE = Rule(
@@ -78,6 +79,8 @@ class DiagnoseOrder:
     apply: bool = False
     seed: int = 0
     follow_up: Path | None = None
+    author: str = ""
+    notes: str = ""
 
 
 def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> DiagnosisResult:
@@ -116,8 +119,10 @@ def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> DiagnosisR
     result = result_of(measurement, order, found, progress.elapsed)
     text = json.dumps(result.to_dict(), ensure_ascii=False, allow_nan=False, indent=1)
     write_whole(order.out / result.NAME, text + "\n")
-    write_diagnosis_report(result, order.out)
+    missing = write_report(diagnosis_report(result), order.out, {result.NAME: text + "\n"})
     say(f"{order.out}/report.html, report.md, {result.NAME}")
+    if missing:
+        say(missing)
     if found.suggestions:
         write_next(order.out / "next", order.folder, measurement, found.suggestions[0])
         say(f"{order.out}/next: what to measure next, to be filled in; then --follow-up {order.out}/next")
@@ -188,6 +193,7 @@ def result_of(measurement: Measurement, order: DiagnoseOrder, found: Diagnosis, 
         pours=PourCounts(found.pours, found.settings),
         timing=Duration(total_s),
         versions=versions(),
+        about=made_today(order.author, order.notes),
     )
 
 

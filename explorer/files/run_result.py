@@ -14,6 +14,7 @@ A number that could not be measured is null.
 
 from __future__ import annotations
 
+import datetime
 import math
 import platform
 from collections import Counter
@@ -23,6 +24,7 @@ from typing import Any
 
 import numpy as np
 
+from doe.provenance import About
 from solver import PHYSICS, Record, Scene, Trace, parameters, value
 from solver.observables import Value, observe
 
@@ -63,6 +65,11 @@ def versions() -> dict[str, str | None]:
         **{name: package_version(name) for name in RUNTIME},
         "python": platform.python_version(),
     }
+
+
+def made_today(author: str, notes: str) -> About:
+    """Who asked for a result, today."""
+    return About(author.strip(), datetime.date.today().isoformat(), notes.strip())
 
 
 def package_version(distribution: str) -> str | None:

@@ -12,13 +12,17 @@ from doe.laboratory.analysis import analyse_composition, analyse_elastic
 from doe.laboratory.bias import BiasTable, bias_table
 from explorer.errors import CommandError
 from explorer.files.output_file import check_new_file
-from explorer.files.run_folder import json_text
+from explorer.files.run_folder import appearing, check_vacant, json_text
+from explorer.files.run_result import made_today
 from explorer.laboratory.part import part_table, part_text, with_part
 from explorer.laboratory.twin_row import TwinRow, check_twin
 from explorer.scene.file import DEFAULT_MATERIAL, material_scene
 from explorer.tables.laboratory import bias_data, bias_text, lab_data, lab_text, twin_text
 from solver import ParameterError, Scene
 from solver.assets import asset_path
+
+BENCH = "bench"
+"""Kind of the result in a folder of --report, and the name of its file."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +39,9 @@ class LabOrder:
     simulate: bool = False
     bias: bool = False
     json: bool = False
+    report: Path | None = None
+    author: str = ""
+    notes: str = ""
 
 
 def run_lab(order: LabOrder, say: Callable[[str], None]) -> bool:
@@ -59,17 +66,25 @@ def run_lab(order: LabOrder, say: Callable[[str], None]) -> bool:
             say("\nThe bias of this formula is a closed form; it is shown as it is, and not simulated.")
         for text in filter(None, (bias and bias_text(bias), rows and twin_text(rows))):
             say(f"\n{text}")
-        for path in filter(None, (order.out, order.figure)):
+        for path in filter(None, (order.out, order.figure, order.report)):
             say(f"\nwrote {path}")
     return all(row.closes is not False for row in rows)
 
 
 def _write(order: LabOrder, result: LabResult, part: dict[str, Any]) -> None:
     """The files that were asked for."""
+    about = made_today(order.author, order.notes)
     if order.figure:
-        from explorer.report.figures.bench import write_curves
+        from explorer.report.bench import write_curves
 
-        write_curves(order.figure, result)
+        write_curves(order.figure, result, about)
+    if order.report:
+        from explorer.report.bench import bench_report
+        from explorer.report.folder import write_report
+
+        content = {"kind": BENCH, "about": about.to_dict(), "result": result.to_dict()}
+        with appearing(order.report, "--report") as folder:
+            write_report(bench_report(result, about), folder, {f"{BENCH}.json": json_text(content) + "\n"})
     if order.out:
         order.out.write_text(part_file(result, part), encoding="utf-8")
 
@@ -93,8 +108,10 @@ def _check(order: LabOrder) -> None:
     """Refuse, before any work, what cannot be carried out."""
     if order.file is None and not order.bias:
         raise CommandError("FILE.csv is missing; without readings only --bias has something to show")
-    if order.file is None and (order.simulate or order.out or order.figure or order.compression or order.left_out):
-        raise CommandError("--simulate, --out, --plot, --compression and --leave-out need readings: FILE.csv")
+    if order.file is None and any(
+        (order.simulate, order.out, order.figure, order.report, order.compression, order.left_out)
+    ):
+        raise CommandError("--simulate, --out, --plot, --report, --compression and --leave-out need readings: FILE.csv")
     if order.compression is not None and order.test != "shear":
         raise CommandError("--compression: belongs to the test shear; both moduli give Poisson's ratio")
     if order.left_out and order.test != "composition":
@@ -111,6 +128,8 @@ def _check(order: LabOrder) -> None:
         check_new_file(order.out, ".toml")
     if order.figure:
         check_new_file(order.figure, ".html")
+    if order.report:
+        check_vacant(order.report, "--report")
 
 
 def _scene_with(part: dict[str, Any], order: LabOrder) -> Scene:

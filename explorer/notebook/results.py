@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from html import escape
 from itertools import groupby
@@ -12,16 +12,15 @@ from typing import Any, TypeVar
 from doe.record import Document, RecordError
 from doe.studies.study import TRIES
 from doe.studies.study_result import StudyResult
-from explorer import report as study_report
 from explorer.background.output_folder import ResultFile, checked_folder
 from explorer.diagnosis import run as diagnosis_run
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.errors import CommandError
-from explorer.report import diagnosis as diagnosis_report
-from explorer.report.content import Block, Figure, Folded, Section
+from explorer.report import study_report
+from explorer.report.content import Figure, Report, Section, shown_in
+from explorer.report.diagnosis import diagnosis_report
 from explorer.report.figures.style import CONFIG
 from explorer.report.html import page
-from explorer.report.sections import sections_of
 from explorer.study import run as study_run
 from explorer.study.process import RESULT
 from solver.assets import measurement_folder
@@ -222,20 +221,14 @@ def charts(result: StudyResult | DiagnosisResult) -> Charts:
     Charts
         Name ("pareto", "ascent", "contours-1", …) → :class:`Chart`; those that the result has something for.
     """
-    if isinstance(result, StudyResult):
-        (title, _), sections = study_report.headings_of(result), sections_of(result)
-    else:
-        (title, _), sections = diagnosis_report.headings_of(result), diagnosis_report.sections_of(result)
-    found = (Chart(title, section.title, figure) for section in sections for figure in _figures(section.blocks))
+    report = study_report(result) if isinstance(result, StudyResult) else diagnosis_report(result)
+    found = (
+        Chart(report.title, section.title, one)
+        for section in report.sections
+        for one in shown_in(section.blocks)
+        if isinstance(one, Figure)
+    )
     return Charts({chart.drawn.name: chart for chart in found})
-
-
-def _figures(blocks: Iterable[Block]) -> Iterator[Figure]:
-    for block in blocks:
-        if isinstance(block, Folded):
-            yield from _figures(block.blocks)
-        elif isinstance(block, Figure):
-            yield block
 
 
 def _inline(drawn: Iterable[Chart]) -> str:
@@ -246,7 +239,7 @@ def _inline(drawn: Iterable[Chart]) -> str:
         for title, several in groupby(shown, lambda chart: chart.section)
     ]
     height = AROUND_CHARTS + sum(chart.drawn.spec["layout"]["height"] + AROUND_CHART for chart in shown)
-    content = escape(page(shown[0].report if shown else "", "", sections))
+    content = escape(page(Report(shown[0].report if shown else "", "", None, tuple(sections))))
     return (
         f'<iframe srcdoc="{content}" sandbox="allow-scripts allow-downloads" '
         f'style="width:100%; height:{min(height, MOST_HEIGHT)}px; border:0"></iframe>'

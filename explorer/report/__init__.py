@@ -1,36 +1,46 @@
-"""The report of a study: what ``result.json`` holds, as a page with charts and as Markdown."""
+"""The report of a study: what ``result.json`` holds, as a page with charts, as Markdown, and as figures and data."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from doe.studies.study_result import StudyResult
-from explorer.files.output_file import write_whole
+from explorer.report import folder
+from explorer.report.content import Report
+from explorer.report.data import study_data
 from explorer.report.html import page
 from explorer.report.markdown import document
+from explorer.report.methods import study_methods
 from explorer.report.sections import sections_of
+from explorer.report.sections.answer import banner
 
-__all__ = ["headings_of", "report_html", "report_markdown", "write_report"]
+__all__ = ["report_html", "report_markdown", "study_report", "write_report"]
 
 
-def write_report(result: StudyResult, folder: Path) -> None:
-    """Write ``report.html`` and ``report.md`` into ``folder``; each appears complete or not at all."""
-    texts = {"report.html": report_html(result), "report.md": report_markdown(result)}
-    for name, text in texts.items():
-        write_whole(folder / name, text)
+def study_report(result: StudyResult) -> Report:
+    """The report of a calibration."""
+    study = result.study
+    return Report(
+        title=study.title or study.name,
+        subtitle=f"Calibration report of the study {study.name}, profile {study.profile.name}",
+        banner=banner(result),
+        sections=sections_of(result),
+        about=result.about,
+        data=study_data(result),
+        references=study_methods(result)[1],
+    )
+
+
+def write_report(result: StudyResult, place: Path, results: dict[str, str] | None = None) -> str:
+    """Write the files of `explorer.report.folder` into ``place``; returns its line for the user."""
+    return folder.write_report(study_report(result), place, results)
 
 
 def report_html(result: StudyResult) -> str:
     """The page: self-contained, with charts."""
-    return page(*headings_of(result), sections_of(result))
+    return page(study_report(result))
 
 
 def report_markdown(result: StudyResult) -> str:
     """The same facts without charts."""
-    return document(*headings_of(result), sections_of(result))
-
-
-def headings_of(result: StudyResult) -> tuple[str, str]:
-    """Title and subtitle of the report."""
-    study = result.study
-    return study.title or study.name, f"Calibration report of the study {study.name}, profile {study.profile.name}"
+    return document(study_report(result))

@@ -1,15 +1,70 @@
-"""What a report consists of. Sections are built once from a result; HTML and Markdown render the same ones.
+"""What a report consists of. It is built once from a typed result; HTML, Markdown and the files beside it render it.
 
 Text may hold code spans between backticks; everything else in it is plain and is escaped by the renderers.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
 from typing import Any
+
+from doe.provenance import About
 
 Spec = dict[str, Any]
 """A chart as plotly reads it: {"data": [traces], "layout": {…}}, plain JSON types."""
+
+
+class Word(StrEnum):
+    """The verdicts of all reports. One of them, and nothing before it, begins every report."""
+
+    CALIBRATED = "CALIBRATED WITHIN"
+    NOT_CALIBRATED = "NOT CALIBRATED"
+    OUT_OF_REACH = "OUT OF REACH"
+    TARGET_REACHED = "TARGET REACHED"
+    EFFECT_FOUND = "EFFECT FOUND"
+    NO_EFFECT = "NO EFFECT FOUND"
+    NOTHING_MISSING = "NOTHING MISSING"
+    UNEXPLAINED = "UNEXPLAINED"
+    NO_ANSWER = "NO ANSWER"
+    MEASURED = "MEASURED"
+    REPRODUCED = "REPRODUCED"
+    DIFFERS = "DIFFERS"
+
+    @property
+    def tone(self) -> str:
+        """ "good", "bad" or "open": the colour of the banner, which never says more than the word."""
+        if self in (Word.NOT_CALIBRATED, Word.OUT_OF_REACH, Word.UNEXPLAINED, Word.DIFFERS):
+            return "bad"
+        return "open" if self in (Word.NO_ANSWER, Word.NO_EFFECT) else "good"
+
+
+@dataclass(frozen=True)
+class Banner:
+    """The verdict: its word with what belongs to it ("± 1.50°"), why in one sentence, what to do next in one."""
+
+    word: Word
+    of: str
+    why: str
+    then: str
+
+    @property
+    def headline(self) -> str:
+        """Word and what belongs to it."""
+        return f"{self.word} {self.of}".strip()
+
+
+class Strong(str):
+    """A cell that is the answer among the others of its row."""
+
+    __slots__ = ()
+
+
+class Struck(str):
+    """A cell whose number does not hold: it is struck out."""
+
+    __slots__ = ()
 
 
 @dataclass(frozen=True)
@@ -58,10 +113,30 @@ class Table:
 
 @dataclass(frozen=True)
 class Figure:
-    """A chart with its caption. ``name`` is its id on the page; Markdown leaves it out."""
+    """A chart. ``name`` is its id on the page, ``caption`` says what is drawn, n and method; Markdown leaves it out."""
 
     name: str
     spec: Spec
+    caption: str
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A line drawing: ``svg`` is a whole element of this program's own making, ``alt`` what it shows in words."""
+
+    name: str
+    svg: str
+    alt: str
+    caption: str
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A photograph, or a drawing over one, as PNG."""
+
+    name: str
+    png: bytes
+    alt: str
     caption: str
 
 
@@ -73,7 +148,9 @@ class Folded:
     blocks: tuple[Block, ...]
 
 
-Block = Text | Caution | Facts | Bullets | Code | Table | Figure | Folded
+Block = Text | Caution | Facts | Bullets | Code | Table | Figure | Drawing | Picture | Folded
+Shown = Figure | Drawing | Picture
+"""Blocks that are numbered: "Figure 3."."""
 
 
 @dataclass(frozen=True)
@@ -82,3 +159,48 @@ class Section:
 
     title: str
     blocks: tuple[Block, ...]
+
+
+@dataclass(frozen=True)
+class DataTable:
+    """A table of plain data, written as ``NAME.csv``: numbers in SI or in the unit that their column names."""
+
+    name: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str | float | int | None, ...], ...]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A source that the methods cite. ``key``: as in BibTeX; ``kind``: "article", "book", "software", …"""
+
+    key: str
+    kind: str
+    fields: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class Report:
+    """All of a report; ``about``: who, when, and notes."""
+
+    title: str
+    subtitle: str
+    banner: Banner | None
+    sections: tuple[Section, ...]
+    about: About = field(default_factory=About)
+    data: tuple[DataTable, ...] = ()
+    references: tuple[Reference, ...] = ()
+
+    @property
+    def shown(self) -> dict[str, Shown]:
+        """Figures, drawings and pictures by name, in the order of their numbers."""
+        return {block.name: block for section in self.sections for block in shown_in(section.blocks)}
+
+
+def shown_in(blocks: Iterable[Block]) -> Iterator[Shown]:
+    """What of ``blocks`` is numbered, in their order, folded ones included."""
+    for block in blocks:
+        if isinstance(block, Folded):
+            yield from shown_in(block.blocks)
+        elif isinstance(block, Figure | Drawing | Picture):
+            yield block

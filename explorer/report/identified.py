@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 from doe.analysis.optimum import Optimum
 from doe.stages.surface import OptimumResult
+from explorer.report.content import Strong
 from explorer.units import MISSING, enumeration, parameter_label, parameter_range, parameter_value, percent
 
 BY_RULE = "chosen by rule"
@@ -45,8 +46,13 @@ class FactorSetting:
         yes_or_no = "yes" if self.identified else "no"
         return (
             *(self.name, self.label, yes_or_no),
-            *(self.feasible, self.feasible_share, self.value, self.confidence_set),
+            *(self.range_or_answer, self.feasible_share, self.value, self.confidence_set),
         )
+
+    @property
+    def range_or_answer(self) -> str:
+        """The range that gives the target; where the factor is not identified it is the answer, and stands out."""
+        return self.feasible if self.identified or self.feasible == MISSING else Strong(self.feasible)
 
     @property
     def answer(self) -> str:

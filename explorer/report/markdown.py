@@ -5,15 +5,36 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from explorer.report.content import Block, Bullets, Caution, Code, Facts, Figure, Folded, Section, Table, Text
+from explorer.report.content import (
+    Block,
+    Bullets,
+    Caution,
+    Code,
+    Drawing,
+    Facts,
+    Figure,
+    Folded,
+    Picture,
+    Report,
+    Strong,
+    Struck,
+    Table,
+    Text,
+)
 
 SPECIAL = re.compile(r"([\\*_\[\]<>#|])")
 
 
-def document(title: str, subtitle: str, sections: Sequence[Section]) -> str:
+def document(report: Report) -> str:
     """The whole report."""
-    parts = [f"# {escaped(title)}", escaped(subtitle)]
-    for section in sections:
+    about, banner = report.about, report.banner
+    parts = [f"# {escaped(report.title)}", escaped(report.subtitle)]
+    parts += [", ".join(escaped(one) for one in (about.author, about.date) if one)]
+    if banner is not None:
+        parts += [f"**{escaped(banner.headline)}** – {escaped(banner.why)}", f"Next: {escaped(banner.then)}"]
+    parts += [f"Notes: {escaped(about.notes)}"] if about.notes else []
+    parts = [part for part in parts if part]
+    for section in report.sections:
         parts.append(f"## {escaped(section.title)}")
         parts += [text for block in section.blocks if (text := _block(block))]
     return "\n\n".join(parts) + "\n"
@@ -22,10 +43,12 @@ def document(title: str, subtitle: str, sections: Sequence[Section]) -> str:
 def escaped(text: str) -> str:
     """Text in which Markdown and HTML see no markup; code spans stay, and line breaks become blanks."""
     pieces = re.split(r"(`[^`]+`)", text.replace("\n", " "))
-    return "".join(
+    plain = "".join(
         piece.replace("|", r"\|") if piece.startswith("`") and len(piece) > 1 else SPECIAL.sub(r"\\\1", piece)
         for piece in pieces
     )
+    mark = "**" if isinstance(text, Strong) else "~~" if isinstance(text, Struck) else ""
+    return f"{mark}{plain}{mark}"
 
 
 def _block(block: Block) -> str:
@@ -42,7 +65,7 @@ def _block(block: Block) -> str:
             return f"```sh\n{text}\n```"
         case Table():
             return _table(block)
-        case Figure():
+        case Figure() | Drawing() | Picture():
             return ""
         case Folded(title, blocks):
             return "\n\n".join([f"### {escaped(title)}", *(text for inner in blocks if (text := _block(inner)))])

@@ -14,12 +14,10 @@ from doe.stages.surface import OptimumResult
 from doe.studies.study_result import AnyStudy
 from explorer.report.content import Spec
 from explorer.report.figures.effects import all_effects, errors_at_hand, half_normal, main_effects, pareto_against
-from explorer.report.figures.model import FittedTarget, fitted_targets
-from explorer.report.figures.noise import noise_of_estimators
-from explorer.report.figures.optimum import cloud, ranges
+from explorer.report.figures.model import FittedTarget, cloud, fitted_targets, ranges
+from explorer.report.figures.pours import ascent_path, noise_of_estimators, scan, verification
 from explorer.report.figures.style import short_rows, stacked
 from explorer.report.figures.surface import contours, fit, height_over, residual_quantiles, solutions
-from explorer.report.figures.walks import ascent_path, scan, verification
 from explorer.report.identified import cloud_caution
 from explorer.units import observable_label
 

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from doe.pour_runner import PourRunner
+from doe.provenance import About
 from doe.run_records import Run
 from doe.stages import planned_runs
 from doe.store import Store, default_store
@@ -35,8 +36,9 @@ from doe.studies.study_result import (
 from explorer.background.progress import PROGRESS, RunProgress, told_of_pauses
 from explorer.errors import CommandError
 from explorer.files.output_file import write_whole
-from explorer.files.run_result import versions
+from explorer.files.run_result import made_today, versions
 from explorer.report import write_report
+from explorer.report.set_up import set_up_of
 from explorer.study.process import PARTIAL
 from solver import WorkerPool
 from solver.arch import chosen
@@ -44,6 +46,8 @@ from solver.observables.made_up import estimator_bias
 
 if TYPE_CHECKING:
     from explorer.logs.pour_recorder import StudyRecorder
+
+NOBODY = About()
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,8 @@ class StudyOrder:
     record: Path | None = None
     threads: int | None = None
     tries: int = TRIES
+    author: str = ""
+    notes: str = ""
 
 
 def run_study(order: StudyOrder, say: Callable[[str], None]) -> StudyResult:
@@ -102,12 +108,15 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> StudyResult:
         )
         bias = estimator_bias(study.estimators)
         found = run_campaign(study, profile, runner, bias, progress.stage, follower.begin, partial.keep)
-    result = result_of(study, profile, found, progress.elapsed, order.tries)
+    result = result_of(study, profile, found, progress.elapsed, order.tries, made_today(order.author, order.notes))
     text = json.dumps(result.to_dict(), ensure_ascii=False, allow_nan=False, indent=1)
+    # First and by itself: a report that cannot be written costs no study.
     write_whole(order.out / "result.json", text + "\n")
-    write_report(result, order.out)
+    missing = write_report(result, order.out, {"result.json": text + "\n"})
     partial.remove()
     say(f"{order.out}/report.html, report.md, result.json")
+    if missing:
+        say(missing)
     return result
 
 
@@ -149,7 +158,9 @@ class PartialResult:
         write_whole(self._file, json.dumps(content.to_dict(), ensure_ascii=False, allow_nan=False) + "\n")
 
 
-def result_of(study: Study, profile: Profile, found: Campaign, total_s: float, tries: int = TRIES) -> StudyResult:
+def result_of(
+    study: Study, profile: Profile, found: Campaign, total_s: float, tries: int = TRIES, about: About = NOBODY
+) -> StudyResult:
     """The content of ``result.json``."""
     runs = list(found.stages.all_runs())
     return StudyResult(
@@ -164,4 +175,6 @@ def result_of(study: Study, profile: Profile, found: Campaign, total_s: float, t
         ),
         versions=versions(),
         shapes=tuple(PouredBody(body.name, body.mass, body.spheres, body.clump.fit) for body in study.scene.bodies),
+        about=about,
+        set_up=set_up_of(study.scene),
     )

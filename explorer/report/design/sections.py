@@ -8,22 +8,215 @@ from collections.abc import Callable
 
 import numpy as np
 
+from doe.analysis.canonical import Canonical, RidgePath
 from doe.analysis.screening import Screening
 from doe.analysis.surface_anova import SurfaceAnova
 from doe.analysis.t_tests import Sample
+from doe.stages.surface import OptimumResult
 from explorer.design.result import DesignResult
-from explorer.report.content import Block, Caution, Code, Facts, Section, Table, Text
-from explorer.report.design.effects import effects
-from explorer.report.design.model import diagnostics, model, units_of_factors
-from explorer.report.design.target import shape, target
+from explorer.report.content import Banner, Block, Caution, Code, Facts, Figure, Section, Table, Text, Word
+from explorer.report.design.charts import ridge
+from explorer.report.design.model import diagnostics, effects, model, units_of_factors
+from explorer.report.figures.model import cloud, ranges
+from explorer.report.figures.surface import solutions
+from explorer.report.identified import GIVES_TARGET, cloud_caution, rule, settings
+from explorer.report.sections.answer import ranges_caption
 from explorer.report.sections.surface import equation
-from explorer.units import MISSING, enumeration, fixed, number, observed, parameter_label, parameter_value
+from explorer.units import MISSING, enumeration, fixed, number, observed, parameter_label, parameter_value, percent
+
+WHOLE = ("model", "residual", "lack_of_fit", "pure_error", "total")
+"""Rows of an analysis of variance that are no terms."""
+MOST_PANELS = 3
+"""Factors up to which every pair of them has a panel."""
+
+
+def target(result: DesignResult) -> Section | None:
+    """The settings that give the target; None where none was asked for, or found."""
+    fitted, optimum, response = result.fitted, result.optimum, result.response.path
+    if fitted is None or optimum is None:
+        return None
+    found = optimum.single
+
+    def between(low: float, high: float) -> str:
+        return f"{observed(response, low)} … {observed(response, high)}"
+
+    mean = between(found.predicted_low, found.predicted_high)
+    facts = [
+        ("Answer", found.statement),
+        ("Model there", f"{observed(response, found.predicted)}, 95 % of the mean {mean}"),
+        ("Reachable in the region", between(found.reachable_low, found.reachable_high)),
+        ("Compatible with the target", f"{percent(found.compatible_share)} of the region, at 95 %"),
+    ]  # fmt: skip
+    if not found.target_standard_error:
+        facts.append(("The target itself", "taken as exact; `--target-error` states its standard error"))
+    blocks: list[Block] = [Facts(tuple(facts)), settings_table(result, optimum)]
+    n = f"n = {result.runs.valid} runs in {result.runs.rows} rows"
+    surface = solutions(fitted)
+    if surface is not None:
+        blocks.append(
+            Figure(
+                "solutions", surface, f"{n}. Every setting on the green surface gives the target in the fitted model."
+            )
+        )
+    blocks.append(Figure("ranges", ranges(fitted), ranges_caption(optimum)))
+    if 1 < len(result.factors) <= MOST_PANELS:
+        caption = (
+            f"n = {len(found.bootstrap_points)} refits to resampled {found.resampling} (bootstrap); each dot is the "
+            "solution "
+            f"nearest the reference. {percent(found.share_reached)} of the refits reach the target. "
+            + cloud_caution(optimum)
+        )
+        blocks.append(Figure("cloud", cloud(fitted), caption.rstrip()))
+    return Section("Target", tuple(blocks))
+
+
+def settings_table(result: DesignResult, optimum: OptimumResult) -> Table:
+    """Every factor at the target: its value where it is identified, the range that gives the target, its reference."""
+    rows = tuple(
+        (*setting.cells, parameter_value(factor.path, factor.reference))
+        for setting, factor in zip(settings(optimum), result.factors, strict=True)
+    )
+    header = ("letter", "factor", "identified", GIVES_TARGET, "of low … high", "setting", "95 % set", "reference")
+    nearest = "Of all settings that give the target, the one nearest the reference."
+    return Table(header, rows, rule(optimum, "reference") or nearest)
+
+
+def shape(result: DesignResult) -> Section | None:
+    """Canonical analysis of a full second-order model, and the path of steepest ascent of any model."""
+    model, response = result.analysis.model, result.response.path
+    if model is None:
+        return None
+    canonical = model.canonical
+    blocks: list[Block] = []
+    if canonical is None:
+        blocks.append(Text("The model has not all squares, and so no stationary point of its own."))
+    else:
+        blocks += [Facts(tuple(_stationary(result, canonical))), axes_table(result, canonical)]
+    for path, words in ((model.highest, "highest"), (model.lowest, "lowest")):
+        blocks.append(path_table(result, path, words, response))
+    caption = (
+        f"n = {result.runs.valid} runs. Band: 95 % of the mean (t). The path ends at the distance of the furthest run "
+        "and "
+        "may leave low … high."
+    )
+    return Section("Shape and ridge", (*blocks, Figure("ridge", ridge(result, model), caption)))
+
+
+def axes_table(result: DesignResult, canonical: Canonical) -> Table:
+    """Eigenvalues with the directions along which the surface curves so."""
+    rows = tuple(
+        (number(value, 4), *(number(direction[k], 3) for direction in canonical.eigenvectors))
+        for k, value in enumerate(canonical.eigenvalues)
+    )
+    header = ("eigenvalue", *(factor.name for factor in result.factors))
+    return Table(header, rows, "Canonical axes, coded: y = y_s + Σ eigenvalue · w².")
+
+
+def path_table(result: DesignResult, path: RidgePath, words: str, response: str) -> Table:
+    """The extreme on spheres of growing radius."""
+    rows = tuple(
+        (
+            number(radius),
+            *(parameter_value(f.path, value) for f, value in zip(result.factors, natural, strict=True)),
+            observed(response, mean),
+            "–" if math.isnan(error) else f"± {number(error)}",
+        )
+        for radius, natural, mean, error in zip(
+            path.radius, path.natural.tolist(), path.predicted, path.standard_error, strict=True
+        )
+    )
+    header = ("distance", *(factor.name for factor in result.factors), "model", "standard error")
+    return Table(header, rows, f"Ridge: the {words} response at a distance from the centre [half-widths].")
+
+
+def _stationary(result: DesignResult, canonical: Canonical) -> list[tuple[str, str]]:
+    kind = canonical.kind
+    if kind == "ridge":
+        return [("Stationary point", "none: a ridge, at least one eigenvalue is zero")]
+    place = "inside" if canonical.inside else "outside"
+    at = [
+        f"{f.name} = {parameter_value(f.path, value)}"
+        for f, value in zip(result.factors, canonical.stationary_natural.tolist(), strict=True)
+    ]
+    coded = ", ".join(number(value, 4) for value in canonical.stationary_coded)
+    return [
+        ("Stationary point", f"a {kind} {place} the region: {enumeration(at)} (coded {coded})"),
+        ("Model there", observed(result.response.path, canonical.stationary_response)),
+    ]
 
 
 def sections_of(result: DesignResult) -> tuple[Section, ...]:
     """Every section that ``result`` has something for."""
     found = (make(result) for make in SECTIONS)
     return tuple(section for section in found if section is not None)
+
+
+def banner(result: DesignResult) -> Banner:
+    """The target's settings if one was asked for, else what acts."""
+    found, response = result.analysis, result.response.path
+    optimum = result.optimum
+    if optimum is not None:
+        open_ = [one.name for one in settings(optimum) if not one.identified]
+        single = optimum.single
+        if not single.reached:
+            reach = f"{observed(response, single.reachable_low)} … {observed(response, single.reachable_high)}"
+            return Banner(
+                Word.OUT_OF_REACH,
+                "",
+                f"No setting of the region gives {observed(response, single.target)}: the model reaches {reach}.",
+                "Make runs beyond low … high of the factors that act, or look for a factor that is missing.",
+            )
+        if found.model is not None and not found.model.anova.better_than_noise:
+            return Banner(
+                Word.NO_ANSWER,
+                "",
+                "The model is not better than noise, so the setting for the target is a point and no answer.",
+                "Repeat runs: replicates or centre runs show how large the noise is.",
+            )
+        return Banner(
+            Word.TARGET_REACHED,
+            observed(response, single.target),
+            single.statement,
+            f"Take the ranges of {enumeration(open_)} as the answer; a second response, or more runs, would fix them."
+            if open_
+            else "Run the setting found, a few times, and compare.",
+        )
+    acts = _acting_names(result)
+    if acts:
+        return Banner(
+            Word.EFFECT_FOUND,
+            enumeration(acts),
+            f"Of {result.runs.valid} runs: {acting_words(result)}.",
+            "Ask for the settings of a value: `explorer analyse … --target`.",
+        )
+    return Banner(
+        Word.NO_EFFECT,
+        "",
+        f"Of {result.runs.valid} runs: {acting_words(result)}.",
+        "Add replicates or widen low … high; `explorer design --sigma` says what a design will see.",
+    )
+
+
+def acting_words(result: DesignResult) -> str:
+    """What acts by the tests of a two-level design, or by the terms of the model."""
+    found = result.analysis
+    if found.effects is not None:
+        return acting(found.effects.screening)
+    return "no model could be fitted" if found.model is None else terms_that_act(found.model.anova)
+
+
+def _acting_names(result: DesignResult) -> list[str]:
+    found = result.analysis
+    if found.effects is not None:
+        screening = found.effects.screening
+        tests = {e.name: test for e in screening.effects if not e.is_dummy and (test := screening.deciding_test(e))}
+        if any(math.isfinite(test.p) for test in tests.values()):
+            return [name for name, test in tests.items() if test.p_holm < 0.05]
+        return [e.name for e in screening.effects if not e.is_dummy and abs(e.effect) > screening.lenth.margin]
+    if found.model is None:
+        return []
+    rows = [row for row in found.model.anova.rows if row.source not in WHOLE]
+    return [row.source.replace("*", " × ").replace("^2", "²") for row in rows if row.p < 0.05]
 
 
 def in_short(result: DesignResult) -> Section:
@@ -69,8 +262,7 @@ def acting(analysis: Screening) -> str:
 
 def terms_that_act(anova: SurfaceAnova) -> str:
     """Terms of the model with p < 0.05, each alone."""
-    whole = ("model", "residual", "lack_of_fit", "pure_error", "total")
-    terms = [row for row in anova.rows if row.source not in whole]
+    terms = [row for row in anova.rows if row.source not in WHOLE]
     acting = [row.source.replace("*", " × ").replace("^2", "²") for row in terms if row.p < 0.05]
     if all(math.isnan(row.p) for row in terms):
         return "cannot be told without scatter"

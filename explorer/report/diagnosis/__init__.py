@@ -6,15 +6,16 @@ from collections.abc import Callable
 from pathlib import Path
 
 from explorer.diagnosis.result import DiagnosisResult
-from explorer.files.output_file import write_whole
-from explorer.report.content import Section
-from explorer.report.diagnosis.answer import could_have_seen, in_short, rivals
+from explorer.report.content import Report, Section
+from explorer.report.data import diagnosis_data
+from explorer.report.diagnosis.answer import banner, could_have_seen, in_short, rivals
 from explorer.report.diagnosis.evidence import effects, error, over_the_plate, parameters, pile, residuals
 from explorer.report.diagnosis.method import data, for_a_paper, how_reached, repeat
 from explorer.report.html import page
 from explorer.report.markdown import document
+from explorer.report.methods import diagnosis_references
 
-__all__ = ["diagnosis_html", "diagnosis_markdown", "headings_of", "sections_of", "write_diagnosis_report"]
+__all__ = ["diagnosis_html", "diagnosis_markdown", "diagnosis_report", "sections_of"]
 
 SECTIONS: tuple[Callable[[DiagnosisResult], Section | None], ...] = (
     in_short,
@@ -34,30 +35,31 @@ SECTIONS: tuple[Callable[[DiagnosisResult], Section | None], ...] = (
 """In the order of the page: the answer and what it rests on first, then how it was found."""
 
 
-def write_diagnosis_report(result: DiagnosisResult, folder: Path) -> None:
-    """Write ``report.html`` and ``report.md`` into ``folder``; each appears complete or not at all."""
-    texts = {"report.html": diagnosis_html(result), "report.md": diagnosis_markdown(result)}
-    for name, text in texts.items():
-        write_whole(folder / name, text)
+def diagnosis_report(result: DiagnosisResult) -> Report:
+    """The report of a diagnosis."""
+    found = result.data
+    return Report(
+        title=found.title or Path(found.folder).name,
+        subtitle=f"Diagnosis of the measured data in {found.folder}",
+        banner=banner(result),
+        sections=sections_of(result),
+        about=result.about,
+        data=diagnosis_data(result),
+        references=diagnosis_references(result),
+    )
 
 
 def diagnosis_html(result: DiagnosisResult) -> str:
     """The page: self-contained, with charts."""
-    return page(*headings_of(result), sections_of(result))
+    return page(diagnosis_report(result))
 
 
 def diagnosis_markdown(result: DiagnosisResult) -> str:
     """The same facts without charts."""
-    return document(*headings_of(result), sections_of(result))
+    return document(diagnosis_report(result))
 
 
 def sections_of(result: DiagnosisResult) -> tuple[Section, ...]:
     """Every section that ``result`` has something for."""
     found = (make(result) for make in SECTIONS)
     return tuple(section for section in found if section is not None)
-
-
-def headings_of(result: DiagnosisResult) -> tuple[str, str]:
-    """Title and subtitle of the report."""
-    found = result.data
-    return found.title or Path(found.folder).name, f"Diagnosis of the measured data in {found.folder}"

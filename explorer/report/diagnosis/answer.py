@@ -7,8 +7,8 @@ import math
 from doe.diagnose.next_experiment import SURE
 from doe.diagnose.result import NO_EFFECT, UNEXPLAINED, EffectRow, HeldOut, Place
 from doe.holdout import OVERALL
-from explorer.diagnosis.result import DiagnosisResult, ErrorRow, answers
-from explorer.report.content import Block, Bullets, Caution, Facts, Figure, Section, Table, Text
+from explorer.diagnosis.result import DiagnosisResult, ErrorRow, Kind, answers
+from explorer.report.content import Banner, Block, Bullets, Caution, Facts, Figure, Section, Table, Text, Word
 from explorer.report.diagnosis.charts import likely, probability_chart
 from explorer.report.diagnosis.evidence import strained
 from explorer.report.diagnosis.wording import (
@@ -44,6 +44,34 @@ MOST_LEVERS = 6
 # In short
 
 
+WORDS: dict[Kind, Word] = {
+    "no_missing_effect": Word.NOTHING_MISSING,
+    "effect": Word.EFFECT_FOUND,
+    "effects": Word.EFFECT_FOUND,
+    "ambiguous": Word.NO_ANSWER,
+    "unexplained": Word.UNEXPLAINED,
+}
+
+
+def banner(result: DiagnosisResult) -> Banner:
+    """The answer as a verdict."""
+    found = enumeration([spelled(one) for one in result.named])
+    of = f"{found}, {chance(result.probability(result.named[0]))}" if result.named else ""
+    return Banner(WORDS[result.kind], of, verdict_sentence(result), _what_next(result))
+
+
+def _what_next(result: DiagnosisResult) -> str:
+    match result.kind:
+        case "no_missing_effect":
+            return "Use the calibrated model; the section on what could have been seen says what may still hide."
+        case "effect" | "effects":
+            return "Take the corrected material, and the study that calibrates it: `explorer diagnose … --apply`."
+        case "ambiguous":
+            return f"{_asked_for(result)} `explorer diagnose … --follow-up` takes them."
+        case "unexplained":
+            return "Pour the same set-up again, and check scale, units and the set-up before looking for new physics."
+
+
 def in_short(result: DiagnosisResult) -> Section:
     """The answer for a reader who reads nothing else."""
     blocks: list[Block] = [
@@ -52,7 +80,10 @@ def in_short(result: DiagnosisResult) -> Section:
         Figure(
             "probabilities",
             probability_chart(result),
-            f"Probability of each answer; dashed: {percent(result.threshold)}, from which on an effect is named.",
+            f"Posterior probability of each answer (n = {sum(row.features for row in result.offered)} features of "
+            f"{sum(row.replicates for row in result.measured if row.role == 'fit')} measured pours); dashed: "
+            f"{percent(result.threshold)}, from which on an effect is "
+            "named.",
         ),
         _probability_table(result),
     ]

@@ -60,6 +60,13 @@ ERROR_CAPTION = (
 )
 
 
+def pours_of(result: DiagnosisResult, condition: str) -> str:
+    """How many pours a condition has: "n = 5 measured pours and 20 fresh ones of each model"."""
+    measured = next(row.replicates for row in result.measured if row.condition == condition)
+    fresh = [row.pours for row in result.confirmation.after.conditions if row.condition == condition]
+    return f"n = {measured} measured pours" + (f" and {fresh[0]} fresh ones of each model" if fresh else "")
+
+
 def error(result: DiagnosisResult) -> Section:
     """Tables for held-out and fitted conditions; the held-out ones come first and open."""
     blocks: list[Block] = []
@@ -70,13 +77,15 @@ def error(result: DiagnosisResult) -> Section:
             Text("No effect was added, so before and after are the same model, and there is no skill to state.")
         )
     if result.error.holdout:
+        held_out = sum(row.replicates for row in result.measured if row.role == "holdout")
         blocks += [
             Text("On held-out conditions, which no model was fitted to:"),
             _error_table(result, "holdout", ERROR_CAPTION),
             Figure(
                 "error",
                 error_chart(result, "holdout"),
-                "Errors as multiples of the noise floor; a perfect model lies about 1.",
+                f"Root-mean-square errors of fresh pours over the noise floor, n = {held_out} measured pours that no "
+                "model was fitted to; a perfect model lies about 1.",
             ),
             Folded("On fitted conditions", (_error_table(result, "fit", ""),)),
         ]
@@ -118,7 +127,15 @@ def pile(result: DiagnosisResult) -> Section | None:
         text += " Before and after are the same model here."
     blocks: list[Block] = [Text(text)]
     for k, picture in enumerate(pictures, start=1):
-        blocks.append(Figure(f"pile-{k}", pile_chart(picture), f"Condition {picture.condition}, {_role(picture)}."))
+        blocks.append(
+            Figure(
+                f"pile-{k}",
+                pile_chart(picture),
+                f"Condition {picture.condition}, {_role(picture)}, {pours_of(result, picture.condition)}; bands: ± 1 "
+                "SD "
+                "between pours.",
+            )
+        )
     return Section("The pile", tuple(blocks))
 
 
@@ -136,7 +153,12 @@ def over_the_plate(result: DiagnosisResult) -> Section | None:
     header = ("condition", "root mean square before", "after", "farthest off before, at x, y", "there before", "after")
     rows = tuple(_map_row(picture) for picture in result.maps)
     figures = [
-        Figure(f"map-{k}", map_chart(picture), f"Condition {picture.condition}, {_role(picture)}.")
+        Figure(
+            f"map-{k}",
+            map_chart(picture),
+            f"Condition {picture.condition}, {_role(picture)}, {pours_of(result, picture.condition)}: difference of "
+            "the mean heights; lines: measured height.",
+        )
         for k, picture in enumerate(result.maps, start=1)
     ]
     caption = "Root mean squares where the measured pile is half a body high at least."
@@ -169,7 +191,13 @@ def residuals(result: DiagnosisResult) -> Section:
         "count that, single bars do not."
     )
     few = f" The {drawn} of {features} features that are farthest off." if drawn < features else ""
-    figure = Figure("residuals", residual_chart(result), f"Dashed: 95 % for one feature; solid: for all of them.{few}")
+    figure = Figure(
+        "residuals",
+        residual_chart(result),
+        f"n = {len(result.residuals)} features; residuals in σ of the measured mean. Dashed: 95 % for one feature; "
+        "solid: for all "
+        f"of them (Bonferroni).{few}",
+    )
     return Section(
         "Which numbers it rests on",
         (

@@ -34,8 +34,9 @@ CONFIG: Json = {
     "modeBarButtonsToRemove": ["select2d", "lasso2d"],
     "showSendToCloud": False,
     "plotlyServerURL": "",
+    "toImageButtonOptions": {"format": "svg"},
 }
-"""plotly.js's options for every chart, in a report and on the live page.
+"""plotly.js's options for every chart, in a report and on the live page; its picture button gives SVG, for print.
 
 By default plotly.js 4 (plotly 7) offers "Share chart…", which uploads the data to cloud.plotly.com, and a logo that
 links to plotly.com. Charts hold unpublished data, so both are off. The library's text keeps that address as a default;

@@ -6,21 +6,28 @@ from collections.abc import Callable
 
 from doe.studies.study_result import StudyResult
 from explorer.report.content import Section
-from explorer.report.sections.ascent import ascent
-from explorer.report.sections.assumptions import assumptions, scan
-from explorer.report.sections.effects import effects
-from explorer.report.sections.further import further
-from explorer.report.sections.noise import noise
-from explorer.report.sections.optimum import optimum
-from explorer.report.sections.overview import overview
-from explorer.report.sections.paper import paper
-from explorer.report.sections.repeat import repeat, runs
-from explorer.report.sections.screening import screening
-from explorer.report.sections.surface import surface
-from explorer.report.sections.verification import verification
+from explorer.report.methods import study_methods
+from explorer.report.sections.answer import effects, optimum, overview, parameters, verification
+from explorer.report.sections.closing import further, paper, repeat, runs
+from explorer.report.sections.designs import assumptions, noise, scan, screening
+from explorer.report.sections.surface import ascent, surface
+from explorer.report.set_up import set_up
+
+
+def materials(result: StudyResult) -> Section | None:
+    """What was poured into what."""
+    return set_up(result.set_up, result.study.assumed)
+
+
+def methods(result: StudyResult) -> Section:
+    """The paragraph for a paper."""
+    return study_methods(result)[0]
+
 
 STAGES_FOUND: tuple[Callable[[StudyResult], Section | None], ...] = (
+    parameters,
     overview,
+    materials,
     verification,
     effects,
     noise,
@@ -32,7 +39,7 @@ STAGES_FOUND: tuple[Callable[[StudyResult], Section | None], ...] = (
     optimum,
 )
 """In the order of the page: what was found, then how."""
-AT_THE_END: tuple[Callable[[StudyResult], Section | None], ...] = (paper, runs, repeat)
+AT_THE_END: tuple[Callable[[StudyResult], Section | None], ...] = (paper, methods, runs, repeat)
 
 
 def sections_of(result: StudyResult) -> tuple[Section, ...]:

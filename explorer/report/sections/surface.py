@@ -1,4 +1,4 @@
-"""The response surface: its design, equations, analysis of variance and fit."""
+"""The steepest ascent, and the response surface around where it passes the target: equations, ANOVA, fit."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ import numpy as np
 from doe.analysis.canonical import Canonical
 from doe.analysis.surface import Surface
 from doe.analysis.surface_anova import SurfaceAnova
-from doe.run_records import sample_of
+from doe.run_records import sample_of, valid_values
+from doe.stages.ascent import AscentResult
 from doe.stages.surface import SurfaceResult
 from doe.studies.study import Factor
 from doe.studies.study_result import StudyResult
 from explorer.report.content import Block, Bullets, Facts, Figure, Folded, Section, Table, Text
 from explorer.report.figures.model import FittedTarget, fitted_targets
+from explorer.report.figures.pours import ascent_path
 from explorer.report.figures.surface import contours, fit
 from explorer.units import (
     fixed,
@@ -30,6 +32,56 @@ from explorer.units import (
     unit_of_observable,
     unit_of_parameter,
 )
+
+
+def ascent(result: StudyResult) -> Section:
+    """Steps, means, errors and the bracket."""
+    walk = result.ascent
+    observable = walk.observable
+    blocks: list[Block] = [
+        Text(
+            "Direction and steps follow the effects on the target's own observable; base factor "
+            f"{walk.path.base}. {walk.bracket.statement} Two steps have to differ by "
+            f"{observed(observable, walk.smallest_difference)} to be told apart with chance 0.8."
+        ),
+        Figure(
+            "ascent",
+            ascent_path(walk, result.study.targets[0]),
+            f"n = {sum(len(valid_values(runs, observable)) for runs in walk.runs)} valid pours, one faint point each; "
+            "means "
+            "with 95 % intervals (z) from the pilot’s σ and the number of valid pours of a step; band: the target and "
+            "its "
+            "margin.",
+        ),
+        _steps(walk),
+    ]
+    notes = (*walk.notes, *(f"Region of the surface, SI units: {note}" for note in walk.region.notes))
+    if notes:
+        blocks.append(Bullets(notes))
+    return Section("Steepest ascent", tuple(blocks))
+
+
+def _steps(walk: AscentResult) -> Table:
+    observable, factors = walk.observable, walk.factors
+    rows = []
+    for k, natural in enumerate(walk.path.natural.tolist()):
+        rows.append(
+            (
+                str(k + 1),
+                *(parameter_value(f.path, value) for f, value in zip(factors, natural, strict=True)),
+                str(len(valid_values(walk.runs[k], observable))),
+                observed(observable, walk.means[k]),
+                observed(observable, walk.sd[k]),
+                observed(observable, walk.standard_error[k]),
+                fixed(walk.relative_error_percent[k]),
+            )
+        )
+    header = (
+        "step",
+        *(f"{factor.name} {parameter_label(factor.path)}" for factor in factors),
+        *("valid pours", "mean", "sd", "standard error", "relative error [%]"),
+    )
+    return Table(header, tuple(rows), f"{observable_label(observable)}; valid pours only.")
 
 
 def surface(result: StudyResult) -> Section:
@@ -70,7 +122,7 @@ def anova_table(anova: SurfaceAnova) -> Table:
             number(row.sum_of_squares, 4),
             str(row.df),
             number(row.mean_square, 4),
-            number(row.f, 4),
+            number(row.f),
             p_value(row.p),
         )
         for row in anova.rows
@@ -100,9 +152,14 @@ def _of_target(place: int, fitted: FittedTarget, canonical: Canonical) -> list[B
             )
         )
     ]  # fmt: skip
-    caption = "Through the optimum; the points of the design are projected on each panel."
+    n = f"n = {len(fitted.model.observed)} valid pours at {len(fitted.design)} points of the design"
+    caption = (
+        f"{n}; second-order model by least squares, cut through the optimum; the points of the design are projected on "
+        "each "
+        "panel. Thick line: model = target."
+    )
     blocks.append(Figure(f"contours-{place}", contours(fitted), caption))
-    blocks.append(Figure(f"fit-{place}", fit(fitted), ""))
+    blocks.append(Figure(f"fit-{place}", fit(fitted), f"{n}, one mark each; residuals are studentized externally."))
     blocks.append(anova_table(anova))
     if anova.notes:
         blocks.append(Bullets(anova.notes))

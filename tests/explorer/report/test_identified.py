@@ -14,8 +14,7 @@ from explorer.report.comparison import comparison
 from explorer.report.content import Table
 from explorer.report.design import design_markdown
 from explorer.report.design.charts import design_plots
-from explorer.report.figures.model import fitted_targets
-from explorer.report.figures.optimum import ranges
+from explorer.report.figures.model import fitted_targets, ranges
 from explorer.report.html import escaped
 from explorer.report.study_charts import study_plots
 from explorer.units import parameter_range, parameter_value

@@ -1,9 +1,9 @@
 """What a report says of a study's runs, valid ones and seeds tried, and of the limits that its method sets."""
 
-import importlib
 import re
 
 from explorer.report import report_html, report_markdown
+from explorer.report.sections import designs
 from solver.scenes.contact_model import ContactModel
 from tests.explorer.reported_studies import PROFILE, result_of_case, table, typed, visible
 
@@ -38,10 +38,8 @@ def test_numbers_of_the_method_are_printed_from_where_they_are_decided(monkeypat
     assert "touch fewer than 5 bodies" in text
     result["study"]["tries"] = 1
     result["screening"]["analysis"]["rows"] = 36
-    # By import_module: the package's own functions have the names of its modules.
-    sections = "explorer.report.sections"
-    monkeypatch.setattr(importlib.import_module(f"{sections}.noise"), "BIAS_LIMIT_DEG", 7.5)
-    monkeypatch.setattr(importlib.import_module(f"{sections}.screening"), "MIN_BODIES", 9)
+    monkeypatch.setattr(designs, "BIAS_LIMIT_DEG", 7.5)
+    monkeypatch.setattr(designs, "MIN_BODIES", 9)
     text = report_markdown(typed(result))
     assert "at most 1 seed is tried" in text
     assert "main effects in the 36-run design" in text

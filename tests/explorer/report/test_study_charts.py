@@ -14,7 +14,7 @@ from doe.studies.study_result import StudyDescription
 from explorer.report.diagnosis.charts import diagnosis_plots
 from explorer.report.figures.effects import all_effects, errors_at_hand, main_effects, pareto_against
 from explorer.report.figures.model import fitted_targets, prediction, profiler
-from explorer.report.figures.noise import noise_of_estimators
+from explorer.report.figures.pours import noise_of_estimators
 from explorer.report.figures.style import short_rows, stacked
 from explorer.report.figures.surface import height_over, residual_quantiles, solutions
 from explorer.report.study_charts import study_plots

@@ -1,0 +1,213 @@
+"""The report of photographed piles: each picture with what was read off it, the angles, and the outlines."""
+
+from __future__ import annotations
+
+import io
+import math
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+from scipy import stats
+
+from doe.provenance import About
+from doe.record import Document, Record
+from explorer.files.run_result import made_today, versions
+from explorer.photograph.annotated import sheet
+from explorer.photograph.run import MeasuredPhotographs, MeasureOrder
+from explorer.report.content import (
+    Banner,
+    Block,
+    Bullets,
+    DataTable,
+    Figure,
+    Picture,
+    Report,
+    Section,
+    Spec,
+    Strong,
+    Table,
+    Word,
+)
+from explorer.report.figures.style import ASSUMPTION, CHOSEN, FACTOR, TARGET, axis, chart, label, line
+from explorer.units import MISSING, fixed, number
+from solver.photograph import PhotographedPile, Refusal, open_picture
+from solver.photograph.reading_error import COVERAGE
+
+MOST_POINTS = 500
+"""Of an outline."""
+COLOURS = (FACTOR, ASSUMPTION, TARGET, CHOSEN)
+READ = "read"
+"""Name of the picture with what was read."""
+
+
+@dataclass(frozen=True)
+class ReadPile(Record):
+    """A pile on a picture; lengths in ``unit`` ("m" or "px"), angles [°], each with half its 95 % interval."""
+
+    name: str
+    unit: str
+    left: tuple[float, float]
+    right: tuple[float, float]
+    mean: tuple[float, float]
+    height: float
+    half_width: float
+    u: tuple[float, ...]
+    z: tuple[float, ...]
+    """The outline over the base line."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PhotographResult(Document):
+    """What was read off photographs: the content of ``photograph.json``. ``refused``: picture → why it has no angle."""
+
+    SCHEMA: ClassVar[int] = 1
+    NAME: ClassVar[str] = "photograph.json"
+
+    kind: str = "photograph"
+    piles: tuple[ReadPile, ...]
+    refused: dict[str, str]
+    versions: dict[str, str | None]
+    about: About = field(default_factory=About)
+
+    @property
+    def over_pictures(self) -> tuple[float, float, float]:
+        """Mean over the pictures, SD, and half the 95 % interval of the mean (Student's t) [°]; NaN below two."""
+        means = np.array([pile.mean[0] for pile in self.piles])
+        if means.size < 2:
+            return (float(means[0]) if means.size else math.nan), math.nan, math.nan
+        sd = float(means.std(ddof=1))
+        return float(means.mean()), sd, float(stats.t.ppf(0.975, means.size - 1)) * sd / math.sqrt(means.size)
+
+
+def photograph_result(measured: MeasuredPhotographs, author: str, notes: str) -> PhotographResult:
+    """The record of what was measured."""
+    return PhotographResult(
+        piles=tuple(_read(one) for one in measured.readings if isinstance(one, PhotographedPile)),
+        refused={one.name: f"{one.reason}: {one.detail}" for one in measured.readings if isinstance(one, Refusal)},
+        versions=versions(),
+        about=made_today(author, notes),
+    )
+
+
+def read_picture(order: MeasureOrder, measured: MeasuredPhotographs) -> bytes:
+    """The pictures with what was read, as PNG."""
+    file = io.BytesIO()
+    sheet([open_picture(path) for path in order.pictures], measured.readings, measured.simulated).save(file, "PNG")
+    return file.getvalue()
+
+
+def photograph_report(result: PhotographResult, picture: bytes | None) -> Report:
+    """The report; ``picture`` is what :func:`read_picture` gave, None where it is lost."""
+    names = ", ".join([*(pile.name for pile in result.piles), *result.refused])
+    blocks: list[Block] = [_angles(result)]
+    if picture is not None:
+        blocks.append(
+            Picture(
+                READ,
+                picture,
+                f"Photographs of piles with the outline, both flank lines and the base line drawn over them: {names}",
+                f"n = {len(result.piles) + len(result.refused)} pictures, read by one silhouette each. White: outline; "
+                "orange: "
+                "flank lines (least squares); blue: base line.",
+            )
+        )
+    sections = [Section("Angle of repose", tuple(blocks))]
+    if result.piles:
+        sections.append(Section("Outlines", (Figure("outlines", outlines(result), _outline_words(result)),)))
+    if result.refused:
+        lines = tuple(f"{name}: {why}" for name, why in result.refused.items())
+        sections.append(Section("Pictures without an angle", (Bullets(lines),)))
+    data = DataTable(
+        "outlines",
+        ("picture", "unit", "u", "z"),
+        tuple((pile.name, pile.unit, u, z) for pile in result.piles for u, z in zip(pile.u, pile.z, strict=True)),
+    )
+    return Report("Angle of repose on photographs", names, banner(result), tuple(sections), result.about, (data,))
+
+
+def banner(result: PhotographResult) -> Banner:
+    """The angle with its spread over pictures, or that there is none."""
+    n, lost = len(result.piles), len(result.refused)
+    if n == 0:
+        return Banner(
+            Word.NO_ANSWER,
+            "",
+            f"None of {lost} pictures shows a pile that can be read.",
+            "See below why, and take them again.",
+        )
+    mean, sd, half = result.over_pictures
+    beside = f" {lost} more show none that can be read." if lost else ""
+    if n == 1:
+        return Banner(
+            Word.MEASURED,
+            f"{fixed(mean)}°",
+            f"One picture, read to ± {fixed(result.piles[0].mean[1])}° (95 % of reading this silhouette); how far "
+            "pours differ it "
+            f"cannot say.{beside}",
+            "Photograph four more pours: a study needs the standard deviation between them.",
+        )
+    return Banner(
+        Word.MEASURED,
+        f"{fixed(mean)} ± {fixed(half)}°",
+        f"n = {n} pictures, SD {fixed(sd)}°; ±: 95 % of their mean, Student’s t.{beside}",
+        f"Put mean {fixed(mean)}°, SD {fixed(sd)}° and n = {n} into the target of a study.",
+    )
+
+
+def outlines(result: PhotographResult) -> Spec:
+    """The outlines over each other on one scale."""
+    in_metres = all(pile.unit == "m" for pile in result.piles)
+    factor, unit = (1e3, "mm") if in_metres else (1.0, "px")
+    traces = [
+        {
+            "type": "scatter",
+            "mode": "lines",
+            "x": [factor * u for u in pile.u],
+            "y": [factor * z for z in pile.z],
+            "name": label(pile.name),
+            "line": line(COLOURS[k % len(COLOURS)]),
+        }
+        for k, pile in enumerate(result.piles)
+    ]
+    layout = {
+        "xaxis": axis(f"distance from the pile’s middle [{unit}]"),
+        "yaxis": axis(f"height [{unit}]", scaleanchor="x", rangemode="tozero"),
+    }
+    return chart(traces, layout, 340)
+
+
+def _outline_words(result: PhotographResult) -> str:
+    return (
+        f"n = {len(result.piles)} piles, the upper edge of each silhouette over its base line, both axes on one scale."
+    )
+
+
+def _angles(result: PhotographResult) -> Table:
+    rows = []
+    for pile in result.piles:
+        factor, unit = (1e3, "mm") if pile.unit == "m" else (1.0, "px")
+        angles = [f"{fixed(value)} ± {fixed(half)}°" for value, half in (pile.left, pile.right, pile.mean)]
+        sizes = [f"{number(factor * length, 4)} {unit}" for length in (pile.height, pile.half_width)]
+        rows.append((pile.name, *angles[:2], Strong(angles[2]), *sizes))
+    rows += [(name, *[MISSING] * 5) for name in result.refused]
+    header = ("picture", "left flank", "right flank", "mean", "height", "half-width")
+    return Table(header, tuple(rows), "±: 95 % of reading this silhouette; another pour differs by far more.")
+
+
+def _read(pile: PhotographedPile) -> ReadPile:
+    step = max(1, -(-pile.outline.u.size // MOST_POINTS))
+    left, right, mean = (
+        (one.value_deg, COVERAGE * one.error_deg) for one in (pile.angles.left, pile.angles.right, pile.angles.mean)
+    )
+    return ReadPile(
+        pile.name,
+        pile.unit,
+        left,
+        right,
+        mean,
+        pile.height,
+        pile.half_width,
+        tuple(pile.outline.u[::step].tolist()),
+        tuple(pile.outline.top[::step].tolist()),
+    )

@@ -1,0 +1,514 @@
+"""The answer of a study: in short, the verification of it, what moves the response, and the optimum."""
+
+from __future__ import annotations
+
+import math
+
+from doe.analysis.optimum import Compromise
+from doe.analysis.screening import SIGNIFICANT
+from doe.analysis.t_tests import Sample
+from doe.analysis.verification import Verification
+from doe.stages.screening import ScreeningResult
+from doe.stages.surface import OptimumResult
+from doe.stages.verification import VerificationResult
+from doe.studies.factors import MIN_BODIES
+from doe.studies.study_result import StudyResult, valid_runs
+from doe.target import Target
+from explorer.report.content import Banner, Block, Caution, Facts, Figure, Section, Strong, Struck, Table, Text, Word
+from explorer.report.figures.effects import all_effects
+from explorer.report.figures.model import cloud, fitted_targets, ranges
+from explorer.report.figures.pours import verification as verification_chart
+from explorer.report.identified import BY_RULE, GIVES_TARGET, cloud_caution, is_identified, rule, settings
+from explorer.units import (
+    MISSING,
+    code,
+    duration,
+    enumeration,
+    fixed,
+    number,
+    observable_label,
+    observed,
+    p_value,
+    parameter_label,
+    parameter_range,
+    parameter_value,
+    percent,
+    signed,
+    unit_of_observable,
+)
+
+
+def banner(result: StudyResult) -> Banner:
+    """Whether the material is calibrated: fresh pours decide, and a surface that is mere noise decides nothing."""
+    target, test, single = result.study.targets[0], result.verification.tests[0], result.optimum.single
+    name = target.observable
+    poured = (
+        f"{test.simulated.n} fresh pours at the chosen setting gave {observed(name, test.simulated.mean)} against "
+        f"{observed(name, target.mean)} measured"
+    )
+    verdicts = {one.verdict for one in result.verification.tests}
+    reach = f"{observed(name, single.reachable_low)} … {observed(name, single.reachable_high)}"
+    if not single.reached and verdicts != {"equivalent"}:
+        return Banner(
+            Word.OUT_OF_REACH,
+            "",
+            f"No setting of the region gives {observed(name, target.mean)}: the model reaches {reach}, and {poured}.",
+            "Widen the ranges of the factors that act, or add a factor that is missing: for round bodies rolling "
+            "resistance, `effect.rolling_resistance.rolling_friction`.",
+        )
+    if not single.better_than_noise:
+        return Banner(
+            Word.NOT_CALIBRATED,
+            "",
+            f"The response surface is not better than noise, so the chosen point is no calibration, although {poured}."
+            if verdicts == {"equivalent"}
+            else f"The response surface is not better than noise, and {poured}.",
+            "Pour more replicates per point, or widen the ranges until the factors show above the noise of one pour, "
+            f"σ = {observed(name, result.pilot.noise[name].sigma)}.",
+        )
+    if "different" in verdicts:
+        return Banner(
+            Word.NOT_CALIBRATED,
+            "",
+            f"{poured[0].upper()}{poured[1:]}: {verdict(target, test)}",
+            "Start again around the point found, with narrower ranges; if it stays, ask `explorer diagnose` whether "
+            "the "
+            "model lacks an effect.",
+        )
+    if verdicts != {"equivalent"}:
+        return Banner(
+            Word.NO_ANSWER,
+            "",
+            f"{poured[0].upper()}{poured[1:]}: {verdict(target, test)}",
+            f"Pour more than {test.simulated.n} times in the verification, or state a margin that this noise can show.",
+        )
+    margins = " and ".join(f"± {observed(one.observable, one.margin)}" for one in result.study.targets)
+    open_ = [one.name for one in settings(result.optimum) if not one.identified]
+    return Banner(
+        Word.CALIBRATED,
+        margins,
+        f"{poured[0].upper()}{poured[1:]}: {verdict(target, test)}",
+        f"Take the ranges of {enumeration(open_)} as the answer, and add a second measurement (another rig or "
+        "observable) to fix them."
+        if open_
+        else "Use these values, and check them on a test that was not fitted.",
+    )
+
+
+ANSWER = 3
+"""Cells of a setting's row before its numbers: name, label, whether it is identified."""
+
+
+def holds(result: StudyResult) -> bool:
+    """Whether the parameters found may be used: the material is calibrated."""
+    return banner(result).word is Word.CALIBRATED
+
+
+def parameters(result: StudyResult) -> Section:
+    """The calibrated parameters; struck out where the verdict says that they are none."""
+    good = holds(result)
+    rows = []
+    for one in settings(result.optimum):
+        known = f"95 % set {one.confidence_set}" if one.identified else f"not identified; {BY_RULE}: {one.chosen}"
+        value = one.chosen if one.identified or one.feasible == MISSING else one.feasible
+        rows.append(
+            (one.name, one.label, Strong(value), known) if good else (one.name, one.label, Struck(value), known)
+        )
+    how = "Bold: the answer; of a factor that the target does not identify it is the range that gives the target."
+    caption = how if good else "Struck out: these values do not calibrate the material."
+    return Section(
+        "Parameters", (Table(("factor", "parameter", "value", "how well it is known"), tuple(rows), caption),)
+    )
+
+
+def overview(result: StudyResult) -> Section:
+    """The study in a few lines, the warnings that belong to them, and the resolution of every stage."""
+    blocks: list[Block] = [Facts(tuple(_facts(result)))]
+    blocks += [Caution(text) for text in cautions(result)]
+    blocks.append(_resolutions(result))
+    return Section("In short", tuple(blocks))
+
+
+def cautions(result: StudyResult) -> list[str]:
+    """What keeps the numbers of this study from meaning more than they do, one sentence each."""
+    found = []
+    fallback = [s.name for s in result.screening.selected if s.reason != SIGNIFICANT]
+    if fallback:
+        found.append(
+            f"{enumeration(fallback)} went on without being significant, in the order of the study's fallback list; "
+            "what later stages say about them is the shape of noise unless their intervals say otherwise."
+        )
+    if result.screening.analysis.pure_error is None:
+        found.append("One pour per row: significance rests on the dummy columns alone, with few degrees of freedom.")
+    missing = result.screening.analysis.missing_rows
+    if missing:
+        rows = enumeration([str(row + 1) for row in missing])
+        found.append(f"Screening row {rows} has no valid pour and is analysed as missing.")
+    if not result.ascent.bracket.reached:
+        found.append("The steepest ascent did not pass the target; the surface stands around its nearest step.")
+    optimum = result.optimum.single
+    if not optimum.better_than_noise:
+        found.append("The response surface is not better than noise: the optimum is a point, not a calibration.")
+    observable = result.study.targets[0].observable
+    if not optimum.reached:
+        found.append(
+            f"The target {observed(observable, optimum.target)} lies outside what the model reaches in its region, "
+            f"{observed(observable, optimum.reachable_low)} … {observed(observable, optimum.reachable_high)}; "
+            "the optimum is where it comes nearest."
+        )
+    elif optimum.unidentified:
+        found.append(
+            f"One number cannot fix several parameters: {enumeration(optimum.unidentified)} can take at least half "
+            "of the region while the model stays at the target."
+        )
+    pairs = zip(result.verification.targets, result.verification.tests, strict=True)
+    return found + [text for target, test in pairs for text in precision_cautions(target, test)]
+
+
+def precision_cautions(target: Target, test: Verification) -> list[str]:
+    """Where an error is smaller than what the replicates can show, and where a spread was not measured."""
+    found = []
+    error, spread = test.relative_error_percent, test.simulated.standard_error
+    name = observable_label(target.observable)
+    if error < 100 * spread / abs(target.mean):
+        found.append(
+            f"{name[0].upper()}{name[1:]}: the relative error of {fixed(error)} % is smaller than the standard error "
+            f"of the simulated mean, {observed(target.observable, spread)} = "
+            f"{fixed(100 * spread / abs(target.mean))} %. Pours this noisy cannot show an error this small."
+        )
+    if target.sd is not None and target.sd_source != "measured":
+        found.append(
+            f"{name[0].upper()}{name[1:]}: the measurement's standard deviation "
+            f"{observed(target.observable, target.sd)} is {target.sd_source}, not measured; the Welch and "
+            "equivalence tests lean on it."
+        )
+    return found
+
+
+def _facts(result: StudyResult) -> list[tuple[str, str]]:
+    study, profile, totals = result.study, result.study.profile, result.runs
+    observable = study.targets[0].observable
+    noise, test, analysis = result.pilot.noise[observable], result.verification.tests[0], result.screening.analysis
+    chosen = [
+        f"{one.name} ({one.label})" + (f" = {one.chosen}" if one.identified else f": {one.answer}")
+        for one in settings(result.optimum)
+    ]
+    outcomes = ", ".join(f"{count} {name.replace('_', ' ')}" for name, count in sorted(totals.by_outcome.items()))
+    return [
+        (
+            "Study",
+            f"{code(study.name)}, profile {profile.name}: {number(1e3 * profile.mass)} g, {profile.spheres} shapes",
+        ),
+        ("Runs", f"{totals.total} pours: {outcomes}; {percent(1 - totals.valid / totals.total, 1)} not valid"),
+        (
+            "Noise of one pour",
+            f"σ = {observed(observable, noise.sigma)} (95 % interval {observed(observable, noise.low)} … "
+            f"{observed(observable, noise.high)}, {noise.runs} seeds; {observable_label(observable)})",
+        ),
+        ("Significant factors", f"{enumeration(analysis.significant())} (Holm, against the {analysis.error_source})"),
+        ("Largest unknown", assumption_statement(result)),
+        ("Optimum", "; ".join(chosen) if holds(result) else Struck("; ".join(chosen))),
+        (
+            "Verification",
+            f"{observed(observable, test.simulated.mean)} over {test.simulated.n} fresh pours against "
+            f"{observed(observable, test.target.mean)}: {test.verdict}; "
+            f"relative error {fixed(test.relative_error_percent)} %",
+        ),
+        ("Time", duration(result.timing.total_s)),
+    ]
+
+
+def assumption_statement(result: StudyResult) -> str:
+    """Which unknown of the set-up moves the response most, beside the largest factor and the noise."""
+    screening, assumptions = result.screening, result.assumptions
+    assumed = () if assumptions is None else assumptions.analysis.factor_effects()
+    factors = screening.analysis.factor_effects()
+    if assumptions is None or not assumed or not factors:
+        return "this study declares no assumption"
+    unknown, largest, response = assumed[0], factors[0], screening.response
+    where = {factor.name: factor.path for factor in (*screening.factors, *assumptions.factors)}
+    text = (
+        f"{parameter_label(where[unknown.name])} moves the response by {observed(response, abs(unknown.effect))} over "
+        f"its assumed range; the largest factor, {largest.name} ({parameter_label(where[largest.name])}), by "
+        f"{observed(response, abs(largest.effect))} over its own"
+    )
+    if largest.effect:
+        text += f" (ratio {number(abs(unknown.effect) / abs(largest.effect), 2)})"
+    noise = result.pilot.noise.get(response)
+    if noise is not None and noise.sigma:
+        text += f"; one pour scatters by σ = {observed(response, noise.sigma)}"
+    if unknown.name not in assumptions.analysis.significant():
+        text += ". No assumption is significant after Holm's correction"
+    return text
+
+
+def _resolutions(result: StudyResult) -> Table:
+    observable, response = result.study.targets[0].observable, result.screening.response
+    sizes = {
+        "screening": _of_screening(result.screening, response),
+        "ascent": f"{observed(observable, result.ascent.smallest_difference)} between two steps",
+        "surface": f"{observed(observable, result.surface.smallest_main_effect[0])} from low to high of a factor",
+        "verification": f"{observed(observable, result.verification.smallest_difference[0])} from the target",
+    }
+    if result.scan is not None:
+        sizes["scan"] = f"{observed(result.scan.observable, result.scan.smallest_difference)} between two values"
+    if result.assumptions is not None:
+        sizes["assumptions"] = _of_screening(result.assumptions, response)
+    rows = []
+    for stage, seen in result.runs.outcomes().items():
+        pours, valid = seen.total(), valid_runs(seen)
+        rows.append((stage, str(pours), str(valid), percent(1 - valid / pours, 1), sizes.get(stage, "–")))
+    tries = result.study.tries
+    return Table(
+        ("stage", "pours", "valid", "not valid", "smallest effect it could see"),
+        tuple(rows),
+        "Smallest effect: found with chance 0.8 at level 0.05, one effect at a time. Every mean is over "
+        "valid pours; one that is not valid is kept with its outcome. "
+        f"For one replicate at most {tries} {'seed is' if tries == 1 else 'seeds are'} tried.",
+    )
+
+
+def _of_screening(screening: ScreeningResult, response: str) -> str:
+    error = screening.analysis.deciding_error
+    if error is None:
+        return "–"
+    return (
+        f"{observed(response, error.smallest_detectable_effect)} from low to high; "
+        f"{observed(response, error.smallest_detectable_effect_bonferroni)} for all factors at once"
+    )
+
+
+def verification(result: StudyResult) -> Section:
+    """Per target: samples, tests, equivalence, relative error beside the noise."""
+    stage = result.verification
+    seeds = len({run.seed for run in stage.runs})
+    blocks: list[Block] = [
+        Text(
+            f"{len(stage.runs)} pours at the optimum with {seeds} seeds that no other stage used; "
+            f"{percent(stage.no_pile_share, 1)} are not valid. Means are over valid pours."
+        )
+    ]
+    for index, (target, test) in enumerate(zip(stage.targets, stage.tests, strict=True)):
+        blocks += _of_target(stage, index, target, test)
+    return Section("Verification", tuple(blocks))
+
+
+def _of_target(stage: VerificationResult, index: int, target: Target, test: Verification) -> list[Block]:
+    name = target.observable
+    words = observable_label(name)
+    caption = (
+        f"n = {test.simulated.n} valid fresh pours, one point each; diamonds: means with 95 % intervals (t); band: "
+        "target ± "
+        "equivalence margin, fixed before any run."
+    )
+    return [
+        Text(f"{words[0].upper()}{words[1:]}: {verdict(target, test)}"),
+        Figure(f"verification-{index + 1}", verification_chart(stage, index), caption),
+        _samples(target, test),
+        _tests(target, test),
+    ]
+
+
+def verdict(target: Target, test: Verification) -> str:
+    """The outcome in one sentence, the equivalence test first: no difference found is no proof of agreement."""
+    name = target.observable
+    margin = observed(name, target.margin)
+    deciding = test.deciding
+    words = {
+        "equivalent": f"equivalent to the measurement within ± {margin}.",
+        "different": f"different from the measurement, and not shown to lie within ± {margin}.",
+        "cannot tell": f"neither different nor shown to lie within ± {margin}; more pours are needed to tell.",
+    }[test.verdict]
+    if deciding is None or math.isnan(deciding.low):
+        return words
+    interval = f"{_difference(name, deciding.low)} … {_difference(name, deciding.high)}"
+    return f"{words} Difference {_difference(name, deciding.difference)}, 95 % interval {interval}."
+
+
+def _samples(target: Target, test: Verification) -> Table:
+    name = target.observable
+    rows = []
+    samples = [("simulated", test.simulated), ("measured", test.target)]
+    if target.before_mean is not None:
+        sd, n = target.before_sd, target.before_n
+        samples.append(("the model before", Sample(target.before_mean, math.nan if sd is None else sd, n or 0)))
+    for words, sample in samples:
+        spread = observed(name, sample.sd)
+        if words == "measured" and math.isfinite(sample.sd) and target.sd_source != "measured":
+            spread += f" ({target.sd_source})"
+        error = observed(name, sample.standard_error)
+        rows.append((words, observed(name, sample.mean), spread, str(sample.n or MISSING), error))
+    share = 100 * test.simulated.standard_error / abs(target.mean)
+    caption = (
+        f"Relative error {fixed(test.relative_error_percent)} %; standard error of the simulated mean "
+        f"{fixed(share)} % of the target."
+    )
+    return Table(("", "mean", "sd", "n", "standard error"), tuple(rows), caption)
+
+
+def _tests(target: Target, test: Verification) -> Table:
+    name = target.observable
+    rows: list[tuple[str, ...]] = []
+    for found, words in (
+        (test.welch, "Welch, two samples"),
+        (test.pooled, "Student, two samples, equal variances"),
+        (test.one_sample, "one sample against the measured mean"),
+    ):
+        if found is None:
+            continue
+        interval = f"{_difference(name, found.low)} … {_difference(name, found.high)}"
+        rows.append(
+            (
+                words,
+                _difference(name, found.difference),
+                f"{percent(found.level)}: {interval}",
+                fixed(found.t),
+                fixed(found.df, 1),
+                p_value(found.p),
+            )
+        )
+    equivalence = test.equivalence
+    if equivalence is not None:
+        interval = f"{_difference(name, equivalence.low)} … {_difference(name, equivalence.high)}"
+        margin = observed(name, equivalence.margin)
+        rows.append(
+            (
+                f"equivalence within ± {margin} (TOST)",
+                MISSING,
+                f"{percent(equivalence.level)}: {interval}",
+                MISSING,
+                MISSING,
+                p_value(equivalence.p),
+            )
+        )
+    if not rows:
+        rows.append(("no test: one pour, or no spread", *[MISSING] * 5))
+    caption = "Difference = simulated − measured. A small p of the equivalence test speaks for agreement."
+    return Table(("test", "difference", "interval", "t", "df", "p"), tuple(rows), caption)
+
+
+def _difference(name: str, value: float) -> str:
+    """A difference with its sign and unit."""
+    text = observed(name, value)
+    unit = unit_of_observable(name)
+    return f"+{text}" if unit.of(value) >= 0 else text
+
+
+def effects(result: StudyResult) -> Section:
+    """All effects in one chart, and what the calibration hangs on."""
+    response = observable_label(result.screening.response)
+    text = f"Effects on {response}, each over its own range, with 95 % intervals."
+    blocks: list[Block] = [Text(text)]
+    title = "What moves the angle" if "angle" in response else "What moves the response"
+    if result.assumptions is not None:
+        statement = assumption_statement(result)
+        blocks.append(Text(f"What the calibration hangs on: {statement}."))
+    caption = (
+        f"Effect = mean at the high level − mean at the low level, with its 95 % interval (t); n = "
+        f"{result.screening.analysis.runs} valid pours in {result.screening.analysis.rows} rows."
+    )
+    if any(part is not None and part.not_testable for part in (result.screening, result.assumptions)):
+        caption += f" Not testable: acts on fewer than {MIN_BODIES} bodies."
+    return Section(title, (*blocks, Figure("effects", all_effects(result.screening, result.assumptions), caption)))
+
+
+def optimum(result: StudyResult) -> Section:
+    """Chosen setting, the 95 % sets of identified parameters and the ranges that give the target."""
+    found, single, first = result.optimum, result.optimum.single, fitted_targets(result)[0]
+    blocks: list[Block] = [Text(_statement(result)), _settings(result, first.reference_name)]
+    if found.compromise is not None:
+        blocks += _compromise(result, found.compromise)
+    blocks += [
+        Figure("ranges", ranges(first), ranges_caption(found)),
+        Figure(
+            "cloud",
+            cloud(first),
+            f"n = {len(single.bootstrap_points)} refits to resampled {single.resampling} (bootstrap); each dot is the "
+            "solution "
+            f"nearest the measured parameters. {percent(single.share_reached)} of the refits reach the target. "
+            f"{cloud_caution(found)}".rstrip(),
+        ),
+    ]
+    return Section("Optimum", tuple(blocks))
+
+
+def ranges_caption(found: OptimumResult) -> str:
+    """What the bars of the ranges are."""
+    return (
+        "The narrower a bar, the better a factor is known: wide, the region of the surface; middle, where the fitted "
+        "model "
+        f"gives the target; narrow, the 95 % set over n = {len(found.single.bootstrap_points)} bootstrap refits."
+    )
+
+
+def _statement(result: StudyResult) -> str:
+    single = result.optimum.single
+    name = result.study.targets[0].observable
+    between = f"{observed(name, single.predicted_low)} … {observed(name, single.predicted_high)}"
+    if single.reached:
+        text = (
+            f"Of all settings at which the model gives {observed(name, single.target)}, this one is nearest the "
+            f"measured parameters (distance {fixed(single.distance)} half-widths); the model's 95 % interval there "
+            f"is {between}."
+        )
+    else:
+        text = (
+            f"The model does not give {observed(name, single.target)} in its region; it comes nearest with "
+            f"{observed(name, single.predicted)} ({between})."
+        )
+    if single.unidentified:
+        text += (
+            f" The target does not identify {enumeration(single.unidentified)}: the answer is the range that gives "
+            "the target, and the value in it is chosen by rule."
+        )
+    text += (
+        f" In {percent(single.compatible_share)} of the region the predicted mean is compatible with the target "
+        "at 95 %."
+    )
+    error = single.target_standard_error
+    any_identified = any(is_identified(single, k) for k in range(len(single.names)))
+    including = "The 95 % set and this share include" if any_identified else "This share includes"
+    text += (
+        f" {including} the target's own standard error, {observed(name, error)}."
+        if error
+        else " The target is taken as exact: the study states no standard deviation and number of measurements."
+    )
+    if not single.better_than_noise:
+        text += " The surface is not better than noise, so this point is not a calibration."
+    return text
+
+
+def _settings(result: StudyResult, reference_name: str) -> Table:
+    found, good = result.optimum, holds(result)
+    rows = tuple(
+        (
+            *(cell if good or k < ANSWER else Struck(cell) for k, cell in enumerate(setting.cells)),
+            parameter_value(factor.path, factor.reference),
+            parameter_range(factor.path, factor.low, factor.high),
+        )
+        for setting, factor in zip(settings(found), found.factors, strict=True)
+    )
+    header = (
+        *("factor", "parameter", "identified", GIVES_TARGET, "of the region", "optimum", "95 % set"),
+        *("measured", "screened"),
+    )
+    first_alone = "Intervals and ranges of the first target alone." if found.compromise is not None else ""
+    return Table(header, rows, f"{rule(found, reference_name)} {first_alone}".strip())
+
+
+def _compromise(result: StudyResult, compromise: Compromise) -> list[Block]:
+    rows = tuple(
+        (
+            observable_label(target.observable),
+            observed(target.observable, target.mean),
+            observed(target.observable, predicted),
+            signed(missed),
+            fixed(target.weight),
+        )
+        for target, predicted, missed in zip(
+            result.study.targets, compromise.predicted, compromise.standardised, strict=True
+        )
+    )
+    header = ("target", "measured", "model at the optimum", "missed by [standard errors]", "weight")
+    text = f"Several targets: the setting of least weighted misfit J = {fixed(compromise.misfit)}."
+    return [Text(f"{text} {compromise.statement}"), Table(header, rows)]
