@@ -170,7 +170,7 @@ class Page:
 
 
 def named_keys(gui: viser.GuiApi) -> list[tuple[str, str]]:
-    """Keys of the page's commands with what they do; a key stands in its label already where it is one of the pour's."""
+    """Keys of the page's commands with what they do."""
     commands = [handle._impl.props for handle in gui._command_handle_from_uuid.values()]
     return [("+".join(key if isinstance(key, tuple) else (key,)), one.label) for one in commands if (key := one.hotkey)]
 

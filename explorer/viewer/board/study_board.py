@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from doe.run_records import Run
-from doe.studies.study_result import AnyStudy, StudyResult
+from doe.studies.study_result import AnyStudy, PartialStudy, StudyResult
 from explorer.background.command_process import CommandStatus
 from explorer.outcomes import outcome_text
 from explorer.report.content import Table
@@ -21,6 +21,7 @@ RUN_HEADER = ("Stage", "Setting", "Seed", "Outcome", "Value")
 def study_board(result: AnyStudy | None, status: CommandStatus | None, report: str = "") -> Board:
     """The board of ``result``; ``status`` of the process that works on it, None where none does."""
     alive = status is not None and status.alive
+    so_far = (result.partial or "", result.line) if isinstance(result, PartialStudy) else ("", "")
     if result is None:
         return Board("", working(status) if status is not None and alive else "", stages=stages_of(status))
     study, finished = result.study, isinstance(result, StudyResult)
@@ -28,7 +29,7 @@ def study_board(result: AnyStudy | None, status: CommandStatus | None, report: s
         title=study.title or study.name,
         subtitle=working(status) if status is not None and alive else f"profile {study.profile.name}",
         banner=banner(result) if isinstance(result, StudyResult) else None,
-        stages=stages_of(status) if alive else (),
+        stages=stages_of(status, so_far) if alive else (),
         charts=made_charts(study_plots(result))[:: -1 if finished else 1],
         tables=(*_answers(result), _runs(result)),
         report=report,
@@ -43,8 +44,8 @@ def working(status: CommandStatus) -> str:
     return f"{words}: {status.stage}, {status.done} of {status.planned}, time left {time_left(status.eta_s)}"
 
 
-def stages_of(status: CommandStatus | None) -> tuple[Stage, ...]:
-    """The stages of a command with how far each is."""
+def stages_of(status: CommandStatus | None, so_far: tuple[str, str] = ("", "")) -> tuple[Stage, ...]:
+    """The stages of a command with how far each is; ``so_far``: a stage, and what it would find if it ended now."""
     if status is None:
         return ()
     return tuple(
@@ -56,7 +57,7 @@ def stages_of(status: CommandStatus | None) -> tuple[Stage, ...]:
             else AT_WORK
             if status.alive and one.name == status.stage
             else TO_COME,
-            one.finding or "",
+            one.finding or (f"so far: {so_far[1]}" if one.name == so_far[0] and so_far[1] else ""),
         )
         for one in status.stages
     )

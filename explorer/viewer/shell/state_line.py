@@ -23,6 +23,9 @@ from explorer.project.steps import (
     pour_step,
     report_step,
 )
+from explorer.report.content import Banner
+from explorer.report.diagnosis.answer import banner as diagnosis_banner
+from explorer.report.sections.answer import banner as study_banner
 from explorer.study.process import RESULT as STUDY_RESULT
 from explorer.viewer.panel import AROUND, SELDOM, Now, PageContext, Panel
 
@@ -108,19 +111,16 @@ FinishedReader = Callable[[Mapping[str, Any], Path], Finished]
 
 
 def study_finished(content: Mapping[str, Any], folder: Path) -> Finished:
-    """What a finished study found, in a word."""
-    result = StudyResult.from_dict(content)
-    optimum = result.optimum.single
-    if not optimum.better_than_noise:
-        said, succeeded = "not better than noise", False
-    elif not optimum.reached:
-        said, succeeded = "target out of reach", False
-    else:
-        said, succeeded = f"error {result.verification.tests[0].relative_error_percent:.1f} %", True
-    return Finished(said, succeeded, (folder / REPORT).is_file())
+    """What a finished study found."""
+    return _finished(study_banner(StudyResult.from_dict(content)), folder)
 
 
 def diagnosis_finished(content: Mapping[str, Any], folder: Path) -> Finished:
-    """What a finished diagnosis found, in a word."""
-    result = DiagnosisResult.from_dict(content)
-    return Finished(result.verdict.replace("_", " "), True, (folder / REPORT).is_file())
+    """What a finished diagnosis found."""
+    return _finished(diagnosis_banner(DiagnosisResult.from_dict(content)), folder)
+
+
+def _finished(banner: Banner, folder: Path) -> Finished:
+    """The verdict of the report, in small letters."""
+    said = f"{banner.word.lower()} {banner.of}".strip()
+    return Finished(said, banner.word.tone != "bad", (folder / REPORT).is_file())

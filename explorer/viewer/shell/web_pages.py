@@ -89,6 +89,10 @@ class WebPages:
         """Serve ``page`` at ``address`` from now on, in place of one before it."""
         self._pages[address] = lambda: page
 
+    def page(self, address: str) -> WebPage:
+        """What is served at ``address``. Raises KeyError where nothing is."""
+        return self._pages[address]()
+
     def publish_folder(self, folder: Path) -> str:
         """Serve the files that ``folder`` and its folders hold now, of known kinds; returns their common address."""
         address = f"/reports/{folder_id(folder)}/"

@@ -16,7 +16,19 @@ from explorer.units import checked
 from explorer.viewer.board.board_view import BoardView
 from explorer.viewer.board.diagnosis_board import diagnosis_board
 from explorer.viewer.panel import DIAGNOSE, SELDOM, Now, PageContext, Panel
-from explorer.viewer.study.process_view import ProcessView, escaped, stages_markdown, waiting_markdown
+from explorer.viewer.study.process_view import (
+    CANCEL,
+    CLEAR,
+    CONTINUE,
+    PAUSE,
+    QUEUE,
+    RESUME,
+    START,
+    ProcessView,
+    escaped,
+    state_markdown,
+    waiting_markdown,
+)
 from explorer.viewer.study.result_chooser import ResultChooser
 from solver import EFFECTS
 from solver.assets import shipped_measurements
@@ -44,26 +56,31 @@ class DiagnosisPanel(Panel):
         self._diagnosis, self._file = diagnosis, ResultFile(RESULT)
         self._shipped, self._uploads = shipped_measurements(), page.uploads
         self._shown: Hashable = None
-        gui.add_markdown(
-            "Which physical effect do measured data ask for that the declared model lacks, and how sure is that? With "
-            "nothing in the store all effects take about 150 to 400 pours, for the shipped data some 15 to 40 min on "
-            "two cores; a second data set of the same model takes minutes."
-        )
         self._data = gui.add_dropdown(
             "Measured data",
             self._offered(),
             initial_value=FIRST if FIRST in self._shipped else OWN,
-            hint="Data sets that come with the program, those uploaded in the tab Pour, or a folder of your own.",
+            hint="Data sets that come with the program, those uploaded under Pour, or a folder of your own. With "
+            "nothing in the store all effects take some 150 to 400 pours: 15 to 40 min on two cores for the shipped "
+            "data, minutes for a second set of the same model.",
         )
         self._folder = gui.add_text(
             "Folder", "", hint="Folder with measurement.toml, on the machine that serves this page."
         )
         with gui.add_folder("Effects in question, and how much is poured", expand_by_default=False):
             self._candidates = CandidateEffects(server)
-        acts = {"Start": self._start, "Pause / go on": self._pause, "Cancel": diagnosis.cancel}
-        more = {"Resume": self._resume, "Queue": self._queue, "Clear queue": diagnosis.clear_queue}
-        self._view = ProcessView(server, "Diagnosis", acts, post, more)
-        self._chooser = ResultChooser(server, "Result", PRESENT, RESULT, post, self._follow)
+        acts = {
+            START: self._start,
+            PAUSE: diagnosis.pause,
+            CONTINUE: diagnosis.go_on,
+            CANCEL: diagnosis.cancel,
+            RESUME: self._resume,
+            QUEUE: self._queue,
+            CLEAR: diagnosis.clear_queue,
+        }
+        self._view = ProcessView(server, "Diagnosis", acts, post)
+        with gui.add_folder("Other results", expand_by_default=False):
+            self._chooser = ResultChooser(server, "Result", PRESENT, RESULT, post, self._follow)
         self._trouble = gui.add_markdown("")
         self._pages = page.pages
         self._result: DiagnosisResult | None = None
@@ -77,12 +94,6 @@ class DiagnosisPanel(Panel):
 
     def _queue(self) -> None:
         self._diagnosis.queue(self._question())
-
-    def _pause(self) -> None:
-        if self._diagnosis.status().state == "paused":
-            self._diagnosis.go_on()
-        else:
-            self._diagnosis.pause()
 
     def _offered(self) -> tuple[str, ...]:
         """What the list of data sets holds now."""
@@ -100,8 +111,9 @@ class DiagnosisPanel(Panel):
             self._data.options = offered
         status = self._diagnosis.status()
         # How much more is poured, in this stage and after it, is decided by what comes out.
-        text = stages_markdown(status, "diagnosis", "Pours", now.notice, counted="Known of this stage")
-        self._view.show(status, text + waiting_markdown(self._diagnosis.waiting()))
+        waiting = self._diagnosis.waiting()
+        text = state_markdown(status, "diagnosis", "pours", now.notice, counted="known of this stage")
+        self._view.show(status, text + waiting_markdown(waiting), waiting)
         self._chooser.offer(self._diagnosis.finished())
         self._follow()
         self._show_board()

@@ -1,7 +1,4 @@
-"""A command that runs in the background: buttons, bar and text, with its stages and its runs without a pile as tables.
-
-What stands in the text is the panel's own; the tables are markdown.
-"""
+"""A command that runs in the background: the buttons that mean something now, a bar, where it is, and failed runs."""
 
 from __future__ import annotations
 
@@ -11,16 +8,22 @@ from collections.abc import Mapping, Sequence
 import viser
 
 from explorer.background.command_process import CommandStatus
-from explorer.background.progress import FailedRun, StageProgress, failures
+from explorer.background.progress import FailedRun, failures
 from explorer.outcomes import outcome_text
 from explorer.viewer.actions import Action, Post, button_group
 
 MARKDOWN_MARKS = re.compile(r"([\\`*_{}\[\]<>()#+!|~&])")
 
+START, PAUSE, CONTINUE, CANCEL = "Start", "Pause", "Continue", "Cancel"
+RESUME, RETRY, QUEUE, CLEAR = "Resume last", "Retry", "Queue", "Clear queue"
+OFFERED = {"running": (PAUSE, CANCEL, QUEUE), "paused": (CONTINUE, CANCEL, QUEUE)}
+"""State → buttons while a command is there; otherwise it can be started, resumed or tried again."""
+WITHOUT_ONE = (START, RESUME, RETRY)
+
 STATE_WORDS = {
     "running": "Running at low priority; the pour goes on.",
     "paused": "Paused: it stands still and keeps what it has.",
-    "cancelled": "Cancelled.",
+    "cancelled": "Cancelled. What was poured is kept: *Resume last* goes on.",
     "finished": "Finished.",
     "failed": "Failed.",
 }
@@ -30,23 +33,22 @@ DONE, AT_WORK, TO_COME = "done", "▶", "–"
 
 
 class ProcessView:
-    """Buttons named ``title``, which post the ``acts`` of their names, a second row for ``more``; a bar and a text."""
+    """Buttons named ``title`` that post the ``acts`` of their names, a bar and a text."""
 
-    def __init__(
-        self,
-        server: viser.ViserServer,
-        title: str,
-        acts: Mapping[str, Action],
-        post: Post,
-        more: Mapping[str, Action] | None = None,
-    ) -> None:
-        rows = [(title, acts)] + ([("", more)] if more else [])
-        self._buttons = [button_group(server.gui, name, row, post) for name, row in rows]
+    def __init__(self, server: viser.ViserServer, title: str, acts: Mapping[str, Action], post: Post) -> None:
+        self._acts = dict(acts)
+        self._buttons = button_group(server.gui, title, acts, post)
         self._bar = server.gui.add_progress_bar(0.0)
         self._text = server.gui.add_markdown("")
 
-    def show(self, status: CommandStatus, text: str) -> None:
-        """Bar and text; call it inside ``server.atomic()``."""
+    def show(self, status: CommandStatus, text: str, waiting: Sequence[str] = ()) -> None:
+        """Buttons, bar and text; call it inside ``server.atomic()``."""
+        wanted = (*OFFERED.get(status.state, WITHOUT_ONE), *((CLEAR,) if waiting else ()))
+        options = tuple(label for label in wanted if label in self._acts)
+        if tuple(self._buttons.options) != options:
+            self._buttons.options = options
+        if self._bar.visible != status.alive:
+            self._bar.visible = status.alive
         percent = 100.0 * progress(status)
         if self._bar.value != percent:
             self._bar.value = percent  # type: ignore[misc]
@@ -61,47 +63,27 @@ def progress(status: CommandStatus) -> float:
     return min(1.0, max(0.0, status.done / status.planned)) if status.planned > 0 else 0.0
 
 
-def stages_markdown(
-    status: CommandStatus, what: str, runs: str, notice: str = "", so_far: str = "", counted: str = ""
-) -> str:
-    """State, a row per stage, and failed runs; texts of the command are escaped.
+def state_markdown(status: CommandStatus, what: str, runs: str, notice: str = "", counted: str = "") -> str:
+    """State, messages and failed runs; texts of the command are escaped.
 
     Args:
         status: how far it is.
         what: what a run of the command is called, such as "study".
-        runs: heading of what is counted, such as "Runs".
+        runs: what is counted, such as "runs".
         notice: the page's own last message, such as a refused click.
-        so_far: what the stage at work would find if it ended now.
         counted: what the numbers done and planned and the time left are of, where it is less than the whole.
     """
-    state = STATE_WORDS.get(status.state, f"No {what} runs.")
+    state = STATE_WORDS.get(status.state, f"No {what} is running.")
     if status.alive and status.planned:
         part = f"{counted}: " if counted else ""
-        state += f" {part}{status.done} of {status.planned} {runs.lower()}, time left {time_left(status.eta_s)}."
-    if status.alive and not status.done and status.stage:
+        state += f" {part}{status.done} of {status.planned} {runs}, time left {time_left(status.eta_s)}."
+    if status.alive and status.stage:
         state += f" Now: {escaped(status.stage)}."
     parts = [state]
     parts += [escaped(text) for text in dict.fromkeys((notice, status.message)) if text]
-    if status.stages:
-        parts.append(_table(status, runs, so_far))
-    lost = failures(status.tried)
-    if lost:
+    if lost := failures(status.tried):
         parts.append(failures_markdown(lost))
     return "\n\n".join(parts)
-
-
-def _table(status: CommandStatus, runs: str, so_far: str) -> str:
-    rows = "\n".join(_row(stage, status, so_far) for stage in status.stages)
-    return f"| Stage | {runs} | | Found |\n|:--|--:|:-:|:--|\n{rows}"
-
-
-def _row(stage: StageProgress, status: CommandStatus, so_far: str) -> str:
-    over = stage.finding is not None or 0 < stage.planned <= stage.done
-    at_work = status.alive and not over and stage.name == status.stage
-    mark = DONE if over else AT_WORK if at_work else TO_COME
-    count = f"{stage.done} of {stage.planned}" if stage.planned else TO_COME
-    found = stage.finding or (f"so far: {so_far}" if at_work and so_far else "")
-    return f"| {escaped(stage.name)} | {count} | {mark} | {escaped(found)} |"
 
 
 def failures_markdown(lost: tuple[FailedRun, ...]) -> str:

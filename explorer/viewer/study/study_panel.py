@@ -8,7 +8,7 @@ from pathlib import Path
 from doe.record import RecordError
 from doe.stages import planned_runs
 from doe.studies.study import Study, load_study
-from doe.studies.study_result import AnyStudy, PartialStudy, study_from
+from doe.studies.study_result import AnyStudy, study_from
 from explorer.background.output_folder import ResultFile
 from explorer.errors import CommandError
 from explorer.session import Session
@@ -20,7 +20,20 @@ from explorer.viewer.panel import CALIBRATE, SELDOM, Now, PageContext, Panel
 from explorer.viewer.study.comparison_panel import ComparisonPanel
 from explorer.viewer.study.order_panel import OrderPanel
 from explorer.viewer.study.plot_view import PlotView
-from explorer.viewer.study.process_view import ProcessView, escaped, stages_markdown, waiting_markdown
+from explorer.viewer.study.process_view import (
+    CANCEL,
+    CLEAR,
+    CONTINUE,
+    PAUSE,
+    QUEUE,
+    RESUME,
+    RETRY,
+    START,
+    ProcessView,
+    escaped,
+    state_markdown,
+    waiting_markdown,
+)
 from explorer.viewer.study.profiler_panel import ProfilerPanel
 from explorer.viewer.study.result_chooser import ResultChooser, title
 from solver import Scene, canonical, parameters, with_values
@@ -44,9 +57,6 @@ class StudyPanel(Panel):
         self._shown: Hashable = None
         self._result: AnyStudy | None = None
         self._trouble = ""
-        self._so_far = ("", "")
-        name = escaped(study.study_file.stem)
-        gui.add_markdown(f"**{name}** — screening, steepest ascent, response surface, optimum, verification.")
         self._profile = gui.add_dropdown(
             "Profile",
             (NONE,) if loaded is None else tuple(loaded.profiles),
@@ -54,13 +64,22 @@ class StudyPanel(Panel):
         )
         with gui.add_folder("Ranges and target of the next study", expand_by_default=False):
             self._order = OrderPanel(server, study.study_file, loaded, post)
-        acts = {"Start": self._start, "Pause / go on": self._pause, "Cancel": study.cancel}
-        more = {"Resume": study.resume, "Retry": study.retry, "Queue": self._queue, "Clear queue": study.clear_queue}
-        self._view = ProcessView(server, "Study", acts, post, more)
-        self._chooser = ResultChooser(server, "Result", PRESENT, RESULT, post, self._follow)
-        self._pages = page.pages
+        acts = {
+            START: self._start,
+            PAUSE: study.pause,
+            CONTINUE: study.go_on,
+            CANCEL: study.cancel,
+            RESUME: study.resume,
+            RETRY: study.retry,
+            QUEUE: self._queue,
+            CLEAR: study.clear_queue,
+        }
+        self._view = ProcessView(server, "Study", acts, post)
+        with gui.add_folder("Other results", expand_by_default=False):
+            self._chooser = ResultChooser(server, "Result", PRESENT, RESULT, post, self._follow)
+        self._pages, self._channel = page.pages, page.channel
         self._board = BoardView(server, page.pages, "/study/page.json", "Study")
-        page.channel.offer("open_run", lambda asked: post(lambda: self._open_run(asked)))
+        self._channel.offer("open_run", lambda asked: post(lambda: self._open_run(asked)))
         with gui.add_folder("Profiler", expand_by_default=False):
             self._plots = PlotView(server, "Chart", PROFILED, post)
             self._profiler = ProfilerPanel(server, post, self._plots.show_anew, self._set_live)
@@ -74,12 +93,11 @@ class StudyPanel(Panel):
     def show(self, now: Now) -> None:
         """Ask the study how far it is."""
         status = self._study.status()
-        stage, line = self._so_far
-        text = stages_markdown(status, "study", "Runs", now.notice, line if stage == status.stage else "")
-        text += waiting_markdown(self._study.waiting())
+        waiting = self._study.waiting()
+        text = state_markdown(status, "study", "runs", now.notice) + waiting_markdown(waiting)
         if self._trouble:
             text += f"\n\n{escaped(self._trouble)}"
-        self._view.show(status, text)
+        self._view.show(status, text, waiting)
         folders = self._study.finished()
         self._chooser.offer(folders)
         self._comparison.offer(folders)
@@ -91,12 +109,6 @@ class StudyPanel(Panel):
 
     def _queue(self) -> None:
         self._study.queue(str(self._profile.value), self._order.edits)
-
-    def _pause(self) -> None:
-        if self._study.status().state == "paused":
-            self._study.go_on()
-        else:
-            self._study.pause()
 
     def _follow(self) -> None:
         """Show the chosen result where it is another one than before."""
@@ -111,8 +123,6 @@ class StudyPanel(Panel):
         self._shown, self._trouble = shown, ""
         try:
             result = None if content is None else study_from(content)
-            if present:
-                self._so_far = (result.partial or "", result.line) if isinstance(result, PartialStudy) else ("", "")
             self._show_result(result, "" if folder is None else title(folder), shown)
         except RecordError as error:
             # A folder that somebody named may hold any JSON, also that of another version.

@@ -86,14 +86,26 @@ class PanelAtHand:
         return self.actions.carry_out()
 
     def press(self, button):
-        for row in self.panel._view._buttons:
-            self._call(row, button)
+        self._call(self.panel._view._buttons, button)
         return self.actions.carry_out()
+
+    def board(self):
+        """The board of the panel, when it is made."""
+        self.show()
+        return board_at(self.panel)
 
     def _call(self, handle, value):
         event = type("Event", (), {"client_id": 0, "target": type("Handle", (), {"value": value})})
         for callback in handle._impl.update_cb:
             callback(event)
+
+
+def board_at(panel, address="/study/page.json"):
+    """What the board of ``panel`` draws, once it is made."""
+    panel._board._worker.join(60)
+    panel._show_board()
+    panel._board._worker.join(60)
+    return json.loads(panel._pages.page(address).body)
 
 
 def written(folder, content, name="result.json"):

@@ -8,18 +8,30 @@ import pytest
 
 from doe.stages import planned_runs
 from doe.studies.study import load_study
+from doe.studies.study_result import study_from
 from explorer.background.command_process import CommandStatus
 from explorer.background.progress import StageProgress, TriedRun
+from explorer.report.sections.answer import banner as study_banner
 from explorer.report.study_charts import Plot
 from explorer.units import InputError
 from explorer.viewer.actions import Actions
 from explorer.viewer.panel import Now
 from explorer.viewer.study.order_panel import number_on_screen
 from explorer.viewer.study.plot_view import NOTHING, Drawn, PlotView
-from explorer.viewer.study.process_view import stages_markdown
-from explorer.viewer.study.profiler_panel import TITLE as PROFILER
+from explorer.viewer.study.process_view import (
+    CANCEL,
+    CLEAR,
+    CONTINUE,
+    PAUSE,
+    QUEUE,
+    RESUME,
+    RETRY,
+    START,
+    state_markdown,
+)
 from explorer.viewer.study.study_panel import NONE, StudyPanel
 from explorer.viewer.view import ThemeSwitch
+from solver.scenes.scene import value
 from tests.explorer.viewer.page_session import page_context
 from tests.explorer.viewer.study_panel_at_hand import (
     OWN_PROFILES,
@@ -35,15 +47,29 @@ EVIL = "<img src=x> *bold* | `code`"
 
 
 def test_the_buttons_ask_for_what_they_say(table):
-    for button in ("Start", "Pause / go on", "Cancel", "Resume", "Retry", "Queue", "Clear queue", "Delete everything"):
+    for button in (START, PAUSE, CANCEL, RESUME, RETRY, QUEUE, CLEAR, CONTINUE, "Delete everything"):
         assert table.press(button) in ("", None)
-    table.study.now = CommandStatus("paused")
-    table.press("Pause / go on")
     asked = [one if isinstance(one, str) else one[:2] for one in table.study.asked]
     assert asked == [
         *(("start", "quick"), "pause", "cancel", "resume", "retry", ("queue", "quick"), "clear_queue", "go_on"),
     ]
     assert not table.study.asked[0][2]
+
+
+@pytest.mark.parametrize(
+    ("state", "waiting", "offered"),
+    [
+        ("idle", (), (START, RESUME, RETRY)),
+        ("running", (), (PAUSE, CANCEL, QUEUE)),
+        ("paused", ("full",), (CONTINUE, CANCEL, QUEUE, CLEAR)),
+        ("failed", (), (START, RESUME, RETRY)),
+    ],
+)
+def test_only_buttons_that_mean_something_now_are_there(table, state, waiting, offered):
+    table.study.now, table.study.queued = CommandStatus(state), waiting
+    table.show()
+    assert tuple(table.panel._view._buttons.options) == offered
+    assert table.panel._view._bar.visible == (state in ("running", "paused"))
 
 
 def test_the_profiles_of_the_study_file_are_offered_and_started(server, tmp_path, monkeypatch):
@@ -62,8 +88,9 @@ def test_the_profiles_of_the_study_file_are_offered_and_started(server, tmp_path
 
 
 def test_an_empty_page_says_what_to_do(table):
-    table.show()
-    assert "Press *Start*" in table.panel._plots._caption.content
+    board = table.board()
+    assert (board["title"], board["charts"]) == ("", [])
+    assert "No study is running" in table.panel._view._text.content
     assert table.panel._plots._choice.options == (NOTHING,)
     assert table.panel._plots._chart is None  # plotly.js is not sent for nothing
     assert "comes with the response surface" in table.panel._profiler._words.content
@@ -87,8 +114,10 @@ def test_stages_failed_runs_and_the_queue_are_told(table):
     table.show("no")
     text = table.panel._view._text.content
     assert "28 of 112 runs, time left 2 min 05 s" in text
-    assert "| pilot | 20 of 20 | done | 22 ± 3" in text
-    assert "| screening | 8 of 28 | ▶ |" in text
+    assert [(one["name"], one["count"], one["mark"]) for one in table.board()["stages"]] == [
+        ("pilot", "20 of 20", "done"),
+        ("screening", "8 of 28", "▶"),
+    ]
     assert "**1 without a valid result**" in text
     assert "| 7 | 9: at rest |" in text
     assert "Waiting: standard; full, changed." in text
@@ -99,29 +128,42 @@ def test_stages_failed_runs_and_the_queue_are_told(table):
 
 def test_a_paused_command_and_one_that_found_no_replacement_say_so():
     lost = tuple(TriedRun("scan", "a", 0, k, k, "jammed", "", False) for k in range(9))
-    text = stages_markdown(CommandStatus("paused", tried=lost), "study", "Runs")
+    text = state_markdown(CommandStatus("paused", tried=lost), "study", "runs")
     assert text.startswith("Paused")
     assert "**9 without a valid result**, the newest 6:" in text
     assert "| jammed | 8 | none |" in text
 
 
-def test_a_finished_study_is_drawn_and_stays_while_nothing_changes(table, result, tmp_path):
+def test_a_finished_study_is_a_board_of_verdict_charts_answers_and_runs(table, result, tmp_path):
+    folder = written(tmp_path / "study-1", result)
+    (folder / "report.html").write_text("report", encoding="utf-8")
+    table.study.out = folder
+    board = table.board()
+    assert board["banner"]["headline"] == study_banner(study_from(result)).headline
+    titles = [chart["title"] for chart in board["charts"]]
+    assert titles[0] == "Verification"  # the answer first
+    assert {"Scan of an assumption", "Half-normal", "Contours"} <= set(titles)
+    answers, runs = (next(one for one in board["tables"] if one["title"].startswith(name)) for name in ("Par", "Runs"))
+    assert len(answers["rows"]) == len(result["surface"]["factors"])
+    assert len(runs["rows"]) == len(runs["opens"]) == result["runs"]["total"]
+    assert table.panel._pages.page(board["report"]).body == b"report"
+    (folder / "result.json").write_text(json.dumps(result | {"scan": None}))
+    assert "Scan of an assumption" not in [chart["title"] for chart in table.board()["charts"]]
+
+
+def test_a_row_of_the_board_pours_that_run_in_the_scene(table, result, tmp_path):
     table.study.out = written(tmp_path / "study-1", result)
-    table.show()
-    plots = table.panel._plots
-    assert plots._choice.options[-1] == PROFILER
-    assert drawn(plots)["layout"]["xaxis"]["title"]["text"] == "noise σ of one pour [°]"
-    table.enter(plots._choice, "Scan of an assumption")
-    first = drawn(plots)
-    assert first["layout"]["xaxis"]["title"]["text"] == "outlet height [mm]"
-    assert plots._caption.content.startswith("Band: the target")
-    before = plots._chart.figure
-    table.show()
-    assert plots._chart.figure is before
-    (tmp_path / "study-1" / "result.json").write_text(json.dumps(result | {"scan": None}))
-    table.show()
-    assert "Scan of an assumption" not in plots._choice.options
-    assert drawn(plots) != first
+    (runs,) = (one for one in table.board()["tables"] if one["title"].startswith("Runs"))
+    asked = next(one for one in runs["opens"] if one["stage"] == "surface" and one["label"].startswith("point 4"))
+    # The formula gives other keys than a pour would, and the page says so.
+    table.panel._channel.take(json.dumps(asked))
+    assert "have changed since that run" in table.actions.carry_out()
+    (poured,) = table.session.asked
+    assert (poured[0], poured[2]) == ("restart", asked["seed"])
+    for factor, natural in zip(result["surface"]["factors"], result["surface"]["natural"][3], strict=True):
+        assert value(poured[1], factor["path"]) == pytest.approx(natural)
+    table.panel._channel.take(json.dumps(asked | {"seed": -1}))
+    assert "not in the study that is shown" in table.actions.carry_out()
 
 
 def test_dark_and_light(table, result, tmp_path):
@@ -179,15 +221,17 @@ def test_a_study_that_runs_shows_what_it_has(table, result, tmp_path):
     table.study.now = CommandStatus("running", "screening", 40, 100, stages=(StageProgress("screening", 20, 84),))
     table.show()
     table.show()
-    assert r"| screening | 20 of 84 | ▶ | so far: X7 \*acts\* |" in table.panel._view._text.content
-    assert "Half-normal" in table.panel._plots._choice.options
-    assert "Ascent path" not in table.panel._plots._choice.options
-    assert table.panel._runs._stage.options == ("pilot", "screening")
+    board = table.board()
+    (stage,) = board["stages"]
+    assert (stage["mark"], stage["found"]) == ("▶", "so far: X7 *acts*")
+    titles = [chart["title"] for chart in board["charts"]]
+    assert "Half-normal" in titles
+    assert "Ascent path" not in titles
+    assert board["banner"] is None
     # finished: the result counts, and a partial one that was left behind does not
     written(tmp_path / "study-1", result)
     table.study.now = CommandStatus("finished")
-    table.show()
-    assert "Ascent path" in table.panel._plots._choice.options
+    assert "Ascent path" in [chart["title"] for chart in table.board()["charts"]]
 
 
 def test_ranges_and_target_are_asked_for_as_entered(table):

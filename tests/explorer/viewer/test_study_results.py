@@ -1,4 +1,4 @@
-"""What the page does with a result of a study: profiler, runs poured again, comparison, files that are none."""
+"""What the page does with a result of a study: profiler, comparison, files that are none."""
 
 import math
 from pathlib import Path
@@ -61,9 +61,6 @@ def test_every_target_has_a_profiler(table, tmp_path):
         assert drawn(plots)["data"] != before["data"]
         assert f"[{unit}]" in drawn(plots)["layout"]["yaxis"]["title"]["text"]
         assert unit in profiler._words.content
-    table.enter(plots._choice, "Half-normal")
-    table.enter(slider, slider.min)
-    assert plots._choice.value == titles[0]
 
 
 def test_values_that_act_on_restart_begin_the_pour_anew():
@@ -74,29 +71,6 @@ def test_values_that_act_on_restart_begin_the_pour_anew():
     assert value(asked[1], "rig.outlet_height") == 0.07
     with pytest.raises(ValueError, match=r"material.sand"):
         set_live(session, {"material.sand.shear_modulus": 1e7})
-
-
-def test_any_run_is_poured_again(table, result, tmp_path):
-    table.study.out = written(tmp_path / "study-1", result)
-    table.show()
-    runs = table.panel._runs
-    table.enter(runs._stage, "surface")
-    chosen = runs._run.options[3]
-    assert chosen.startswith("point ")
-    table.enter(runs._run, chosen)
-    assert "Set: " in runs._words.content
-    runs._pour()
-    (asked,) = table.session.asked
-    stored = runs._runs[chosen]
-    assert asked[2] == stored.seed
-    k = int(stored.label.split()[1]) - 1
-    for factor, natural in zip(result["surface"]["factors"], result["surface"]["natural"][k], strict=True):
-        assert value(asked[1], factor["path"]) == pytest.approx(natural)
-    # The formula gives other keys than a pour would, and the page says so.
-    assert "have changed since that run" in runs._words.content
-    table.enter(runs._run, "no such run")
-    with pytest.raises(ValueError, match="no run is chosen"):
-        runs._pour()
 
 
 def test_a_result_from_elsewhere_is_added_and_compared(table, result, tmp_path):
