@@ -16,6 +16,7 @@ from explorer.commands import (
     analyse,
     audit,
     bench,
+    board,
     calibrate,
     design,
     diagnose,
@@ -118,6 +119,7 @@ def options(
 
 app.command()(serve.serve)
 app.command(cls=simulate.Rigs)(simulate.simulate)
+app.command()(board.board)
 app.command()(calibrate.calibrate)
 app.command()(diagnose.diagnose)
 app.command(cls=design.Designs)(design.design)

@@ -14,14 +14,19 @@ from explorer.logs.recording import recorded_lines
 from explorer.project.project import Project
 from explorer.session import Session
 from explorer.study.process import CalibrationProcess
+from explorer.viewer.board.board import board_json
+from explorer.viewer.board.folder_board import FolderBoard
 from explorer.viewer.guarded_server import address, guarded_server
 from explorer.viewer.output.recording_switch import session_recorder
 from explorer.viewer.page import Page
 from explorer.viewer.shell.channel import ShellChannel
-from explorer.viewer.shell.web_pages import WebPages
+from explorer.viewer.shell.web_pages import JSON, WebPage, WebPages, folder_id
 from solver.scenes.scene import Scene
 
 LABEL = "Granular material explorer"
+REPORT = "report.html"
+FOLLOW_INTERVAL = 2.0
+"""Seconds between two looks at the folder of a board."""
 
 
 def print_address(url: str) -> None:
@@ -99,6 +104,31 @@ def replay(
         page = ReplayPage(server, read, recording.name)
         ready(f"http://{address(host)}:{server.get_port()}")
         page.run(stop)
+
+
+def board(
+    folder: Path, *, host: str = "127.0.0.1", port: int = 8080, ready: Callable[[str], None] = print_address
+) -> None:
+    """Serve the board of the study or diagnosis in ``folder``; blocks until SIGINT or SIGTERM (main thread only).
+
+    Raises:
+        CommandError: the folder holds no result, or one of another version.
+        PortError: the port is busy or the host is not of this machine.
+    """
+    found = FolderBoard(folder)
+    pages = WebPages(LABEL)
+    with stopped_by_signals() as stop, ExitStack() as ending:
+        # Made before the address is told: what cannot be shown is refused at once.
+        shown, address_of = found.version(), f"/study/{folder_id(folder)}.json"
+        report = pages.publish_folder(folder) + REPORT if (folder / REPORT).is_file() else ""
+        pages.publish(address_of, WebPage(JSON, board_json(found.board(report))))
+        server = guarded_server(host, port, LABEL, pages)
+        ending.callback(server.stop)
+        ready(f"http://{address(host)}:{server.get_port()}/shell/board.html#{address_of}")
+        while not stop.wait(FOLLOW_INTERVAL):
+            if found.version() != shown:
+                shown = found.version()
+                pages.publish(address_of, WebPage(JSON, board_json(found.board(report))))
 
 
 @contextmanager

@@ -1,0 +1,68 @@
+"""Boards of studies and diagnoses: what they show of a result, live or of a folder."""
+
+import json
+
+import pytest
+
+from doe.studies.study_result import study_from
+from explorer.background.command_process import CommandStatus
+from explorer.background.progress import StageProgress
+from explorer.errors import CommandError
+from explorer.report.content import Word
+from explorer.viewer.board.board import Board, board_json
+from explorer.viewer.board.diagnosis_board import diagnosis_board
+from explorer.viewer.board.folder_board import FolderBoard
+from explorer.viewer.board.study_board import study_board
+from tests.explorer import diagnosed, reported_studies
+
+
+@pytest.mark.parametrize("case", reported_studies.CASES)
+def test_every_kind_of_study_is_plain_json_without_a_gap(case):
+    board = study_board(study_from(reported_studies.result_of_case(case)), None, "/reports/x/report.html")
+    text = board_json(board).decode()
+    shown = json.loads(text)
+    assert shown["banner"]["headline"].startswith(tuple(Word))
+    assert shown["report"] == "/reports/x/report.html"
+    for chart in shown["charts"]:
+        assert chart["spec"]["data"]
+        assert 0.3 < chart["aspect"] < 4.0
+    for table in shown["tables"]:
+        assert all(len(row) == len(table["header"]) for row in table["rows"])
+        assert len(table["opens"]) in (0, len(table["rows"]))
+
+
+@pytest.mark.parametrize("case", diagnosed.CASES)
+def test_every_kind_of_diagnosis_says_what_is_missing_and_shows_the_piles(case):
+    result = diagnosed.typed(diagnosed.result_of_case(case))
+    shown = json.loads(board_json(diagnosis_board(result, None)))
+    assert shown["banner"]["headline"].startswith(tuple(Word))
+    assert shown["lead"]
+    titles = [chart["title"] for chart in shown["charts"]]
+    assert len([one for one in titles if one.startswith("Pile")]) == len(result.piles)
+    assert len([one for one in titles if one.startswith("Where the pile is off")]) == len(result.maps)
+    assert titles[: len(result.piles)] == [one for one in titles if one.startswith("Pile")]
+
+
+def test_without_a_result_a_board_says_where_the_command_is():
+    status = CommandStatus("running", "pilot", 3, 20, 61.0, stages=(StageProgress("pilot", 3, 20),))
+    shown = json.loads(board_json(study_board(None, status)))
+    assert shown["subtitle"] == "Running: pilot, 3 of 20, time left 1 min 01 s"
+    assert [one["mark"] for one in shown["stages"]] == ["▶"]
+    assert json.loads(board_json(study_board(None, None))) == json.loads(board_json(Board("", "")))
+
+
+def test_a_folder_is_a_board_that_follows_its_files(tmp_path):
+    with pytest.raises(CommandError, match=r"holds no result\.json, partial\.json or diagnosis\.json"):
+        FolderBoard(tmp_path)
+    result = reported_studies.result_of_case("planted")
+    partial = {key: result[key] for key in ("schema", "study", "pilot")} | {"partial": "pilot", "line": "so far"}
+    (tmp_path / "partial.json").write_text(json.dumps(partial), encoding="utf-8")
+    folder = FolderBoard(tmp_path)
+    first = folder.version()
+    assert folder.board().banner is None
+    (tmp_path / "result.json").write_text(json.dumps(result), encoding="utf-8")
+    assert folder.version() != first
+    assert folder.board().banner is not None
+    (tmp_path / "result.json").write_text('{"runs": 1}', encoding="utf-8")
+    with pytest.raises(CommandError, match=str(tmp_path)):
+        folder.board()
