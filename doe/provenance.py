@@ -17,6 +17,17 @@ class About(Record):
 
 
 @dataclass(frozen=True)
+class PouredPile(Record):
+    """Mean silhouette of the piles of one setting, and ``sd`` between pours, over ``u`` from their middle [m]."""
+
+    name: str
+    pours: int
+    u: tuple[float, ...]
+    mean: tuple[float, ...]
+    sd: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class SetUp(Record):
     """The scene at its reference values: ``rig``, the material of its ``wall``, and ``dt``, the time step [s].
 

@@ -43,6 +43,13 @@ def test_the_interface_works_from_a_wheel(site, tmp_path):
     assert all(Path(file).is_relative_to(site) for file in files)
 
 
+def test_a_report_can_be_written_from_a_wheel(site):
+    """The templates are no Python files; a wheel without them has reports only in a checkout."""
+    places = {path.name for path in (ROOT / "explorer/report/templates").iterdir()}
+    assert places == {path.name for path in (site / "explorer/report/templates").iterdir()}
+    assert {"page.html.j2", "blocks.html.j2"} < places
+
+
 def test_a_wheel_says_that_its_types_are_to_be_read(site):
     """PEP 561: without the marker mypy and editors take every name of an installed package for Any."""
     assert all((site / package / "py.typed").is_file() for package in ("doe", "explorer", "solver"))

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, ClassVar, Self
 
-from doe.provenance import About, SetUp
+from doe.provenance import About, PouredPile, SetUp
 from doe.record import Document, Record
 from doe.run_records import Run, Setting
 from doe.stages.ascent import AscentResult
@@ -236,6 +236,8 @@ class StudyResult(AllStages, Described):
     about: About = field(default_factory=About)
     set_up: SetUp | None = None
     """None in results of before there was one."""
+    piles: tuple[PouredPile, ...] = ()
+    """At the reference setting and at the optimum; none of a rig without a free pile."""
 
 
 AnyStudy = PartialStudy | StudyResult

@@ -50,9 +50,8 @@ def bench_report(result: LabResult, about: About) -> Report:
     for k, (title, spec) in enumerate(curve_charts(result).items(), start=1):
         curves = [one for one in result.curves if _group(one) == title]
         points = sum(len(one.force) for one in curves)
-        caption = (
-            f"{title}: n = {len(curves)} replicates, {points} points. Line: the part taken as straight (least squares)."
-        )
+        words = title.replace("_", " ")
+        caption = f"{words}: n = {len(curves)} replicates, {points} points. Line: the part taken as straight."
         figures.append(Figure(f"curves-{k}", spec, caption))
     if figures:
         sections.append(Section("Curves", tuple(figures)))
@@ -185,7 +184,7 @@ def force_displacement(curves: list[CurveFit], title: str) -> Spec:
             }
         )
     layout: Json = {
-        "title": {"text": label(title)},
+        "title": {"text": label(title.replace("_", " "))},
         "xaxis": axis("displacement [mm]"),
         "yaxis": axis("force [N]"),
         "margin": {"l": 60, "r": 24, "t": 80, "b": 52},

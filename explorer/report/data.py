@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 
 from doe.analysis.surface_anova import SurfaceAnova
 from doe.studies.study_result import StudyResult
@@ -88,7 +89,7 @@ def _study_runs(result: StudyResult) -> DataTable:
 def _parameters(result: StudyResult) -> DataTable:
     """Every parameter at its reference value, and those of the surface as the target leaves them (SI)."""
     units, guesses, single = parameter_units(), is_assumed(result.study.assumed), result.optimum.single
-    source = result.study.file
+    source = Path(result.study.file).name
     place = {factor.path: k for k, factor in enumerate(result.optimum.factors)}
     values = dict(result.set_up.values) if result.set_up else {f.path: f.reference for f in result.study.factors}
     rows = []

@@ -42,10 +42,10 @@ def write_report(report: Report, folder: Path, results: Mapping[str, str] | None
     has_figures = any(isinstance(one, Figure) for one in report.shown.values())
     can_print = find_spec("matplotlib") is not None
     files |= _figures(report, can_print)
-    for place in ("data", "figures"):
-        (folder / place).mkdir(parents=True, exist_ok=True)
     for name, content in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
         write_whole_bytes(folder / name, content)
+    (folder / MANIFEST).parent.mkdir(exist_ok=True)
     write_whole(folder / MANIFEST, json_text(manifest(report, files)) + "\n")
     return NO_FIGURES if has_figures and not can_print else ""
 

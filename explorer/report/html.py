@@ -11,8 +11,10 @@ import gzip
 import html
 import json
 import re
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
@@ -38,7 +40,7 @@ def page(report: Report) -> str:
     return TEMPLATES.get_template("page.html.j2").render(
         report=report,
         numbers=numbers,
-        policy=POLICY,
+        policy=Markup(POLICY),
         config=CONFIG,
         plotly=packed_plotly() if has_charts else "",
     )
@@ -84,9 +86,15 @@ def axes_text(spec: Spec) -> str:
     found = []
     for letter, way in (("x", "Across"), ("y", "up"), ("z", "height")):
         axes = [one for key, one in (layout | scene).items() if re.fullmatch(rf"{letter}axis\d*", key)]
-        titles = [html.unescape(text) for one in axes if (text := one.get("title", {}).get("text"))]
+        titles = [html.unescape(text) for one in axes if (text := _title(one))]
         found += [f"{way}: {', '.join(dict.fromkeys(titles))}"] if titles else []
     return f"{'; '.join(found)}." if found else ""
+
+
+def _title(axis: Mapping[str, Any]) -> str:
+    """Title of an axis; of one without, what stands along it."""
+    text: str = axis.get("title", {}).get("text", "")
+    return text or " and ".join(axis.get("ticktext", ()))
 
 
 def captioned(one: Shown) -> str:

@@ -200,9 +200,15 @@ def _designs(result: StudyResult) -> str:
         "walk of "
         f"steepest ascent{citations(('box1951',))} in {len(result.ascent.means)} steps; and a {surface} design of "
         f"{len(result.surface.design)} points{citations(DESIGNS.get(surface, ()))} over {enumeration(names)}. "
-        f"The screening read {observable_label(result.pilot.estimator)}, all later stages "
-        f"{observable_label(target.observable)}."
+        f"{_read(result.pilot.estimator, target.observable)}"
     )
+
+
+def _read(screening: str, later: str) -> str:
+    if screening == later:
+        return f"All of them were read by the {observable_label(later)}."
+    first, then = observable_label(screening), observable_label(later)
+    return f"The screening was read by the {first}, all later stages by the {then}."
 
 
 def _tests(result: StudyResult) -> str:

@@ -15,7 +15,7 @@ from typing import Any
 
 from doe.laboratory import LabResult
 from doe.provenance import About
-from doe.record import RecordError
+from doe.record import Record
 from doe.studies.study_result import StudyResult
 from explorer.design.result import DesignResult
 from explorer.diagnosis.result import DiagnosisResult
@@ -25,64 +25,84 @@ from explorer.report.bench import bench_report
 from explorer.report.content import Banner, Block, Drawing, Figure, Folded, Picture, Report, Section, Strong, Table
 from explorer.report.design import design_report
 from explorer.report.diagnosis import diagnosis_report
+from explorer.report.figures.pours import pile_outlines
 from explorer.report.photograph import READ, PhotographResult, photograph_report
+from explorer.units import enumeration
 
 Content = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
 class Part:
-    """A folder of a project: what kind of work it is, and its report."""
+    """A folder of a project: what kind of work it is, its result, and its report."""
 
     kind: str
-    folder: Path
+    result: object
     report: Report
 
 
-def _bench(content: Content, folder: Path) -> Report:
-    return bench_report(LabResult.from_dict(content["result"]), About.from_dict(content["about"]))
+@dataclass(frozen=True)
+class BenchFile(Record):
+    """The content of ``bench.json``."""
+
+    result: LabResult
+    about: About
 
 
-def _photograph(content: Content, folder: Path) -> Report:
+def _picture(folder: Path) -> bytes | None:
     pictures = sorted((folder / "figures").glob(f"figure_*_{READ}.png"))
-    return photograph_report(PhotographResult.from_dict(content), pictures[0].read_bytes() if pictures else None)
+    return pictures[0].read_bytes() if pictures else None
 
 
-KINDS: dict[str, tuple[str, Callable[[Content], bool], Callable[[Content, Path], Report]]] = {
-    "Photographs": ("photograph.json", lambda _: True, _photograph),
-    "Bench test": ("bench.json", lambda _: True, _bench),
+KINDS: dict[str, tuple[str, Callable[[Content], bool], Callable[[Content], Any], Callable[[Any, Path], Report]]] = {
+    "Photographs": (
+        PhotographResult.NAME,
+        lambda _: True,
+        PhotographResult.from_dict,
+        lambda result, folder: photograph_report(result, _picture(folder)),
+    ),
+    "Bench test": (
+        "bench.json",
+        lambda _: True,
+        BenchFile.from_dict,
+        lambda file, _: bench_report(file.result, file.about),
+    ),
     "Design": (
         "result.json",
         lambda content: content.get("kind") == "design analysis",
-        lambda content, _: design_report(DesignResult.from_dict(content)),
+        DesignResult.from_dict,
+        lambda result, _: design_report(result),
     ),
     "Calibration": (
         "result.json",
         lambda content: "study" in content,
-        lambda content, _: study_report(StudyResult.from_dict(content)),
+        StudyResult.from_dict,
+        lambda result, _: study_report(result),
     ),
     "Diagnosis": (
         DiagnosisResult.NAME,
         lambda _: True,
-        lambda content, _: diagnosis_report(DiagnosisResult.from_dict(content)),
+        DiagnosisResult.from_dict,
+        lambda result, _: diagnosis_report(result),
     ),
 }
-"""Kind → file, whether its content is of this kind, and the report of it; in the order of the work."""
+"""Kind → file, whether its content is of this kind, how it is read, and its report; in the order of the work."""
 
 
 def part_of(folder: Path) -> Part:
     """What a folder holds; CommandError in one line where it is no finished result."""
-    for kind, (name, fits, report) in KINDS.items():
+    for kind, (name, fits, read, report) in KINDS.items():
         file = folder / name
         if not file.is_file():
             continue
         try:
             content = json.loads(file.read_text(encoding="utf-8"))
             if isinstance(content, dict) and fits(content):
-                return Part(kind, folder, report(content, folder))
-        except (RecordError, ValueError, KeyError) as problem:
+                result = read(content)
+                return Part(kind, result, report(result, folder))
+        except ValueError as problem:
             raise CommandError(f"{file}: {problem}") from None
-    names = ", ".join(dict.fromkeys(name for name, _, _ in KINDS.values()))
+    names = ", ".join(dict.fromkeys(name for name, *_ in KINDS.values()))
     raise CommandError(f"{folder}: holds no finished result ({names})")
 
 
@@ -105,7 +125,7 @@ def project_report(folders: list[Path], title: str, about: About) -> Report:
             if part.report.banner
         ),
     )
-    sections = [Section("Verdicts", (verdicts,))]
+    sections = [Section("Verdicts", (verdicts,)), *_side_by_side(parts)]
     for k, part in enumerate(parts, start=1):
         sections += [_renamed(section, f"{k}. {part.kind}", f"part-{k}-") for section in part.report.sections]
     return Report(
@@ -126,6 +146,26 @@ def project_report(folders: list[Path], title: str, about: About) -> Report:
         ),
         references=tuple({one.key: one for part in parts for one in part.report.references}.values()),
     )
+
+
+def _side_by_side(parts: list[Part]) -> list[Section]:
+    """Photographed outlines over the mean silhouettes of a study, where there are both and the scale is known."""
+    studies = [part.result for part in parts if isinstance(part.result, StudyResult) and part.result.piles]
+    photographs = [part.result for part in parts if isinstance(part.result, PhotographResult)]
+    measured = {pile.name: (pile.u, pile.z) for one in photographs for pile in one.piles if pile.unit == "m"}
+    if not studies or not measured:
+        return []
+    n = enumeration([f"{pile.pours} pours at the {pile.name}" for pile in studies[0].piles])
+    caption = (
+        f"Photographed outlines (n = {len(measured)}) over mean silhouettes of n = {n}; bands: ± 1 SD between pours; "
+        "both axes "
+        "on one scale."
+    )
+    return [
+        Section(
+            "Photograph, reference and optimum", (Figure("piles", pile_outlines(studies[0].piles, measured), caption),)
+        )
+    ]
 
 
 def _renamed(section: Section, before: str, prefix: str) -> Section:

@@ -34,6 +34,7 @@ WIDTH, MARGIN, LEAST_GAP, TICK = 560.0, 130.0, 17.0, 4.0
 SAME = 1e-9
 """Lengths closer than this are one [m]."""
 MOST_CORNERS = 64
+MOST_WIDTHS = 4
 MARK = " †"
 """Behind a value that was assumed."""
 NO_DENSITY = "–"
@@ -229,6 +230,7 @@ def _svg(strokes: Sequence[Stroke], planes: Sequence[str], lengths: dict[str, fl
         along = np.array([a, b]) / math.hypot(a, b)
         ends = [middle - edge * along, middle + edge * along]
         parts.append(f'<line {_ends(at(ends[0]), at(ends[1]))} stroke-width="3"/>')
+    top = float(corners[:, 1].max())
     marks = [*_heights(corners, level, lengths, half, scale), *_widths(corners, lengths)]
     for (start, end), (x, z), words in marks:
         upright = abs(start[0] - end[0]) < SAME
@@ -237,7 +239,7 @@ def _svg(strokes: Sequence[Stroke], planes: Sequence[str], lengths: dict[str, fl
             parts.append(f'<line {_ends(at(a), at(b))} stroke-width="1" opacity="0.75"/>')
         place = at((x, z)).split(",")
         anchor, shift = ("start", 6) if upright else ("middle", 0)
-        lift = 4 if upright else -5
+        lift = 4 if upright else -5 if top - z < SAME else 15
         parts.append(
             f'<text x="{float(place[0]) + shift:.1f}" y="{float(place[1]) + lift:.1f}" text-anchor="{anchor}" '
             f'stroke="none" fill="currentColor" font-size="11">{escape(words)}</text>'
@@ -270,11 +272,9 @@ def _widths(corners: Array, lengths: dict[str, float]) -> list[Mark]:
     for x, z in corners:
         found[round(float(z), 9)] = max(found.get(round(float(z), 9), 0.0), abs(float(x)))
     by_width = {round(r, 9): z for z, r in sorted(found.items()) if r > SAME}
-    return [
-        (((-r, z), (r, z)), (0.0, z), _dimension(2.0 * r, lengths, "diameter"))
-        for r, z in by_width.items()
-        if len(by_width) <= 4
-    ]
+    if len(by_width) > MOST_WIDTHS:
+        by_width = dict([max(by_width.items())])  # of a circle, its diameter
+    return [(((-r, z), (r, z)), (0.0, z), _dimension(2.0 * r, lengths, "diameter")) for r, z in by_width.items()]
 
 
 def _dimension(length: float, lengths: dict[str, float], kind: str) -> str:

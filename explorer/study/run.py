@@ -16,11 +16,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+import numpy.typing as npt
+
 from doe.pour_runner import PourRunner
-from doe.provenance import About
+from doe.provenance import About, PouredPile
 from doe.run_records import Run
 from doe.stages import planned_runs
-from doe.store import Store, default_store
+from doe.store import Store, StoredRun, default_store
 from doe.studies.campaign import Campaign, PartialStages, run_campaign
 from doe.studies.profile import Profile
 from doe.studies.study import TRIES, Study, load_study, with_profile
@@ -29,6 +32,7 @@ from doe.studies.study_result import (
     PouredBody,
     RunCounts,
     StageResult,
+    Stages,
     StudyDescription,
     StudyResult,
     Timing,
@@ -40,14 +44,20 @@ from explorer.files.run_result import made_today, versions
 from explorer.report import write_report
 from explorer.report.set_up import set_up_of
 from explorer.study.process import PARTIAL
-from solver import WorkerPool
+from solver import WorkerPool, pour_rig, unpacked
 from solver.arch import chosen
 from solver.observables.made_up import estimator_bias
+from solver.observables.repose import AZIMUTHS_DEG, flank_feet, outline
+from solver.rigs.rig import PILE
 
 if TYPE_CHECKING:
     from explorer.logs.pour_recorder import StudyRecorder
 
 NOBODY = About()
+REFERENCE = "reference"
+"""Label of the pilot's first setting."""
+SILHOUETTE_POINTS = 161
+FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -108,7 +118,9 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> StudyResult:
         )
         bias = estimator_bias(study.estimators)
         found = run_campaign(study, profile, runner, bias, progress.stage, follower.begin, partial.keep)
-    result = result_of(study, profile, found, progress.elapsed, order.tries, made_today(order.author, order.notes))
+        piles = poured_piles(found.stages, store) if PILE in pour_rig(study.scene).gives else ()
+    about = made_today(order.author, order.notes)
+    result = replace(result_of(study, profile, found, progress.elapsed, order.tries, about), piles=piles)
     text = json.dumps(result.to_dict(), ensure_ascii=False, allow_nan=False, indent=1)
     # First and by itself: a report that cannot be written costs no study.
     write_whole(order.out / "result.json", text + "\n")
@@ -118,6 +130,42 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> StudyResult:
     if missing:
         say(missing)
     return result
+
+
+def poured_piles(stages: Stages, store: Store) -> tuple[PouredPile, ...]:
+    """Mean silhouettes at the reference setting and at the optimum, read off the stored pours; none that are lost."""
+    chosen = (
+        ("reference", [run for runs in stages.runs_of("pilot") for run in runs if run.label == REFERENCE]),
+        ("optimum", [run for runs in stages.runs_of("verification") for run in runs]),
+    )
+    seen = [
+        (name, [views for run in runs if run.valid and (views := _silhouettes(store.find(run.key)))])
+        for name, runs in chosen
+    ]
+    reach = max((float(np.abs(u).max()) for _, pours in seen for views in pours for u, _ in views), default=0.0)
+    grid = np.linspace(-reach, reach, SILHOUETTE_POINTS)
+    found = []
+    for name, pours in seen:
+        if len(pours) > 1:
+            tops = np.array([np.mean([np.interp(grid, u, z, 0.0, 0.0) for u, z in views], axis=0) for views in pours])
+            mean, sd = tops.mean(axis=0), tops.std(axis=0, ddof=1)
+            found.append(PouredPile(name, len(pours), *(tuple(one.round(6).tolist()) for one in (grid, mean, sd))))
+    return tuple(found)
+
+
+def _silhouettes(run: StoredRun | None) -> list[tuple[FloatArray, FloatArray]]:
+    """Outlines (u, z) [m] of a stored pile from several sides, u = 0 between the feet of its flanks."""
+    if run is None or not run.raw:
+        return []
+    spheres = unpacked(run.raw).pile.spheres
+    found = []
+    for azimuth in AZIMUTHS_DEG[::3]:
+        view = outline(spheres, azimuth)
+        left, right = view.flanks
+        if left is not None and right is not None and left.slope > 0.0 < right.slope:
+            inside = view.top > 0.0
+            found.append(((view.u - 0.5 * sum(flank_feet((left, right))))[inside], view.top[inside]))
+    return found
 
 
 def holds_more_than(folder: Path, study_file: Path) -> bool:

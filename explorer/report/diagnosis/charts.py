@@ -5,7 +5,6 @@ Errors are shown over the noise floor, residuals with the bands that a right mod
 
 from __future__ import annotations
 
-import math
 from functools import partial
 
 import numpy as np
@@ -18,6 +17,7 @@ from doe.measurement.residual_map import ResidualMap
 from explorer.diagnosis.result import DiagnosisResult, PileProfiles
 from explorer.report.content import Spec
 from explorer.report.diagnosis.wording import feature_label, spelled
+from explorer.report.figures.pours import profile
 from explorer.report.figures.style import (
     ASSUMPTION,
     BELOW_TO_ABOVE,
@@ -29,7 +29,6 @@ from explorer.report.figures.style import (
     axis,
     chart,
     label,
-    line,
     points,
     side_by_side,
     suffix,
@@ -167,33 +166,13 @@ def pile_chart(picture: PileProfiles) -> Spec:
     radius = [MM * r for r in picture.radius.tolist()]
     x = [-r for r in reversed(radius)] + radius
     traces: list[Json] = []
-    for words, profile, colour, dash in (
+    for words, found, colour, dash in (
         ("measured", picture.measured, MEASURED, "solid"),
         ("before", picture.before, BEFORE, "dot"),
         ("after", picture.after, AFTER, "dash"),
     ):
-        mean = [MM * h if math.isfinite(h) else None for h in _mirrored(profile.mean)]
-        known = [
-            (at, MM * (middle - spread), MM * (middle + spread))
-            for at, middle, spread in zip(x, _mirrored(profile.mean), _mirrored(profile.sd), strict=True)
-            if math.isfinite(middle) and math.isfinite(spread)
-        ]
-        traces.append(
-            {
-                "type": "scatter",
-                "mode": "lines",
-                "x": [at for at, _, _ in known] + [at for at, _, _ in known[::-1]],
-                "y": [high for _, _, high in known] + [max(0.0, low) for _, low, _ in known[::-1]],
-                "fill": "toself",
-                "fillcolor": BAND[colour],
-                "line": {"width": 0},
-                "hoverinfo": "skip",
-                "showlegend": False,
-                "name": f"{words} ± sd",
-            }
-        )
-        stroke = line(colour, dash, 2.2)
-        traces.append({"type": "scatter", "mode": "lines", "x": x, "y": mean, "name": words, "line": stroke})
+        mean, sd = ([MM * h for h in _mirrored(one)] for one in (found.mean, found.sd))
+        traces += profile(words, x, mean, sd, (colour, BAND[colour], dash))
     layout: Json = {
         "xaxis": axis("distance from the pile's middle [mm]"),
         "yaxis": axis("mean height [mm]", scaleanchor="x", rangemode="tozero"),

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from doe.analysis.pilot import EstimatorChoice
+from doe.provenance import PouredPile
 from doe.run_records import Run, valid_values
 from doe.stages.ascent import AscentResult
 from doe.stages.pilot import PilotResult
@@ -18,6 +19,7 @@ from explorer.report.figures.style import (
     CHOSEN,
     DUMMY,
     FACTOR,
+    INTERVAL_BAND,
     MARGIN_BAND,
     TARGET,
     Json,
@@ -138,6 +140,9 @@ def _cycle(count: int) -> list[str]:
     return [colours[k % len(colours)] for k in range(count)]
 
 
+Look = tuple[str, str, str]
+"""Colour of a line, of its band, and dash."""
+REFERENCE_BAND = "rgba(212, 126, 44, 0.18)"
 NORMAL_95 = 1.96
 FAINT = 0.45
 MEASURED = 1.0
@@ -181,6 +186,47 @@ def ascent_path(walk: AscentResult, target: Target) -> Spec:
     ]
     layout = {"xaxis": axis("step", dtick=1), "yaxis": axis(observable_title(walk.observable))}
     return chart(traces, layout | _target_marks(target), 400)
+
+
+def profile(words: str, x: Sequence[float], mean: Sequence[float], sd: Sequence[float], look: Look) -> list[Json]:
+    """A mean height with its band of one standard deviation, in the unit of its numbers; gaps where it is NaN."""
+    colour, band, dash = look
+    known = [
+        (at, middle - spread, middle + spread)
+        for at, middle, spread in zip(x, mean, sd, strict=True)
+        if math.isfinite(middle) and math.isfinite(spread)
+    ]
+    edge = {
+        "type": "scatter",
+        "mode": "lines",
+        "x": [at for at, _, _ in known] + [at for at, _, _ in known[::-1]],
+        "y": [high for _, _, high in known] + [max(0.0, low) for _, low, _ in known[::-1]],
+        "fill": "toself",
+        "fillcolor": band,
+        "line": {"width": 0},
+        "hoverinfo": "skip",
+        "showlegend": False,
+        "name": f"{words} ± sd",
+    }
+    stroke = line(colour, dash, 2.2)
+    return [edge, {"type": "scatter", "mode": "lines", "x": list(x), "y": finite(mean), "name": words, "line": stroke}]
+
+
+def pile_outlines(piles: Sequence[PouredPile], measured: Mapping[str, tuple[Sequence[float], Sequence[float]]]) -> Spec:
+    """Mean silhouettes with bands, and photographed outlines (name → u, z [m]) over them, on one scale [mm]."""
+    looks = {"reference": (ASSUMPTION, REFERENCE_BAND, "dot"), "optimum": (FACTOR, INTERVAL_BAND, "dash")}
+    traces: list[Json] = []
+    for pile in piles:
+        u, mean, sd = ([1e3 * value for value in row] for row in (pile.u, pile.mean, pile.sd))
+        traces += profile(f"{pile.name}, n = {pile.pours}", u, mean, sd, looks[pile.name])
+    for name, (across, up) in measured.items():
+        x, y = ([1e3 * value for value in row] for row in (across, up))
+        traces.append({"type": "scatter", "mode": "lines", "x": x, "y": y, "name": label(name), "line": line(TARGET)})
+    layout = {
+        "xaxis": axis("distance from the pile’s middle [mm]"),
+        "yaxis": axis("height [mm]", scaleanchor="x", rangemode="tozero"),
+    }
+    return chart(traces, layout, 340)
 
 
 def scan(scanned: ScanResult, target: Target) -> Spec:

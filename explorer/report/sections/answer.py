@@ -17,6 +17,7 @@ from doe.target import Target
 from explorer.report.content import Banner, Block, Caution, Facts, Figure, Section, Strong, Struck, Table, Text, Word
 from explorer.report.figures.effects import all_effects
 from explorer.report.figures.model import cloud, fitted_targets, ranges
+from explorer.report.figures.pours import pile_outlines
 from explorer.report.figures.pours import verification as verification_chart
 from explorer.report.identified import BY_RULE, GIVES_TARGET, cloud_caution, is_identified, rule, settings
 from explorer.units import (
@@ -291,6 +292,18 @@ def verification(result: StudyResult) -> Section:
     for index, (target, test) in enumerate(zip(stage.targets, stage.tests, strict=True)):
         blocks += _of_target(stage, index, target, test)
     return Section("Verification", tuple(blocks))
+
+
+def piles(result: StudyResult) -> Section | None:
+    """Mean silhouettes at the reference setting and at the optimum; None where none was kept."""
+    found = result.piles
+    if not found:
+        return None
+    n = enumeration([f"{pile.pours} pours at the {pile.name}" for pile in found])
+    caption = (
+        f"Mean silhouettes over n = {n}, each from four sides; bands: ± 1 SD between pours; both axes on one scale."
+    )
+    return Section("The pile", (Figure("pile", pile_outlines(found, {}), caption),))
 
 
 def _of_target(stage: VerificationResult, index: int, target: Target, test: Verification) -> list[Block]:

@@ -10,8 +10,7 @@ import pytest
 from doe.audit import Printed, audit_study, printed
 from doe.audit.surface_refit import refit
 from explorer.audit.read_study import places, read_study, read_table
-from explorer.audit.report import audit_sections, audit_text, write_audit
-from explorer.report.html import page
+from explorer.audit.report import audit_html, audit_sections, audit_text, write_audit
 from solver.assets import asset_path
 from tests.doe.audit.made_up import clean_study
 from tests.explorer.audit.audited_folder import write_study
@@ -238,7 +237,7 @@ def test_plain_data_and_a_report(clean, tmp_path):
     found = json.loads(result.stdout)
     assert {figure["status"] for figure in found["figures"]} == {"reproduced"}
     assert found == json.loads((tmp_path / "report" / "audit.json").read_text())
-    assert {path.name for path in (tmp_path / "report").iterdir()} == {"audit.json", "report.html", "report.md"}
+    assert {path.name for path in (tmp_path / "report").iterdir()} == {"audit.json", "report.html", "report.md", "data"}
     assert "is not empty" in refused(explorer("audit", folder, "--out", tmp_path / "report"))
 
 
@@ -258,7 +257,7 @@ def test_the_report_holds_every_figure_and_lets_no_markup_through(article, tmp_p
 def test_a_study_in_which_nothing_differs_has_no_empty_section(clean):
     titles = [section.title for section in audit_sections(audit_study(clean))]
     assert titles == ["In short", "What is reproduced"]
-    assert "What is reproduced" in page("a", "b", audit_sections(audit_study(clean)))
+    assert "What is reproduced" in audit_html(audit_study(clean))
 
 
 SPOILED = {

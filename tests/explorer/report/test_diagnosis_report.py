@@ -24,6 +24,7 @@ from explorer.report.diagnosis.wording import (
     feature_label,
     size_text,
 )
+from explorer.report.folder import write_report
 from solver import ASYMMETRY_NAMES, BULK_NAMES, HISTOGRAM_NAMES, PROFILE_NAMES, TEXTURE_NAMES
 from solver.effects import EFFECTS
 from tests.explorer.diagnosed import CASES, EXPECTED, HOSTILE, NAMES, SEEN_AS, result_of_case, typed
@@ -46,9 +47,13 @@ def of_content(make):
 
 
 diagnosis_html, diagnosis_markdown = of_content(report.diagnosis_html), of_content(report.diagnosis_markdown)
-sections_of, write_diagnosis_report = of_content(report.sections_of), of_content(report.write_diagnosis_report)
+sections_of = of_content(report.sections_of)
 cautions, verdict_sentence = of_content(answer.cautions), of_content(answer.verdict_sentence)
 strained, feature_value = of_content(evidence.strained), of_content(wording.feature_value)
+
+
+def write_diagnosis_report(content, folder):
+    write_report(report.diagnosis_report(typed(content)), folder)
 
 
 def amplitude_text(estimate):
@@ -123,7 +128,7 @@ def test_no_missing_number_leaks_into_the_text(result):
 
 
 def test_page_loads_nothing_from_elsewhere(result):
-    page = re.sub(r'<script id="plotly">.*?</script>', "", diagnosis_html(result), flags=re.DOTALL)
+    page = re.sub(r'<script id="plotly"[^>]*>.*?</script>', "", diagnosis_html(result), flags=re.DOTALL)
     assert not re.search(r"https?:|//cdn|@import|url\(", page)
     assert not re.search(r"<(script|img|link|iframe)[^>]+(src|href)=", page)
 
@@ -549,7 +554,13 @@ def test_a_result_without_a_number_is_refused_in_one_line(results):
 
 def test_files_appear_complete_or_not_at_all(results, tmp_path):
     write_diagnosis_report(results["effect"], tmp_path)
-    assert {path.name for path in tmp_path.iterdir()} == {"report.html", "report.md"}
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "report.html",
+        "report.md",
+        "figures",
+        "data",
+        "references.bib",
+    }
     before = (tmp_path / "report.md").read_text(encoding="utf-8")
     broken = copy.deepcopy(results["effect"])
     broken["effects"][0]["amplitudes"][0]["effect"] = "no such effect"

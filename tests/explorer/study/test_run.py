@@ -2,15 +2,19 @@
 
 import dataclasses
 import json
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from doe.pour_runner import TRIES
 from doe.studies.study_result import OWN_STAGES
 from explorer.study import run as study_run
 from solver import asset_path
+from solver.pours.record import Spheres
 from tests.doe.formula_runner import FormulaRunner
 from tests.doe.studies.test_campaign import planted
+from tests.explorer import reported_studies
 from tests.explorer.command_line import explorer
 from tests.explorer.viewer.study_panel_at_hand import study_with_own_profiles
 
@@ -142,3 +146,28 @@ def test_without_headless_it_says_where_to_go(tmp_path):
     refused = explorer("calibrate", "--out", str(tmp_path / "out"))
     assert refused.exit_code == 2
     assert "--headless" in refused.stderr
+
+
+def test_piles_of_reference_and_optimum_are_read_off_the_store(monkeypatch):
+    """Small spheres on a cone of 30° and 50 mm height: its silhouette from any side is h (1 − |u|/r)."""
+    height, radius, small = 0.05, 0.05 / np.tan(np.radians(30.0)), 4e-4
+    rings = np.linspace(0.0, radius, 220)
+    places = [
+        (r * np.cos(a), r * np.sin(a), height * (1.0 - r / radius))
+        for r in rings
+        for a in np.linspace(0.0, 2.0 * np.pi, 1 + int(r / radius * 900), endpoint=False)
+    ]
+    spheres = Spheres(np.array(places), np.full(len(places), small), np.arange(len(places)))
+    record = SimpleNamespace(pile=SimpleNamespace(spheres=spheres))
+    monkeypatch.setattr(study_run, "unpacked", lambda raw: record)
+    kept = SimpleNamespace(find=lambda key: SimpleNamespace(raw=b"kept") if key != "lost" else None)
+    run = reported_studies.typed(reported_studies.result_of_case("planted")).verification.runs[0]
+    runs = [dataclasses.replace(run, label="reference", outcome="at_rest", key=key) for key in ("a", "b", "lost")]
+    jammed = dataclasses.replace(run, label="reference", outcome="jammed", key="jammed")
+    stages = SimpleNamespace(runs_of=lambda stage: ((*runs, jammed),) if stage == "pilot" else ())
+    (pile,) = study_run.poured_piles(stages, kept)
+    assert (pile.name, pile.pours) == ("reference", 2)
+    u = np.array(pile.u)
+    inside = np.abs(u) < 0.9 * radius
+    assert np.array(pile.mean)[inside] == pytest.approx(height * (1.0 - np.abs(u[inside]) / radius), abs=1.5e-3)
+    assert np.allclose(pile.sd, 0.0)
