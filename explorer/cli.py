@@ -26,6 +26,7 @@ from explorer.commands import (
     measurements,
     new,
     parameters,
+    repeat,
     replay,
     runs,
     schema,
@@ -117,6 +118,7 @@ def options(
 
 app.command()(serve.serve)
 app.command(cls=simulate.Rigs)(simulate.simulate)
+app.command()(repeat.repeat)
 app.command()(calibrate.calibrate)
 app.command()(diagnose.diagnose)
 app.command(cls=design.Designs)(design.design)

@@ -18,6 +18,7 @@ from explorer.viewer.pour.chart import Chart
 from explorer.viewer.pour.live_panel import LivePanel
 from explorer.viewer.pour.motion_chart import MotionChart
 from explorer.viewer.pour.outline_panel import OutlinePanel
+from explorer.viewer.pour.population_panel import PopulationPanel
 from explorer.viewer.pour.readout import Readout
 from explorer.viewer.pour.restart_panel import RestartPanel
 from explorer.viewer.pour.run_panel import RunPanel
@@ -32,6 +33,7 @@ PANELS: Registry[type[Panel]] = Registry(
     (
         RunPanel,
         Readout,
+        PopulationPanel,
         Chart,
         MotionChart,
         OutlinePanel,
