@@ -24,6 +24,7 @@ from explorer.viewer.pour.restart_panel import RestartPanel
 from explorer.viewer.pour.run_panel import RunPanel
 from explorer.viewer.pour.scene_panel import ScenePanel
 from explorer.viewer.pour.second_pile import SecondPile
+from explorer.viewer.pour.standing_panel import StandingPanel
 from explorer.viewer.study.diagnosis_panel import DiagnosisPanel
 from explorer.viewer.study.study_panel import StudyPanel
 from solver.plugins import Registry, derived_from
@@ -37,6 +38,7 @@ PANELS: Registry[type[Panel]] = Registry(
         Chart,
         MotionChart,
         OutlinePanel,
+        StandingPanel,
         LivePanel,
         ChangesPanel,
         ScenePanel,
