@@ -15,6 +15,7 @@ from explorer.viewer.output.recording_panel import RecordingPanel
 from explorer.viewer.panel import Panel
 from explorer.viewer.pour.changes_panel import ChangesPanel
 from explorer.viewer.pour.chart import Chart
+from explorer.viewer.pour.disturb_panel import DisturbPanel
 from explorer.viewer.pour.live_panel import LivePanel
 from explorer.viewer.pour.motion_chart import MotionChart
 from explorer.viewer.pour.outline_panel import OutlinePanel
@@ -40,6 +41,7 @@ PANELS: Registry[type[Panel]] = Registry(
         OutlinePanel,
         StandingPanel,
         LivePanel,
+        DisturbPanel,
         ChangesPanel,
         ScenePanel,
         RestartPanel,

@@ -37,8 +37,8 @@ Targets = dict[str, tuple[str, ...]]
 LINEAR_STEP = 0.01
 POWER_DIGITS = 2
 """Decimals of a power of ten: as fine as the slider's step, and no more than its box can show."""
-LARGEST_FACTOR = 4.0
-"""By which values that differ are scaled at most in one go."""
+LARGEST_FACTOR, LARGEST_POWER = 4.0, 100.0
+"""By which values that differ are scaled at most in one go, on a linear and on a logarithmic slider."""
 DECADES = 1.0
 """A logarithmic slider reaches this far to either side of the present value, then out to whole decades."""
 HANDS_OFF = 1.5
@@ -246,15 +246,14 @@ class ScalingControl(LiveControl):
         self._factor = 1.0
         self._base = {path: float(value(scene, path)) for path in self._paths}
         parameter, name = self._parameter, title(self._parameter).split(" [")[0]
-        low, high = factor_range(list(self._base.values()), parameter.low, parameter.high)
-        slider = gui.add_slider(
-            f"{name}: mixed, ×",
-            low,
-            high,
-            LINEAR_STEP,
-            1.0,
-            hint=f"The values differ. All are multiplied by this factor, so that their ratios stay. {parameter.doc}",
-        )
+        largest = LARGEST_POWER if parameter.scale == "log" else LARGEST_FACTOR
+        low, high = factor_range(list(self._base.values()), parameter.low, parameter.high, largest)
+        hint = f"The values differ. All are multiplied by this factor, so that their ratios stay. {parameter.doc}"
+        if parameter.scale == "log":
+            bottom, top = (round(math.log10(end), POWER_DIGITS) for end in (max(low, 1.0 / LARGEST_POWER), high))
+            slider = gui.add_slider(f"{name}: mixed, × 10^", bottom, top, LINEAR_STEP, 0.0, hint=hint)
+            return (Face(slider, math.log10, lambda entered: 10.0 ** checked(entered, bottom, top, name)),)
+        slider = gui.add_slider(f"{name}: mixed, ×", low, high, LINEAR_STEP, 1.0, hint=hint)
         return (Face(slider, lambda factor: factor, lambda entered: checked(entered, low, high, name)),)
 
     def _number(self, scene: Scene) -> float:
@@ -327,13 +326,15 @@ def agree(scene: Scene, paths: Sequence[str]) -> bool:
     return len({value(scene, path) for path in paths}) == 1
 
 
-def factor_range(numbers: Sequence[float], low: float, high: float) -> tuple[float, float]:
-    """Factors by which all of ``numbers`` stay within ``low`` … ``high``, at most ``LARGEST_FACTOR``."""
+def factor_range(
+    numbers: Sequence[float], low: float, high: float, largest: float = LARGEST_FACTOR
+) -> tuple[float, float]:
+    """Factors by which all of ``numbers`` stay within ``low`` … ``high``, at most ``largest``."""
     least = max((low / number for number in numbers if number > 0.0), default=1.0)
     most = min((high / number for number in numbers if number > 0.0), default=1.0)
     # To the slider's step, inwards.
     steps = 1.0 / LINEAR_STEP
-    return min(1.0, math.ceil(steps * least) / steps), max(1.0, math.floor(steps * min(most, LARGEST_FACTOR)) / steps)
+    return min(1.0, math.ceil(steps * least) / steps), max(1.0, math.floor(steps * min(most, largest)) / steps)
 
 
 def decades_around(number: float, low: float, high: float) -> tuple[int, int]:

@@ -53,7 +53,7 @@ class ThisPour:
     doubt: str
     """Why the angle is none of a pile yet; empty where it is."""
     changed: bool
-    """Parameters were changed while it was poured, so that it is no draw of this population."""
+    """Parameters were changed, or the pile disturbed, so that it is no draw of this population."""
 
 
 class PopulationPanel(Panel):
@@ -88,9 +88,8 @@ class PopulationPanel(Panel):
         command = self._process.status()
         if self._more.visible == command.alive:
             self._more.visible, self._stop.visible = not command.alive, command.alive
-        pour = ThisPour(
-            angle_of_repose_deg(status), status.seed, self._doubt.doubt(status), status.energy_put_in is not None
-        )
+        changed = status.energy_put_in is not None or status.disturbed
+        pour = ThisPour(angle_of_repose_deg(status), status.seed, self._doubt.doubt(status), changed)
         if not self._work.busy_with and wall >= self._since + SETTLED:
             self._look(status.scene, pour, wall)
         here = self._found is not None and self._found[0] == status.scene
@@ -229,7 +228,7 @@ def _few(population: Population) -> str:
 def _of_this_pour(population: Population, pour: ThisPour) -> str:
     if not math.isfinite(pour.angle) or not population.n:
         return ""
-    about = pour.doubt or ("parameters were changed on its way" if pour.changed else f"seed {pour.seed}")
+    about = pour.doubt or ("changed or disturbed on its way" if pour.changed else f"seed {pour.seed}")
     return f"<span style='color:{css(FLANK)}'>▲</span> this pour {pour.angle:.1f}° ({about})."
 
 
@@ -247,7 +246,8 @@ def _compared_line(population: Population, changed: str, found: Comparison | Non
 
 def _process_line(command: CommandStatus) -> str:
     if command.alive:
-        return f"Pouring: {command.done} of {command.planned or MORE}, time left {time_left(command.eta_s)}."
+        left = f"time left {time_left(command.eta_s)}" if command.done else "the first one takes longest"
+        return f"Pouring in the background: {command.done} of {command.planned or MORE}, {left}."
     return escape(command.message) if command.state in ("failed", "cancelled") else ""
 
 

@@ -199,7 +199,9 @@ def test_the_control_is_another_one_once_the_values_agree_and_back(sections):
 
 
 def test_moduli_that_differ_are_scaled_too(sections):
-    event(sections.bodies._live[0]._faces[0].handle, 2.0)
+    slider = sections.bodies._live[0]._faces[0].handle
+    assert (slider.value, slider.min, slider.max) == (0.0, -2.0, 2.0)
+    event(slider, math.log10(2.0))
     found = [value(sections.session.now.scene, f"material.{name}.shear_modulus") for name in ("seed", "plate")]
     assert found == pytest.approx([2 * 56.3e6, 2 * 35.5e6])
 

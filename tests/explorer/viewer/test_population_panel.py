@@ -68,7 +68,7 @@ def test_the_single_pour_is_named_with_what_is_to_be_known_of_it():
     found = population(18.0, 20.0)
     assert "this pour 21.7° (seed 3)" in told(found)
     assert "this pour 21.7° (forming)" in told(found, replace(PILE, doubt="forming"))
-    assert "this pour 21.7° (parameters were changed on its way)" in told(found, replace(PILE, changed=True))
+    assert "this pour 21.7° (changed or disturbed on its way)" in told(found, replace(PILE, changed=True))
 
 
 def test_a_change_that_one_pour_cannot_show_says_what_would():
@@ -182,5 +182,5 @@ def test_more_pours_are_asked_for_and_can_be_cancelled(table):
     table.panel._pour()
     assert started == [(SOURCE.scene, MORE)]
     table.panel._process.status = lambda: CommandStatus("running", done=3, planned=8, eta_s=64.0)
-    assert "Pouring: 3 of 8, time left 1 min 04 s." in table.look()
+    assert "Pouring in the background: 3 of 8, time left 1 min 04 s." in table.look()
     assert (table.panel._more.visible, table.panel._stop.visible) == (False, True)
