@@ -20,6 +20,7 @@ from explorer.viewer.actions import BackgroundWork
 from explorer.viewer.palette import FLANK, css
 from explorer.viewer.panel import POUR, SELDOM, Now, PageContext, Panel
 from explorer.viewer.pour.readout import AngleDoubt, angle_of_repose_deg
+from explorer.viewer.pour.standing_panel import changes_in_words
 from explorer.viewer.study.process_view import time_left
 from solver import Scene
 
@@ -122,7 +123,10 @@ class PopulationPanel(Panel):
     def _taking(self, scene: Scene) -> Callable[[Population], None]:
         def take(population: Population) -> None:
             if self._found is not None and self._found[0] != scene:
-                self._former, self._comparison = self._found, None
+                # What a slider stood at on its way has no pours; those before it say more.
+                if self._former is None or self._found[1].n > 1:
+                    self._former = self._found
+                self._comparison = None
                 self._changed = told_difference(self._former[0], scene)
             self._found = scene, population
 
@@ -136,8 +140,7 @@ def told_difference(former: Scene, scene: Scene) -> str:
     """What was changed, in words; empty where nothing was that can be compared."""
     if former.rig.name != scene.rig.name:
         return ""
-    found = list(differences(former, scene))
-    return str(found[0]) if len(found) == 1 else f"{len(found)} parameters changed" if found else ""
+    return changes_in_words(list(differences(former, scene)))
 
 
 def population_html(

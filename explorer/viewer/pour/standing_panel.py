@@ -6,15 +6,17 @@ Friction, restitution and stiffness act on what moves. The former pile then stay
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
 import numpy as np
+import numpy.typing as npt
 
 from explorer.live.frames import Frame
 from explorer.live.messages import SessionState, Status
 from explorer.scene.meshes import body_triangles
-from explorer.scene.source import differences
+from explorer.scene.source import Difference, differences, shown
 from explorer.viewer.palette import Colour
 from explorer.viewer.panel import POUR, Now, PageContext, Panel
 from explorer.viewer.pour.readout import angle_of_repose_deg
@@ -22,8 +24,8 @@ from explorer.viewer.scene_nodes import BodyNodes, DrawnComponent
 from explorer.viewer.view import small_html
 from solver import Scene, body_counts
 
-STOOD = 2e-4
-"""Shift [m] of the body that moved furthest, up to which a pile is said to stand: a thirtieth of a seed's thickness."""
+STOOD, FEW = 5e-4, 0.1
+"""A pile is said to stand where at most this share of its bodies moved by more than this [m], a tenth of a seed."""
 WATCHED = 0.3
 """Simulated time [s] after a change before that is said."""
 GHOST: Colour = (170, 178, 186)
@@ -37,7 +39,6 @@ WHEN = {
 }
 """By the last word of a path."""
 OTHERWISE = "it acts when something moves"
-MOST_NAMED = 3
 
 
 @dataclass(frozen=True)
@@ -78,10 +79,10 @@ class StandingPanel(Panel):
         self._frame = now.frame
         self._follow(status, now.frame)
         changed = self._rest is not None and self._rest.scene != status.scene
-        moved = shift(self._rest.frame, now.frame) if changed and self._rest is not None and now.frame else math.nan
         lines = []
-        if changed and self._rest is not None and watched(self._rest, status) and math.isfinite(moved):
-            lines.append(standing_text(self._rest.scene, status.scene, moved))
+        if changed and self._rest is not None and now.frame is not None and watched(self._rest, status):
+            moved = shifts(self._rest.frame, now.frame)
+            lines += [standing_text(self._rest.scene, status.scene, moved)] if moved.size else []
         if self._former is not None:
             lines.append(ghost_text(self._former, status))
         html = small_html("".join(f"<div>{line}</div>" for line in lines))
@@ -130,32 +131,48 @@ def watched(rest: Rest, status: Status) -> bool:
     return status.state == SessionState.ENDED or status.time >= rest.time + WATCHED
 
 
-def shift(before: Frame, now: Frame) -> float:
-    """How far the body moved [m] that moved furthest, of those in the domain in both; NaN where there is none."""
+def shifts(before: Frame, now: Frame) -> npt.NDArray[np.float32]:
+    """How far each body moved [m] that is in the domain in both; none where they are not of one pour."""
     if len(before.position) != len(now.position):
-        return math.nan
+        return np.zeros(0, dtype=np.float32)
     both = before.inside & now.inside
-    moved = np.linalg.norm(now.position[both] - before.position[both], axis=1)
-    return float(moved.max()) if moved.size else math.nan
+    found: npt.NDArray[np.float32] = np.linalg.norm(now.position[both] - before.position[both], axis=1)
+    return found
 
 
-def standing_text(before: Scene, now: Scene, moved: float) -> str:
-    """One line (HTML): whether the pile stood, and when what was changed acts."""
+def standing_text(before: Scene, now: Scene, moved: npt.NDArray[np.float32]) -> str:
+    """One line (HTML): whether the pile stood while its bodies ``moved`` [m], and when what was changed acts."""
     found = list(differences(before, now))
-    names = ", ".join(escape(str(one)) for one in found[:MOST_NAMED])
-    more = f" and {len(found) - MOST_NAMED} more" if len(found) > MOST_NAMED else ""
-    if moved > STOOD:
-        return f"{names}{more}: the pile moved, one body by {1e3 * moved:.2g} mm. It was not poured with these values."
+    loose, furthest = int((moved > STOOD).sum()), f"{1e3 * float(moved.max()):.1g} mm"
+    many = f"{loose} of {len(moved)} bodies by more than {1e3 * STOOD:g} mm, up to {furthest}"
+    names = escape(changes_in_words(found))
+    if loose > FEW * len(moved):
+        return f"{names}: the pile moved, {many}. It was not poured with these values."
     acts = dict.fromkeys(WHEN.get(one.path.rpartition(".")[2], OTHERWISE) for one in found)
-    return (
-        f"{names}{more}: <b>the pile stands; {', '.join(acts)}</b>. No body moved by more than "
-        f"{1e3 * max(moved, 1e-6):.1g} mm. Shake it, tap it, or pour again."
-    )
+    little = many if loose else f"no body moved by more than {furthest}"
+    return f"{names}: <b>the pile stands; {', '.join(acts)}</b> ({little}). Shake it, tap it, or pour again."
+
+
+def changes_in_words(found: Sequence[Difference]) -> str:
+    """E.g. "static friction seed–seed 0.57 → 0.4; restitution of 9 0.4 … 0.67 → 0.2 … 0.33"."""
+    words = []
+    for name in dict.fromkeys(one.path.rpartition(".")[2] for one in found):
+        mine = [one for one in found if one.path.rpartition(".")[2] == name]
+        of_what = "–".join(mine[0].path.split(".")[1:-1]) if len(mine) == 1 else f"of {len(mine)}"
+        before, now = (span(mine, values) for values in ([one.before for one in mine], [one.now for one in mine]))
+        words.append(" ".join(part for part in (name.replace("_", " "), of_what, f"{before} → {now}") if part))
+    return "; ".join(words)
+
+
+def span(found: Sequence[Difference], values: Sequence[float | str]) -> str:
+    """``values`` of one parameter of many things: one of them, or the smallest and the largest, with their unit."""
+    numbers: list[float | str] = [*sorted(one for one in values if not isinstance(one, str))] or list(values)
+    return " … ".join(dict.fromkeys(shown(one, found[0].unit) for one in (numbers[0], numbers[-1])))
 
 
 def ghost_text(former: Rest, status: Status) -> str:
     """What the ghost is, in HTML."""
-    found = [str(one) for one in differences(former.scene, status.scene)]
     angle = f"{former.angle:.1f}°" if math.isfinite(former.angle) else "no angle"
-    since = f"; since then {escape(', '.join(found[:MOST_NAMED]))}" if found else ""
+    found = list(differences(former.scene, status.scene))
+    since = f"; since then {escape(changes_in_words(found))}" if found else ""
     return f"Grey: the former pile, {angle} in one pour{since}."
