@@ -24,7 +24,7 @@ from typing import IO, Any
 
 import platformdirs
 
-from solver import PHYSICS, RIGS, RawPourError, Record, observables_in, observe, unpacked
+from solver import PHYSICS, RIGS, Outcome, RawPourError, Record, Scene, observables_in, observe, pour_keys, unpacked
 
 READINGS = 2
 """Version of what is read off a raw pour. Raise it when an outcome, an observable, a summary or a profile comes to be
@@ -82,6 +82,11 @@ class StoredRun:
     raw: bytes
     """See `solver.pours.raw_pour`; empty for a run stored before raw pours were kept."""
     created: float = 0.0
+
+    @property
+    def valid(self) -> bool:
+        """True if what was read off the run counts, as of `doe.run_records.Run`."""
+        return Outcome(self.outcome).valid
 
 
 def default_store() -> Path:
@@ -189,6 +194,17 @@ class Store:
             return run
         record = self._record(run)
         return dataclasses.replace(run, outcome=str(record.outcome), message=record.message)
+
+    def pours_of(self, scene: Scene) -> tuple[StoredRun, ...]:
+        """Runs of exactly ``scene``, by seed: for every seed that any run has, what :meth:`find` finds by its key.
+
+        None in a store of another physics, whose keys are others. Raises StoreError as :meth:`find`.
+        """
+        if self.physics != PHYSICS:
+            return ()
+        with self._told():
+            seeds = [seed for (seed,) in self._db.execute("SELECT DISTINCT seed FROM pours ORDER BY seed")]
+        return tuple(run for key in pour_keys(scene, seeds).values() if (run := self.find(key)) is not None)
 
     def add(self, run: StoredRun) -> None:
         """Keep a run; on disk when this returns."""

@@ -27,6 +27,7 @@ from explorer.commands import (
     measurements,
     new,
     parameters,
+    repeat,
     replay,
     report,
     runs,
@@ -120,6 +121,7 @@ def options(
 app.command()(serve.serve)
 app.command(cls=simulate.Rigs)(simulate.simulate)
 app.command()(board.board)
+app.command()(repeat.repeat)
 app.command()(calibrate.calibrate)
 app.command()(diagnose.diagnose)
 app.command(cls=design.Designs)(design.design)

@@ -19,11 +19,13 @@ from explorer.live.messages import (
     Command,
     Event,
     Failure,
+    MovePlate,
     Pause,
     Play,
     Report,
     SessionState,
     SetParameters,
+    SetPull,
     SetSpeed,
     Start,
     Status,
@@ -34,6 +36,7 @@ from explorer.live.messages import (
 from explorer.live.solver_process import SolverProcess
 from explorer.scene.source import SceneSource
 from solver.params import ParameterError
+from solver.pours.disturbance import PlateMotion, Pull
 from solver.scenes.scene import Scene, body_counts, canonical, parameters, poured_mass, with_values
 
 SPEED_RANGE = (0.01, 10.0)
@@ -132,6 +135,14 @@ class Session:
                 raise ParameterError(f"{path}: acts on restart only, not on a running pour")
         with_values(scene, dict(values))
         self._send(SetParameters(dict(values)))
+
+    def move_plate(self, motion: PlateMotion) -> None:
+        """Tap or shake the plate of the running pour. What comes of it is an event, a refusal too."""
+        self._send(MovePlate(motion))
+
+    def pull(self, pull: Pull | None) -> None:
+        """Pull one body until another call says otherwise; None: let go."""
+        self._send(SetPull(pull))
 
     def watch(self, wanted: bool, body: int | None = None) -> None:
         """Say whether :meth:`details` are looked at, and of which body (by order of entry) all contacts are wanted."""

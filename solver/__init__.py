@@ -30,7 +30,7 @@ from solver.observables.surface_features import (
 )
 from solver.params import Parameter, ParameterError, parse_quantity
 from solver.plugins import PluginError, Registry, instance_of, plugged_in
-from solver.pours.pour_key import pour_key
+from solver.pours.pour_key import pour_key, pour_keys
 from solver.pours.raw_pour import RawPourError, packed, unpacked
 from solver.pours.record import Bodies, Entries, Outcome, Phase, Pile, Record, Spheres, Trace
 from solver.rigs import RIGS
@@ -188,6 +188,7 @@ __all__ = [
     "parse_quantity",
     "plugged_in",
     "pour_key",
+    "pour_keys",
     "pour_rig",
     "poured_mass",
     "profile_features",

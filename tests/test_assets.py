@@ -207,7 +207,7 @@ def test_a_name_that_is_no_file_is_refused(name):
 
 
 def test_an_unknown_kind_lists_the_kinds():
-    with pytest.raises(ValueError, match="allowed: materials, studies, benchmarks, presets, meshes, source_tables"):
+    with pytest.raises(ValueError, match="allowed: materials, studies, benchmarks, scenes, presets, meshes, "):
         asset_path("recipes", "wheat")  # type: ignore[arg-type]
 
 

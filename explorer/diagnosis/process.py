@@ -35,6 +35,10 @@ class Question:
 class DiagnosisProcess(Protocol):
     """What the page needs of diagnoses that run somewhere."""
 
+    @property
+    def store(self) -> Path | None:
+        """File of the store of runs, of the page's other pours too; None for the default store."""
+
     def start(self, question: Question) -> None:
         """Start a new diagnosis. Raises a ValueError where one runs already, or the question cannot be asked."""
 
@@ -80,7 +84,7 @@ class DiagnoseProcess:
     """
 
     def __init__(self, folder: Path, store: Path | None = None, program: Sequence[str] = PROGRAM) -> None:
-        self._folder, self._store = folder, store
+        self._folder, self.store = folder, store
         self._process = CommandProcess("diagnosis", {0: "report"}, program)
         self._line: WaitingLine[Question] = WaitingLine(self._process, self._begin, "diagnoses")
         self.status, self.clear_queue = self._line.status, self._line.clear
@@ -135,7 +139,7 @@ class DiagnoseProcess:
 
     def _arguments(self, question: Question, out: Path) -> list[str]:
         """The command line that is run, as a person would type it."""
-        store = () if self._store is None else ("--store", str(self._store))
+        store = () if self.store is None else ("--store", str(self.store))
         effects = ("--effects", ",".join(question.effects)) if question.effects else ()
         budget = () if question.budget is None else ("--budget", str(question.budget))
         return ["diagnose", question.data, "--out", str(out), "--apply", *effects, *budget, *store]

@@ -23,11 +23,13 @@ from explorer.live.history import History, Moment
 from explorer.live.messages import (
     Command,
     Event,
+    MovePlate,
     Pause,
     Play,
     Report,
     SessionState,
     SetParameters,
+    SetPull,
     SetSpeed,
     Start,
     Status,
@@ -98,6 +100,10 @@ class LivePour:
                 self._throttle.restart(clock.perf_counter(), self._pour.time)
             case SetParameters(values=values):
                 self._set_parameters(values)
+            case MovePlate(motion=motion):
+                self._disturb(partial(self._pour.move_plate, motion))
+            case SetPull(pull=pull):
+                self._disturb(partial(self._pour.pull, pull))
             case Watch():
                 self._screen.watch(command)
                 self._publish()
@@ -166,6 +172,8 @@ class LivePour:
             contacts=round(sample["touching"]),
             gate_shut=pour.gate_shut,
             energy_put_in=pour.energy_put_in if self._retuned else None,
+            disturbance=pour.disturbance,
+            disturbed=pour.disturbed,
             observables=self._angles.newest.observables,
             outline=self._angles.newest.outline,
         )
@@ -231,6 +239,22 @@ class LivePour:
         self._pour.ramp_to(endless(changed))
         self._dt_limit = stability_limit(self._pour.scene)
         self._retuned = True
+        self._history.changed(self._pour.time)
+        self._keep()
+        self._throttle.restart(clock.perf_counter(), self._pour.time)
+
+    def _disturb(self, act: Callable[[], None]) -> None:
+        """Carry out ``act`` on the pour, as an event that the pour can be brought back past, and to."""
+        before = self._pour.disturbance
+        try:
+            act()
+        except ParameterError as error:
+            self._event(f"refused: {error}")
+            return
+        now = self._pour.disturbance
+        text = now if now else f"no more: {before}" if before else ""
+        if text:
+            self._report(Event(self._generation, self._pour.time, text, is_order=True))
         self._history.changed(self._pour.time)
         self._keep()
         self._throttle.restart(clock.perf_counter(), self._pour.time)

@@ -13,6 +13,7 @@ from enum import StrEnum
 
 from solver.observables.observable import Value
 from solver.observables.repose import Outline
+from solver.pours.disturbance import PlateMotion, Pull
 from solver.pours.record import Outcome, Phase
 from solver.scenes.scene import Scene
 
@@ -73,6 +74,20 @@ class SetParameters:
 
 
 @dataclass(frozen=True)
+class MovePlate:
+    """Tap or shake the plate; it ends where it began."""
+
+    motion: PlateMotion
+
+
+@dataclass(frozen=True)
+class SetPull:
+    """Pull one body from now on, or none."""
+
+    pull: Pull | None
+
+
+@dataclass(frozen=True)
 class SetSpeed:
     """Wanted ratio of simulated to wall time; the solver goes as fast as it can up to that."""
 
@@ -93,7 +108,7 @@ class Close:
     """End the process."""
 
 
-Command = Start | Play | Pause | Step | StepBack | SetParameters | SetSpeed | Watch | Close
+Command = Start | Play | Pause | Step | StepBack | SetParameters | MovePlate | SetPull | SetSpeed | Watch | Close
 
 
 @dataclass(frozen=True)
@@ -137,6 +152,10 @@ class Status:
     gate_shut: bool = False
     energy_put_in: float | None = None
     """Elastic energy that the last change of parameters put into the contacts [J]; None before the first change."""
+    disturbance: str = ""
+    """What is done to the pile now, in words: the plate is shaken, a body is pulled; empty where nothing is."""
+    disturbed: bool = False
+    """Something of the kind was done since the pour began."""
     observables: Mapping[str, Value] = field(default_factory=dict)
     """Angles of the pile as it is now, renewed about every 0.1 s of simulated time; empty until there is a pile."""
     outline: Outline | None = None

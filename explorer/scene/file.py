@@ -28,7 +28,7 @@ from solver.shapes.solid import ShapeError
 
 DEFAULT_MATERIAL = "sunflower_extract"
 DEFAULT_STUDY = "sunflower_extract"
-SHIPPED: tuple[AssetKind, ...] = ("materials", "studies", "benchmarks")
+SHIPPED: tuple[AssetKind, ...] = ("materials", "studies", "benchmarks", "scenes")
 """Where a shipped name is looked for, in this order."""
 
 SET_UP_KEYS = ("format", "title", "material", *SET_UP)
@@ -82,10 +82,10 @@ def _file_of(source: str) -> Path:
     for kind in SHIPPED:
         if stem in shipped_assets(kind):
             return asset_path(kind, stem)
-    rigs, materials, studies, benchmarks = map(", ".join, (SOURCES, *map(shipped_assets, SHIPPED)))
+    rigs, materials, studies, benchmarks, scenes = map(", ".join, (SOURCES, *map(shipped_assets, SHIPPED)))
     raise ParameterError(
-        f"{source}: no such file, and no rig ({rigs}), shipped material ({materials}), study ({studies}) or "
-        f"benchmark ({benchmarks}) of that name"
+        f"{source}: no such file, and no rig ({rigs}), shipped material ({materials}), study ({studies}), "
+        f"benchmark ({benchmarks}) or prepared scene ({scenes}) of that name"
     )
 
 

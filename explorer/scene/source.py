@@ -42,6 +42,11 @@ def material_source(material: str) -> SceneSource:
     return SceneSource((named,), material_scene(named), named)
 
 
+def prepared_source(name: str) -> SceneSource:
+    """The source of a shipped prepared scene; raises as :func:`explorer.scene.file.load_scene`."""
+    return SceneSource((name,), load_scene(name))
+
+
 def study_source(file: Path) -> SceneSource:
     """The source of a study: its shipped name where that says the same, otherwise its path."""
     scene = study_scene(file)

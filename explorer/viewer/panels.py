@@ -16,13 +16,16 @@ from explorer.viewer.panel import Panel
 from explorer.viewer.pour.changes_panel import ChangesPanel
 from explorer.viewer.pour.chart import Chart
 from explorer.viewer.pour.controls_panel import ControlsPanel
+from explorer.viewer.pour.disturb_panel import DisturbPanel
 from explorer.viewer.pour.live_panel import LivePanel
 from explorer.viewer.pour.motion_chart import MotionChart
 from explorer.viewer.pour.outline_panel import OutlinePanel
+from explorer.viewer.pour.population_panel import PopulationPanel
 from explorer.viewer.pour.readout import Readout
 from explorer.viewer.pour.restart_panel import RestartPanel
 from explorer.viewer.pour.scene_panel import ScenePanel
 from explorer.viewer.pour.second_pile import SecondPile
+from explorer.viewer.pour.standing_panel import StandingPanel
 from explorer.viewer.shell.state_line import StateLine
 from explorer.viewer.shell.timeline import Timeline
 from explorer.viewer.study.diagnosis_panel import DiagnosisPanel
@@ -36,11 +39,14 @@ PANELS: Registry[type[Panel]] = Registry(
         StateLine,
         Timeline,
         Readout,
+        PopulationPanel,
+        StandingPanel,
         ControlsPanel,
         Chart,
         MotionChart,
         OutlinePanel,
         LivePanel,
+        DisturbPanel,
         ChangesPanel,
         ScenePanel,
         RestartPanel,

@@ -40,7 +40,7 @@ WORLD = {
     "border": ti.i32,  # sleepers that something awake may push
     "live": ti.i32,  # entries of the list whose force may change
     "dissipated": ti.f64,  # energy that contacts and falling asleep have taken [J]
-    "wall_work": ti.f64,  # work of moving walls on the bodies [J]
+    "wall_work": ti.f64,  # work of moving walls and of a pull on the bodies [J]
     "taken_out": ti.f64,  # kinetic and potential energy of bodies that were taken out [J]
     "domain": ti.f64,  # bodies beyond |x| or |y| of this are taken out [m]
     "grip": ti.f64,  # distance at which effects may still hold surfaces that have touched [m]
@@ -100,6 +100,9 @@ MEMBER = {
     "listed": ti.i32,  # 1: has entries in the contact list
 }
 """Per member sphere, shape (worlds, members)."""
+
+PULL = {"body": ti.i32, "force": Vec3}
+"""The body that a person pulls, its number + 1 (0: none), and the force on its centre of mass [N]; per world."""
 
 HISTORY = {"i": ti.i32, "j": ti.i32, "spring": Vec3, "loss": Vec3, "radius": ti.f64, "expected": ti.f64}
 """What a contact keeps when the list is built again, shape (worlds, contacts)."""
@@ -259,6 +262,7 @@ class State:
     def __init__(self, capacity: Capacity) -> None:
         c = capacity
         self.world = Group(WORLD, (c.worlds,))
+        self.pull = Group(PULL, (c.worlds,))
         self.body = Group(BODY, (c.worlds, c.bodies))
         self.member = Group(MEMBER, (c.worlds, c.members))
         self.contact = Group(CONTACT, (c.worlds, c.contacts))

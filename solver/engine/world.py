@@ -180,6 +180,10 @@ class Batch:
         reach = extent(rig.surfaces()[wall], angular_velocity, rig.domain_half_width)
         modify.set_motion(self._s, w, wall, np.array([*velocity, *angular_velocity, reach], dtype=float))
 
+    def set_pull(self, w: int, b: int | None, force: Sequence[float]) -> None:
+        """Pull at the centre of mass of body ``b`` with ``force`` [N] from now on; None: at none. Wakes all bodies."""
+        modify.set_pull(self._s, w, 0 if b is None else b + 1, *(float(component) for component in force))
+
     def set_container(self, w: int, inside: Container) -> None:
         """What counts as inside the rig from now on (a cylinder that is lifted takes its inside along)."""
         modify.set_container(self._s, w, inside.height, inside.radius)

@@ -48,7 +48,12 @@ PLAIN = (
 )
 """Parts of a pour that are numbers, text, or lists of them."""
 HEAD = "pour.json"
-DECIDED = (*(name for name in PLAIN if name != "samples"), "ended", "outcome", "message", "_table", "_ramp", "_inside")
+DISTURBED = ("_motion", "_motion_left", "_pull", "disturbed")
+DECIDED = (
+    *(name for name in PLAIN if name != "samples"),
+    *("ended", "outcome", "message", "_table", "_ramp", "_inside"),
+    *DISTURBED,
+)
 """What a pour has decided, in values that it replaces and never changes."""
 
 
@@ -85,7 +90,9 @@ class Kept:
 
 
 def checkpoint_of(pour: Pour) -> Checkpoint:
-    """The present state of ``pour``, between two launches."""
+    """The present state of ``pour``, between two launches. Raises ParameterError while a person disturbs it."""
+    if pour.disturbance:
+        raise ParameterError(f"no checkpoint while {pour.disturbance}")
     decided: dict[str, Any] = {name: getattr(pour, name) for name in PLAIN}
     decided["ended"], decided["told"] = pour.ended, (pour.outcome, pour.message)
     decided["random"] = pour.supply.random.bit_generator.state
@@ -185,9 +192,10 @@ def put_back(pour: Pour, kept: Kept) -> None:
     pour.scene = kept.scene
     pour._to_do = list(kept.to_do)
     pour.supply.random.bit_generator.state = kept.random
-    # These two wake every body; what follows puts the sleepers back to sleep.
+    # These wake every body; what follows puts the sleepers back to sleep.
     pour.batch.set_law(pour.w, pour._table)
     pour.batch.set_effects(pour.w, kept.scene)
+    pour.apply_pull()
     pour.batch.put_moving(pour.w, kept.world)
 
 

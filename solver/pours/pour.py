@@ -18,7 +18,9 @@ import numpy.typing as npt
 from solver.engine.world import SUMMARY_COLUMNS, Batch, law_table
 from solver.laws import CONTACT_LAWS
 from solver.observables.free_surface import surface_heights
+from solver.params import ParameterError
 from solver.pours.contacts import Contacts, contacts_from
+from solver.pours.disturbance import PLATE, PlateMotion, Pull
 from solver.pours.parameter_ramp import RAMP_STEPS, RAMP_TIME, Ramp, spring_ratio
 from solver.pours.raw_pour import packed, unpacked
 from solver.pours.record import Bodies, Outcome, Phase, Record, Verdict
@@ -62,6 +64,11 @@ class Pour:
         self._law, self._table = CONTACT_LAWS[scene.contact.law], law_table(scene)
         self._ramp: Ramp | None = None
         self._ramp_left = 0
+        self._motion: tuple[PlateMotion, float] | None = None
+        self._motion_left = 0
+        self._pull: Pull | None = None
+        self.disturbed = False
+        """Whether the plate was moved or a body pulled since the pour began."""
         self.energy_put_in = 0.0
         self._supplied = 0.0
         self.steps = 0
@@ -120,6 +127,8 @@ class Pour:
         limit = self._left
         if self._ramp is not None:
             limit = min(limit, self._ramp_left)
+        if self._motion is not None:
+            limit = min(limit, self._motion_left)
         return limit if at_most is None else min(limit, at_most)
 
     def decides_after(self, steps: int) -> bool:
@@ -137,6 +146,10 @@ class Pour:
             self._ramp_left -= steps
             if self._ramp_left <= 0:
                 self._follow_ramp(self._ramp)
+        if self._motion is not None:
+            self._motion_left -= steps
+            if self._motion_left <= 0:
+                self._follow_motion(*self._motion)
         if self._left > 0 or row is None:
             return False
         self._left = self._interval_steps()
@@ -159,17 +172,48 @@ class Pour:
         self.energy_put_in = 0.0
         self._set_table(self._ramp.table(self.time))
         self._ramp_left = self._ramp_steps()
-        self._quiet_samples = 0
-        if self.ended[0] in (Outcome.AT_REST, Outcome.JAMMED, Outcome.OBSTRUCTED):
-            self.ended = self.outcome, self.message = RUNNING
+        self._wake()
+
+    def move_plate(self, motion: PlateMotion) -> None:
+        """Begin to move the plate, which ends where it began; wakes the pour up if it had come to rest.
+
+        Raises ParameterError for a rig without a plate and while the plate moves already.
+        """
+        if PLATE not in self.rig.surface_names:
+            raise ParameterError(f"{self.rig.name}: has no plate that could be moved")
+        if self._motion is not None:
+            raise ParameterError("the plate moves already; wait until it stands")
+        self._motion, self.disturbed = (motion, self.time), True
+        self._follow_motion(*self._motion)
+        self._wake()
+
+    def pull(self, pull: Pull | None) -> None:
+        """Pull one body from now on, or none; wakes the pour up. Raises ParameterError for a body that is not there."""
+        if pull is not None and not 0 <= pull.body < self.entered:
+            raise ParameterError(f"pull: there is no body no. {pull.body + 1}; {self.entered} have entered")
+        self._pull, self.disturbed = pull, True
+        self.apply_pull()
+        self._wake()
+
+    def apply_pull(self) -> None:
+        """Tell the batch which body is pulled; wakes all bodies."""
+        body, force = (None, (0.0, 0.0, 0.0)) if self._pull is None else (self._pull.body, self._pull.force)
+        self.batch.set_pull(self.w, body, force)
+
+    @property
+    def disturbance(self) -> str:
+        """What is done to the pile now, in words; empty where nothing is."""
+        motion = None if self._motion is None else self._motion[0]
+        return "; ".join(str(one) for one in (motion, self._pull) if one is not None)
 
     def move_to(self, batch: Batch) -> None:
         """Go on in ``batch``, in the same world, with the same bits: for instance in one with effects compiled in."""
         kept = self.batch.take(self.w)
         batch.load(self.w, self.scene, self.supply.layout, self.dt, (True,) * len(self.rig.surfaces()))
         batch.set_law(self.w, self._table)
-        batch.put(self.w, kept)
         self.batch = batch
+        self.apply_pull()
+        batch.put(self.w, kept)
 
     def bodies(self) -> Bodies:
         """Present state of all bodies that have entered."""
@@ -255,7 +299,8 @@ class Pour:
         self.samples.append(row)
         self._insert()
         self._moving = max(row["speed"], row["funnel_speed"] if self.gate_shut else 0.0)
-        self._quiet_samples = self._quiet_samples + 1 if self._moving < self.scene.numerics.rest_speed else 0
+        quiet = self._moving < self.scene.numerics.rest_speed and self._motion is None
+        self._quiet_samples = self._quiet_samples + 1 if quiet else 0
         self._watch()
         self.ended = verdict(self.rig, self.scene.numerics, self._moment(row))
         self.outcome, self.message = self._told()
@@ -323,6 +368,26 @@ class Pour:
         if ramp.over(self.time):
             self._ramp = None
             self._set_time_step(time_step(self.scene))
+
+    def _follow_motion(self, motion: PlateMotion, began: float) -> None:
+        """Give the plate the velocity of the next piece, or let it stand at the end."""
+        plate, since = self.rig.surface_names.index(PLATE), self.time - began
+        if since >= motion.duration - 0.5 * self.dt:
+            self._motion, velocity = None, np.zeros(3)
+        else:
+            rest = min(motion.piece, motion.duration - since)
+            # Less a hair: a sum of steps must not make a piece of one more.
+            self._motion_left = max(1, math.ceil(rest / self.dt - 1e-6))
+            took = self._motion_left * self.dt
+            here = self.surface_poses()[plate, :3] - np.array(self.rig.surfaces()[plate].pose.origin)
+            velocity = (np.array(motion.displacement(min(since + took, motion.duration))) - here) / took
+        self.batch.set_motion(self.w, plate, velocity.tolist(), (0.0, 0.0, 0.0))
+
+    def _wake(self) -> None:
+        """Let a pour that had come to rest go on."""
+        self._quiet_samples = 0
+        if self.ended[0] in (Outcome.AT_REST, Outcome.JAMMED, Outcome.OBSTRUCTED):
+            self.ended = self.outcome, self.message = RUNNING
 
     def _set_table(self, table: npt.NDArray[np.float64]) -> None:
         elastic = SUMMARY_COLUMNS.index("elastic")

@@ -12,6 +12,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -38,8 +39,15 @@ def pour_key(scene: Scene, seed: int, variant: str = "") -> str:
     str
         64 hexadecimal digits (SHA-256).
     """
-    text = json.dumps([PHYSICS, seed, variant, chosen(), _decisive(scene)], sort_keys=True)
-    return hashlib.sha256(text.encode()).hexdigest()
+    return pour_keys(scene, (seed,), variant)[seed]
+
+
+def pour_keys(scene: Scene, seeds: Iterable[int], variant: str = "") -> dict[int, str]:
+    """Return the `pour_key` of ``scene`` with each of ``seeds``; the scene, which takes the time, is described once."""
+    before, after = json.dumps(PHYSICS), f"{json.dumps(variant)}, {json.dumps(chosen())}"
+    described = json.dumps(_decisive(scene), sort_keys=True)
+    texts = {seed: f"[{before}, {seed}, {after}, {described}]" for seed in seeds}
+    return {seed: hashlib.sha256(text.encode()).hexdigest() for seed, text in texts.items()}
 
 
 def _decisive(scene: Scene) -> dict[str, Any]:

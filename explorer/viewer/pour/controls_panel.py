@@ -12,7 +12,7 @@ from explorer.live.messages import Status
 from explorer.units import checked, screen_unit
 from explorer.viewer.actions import button_group
 from explorer.viewer.panel import CONTROLS, PageContext
-from explorer.viewer.pour.live_panel import LiveControl, screen_range
+from explorer.viewer.pour.live_panel import LiveControl, live_control, screen_range
 from explorer.viewer.pour.rebuilt_panel import RebuiltPanel
 from solver.scenes.material import Pair
 from solver.scenes.scene import Scene, parameters, value, with_values
@@ -37,12 +37,11 @@ class Controls:
 
     def __init__(self, page: PageContext, scene: Scene) -> None:
         gui, session, post = page.server.gui, page.session, page.post
-        self._session = session
+        self._page, self._session = page, session
         known = parameters(scene)
-        self._live = [
-            LiveControl(gui, known[paths[0]], paths, scene, post, session.set_parameters, label)
-            for label, paths in quantities(scene).items()
-        ]
+        self._place = gui.add_folder(None)
+        self._live: list[LiveControl] = []
+        self._build(scene)
         self._feed = None
         if FEED_RATE in known:
             low, high = screen_range(known[FEED_RATE])
@@ -66,8 +65,23 @@ class Controls:
 
     def show(self, status: Status) -> None:
         """Follow the solver's values."""
+        if not all(control.fits(status.scene) for control in self._live):
+            self._build(status.scene)
         for control in self._live:
             control.follow(status.scene)
+
+    def _build(self, scene: Scene) -> None:
+        """Sliders for ``scene``, in place of those that there were."""
+        for control in self._live:
+            control.remove()
+        known, page = parameters(scene), self._page
+        with self._place:
+            self._live = [
+                live_control(
+                    page.server.gui, known[paths[0]], paths, scene, page.post, page.session.set_parameters, label
+                )
+                for label, paths in quantities(scene).items()
+            ]
 
     def _pour(self, step: int) -> None:
         status = self._session.status()

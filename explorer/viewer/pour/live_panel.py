@@ -36,6 +36,8 @@ Targets = dict[str, tuple[str, ...]]
 LINEAR_STEP = 0.01
 POWER_DIGITS = 2
 """Decimals of a power of ten: as fine as the slider's step, and no more than its box can show."""
+LARGEST_FACTOR, LARGEST_POWER = 4.0, 100.0
+"""By which values that differ are scaled at most in one go, on a linear and on a logarithmic slider."""
 DECADES = 1.0
 """A logarithmic slider reaches this far to either side of the present value, then out to whole decades."""
 HANDS_OFF = 1.5
@@ -106,11 +108,13 @@ class _Section:
         self._chosen = chosen
         with self._folder:
             self._live = [
-                LiveControl(self._server.gui, parameter, paths, scene, self._post, self._session.set_parameters)
+                live_control(self._server.gui, parameter, paths, scene, self._post, self._session.set_parameters)
                 for parameter, paths in live_parameters(scene, self._targets[chosen])
             ]
 
     def show(self, scene: Scene) -> None:
+        if not all(control.fits(scene) for control in self._live):
+            self._build(scene, self._chosen)
         for control in self._live:
             control.follow(scene)
         echo = echo_html(scene, self._targets[self._chosen])
@@ -157,7 +161,7 @@ def echo_html(scene: Scene, prefixes: tuple[str, ...]) -> str:
 
 
 class LiveControl:
-    """One parameter at ``paths``, set together; follows what the solver has in force."""
+    """One parameter at ``paths``, which have one value, set together; follows what the solver has in force."""
 
     def __init__(
         self,
@@ -169,16 +173,19 @@ class LiveControl:
         apply: Apply,
         label: str = "",
     ) -> None:
-        self._parameter, self._paths = parameter, tuple(paths)
+        self._parameter, self._paths, self._label = parameter, tuple(paths), label
         self._touched = -math.inf
-        faces = log_faces if parameter.scale == "log" else linear_faces
-        self._faces = faces(gui, parameter, self._number(scene), label)
+        self._faces = self._made(gui, scene)
         for face in self._faces:
             self._listen(face, post, apply)
 
+    def fits(self, scene: Scene) -> bool:
+        """Whether this kind of control is the one for ``scene``; always while a person is at it."""
+        return self._held or agree(scene, self._paths)
+
     def follow(self, scene: Scene) -> None:
         """Move to the solver's value, unless a person is at the control."""
-        if time.monotonic() < self._touched + HANDS_OFF:
+        if self._held:
             return
         number = self._number(scene)
         for face in self._faces:
@@ -191,10 +198,16 @@ class LiveControl:
         for face in self._faces:
             face.handle.remove()
 
+    @property
+    def _held(self) -> bool:
+        return time.monotonic() < self._touched + HANDS_OFF
+
+    def _made(self, gui: viser.GuiApi, scene: Scene) -> tuple[Face, ...]:
+        faces = log_faces if self._parameter.scale == "log" else linear_faces
+        return faces(gui, self._parameter, self._number(scene), self._label)
+
     def _number(self, scene: Scene) -> float:
-        return screen_unit(self._parameter).to_screen(
-            mean_value(scene, self._paths, geometric=self._parameter.scale == "log")
-        )
+        return screen_unit(self._parameter).to_screen(float(value(scene, self._paths[0])))
 
     def _listen(self, face: Face, post: Post, apply: Apply) -> None:
         def entered(event: viser.GuiEvent[Any]) -> None:
@@ -208,6 +221,58 @@ class LiveControl:
 
     def _values(self, number: float) -> Mapping[str, float | str]:
         return dict.fromkeys(self._paths, screen_unit(self._parameter).to_si(number))
+
+
+class ScalingControl(LiveControl):
+    """One parameter at ``paths``, whose values differ: scaled together by a factor, so that their ratios stay.
+
+    The factor is counted from the values as they were when the control was made, so that even from 0 it leads back.
+    """
+
+    def fits(self, scene: Scene) -> bool:
+        """Whether the values are still those that the factor is counted from, or a person is at it."""
+        found = [float(value(scene, path)) for path in self._paths]
+        wanted = self._scaled(self._factor)
+        return self._held or all(math.isclose(one, wanted[path]) for path, one in zip(self._paths, found, strict=True))
+
+    def _made(self, gui: viser.GuiApi, scene: Scene) -> tuple[Face, ...]:
+        self._factor = 1.0
+        self._base = {path: float(value(scene, path)) for path in self._paths}
+        parameter, name = self._parameter, self._label or title(self._parameter).split(" [")[0]
+        largest = LARGEST_POWER if parameter.scale == "log" else LARGEST_FACTOR
+        low, high = factor_range(list(self._base.values()), parameter.low, parameter.high, largest)
+        hint = f"The values differ. All are multiplied by this factor, so that their ratios stay. {parameter.doc}"
+        if parameter.scale == "log":
+            bottom, top = (round(math.log10(end), POWER_DIGITS) for end in (max(low, 1.0 / LARGEST_POWER), high))
+            slider = gui.add_slider(f"{name}: mixed, × 10^", bottom, top, LINEAR_STEP, 0.0, hint=hint)
+            return (Face(slider, math.log10, lambda entered: 10.0 ** checked(entered, bottom, top, name)),)
+        slider = gui.add_slider(f"{name}: mixed, ×", low, high, LINEAR_STEP, 1.0, hint=hint)
+        return (Face(slider, lambda factor: factor, lambda entered: checked(entered, low, high, name)),)
+
+    def _number(self, scene: Scene) -> float:
+        return self._factor  # it fits, or the control is made anew
+
+    def _values(self, number: float) -> Mapping[str, float | str]:
+        self._factor = number
+        return dict(self._scaled(number))
+
+    def _scaled(self, factor: float) -> dict[str, float]:
+        low, high = self._parameter.low, self._parameter.high
+        return {path: min(max(factor * base, low), high) for path, base in self._base.items()}
+
+
+def live_control(
+    gui: viser.GuiApi,
+    parameter: Parameter,
+    paths: Sequence[str],
+    scene: Scene,
+    post: Post,
+    apply: Apply,
+    label: str = "",
+) -> LiveControl:
+    """A control for ``parameter`` at ``paths``: their value, or a factor where they have several."""
+    kind = LiveControl if agree(scene, paths) else ScalingControl
+    return kind(gui, parameter, paths, scene, post, apply, label)
 
 
 @dataclass(frozen=True)
@@ -269,18 +334,20 @@ def screen_range(parameter: Parameter) -> tuple[float, float]:
     return unit.to_screen(parameter.low), unit.to_screen(parameter.high)
 
 
-def mean_value(scene: Scene, paths: Sequence[str], geometric: bool = False) -> float:
-    """Arithmetic or geometric mean of the parameters at ``paths`` [SI]: where a slider for all of them
-    stands.
+def agree(scene: Scene, paths: Sequence[str]) -> bool:
+    """Whether the parameters at ``paths`` have one value."""
+    return len({value(scene, path) for path in paths}) == 1
 
-    The value itself where they agree; otherwise three digits, since no thing has that value.
-    """
-    values = [float(value(scene, path)) for path in paths]
-    if min(values) == max(values):
-        return values[0]
-    if geometric:
-        return float(f"{math.exp(sum(math.log(number) for number in values) / len(values)):.3g}")
-    return float(f"{sum(values) / len(values):.3g}")
+
+def factor_range(
+    numbers: Sequence[float], low: float, high: float, largest: float = LARGEST_FACTOR
+) -> tuple[float, float]:
+    """Factors by which all of ``numbers`` stay within ``low`` … ``high``, at most ``largest``."""
+    least = max((low / number for number in numbers if number > 0.0), default=1.0)
+    most = min((high / number for number in numbers if number > 0.0), default=1.0)
+    # To the slider's step, inwards.
+    steps = 1.0 / LINEAR_STEP
+    return min(1.0, math.ceil(steps * least) / steps), max(1.0, math.floor(steps * min(most, largest)) / steps)
 
 
 def decades_around(number: float, low: float, high: float) -> tuple[int, int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Iterable, Sequence
 from html import escape
 from itertools import groupby
@@ -13,10 +14,15 @@ from explorer.outcomes import OUTCOME_SENTENCES, OUTCOME_WORDS, WARNINGS
 from explorer.viewer.look.look import COMPONENT
 from explorer.viewer.palette import component_colour, css
 from explorer.viewer.panel import CONTROLS, Now, PageContext, Panel
-from solver.pours.record import Phase
+from solver.pours.record import Outcome, Phase
 from solver.scenes.scene import Scene
 
 EVENTS_SHOWN = 3
+FORMED_FOR = 0.5
+"""Simulated time [s] over which readings have to agree within their spread before an angle counts as that of a pile."""
+READINGS_KEPT = 200
+"""Of the angle, for a pour that is brought back a little."""
+FORMING, VOID = "forming", "not of a valid pile"
 
 PHASE_WORDS = {
     Phase.FILL: "filling",
@@ -41,6 +47,7 @@ STYLE = """<style>
 .pour .state, .pour .condition {padding: 0.1em 0.7em; border-radius: 0.8em; background: rgba(128,150,170,0.22);}
 .pour .trouble {background: rgba(213,94,0,0.55);}
 .pour .big {font-size: 2.4em; font-weight: 600; line-height: 1.2; font-variant-numeric: tabular-nums;}
+.pour .doubt {font-size: 1.2em; line-height: 2.4em; opacity: 0.65; font-variant-numeric: tabular-nums;}
 .pour .dim {opacity: 0.65;}
 .pour .grid {display: grid; grid-template-columns: 1fr 1fr; column-gap: 1.6em; margin-top: 0.3em;}
 .pour .cell {display: flex; justify-content: space-between; font-variant-numeric: tabular-nums;}
@@ -60,25 +67,62 @@ class Readout(Panel):
 
     def __init__(self, page: PageContext) -> None:
         self._look, self._html = page.look, page.server.gui.add_html("")
+        self._angle = AngleDoubt()
 
     def show(self, now: Now) -> None:
         """Tell what the pour is doing, and what was refused last."""
-        html = readout_html(now.status, now.events, now.notice, self._look.look.colour_by == COMPONENT)
+        by_component, doubt = self._look.look.colour_by == COMPONENT, self._angle.doubt(now.status)
+        html = readout_html(now.status, now.events, now.notice, by_component, doubt)
         if self._html.content != html:
             self._html.content = html
 
 
-def readout_html(status: Status, events: Sequence[Event], notice: str, by_component: bool = True) -> str:
+class AngleDoubt:
+    """Why the angle that is read off a pour is not yet that of a pile: ``FORMING``, ``VOID``, or "" where it is.
+
+    It stands once the pour has come to a valid end. Before that, everything has to be below the outlet, and the angles
+    read over ``FORMED_FOR`` within the last one's spread of each other; so it does in a drum that turns.
+    """
+
+    def __init__(self) -> None:
+        self._generation = 0
+        self._read: deque[tuple[float, float]] = deque(maxlen=READINGS_KEPT)
+
+    def doubt(self, status: Status) -> str:
+        """Take note of ``status`` and judge it."""
+        read, found = self._read, status.observables.get("angle_of_repose_deg")
+        if status.generation != self._generation:
+            self._generation = status.generation
+            read.clear()
+        while read and read[-1][0] >= status.time:  # brought back, or the same moment
+            read.pop()
+        if found is None or not math.isfinite(found.value):
+            read.clear()
+            return FORMING
+        read.append((status.time, found.value))
+        if status.outcome != Outcome.RUNNING:
+            return "" if status.outcome.valid else VOID
+        begin = status.time - FORMED_FOR
+        angles = [angle for time, angle in read if time >= begin]
+        long_enough = read[0][0] <= begin + 1e-9  # less a hair: sums of steps
+        agree = found.spread is not None and max(angles) - min(angles) <= found.spread
+        return "" if status.phase in (Phase.PILE, Phase.RUN) and long_enough and agree else FORMING
+
+
+def readout_html(
+    status: Status, events: Sequence[Event], notice: str, by_component: bool = True, doubt: str = ""
+) -> str:
     """The whole readout; ``notice`` is the page's own last message (a refused input, for instance).
 
     ``by_component``: whether a body's colour says what it is; a legend of components would be wrong otherwise.
+    ``doubt``: of :class:`AngleDoubt`; an angle in doubt is small and grey.
     """
     cells = "".join(_cell(name, text) for name, text in readings(status))
     cells += "".join(_cell(name, text, "wide") for name, text in long_readings(status))
     lines = "".join(f"<div class='note'>{escape(text)}</div>" for text in notes(status, events, notice))
     components = legend(status.scene) if by_component else ""
     top = f"<div class='top'>{_state(status)}<span>{components}</span></div>"
-    return f"{STYLE}<div class='pour'>{top}{_angle(status)}<div class='grid'>{cells}</div>{lines}</div>"
+    return f"{STYLE}<div class='pour'>{top}{_angle(status, doubt)}<div class='grid'>{cells}</div>{lines}</div>"
 
 
 def readings(status: Status) -> list[tuple[str, str]]:
@@ -172,7 +216,7 @@ def _state(status: Status) -> str:
     return f"<span>{pills}</span>"
 
 
-def _angle(status: Status) -> str:
+def _angle(status: Status, doubt: str) -> str:
     values = status.observables
     found = values.get("angle_of_repose_deg")
     if found is None:
@@ -182,7 +226,9 @@ def _angle(status: Status) -> str:
         left, right = (math.nan if flank is None else flank.value for flank in flanks)
         spread = "" if found.spread is None else f" ± {found.spread:.1f}° over flanks"
         words = f"angle of repose{spread} · one view: left {_degrees(left)}, right {_degrees(right)}"
-    return f"<div class='big'>{_degrees(angle_of_repose_deg(status))}</div><div class='dim'>{words}</div>"
+    angle = _degrees(angle_of_repose_deg(status))
+    number = f"<div class='doubt'>{angle} · {doubt}</div>" if doubt else f"<div class='big'>{angle}</div>"
+    return f"{number}<div class='dim'>{words}</div>"
 
 
 def _degrees(angle_deg: float) -> str:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
+
+import viser
 
 from explorer.errors import CommandError
 from explorer.files.uploads import funnel_source, shaped_source
-from explorer.scene.source import SceneSource, rig_source
+from explorer.scene.source import SceneSource, prepared_source, rig_source
 from explorer.viewer.actions import on_upload
 from explorer.viewer.panel import SET_UP, Now, PageContext, Panel
 from explorer.viewer.view import small_html
@@ -17,6 +20,7 @@ from solver.shapes.mesh_file import LENGTH_UNITS, SUFFIXES
 
 OWN = "file below"
 """Choice of the list that takes the file in the text field."""
+NO_SCENE = "choose …"
 UNIT_OF_FILE = "as usual"
 """Choice of the unit of a mesh: that of its format, or millimetres."""
 
@@ -37,6 +41,11 @@ class ScenePanel(Panel):
         self._rig = gui.add_dropdown("Rig", tuple(RIGS), hint="What the bodies are poured into.")
         self._material = gui.add_dropdown(
             "Material", (*self._shipped, OWN), hint="Materials that come with the program, or a file of your own."
+        )
+        self._prepared = gui.add_dropdown(
+            "Prepared scene",
+            (NO_SCENE, *shipped_assets("scenes")),
+            hint="A small scene each in which friction, restitution or stiffness is seen at once: move its slider.",
         )
         self._file = gui.add_text("File", "", hint="Material file (TOML), on the machine that serves this page.")
         pour = gui.add_button("Pour this", hint="A new pour; changes are then counted from this material and rig.")
@@ -59,6 +68,12 @@ class ScenePanel(Panel):
             )
         self._doing = gui.add_html("")
         pour.on_click(lambda _: post(self._pour))
+
+        @self._prepared.on_update
+        def _(event: viser.GuiEvent[Any]) -> None:
+            chosen = str(event.target.value)
+            if event.client_id is not None and chosen != NO_SCENE:
+                post(lambda: self._pour_prepared(chosen))
 
         on_upload(self._upload, self._take_shape, post)
         on_upload(self._funnel, self._take_funnel, post)
@@ -92,6 +107,12 @@ class ScenePanel(Panel):
         if not material:
             raise CommandError("material: name a file, or choose one from the list")
         self._begin("reading the material", lambda: _checked(rig_source(rig, material)))
+
+    def _pour_prepared(self, name: str) -> None:
+        self._prepared.value = NO_SCENE  # type: ignore[misc]
+        if name not in shipped_assets("scenes"):
+            raise CommandError(f"scene {name[:60]!r}: there is none of that name")
+        self._begin("reading the scene", lambda: _checked(prepared_source(name)))
 
     def _take_shape(self, name: str, content: bytes) -> None:
         present, body, unit = self._session.status().scene, str(self._body.value), self._given_unit()

@@ -90,6 +90,14 @@ def set_gravity(s: ti.template(), w: ti.i32, x: ti.f64, y: ti.f64, z: ti.f64):
 
 
 @ti.kernel
+def set_pull(s: ti.template(), w: ti.i32, pulled: ti.i32, x: ti.f64, y: ti.f64, z: ti.f64):
+    """Replace the body that is pulled (its number + 1, 0: none) and the force [N]."""
+    s.pull.body[w] = pulled
+    s.pull.force[w] = Vec3(x, y, z)
+    rouse_all(s, w)
+
+
+@ti.kernel
 def set_time_step(s: ti.template(), w: ti.i32, dt: ti.f64):
     """Replace the time step [s]."""
     s.world.dt[w] = dt

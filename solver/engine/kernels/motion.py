@@ -57,6 +57,10 @@ def move(s: ti.template(), w, b):
         force = body_force(s, w, b)
         velocity += dt * s.body.inverse_mass[w, b] * force
         s.world.dissipated[w] = s.world.dissipated[w] - 0.5 * dt * force.dot(velocity + s.body.velocity[w, b])
+    if s.pull.body[w] == b + 1:
+        pull = s.pull.force[w]
+        velocity += dt * s.body.inverse_mass[w, b] * pull
+        s.world.wall_work[w] = s.world.wall_work[w] + 0.5 * dt * pull.dot(velocity + s.body.velocity[w, b])
     spin = spun(s.body.spin[w, b], s.body.inertia[w, b], s.body.inverse_inertia[w, b], torque, dt)
     s.body.velocity[w, b] = velocity
     s.body.spin[w, b] = spin

@@ -48,6 +48,8 @@ def load_world(s: ti.template(), w: ti.i32, settings: Settings):
     s.world.tangential_law[w] = settings.tangential_law
     s.world.tangential_dashpot[w] = settings.tangential_dashpot
     s.world.grip[w] = 0.0
+    s.pull.body[w] = 0
+    s.pull.force[w] = Vec3(0.0, 0.0, 0.0)
     s.world.outdated[w] = 1
     s.world.bodies[w] = 0
     s.world.walls[w] = 0

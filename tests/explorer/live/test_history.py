@@ -9,7 +9,19 @@ import pytest
 from explorer.live.details import DetailWriter, detail_reader, shared_details
 from explorer.live.frames import FrameReader, FrameWriter, shared_block
 from explorer.live.history import History, thinnest
-from explorer.live.messages import Event, SessionState, SetParameters, Start, Status, Step, StepBack
+from explorer.live.messages import (
+    Event,
+    MovePlate,
+    Pause,
+    SessionState,
+    SetParameters,
+    SetPull,
+    Start,
+    Status,
+    Step,
+    StepBack,
+)
+from solver.pours.disturbance import Pull, Shake, Tap
 from solver.pours.record import Outcome
 from solver.scenes.scene import value
 from tests.explorer.beads import bead_scene
@@ -88,7 +100,6 @@ def test_a_moment_replaces_one_of_the_same_time():
 def live(taichi):
     """A live pour of beads that stands still at its beginning, in this process."""
     from explorer.live.live_pour import LivePour, Publisher
-    from explorer.live.messages import Pause
 
     block, reports = shared_block(multiprocessing.get_context("spawn")), []
     details = shared_details(multiprocessing.get_context("spawn"))
@@ -178,3 +189,75 @@ def test_before_the_beginning_there_is_nothing(live):
     assert [report.text for report in live.reports if isinstance(report, Event)] == [
         "this is the earliest moment that is kept"
     ]
+
+
+SHAKE = Shake(amplitude=2e-3, frequency=20.0, periods=4)
+
+
+def events(live):
+    found = [report for report in live.reports if isinstance(report, Event)]
+    live.reports.clear()
+    return found
+
+
+def test_a_shake_is_an_event_wakes_the_pile_and_comes_to_rest_again(live):
+    _, rest = run(live, 5.0)
+    assert not rest.disturbed
+    live.reports.clear()
+    live.pour.obey(MovePlate(SHAKE))
+    shaken = live.pour.status()
+    assert shaken.state in (SessionState.RUNNING, SessionState.PAUSED)
+    assert (shaken.disturbed, shaken.disturbance) == (True, str(SHAKE))
+    assert [(event.time, event.text, event.is_order) for event in events(live)] == [(rest.time, str(SHAKE), True)]
+    _, after = run(live, 5.0)
+    assert after.state == SessionState.ENDED
+    assert (after.disturbed, after.disturbance) == (True, "")
+    assert after.time > rest.time + SHAKE.duration
+
+
+def test_back_into_a_shake_repeats_its_bits_and_back_past_it_there_was_none(live):
+    run(live, 0.5)
+    still = live.pour.status()
+    live.pour.obey(MovePlate(SHAKE))
+    first, _ = run(live, 0.1)
+    again, _ = run(live, 0.05)
+    live.pour.obey(StepBack(0.05))
+    assert live.pour.status().disturbance == str(SHAKE)
+    np.testing.assert_array_equal(live.reader.newest().position, first.position)
+    repeated, _ = run(live, 0.05)
+    np.testing.assert_array_equal(repeated.position, again.position)
+    np.testing.assert_array_equal(repeated.surfaces, again.surfaces)
+    live.pour.obey(StepBack(live.pour.status().time - still.time + 0.05))
+    back = live.pour.status()
+    assert (back.disturbed, back.disturbance) == (False, "")
+    frame, _ = run(live, 0.3)
+    np.testing.assert_array_equal(frame.surfaces[0, :3], 0.0)
+
+
+def test_a_pull_lasts_until_it_is_let_go_and_is_undone_by_going_back(live):
+    before, rest = run(live, 5.0)
+    live.pour.obey(Pause())  # the step of 5 s is over
+    live.pour.obey(SetPull(Pull(0, (0.0, 0.0, 0.1))))  # a bead weighs 22 mN
+    lifted, held = run(live, 0.05)
+    assert "body no. 1 is pulled with (0, 0, 100) mN" in held.disturbance
+    # Height a t²/2 with a = F/m - g, from rest.
+    rise = lifted.position[0, 2] - before.position[0, 2]
+    assert rise == pytest.approx(0.5 * (0.1 / (22.18e-3 / 9.81) - 9.81) * (held.time - rest.time) ** 2, rel=0.03)
+    live.pour.obey(SetPull(None))
+    assert live.pour.status().disturbance == ""
+    live.pour.obey(StepBack(0.02))
+    assert "body no. 1 is pulled" in live.pour.status().disturbance
+    live.pour.obey(StepBack(0.2))
+    assert live.pour.status().disturbance == ""
+
+
+def test_what_is_refused_is_an_event_and_changes_nothing(live):
+    run(live, 0.3)
+    live.pour.obey(MovePlate(SHAKE))
+    live.reports.clear()
+    live.pour.obey(MovePlate(Tap(1e-3, 0.02)))
+    live.pour.obey(SetPull(Pull(999, (0.0, 0.0, 0.1))))
+    texts = [event.text for event in events(live)]
+    assert texts[0] == "refused: the plate moves already; wait until it stands"
+    assert texts[1].startswith("refused: pull: there is no body no. 1000; ")
+    assert live.pour.status().disturbance == str(SHAKE)

@@ -27,7 +27,7 @@ class PageSession:
 
     def __init__(self, source: SceneSource) -> None:
         self.source = source
-        self.asked: list[str] = []
+        self.asked: list[object] = []
         self.events: list[Event] = []
         self.now = Status(SessionState.RUNNING, "", source.scene, seed=1, generation=1, speed=1.0)
         self.newest: Frame | None = None
@@ -45,6 +45,12 @@ class PageSession:
             Event(self.now.generation, self.now.time, line, True) for line in changes(self.now.scene, changed)
         ]
         self.now = replace(self.now, scene=changed)
+
+    def move_plate(self, motion) -> None:
+        self.asked.append(motion)
+
+    def pull(self, pull) -> None:
+        self.asked.append(pull)
 
     def start(self, scene: Scene, seed: int, source: SceneSource | None = None) -> None:
         self.asked.append("start")

@@ -1,21 +1,25 @@
 """What the page makes of parameters, and what it takes from a browser."""
 
 import math
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from explorer.live.messages import SessionState, Status
+from explorer.scene.source import material_source
 from explorer.units import InputError, checked, quantity, screen_unit, title
 from explorer.viewer.actions import Actions
 from explorer.viewer.pour.live_panel import (
     LiveControl,
+    LiveSections,
     decade_mark,
     decades_around,
     echo_html,
     effect_targets,
+    factor_range,
     live_parameters,
     material_targets,
-    mean_value,
     pair_targets,
 )
 from explorer.viewer.pour.restart_panel import PATHS, SetUpInputs, entered, size_paths
@@ -23,7 +27,7 @@ from solver import load_material, parameters, with_values
 from solver.rigs import RIGS
 from solver.scenes.scene import value, with_rig
 from solver.scenes.sizes import SizeDistribution
-from tests.explorer.viewer.page_session import event
+from tests.explorer.viewer.page_session import PageSession, event
 
 SCENE = load_material("sunflower_extract")
 KNOWN = parameters(SCENE)
@@ -146,11 +150,67 @@ def test_the_solvers_values_are_shown_as_a_range_where_they_differ():
     assert "0.57 … " not in echo_html(SCENE, pair_targets(SCENE)["seed – seed"])
 
 
-def test_a_slider_for_many_stands_at_their_mean():
-    paths = [f"material.{name}.shear_modulus" for name in ("seed", "plate")]
-    # Geometric mean of 56.3 and 35.5 MPa: 44.706 MPa; three digits.
-    assert mean_value(SCENE, paths, geometric=True) == 44.7e6
-    assert mean_value(SCENE, paths[:1]) == 56.3e6
+@pytest.fixture
+def sections(server):
+    """The panel's sections with a session that takes everything over at once, and what it was sent."""
+    session = PageSession(material_source("sunflower_extract"))
+    made = LiveSections(server, session, SCENE, lambda action: action())
+    return SimpleNamespace(pairs=made._sections[0], bodies=made._sections[1], session=session, show=made.show)
+
+
+def friction(session):
+    return np.array([value(session.now.scene, f"pair.{pair.a}.{pair.b}.static_friction") for pair in SCENE.pairs])
+
+
+def test_pairs_that_differ_are_mixed_and_scaled_with_their_ratios_kept(sections):
+    before, slider = friction(sections.session), sections.pairs._live[0]._faces[0].handle
+    assert "mixed" in slider.label
+    assert slider.value == 1.0
+    assert len(set(before)) > 1
+    # One press of an arrow key: a hundredth, and not nine equal pairs.
+    event(slider, 1.01)
+    assert friction(sections.session) == pytest.approx(1.01 * before)
+    event(slider, slider.max)
+    assert friction(sections.session).max() <= 3.0
+    assert friction(sections.session) / friction(sections.session)[0] == pytest.approx(before / before[0])
+
+
+def test_a_factor_of_zero_leads_back_to_the_ratios(sections):
+    before, slider = friction(sections.session), sections.pairs._live[0]._faces[0].handle
+    event(slider, 0.0)
+    assert not friction(sections.session).any()
+    sections.pairs._live[0]._touched = -math.inf
+    sections.show(sections.session.now)
+    event(sections.pairs._live[0]._faces[0].handle, 0.5)
+    assert friction(sections.session) == pytest.approx(0.5 * before)
+
+
+def test_the_control_is_another_one_once_the_values_agree_and_back(sections):
+    sections.session.set_parameters({f"pair.{pair.a}.{pair.b}.static_friction": 0.4 for pair in SCENE.pairs})
+    sections.show(sections.session.now)
+    slider = sections.pairs._live[0]._faces[0].handle
+    assert (slider.label, slider.value) == ("Static friction", 0.4)
+    event(slider, 0.6)
+    assert (friction(sections.session) == 0.6).all()
+    sections.session.set_parameters({"pair.seed.seed.static_friction": 0.3})
+    sections.pairs._live[0]._touched = -math.inf
+    sections.show(sections.session.now)
+    assert "mixed" in sections.pairs._live[0]._faces[0].handle.label
+
+
+def test_moduli_that_differ_are_scaled_too(sections):
+    slider = sections.bodies._live[0]._faces[0].handle
+    assert (slider.value, slider.min, slider.max) == (0.0, -2.0, 2.0)
+    event(slider, math.log10(2.0))
+    found = [value(sections.session.now.scene, f"material.{name}.shear_modulus") for name in ("seed", "plate")]
+    assert found == pytest.approx([2 * 56.3e6, 2 * 35.5e6])
+
+
+def test_a_factor_keeps_all_values_in_their_range_and_begins_at_one():
+    assert factor_range([0.5, 0.8], 0.0, 1.0) == (0.0, 1.25)
+    assert factor_range([0.3, 0.9], 0.0, 1.0) == (0.0, 1.11)
+    assert factor_range([0.0, 0.01], 0.0, 3.0) == (0.0, 4.0)
+    assert factor_range([0.02, 1.0], 0.01, 1.0) == (0.5, 1.0)
 
 
 def test_a_logarithmic_slider_spans_whole_decades_within_the_range():

@@ -4,12 +4,12 @@ import pytest
 from viser import UploadedFile
 
 from explorer.scene.file import load_scene
-from explorer.scene.source import material_source
+from explorer.scene.source import command_line, material_source
 from explorer.scene.text import material_toml
 from explorer.viewer.actions import Actions
 from explorer.viewer.panel import Now
-from explorer.viewer.pour.scene_panel import OWN, ScenePanel
-from solver.assets import asset_path
+from explorer.viewer.pour.scene_panel import NO_SCENE, OWN, ScenePanel
+from solver.assets import asset_path, shipped_assets
 from solver.rigs import RIGS
 from solver.scenes.scene import with_values
 from tests.explorer.beads import bead_scene
@@ -52,6 +52,23 @@ def test_every_rig_and_shipped_material_can_be_poured(bench, rig, material):
     bench.panel._rig.value, bench.panel._material.value = "funnel", OWN
     bench.panel.show(Now(bench.session.status()))
     assert (bench.panel._rig.value, bench.panel._material.value) == (rig, material)
+
+
+@pytest.mark.parametrize("name", shipped_assets("scenes"))
+def test_a_prepared_scene_is_poured_and_has_a_command_line(bench, name):
+    event(bench.panel._prepared, name)
+    assert finished(bench.actions, bench.background) == ""
+    assert bench.session.now.scene == load_scene(name)
+    assert bench.panel._prepared.value == NO_SCENE
+    line = command_line(bench.session.source, bench.session.now.scene, 1)
+    assert line == f"explorer simulate {name} --seed 1"
+    bench.panel.show(Now(bench.session.status()))
+
+
+def test_only_listed_scenes_are_poured(bench):
+    event(bench.panel._prepared, "../materials/nine_sphere_seed")
+    assert "there is none of that name" in finished(bench.actions, bench.background)
+    assert bench.session.asked == []
 
 
 def test_a_file_of_ones_own_is_poured(bench, tmp_path):

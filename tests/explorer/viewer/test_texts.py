@@ -1,6 +1,7 @@
 """Readout, chart and study panel: what is shown for a given state."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -13,8 +14,11 @@ from explorer.outcomes import OUTCOME_SENTENCES
 from explorer.viewer.palette import BODY_COLOURS, linear
 from explorer.viewer.pour.chart import MOST_POINTS, PourCurves
 from explorer.viewer.pour.readout import (
+    FORMING,
     PHASE_WORDS,
     STATE_WORDS,
+    VOID,
+    AngleDoubt,
     condition,
     not_later,
     notes,
@@ -226,3 +230,40 @@ def test_progress_is_a_share():
 
 def test_text_from_a_command_brings_no_markdown():
     assert escaped("a\n# b") == r"a \# b"
+
+
+def read(time, angle, spread=2.0, phase=Phase.PILE, outcome=Outcome.RUNNING):
+    found = {"angle_of_repose_deg": Value(angle, "deg", spread)}
+    return replace(STATUS, time=time, phase=phase, outcome=outcome, observables=found)
+
+
+def test_an_angle_forms_until_it_stands_within_its_own_spread():
+    angle = AngleDoubt()
+    # While bodies still come down, however steady it looks and however wide its spread is.
+    assert {angle.doubt(read(0.1 * k, 33.4, 28.3, Phase.DISCHARGE)) for k in range(20)} == {FORMING}
+    falling = [angle.doubt(read(2.0 + 0.1 * k, 30.0 - 2.0 * k)) for k in range(8)]
+    assert set(falling) == {FORMING}
+    standing = [angle.doubt(read(2.8 + 0.1 * k, 16.0 + 0.1 * k)) for k in range(8)]
+    assert standing[0] == FORMING
+    assert standing[-1] == ""
+    # Friction is taken away and it flows apart.
+    assert [angle.doubt(read(3.6 + 0.1 * k, 16.0 - 1.5 * k)) for k in range(1, 5)][-1] == FORMING
+
+
+def test_an_end_decides_at_once_and_a_step_back_forgets_what_came_later():
+    angle = AngleDoubt()
+    assert angle.doubt(read(1.0, 20.0)) == FORMING
+    assert angle.doubt(read(1.1, 20.0, outcome=Outcome.AT_REST)) == ""
+    assert angle.doubt(read(1.1, 20.0, outcome=Outcome.JAMMED)) == VOID
+    for k in range(6):
+        angle.doubt(read(2.0 + 0.1 * k, 20.0))
+    assert angle.doubt(read(2.6, 24.0)) == FORMING
+    assert angle.doubt(read(2.55, 20.5)) == ""
+    assert angle.doubt(replace(read(2.6, 20.5), generation=2)) == FORMING
+
+
+def test_an_angle_in_doubt_is_small_and_says_why():
+    forming = readout_html(STATUS, [], "", doubt=FORMING)
+    assert re.search(r"class='doubt'>[\d.–°]+ · forming<", forming)
+    assert "class='big'" not in forming
+    assert "class='big'" in readout_html(STATUS, [], "")

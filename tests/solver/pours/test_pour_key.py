@@ -1,6 +1,8 @@
 """The key of a pour changes with all that decides its bits, and with nothing else."""
 
 import dataclasses
+import hashlib
+import json
 import re
 import shutil
 import subprocess
@@ -9,9 +11,11 @@ from pathlib import Path
 
 import pytest
 
-from solver import load_material, pour_key, value, with_rig, with_values
+from solver import PHYSICS, load_material, pour_key, pour_keys, value, with_rig, with_values
+from solver.arch import chosen
 from solver.effects import EFFECTS
 from solver.params import param
+from solver.pours import pour_key as pour_key_module
 from solver.scenes.body import Members
 from solver.scenes.insertion import Insertion
 from solver.scenes.numerics import Numerics
@@ -32,6 +36,13 @@ def test_equal_scenes_have_equal_keys():
 
 def test_seed_and_variant_count():
     assert len({KEY, pour_key(SCENE, 2), pour_key(SCENE, 1, "sticky"), pour_key(SCENE, 1, "misread")}) == 4
+
+
+def test_keys_of_many_seeds_are_digests_of_one_json_text_each():
+    described = pour_key_module._decisive(SCENE)
+    texts = {s: json.dumps([PHYSICS, s, "wet", chosen(), described], sort_keys=True) for s in (0, 7, 2**32 - 1)}
+    assert pour_keys(SCENE, texts, "wet") == {s: hashlib.sha256(text.encode()).hexdigest() for s, text in texts.items()}
+    assert pour_keys(SCENE, [1]) == {1: KEY}
 
 
 @pytest.mark.parametrize("rig", ["funnel", "rotating_drum"])

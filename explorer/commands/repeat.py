@@ -1,0 +1,37 @@
+"""``explorer repeat``: more seeds of one scene, into the store."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+
+import typer
+
+
+def repeat(
+    source: str = typer.Argument(metavar="RIG_OR_FILE", help="As for `explorer simulate`."),
+    material: str | None = typer.Option(None, help="Material in the rig: file or shipped name."),
+    set_: list[str] = typer.Option([], "--set", metavar="PATH=VALUE", help="Set a parameter; may be repeated."),
+    pours: int = typer.Option(8, min=1, max=1000, help="Number of pours, with seeds that the store does not hold yet."),
+    out: Path | None = typer.Option(None, help="New folder for the progress, which the page reads."),
+    store: Path | None = typer.Option(None, help="SQLite file that keeps every pour."),
+    threads: int | None = typer.Option(None, min=1, help="Worker processes; one per core if not given."),
+) -> None:
+    """Pour a scene with more seeds, keep every pour in the store, and print what all of its seeds gave.
+
+    Pours that a calibration has made of exactly this scene count as well.
+    """
+    from explorer.population.run import PoursOrder, pour_more
+    from explorer.scene.file import load_scene, with_settings
+    from explorer.tables.text_table import text_table
+
+    # The page cancels with SIGTERM; that has to end like Ctrl-C, with the store closed and finished pours kept.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    scene = with_settings(load_scene(source, material), set_)
+    found = pour_more(PoursOrder(scene, pours, out, store, threads), typer.echo)
+    rows = [
+        [one.observable, f"{one.sample.mean:.4g}", f"{one.sample.sd:.4g}", str(one.n), str(one.void)]
+        for one in found
+        if one.n
+    ]
+    typer.echo(text_table(["observable", "mean", "sd", "seeds", "void"], rows) if rows else "no valid pour")

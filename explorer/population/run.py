@@ -1,0 +1,77 @@
+"""More pours of one scene, with seeds that the store does not hold yet; every one is kept there."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Iterable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from itertools import count, islice
+from pathlib import Path
+
+from doe.population import Population
+from doe.pour_runner import PourRunner
+from doe.run_records import Run, Setting
+from doe.store import Store, default_store
+from explorer.background.progress import PROGRESS, RunProgress, told_of_pauses
+from explorer.errors import CommandError
+from explorer.population.process import populations
+from solver import Scene, WorkerPool, observable_names
+from solver.arch import chosen
+
+STAGE = "pours"
+"""Name of the one stage, in the progress and in the store."""
+
+
+@dataclass(frozen=True)
+class PoursOrder:
+    """What a user asked for: ``pours`` more of ``scene``; ``out`` takes the progress, None for none."""
+
+    scene: Scene
+    pours: int
+    out: Path | None = None
+    store: Path | None = None
+    threads: int | None = None
+
+
+def pour_more(order: PoursOrder, say: Callable[[str], None]) -> tuple[Population, ...]:
+    """Pour, and return the population of every observable of the rig, earlier pours included.
+
+    Seeds are the smallest from 1 on that the store does not hold for this scene. Finished pours are kept whatever
+    happens to the rest.
+    """
+    if order.out is not None and order.out.exists() and any(order.out.iterdir()):
+        raise CommandError(f"--out {order.out}: is not empty; name a new folder")
+    path = order.store or default_store()
+    store = Store(path)
+    with ExitStack() as stack:
+        stack.callback(store.close)
+        seeds = new_seeds((run.seed for run in store.pours_of(order.scene)), order.pours)
+        say(f"{order.scene.title}: {order.pours} pours, seeds {', '.join(map(str, seeds))}; store {path}")
+        progress: RunProgress | None = None
+        if order.out is not None:
+            order.out.mkdir(parents=True, exist_ok=True)
+            file = order.out / PROGRESS
+            progress = RunProgress(file, {STAGE: order.pours}, say, terminal=sys.stdout.isatty())
+            stack.callback(progress.close)
+            stack.enter_context(told_of_pauses(progress.went_on))
+            progress.compiling()
+
+        def ended(stage: str, run: Run, remaining: int) -> None:
+            if progress is not None:
+                progress.run(stage, run, remaining)
+
+        workers = min(order.threads or os.cpu_count() or 1, order.pours)
+        pool = stack.enter_context(WorkerPool(workers)) if chosen() == "cpu" else None
+        pours = pool.run_queue if pool else None
+        name = order.scene.title
+        runner = PourRunner(order.scene, store, name, 0, order.threads, on_run=ended, pours=pours, seeds=seeds)
+        runner.run(STAGE, [Setting(STAGE, {}, order.pours)])
+        return populations(store, order.scene, observable_names(order.scene))
+
+
+def new_seeds(stored: Iterable[int], n: int) -> tuple[int, ...]:
+    """The ``n`` smallest seeds from 1 on that are not ``stored``."""
+    known = set(stored)
+    return tuple(islice((seed for seed in count(1) if seed not in known), n))

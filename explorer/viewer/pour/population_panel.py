@@ -1,0 +1,262 @@
+"""Beside the angle of one pour what other seeds give: a strip of the stored pours, and *Pour 8 more*.
+
+The stored pours are those of exactly the parameters in force, by the keys under which a calibration finds its own.
+After a change of parameters the present ones are held against the former ones: what one pour tells, what more would.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from html import escape
+
+from doe.population import Comparison, Population, compared
+from explorer.background.command_process import CommandStatus
+from explorer.population.process import PopulationProcess
+from explorer.scene.source import differences
+from explorer.viewer.actions import BackgroundWork
+from explorer.viewer.palette import FLANK, css
+from explorer.viewer.panel import CONTROLS, SELDOM, Now, PageContext, Panel
+from explorer.viewer.pour.readout import AngleDoubt, angle_of_repose_deg
+from explorer.viewer.pour.standing_panel import changes_in_words
+from explorer.viewer.study.process_view import time_left
+from solver import Scene
+
+OBSERVABLE = "angle_of_repose_deg"
+MORE = 8
+"""Pours of one order."""
+SETTLED = 0.7
+"""Wall time [s] for which parameters have to stay before their pours are looked for: a slider's drag asks once."""
+AGAIN = 4.0
+"""Least wall time [s] between two looks at the same parameters, while pours are added to the store."""
+TRUSTED = 10
+"""From so many values on the standard deviation is told without its own uncertainty."""
+WIDTH, HEIGHT, MARGIN, BASE = 300.0, 74.0, 14.0, 46.0
+"""Of the strip; ``BASE``: height of its axis."""
+DOT = 3.2
+"""Radius of a dot."""
+HINT = (
+    "Mean ± standard deviation of the angle over stored pours with exactly these parameters, one dot per seed. "
+    "One pour falls within m ± t(0.975, n−1) s √(1 + 1/n) of them with 95 %; n pours of each of two settings show a "
+    "difference of (shift of the noncentral t for 80 % power at p < 0.05) · s √(2/n)."
+)
+
+
+@dataclass(frozen=True)
+class ThisPour:
+    """The single pour that is seen."""
+
+    angle: float
+    """[°]; NaN where there is none."""
+    seed: int
+    doubt: str
+    """Why the angle is none of a pile yet; empty where it is."""
+    changed: bool
+    """Parameters were changed, or the pile disturbed, so that it is no draw of this population."""
+
+
+class PopulationPanel(Panel):
+    """The strip, the line, and the order for more pours."""
+
+    name, tab, every = "population", CONTROLS, SELDOM
+
+    def __init__(self, page: PageContext) -> None:
+        gui = page.server.gui
+        self._session, self._work = page.session, BackgroundWork(page.post)
+        self._process = PopulationProcess(page.data / "pours", page.diagnosis.store)
+        self._doubt = AngleDoubt()
+        self._scene: Scene | None = None
+        self._since = self._asked_at = -math.inf
+        self._asked_for: object = None
+        self._found: tuple[Scene, Population] | None = None
+        self._former: tuple[Scene, Population] | None = None
+        self._changed = ""
+        self._compared_for: object = None
+        self._comparison: Comparison | None = None
+        self._html = gui.add_html("")
+        self._more = gui.add_button(f"Pour {MORE} more", hint=f"In the background, with other seeds. {HINT}")
+        self._stop = gui.add_button("Cancel these pours", visible=False, hint="Finished pours are kept.")
+        self._more.on_click(lambda _: page.post(self._pour))
+        self._stop.on_click(lambda _: page.post(self._process.cancel))
+
+    def show(self, now: Now) -> None:
+        """Look for pours of the parameters in force, and tell what there is."""
+        status, wall = now.status, time.monotonic()
+        if status.scene != self._scene:
+            self._scene, self._since = status.scene, wall
+        command = self._process.status()
+        if self._more.visible == command.alive:
+            self._more.visible, self._stop.visible = not command.alive, command.alive
+        changed = status.energy_put_in is not None or status.disturbed
+        pour = ThisPour(angle_of_repose_deg(status), status.seed, self._doubt.doubt(status), changed)
+        if not self._work.busy_with and wall >= self._since + SETTLED:
+            self._look(status.scene, pour, wall)
+        here = self._found is not None and self._found[0] == status.scene
+        population = self._found[1] if self._found is not None and here else None
+        html = population_html(population, pour, command, self._changed if here else "", self._comparison)
+        if self._html.content != html:
+            self._html.content = html
+
+    def close(self) -> None:
+        """End pours in the background; finished ones are kept."""
+        self._process.close()
+
+    def _pour(self) -> None:
+        self._process.start(self._session.status().scene, MORE)
+
+    def _look(self, scene: Scene, pour: ThisPour, wall: float) -> None:
+        """Read the store where it may have become another, then compare, both off the loop."""
+        wanted = scene, self._process.stamp()
+        anew = self._found is None or self._found[0] != scene
+        if wanted != self._asked_for and (anew or wall >= self._asked_at + AGAIN):
+            self._asked_for, self._asked_at = wanted, wall
+            self._work.start("reading stored pours", lambda: self._process.read(scene, OBSERVABLE), self._taking(scene))
+        elif self._found is not None and self._former is not None and not anew:
+            new, former = self._found[1], self._former[1]
+            single = math.nan if pour.doubt else round(pour.angle, 1)
+            if (new, single, former) != self._compared_for:
+                self._compared_for = new, single, former
+                self._work.start("comparing pours", lambda: compared(new, single, former), self._take_comparison)
+
+    def _taking(self, scene: Scene) -> Callable[[Population], None]:
+        def take(population: Population) -> None:
+            if self._found is not None and self._found[0] != scene:
+                # What a slider stood at on its way has no pours; those before it say more.
+                if self._former is None or self._found[1].n > 1:
+                    self._former = self._found
+                self._comparison = None
+                self._changed = told_difference(self._former[0], scene)
+            self._found = scene, population
+
+        return take
+
+    def _take_comparison(self, comparison: Comparison | None) -> None:
+        self._comparison = comparison
+
+
+def told_difference(former: Scene, scene: Scene) -> str:
+    """What was changed, in words; empty where nothing was that can be compared."""
+    if former.rig.name != scene.rig.name:
+        return ""
+    return changes_in_words(list(differences(former, scene)))
+
+
+def population_html(
+    population: Population | None, pour: ThisPour, command: CommandStatus, changed: str, comparison: Comparison | None
+) -> str:
+    """Strip, line, comparison and progress; ``changed``: what differs from the former parameters, "" for no telling."""
+    lines = [_process_line(command)]
+    if population is None:
+        lines.insert(0, "Looking for other pours with these parameters …")
+        return _block("", lines)
+    lines = [_few(population), _of_this_pour(population, pour), _compared_line(population, changed, comparison), *lines]
+    sample = population.sample
+    head = "" if population.n < 2 else f"<b>{sample.mean:.1f} ± {sample.sd:.1f}°</b> over {population.n} seeds"
+    drawn = strip_svg(population, pour) if population.n else ""
+    return _block(f"{head}{drawn}", lines)
+
+
+def strip_svg(population: Population, pour: ThisPour) -> str:
+    """One dot per seed over an axis in degrees, a bar for mean ± sd, and a mark for the pour that is seen."""
+    sample, mark = population.sample, pour.angle if math.isfinite(pour.angle) else None
+    spread = sample.sd if population.n > 1 else 0.0
+    ends = [*population.values, sample.mean - spread, sample.mean + spread, *([] if mark is None else [mark])]
+    low, high = float(math.floor(min(ends))), float(math.ceil(max(ends)))
+    low, high = (low - 1.0, high + 1.0) if high - low < 2.0 else (low, high)
+
+    def x(angle: float) -> float:
+        return MARGIN + (WIDTH - 2 * MARGIN) * (angle - low) / (high - low)
+
+    parts = [f"<line x1='{MARGIN}' x2='{WIDTH - MARGIN}' y1='{BASE}' y2='{BASE}' stroke='currentColor' opacity='.5'/>"]
+    if spread:
+        left, width = x(sample.mean - spread), x(sample.mean + spread) - x(sample.mean - spread)
+        parts.append(
+            f"<rect x='{left:.1f}' y='{BASE - 3}' width='{width:.1f}' height='6' fill='currentColor' opacity='.3'/>"
+        )
+        parts.append(f"<rect x='{x(sample.mean) - 1:.1f}' y='{BASE - 6}' width='2' height='12' fill='currentColor'/>")
+    parts += [
+        f"<circle cx='{cx:.1f}' cy='{cy:.1f}' r='{DOT}' fill='currentColor' fill-opacity='.75'>"
+        f"<title>seed {seed}: {angle:.1f}°</title></circle>"
+        for seed, angle, (cx, cy) in zip(
+            population.seeds, population.values, stacked([x(angle) for angle in population.values]), strict=True
+        )
+    ]
+    if mark is not None:
+        at, colour = x(mark), css(FLANK)
+        inside = "none" if pour.doubt or pour.changed else colour
+        parts.append(
+            f"<path d='M{at:.1f} {BASE + 2} l5 9 h-10 z' fill='{inside}' stroke='{colour}' stroke-width='1.5'>"
+            f"<title>this pour: {mark:.1f}°</title></path>"
+        )
+    for angle, anchor in ((low, "start"), (high, "end")):
+        parts.append(
+            f"<text x='{x(angle):.1f}' y='{HEIGHT - 3}' text-anchor='{anchor}' font-size='11' fill='currentColor'>"
+            f"{angle:.0f}°</text>"
+        )
+    label = f"{population.n} stored pours between {min(population.values):.1f} and {max(population.values):.1f}°"
+    return (
+        f"<svg viewBox='0 0 {WIDTH:.0f} {HEIGHT:.0f}' width='100%' role='img' aria-label='{label}' "
+        f"style='display:block; max-width:26em'>{''.join(parts)}</svg>"
+    )
+
+
+def stacked(places: Sequence[float]) -> list[tuple[float, float]]:
+    """Centres of dots at ``places`` along the axis, each as low above it as no other one is in its way."""
+    rows: list[list[float]] = []
+    found: list[tuple[float, float]] = []
+    for place in places:
+        row = next((k for k, taken in enumerate(rows) if all(abs(place - one) > 2 * DOT for one in taken)), len(rows))
+        rows[row:row] = [[]] if row == len(rows) else []
+        rows[row].append(place)
+        # More rows than there is room for lie over each other.
+        found.append((place, max(DOT + 1, BASE - 9 - 2.1 * DOT * row)))
+    return found
+
+
+def _few(population: Population) -> str:
+    n, void = population.n, population.void
+    lost = f" {void} more gave no valid pile." if void else ""
+    if n == 0:
+        return "No other pour with these parameters is stored: this number is one draw, its scatter unknown." + lost
+    if n == 1:
+        return f"One stored pour, {population.values[0]:.1f}°: how far seeds scatter is unknown." + lost
+    low, high = population.interval
+    mean = f"mean {low:.1f} … {high:.1f}° (95 %)"
+    # Standard error of a standard deviation of normal values: σ/√(2(n − 1)).
+    return mean + (f"; few: the sd itself is ± {100 / math.sqrt(2 * (n - 1)):.0f} %." if n < TRUSTED else ".") + lost
+
+
+def _of_this_pour(population: Population, pour: ThisPour) -> str:
+    if not math.isfinite(pour.angle) or not population.n:
+        return ""
+    about = pour.doubt or ("changed or disturbed on its way" if pour.changed else f"seed {pour.seed}")
+    return f"<span style='color:{css(FLANK)}'>▲</span> this pour {pour.angle:.1f}° ({about})."
+
+
+def _compared_line(population: Population, changed: str, found: Comparison | None) -> str:
+    if not changed:
+        return ""
+    if found is None:
+        return f"{escape(changed)}: no two stored pours of the former parameters, so nothing tells chance from effect."
+    pours = "one pour" if population.n < 2 else f"{found.pours} pours"
+    sides = f"{found.difference:+.1f} ± {found.half_width:.1f}° (95 %)"
+    verdict = "distinguishable" if found.distinguishable else "not distinguishable"
+    more = f"; {found.planned} pours of each would show {found.resolved:.1f}°"
+    return f"{escape(changed)}: {sides} against {found.former} former: <b>{verdict} in {pours}</b>{more}."
+
+
+def _process_line(command: CommandStatus) -> str:
+    if command.alive:
+        left = f"time left {time_left(command.eta_s)}" if command.done else "the first one takes longest"
+        return f"Pouring in the background: {command.done} of {command.planned or MORE}, {left}."
+    return escape(command.message) if command.state in ("failed", "cancelled") else ""
+
+
+def _block(head: str, lines: Sequence[str]) -> str:
+    said = "".join(f"<div style='opacity:0.8'>{line}</div>" for line in lines if line)
+    return (
+        "<div class='population' style='padding:0 0.9em 0.2em 0.75em; font-size:0.82em; line-height:1.4; "
+        f"font-variant-numeric:tabular-nums'>{head}{said}</div>"
+    )
