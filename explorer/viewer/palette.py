@@ -31,6 +31,9 @@ PLATE: Colour = (74, 82, 92)
 
 RING: Colour = (110, 122, 135)
 
+TEXT: Colour = (214, 221, 228)
+"""What is written on the plate."""
+
 BRAND: Colour = (86, 150, 200)
 
 VIRIDIS: tuple[Colour, ...] = (
