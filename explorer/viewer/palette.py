@@ -52,8 +52,13 @@ VIRIDIS: tuple[Colour, ...] = (
 
 SELECTED: Colour = (255, 255, 255)
 
-CHAINS: tuple[Colour, ...] = ((150, 190, 230), (240, 228, 66), (213, 94, 0))
-"""Lines of weak, middling and strong contacts; their thickness tells them apart as well."""
+STILL: Colour = (206, 210, 214)
+"""Bodies of which a coloured quantity has nothing to tell: at rest, without contact."""
+
+CORE: Colour = (255, 255, 255)
+
+HALO: Colour = (16, 18, 22)
+"""Rim of the lines in the scene: with it they are seen before bodies, plate and page, dark or light."""
 
 SRGB_GAMMA = 2.2
 

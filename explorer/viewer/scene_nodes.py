@@ -8,16 +8,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
+import trimesh
 import viser
 from PIL import Image, ImageDraw, ImageFont
 
 from explorer.live.frames import Frame
 from explorer.scene.meshes import GATE_NAME, PLATE_NAME, body_triangles, rig_poses, rig_triangles, rim_circles
-from explorer.viewer.palette import GLASS, PLATE, RIM, RING, TEXT, Colour, component_colour, linear
+from explorer.viewer.palette import GLASS, HALO, PLATE, RIM, RING, TEXT, Colour, component_colour, linear
 from solver.scenes.scene import Scene, body_counts
 
 Array = npt.NDArray[np.float64]
@@ -40,6 +41,8 @@ CORNERS = 72
 """Corners of a circle on the plate and of a rim."""
 LINE = 8e-4
 """Thickness of lines [m]."""
+TUBE_SIDES, RIM_WIDER = 8, 1.5
+"""Sides of a tube, and the radius of its rim as a multiple of its own."""
 CLEAR, OPACITY = 0.16, {GATE_NAME: 0.5}
 """Opacity of what one has to look through: all surfaces but the plate."""
 
@@ -189,6 +192,80 @@ def rings(radius: float) -> Array:
     return np.concatenate([circle(k * RING_SPACING, LINE) for k in range(1, ring_count(radius) + 1)])
 
 
+class Tubes:
+    """Lines in the scene as thick as their numbers say, each with a dark rim: legible before anything.
+
+    The rim is a wider tube of which only the far inside is drawn, so it stands out on both sides of the line.
+    """
+
+    def __init__(self, server: viser.ViserServer, name: str, colour: Colour) -> None:
+        self._server, self._name, self._colour = server, name, colour
+        self._nodes: list[Any] = []
+        self._room = 0
+
+    def show(self, segments: npt.NDArray[np.floating[Any]], radius: npt.NDArray[np.floating[Any]]) -> None:
+        """Draw ``segments``, shape (n, 2, 3), with the radii (n,) [m]; call it inside ``server.atomic()``."""
+        n = len(segments)
+        if n == 0:
+            self.hide()
+            return
+        if n > self._room:
+            self.remove()
+            self._room = 1 << (n - 1).bit_length()
+            self._nodes = [self._node("core", self._colour, "front"), self._node("rim", HALO, "back")]
+        places = tube_places(segments, radius, self._room)
+        for node, wider in zip(self._nodes, (1.0, RIM_WIDER), strict=True):
+            node.batched_positions, node.batched_wxyzs = places.position, places.quaternion
+            node.batched_scales = places.scale * np.array([wider, wider, 1.0], dtype=np.float32)
+            node.visible = True
+
+    def hide(self) -> None:
+        """Draw nothing."""
+        for node in self._nodes:
+            if node.visible:
+                node.visible = False
+
+    def remove(self) -> None:
+        """Take the nodes off the page."""
+        for node in self._nodes:
+            node.remove()
+        self._nodes, self._room = [], 0
+
+    def _node(self, part: str, colour: Colour, side: Literal["front", "back"]) -> Any:
+        mesh, none = trimesh.creation.cylinder(1.0, 1.0, TUBE_SIDES), hidden_poses(self._room)
+        return self._server.scene.add_batched_meshes_simple(
+            f"{self._name}/{part}",
+            mesh.vertices,
+            mesh.faces,
+            batched_wxyzs=none.quaternion,
+            batched_positions=none.position,
+            batched_scales=np.zeros((self._room, 3), dtype=np.float32),
+            batched_colors=linear(colour),
+            lod="off",
+            side=side,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+
+
+def tube_places(
+    segments: npt.NDArray[np.floating[Any]], radius: npt.NDArray[np.floating[Any]], room: int
+) -> InstancePoses:
+    """Poses and scales (room, 3) that lay a cylinder of radius 1 and height 1 about z along each of ``segments``."""
+    poses, n = hidden_poses(room), len(segments)
+    along = segments[:, 1] - segments[:, 0]
+    length = np.linalg.norm(along, axis=1)
+    x, y, z = (along / np.where(length > 0.0, length, 1.0)[:, None]).T
+    # Half way from z to the direction; one that points straight down is half a turn about x.
+    turn = np.column_stack([1.0 + z, -y, x, np.zeros(n)])
+    turn[1.0 + z < 1e-9] = (0.0, 1.0, 0.0, 0.0)
+    poses.position[:n] = segments.mean(axis=1)
+    poses.quaternion[:n] = turn / np.linalg.norm(turn, axis=1, keepdims=True)
+    scale = np.zeros((room, 3), dtype=np.float32)
+    scale[:n] = np.column_stack([radius, radius, length])
+    return InstancePoses(poses.position, poses.quaternion, scale)
+
+
 class BodyNodes:
     """Nodes of all bodies, below the node ``root``; none for a component without bodies."""
 
@@ -291,7 +368,7 @@ class InstancePoses:
     quaternion: npt.NDArray[np.float32]
     """wxyz, shape (n, 4)."""
     scale: npt.NDArray[np.float32]
-    """Size of a body relative to its mesh, or 0, shape (n,)."""
+    """Size of a body relative to its mesh, or 0, shape (n,); of a tube (n, 3)."""
 
 
 def component_poses(frame: Frame, component: int, n: int, seen: npt.NDArray[np.bool_] | None = None) -> InstancePoses:

@@ -15,7 +15,7 @@ from explorer.viewer.actions import ClientAction, Post, add_client_key, client_b
 from explorer.viewer.look.camera import CameraPanel, go_along
 from explorer.viewer.look.colour_by import QUANTITIES, ColourPanel
 from explorer.viewer.look.drawn_look import DrawnLook
-from explorer.viewer.look.force_chains import ForceChains, ForcePanel
+from explorer.viewer.look.force_chains import ForceChains, ForcePanel, chain_key
 from explorer.viewer.look.inspector import body_html, nearest_hit
 from explorer.viewer.look.look import in_sight
 from explorer.viewer.look.look_settings import CutPanel
@@ -143,7 +143,7 @@ class LookPanel(Panel):
         if told == self._told_for:
             return
         self._told_for = told
-        self._colours.show(details)
+        self._colours.show(details, chain_key(details, self._settings.look))
         self._forces.show(details)
         self._text.content = body_html(self._status.scene, frame, details, self._selected)
 

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from explorer.live.frames import NO_SURFACES, Frame
 from explorer.logs.recording import SAME_TIME, Component, Instances, Recording, index_at
 from explorer.scene.meshes import rig_poses
-from explorer.viewer.look.colour_by import ColourQuantity
+from explorer.viewer.look.colour_by import STILL_SPEED, STILL_WORDS, ColourQuantity
 from solver.scenes.scene import Scene
 
 Array = npt.NDArray[np.float64]
@@ -93,9 +93,17 @@ class RecordedMotion:
 
 
 QUANTITIES: Mapping[str, ColourQuantity] = {
-    "speed": ColourQuantity("m/s", 1.0, lambda motion: motion.speed, "mean from the frame before to the one after"),
+    "speed": ColourQuantity(
+        "m/s",
+        1.0,
+        lambda motion: motion.speed,
+        "mean from the frame before to the one after",
+        0.01,
+        STILL_SPEED,
+        STILL_WORDS,
+    ),
     "residence time": ColourQuantity(
-        "s", 1.0, lambda motion: motion.residence, "time since a body is first in the recording"
+        "s", 1.0, lambda motion: motion.residence, "time since a body is first in the recording", 0.1
     ),
 }
 """Of a recording that says in every frame which body is which."""

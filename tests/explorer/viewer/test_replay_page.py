@@ -18,7 +18,7 @@ from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.look import drawn_look
 from explorer.viewer.look.camera import view_of
 from explorer.viewer.look.look import COMPONENT
-from explorer.viewer.palette import VIRIDIS, linear, linear_all, mapped
+from explorer.viewer.palette import STILL, linear, linear_all, mapped
 from explorer.viewer.replay.replay_page import MeshNodes, ReplayPage, columns, drawn_height, moment_html
 from explorer.viewer.scene_nodes import PLATE_RADIUS, SceneNodes, plate_radius
 from explorer.viewer.view import light, look_at_height
@@ -207,15 +207,15 @@ def test_colours_are_of_the_component_of_speed_and_of_residence_time(page, recor
     settle(page)
     colour = list(linear(recording.components[0].shape.colour))
     assert node.batched_colors[:3].tolist() == [colour] * 3
-    # A body enters with every frame: 40, 20 and 0 ms ago, in a range up to 50 ms.
-    settle(page, colour_by="residence time")
+    # A body enters with every frame: 40, 20 and 0 ms ago.
+    settle(page, colour_by="residence time", automatic=False, low=0.0, high=0.05)
     expected = linear_all(mapped(np.array([0.8, 0.4, 0.0])))
     assert node.batched_colors[:3].tolist() == expected.tolist()
     assert "residence time [s]: time since a body is first in the recording" in page._look._colours._bar.content
     assert page._look._colours._bar.visible
     # None of them moves.
     settle(page, colour_by="speed")
-    assert node.batched_colors[:3].tolist() == [list(linear(VIRIDIS[0]))] * 3
+    assert node.batched_colors[:3].tolist() == [list(linear(STILL))] * 3
     settle(page, colour_by=COMPONENT)
     assert node.batched_colors[:3].tolist() == [colour] * 3
     assert not page._look._colours._bar.visible
