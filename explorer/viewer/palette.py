@@ -34,7 +34,8 @@ RING: Colour = (110, 122, 135)
 TEXT: Colour = (214, 221, 228)
 """What is written on the plate."""
 
-BRAND: Colour = (86, 150, 200)
+BRAND, BRAND_ON_WHITE = (86, 150, 200), (31, 110, 165)
+"""Buttons and what is chosen, on a dark and on a light page: 4.5 : 1 at least as text on either."""
 
 VIRIDIS: tuple[Colour, ...] = (
     (68, 1, 84),

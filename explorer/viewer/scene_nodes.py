@@ -33,8 +33,10 @@ PLATE_MARGIN = 0.01
 """The plate goes on for at least this behind the centre of the farthest body [m]."""
 TEXT_AT, BAR_AT = math.radians(-38.0), math.radians(-74.0)
 """Azimuths of the radii that are written at the circles, and of the scale bar: in front of a camera as it begins."""
-TEXT_HEIGHT, TEXT_PIXELS = 11e-3, 64
+TEXT_HEIGHT, TEXT_PIXELS = 15e-3, 64
 """Of what is written on the plate: height of a line [m], and pixels for it."""
+STRETCHED = 1.6
+"""Letters are higher than wide by this, as on a road: they are mostly seen at a low angle."""
 BAR_LENGTH, BAR_RADIUS, BAR_THICKNESS = 0.05, 0.14, 2e-3
 """The scale bar on the plate and its distance from the axis [m]."""
 CORNERS = 72
@@ -123,7 +125,9 @@ class DrawnPlate:
         along = 0.5 * BAR_LENGTH / BAR_RADIUS * np.array([-1.0, 1.0])
         ends = np.column_stack([BAR_RADIUS * np.cos(BAR_AT + along), BAR_RADIUS * np.sin(BAR_AT + along), [LINE, LINE]])
         self._bar = server.scene.add_line_segments(f"{root}/rig/bar", ends[None], TEXT, thickness=BAR_THICKNESS)
-        self._bar_text = self._written("bar text", f"{100.0 * BAR_LENGTH:.0f} cm", BAR_RADIUS, BAR_AT)
+        self._bar_text = self._written(
+            "bar text", f"{100.0 * BAR_LENGTH:.0f} cm", BAR_RADIUS + 0.7 * TEXT_HEIGHT, BAR_AT
+        )
         self._labels: list[Any] = []
         self._size()
 
@@ -144,25 +148,26 @@ class DrawnPlate:
         self._disc.scale = (widened, widened, 1.0)
         for k in range(len(self._labels) + 1, ring_count(self._radius) + 1):
             radius = k * RING_SPACING
-            self._labels.append(self._written(f"radius {k}", f"r = {100.0 * radius:.0f} cm", radius, TEXT_AT))
+            text = f"r = {100.0 * radius:.0f} cm"
+            self._labels.append(self._written(f"radius {k}", text, radius - 0.6 * TEXT_HEIGHT, TEXT_AT))
         for k, label in enumerate(self._labels, start=1):
             label.visible = k <= ring_count(self._radius)
 
     def _written(self, name: str, text: str, radius: float, azimuth: float) -> Any:
-        """``text`` lying on the plate, inside of the circle of ``radius`` [m], to be read from there."""
-        pixels, place = text_pixels(text), radius - 0.6 * TEXT_HEIGHT
+        """``text`` lying on the plate with its middle at ``radius`` [m], to be read from outside."""
+        pixels = text_pixels(text)
         half = 0.5 * (azimuth + 0.5 * np.pi)
         return self._server.scene.add_image(
             f"{self._root}/rig/{name}",
             pixels,
-            TEXT_HEIGHT * pixels.shape[1] / pixels.shape[0],
+            TEXT_HEIGHT * pixels.shape[1] / pixels.shape[0] / STRETCHED,
             TEXT_HEIGHT,
             format="png",
             cast_shadow=False,
             receive_shadow=False,
             # viser's images face downward; so half a turn about their own x axis, then one about z.
             wxyz=(0.0, math.cos(half), math.sin(half), 0.0),
-            position=(place * math.cos(azimuth), place * math.sin(azimuth), LINE),
+            position=(radius * math.cos(azimuth), radius * math.sin(azimuth), LINE),
         )
 
 

@@ -216,11 +216,16 @@ def bar_html(look: Look, quantity: ColourQuantity | None, details: Numbered | No
 
 def key_html(bar: str, numbers: tuple[float, float, float], words: str) -> str:
     """A bar (HTML) with the numbers at its ends and its middle, and what it means in ``words`` (HTML)."""
-    ends = "".join(f"<span>{number:.{MOST_WRITTEN}g}</span>" for number in numbers)
+    ends = "".join(f"<span>{written(number)}</span>" for number in numbers)
     return (
         f"<div style='padding:0.2em 0.9em; font-size:13px'>{bar}"
         f"<div style='display:flex; justify-content:space-between'>{ends}</div><div>{words}</div></div>"
     )
+
+
+def written(number: float) -> str:
+    """A number beside a bar: three digits, and no power of ten below a million."""
+    return f"{number:.{MOST_WRITTEN}g}" if not 1e3 <= abs(number) < 1e6 else f"{number:.0f}"
 
 
 class ColourPanel:

@@ -72,10 +72,10 @@ def chain_radii(force: Array, details: Details, threshold: float) -> Array:
 
 
 def strongest(details: Details, threshold: float) -> float:
-    """Upper end of the key [N]: a round number near the largest of the forces that are drawn."""
-    strength = np.abs(details.normal_force).astype(np.float64)
-    drawn = strength[strength >= weakest(details, threshold)]
-    return nice_top(drawn) if len(drawn) else 1.0
+    """Upper end of the key [N]: a round number near the largest forces, and above the weakest one that is drawn."""
+    # One body that is jammed may press a hundred times as hard as the pile does: percentiles do not follow it.
+    top = nice_top(np.abs(details.normal_force).astype(np.float64))
+    return max(top, nice_top(np.array([2.0 * weakest(details, threshold)])))
 
 
 def weakest(details: Details, threshold: float) -> float:

@@ -22,10 +22,10 @@ import viser.uplot
 
 from explorer.live.frames import Frame
 from explorer.logs.recording import SAME_TIME, RecordedSurface, Recording
-from explorer.scene.meshes import GATE_NAME, PLATE_NAME, scene_height
+from explorer.scene.meshes import GATE_NAME, PLATE_NAME, outlet_height, scene_height
 from explorer.units import checked
 from explorer.viewer.actions import Action, Actions, FrameClock, Post, SliderHands, add_keys, button_group
-from explorer.viewer.look.camera import CameraPanel
+from explorer.viewer.look.camera import CameraPanel, pile_points
 from explorer.viewer.look.colour_by import ColourPanel
 from explorer.viewer.look.drawn_look import DrawnLook, DrawnNodes
 from explorer.viewer.look.look import in_sight
@@ -200,7 +200,7 @@ def moment_html(recording: Recording, time: float, playing: bool, notice: str = 
     lines = [f"{'playing' if playing else 'paused'} · {time:.3f} of {recording.times[-1]:.3f} s · {bodies} bodies"]
     happened = [f"{when:.3f} s  {text}" for when, text in recording.events if when <= time + 1e-9]
     lines += [notice] * bool(notice) + happened[: -EVENTS_SHOWN - 1 : -1]
-    return "<div style='padding:0 0.75em; font-size:0.82em'>" + "<br>".join(map(escape, lines)) + "</div>"
+    return small_html("<br>".join(map(escape, lines)))
 
 
 class Timeline:
@@ -256,7 +256,8 @@ class ReplayLook:
         self._colours = ColourPanel(server, bar, self._settings, self._frames.quantities, post, self._frames.note)
         CutPanel(server, self._settings, post)
         height = drawn_height(recording)
-        CameraPanel(server, post, lambda: height)
+        outlet = math.inf if recording.scene is None else outlet_height(recording.scene.rig)
+        CameraPanel(server, post, lambda: height, lambda: pile_points(self._frame, outlet))
         self._frame = self._frames.frame(1)
         self._motion: RecordedMotion | None = None
         self._told_for: object = None
