@@ -68,10 +68,10 @@ def chain_segments(
 
 def chain_radii(force: Array, details: Details, threshold: float) -> Array:
     """Radii [m] of lines of these forces [N]: proportional, up to the end of the key."""
-    return np.clip(THICKEST * force / strongest(details, threshold), THINNEST, THICKEST)
+    return np.clip(THICKEST * force / strongest_drawn(details, threshold), THINNEST, THICKEST)
 
 
-def strongest(details: Details, threshold: float) -> float:
+def strongest_drawn(details: Details, threshold: float) -> float:
     """Upper end of the key [N]: a round number near the largest forces, and above the weakest one that is drawn."""
     # One body that is jammed may press a hundred times as hard as the pile does: percentiles do not follow it.
     top = nice_top(np.abs(details.normal_force).astype(np.float64))
@@ -101,7 +101,7 @@ def chain_key(details: Details | None, look: Look) -> str:
     """What the thickness of the lines means: a wedge with its ends and its middle [mN]."""
     if not look.chains or details is None or details.touching == 0:
         return ""
-    top = MN * strongest(details, look.threshold)
+    top = MN * strongest_drawn(details, look.threshold)
     wedge = (
         "<svg viewBox='0 0 100 8' preserveAspectRatio='none' style='width:100%; height:0.9em; display:block' "
         "role='img' aria-label='thin to thick'><polygon points='0,4 100,0 100,8' fill='currentColor'/></svg>"

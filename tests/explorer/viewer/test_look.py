@@ -29,7 +29,7 @@ from explorer.viewer.look.force_chains import (
     chain_radii,
     chain_segments,
     chain_text,
-    strongest,
+    strongest_drawn,
 )
 from explorer.viewer.look.look import COMPONENT, CUTS, NOTHING, Look, in_sight
 from explorer.viewer.look.look_settings import CutPanel, LookSettings
@@ -226,8 +226,8 @@ def test_chains_go_from_centre_to_centre_and_are_as_thick_as_they_press():
     strong = segments[np.isclose(force, 5e-3)]
     np.testing.assert_allclose(strong, [[[0, 0, 0], [0.005, 0, 0]], [[0.005, 0, 0], [0.01, 0, 0]]])
     radius = chain_radii(force, DETAILS, 1.0)
-    assert radius / force == pytest.approx(THICKEST / strongest(DETAILS, 1.0))
-    assert strongest(DETAILS, 1.0) == pytest.approx(5e-3)
+    assert radius / force == pytest.approx(THICKEST / strongest_drawn(DETAILS, 1.0))
+    assert strongest_drawn(DETAILS, 1.0) == pytest.approx(5e-3)
     text = chain_text(DETAILS, Look(chains=True))
     assert "from 1 mN on. 3 of 40 contacts; their mean is 1 mN" in text
 
