@@ -1,12 +1,10 @@
-"""What a person takes along: bodies as a table, their shapes as a mesh, a picture as PNG, several files as one."""
+"""What a person takes along: bodies as a table, their shapes as a mesh, several files as one."""
 
 from __future__ import annotations
 
 import csv
 import io
-import struct
 import zipfile
-import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import cast
@@ -69,21 +67,6 @@ def zipped(files: Mapping[str, Path]) -> bytes:
         for name, path in files.items():
             entries.write(path, name)
     return archive.getvalue()
-
-
-def png(pixels: npt.NDArray[np.uint8]) -> bytes:
-    """An image of shape (height, width, 3 or 4), RGB or RGBA, as a PNG file (W3C, Portable Network Graphics, 2003)."""
-    height, width, channels = pixels.shape
-    colour_type = {3: 2, 4: 6}[channels]
-    # In front of every line of pixels stands its filter: 0, none.
-    lines = np.concatenate([np.zeros((height, 1), np.uint8), pixels.reshape(height, width * channels)], axis=1)
-    header = struct.pack(">IIBBBBB", width, height, 8, colour_type, 0, 0, 0)
-    chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(lines.tobytes())), (b"IEND", b""))
-    return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(name, content) for name, content in chunks)
-
-
-def _chunk(name: bytes, content: bytes) -> bytes:
-    return struct.pack(">I", len(content)) + name + content + struct.pack(">I", zlib.crc32(name + content))
 
 
 def _placed(shape: Triangles, frame: Frame, k: int) -> npt.NDArray[np.float64]:

@@ -6,6 +6,7 @@
     curves/<plot>/<name>        scalars, the unit in the name
     log                         events
     parameters, outcome         Markdown: what was poured, and what came out
+    scene                       the scene at the beginning, as the text of a material file
 
 Timelines: ``sim_time`` [s] and ``step``. Poses are single precision: an f32 position of 0.1 m resolves 7 nm.
 """
@@ -36,6 +37,7 @@ from explorer.scene.meshes import (
     rig_triangles,
     scene_height,
 )
+from explorer.scene.text import material_toml
 from explorer.viewer.palette import GLASS, PLATE, component_colour
 from solver import Scene
 from solver.observables import Value
@@ -154,6 +156,7 @@ class PourLog:
         self._stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         document = parameters_document(self._scene, seed)
         self._stream.log("parameters", rr.TextDocument(document, media_type="text/markdown"), static=True)
+        self._stream.log("scene", rr.TextDocument(material_toml(self._scene)), static=True)
         for curve in CURVES:
             self._stream.log(curve_entity(curve), rr.SeriesLines(names=curve.name), static=True)
         self._rig = rig_triangles(self._scene.rig)

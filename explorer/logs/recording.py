@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from solver.scenes.scene import Scene
+
 Array = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
 
@@ -17,6 +19,8 @@ SAME_TIME = 1e-6
 """[s]; recorded times are whole nanoseconds, those of a slider rounded to this."""
 FRAME_INTERVAL = 0.02
 """Simulated time [s] between frames that are kept."""
+SOON = 0.1
+"""A recording that begins within this of a pour's beginning holds the pour from its beginning on [s]."""
 BODIES = "/world/bodies/"
 WORLD = "/world/"
 
@@ -101,6 +105,27 @@ class Recording:
     parameters: str
     outcome: str
     """Markdown, as is ``parameters``; empty where the pour was cut off."""
+    scene: Scene | None = None
+    """What was poured, as it was at the beginning; None where the file does not hold it."""
+
+    @property
+    def zero(self) -> float:
+        """When its pour began [s], or where the file begins amid a pour its first frame."""
+        first = [float(times[0]) for times in (self.times, *(times for times, _ in self.curves.values())) if len(times)]
+        return 0.0 if min(first + [time for time, _ in self.events[:1]]) <= SOON else float(self.times[0])
+
+    def counted_from(self, zero: float) -> Recording:
+        """The same with all times as those since ``zero`` [s]."""
+        return replace(
+            self,
+            times=self.times - zero,
+            components=tuple(replace(one, times=one.times - zero) for one in self.components),
+            surfaces=tuple(
+                replace(one, times=one.times - zero, shown_from=one.shown_from - zero) for one in self.surfaces
+            ),
+            curves={name: (times - zero, values) for name, (times, values) in self.curves.items()},
+            events=tuple((time - zero, text) for time, text in self.events),
+        )
 
 
 @dataclass(frozen=True)

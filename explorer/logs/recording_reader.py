@@ -5,6 +5,7 @@ A file of a killed writer is read up to the last frame that was written out.
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,6 +30,8 @@ from explorer.logs.recording import (
     index_at,
 )
 from explorer.logs.replay import check_recording
+from solver.scenes.material_file import scene_from
+from solver.scenes.scene import Scene
 
 Array = npt.NDArray[np.float64]
 Floats = npt.NDArray[np.float32]
@@ -72,7 +75,20 @@ def read_recording(path: Path) -> Recording:
         tuple(events),
         _document(found, "/parameters"),
         _document(found, "/outcome"),
+        _scene(_document(found, "/scene"), {component.shape.name for component in components}),
     )
+
+
+def _scene(text: str, poured: set[str]) -> Scene | None:
+    """The scene that ``text`` (TOML) declares.
+
+    None where there is none, or none that can be read: a mesh that is a file elsewhere, a key of another version.
+    """
+    try:
+        scene = scene_from(tomllib.loads(text), Path("scene.toml")) if text else None
+    except (ValueError, OSError):
+        return None
+    return scene if scene is not None and poured <= {body.name for body in scene.bodies} else None
 
 
 def _columns(path: Path) -> dict[str, dict[str, _Rows]]:

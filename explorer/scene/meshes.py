@@ -89,6 +89,17 @@ def scene_height(scene: Scene) -> float:
     return max(*tops, min(feed.floor + scene.insertion.region_height, feed.ceiling), float(poses[:, 2].max()))
 
 
+def outlet_height(rig: Rig) -> float:
+    """Height of the lowest rim of a shell before ``rig`` acts [m]; 0 where it has none: what it feeds lies below."""
+    rims = rim_circles(rig)
+    rings = [
+        _in_world(surface, np.array([(r, 0.0, z), (-r, 0.0, z), (0.0, r, z), (0.0, -r, z)]))[:, 2].min()
+        for name, surface in zip(rig.surface_names, rig.surfaces(), strict=True)
+        for r, z in rims.get(name, ())
+    ]
+    return float(min(rings, default=0.0))
+
+
 def _in_world(surface: Surface, points: npt.NDArray[Any]) -> Array:
     turn = rotation_matrix(np.array(surface.pose.quaternion))
     placed: Array = points @ turn.T + np.array(surface.pose.origin)

@@ -31,7 +31,11 @@ PLATE: Colour = (74, 82, 92)
 
 RING: Colour = (110, 122, 135)
 
-BRAND: Colour = (86, 150, 200)
+TEXT: Colour = (214, 221, 228)
+"""What is written on the plate."""
+
+BRAND, BRAND_ON_WHITE = (86, 150, 200), (31, 110, 165)
+"""Buttons and what is chosen, on a dark and on a light page: 4.5 : 1 at least as text on either."""
 
 VIRIDIS: tuple[Colour, ...] = (
     (68, 1, 84),
@@ -49,8 +53,13 @@ VIRIDIS: tuple[Colour, ...] = (
 
 SELECTED: Colour = (255, 255, 255)
 
-CHAINS: tuple[Colour, ...] = ((150, 190, 230), (240, 228, 66), (213, 94, 0))
-"""Lines of weak, middling and strong contacts; their thickness tells them apart as well."""
+STILL: Colour = (206, 210, 214)
+"""Bodies of which a coloured quantity has nothing to tell: at rest, without contact."""
+
+CORE: Colour = (255, 255, 255)
+
+HALO: Colour = (16, 18, 22)
+"""Rim of the lines in the scene: with it they are seen before bodies, plate and page, dark or light."""
 
 SRGB_GAMMA = 2.2
 

@@ -5,17 +5,20 @@ The bodies' nodes serve a live pour and a recording alike.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
+import trimesh
 import viser
+from PIL import Image, ImageDraw, ImageFont
 
 from explorer.live.frames import Frame
 from explorer.scene.meshes import GATE_NAME, PLATE_NAME, body_triangles, rig_poses, rig_triangles, rim_circles
-from explorer.viewer.palette import GLASS, PLATE, RIM, RING, Colour, component_colour, linear
+from explorer.viewer.palette import GLASS, HALO, PLATE, RIM, RING, TEXT, Colour, component_colour, linear
 from solver.scenes.scene import Scene, body_counts
 
 Array = npt.NDArray[np.float64]
@@ -25,11 +28,23 @@ FINE = 2000
 RING_SPACING = 0.05
 """Circles on the plate, a scale for the eye [m]."""
 PLATE_RADIUS = 0.2
-"""Radius of the disc that stands for the infinite plate [m]."""
+"""Radius of the disc that stands for the infinite plate [m]; where a body lies farther out, it is larger."""
+PLATE_MARGIN = 0.01
+"""The plate goes on for at least this behind the centre of the farthest body [m]."""
+TEXT_AT, BAR_AT = math.radians(-38.0), math.radians(-74.0)
+"""Azimuths of the radii that are written at the circles, and of the scale bar: in front of a camera as it begins."""
+TEXT_HEIGHT, TEXT_PIXELS = 15e-3, 64
+"""Of what is written on the plate: height of a line [m], and pixels for it."""
+STRETCHED = 1.6
+"""Letters are higher than wide by this, as on a road: they are mostly seen at a low angle."""
+BAR_LENGTH, BAR_RADIUS, BAR_THICKNESS = 0.05, 0.14, 2e-3
+"""The scale bar on the plate and its distance from the axis [m]."""
 CORNERS = 72
 """Corners of a circle on the plate and of a rim."""
 LINE = 8e-4
 """Thickness of lines [m]."""
+TUBE_SIDES, RIM_WIDER = 8, 1.5
+"""Sides of a tube, and the radius of its rim as a multiple of its own."""
 CLEAR, OPACITY = 0.16, {GATE_NAME: 0.5}
 """Opacity of what one has to look through: all surfaces but the plate."""
 
@@ -52,6 +67,7 @@ class SceneNodes:
         self._rig = rig_nodes(server, scene, root)
         self._surface_names, self._at_first = scene.rig.surface_names, rig_poses(scene.rig)
         self._surfaces = self._at_first
+        self._plate = DrawnPlate(server, self._rig[PLATE_NAME], root) if PLATE_NAME in self._rig else None
 
     def show(self, frame: Frame, seen: npt.NDArray[np.bool_] | None = None) -> None:
         """Move bodies and surfaces to where ``frame`` has them; call it inside ``server.atomic()``.
@@ -59,6 +75,8 @@ class SceneNodes:
         ``seen`` says which bodies are drawn, shape (n,); by default all that are in the domain.
         """
         self._show_surfaces(frame.surfaces)
+        if self._plate is not None:
+            self._plate.reach(plate_radius(frame))
         self.bodies.show(frame, seen)
 
     def fade(self, opacity: float) -> None:
@@ -69,6 +87,8 @@ class SceneNodes:
     def clear(self) -> None:
         """Hide all bodies, surfaces where they were: a new pour has not begun to fall yet."""
         self._show_surfaces(self._at_first)
+        if self._plate is not None:
+            self._plate.reach(PLATE_RADIUS)
         self.bodies.clear()
 
     def _show_surfaces(self, poses: Array) -> None:
@@ -88,8 +108,167 @@ class SceneNodes:
     def remove(self) -> None:
         """Take all nodes off the page."""
         self.bodies.remove()
+        if self._plate is not None:
+            self._plate.remove()
         for node in self._rig.values():
             node.remove()
+
+
+class DrawnPlate:
+    """The disc that stands for the infinite plate, its mesh in ``disc``; circles, their radii and a bar as a scale."""
+
+    def __init__(self, server: viser.ViserServer, disc: Any, root: str = "") -> None:
+        self._server, self._disc, self._root = server, disc, root
+        self._radius = PLATE_RADIUS
+        self._of_mesh = float(np.hypot(*disc.vertices[:, :2].T).max())
+        self._rings = server.scene.add_line_segments(f"{root}/rig/scale", rings(PLATE_RADIUS), RING, thickness=LINE)
+        along = 0.5 * BAR_LENGTH / BAR_RADIUS * np.array([-1.0, 1.0])
+        ends = np.column_stack([BAR_RADIUS * np.cos(BAR_AT + along), BAR_RADIUS * np.sin(BAR_AT + along), [LINE, LINE]])
+        self._bar = server.scene.add_line_segments(f"{root}/rig/bar", ends[None], TEXT, thickness=BAR_THICKNESS)
+        self._bar_text = self._written(
+            "bar text", f"{100.0 * BAR_LENGTH:.0f} cm", BAR_RADIUS + 0.7 * TEXT_HEIGHT, BAR_AT
+        )
+        self._labels: list[Any] = []
+        self._size()
+
+    def reach(self, radius: float) -> None:
+        """Make it as large as ``radius`` [m]; call it inside ``server.atomic()``."""
+        if radius != self._radius:
+            self._radius = radius
+            self._rings.points = rings(radius).astype(np.float32)
+            self._size()
+
+    def remove(self) -> None:
+        """Take the scale off the page; the disc belongs to the rig."""
+        for node in (self._rings, self._bar, self._bar_text, *self._labels):
+            node.remove()
+
+    def _size(self) -> None:
+        widened = self._radius / self._of_mesh
+        self._disc.scale = (widened, widened, 1.0)
+        for k in range(len(self._labels) + 1, ring_count(self._radius) + 1):
+            radius = k * RING_SPACING
+            text = f"r = {100.0 * radius:.0f} cm"
+            self._labels.append(self._written(f"radius {k}", text, radius - 0.6 * TEXT_HEIGHT, TEXT_AT))
+        for k, label in enumerate(self._labels, start=1):
+            label.visible = k <= ring_count(self._radius)
+
+    def _written(self, name: str, text: str, radius: float, azimuth: float) -> Any:
+        """``text`` lying on the plate with its middle at ``radius`` [m], to be read from outside."""
+        pixels = text_pixels(text)
+        half = 0.5 * (azimuth + 0.5 * np.pi)
+        return self._server.scene.add_image(
+            f"{self._root}/rig/{name}",
+            pixels,
+            TEXT_HEIGHT * pixels.shape[1] / pixels.shape[0] / STRETCHED,
+            TEXT_HEIGHT,
+            format="png",
+            cast_shadow=False,
+            receive_shadow=False,
+            # viser's images face downward; so half a turn about their own x axis, then one about z.
+            wxyz=(0.0, math.cos(half), math.sin(half), 0.0),
+            position=(radius * math.cos(azimuth), radius * math.sin(azimuth), LINE),
+        )
+
+
+def text_pixels(text: str) -> npt.NDArray[np.uint8]:
+    """``text`` in the colour of the scale on nothing, as RGBA, shape (TEXT_PIXELS, width, 4)."""
+    font = ImageFont.load_default(0.8 * TEXT_PIXELS)
+    left, _, right, _ = font.getbbox(text)
+    image = Image.new("RGBA", (math.ceil(right - left), TEXT_PIXELS), (*TEXT, 0))
+    ImageDraw.Draw(image).text((-left, 0.5 * TEXT_PIXELS), text, (*TEXT, 255), font, anchor="lm")
+    return np.asarray(image)
+
+
+def plate_radius(frame: Frame) -> float:
+    """Radius [m] of the plate under ``frame``: the circle beyond its farthest body, at least ``PLATE_RADIUS``."""
+    reach = np.hypot(*frame.position[frame.inside, :2].T.astype(np.float64)).max(initial=0.0)
+    return max(PLATE_RADIUS, RING_SPACING * ring_count(float(reach) + PLATE_MARGIN + RING_SPACING))
+
+
+def ring_count(radius: float) -> int:
+    """How many circles a plate of this radius [m] holds, one at its rim included."""
+    return int(radius / RING_SPACING + 1e-9)
+
+
+def rings(radius: float) -> Array:
+    """The circles on a plate of this radius [m] as line segments, shape (n, 2, 3)."""
+    # Above the plate by the lines' thickness, so that they are not lost in it.
+    return np.concatenate([circle(k * RING_SPACING, LINE) for k in range(1, ring_count(radius) + 1)])
+
+
+class Tubes:
+    """Lines in the scene as thick as their numbers say, each with a dark rim: legible before anything.
+
+    The rim is a wider tube of which only the far inside is drawn, so it stands out on both sides of the line.
+    """
+
+    def __init__(self, server: viser.ViserServer, name: str, colour: Colour) -> None:
+        self._server, self._name, self._colour = server, name, colour
+        self._nodes: list[Any] = []
+        self._room = 0
+
+    def show(self, segments: npt.NDArray[np.floating[Any]], radius: npt.NDArray[np.floating[Any]]) -> None:
+        """Draw ``segments``, shape (n, 2, 3), with the radii (n,) [m]; call it inside ``server.atomic()``."""
+        n = len(segments)
+        if n == 0:
+            self.hide()
+            return
+        if n > self._room:
+            self.remove()
+            self._room = 1 << (n - 1).bit_length()
+            self._nodes = [self._node("core", self._colour, "front"), self._node("rim", HALO, "back")]
+        places = tube_places(segments, radius, self._room)
+        for node, wider in zip(self._nodes, (1.0, RIM_WIDER), strict=True):
+            node.batched_positions, node.batched_wxyzs = places.position, places.quaternion
+            node.batched_scales = places.scale * np.array([wider, wider, 1.0], dtype=np.float32)
+            node.visible = True
+
+    def hide(self) -> None:
+        """Draw nothing."""
+        for node in self._nodes:
+            if node.visible:
+                node.visible = False
+
+    def remove(self) -> None:
+        """Take the nodes off the page."""
+        for node in self._nodes:
+            node.remove()
+        self._nodes, self._room = [], 0
+
+    def _node(self, part: str, colour: Colour, side: Literal["front", "back"]) -> Any:
+        mesh, none = trimesh.creation.cylinder(1.0, 1.0, TUBE_SIDES), hidden_poses(self._room)
+        return self._server.scene.add_batched_meshes_simple(
+            f"{self._name}/{part}",
+            mesh.vertices,
+            mesh.faces,
+            batched_wxyzs=none.quaternion,
+            batched_positions=none.position,
+            batched_scales=np.zeros((self._room, 3), dtype=np.float32),
+            batched_colors=linear(colour),
+            lod="off",
+            side=side,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+
+
+def tube_places(
+    segments: npt.NDArray[np.floating[Any]], radius: npt.NDArray[np.floating[Any]], room: int
+) -> InstancePoses:
+    """Poses and scales (room, 3) that lay a cylinder of radius 1 and height 1 about z along each of ``segments``."""
+    poses, n = hidden_poses(room), len(segments)
+    along = segments[:, 1] - segments[:, 0]
+    length = np.linalg.norm(along, axis=1)
+    x, y, z = (along / np.where(length > 0.0, length, 1.0)[:, None]).T
+    # Half way from z to the direction; one that points straight down is half a turn about x.
+    turn = np.column_stack([1.0 + z, -y, x, np.zeros(n)])
+    turn[1.0 + z < 1e-9] = (0.0, 1.0, 0.0, 0.0)
+    poses.position[:n] = segments.mean(axis=1)
+    poses.quaternion[:n] = turn / np.linalg.norm(turn, axis=1, keepdims=True)
+    scale = np.zeros((room, 3), dtype=np.float32)
+    scale[:n] = np.column_stack([radius, radius, length])
+    return InstancePoses(poses.position, poses.quaternion, scale)
 
 
 class BodyNodes:
@@ -194,7 +373,7 @@ class InstancePoses:
     quaternion: npt.NDArray[np.float32]
     """wxyz, shape (n, 4)."""
     scale: npt.NDArray[np.float32]
-    """Size of a body relative to its mesh, or 0, shape (n,)."""
+    """Size of a body relative to its mesh, or 0, shape (n,); of a tube (n, 3)."""
 
 
 def component_poses(frame: Frame, component: int, n: int, seen: npt.NDArray[np.bool_] | None = None) -> InstancePoses:
@@ -219,17 +398,15 @@ def hidden_poses(n: int) -> InstancePoses:
 
 
 def rig_nodes(server: viser.ViserServer, scene: Scene, root: str = "") -> dict[str, Any]:
-    """Nodes of the rig by name: its surfaces with the rims of shells, and circles on the plate as a scale."""
+    """Nodes of the rig's surfaces by name, with the rims of shells."""
     nodes: dict[str, Any] = {}
     poses, rims = rig_poses(scene.rig), rim_circles(scene.rig)
     for (name, mesh), pose in zip(rig_triangles(scene.rig).items(), poses, strict=True):
         clear = name != PLATE_NAME
-        widened = 1.0 if clear else PLATE_RADIUS / float(np.hypot(*mesh.vertices[:, :2].T).max())
         nodes[name] = server.scene.add_mesh_simple(
             f"{root}/rig/{name}",
             mesh.vertices,
             mesh.faces,
-            scale=(widened, widened, 1.0),
             color=GLASS if clear else PLATE,
             opacity=OPACITY.get(name, CLEAR) if clear else None,
             **drawn(name),
@@ -241,7 +418,7 @@ def rig_nodes(server: viser.ViserServer, scene: Scene, root: str = "") -> dict[s
             ends = np.concatenate([circle(radius, height) for radius, height in rims[name]])
             # Below the surface's node: it moves, and goes, with that.
             server.scene.add_line_segments(f"{root}/rig/{name}/rims", ends, RIM, thickness=LINE)
-    return nodes | (_scale(server, root) if PLATE_NAME in nodes else {})
+    return nodes
 
 
 def drawn(name: str) -> dict[str, Any]:
@@ -258,13 +435,6 @@ def drawn(name: str) -> dict[str, Any]:
 def seen_through(name: str) -> bool:
     """Whether a surface of the rig fades as a person wants it: all but the plate, and those with their own opacity."""
     return name != PLATE_NAME and name not in OPACITY
-
-
-def _scale(server: viser.ViserServer, root: str) -> dict[str, Any]:
-    radii = np.arange(RING_SPACING, PLATE_RADIUS + 1e-9, RING_SPACING)
-    # Above the plate by the lines' thickness, so that they are not lost in it.
-    rings = np.concatenate([circle(radius, LINE) for radius in radii])
-    return {"scale": server.scene.add_line_segments(f"{root}/rig/scale", rings, RING, thickness=LINE)}
 
 
 def circle(radius: float, height: float) -> Array:

@@ -13,7 +13,8 @@ COLOURS = """() => Object.entries(window.__viserSceneTree.getState())
     .filter(([name, node]) => /^.bodies.\\d+$/.test(name) && node?.message?.props?.batched_colors)
     .sort().flatMap(([name, node]) => Array.from(node.message.props.batched_colors))"""
 FORCES = """() => Object.entries(window.__viserSceneTree.getState())
-    .filter(([name, node]) => /^.forces.\\d+$/.test(name) && node?.message?.props?.points?.length > 6).length"""
+    .filter(([name, node]) => name === "/forces/core" && node?.message?.props?.batched_scales)
+    .flatMap(([name, node]) => Array.from(node.message.props.batched_scales)).filter(scale => scale > 0).length"""
 
 
 def press(page, key):  # noqa: F811

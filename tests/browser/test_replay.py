@@ -128,3 +128,42 @@ def test_keys_colour_the_bodies_and_cut_them_away(page):
     for _ in range(2):  # x below, x above
         press(page, "x")
     wait_for(lambda: page.evaluate(SEEN) == 1)
+
+
+TEXTS = """() => {
+  const linear = c => { c /= 255; return c <= 0.04045 ? c / 12.92 : Math.pow((c + 0.055) / 1.055, 2.4); };
+  const numbers = s => (s.match(/[\\d.]+/g) || [0, 0, 0, 0]).map(Number);
+  const parsed = s => numbers(s).length > 3 ? numbers(s) : [...numbers(s), 1];
+  const over = (c, below) => [0, 1, 2].map(i => c[i] * c[3] + below[i] * (1 - c[3]));
+  const light = c => 0.2126 * linear(c[0]) + 0.7152 * linear(c[1]) + 0.0722 * linear(c[2]);
+  const found = [], walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (walker.nextNode()) {
+    const text = walker.currentNode.textContent.trim(), holder = walker.currentNode.parentElement;
+    if (!text || ["SCRIPT", "STYLE"].includes(holder.tagName) || !holder.getClientRects().length) continue;
+    let opacity = 1, ground = [];
+    for (let e = holder; e; e = e.parentElement) {
+      opacity *= Number(getComputedStyle(e).opacity);
+      if (!ground.length || ground.at(-1)[3] < 1) ground.push(parsed(getComputedStyle(e).backgroundColor));
+    }
+    const below = ground.reverse().reduce((under, c) => over(c, under), [255, 255, 255]);
+    const style = getComputedStyle(holder);
+    const colour = parsed(style.color), drawn = light(over([...colour.slice(0, 3), colour[3] * opacity], below));
+    const [dark, bright] = [drawn, light(below)].sort((a, b) => a - b);
+    found.push([text, (bright + 0.05) / (dark + 0.05), parseFloat(style.fontSize), style.letterSpacing]);
+  }
+  return found;
+}"""
+"""Each text with its contrast (WCAG 2.2), size [px] and spacing; texts in charts are pixels, and not among them."""
+
+
+def test_texts_are_read_on_a_dark_and_on_a_light_page(page):
+    for _ in range(2):
+        for name in ("Replay", "Look"):
+            page.get_by_role("tab", name=name).click()
+            page.wait_for_timeout(500)
+            found = page.evaluate(TEXTS)
+            assert len(found) > 10
+            assert [one for one in found if one[1] < 4.5] == []
+            assert {round(size) for _, _, size, _ in found} <= {13, 15, 28}
+            assert {spacing for *_, spacing in found} == {"normal"}
+        page.get_by_text("Dark page").click()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from typing import Any
@@ -10,6 +11,8 @@ import numpy as np
 import numpy.typing as npt
 import viser
 
+from explorer.live.frames import Frame
+from explorer.units import InputError
 from explorer.viewer.actions import ClientAction, Post, add_client_key, client_buttons
 from explorer.viewer.guarded_server import address
 from explorer.viewer.view import VIEW_DIRECTION, VIEW_FIELD, CameraView, view_from
@@ -27,6 +30,11 @@ DIRECTIONS: Mapping[str, tuple[float, float, float]] = {
 STILL = 1e-5
 """A body that has moved by less than this [m] does not move the camera."""
 LINK = "Link to this view"
+FRAME_PILE, FRAME_KEY = "Frame the pile", "5"
+FRAMED = 0.9
+"""Share of the picture that the pile takes, across or upright."""
+BODY_REACH = 0.01
+"""A body reaches as far as this from its centre [m], for a picture of the pile."""
 VIEW_KEYS: dict[str, Any] = dict(zip(DIRECTIONS, ("1", "2", "3", "4"), strict=True))
 
 
@@ -37,21 +45,37 @@ class CameraPanel:
         server: the page.
         post: where actions go.
         height: tells how high it is what has to be in the picture [m].
+        pile: tells where the bodies of the pile are [m], shape (n, 3).
         leaves: is told of a browser whose camera goes to a preset.
     """
 
     def __init__(
-        self, server: viser.ViserServer, post: Post, height: Callable[[], float], leaves: ClientAction = lambda _: None
+        self,
+        server: viser.ViserServer,
+        post: Post,
+        height: Callable[[], float],
+        pile: Callable[[], Array],
+        leaves: ClientAction = lambda _: None,
     ) -> None:
-        self._server, self._height, self._leaves = server, height, leaves
+        self._server, self._height, self._pile, self._leaves = server, height, pile, leaves
         gui = server.gui
         acts = {name: partial(self._look_from, name) for name in DIRECTIONS}
         with gui.add_folder("Camera"):
             client_buttons(gui, "View", acts, post, hint="Keys 1, 2, 3, 4.")
+            framed = gui.add_button(
+                FRAME_PILE, hint=f"The heap and its strays fill the picture, without the rig. Key {FRAME_KEY}."
+            )
             link = gui.add_button(LINK, hint="Puts the address of what you see into the field below.")
             self._link: Any = gui.add_text("Address", "", hint="Opens the page with this view.")
         for name, key in VIEW_KEYS.items():
             add_client_key(gui, f"View: {name.lower()}", key, acts[name], post)
+
+        add_client_key(gui, FRAME_PILE, FRAME_KEY, self._frame_pile, post)
+
+        @framed.on_click
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client is not None:
+                post(partial(self._frame_pile, event.client))
 
         @link.on_click
         def _(event: viser.GuiEvent[Any]) -> None:
@@ -62,6 +86,15 @@ class CameraPanel:
         self._leaves(client)
         go_to(client, view_of(self._height(), name))
 
+    def _frame_pile(self, client: Any) -> None:
+        points = self._pile()
+        if not len(points):
+            raise InputError("frame the pile: no body is there yet")
+        self._leaves(client)
+        camera = client.camera
+        aspect = camera.image_width / max(camera.image_height, 1) or 1.0
+        go_to_place(client, framing(points, camera.position - camera.look_at, camera.fov, aspect))
+
     def _show_link(self, client: Any) -> None:
         self._link.value = link_to(self._server, client.camera)
 
@@ -69,6 +102,36 @@ class CameraPanel:
 def view_of(height: float, name: str) -> CameraView:
     """The preset ``name``: everything up to ``height`` [m] in one picture."""
     return view_from(DIRECTIONS[name], height)
+
+
+def framing(points: Array, direction: Array, field: float, aspect: float) -> CameraView:
+    """From ``direction`` (pile to camera), so near that ``points`` (n, 3) with a body around each are just in sight.
+
+    Args:
+        points: [m].
+        direction: of any length; straight from above or below it is tilted a little, to know which way is up.
+        field: vertical field of view [rad].
+        aspect: width of the picture over its height.
+    """
+    back = np.asarray(direction, dtype=np.float64) + np.array([0.0, -1e-3 * np.linalg.norm(direction), 0.0])
+    back /= np.linalg.norm(back)
+    right = np.cross([0.0, 0.0, 1.0], back)
+    right /= np.linalg.norm(right)
+    axes = np.array([right, np.cross(back, right), back])
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    across, upright, depth = axes @ (points - middle).T
+    slope = FRAMED * math.tan(0.5 * field)
+    distance = depth + np.maximum((abs(across) + BODY_REACH) / (slope * aspect), (abs(upright) + BODY_REACH) / slope)
+    return CameraView(middle + float(distance.max()) * back, middle)
+
+
+def pile_points(frame: Frame | None, outlet: float) -> Array:
+    """Where the bodies of ``frame`` are that have left the rig, below its ``outlet`` [m]; where none have, all."""
+    if frame is None:
+        return np.zeros((0, 3))
+    points = frame.position[frame.inside].astype(np.float64)
+    below = points[points[:, 2] < outlet]
+    return below if len(below) else points
 
 
 def go_to(client: Any, view: CameraView) -> None:

@@ -16,15 +16,22 @@ from explorer.units import checked
 from explorer.viewer.actions import Post, add_keys
 from explorer.viewer.look.look import COMPONENT, Look
 from explorer.viewer.look.look_settings import LookSettings, one_of
-from explorer.viewer.palette import SELECTED, VIRIDIS, css, linear, linear_all, mapped
+from explorer.viewer.palette import SELECTED, STILL, VIRIDIS, css, linear, linear_all, mapped
 
 Array = npt.NDArray[np.float64]
 
-TOP_PERCENTILE = 99.0
-"""An automatic range reaches to here: a single fast body must not make all others look the same."""
+LOW_PERCENTILE, TOP_PERCENTILE = 2.0, 98.0
+"""An automatic range reaches from here to there: a single fast body must not make all others look the same."""
+
+MOST_DECADES = 4.0
+"""A logarithmic range spans no more than this by itself."""
+
+MOST_WRITTEN = 3
+"""Significant digits of a number beside a bar."""
 
 NICE = (1.0, 2.0, 5.0, 10.0)
 
+RESET = "Reset the range"
 COLOUR_KEY, NEXT_COLOUR = "C", "Colour by the next quantity"
 
 LARGEST = 1e6
@@ -54,10 +61,20 @@ class ColourQuantity:
     """One number in SI per body, out of what is known of them at a moment."""
     meaning: str = ""
     """In a few words, where the name does not say it all."""
+    least: float = 0.0
+    """An automatic range is at least this wide, in the unit of the screen: noise is not to have all colours."""
+    still: float = -math.inf
+    """Bodies below this, in the unit of the screen, are grey."""
+    still_words: str = ""
+    """What these are."""
 
     def shown(self, details: Numbered) -> Array:
         """One number per body in the unit of the screen, shape (n,)."""
         return self.per_si * np.asarray(self.read(details), dtype=np.float64)
+
+
+STILL_SPEED, STILL_WORDS = 1e-3, "at rest: below 1 mm/s"
+"""Speed [m/s] below which a body is grey, and what the key says of it."""
 
 
 def _speed(details: Details) -> npt.NDArray[Any]:
@@ -69,19 +86,60 @@ def _residence(details: Details) -> npt.NDArray[Any]:
 
 
 QUANTITIES: Mapping[str, ColourQuantity] = {
-    "speed": ColourQuantity("m/s", 1.0, _speed),
-    "contact force": ColourQuantity("mN", 1e3, lambda details: details.load, "sum of the normal forces on a body"),
-    "coordination number": ColourQuantity(
-        "", 1.0, lambda details: details.neighbours, "other bodies that a body touches"
+    "speed": ColourQuantity("m/s", 1.0, _speed, least=0.01, still=STILL_SPEED, still_words=STILL_WORDS),
+    "contact force": ColourQuantity(
+        "mN", 1e3, lambda details: details.load, "sum of the normal forces on a body", 0.1, 1e-6, "no contact"
     ),
-    "residence time": ColourQuantity("s", 1.0, _residence, "time since a body entered"),
+    "coordination number": ColourQuantity(
+        "", 1.0, lambda details: details.neighbours, "other bodies that a body touches", 1.0
+    ),
+    "residence time": ColourQuantity("s", 1.0, _residence, "time since a body entered", 0.1),
 }
 """Of a live pour."""
 
 
-def colour_range(look: Look, values: Array) -> tuple[float, float]:
-    """Ends of the colours in the unit of the screen: fixed, or from 0 to a round number near the largest value."""
-    return (0.0, nice_top(values)) if look.automatic else (look.low, look.high)
+def colour_range(look: Look, quantity: ColourQuantity, values: Array) -> tuple[float, float]:
+    """Ends of the colours in the unit of the screen: fixed, or percentiles of ``values``, rounded outward.
+
+    Those that are grey do not count. A logarithmic range begins above 0: where its lower end is not, it is
+    ``MOST_DECADES`` below the upper one.
+    """
+    low, high = (look.low, look.high) if not look.automatic else _percentiles(look, quantity, values)
+    if look.logarithmic:
+        high = high if high > 0.0 else 1.0
+        low = low if 0.0 < low < high else high / 10.0**MOST_DECADES
+    return low, high
+
+
+def _percentiles(look: Look, quantity: ColourQuantity, values: Array) -> tuple[float, float]:
+    least = max(quantity.still, 0.0 if look.logarithmic else -math.inf)
+    told = values[np.isfinite(values) & (values > least)]
+    if not len(told):
+        return 0.0, quantity.least or 1.0
+    low, high = (float(end) for end in np.percentile(told, (LOW_PERCENTILE, TOP_PERCENTILE)))
+    if look.logarithmic:
+        low = max(low, high / 10.0**MOST_DECADES)
+        return _rounded(low, low, math.floor), _rounded(high, high, math.ceil)
+    low = min(low, high - max(quantity.least, 1e-6 * abs(high), 1e-12))
+    if low < 0.0 <= told.min():
+        low, high = 0.0, max(high, quantity.least)
+    return _rounded(low, high - low, math.floor), _rounded(high, high - low, math.ceil)
+
+
+def _rounded(number: float, span: float, way: Callable[[float], int]) -> float:
+    """``number`` up or down (``way``) to a digit that is a tenth to a hundredth of ``span``."""
+    digit = math.floor(math.log10(span)) - 1
+    # A hair: what is round already stays.
+    hair = 1e-9 if way is math.floor else -1e-9
+    return round(way(number / 10.0**digit + hair) * 10.0**digit, max(0, -digit))
+
+
+def shares(look: Look, ends: tuple[float, float], values: Array) -> Array:
+    """Where ``values`` lie between the ``ends`` of the colours, 0 … 1."""
+    low, high = ends
+    if look.logarithmic:
+        return np.asarray(np.log(np.maximum(values, low) / low) / math.log(high / low), dtype=np.float64)
+    return (values - low) / (high - low)
 
 
 def nice_top(values: Array) -> float:
@@ -114,31 +172,60 @@ def body_colours(
     painted = plain.copy()
     if quantity is not None and details is not None:
         values = quantity.shown(details)[: len(painted)]
-        low, high = colour_range(look, values)
-        known = np.flatnonzero(np.isfinite(values))
-        painted[known] = linear_all(mapped((values[known] - low) / (high - low)))
+        ends, known = colour_range(look, quantity, values), np.flatnonzero(np.isfinite(values))
+        painted[known] = linear_all(mapped(shares(look, ends, values[known])))
+        painted[known[values[known] < quantity.still]] = linear(STILL)
     if selected is not None and selected < len(painted):
         painted[selected] = linear(SELECTED)
     return painted
 
 
+@dataclass(frozen=True)
+class ColourKey:
+    """What the colours of bodies mean, for the page and for a picture."""
+
+    title: str
+    """The quantity with its unit."""
+    meaning: str
+    numbers: tuple[float, float, float]
+    """At the lower end of the colours, in their middle, and at the upper end."""
+    still: str
+    """What grey bodies are; empty where there can be none."""
+
+
+def colour_key(look: Look, quantity: ColourQuantity, details: Numbered | None) -> ColourKey:
+    """The key to the colours of :func:`body_colours`."""
+    values = quantity.shown(details) if details is not None else np.zeros(0)
+    low, high = colour_range(look, quantity, values)
+    middle = math.sqrt(low * high) if look.logarithmic else 0.5 * (low + high)
+    unit = f" [{quantity.unit}]" if quantity.unit else ""
+    return ColourKey(f"{look.colour_by}{unit}", quantity.meaning, (low, middle, high), quantity.still_words)
+
+
 def bar_html(look: Look, quantity: ColourQuantity | None, details: Numbered | None) -> str:
-    """The bar below the choice of colours: the map, its ends, the quantity with its unit."""
+    """The bar below the choice of colours: the map, its ends and middle, the quantity with its unit, what is grey."""
     if quantity is None:
         return ""
-    values = quantity.shown(details) if details is not None else np.zeros(0)
-    low, high = colour_range(look, values)
-    stops = ", ".join(css(colour) for colour in VIRIDIS)
-    unit = f" [{quantity.unit}]" if quantity.unit else ""
-    meaning = f": {quantity.meaning}" if quantity.meaning else ""
-    middle = 0.5 * (low + high)
-    ends = "".join(f"<span>{number:.4g}</span>" for number in (low, middle, high))
+    key, stops = colour_key(look, quantity, details), ", ".join(css(colour) for colour in VIRIDIS)
+    bar = f"<div style='height:0.9em; border-radius:0.2em; background:linear-gradient(to right, {stops})'></div>"
+    swatch = f"<span style='display:inline-block; width:0.8em; height:0.8em; background:{css(STILL)}'></span>"
+    words = key.title + (f": {key.meaning}" if key.meaning else "")
+    words += " (logarithmic)" if look.logarithmic else ""
+    return key_html(bar, key.numbers, words + (f" · {swatch} {key.still}" if key.still else ""))
+
+
+def key_html(bar: str, numbers: tuple[float, float, float], words: str) -> str:
+    """A bar (HTML) with the numbers at its ends and its middle, and what it means in ``words`` (HTML)."""
+    ends = "".join(f"<span>{written(number)}</span>" for number in numbers)
     return (
-        "<div style='padding:0.2em 0.9em; font-size:0.82em'>"
-        f"<div style='height:0.9em; border-radius:0.2em; background:linear-gradient(to right, {stops})'></div>"
-        f"<div style='display:flex; justify-content:space-between'>{ends}</div>"
-        f"<div style='opacity:0.75'>{look.colour_by}{unit}{meaning}</div></div>"
+        f"<div style='padding:0.2em 0.9em; font-size:13px'>{bar}"
+        f"<div style='display:flex; justify-content:space-between'>{ends}</div><div>{words}</div></div>"
     )
+
+
+def written(number: float) -> str:
+    """A number beside a bar: three digits, and no power of ten below a million."""
+    return f"{number:.{MOST_WRITTEN}g}" if not 1e3 <= abs(number) < 1e6 else f"{number:.0f}"
 
 
 class ColourPanel:
@@ -162,20 +249,28 @@ class ColourPanel:
             hint = f"What the colour of a body says. Key {COLOUR_KEY}: the next one.{' ' if note else ''}{note}"
             self._colour = gui.add_dropdown("Colour by", choices, hint=hint)
             self._automatic = gui.add_checkbox(
-                "Automatic range", True, hint="From 0 to a round number near the largest value."
+                "Automatic range",
+                True,
+                hint=f"Follows the values: from their {LOW_PERCENTILE:g} % to their {TOP_PERCENTILE:g} % percentile.",
+            )
+            self._logarithmic = gui.add_checkbox(
+                "Logarithmic", False, hint="The same ratio of two values is the same step of colour."
             )
             self._low, self._high = (
                 gui.add_number(label, end, min=-LARGEST, max=LARGEST, step=STEP, hint="In the unit of the bar.")
                 for label, end in (("From", look.low), ("To", look.high))
             )
+            self._reset = gui.add_button(RESET, hint="Automatic and linear, as at first.")
         settings.bind(
             self._colour, lambda look: look.colour_by, lambda sent: {"colour_by": one_of(sent, choices, "colour by")}
         )
         settings.bind(
             self._automatic, lambda look: look.automatic, lambda sent: {**self._ends(), "automatic": sent is True}
         )
+        settings.bind(self._logarithmic, lambda look: look.logarithmic, lambda sent: {"logarithmic": sent is True})
         settings.listen(self._low, lambda sent: self._fixed(low=checked(sent, -LARGEST, LARGEST, "from")))
         settings.listen(self._high, lambda sent: self._fixed(high=checked(sent, -LARGEST, LARGEST, "to")))
+        self._reset.on_click(lambda _: post(lambda: settings.change(automatic=True, logarithmic=False)))
         add_keys(gui, {NEXT_COLOUR: lambda: settings.next("colour_by", choices)}, {NEXT_COLOUR: COLOUR_KEY}, post)
 
     @property
@@ -183,16 +278,16 @@ class ColourPanel:
         """What the colours tell; None: the component."""
         return self._quantities.get(self._settings.look.colour_by)
 
-    def show(self, details: Numbered | None) -> None:
-        """Draw the bar; call it inside ``server.atomic()``."""
+    def show(self, details: Numbered | None, more: str = "") -> None:
+        """Draw the bar, and ``more`` below it; call it inside ``server.atomic()``."""
         look, quantity = self._settings.look, self.quantity
-        bar = bar_html(look, quantity, details)
+        bar = bar_html(look, quantity, details) + more
         if self._bar.content != bar:
             self._bar.content, self._bar.visible = bar, bool(bar)
         if look.automatic and quantity is not None and details is not None:
             # The boxes follow, so that a person who fixes the range begins with the one that is on the screen.
             boxes: tuple[Any, ...] = (self._low, self._high)
-            for box, end in zip(boxes, colour_range(look, quantity.shown(details)), strict=True):
+            for box, end in zip(boxes, colour_range(look, quantity, quantity.shown(details)), strict=True):
                 if box.value != end:
                     box.value = end
 

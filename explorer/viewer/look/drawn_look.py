@@ -60,7 +60,7 @@ class DrawnLook:
     ) -> None:
         """Colours as in :func:`body_colours`, opacities and shadows."""
         values = details.number if details is not None and quantity is not None else 0
-        colours = (look.colour_by, look.automatic, look.low, look.high)
+        colours = (look.colour_by, look.automatic, look.logarithmic, look.low, look.high)
         painted = (id(nodes), frame.generation, len(frame.component), colours, values, selected)
         if painted != self._painted_for:
             self._painted_for = painted

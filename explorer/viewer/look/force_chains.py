@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 import viser
@@ -13,16 +10,20 @@ from explorer.live.details import Details
 from explorer.live.frames import Frame
 from explorer.units import checked
 from explorer.viewer.actions import Post, add_keys
+from explorer.viewer.look.colour_by import key_html, nice_top
 from explorer.viewer.look.look import Look
 from explorer.viewer.look.look_settings import LookSettings
-from explorer.viewer.palette import CHAINS
+from explorer.viewer.palette import CORE
+from explorer.viewer.scene_nodes import Tubes
 
+Array = npt.NDArray[np.float64]
 Segments = npt.NDArray[np.float32]
 
-STRONGER = (1.0, 2.0, 4.0)
-"""Where the classes of force begin, as multiples of the threshold."""
-THICKNESS = (6e-4, 1.2e-3, 2.4e-3)
-"""Thickness of the lines of each class [m]."""
+MN = 1e3
+"""Millinewtons per newton."""
+
+THICKEST, THINNEST = 1.6e-3, 2e-4
+"""Radius [m] of the line of a contact at the upper end of the key, and at least."""
 LEAST_SHARE = 1e-9
 """Contacts that do not press at all are no part of a chain, even with a threshold of 0 (share of the mean force)."""
 CHAINS_KEY, FORCE_CHAINS = "K", "Force chains"
@@ -31,50 +32,50 @@ MOST_TIMES_MEAN = 5.0
 
 
 class ForceChains:
-    """One node of lines per class of force."""
+    """Tubes, as thick as the contacts press."""
 
     def __init__(self, server: viser.ViserServer) -> None:
-        nowhere = np.zeros((1, 2, 3), dtype=np.float32)
-        self._nodes: list[Any] = [
-            server.scene.add_line_segments(f"/forces/{k}", nowhere, colour, thickness=thickness, visible=False)
-            for k, (colour, thickness) in enumerate(zip(CHAINS, THICKNESS, strict=True))
-        ]
+        self._tubes = Tubes(server, "/forces", CORE)
 
     def show(self, frame: Frame, seen: npt.NDArray[np.bool_], details: Details, threshold: float) -> None:
         """Draw the contacts of bodies in sight; call it inside ``server.atomic()``."""
-        for node, segments in zip(self._nodes, chain_segments(frame, seen, details, threshold), strict=True):
-            if len(segments):
-                node.points = segments
-            node.visible = len(segments) > 0
+        segments, force = chain_segments(frame, seen, details, threshold)
+        self._tubes.show(segments, chain_radii(force, details, threshold))
 
     def hide(self) -> None:
         """Draw nothing."""
-        for node in self._nodes:
-            node.visible = False
+        self._tubes.hide()
 
 
 def chain_segments(
     frame: Frame, seen: npt.NDArray[np.bool_], details: Details, threshold: float
-) -> tuple[Segments, ...]:
-    """Lines (k, 2, 3) [m] of each class: contacts with |F_n| ≥ ``threshold`` · mean, from the centres to the point.
+) -> tuple[Segments, Array]:
+    """Lines (k, 2, 3) [m] and their forces (k,) [N]: contacts with |F_n| ≥ ``threshold`` · mean, centre to point.
 
     Contacts of bodies that are not ``seen``, shape (n,), are left out; a contact with the rig has one line.
     """
-    strength = np.abs(details.normal_force)
+    strength = np.abs(details.normal_force).astype(np.float64)
     n, between = len(frame.position), details.partner >= 0
-    there = (details.body < n) & (details.partner < n)
-    there &= seen[np.where(there, details.body, 0)] & (~between | seen[np.where(there & between, details.partner, 0)])
-    edges = [weakest(details, threshold) * factor for factor in STRONGER] + [np.inf]
-    classes = []
-    for low, high in pairwise(edges):
-        mine = there & (strength >= low) & (strength < high)
-        both = mine & between
-        ends = [
-            np.stack([frame.position[details.body[mine]], details.point[mine]], axis=1),
-            np.stack([details.point[both], frame.position[details.partner[both]]], axis=1),
-        ]
-        classes.append(np.concatenate(ends).astype(np.float32))
-    return tuple(classes)
+    mine = (details.body < n) & (details.partner < n) & (strength >= weakest(details, threshold))
+    mine &= seen[np.where(mine, details.body, 0)] & (~between | seen[np.where(mine & between, details.partner, 0)])
+    both = mine & between
+    ends = [
+        np.stack([frame.position[details.body[mine]], details.point[mine]], axis=1),
+        np.stack([details.point[both], frame.position[details.partner[both]]], axis=1),
+    ]
+    return np.concatenate(ends).astype(np.float32), np.concatenate([strength[mine], strength[both]])
+
+
+def chain_radii(force: Array, details: Details, threshold: float) -> Array:
+    """Radii [m] of lines of these forces [N]: proportional, up to the end of the key."""
+    return np.clip(THICKEST * force / strongest_drawn(details, threshold), THINNEST, THICKEST)
+
+
+def strongest_drawn(details: Details, threshold: float) -> float:
+    """Upper end of the key [N]: a round number near the largest forces, and above the weakest one that is drawn."""
+    # One body that is jammed may press a hundred times as hard as the pile does: percentiles do not follow it.
+    top = nice_top(np.abs(details.normal_force).astype(np.float64))
+    return max(top, nice_top(np.array([2.0 * weakest(details, threshold)])))
 
 
 def weakest(details: Details, threshold: float) -> float:
@@ -91,9 +92,21 @@ def chain_text(details: Details | None, look: Look) -> str:
     low = weakest(details, look.threshold)
     drawn = int((np.abs(details.normal_force) >= low).sum())
     return (
-        f"Lines: normal force from {1e3 * low:.3g} mN on; thicker from {2e3 * low:.3g} and {4e3 * low:.3g} mN. "
-        f"{drawn} of {details.touching} contacts; their mean is {1e3 * details.mean_force:.3g} mN."
+        f"Lines: normal force from {1e3 * low:.3g} mN on. {drawn} of {details.touching} contacts; "
+        f"their mean is {1e3 * details.mean_force:.3g} mN."
     )
+
+
+def chain_key(details: Details | None, look: Look) -> str:
+    """What the thickness of the lines means: a wedge with its ends and its middle [mN]."""
+    if not look.chains or details is None or details.touching == 0:
+        return ""
+    top = MN * strongest_drawn(details, look.threshold)
+    wedge = (
+        "<svg viewBox='0 0 100 8' preserveAspectRatio='none' style='width:100%; height:0.9em; display:block' "
+        "role='img' aria-label='thin to thick'><polygon points='0,4 100,0 100,8' fill='currentColor'/></svg>"
+    )
+    return key_html(wedge, (0.0, 0.5 * top, top), "normal force [mN]: thickness of the lines")
 
 
 class ForcePanel:

@@ -29,6 +29,8 @@ class Look:
     colour_by: str = COMPONENT
     automatic: bool = True
     """The range of the colours follows the values."""
+    logarithmic: bool = False
+    """Colours go with the logarithm of a value."""
     low: float = 0.0
     """Lower end of a fixed range of the colours, in the unit of the screen."""
     high: float = 1.0

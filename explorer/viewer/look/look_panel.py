@@ -5,17 +5,18 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import viser
 
 from explorer.live.details import Details
 from explorer.live.frames import Frame
-from explorer.scene.meshes import scene_height
+from explorer.scene.meshes import outlet_height, scene_height
 from explorer.units import InputError
 from explorer.viewer.actions import ClientAction, Post, add_client_key, client_buttons
-from explorer.viewer.look.camera import CameraPanel, go_along
+from explorer.viewer.look.camera import CameraPanel, go_along, pile_points
 from explorer.viewer.look.colour_by import QUANTITIES, ColourPanel
 from explorer.viewer.look.drawn_look import DrawnLook
-from explorer.viewer.look.force_chains import ForceChains, ForcePanel
+from explorer.viewer.look.force_chains import ForceChains, ForcePanel, chain_key
 from explorer.viewer.look.inspector import body_html, nearest_hit
 from explorer.viewer.look.look import in_sight
 from explorer.viewer.look.look_settings import CutPanel
@@ -53,7 +54,7 @@ class LookPanel(Panel):
         self._drawn: Frame | None = None
         self._chained_for: object = None
         self._told_for: object = None
-        CameraPanel(server, post, lambda: scene_height(session.status().scene), self._stay)
+        CameraPanel(server, post, lambda: scene_height(session.status().scene), self._pile, self._stay)
         self._add_inspector(post)
 
     def _add_inspector(self, post: Post) -> None:
@@ -136,7 +137,7 @@ class LookPanel(Panel):
         if told == self._told_for:
             return
         self._told_for = told
-        self._colours.show(details)
+        self._colours.show(details, chain_key(details, self._settings.look))
         self._forces.show(details)
         self._text.content = body_html(self._status.scene, frame, details, self._selected)
 
@@ -183,6 +184,9 @@ class LookPanel(Panel):
         clients = self._server.get_clients()
         self._followers &= set(clients)
         go_along((clients[number] for number in self._followers), frame.position[self._selected].astype(float))
+
+    def _pile(self) -> npt.NDArray[np.float64]:
+        return pile_points(self._drawn, outlet_height(self._scene.rig))
 
     def _stay(self, client: Any) -> None:
         """The camera of ``client`` goes along with no body any longer."""

@@ -9,19 +9,18 @@ from typing import Any
 import viser
 
 from explorer.errors import CommandError
-from explorer.files.exports import bodies_csv, bodies_stl, png
+from explorer.files.exports import bodies_csv, bodies_stl
 from explorer.live.frames import Frame
 from explorer.scene.source import SceneSource, command_line
 from explorer.scene.text import material_toml
+from explorer.viewer.look.colour_by import QUANTITIES, colour_key
+from explorer.viewer.look.force_chains import MN, strongest_drawn
+from explorer.viewer.output.picture import Legend, PicturePanel
 from explorer.viewer.output.send_file import send_file
+from explorer.viewer.palette import component_colour
 from explorer.viewer.panel import EXPORT, Now, PageContext, Panel
 from explorer.viewer.view import small_html
 from solver.scenes.scene import Scene
-
-LARGEST_PICTURE = (1440, 2560)
-"""Height and width [pixels]."""
-RENDER_WAIT = 30.0
-"""Seconds that a browser has to draw a picture."""
 
 
 class OutputPanel(Panel):
@@ -40,12 +39,13 @@ class OutputPanel(Panel):
             "Scene (TOML)": ("A material file that every command takes, with rig and parameters.", self._scene),
             "Bodies (CSV)": ("Component, mass, place and orientation of every body, SI.", self._bodies),
             "Bodies (STL)": ("True shapes of all bodies where they are, in millimetres.", self._mesh),
-            "Picture (PNG)": ("The scene as this browser shows it, without the panels.", self._picture),
         }
         self._exports = {}
         for label, (hint, act) in hints.items():
             self._exports[label] = gui.add_button(label, hint=hint)
             self._listen(self._exports[label], act)
+        self._look = page.look
+        self._picture = PicturePanel(gui, page.post, page.background, self._picture_name, self._legend)
 
     def show(self, now: Now) -> None:
         """The command line of what is on the screen."""
@@ -80,30 +80,25 @@ class OutputPanel(Panel):
             "making the mesh", lambda: bodies_stl(frame, scene), lambda made: send_file(client, name, made)
         )
 
-    def _picture(self, client: Any) -> None:
-        name = f"picture_{self._session.status().time:.3f}s.png"
-        self._background.start(
-            "taking the picture", lambda: picture(client), lambda made: send_file(client, name, made)
-        )
+    def _picture_name(self) -> str:
+        return f"picture_{self._session.status().time:.3f}s.png"
+
+    def _legend(self) -> Legend:
+        """What the picture shows at present."""
+        look, details = self._look.look, self._session.details()
+        strongest = MN * strongest_drawn(details, look.threshold) if look.chains and details is not None else None
+        if look.colour_by in QUANTITIES:
+            return Legend(colours=colour_key(look, QUANTITIES[look.colour_by], details), strongest=strongest)
+        frame, scene = self._session.frame(), self._session.status().scene
+        there = set() if frame is None else set(frame.component[frame.inside].tolist())
+        names = [(body.name, component_colour(k)) for k, body in enumerate(scene.bodies) if k in there]
+        return Legend(names, strongest=strongest)
 
     def _drawn(self) -> tuple[Frame, Scene]:
         frame = self._session.frame()
         if frame is None:
             raise CommandError("no body has entered yet")
         return frame, self._session.status().scene
-
-
-def picture(client: Any) -> bytes:
-    """The scene as ``client`` sees it, as PNG; CommandError where its browser does not draw it."""
-    height, width = client.camera.image_height, client.camera.image_width
-    shrink = min(1.0, LARGEST_PICTURE[0] / max(height, 1), LARGEST_PICTURE[1] / max(width, 1))
-    if height < 1 or width < 1:
-        raise CommandError("picture: the browser has not told its size yet")
-    try:
-        pixels = client.get_render(round(shrink * height), round(shrink * width), timeout=RENDER_WAIT)
-    except (RuntimeError, TimeoutError) as error:
-        raise CommandError(f"picture: the browser did not draw it: {' '.join(str(error).split())[:120]}") from None
-    return png(pixels)
 
 
 def command_html(source: SceneSource, scene: Scene, seed: int) -> str:

@@ -11,9 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from explorer.live.frames import Frame
+from explorer.live.frames import NO_SURFACES, Frame
 from explorer.logs.recording import SAME_TIME, Component, Instances, Recording, index_at
-from explorer.viewer.look.colour_by import ColourQuantity
+from explorer.scene.meshes import rig_poses
+from explorer.viewer.look.colour_by import STILL_SPEED, STILL_WORDS, ColourQuantity
+from solver.scenes.scene import Scene
 
 Array = npt.NDArray[np.float64]
 
@@ -22,10 +24,14 @@ NOT_TOLD = "This one is older: it does not say which body is which, so there are
 
 
 class RecordedFrames:
-    """Frames of ``recording``, numbered from 1, component by component; bodies that have left are not in them."""
+    """Frames of ``recording``, numbered from 1, component by component; bodies that have left are not in them.
+
+    Components are numbered as in the recording's scene; where it holds none, in the order of the file.
+    """
 
     def __init__(self, recording: Recording) -> None:
         self._recording = recording
+        self._kinds = component_numbers(recording)
         told = tells_who_is_who(recording)
         self.quantities: Mapping[str, ColourQuantity] = QUANTITIES if told else {}
         """What the bodies can be coloured by."""
@@ -40,7 +46,7 @@ class RecordedFrames:
     def frame(self, number: int) -> Frame:
         """All bodies of one frame."""
         time, there = self._at(number)
-        kinds = np.repeat(np.arange(len(there)), [len(one.scale) for one in there])
+        kinds = np.repeat(self._kinds, [len(one.scale) for one in there])
         return Frame(
             number=number,
             generation=1,
@@ -50,7 +56,17 @@ class RecordedFrames:
             component=kinds.astype(np.int32),
             inside=np.ones(len(kinds), dtype=bool),
             scale=np.concatenate([one.scale for one in there]),
+            surfaces=NO_SURFACES if self._recording.scene is None else self._surfaces(self._recording.scene, time),
         )
+
+    def _surfaces(self, scene: Scene, time: float) -> Array:
+        """Poses of the rig's surfaces at ``time`` [s], as in ``rig_poses``."""
+        placed = {surface.shape.name: surface.pose_at(time) for surface in self._recording.surfaces}
+        poses = rig_poses(scene.rig)
+        for row, name in enumerate(scene.rig.surface_names):
+            pose = placed.get(name)
+            poses[row] = poses[row] if pose is None else pose
+        return poses
 
     def motion(self, number: int) -> RecordedMotion:
         """What its bodies can be coloured by; call it for recordings that have ``quantities`` only."""
@@ -77,12 +93,28 @@ class RecordedMotion:
 
 
 QUANTITIES: Mapping[str, ColourQuantity] = {
-    "speed": ColourQuantity("m/s", 1.0, lambda motion: motion.speed, "mean from the frame before to the one after"),
+    "speed": ColourQuantity(
+        "m/s",
+        1.0,
+        lambda motion: motion.speed,
+        "mean from the frame before to the one after",
+        0.01,
+        STILL_SPEED,
+        STILL_WORDS,
+    ),
     "residence time": ColourQuantity(
-        "s", 1.0, lambda motion: motion.residence, "time since a body is first in the recording"
+        "s", 1.0, lambda motion: motion.residence, "time since a body is first in the recording", 0.1
     ),
 }
 """Of a recording that says in every frame which body is which."""
+
+
+def component_numbers(recording: Recording) -> list[int]:
+    """Number of each component of ``recording`` in its scene, or in the file."""
+    if recording.scene is None:
+        return list(range(len(recording.components)))
+    names = [body.name for body in recording.scene.bodies]
+    return [names.index(component.shape.name) for component in recording.components]
 
 
 def tells_who_is_who(recording: Recording) -> bool:

@@ -1,7 +1,8 @@
 """``explorer serve --replay``: a recording on the page, with a time slider, keys, curves, the log and the look.
 
-A replay plays at a speed, stops at the end, and steps from frame to frame. Its bodies and surfaces are those in the
-file, in their own meshes and colours; colours, cut, rig and cameras have the live page's controls.
+A replay plays at a speed, stops at the end, and steps from frame to frame. It is drawn by the live page's nodes for
+the scene that the file holds; an older file holds none, and its bodies and surfaces are drawn in the meshes and colours
+that it has. Colours, cut, rig and cameras have the live page's controls.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import math
 import threading
 import time as clock
+from collections.abc import Sequence
 from functools import partial
 from html import escape
 from typing import Any
@@ -19,31 +21,44 @@ import viser
 import viser.uplot
 
 from explorer.live.frames import Frame
-from explorer.logs.recording import Recording
+from explorer.logs.recording import SAME_TIME, RecordedSurface, Recording
+from explorer.scene.meshes import GATE_NAME, PLATE_NAME, outlet_height, scene_height
 from explorer.units import checked
 from explorer.viewer.actions import Action, Actions, FrameClock, Post, SliderHands, add_keys, button_group
-from explorer.viewer.look.camera import CameraPanel
+from explorer.viewer.look.camera import CameraPanel, pile_points
 from explorer.viewer.look.colour_by import ColourPanel
-from explorer.viewer.look.drawn_look import DrawnLook
+from explorer.viewer.look.drawn_look import DrawnLook, DrawnNodes
 from explorer.viewer.look.look import in_sight
 from explorer.viewer.look.look_settings import CutPanel, LookSettings
 from explorer.viewer.palette import ANGLE_LINE, CONTACTS_LINE, ENERGY_LINE, MASS_LINE
 from explorer.viewer.pour.chart import LEAST_TOP_DEG, axis
 from explorer.viewer.replay.recorded_frames import RecordedFrames, RecordedMotion
-from explorer.viewer.scene_nodes import BodyNodes, DrawnComponent, drawn, seen_through
+from explorer.viewer.scene_nodes import (
+    BodyNodes,
+    DrawnComponent,
+    DrawnPlate,
+    SceneNodes,
+    drawn,
+    plate_radius,
+    seen_through,
+)
 from explorer.viewer.shell.timeline import FASTEST, SLOWEST
-from explorer.viewer.view import DARK, ThemeSwitch, apply_theme, light, look_at_height
+from explorer.viewer.view import DARK, ThemeSwitch, apply_theme, light, look_at_height, small_html
+from solver.scenes.scene import Scene
 
 Array = npt.NDArray[np.float64]
 
 FRAME_INTERVAL = 1.0 / 30.0
 """Wall time [s] between two looks at the replay."""
 EVENTS_SHOWN = 6
+NO_SCENE = "This recording is older and does not hold its scene: the rig is drawn as the file has it, without rims."
 PLAY_PAUSE, TO_START, BACK, STEP = "Play / pause (space)", "To start (R)", "◀ frame (←)", "frame ▶ (→)"
 HAIR = 1e-6
 """Time [s] by which the end of a chart moves to and fro."""
 SLIDER_STEP = 1e-3
-"""Step of the time slider [s]; about as fine as frames lie."""
+"""Step of the time slider [s]; finer than frames lie."""
+LEAST_AXIS = 0.1
+"""Times of a chart go to here [s] at least: between closer numbers there is no room."""
 CURVES = (
     ("angle_of_repose_deg", "angle [°]", ANGLE_LINE),
     ("discharged_mass_g", "mass [g]", MASS_LINE),
@@ -57,15 +72,20 @@ class ReplayPage:
     """What a browser sees of ``recording``."""
 
     def __init__(self, server: viser.ViserServer, recording: Recording, name: str) -> None:
+        zero = recording.zero
+        recording = recording.counted_from(zero)
         self._server, self._recording = server, recording
-        self._timeline, self._actions = Timeline(recording.times), Actions()
+        self._timeline, self._actions = Timeline(np.union1d(0.0, recording.times)), Actions()
         self._notice = ""
         light(server)
-        look_at_height(server, highest(recording))
+        look_at_height(server, drawn_height(recording))
         self._shown, self._turn = math.nan, 0
         apply_theme(server, DARK)
         server.gui.main_panel.dock_right()
         server.gui.add_markdown(f"**Replay** of `{name.replace('`', '')}`")
+        notes = [f"It begins {zero:.3f} s after the pour did; times count from there."] * (zero > 0.0)
+        notes += [NO_SCENE] * (recording.scene is None)
+        self._notes = server.gui.add_html(small_html("<br>".join(notes)) if notes else "", visible=bool(notes))
         colour_bar = server.gui.add_html("", visible=False)
         tabs = server.gui.add_tab_group()
         with tabs.add_tab("Replay", viser.Icon.PLAYER_PLAY):
@@ -95,14 +115,15 @@ class ReplayPage:
         add_keys(gui, acts, {PLAY_PAUSE: "space", TO_START: "R"}, post)
         arrows = {BACK: "arrowleft", STEP: "arrowright"}
         add_keys(gui, acts, arrows, SliderHands(self._server).unless_on_a_slider(post))
-        last = max(timeline.last, timeline.first + SLIDER_STEP)
-        self._slider = gui.add_slider("Time [s]", timeline.first, last, SLIDER_STEP, timeline.first)
+        # A whole number of steps: viser writes the ends, and what is in the box, with as many digits as they have.
+        last = round(SLIDER_STEP * max(1, math.ceil((timeline.last - SAME_TIME) / SLIDER_STEP)), 3)
+        self._slider = gui.add_slider("Time [s]", 0.0, last, SLIDER_STEP, 0.0)
 
         @self._slider.on_update
         def _(event: viser.GuiEvent[Any]) -> None:
             if event.client_id is not None:
                 value = event.target.value
-                self._actions.post(lambda: timeline.go_to(checked(value, timeline.first, last, "time")))
+                self._actions.post(lambda: timeline.go_to(checked(value, 0.0, last, "time")))
 
         speed = gui.add_slider("Speed", SLOWEST, FASTEST, SLOWEST, 1.0, hint="Recorded seconds per second.")
 
@@ -131,17 +152,17 @@ class ReplayPage:
             self._look.show(time)
             if time != self._shown:
                 self._shown = time
-                self._slider.value = round(time, 6)  # type: ignore[misc]
+                self._slider.value = round(time, 3)  # type: ignore[misc]
                 self._turn += 1
                 for name, plot in self._plots:
-                    plot.data = columns(*self._recording.curves[name], time, self._turn)
+                    plot.data = columns(*self._recording.curves[name], time, self._timeline.last, self._turn)
         text = moment_html(self._recording, time, self._timeline.playing, self._notice)
         if self._text.content != text:
             self._text.content = text
 
 
 def _plot(server: viser.ViserServer, recording: Recording, name: str, label: str, colour: str) -> tuple[str, Any]:
-    data = columns(*recording.curves[name], recording.times[0])
+    data = columns(*recording.curves[name], 0.0, float(recording.times[-1]))
     top = LEAST_TOP_DEG if name == "angle_of_repose_deg" else float(np.nanmax(data[1], initial=1.0))
     plot = server.gui.add_uplot(
         data,
@@ -158,18 +179,19 @@ def _plot(server: viser.ViserServer, recording: Recording, name: str, label: str
     return name, plot
 
 
-def columns(times: Array, values: Array, now: float, turn: int = 0) -> tuple[Array, Array, Array]:
-    """Times, values, and the value at ``now`` [s] alone, NaN elsewhere; the last row is no point of the curve.
+def columns(times: Array, values: Array, now: float, last: float, turn: int = 0) -> tuple[Array, Array, Array]:
+    """Times, values, and the value at ``now`` [s] alone, NaN elsewhere; the first and the last row are no points.
 
+    They stretch all charts over the same times, from 0 to ``last`` [s].
     A chart lays its axes out anew only when the range of its times changes. The first data may come before the chart
     knows its size, and would leave it without numbers; so the end moves by a hair at every ``turn``.
     """
-    marked = np.full(len(times) + 1, np.nan)
+    marked = np.full(len(times) + 2, np.nan)
     k = int(np.searchsorted(times, now, side="right")) - 1
     if k >= 0:
-        marked[k] = values[k]
-    end = times[-1] + HAIR * (1 + turn % 2) if len(times) else 0.0
-    return np.append(times, end), np.append(values, np.nan), marked
+        marked[k + 1] = values[k]
+    end = max(last, LEAST_AXIS) + HAIR * (1 + turn % 2)
+    return np.array([0.0, *times, end]), np.array([np.nan, *values, np.nan]), marked
 
 
 def moment_html(recording: Recording, time: float, playing: bool, notice: str = "") -> str:
@@ -178,7 +200,7 @@ def moment_html(recording: Recording, time: float, playing: bool, notice: str = 
     lines = [f"{'playing' if playing else 'paused'} · {time:.3f} of {recording.times[-1]:.3f} s · {bodies} bodies"]
     happened = [f"{when:.3f} s  {text}" for when, text in recording.events if when <= time + 1e-9]
     lines += [notice] * bool(notice) + happened[: -EVENTS_SHOWN - 1 : -1]
-    return "<div style='padding:0 0.75em; font-size:0.82em'>" + "<br>".join(map(escape, lines)) + "</div>"
+    return small_html("<br>".join(map(escape, lines)))
 
 
 class Timeline:
@@ -229,12 +251,13 @@ class ReplayLook:
     """Draws the frames of ``recording`` as a person wants to see them; ``bar`` explains the colours."""
 
     def __init__(self, server: viser.ViserServer, recording: Recording, bar: viser.GuiHtmlHandle, post: Post) -> None:
-        self._frames, self._nodes = RecordedFrames(recording), ReplayNodes(server, recording)
+        self._frames, self._nodes = RecordedFrames(recording), replay_nodes(server, recording)
         self._settings, self._on_page = LookSettings(post), DrawnLook(server)
         self._colours = ColourPanel(server, bar, self._settings, self._frames.quantities, post, self._frames.note)
         CutPanel(server, self._settings, post)
-        height = highest(recording)
-        CameraPanel(server, post, lambda: height)
+        height = drawn_height(recording)
+        outlet = math.inf if recording.scene is None else outlet_height(recording.scene.rig)
+        CameraPanel(server, post, lambda: height, lambda: pile_points(self._frame, outlet))
         self._frame = self._frames.frame(1)
         self._motion: RecordedMotion | None = None
         self._told_for: object = None
@@ -257,8 +280,28 @@ class ReplayLook:
             self._colours.show(self._motion)
 
 
-class ReplayNodes:
-    """Nodes of one recording."""
+def replay_nodes(server: viser.ViserServer, recording: Recording) -> DrawnNodes:
+    """The live page's nodes if ``recording`` holds its scene, else those of the meshes in the file."""
+    if recording.scene is None:
+        return MeshNodes(server, recording)
+    return RecordedSceneNodes(server, recording.scene, recording.surfaces)
+
+
+class RecordedSceneNodes(SceneNodes):
+    """Nodes of ``scene``; its gate is there as long as it was among the recorded ``surfaces``."""
+
+    def __init__(self, server: viser.ViserServer, scene: Scene, surfaces: Sequence[RecordedSurface]) -> None:
+        super().__init__(server, scene)
+        self._gates = [surface for surface in surfaces if surface.shape.name == GATE_NAME]
+
+    def show(self, frame: Frame, seen: npt.NDArray[np.bool_] | None = None) -> None:
+        """Draw the state of ``frame``, gate included. Call it inside ``server.atomic()``."""
+        super().show(frame, seen)
+        self.show_gate(any(gate.seen_at(frame.time) for gate in self._gates))
+
+
+class MeshNodes:
+    """Nodes of a recording that does not hold its scene."""
 
     def __init__(self, server: viser.ViserServer, recording: Recording) -> None:
         self.bodies = BodyNodes(server, [DrawnComponent(c.shape, c.shape.colour, c.most) for c in recording.components])
@@ -276,10 +319,14 @@ class ReplayNodes:
             )
             for surface in recording.surfaces
         ]
+        plates = [node for surface, node in self._surfaces if surface.shape.name == PLATE_NAME]
+        self._plate = DrawnPlate(server, plates[0]) if plates else None
 
     def show(self, frame: Frame, seen: npt.NDArray[np.bool_] | None = None) -> None:
         """Draw the state of ``frame``; ``seen`` says which bodies are drawn. Call it inside ``server.atomic()``."""
         self.bodies.show(frame, seen)
+        if self._plate is not None:
+            self._plate.reach(plate_radius(frame))
         for surface, node in self._surfaces:
             node.visible = surface.seen_at(frame.time)
             pose = surface.pose_at(frame.time)
@@ -293,8 +340,10 @@ class ReplayNodes:
                 node.opacity = opacity
 
 
-def highest(recording: Recording) -> float:
-    """Height of the rig [m], or of the bodies where there is none but a plate."""
+def drawn_height(recording: Recording) -> float:
+    """What a picture of it all reaches up to [m]; without a scene the top of the rig, or of the bodies."""
+    if recording.scene is not None:
+        return scene_height(recording.scene)
     tops = [float(s.shape.vertices[:, 2].max()) for s in recording.surfaces]
     tops += [float(f.position[:, 2].max()) for c in recording.components for f in c.frames if len(f.scale)]
     return max(float(np.max(tops)), 1e-3)

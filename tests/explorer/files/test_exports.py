@@ -5,12 +5,11 @@ import io
 from dataclasses import replace
 
 import numpy as np
-import PIL.Image
 import pytest
 import trimesh
 
 from explorer.errors import CommandError
-from explorer.files.exports import bodies_csv, bodies_stl, png
+from explorer.files.exports import bodies_csv, bodies_stl
 from solver import load_material
 from tests.explorer.beads import MASS, RADIUS, bead_scene
 from tests.explorer.viewer.page_session import frame_of
@@ -58,9 +57,3 @@ def test_a_body_is_turned_and_sized_as_on_the_screen():
 def test_nothing_to_export_is_told():
     with pytest.raises(CommandError, match="no body is in the domain yet"):
         bodies_stl(frame_of([], np.zeros((0, 3))), BEADS)
-
-
-@pytest.mark.parametrize("channels", [3, 4])
-def test_another_program_reads_the_picture(channels):
-    pixels = np.random.default_rng(1).integers(0, 256, (7, 5, channels), dtype=np.uint8)
-    np.testing.assert_array_equal(np.asarray(PIL.Image.open(io.BytesIO(png(pixels)))), pixels)

@@ -5,9 +5,10 @@ import pytest
 
 from explorer.errors import CommandError
 from explorer.logs.pour_log import PourLog
-from explorer.logs.recording_reader import read_recording
+from explorer.logs.recording_reader import _scene, read_recording
 from explorer.scene.file import load_scene, with_settings
 from explorer.scene.meshes import body_triangles, rig_poses
+from explorer.scene.text import material_toml
 from explorer.viewer.palette import BODY_COLOURS
 from solver import with_values
 from solver.observables import Value
@@ -37,6 +38,16 @@ def test_bodies_are_where_they_were(scene, tmp_path):
         assert np.array_equal(there.scale, np.ones(chosen.sum()))
     # The plate's body came at 20 ms and rolled out at 40 ms.
     assert [len(plate.at(time).scale) == 0 for time in (0.0, 0.02, 0.04)] == [True, False, True]
+
+
+def test_the_scene_is_in_the_file_and_a_text_that_cannot_be_read_is_none(tmp_path):
+    path, scene = tmp_path / "pour.rrd", with_settings(load_scene("funnel"), ["pair.seed.seed.static_friction=0.3"])
+    with PourLog(path, scene, seed=1) as log:
+        log.frame(0.0, poses(0), {})
+    assert read_recording(path).scene == scene
+    for text in ("", "format = 1", "not TOML", "[[body]]"):
+        assert _scene(text, set()) is None
+    assert _scene(material_toml(scene), {"seed", "another body"}) is None
 
 
 def test_every_pose_is_of_a_body_that_is_known(scene, tmp_path):

@@ -38,6 +38,9 @@ class PageSession:
     def frame(self) -> Frame | None:
         return self.newest
 
+    def details(self) -> None:
+        return None
+
     def set_parameters(self, values: Mapping[str, float | str]) -> None:
         self.asked.append("set_parameters")
         changed = with_values(self.now.scene, dict(values))

@@ -10,17 +10,28 @@ import numpy as np
 import pytest
 
 from explorer.live.messages import SessionState, Status
-from explorer.scene.meshes import body_triangles, scene_height
+from explorer.scene.file import load_scene
+from explorer.scene.meshes import body_triangles, outlet_height, scene_height
 from explorer.units import InputError
 from explorer.viewer.actions import Actions
-from explorer.viewer.look.camera import DIRECTIONS, go_along, go_to, link_to, view_of
+from explorer.viewer.look.camera import (
+    BODY_REACH,
+    DIRECTIONS,
+    FRAMED,
+    framing,
+    go_along,
+    go_to,
+    link_to,
+    pile_points,
+    view_of,
+)
 from explorer.viewer.look.inspector import NOBODY, body_html, first_crossing, nearest_hit
 from explorer.viewer.look.look_panel import LookPanel
 from explorer.viewer.palette import SELECTED, linear
 from explorer.viewer.panel import Now
 from explorer.viewer.view import VIEW_FIELD
 from tests.explorer.beads import RADIUS, bead_scene
-from tests.explorer.viewer.page_session import page_context
+from tests.explorer.viewer.page_session import frame_of, page_context
 from tests.explorer.viewer.test_look import DETAILS, FRAME
 
 SCENE = bead_scene()
@@ -270,14 +281,42 @@ def test_what_is_asked_for_is_drawn_when_it_comes(tab):
     tab.tab._settings.change(colour_by="speed", chains=True)
     tab.tab.draw(Now(tab.session.status(), BEADS))
     assert tab.session.watched == (True, None)
-    assert not any(node.visible for node in tab.tab._chains._nodes)
+    assert not any(node.visible for node in tab.tab._chains._tubes._nodes)
     before = tab.nodes.bodies.nodes[0].batched_colors.copy()
     tab.session.found = DETAILS
     tab.tab.draw(Now(tab.session.status(), BEADS))
-    assert any(node.visible for node in tab.tab._chains._nodes)
+    assert any(node.visible for node in tab.tab._chains._tubes._nodes)
     assert (tab.nodes.bodies.nodes[0].batched_colors != before).any()
     assert tab.nodes.bodies.nodes[0].opacity < 1.0
     tab.tab._settings.change(colour_by="component", chains=False)
     tab.tab.draw(Now(tab.session.status(), BEADS))
-    assert not any(node.visible for node in tab.tab._chains._nodes)
+    assert not any(node.visible for node in tab.tab._chains._tubes._nodes)
     assert tab.nodes.bodies.nodes[0].opacity is None
+
+
+@pytest.mark.parametrize("direction", [(0.62, -0.75, 0.24), (0.0, -1.0, 0.0), (0.0, 0.0, 3.0), (1.0, 0.0, -0.2)])
+@pytest.mark.parametrize("aspect", [0.5, 1.1, 2.4])
+def test_the_pile_is_framed_from_wherever_one_looks(direction, aspect):
+    """All points are in the picture, and one is at the edge of the part that is taken up."""
+    points = np.random.default_rng(3).normal(size=(50, 3)) * [0.1, 0.06, 0.02]
+    view = framing(points, np.array(direction), VIEW_FIELD, aspect)
+    back = view.position - view.look_at
+    assert back / np.linalg.norm(back) == pytest.approx(direction / np.linalg.norm(direction), abs=2e-3)
+    back /= np.linalg.norm(back)
+    right = np.cross([0.0, 0.0, 1.0], back)
+    right /= np.linalg.norm(right)
+    away = (points - view.position) @ -back
+    across = (abs((points - view.look_at) @ right) + BODY_REACH) / (away * math.tan(VIEW_FIELD / 2) * aspect)
+    upright = (abs((points - view.look_at) @ np.cross(back, right)) + BODY_REACH) / (away * math.tan(VIEW_FIELD / 2))
+    assert (away > 0.0).all()
+    assert max(across.max(), upright.max()) == pytest.approx(FRAMED)
+
+
+def test_the_pile_is_what_has_left_the_funnel():
+    rig = load_scene("funnel").rig
+    assert outlet_height(rig) == pytest.approx(rig.outlet_height)
+    frame = frame_of([0, 0, 0], [[0.0, 0.0, 0.01], [0.1, 0.0, 0.0], [0.0, 0.0, rig.outlet_height + 0.05]])
+    assert pile_points(frame, outlet_height(rig)) == pytest.approx(np.float32([[0.0, 0.0, 0.01], [0.1, 0.0, 0.0]]))
+    assert len(pile_points(frame, 0.0)) == 3
+    assert len(pile_points(None, 0.0)) == 0
+    assert outlet_height(load_scene("lifting_cylinder").rig) == pytest.approx(0.0)

@@ -11,12 +11,43 @@ from explorer.live.details import Details
 from explorer.live.frames import Frame
 from explorer.units import InputError
 from explorer.viewer.actions import Actions
-from explorer.viewer.look.colour_by import QUANTITIES, ColourPanel, bar_html, body_colours, colour_range, nice_top
-from explorer.viewer.look.force_chains import ForceChains, ForcePanel, chain_segments, chain_text
+from explorer.viewer.look.colour_by import (
+    QUANTITIES,
+    ColourPanel,
+    bar_html,
+    body_colours,
+    colour_key,
+    colour_range,
+    nice_top,
+    shares,
+)
+from explorer.viewer.look.force_chains import (
+    THICKEST,
+    ForceChains,
+    ForcePanel,
+    chain_key,
+    chain_radii,
+    chain_segments,
+    chain_text,
+    strongest_drawn,
+)
 from explorer.viewer.look.look import COMPONENT, CUTS, NOTHING, Look, in_sight
 from explorer.viewer.look.look_settings import CutPanel, LookSettings
-from explorer.viewer.palette import SELECTED, VIRIDIS, component_colour, linear, linear_all, mapped
-from explorer.viewer.scene_nodes import SceneNodes
+from explorer.viewer.palette import (
+    CORE,
+    HALO,
+    PLATE,
+    SELECTED,
+    STILL,
+    TEXT,
+    VIRIDIS,
+    component_colour,
+    linear,
+    linear_all,
+    mapped,
+)
+from explorer.viewer.scene_nodes import SceneNodes, tube_places
+from solver.scenes.insertion import rotation_matrix
 from tests.explorer.beads import bead_scene
 
 FRAME = Frame(
@@ -75,16 +106,59 @@ def test_quantities_are_what_their_names_say():
 @pytest.mark.parametrize(
     ("values", "top"), [([0.0, 0.3], 0.5), ([0.11], 0.2), ([7.0], 10.0), ([0.5], 0.5), ([0.0], 1.0), ([], 1.0)]
 )
-def test_an_automatic_range_ends_at_a_round_number(values, top):
+def test_a_key_ends_at_a_round_number(values, top):
     assert nice_top(np.array(values)) == pytest.approx(top)
 
 
-def test_one_fast_body_does_not_stretch_the_range():
-    assert nice_top(np.append(np.full(1000, 0.9), 50.0)) == 1.0
+def test_an_automatic_range_goes_from_percentile_to_percentile_in_few_digits():
+    """Of 0 … 1 in even steps: 0.02 and 0.98; one body that is off by a factor of fifty does not count."""
+    even = np.linspace(0.0, 1.0, 1001)
+    assert colour_range(Look(), AGE, even) == (0.02, 0.98)
+    assert colour_range(Look(), AGE, np.append(even, 50.0)) == (0.02, 0.99)
+    assert colour_range(Look(), AGE, 1e3 + even) == (1000.02, 1000.98)
+    assert colour_range(Look(automatic=False, low=1.0, high=4.0), AGE, even) == (1.0, 4.0)
+    for nothing in (np.zeros(0), np.array([math.nan])):
+        low, high = colour_range(Look(), AGE, nothing)
+        assert low < high
+    # All alike: as wide as makes a difference, not as wide as the noise.
+    low, high = colour_range(Look(), AGE, np.full(9, 2.0) + 1e-9 * np.arange(9))
+    assert high - low == pytest.approx(0.1, rel=0.1)
 
 
-def test_a_fixed_range_stays():
-    assert colour_range(Look(automatic=False, low=1.0, high=4.0), np.array([9.0])) == (1.0, 4.0)
+def test_a_logarithmic_range_begins_above_zero_and_its_middle_is_the_geometric_mean():
+    look, values = Look(logarithmic=True), np.array([0.0, *np.geomspace(1e-2, 1e2, 1001)])
+    low, high = colour_range(look, AGE, values)
+    assert (low, high) == (pytest.approx(1e-2 * 10**0.08, rel=0.1), pytest.approx(1e2 / 10**0.08, rel=0.1))
+    assert shares(look, (1e-2, 1e2), np.array([1e-2, 1.0, 1e2, 0.0])) == pytest.approx([0.0, 0.5, 1.0, 0.0])
+    assert colour_range(replace(look, automatic=False, low=0.0, high=50.0), AGE, values) == (5e-3, 50.0)
+    key = colour_key(replace(look, automatic=False, low=1.0, high=100.0), AGE, None)
+    assert key.numbers == (1.0, pytest.approx(10.0), 100.0)
+
+
+def test_bodies_at_rest_are_grey_and_do_not_stretch_the_range():
+    """Dark on dark, noise had looked like motion: 0.2 mm/s is at rest, and the key says so."""
+    slow = replace(DETAILS, velocity=np.float32([[2e-4, 0, 0], [0, 0.02, 0], [0, 0, 0]]))
+    painted = body_colours(PLAIN, Look(colour_by="speed"), SPEED, slow, selected=None)
+    assert painted[0].tolist() == painted[2].tolist() == list(linear(STILL))
+    assert painted[1].tolist() != list(linear(STILL))
+    assert "at rest: below 1 mm/s" in bar_html(Look(colour_by="speed"), SPEED, slow)
+    resting = replace(DETAILS, velocity=np.zeros((3, 3), dtype=np.float32))
+    assert colour_range(Look(), SPEED, SPEED.shown(resting)) == (0.0, 0.01)
+
+
+def contrast(one, other):
+    """Ratio of luminances as WCAG 2.2 has it."""
+    dark, bright = sorted(
+        float(np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4) @ [0.2126, 0.7152, 0.0722])
+        for c in (np.array(one) / 255.0, np.array(other) / 255.0)
+    )
+    return (bright + 0.05) / (dark + 0.05)
+
+
+def test_what_lies_still_stands_out_from_the_plate_and_lines_from_their_rim():
+    assert contrast(STILL, PLATE) > 4.5
+    assert contrast(CORE, HALO) > 15.0
+    assert contrast(TEXT, PLATE) > 4.5
 
 
 def test_viridis_gets_lighter_all_the_way():
@@ -98,12 +172,12 @@ def test_viridis_gets_lighter_all_the_way():
 
 
 PLAIN = np.array([linear(component_colour(k)) for k in FRAME.component], dtype=np.uint8)
-SPEED = QUANTITIES["speed"]
+SPEED, AGE = QUANTITIES["speed"], QUANTITIES["residence time"]
 
 
 def test_bodies_have_the_colour_of_their_value_and_newcomers_that_of_their_component():
     painted = body_colours(PLAIN, Look(colour_by="speed"), SPEED, DETAILS, selected=None)
-    assert painted[0].tolist() == list(linear(VIRIDIS[0]))
+    assert painted[0].tolist() == list(linear(STILL))
     assert painted[2].tolist() == list(linear(VIRIDIS[-1]))
     assert painted[3].tolist() == list(linear(component_colour(0)))
     plain = body_colours(PLAIN, Look(), None, DETAILS, selected=1)
@@ -123,7 +197,7 @@ def test_a_pour_that_was_brought_back_has_fewer_bodies_than_its_last_details():
     assert body_colours(PLAIN[:1], Look(colour_by="speed"), SPEED, DETAILS, 2).shape == (1, 3)
     segments = chain_segments(early, early.inside, DETAILS, 0.0)
     # Of the four contacts only that with the plate is between things that are there.
-    assert sum(len(one) for one in segments) == 1
+    assert len(segments[0]) == 1
 
 
 def test_before_the_first_body_there_is_nothing_to_paint():
@@ -134,8 +208,9 @@ def test_the_bar_tells_quantity_unit_and_ends():
     text = bar_html(Look(colour_by="contact force"), QUANTITIES["contact force"], DETAILS)
     for part in (
         "contact force [mN]: sum of the normal forces",
-        "<span>0</span>",
-        "<span>2.5</span>",
+        "no contact",
+        "<span>1</span>",
+        "<span>3</span>",
         "<span>5</span>",
     ):
         assert part in text
@@ -143,32 +218,64 @@ def test_the_bar_tells_quantity_unit_and_ends():
     assert bar_html(Look(), None, DETAILS) == ""
 
 
-def test_chains_go_from_centre_to_centre_and_are_thicker_where_they_press_harder():
-    weak, middling, strong = chain_segments(FRAME, np.ones(4, dtype=bool), DETAILS, threshold=1.0)
-    # 1.5 mN with the plate: one line, from the bead to the point. 3 mN: two lines. 5 mN: two lines. 0.5 mN: none.
-    np.testing.assert_allclose(weak, [[[0, 0, 0], [0, 0, -0.006]]])
-    assert len(middling) == 2
+def test_chains_go_from_centre_to_centre_and_are_as_thick_as_they_press():
+    segments, force = chain_segments(FRAME, np.ones(4, dtype=bool), DETAILS, threshold=1.0)
+    # 1.5 mN with the plate: one line, from the bead to the point. 3 and 5 mN: two lines each. 0.5 mN: none.
+    assert sorted(force) == pytest.approx([1.5e-3, 3e-3, 3e-3, 5e-3, 5e-3])
+    np.testing.assert_allclose(segments[np.isclose(force, 1.5e-3)], [[[0, 0, 0], [0, 0, -0.006]]])
+    strong = segments[np.isclose(force, 5e-3)]
     np.testing.assert_allclose(strong, [[[0, 0, 0], [0.005, 0, 0]], [[0.005, 0, 0], [0.01, 0, 0]]])
+    radius = chain_radii(force, DETAILS, 1.0)
+    assert radius / force == pytest.approx(THICKEST / strongest_drawn(DETAILS, 1.0))
+    assert strongest_drawn(DETAILS, 1.0) == pytest.approx(5e-3)
     text = chain_text(DETAILS, Look(chains=True))
-    assert "from 1 mN on; thicker from 2 and 4 mN. 3 of 40 contacts; their mean is 1 mN" in text
+    assert "from 1 mN on. 3 of 40 contacts; their mean is 1 mN" in text
+
+
+def test_the_key_tells_what_the_thickness_means():
+    key = chain_key(DETAILS, Look(chains=True))
+    for part in ("normal force [mN]", "<span>0</span>", "<span>2.5</span>", "<span>5</span>", "<polygon"):
+        assert part in key
+    assert chain_key(DETAILS, Look()) == chain_key(None, Look(chains=True)) == ""
 
 
 def test_chains_of_bodies_that_are_cut_away_are_not_drawn():
-    classes = chain_segments(FRAME, FRAME.inside, DETAILS, threshold=1.0)
-    assert [len(one) for one in classes] == [1, 0, 2]
+    _, force = chain_segments(FRAME, FRAME.inside, DETAILS, threshold=1.0)
+    assert sorted(force) == pytest.approx([1.5e-3, 5e-3, 5e-3])
 
 
 def test_a_threshold_of_nothing_leaves_out_contacts_that_do_not_press():
     idle = replace(DETAILS, normal_force=np.float32([0, 0, 0, 1e-3]))
-    assert sum(len(one) for one in chain_segments(FRAME, np.ones(4, dtype=bool), idle, 0.0)) == 2
+    assert len(chain_segments(FRAME, np.ones(4, dtype=bool), idle, 0.0)[0]) == 2
 
 
-def test_chains_that_are_not_there_are_not_shown(server):
-    chains = ForceChains(server)
+def test_a_tube_lies_along_its_segment_whichever_way_that_points():
+    rng = np.random.default_rng(1)
+    segments = np.concatenate([rng.normal(size=(20, 2, 3)), [[[0, 0, 1], [0, 0, -1]], [[0, 0, 0], [0, 0, 2]]]])
+    radius = rng.uniform(0.1, 1.0, len(segments))
+    places = tube_places(segments, radius, 32)
+    for k, (start, end) in enumerate(segments):
+        turn = rotation_matrix(places.quaternion[k].astype(float))
+        top, rim = np.array([0, 0, 0.5]), np.array([1, 0, 0])
+        assert places.position[k] + turn @ (places.scale[k] * top) == pytest.approx(end, abs=1e-5)
+        assert places.position[k] - turn @ (places.scale[k] * top) == pytest.approx(start, abs=1e-5)
+        assert np.linalg.norm(turn @ (places.scale[k] * rim)) == pytest.approx(radius[k], rel=1e-5)
+    assert (places.scale[len(segments) :] == 0).all()
+
+
+def test_chains_are_hidden_and_their_room_grows(server):
+    chains, tubes = ForceChains(server), np.zeros((40, 2, 3))
+    tubes[:, 1, 0] = 1.0
     chains.show(FRAME, FRAME.inside, DETAILS, 1.0)
-    assert [node.visible for node in chains._nodes] == [True, False, True]
+    core, rim = chains._tubes._nodes
+    assert (core.batched_scales[:, 0] > 0).sum() == 3
+    assert (rim.batched_scales[:3, 0] > core.batched_scales[:3, 0]).all()
+    assert (core._impl.props.side, rim._impl.props.side) == ("front", "back")
     chains.hide()
-    assert not any(node.visible for node in chains._nodes)
+    assert not core.visible
+    assert not rim.visible
+    chains._tubes.show(tubes, np.ones(40))
+    assert (chains._tubes._nodes[0].batched_scales[:, 2] == 1).sum() == 40
 
 
 def test_a_cut_hides_one_side_and_nothing_else():
@@ -247,15 +354,23 @@ def test_an_entered_end_fixes_the_range_at_what_is_on_the_screen(panel):
     settings, handles = panel.settings, panel.handles
     settings.change(colour_by="speed")
     panel.colours.show(DETAILS)
-    assert (handles["_low"].value, handles["_high"].value) == (0.0, 1.0)
+    assert (handles["_low"].value, handles["_high"].value) == (0.51, 0.99)
     enter(handles["_low"], 0.25)
     panel.actions.carry_out()
-    assert (settings.look.automatic, settings.look.low, settings.look.high) == (False, 0.25, 1.0)
+    assert (settings.look.automatic, settings.look.low, settings.look.high) == (False, 0.25, 0.99)
     assert handles["_automatic"].value is False
     enter(handles["_low"], 3.0)
     assert "not above" in panel.actions.carry_out()
     with pytest.raises(InputError, match="colour range"):
         settings.change(low=1.0, high=1.0)
+
+
+def test_a_range_is_reset(panel):
+    panel.settings.change(automatic=False, logarithmic=True, low=0.5, high=2.0)
+    enter(panel.handles["_reset"], True)
+    panel.actions.carry_out()
+    assert panel.settings.look == Look(low=0.5, high=2.0)
+    assert panel.handles["_logarithmic"].value is False
 
 
 def test_keys_walk_through_the_choices(panel):

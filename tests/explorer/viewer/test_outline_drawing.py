@@ -128,13 +128,17 @@ def test_measured_data_are_laid_over_the_pile_and_taken_off(bench):
     bench.sent(panel._curve, "drum_45rpm: free surface")
     panel.show(Now(replace(STATUS, outline=FRONT)))
     assert "drum_45rpm: free surface" in panel._html.content
-    assert panel._nodes._measured.visible
-    assert panel._nodes._flanks.visible
+    assert all(node.visible for node in drawn(panel))
+    assert len(drawn(panel)) == 4  # lines and their rims
     bench.sent(panel._data, NONE)
     panel.show(Now(replace(STATUS, outline=None)))
     assert "measured" not in panel._html.content
-    assert not panel._nodes._measured.visible
-    assert not panel._nodes._flanks.visible
+    assert not any(node.visible for node in drawn(panel))
+
+
+def drawn(panel):
+    """Nodes of the lines in 3-D."""
+    return [*panel._nodes._measured._nodes, *panel._nodes._flanks._nodes]
 
 
 def test_a_folder_without_data_is_refused_in_one_line_and_changes_nothing(bench, tmp_path):

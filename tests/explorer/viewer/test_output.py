@@ -1,11 +1,14 @@
 """The tab of what is taken along: command line, downloads, recordings."""
 
 import io
+import math
 import zipfile
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
+import PIL.Image
 import pytest
 
 from explorer.errors import CommandError
@@ -15,10 +18,23 @@ from explorer.logs.recording_reader import read_recording
 from explorer.scene.file import load_scene
 from explorer.scene.source import SceneSource, material_source
 from explorer.viewer.actions import Actions
+from explorer.viewer.look.colour_by import ColourKey
 from explorer.viewer.output.engine_export import EngineExport
-from explorer.viewer.output.output_panel import OutputPanel, command_html, picture
+from explorer.viewer.output.output_panel import OutputPanel, command_html
+from explorer.viewer.output.picture import (
+    DARK_GROUND,
+    NO_GROUND,
+    WHITE_GROUND,
+    Legend,
+    bar_length,
+    composed,
+    length_words,
+    pixels_per_metre,
+    rendered,
+)
 from explorer.viewer.output.recording_panel import DOWNLOAD, START, STOP, RecordingPanel
 from explorer.viewer.output.recording_switch import BYTES_PER_BODY, HTML, RRD, session_recorder
+from explorer.viewer.palette import BODY_COLOURS, STILL, VIRIDIS
 from explorer.viewer.panel import Now
 from tests.explorer.viewer.page_session import PageSession, event, finished, frame_of, page_context
 
@@ -30,16 +46,19 @@ class Browser:
 
     def __init__(self, error=None):
         self.sent, self.error = {}, error
-        self.camera = type("Camera", (), {"image_height": 90, "image_width": 5120})
+        self.camera = SimpleNamespace(
+            image_height=90, image_width=5120, position=np.array([0.0, -0.5, 0.0]), look_at=np.zeros(3), fov=0.6
+        )
 
     def send_file_download(self, name, content, save_immediately):
         assert save_immediately
         self.sent[name] = content
 
-    def get_render(self, height, width, timeout):
+    def get_render(self, height, width, transport_format, timeout):
         if self.error:
             raise self.error
-        return np.full((height, width, 3), 7, dtype=np.uint8)
+        assert transport_format == "png"
+        return np.zeros((height, width, 4), dtype=np.uint8)  # nothing but what is transparent
 
 
 class FileRecorder:
@@ -69,7 +88,8 @@ class Bench:
         self.panel, self.engine, self.switch = OutputPanel(page), EngineExport(page), RecordingPanel(page)
 
     def press(self, label):
-        event(self.panel._exports[label], True, client=self.browser)
+        button = self.panel._exports.get(label, self.panel._picture.button)
+        event(button, True, client=self.browser)
         return finished(self.actions, self.background)
 
     def record(self, chosen):
@@ -147,17 +167,88 @@ def test_bodies_are_sent_as_table_and_mesh(bench):
     assert bench.press("Bodies (CSV)") == "no body has entered yet"
 
 
-def test_a_picture_is_as_large_as_the_browser_up_to_a_limit(bench):
+def taken(bench):
+    """The picture that the browser was sent, as RGBA or RGB."""
     assert bench.press("Picture (PNG)") == ""
-    (content,) = bench.browser.sent.values()
-    # Width and height of a PNG stand at byte 16.
-    assert [int.from_bytes(content[k : k + 4], "big") for k in (16, 20)] == [2560, 45]
+    return PIL.Image.open(io.BytesIO(bench.browser.sent.pop("picture_0.000s.png")))
+
+
+def test_a_picture_is_a_multiple_of_the_browser_up_to_a_limit(bench):
+    panel = bench.panel._picture
+    assert taken(bench).size == (5120, 90)
+    panel._size.value = "4×"
+    assert taken(bench).size == (7680, 135)  # 20480 would be too wide
+    bench.browser.camera.image_width = 160
+    assert taken(bench).size == (640, 360)
+    panel._size.value = "8×"
+    assert "picture size: '8×' is not one of 1×, 2×, 4×" in bench.press("Picture (PNG)")
+
+
+def test_a_picture_has_the_ground_that_was_chosen(bench):
+    panel = bench.panel._picture
+    bench.browser.camera.image_width = 160
+    for ground, corner in (
+        (DARK_GROUND, (20, 20, 20)),
+        (WHITE_GROUND, (255, 255, 255)),
+        (NO_GROUND, (255, 255, 255, 0)),
+    ):
+        panel._ground.value = ground
+        assert taken(bench).getpixel((159, 89)) == corner
+
+
+def test_a_metre_across_the_axis_has_as_many_pixels_as_the_camera_gives_it():
+    """tan(fov / 2) = h / (2 d): a picture 1 m high at 2 m, however the camera is tilted."""
+    field = 2.0 * math.atan(0.25)
+    level = SimpleNamespace(position=np.array([0.0, -2.0, 0.0]), look_at=np.zeros(3), fov=field)
+    assert pixels_per_metre(level, 800) == pytest.approx(800.0)
+    tilted = SimpleNamespace(position=2.0 * np.array([0.6, 0.0, 0.8]), look_at=np.zeros(3), fov=field)
+    assert pixels_per_metre(tilted, 800) == pytest.approx(800.0)
+    away = SimpleNamespace(position=np.array([0.0, -2.0, 0.0]), look_at=np.array([0.0, -3.0, 0.0]), fov=field)
+    with pytest.raises(CommandError, match="looks away"):
+        pixels_per_metre(away, 800)
+
+
+@pytest.mark.parametrize(
+    ("per_metre", "width", "length", "words"),
+    [(1000.0, 800, 0.2, "20 cm"), (1000.0, 799, 0.1, "10 cm"), (8e4, 800, 2e-3, "2 mm"), (100.0, 800, 2.0, "2 m")],
+)
+def test_the_scale_bar_is_as_long_as_it_says(per_metre, width, length, words):
+    assert bar_length(per_metre, width) == pytest.approx(length)
+    assert length_words(bar_length(per_metre, width)) == words
+    blank = np.zeros((400, width, 4), dtype=np.uint8)
+    image = PIL.Image.open(io.BytesIO(composed(blank, WHITE_GROUND, per_metre, Legend(), 1.0)))
+    row = (np.asarray(image)[400 - 25] < 100).all(axis=1)
+    assert row.sum() == pytest.approx(length * per_metre, abs=2)
+
+
+def test_the_key_shows_components_colours_and_thickness():
+    blank = np.zeros((400, 600, 4), dtype=np.uint8)
+    key = ColourKey("speed [m/s]", "", (0.0, 0.5, 1.0), "at rest")
+
+    def colours(legend):
+        image = PIL.Image.open(io.BytesIO(composed(blank, WHITE_GROUND, 1000.0, legend, 1.0)))
+        return set(map(tuple, np.asarray(image).reshape(-1, 3).tolist()))
+
+    plain = colours(Legend())
+    two = colours(Legend([("seed", BODY_COLOURS[0]), ("petiole", BODY_COLOURS[2])]))
+    assert {BODY_COLOURS[0], BODY_COLOURS[2]} <= two - plain
+    assert {VIRIDIS[0], VIRIDIS[-1], STILL} <= colours(Legend(colours=key)) - plain
+    assert STILL not in colours(Legend(colours=replace(key, still="")))
+
+
+def test_the_key_of_a_picture_is_that_of_the_page(bench):
+    assert bench.panel._legend() == Legend(
+        [("seed", BODY_COLOURS[0]), ("plate", BODY_COLOURS[1]), ("petiole", BODY_COLOURS[2])]
+    )
+    bench.panel._look.change(colour_by="speed", automatic=False, low=1.0, high=3.0, logarithmic=False)
+    legend = bench.panel._legend()
+    assert (legend.components, legend.colours.numbers) == ((), (1.0, 2.0, 3.0))
 
 
 @pytest.mark.parametrize("error", [TimeoutError("too slow"), RuntimeError("gone")])
 def test_a_browser_that_draws_no_picture_is_one_line(error):
     with pytest.raises(CommandError, match=f"picture: the browser did not draw it: {error}"):
-        picture(Browser(error))
+        rendered(Browser(error), 1)
 
 
 def test_a_recording_is_begun_ended_and_sent(bench):

@@ -3,20 +3,25 @@
 import threading
 import time
 from contextlib import nullcontext
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from explorer.live.frames import Frame
 from explorer.logs.pour_log import PourLog
 from explorer.logs.recording_reader import read_recording
 from explorer.scene.file import load_scene
+from explorer.scene.meshes import scene_height
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.look import drawn_look
 from explorer.viewer.look.camera import view_of
 from explorer.viewer.look.look import COMPONENT
-from explorer.viewer.palette import VIRIDIS, linear, linear_all, mapped
-from explorer.viewer.replay.replay_page import ReplayPage, columns, highest, moment_html
+from explorer.viewer.palette import STILL, linear, linear_all, mapped
+from explorer.viewer.replay.replay_page import MeshNodes, ReplayPage, columns, drawn_height, moment_html
+from explorer.viewer.scene_nodes import PLATE_RADIUS, SceneNodes, plate_radius
+from explorer.viewer.view import light, look_at_height
 from tests.explorer.logs.test_pour_log import poses
 
 
@@ -39,27 +44,120 @@ def page(recording):
     server.stop()
 
 
+@pytest.fixture
+def older(recording):
+    """The page of the same recording from before recordings held their scene."""
+    server = guarded_server("127.0.0.1", 0, "test")
+    yield ReplayPage(server, replace(recording, scene=None), "pour.rrd")
+    server.stop()
+
+
 def drawn(page):
     """Positions of the seeds that are not hidden."""
-    (node,) = page._look._nodes.bodies.nodes
+    node = page._look._nodes.bodies.nodes[0]
     return node.batched_positions[node.batched_scales > 0]
 
 
-def gate(page):
-    return next(node for surface, node in page._look._nodes._surfaces if surface.shape.name == "gate")
+def rig(page):
+    """Nodes of the rig by name."""
+    nodes = page._look._nodes
+    return {s.shape.name: node for s, node in nodes._surfaces} if isinstance(nodes, MeshNodes) else nodes._rig
+
+
+def scene_tree(server):
+    """What a browser is sent of the scene: name of a node → its properties, the bodies' own state left out."""
+    nodes = server.scene._handle_from_node_name
+    return {
+        name: {key: value for key, value in vars(node._impl.props).items() if not key.startswith("batched")}
+        for name, node in nodes.items()
+        if hasattr(node._impl, "props")
+    }
 
 
 def test_a_moment_is_drawn_as_it_was_recorded(page, recording):
     page._timeline.go_to(0.03)
     page.show()
     assert np.array_equal(drawn(page), recording.components[0].at(0.02).position)
-    assert page._look._nodes._surfaces
-    assert gate(page).visible
+    assert rig(page)["gate"].visible
     page._timeline.go_to(0.06)
     page.show()
     assert len(drawn(page)) == 4
-    assert not gate(page).visible
+    assert not rig(page)["gate"].visible
     assert page._slider.value == pytest.approx(0.06)
+
+
+def test_it_is_drawn_as_the_live_page_draws_the_scene(page, recording, server):
+    """Node by node, with the camera that a browser begins with."""
+    light(server)
+    live = SceneNodes(server, recording.scene)
+    look_at_height(server, scene_height(recording.scene))
+    page._timeline.go_to(0.06)
+    page.show()
+    state = poses(*[0] * 4)
+    live.show(
+        Frame(1, 1, 0.06, state.position.astype(np.float32), state.quaternion.astype(np.float32), state.component,
+              state.inside, state.scale.astype(np.float32))
+    )  # fmt: skip
+    mine, theirs = scene_tree(page._server), scene_tree(server)
+    assert {"/rig/cone/rims", "/rig/scale", "/rig/radius 9", "/rig/bar", "/bodies/0"} <= set(theirs)
+    assert set(mine) == set(theirs)
+    for name, props in theirs.items():
+        for key, value in props.items():
+            np.testing.assert_equal(mine[name][key], value, f"{name} {key}")
+    camera, expected = page._server.initial_camera, server.initial_camera
+    assert np.array_equal(camera.position, expected.position)
+    assert np.array_equal(camera.look_at, expected.look_at)
+
+
+def test_the_plate_goes_on_behind_the_farthest_body(page, older):
+    for shown in (page, older):
+        shown._timeline.go_to(0.06)  # the farthest body is 0.424 m from the axis
+        shown.show()
+        plate = rig(shown)["plate"]
+        radius = np.hypot(*(np.array(plate.scale)[:2, None] * plate.vertices[:, :2].T)).max()
+        assert radius == pytest.approx(0.45, rel=1e-6)
+        shown._timeline.go_to(0.0)
+        shown.show()
+        radius = np.hypot(*(np.array(plate.scale)[:2, None] * plate.vertices[:, :2].T)).max()
+        assert radius == pytest.approx(PLATE_RADIUS, rel=1e-6)
+    assert plate_radius(Frame(1, 1, 0.0, np.float32([[9, 9, 0]]), None, None, np.array([False]), None)) == PLATE_RADIUS
+
+
+def test_an_older_recording_is_drawn_from_its_meshes_and_says_so(page, older):
+    older._timeline.go_to(0.03)
+    older.show()
+    assert rig(older)["gate"].visible
+    assert len(drawn(older)) == 2
+
+    assert "does not hold its scene" in older._notes.content
+    assert page._notes.content == ""
+
+
+def test_a_recording_that_begins_amid_a_pour_counts_from_its_beginning(recording, server):
+    late = recording.counted_from(-1.910765)
+    assert (recording.zero, late.zero) == (0.0, pytest.approx(1.910765))
+    page = ReplayPage(server, late, "late.rrd")
+    assert (page._slider.min, page._slider.max, page._slider.step) == (0.0, 0.06, 0.001)
+    page._timeline.go_to(0.02)
+    page.show()
+    assert page._slider.value == 0.02
+    assert "0.020 of 0.060 s · 2 bodies" in page._text.content
+    page._timeline.go_to(0.06)
+    page.show()
+    assert "0.050 s  &lt;b&gt;friction" in page._text.content
+    times = page._plots[0][1].data[0]
+    assert times[0] == 0.0
+    assert times[1:5] == pytest.approx([0.0, 0.02, 0.04, 0.06])
+
+
+def test_times_have_few_digits(recording, server):
+    """A first frame at 9.997 ms is no reason to begin there, nor a last one at 1.970355883 s to end there."""
+    odd = replace(recording, times=np.array([0.009997, 1.970355883]))
+    page = ReplayPage(server, odd, "odd.rrd")
+    assert (page._slider.min, page._slider.max) == (0.0, 1.971)
+    page._timeline.go_to(9.0)
+    page.show()
+    assert page._slider.value == 1.97
 
 
 def entered(slider, value):
@@ -104,20 +202,20 @@ def settle(page, **settings):
 
 
 def test_colours_are_of_the_component_of_speed_and_of_residence_time(page, recording):
-    (node,) = page._look._nodes.bodies.nodes
+    node = page._look._nodes.bodies.nodes[0]
     page._timeline.go_to(0.04)
     settle(page)
     colour = list(linear(recording.components[0].shape.colour))
     assert node.batched_colors[:3].tolist() == [colour] * 3
-    # A body enters with every frame: 40, 20 and 0 ms ago, in a range up to 50 ms.
-    settle(page, colour_by="residence time")
+    # A body enters with every frame: 40, 20 and 0 ms ago.
+    settle(page, colour_by="residence time", automatic=False, low=0.0, high=0.05)
     expected = linear_all(mapped(np.array([0.8, 0.4, 0.0])))
     assert node.batched_colors[:3].tolist() == expected.tolist()
     assert "residence time [s]: time since a body is first in the recording" in page._look._colours._bar.content
     assert page._look._colours._bar.visible
     # None of them moves.
     settle(page, colour_by="speed")
-    assert node.batched_colors[:3].tolist() == [list(linear(VIRIDIS[0]))] * 3
+    assert node.batched_colors[:3].tolist() == [list(linear(STILL))] * 3
     settle(page, colour_by=COMPONENT)
     assert node.batched_colors[:3].tolist() == [colour] * 3
     assert not page._look._colours._bar.visible
@@ -133,11 +231,11 @@ def test_a_cut_hides_bodies_and_the_rig_fades(page):
     page._timeline.go_to(0.06)
     settle(page, cut_away="x above", cut_at=0.15)
     assert drawn(page)[:, 0] == pytest.approx([0.0, 0.1])
-    settle(page, rig_opacity=0.5)
-    opacities = {surface.shape.name: node.opacity for surface, node in page._look._nodes._surfaces}
-    assert opacities["cone"] == 0.5
+    settle(page, rig_opacity=0.4)
+    opacities = {name: node.opacity for name, node in rig(page).items()}
+    assert opacities["cone"] == 0.4
     assert opacities["plate"] is None
-    assert opacities["gate"] != 0.5
+    assert opacities["gate"] != 0.4
 
 
 def test_shadows_are_switched_off(page, monkeypatch):
@@ -163,7 +261,7 @@ def test_keys_are_those_of_the_live_page(page, recording):
     assert page._look._settings.look.colour_by == "speed"
     trigger(page, "Cut away the next side")
     assert page._look._settings.look.cut_away == "x below"
-    camera, expected = trigger(page, "View: side").camera, view_of(highest(recording), "Side")
+    camera, expected = trigger(page, "View: side").camera, view_of(drawn_height(recording), "Side")
     assert camera.position == pytest.approx(expected.position)
     assert camera.look_at == pytest.approx(expected.look_at)
 
@@ -190,11 +288,16 @@ def test_the_moment_is_told_and_texts_of_the_file_are_escaped(recording):
 
 def test_the_curve_is_marked_where_time_stands():
     moments, angles = np.array([0.0, 0.1, 0.2]), np.array([1.0, 2.0, 3.0])
-    times, values, marked = columns(moments, angles, 0.15)
-    assert values[:3].tolist() == [1.0, 2.0, 3.0]
+    times, values, marked = columns(moments, angles, 0.15, 0.4)
+    assert values[1:4].tolist() == [1.0, 2.0, 3.0]
     assert np.nansum(marked) == 2.0
-    assert np.isnan(columns(moments, angles, -1.0)[2]).all()
-    # The row behind the curve: no point of it, and never at the same place twice running.
-    assert np.isnan([values[3], marked[3]]).all()
-    assert times[2] < times[3] < times[2] + 1e-5
-    assert columns(moments, angles, 0.15, turn=1)[0][3] != times[3]
+    assert np.isnan(columns(moments, angles, -1.0, 0.4)[2]).all()
+    # The rows around the curve: no points of it, and the end never at the same place twice running.
+    assert np.isnan([values[0], values[4], marked[0], marked[4]]).all()
+    assert (times[0], times[4]) == (0.0, pytest.approx(0.4, abs=1e-5))
+    assert columns(moments, angles, 0.15, 0.4, turn=1)[0][4] != times[4]
+
+
+def test_a_moment_s_chart_has_an_axis_that_can_be_read():
+    """A recording of a millisecond: its ticks would all say the same."""
+    assert columns(np.zeros(1), np.ones(1), 0.0, 0.001)[0][-1] == pytest.approx(0.1, abs=1e-5)
