@@ -23,6 +23,7 @@ from explorer.study.process import StudyProcess
 from explorer.viewer.actions import BackgroundWork, Post
 from explorer.viewer.look.look_settings import LookSettings
 from explorer.viewer.output.recording_switch import RecordingSwitch
+from explorer.viewer.pour.beside_pile import BesidePile
 from explorer.viewer.shell.channel import ShellChannel
 from explorer.viewer.shell.web_pages import WebPages
 
@@ -99,6 +100,11 @@ class PageContext:
     def recording(self) -> RecordingSwitch:
         """Recordings that are begun and ended on the page."""
         return RecordingSwitch(self.server, self.data / "recordings", self.background)
+
+    @cached_property
+    def beside(self) -> BesidePile:
+        """A second pour beside the first."""
+        return BesidePile(self.server, self.session)
 
     @cached_property
     def look(self) -> LookSettings:

@@ -21,6 +21,7 @@ from explorer.viewer.pour.live_panel import LivePanel
 from explorer.viewer.pour.motion_chart import MotionChart
 from explorer.viewer.pour.outline_panel import OutlinePanel
 from explorer.viewer.pour.population_panel import PopulationPanel
+from explorer.viewer.pour.readings_panel import ReadingsPanel
 from explorer.viewer.pour.readout import Readout
 from explorer.viewer.pour.restart_panel import RestartPanel
 from explorer.viewer.pour.scene_panel import ScenePanel
@@ -42,6 +43,7 @@ PANELS: Registry[type[Panel]] = Registry(
         PopulationPanel,
         StandingPanel,
         ControlsPanel,
+        ReadingsPanel,
         Chart,
         MotionChart,
         OutlinePanel,

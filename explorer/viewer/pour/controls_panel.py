@@ -56,6 +56,13 @@ class Controls:
             )
         button_group(
             gui,
+            "Second pile",
+            {"Keep beside": self._keep, "Take away": page.beside.close},
+            post,
+            hint="A pile with the parameters as they are now stays beside the first while you change that.",
+        )
+        button_group(
+            gui,
             AGAIN,
             {"New seed": lambda: self._pour(1), SAME_SEED: lambda: self._pour(0)},
             post,
@@ -83,6 +90,10 @@ class Controls:
                 for label, paths in quantities(scene).items()
             ]
 
+    def _keep(self) -> None:
+        status = self._session.status()
+        self._page.beside.pour(status.scene, status.seed)
+
     def _pour(self, step: int) -> None:
         status = self._session.status()
         scene = status.scene
@@ -100,14 +111,13 @@ def quantities(scene: Scene) -> Mapping[str, tuple[str, ...]]:
     bodies = tuple(dict.fromkeys(body.material for body in scene.bodies))
     among = [pair for pair in scene.pairs if pair.a != scene.rig.wall and pair.b != scene.rig.wall]
     at_wall = [pair for pair in scene.pairs if scene.rig.wall in (pair.a, pair.b) and pair.a != pair.b]
-    grain = scene.bodies[0].name.replace("_", " ") if len(scene.bodies) == 1 else "particles"
 
     def of(pairs: list[Pair], name: str) -> tuple[str, ...]:
         return tuple(f"pair.{pair.a}.{pair.b}.{name}" for pair in pairs)
 
     found = {
-        f"Friction, {grain}": of(among, "static_friction"),
-        "Friction, wall": of(at_wall, "static_friction"),
+        "Friction": of(among, "static_friction"),
+        "Wall friction": of(at_wall, "static_friction"),
         "Restitution": of([*among, *at_wall], "restitution"),
         "Shear modulus": tuple(f"material.{name}.shear_modulus" for name in bodies),
         "Rolling friction": ("effect.rolling_resistance.rolling_friction",),

@@ -10,7 +10,7 @@ from itertools import groupby
 
 from explorer.live.angle_reader import LEAST_SHARE_BELOW
 from explorer.live.messages import Event, SessionState, Status
-from explorer.outcomes import OUTCOME_SENTENCES, OUTCOME_WORDS, WARNINGS
+from explorer.outcomes import OUTCOME_WORDS, WARNINGS
 from explorer.viewer.look.look import COMPONENT
 from explorer.viewer.palette import component_colour, css
 from explorer.viewer.panel import CONTROLS, Now, PageContext, Panel
@@ -49,9 +49,6 @@ STYLE = """<style>
 .pour .big {font-size: 2.4em; font-weight: 600; line-height: 1.2; font-variant-numeric: tabular-nums;}
 .pour .doubt {font-size: 1.2em; line-height: 2.4em; opacity: 0.65; font-variant-numeric: tabular-nums;}
 .pour .dim {opacity: 0.65;}
-.pour .grid {display: grid; grid-template-columns: 1fr 1fr; column-gap: 1.6em; margin-top: 0.3em;}
-.pour .cell {display: flex; justify-content: space-between; font-variant-numeric: tabular-nums;}
-.pour .wide {grid-column: 1 / 3;}
 .pour .top {display: flex; justify-content: space-between; align-items: center;}
 .pour .dot {display: inline-block; width: 0.7em; height: 0.7em; border-radius: 50%;
   margin: 0 0.3em 0 0.8em;}
@@ -112,52 +109,15 @@ class AngleDoubt:
 def readout_html(
     status: Status, events: Sequence[Event], notice: str, by_component: bool = True, doubt: str = ""
 ) -> str:
-    """The whole readout; ``notice`` is the page's own last message (a refused input, for instance).
+    """The readout; ``notice`` is the page's own last message (a refused input, for instance).
 
     ``by_component``: whether a body's colour says what it is; a legend of components would be wrong otherwise.
     ``doubt``: of :class:`AngleDoubt`; an angle in doubt is small and grey.
     """
-    cells = "".join(_cell(name, text) for name, text in readings(status))
-    cells += "".join(_cell(name, text, "wide") for name, text in long_readings(status))
     lines = "".join(f"<div class='note'>{escape(text)}</div>" for text in notes(status, events, notice))
     components = legend(status.scene) if by_component else ""
     top = f"<div class='top'>{_state(status)}<span>{components}</span></div>"
-    return f"{STYLE}<div class='pour'>{top}{_angle(status, doubt)}<div class='grid'>{cells}</div>{lines}</div>"
-
-
-def readings(status: Status) -> list[tuple[str, str]]:
-    """Names and texts of the short readings, two to a line."""
-    names = ("Phase", "Simulated time", "Bodies", "Back to")
-    if status.state == SessionState.STARTING:
-        return [(name, "–") for name in names]
-    bodies = f"{status.bodies} of {status.bodies_planned}"
-    earliest = f"{status.earliest:.3f} s" if math.isfinite(status.earliest) else "–"
-    texts = (PHASE_WORDS[status.phase], f"{status.time:.3f} s", bodies, earliest)
-    return list(zip(names, texts, strict=True))
-
-
-def long_readings(status: Status) -> list[tuple[str, str]]:
-    """Names and texts of the readings that take a line each."""
-    starting, running = status.state == SessionState.STARTING, status.state == SessionState.RUNNING
-    pace = f"{status.real_time_factor:.2f} of {status.speed:.3g} wanted" if running else "–"
-    mass = f"{1e3 * status.discharged_mass:.1f} of {1e3 * status.poured_mass:.1f} g"
-    found = [
-        ("Real-time factor", pace),
-        ("Time step", "–" if starting else time_step_text(status)),
-        ("Outcome", "–" if starting else OUTCOME_SENTENCES[status.outcome]),
-        ("Mass below the outlet", "–" if starting else mass),
-    ]
-    if status.energy_put_in is not None:
-        found.append(("Energy put in by the last change", f"{1e6 * status.energy_put_in:.3g} µJ"))
-    return found
-
-
-def time_step_text(status: Status) -> str:
-    """Time step, and what part it is of the largest stable one."""
-    text = f"{1e6 * status.dt:.2f} µs"
-    if math.isfinite(status.dt_limit):
-        text += f", {status.dt / status.dt_limit:.0%} of the stability limit"
-    return text
+    return f"{STYLE}<div class='pour'>{top}{_angle(status, doubt)}{lines}</div>"
 
 
 def condition(status: Status) -> str:
@@ -201,10 +161,6 @@ def angle_of_repose_deg(status: Status) -> float:
     """Angle of the pile as it is now [°]; NaN where there is none."""
     found = status.observables.get("angle_of_repose_deg")
     return math.nan if found is None else found.value
-
-
-def _cell(name: str, text: str, kind: str = "") -> str:
-    return f"<div class='cell {kind}'><span class='dim'>{name}</span><span>{text}</span></div>"
 
 
 def _state(status: Status) -> str:

@@ -9,10 +9,14 @@ import viser
 from doe.diagnose.budget import Budget
 from doe.record import RecordError
 from explorer.background.output_folder import ResultFile
+from explorer.diagnosis.piles import AnswerPiles, answer_piles
 from explorer.diagnosis.process import RESULT, Question
 from explorer.diagnosis.result import DiagnosisResult
+from explorer.errors import CommandError
 from explorer.files.uploads import kept_measurements
+from explorer.scene.source import SceneSource
 from explorer.units import checked
+from explorer.viewer.actions import button_group
 from explorer.viewer.board.board_view import BoardView
 from explorer.viewer.board.diagnosis_board import diagnosis_board
 from explorer.viewer.panel import DIAGNOSE, SELDOM, Now, PageContext, Panel
@@ -84,6 +88,15 @@ class DiagnosisPanel(Panel):
         self._trouble = gui.add_markdown("")
         self._pages = page.pages
         self._result: DiagnosisResult | None = None
+        self._page = page
+        button_group(
+            gui,
+            "Piles",
+            {"Show side by side": self._show_piles, "Pour the corrected model": self._pour_corrected},
+            post,
+            hint="Measured pile, calibrated model and corrected model in the scene, with one clock and one camera; or "
+            "the corrected model alone, as the pour that the controls act on.",
+        )
         self._board = BoardView(server, page.pages, "/diagnosis/page.json", "Diagnosis")
 
     def _start(self) -> None:
@@ -135,6 +148,33 @@ class DiagnosisPanel(Panel):
             # A folder that somebody named may hold any JSON, also that of another version.
             self._result, trouble = None, escaped(f"{folder}: {error}")
         self._trouble.content = trouble
+
+    def _show_piles(self) -> None:
+        """Measured pile, calibrated and corrected model side by side; the middle one is the page's own pour."""
+        result = self._found()
+        self._page.background.start("reading the measured data", lambda: answer_piles(result), self._place_piles)
+
+    def _place_piles(self, piles: AnswerPiles) -> None:
+        seed = self._page.session.status().seed
+        self._page.session.start(piles.before, seed, SceneSource((), piles.before))
+        self._page.beside.pour(piles.after, seed)
+        measured = "measured, mean profile" if piles.measured and piles.measured.of_revolution else "measured"
+        names = (f"{measured} ({piles.condition})", "calibrated model", "corrected model")
+        self._page.beside.show_measured(piles.measured, names, piles.before)
+
+    def _pour_corrected(self) -> None:
+        """The corrected model as the page's own pour."""
+        result, session = self._found(), self._page.session
+
+        def begin(piles: AnswerPiles) -> None:
+            session.start(piles.after, session.status().seed, SceneSource((), piles.after))
+
+        self._page.background.start("reading the measured data", lambda: answer_piles(result), begin)
+
+    def _found(self) -> DiagnosisResult:
+        if self._result is None:
+            raise CommandError("there is no finished diagnosis yet: start one, or choose one under Other results")
+        return self._result
 
     def _show_board(self) -> None:
         """The board of what is chosen, anew where result or progress is another."""

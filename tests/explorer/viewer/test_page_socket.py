@@ -144,7 +144,7 @@ def test_left_arrow_goes_back_and_space_goes_on(page, browser):
     assert (back.state, back.earliest < 1e-3) == (SessionState.PAUSED, True)
     assert back.time == pytest.approx(before - 0.01, abs=0.002)
     wait_for(lambda: page.look._drawn.time == back.time)
-    wait_for(lambda: f"{back.time:.3f} s" in readout(page))
+    wait_for(lambda: f"{back.time:.3f} s" in page.page.panels["readings"]._html.content)
     browser.press(STEP)
     wait_for(lambda: status(page).time > back.time)
 

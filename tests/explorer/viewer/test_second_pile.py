@@ -6,12 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from explorer.diagnosis.piles import surface_of_revolution
 from explorer.live.frames import Frame
 from explorer.live.messages import SessionState, Status
 from explorer.scene.file import load_scene
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.panel import Now
-from explorer.viewer.pour.second_pile import BESIDE, NONE, ROOT, SecondPile, comparison_markdown
+from explorer.viewer.pour.beside_pile import BESIDE, ROOT, BesidePile
+from explorer.viewer.pour.second_pile import NONE, SecondPile, comparison_markdown
 from solver import Outcome, with_values
 from solver.observables import Value
 from tests.explorer.viewer.page_session import page_context
@@ -71,7 +73,9 @@ def bench():
     """Server, first session, second session, and the panel; actions are carried out at once."""
     server = guarded_server("127.0.0.1", 0, "test")
     first, second = FakeSession(), FakeSession()
-    panel = SecondPile(page_context(server, first), lambda: second)
+    page = page_context(server, first)
+    page.__dict__["beside"] = BesidePile(server, first, lambda: second)
+    panel = SecondPile(page)
     yield SimpleNamespace(server=server, first=first, second=second, panel=panel)
     server.stop()
 
@@ -167,3 +171,18 @@ def test_a_solver_that_died_says_so_without_markup():
     first = Status(SessionState.RUNNING, "", SCENE, 1, 1, 1.0)
     text = comparison_markdown(first, replace(first, state=SessionState.DIED, message="<b>killed</b>"))
     assert "&lt;b&gt;killed&lt;/b&gt;" in text
+
+
+def test_a_measured_pile_stands_on_the_other_side_with_names_above_all_three(bench):
+    surface = surface_of_revolution(np.array([0.01, 0.03]), np.array([0.02, 0.0]))
+    bench.panel._beside.pour(SCENE, 4)
+    bench.panel._beside.show_measured(surface, ("measured", "calibrated model", "corrected model"), SCENE)
+    made = bench.server.scene._handle_from_node_name
+    assert made["/measured"].position[0] == -BESIDE
+    assert [made[f"/names/{name}"].position[0] for name in ("measured", "calibrated model", "corrected model")] == [
+        -BESIDE,
+        0.0,
+        BESIDE,
+    ]
+    bench.panel.close()
+    assert not {"/measured", "/measured/plate", "/names/measured"} & set(made)

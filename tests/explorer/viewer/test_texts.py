@@ -13,6 +13,7 @@ from explorer.live.messages import Event, SessionState, Status
 from explorer.outcomes import OUTCOME_SENTENCES
 from explorer.viewer.palette import BODY_COLOURS, linear
 from explorer.viewer.pour.chart import MOST_POINTS, PourCurves
+from explorer.viewer.pour.readings_panel import readings_html, time_step_text
 from explorer.viewer.pour.readout import (
     FORMING,
     PHASE_WORDS,
@@ -24,7 +25,6 @@ from explorer.viewer.pour.readout import (
     notes,
     readout_html,
     recent,
-    time_step_text,
 )
 from explorer.viewer.scene_nodes import component_poses
 from explorer.viewer.study.process_view import escaped, progress, time_left
@@ -57,7 +57,7 @@ STATUS = Status(
 
 
 def test_the_readout_tells_what_the_solver_said():
-    text = readout_html(STATUS, [], "")
+    text = readout_html(STATUS, [], "") + readings_html(STATUS)
     for part in ("settling", "1.500 s", "0.34 of 1 wanted", "6.19 µs", "5 of 6", "11.3 of 13.6 g", "2.5 µJ"):
         assert part in text
     assert "23.4°" in text
@@ -120,12 +120,12 @@ def test_events_of_one_moment_take_one_line_and_the_newest_comes_first():
 
 def test_a_number_that_means_nothing_yet_is_not_shown():
     before = replace(STATUS, observables={}, energy_put_in=None)
-    text = readout_html(before, [], "")
+    text = readout_html(before, [], "") + readings_html(before)
     assert "Energy" not in text
     assert "from 25% of the mass below the outlet on" in text
     # A change that put nothing in is told as such.
-    assert "0 µJ" in readout_html(replace(STATUS, energy_put_in=0.0), [], "")
-    starting = readout_html(replace(before, state=SessionState.STARTING), [], "")
+    assert "0 µJ" in readings_html(replace(STATUS, energy_put_in=0.0))
+    starting = readings_html(replace(before, state=SessionState.STARTING))
     assert "µs" not in starting
     assert OUTCOME_SENTENCES[Outcome.RUNNING] not in starting
 

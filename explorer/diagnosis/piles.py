@@ -1,0 +1,110 @@
+"""A diagnosis as three piles: the measured one, the calibrated declared model's, and the final model's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from doe.declared.model import effect_values
+from doe.diagnose.result import CalibratedModel
+from doe.measurement.load import load_measurement
+from doe.measurement.measurement import Condition, Measurement
+from explorer.diagnosis.result import DiagnosisResult
+from explorer.errors import CommandError
+from solver import Scene, with_values
+
+LEAST_HEIGHT = 3e-4
+"""Height [m] below which nothing of a measured surface is drawn."""
+SECTORS = 72
+"""Of a surface of revolution."""
+
+
+@dataclass(frozen=True, eq=False)
+class HeightSurface:
+    """A surface over the plate [m]: vertices (v, 3) and triangles (t, 3)."""
+
+    vertices: npt.NDArray[np.float64]
+    faces: npt.NDArray[np.int64]
+    of_revolution: bool
+    """It was made of a mean profile, where no scan was measured."""
+
+
+@dataclass(frozen=True)
+class AnswerPiles:
+    """What is drawn side by side in one condition of the data."""
+
+    condition: str
+    before: Scene
+    """The calibrated declared model."""
+    after: Scene
+    """The final model; the same where nothing is added."""
+    measured: HeightSurface | None
+    """None where the data hold neither scans nor profiles of this condition."""
+
+
+def answer_piles(result: DiagnosisResult) -> AnswerPiles:
+    """The piles of the first fitted condition. Raises a ValueError where the data are not there any more."""
+    folder = Path(result.data.folder)
+    if not folder.is_dir():
+        raise CommandError(f"{folder}: the measured data of this diagnosis are not there any more")
+    measurement = load_measurement(folder)
+    condition = measurement.fit[0]
+    return AnswerPiles(
+        condition.name,
+        model_scene(measurement, condition, result.confirmation.before),
+        model_scene(measurement, condition, result.confirmation.after),
+        measured_surface(result, condition.name),
+    )
+
+
+def model_scene(measurement: Measurement, condition: Condition, model: CalibratedModel) -> Scene:
+    """``model`` in the set-up of ``condition``."""
+    values = dict(zip((one.path for one in measurement.parameters), model.theta, strict=True))
+    for effect, amplitudes in model.effects:
+        values |= effect_values(effect, amplitudes, condition.turned)
+    return with_values(condition.scene, dict(values))
+
+
+def measured_surface(result: DiagnosisResult, condition: str) -> HeightSurface | None:
+    """The measured mean pile: of its scans, or of its mean profile turned about the axis."""
+    for one in result.maps:
+        if one.condition == condition:
+            n = len(one.measured)
+            at = np.asarray(one.pixel * (np.arange(n) + 0.5 - n / 2), dtype=np.float64)
+            return grid_surface(at, at, one.measured)
+    for profile in result.piles:
+        if profile.condition == condition:
+            return surface_of_revolution(profile.radius, profile.measured.mean)
+    return None
+
+
+def grid_surface(
+    x: npt.NDArray[np.float64], y: npt.NDArray[np.float64], height: npt.NDArray[np.float64]
+) -> HeightSurface:
+    """Heights (n, m) over the places ``x`` (n,) and ``y`` (m,); cells that are bare plate are left out."""
+    n, m = height.shape
+    vertices = np.column_stack([np.repeat(x, m), np.tile(y, n), np.nan_to_num(height).ravel()])
+    return HeightSurface(vertices, _covered(vertices, n, m), False)
+
+
+def surface_of_revolution(radius: npt.NDArray[np.float64], height: npt.NDArray[np.float64]) -> HeightSurface:
+    """The profile ``height`` (k,) over ``radius`` (k,) turned about the axis."""
+    known = np.isfinite(height)
+    r = np.concatenate([[0.0], radius[known]])
+    z = np.concatenate([height[known][:1], height[known]])
+    angle = np.linspace(0.0, 2.0 * np.pi, SECTORS + 1)
+    x, y = np.outer(np.cos(angle), r), np.outer(np.sin(angle), r)
+    vertices = np.column_stack([x.ravel(), y.ravel(), np.tile(z, SECTORS + 1)])
+    return HeightSurface(vertices, _covered(vertices, SECTORS + 1, len(r)), True)
+
+
+def _covered(vertices: npt.NDArray[np.float64], n: int, m: int) -> npt.NDArray[np.int64]:
+    """Triangles (t, 3) between ``vertices`` of a grid of n rows and m columns, but for those of bare plate."""
+    number = np.arange(n * m).reshape(n, m)
+    corners = (number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:])
+    cells = np.stack([corner.ravel() for corner in corners], axis=1)
+    cells = cells[vertices[cells, 2].max(axis=1) > LEAST_HEIGHT]
+    return np.concatenate([cells[:, [0, 1, 2]], cells[:, [0, 2, 3]]])
