@@ -77,6 +77,8 @@ class StandingPanel(Panel):
         """Keep the pile while it rests; after a change say whether it stood."""
         status = now.status
         self._frame = now.frame
+        if self._former is not None and another_set_up(self._former.scene, status.scene):
+            self._take_ghost_away()
         self._follow(status, now.frame)
         changed = self._rest is not None and self._rest.scene != status.scene
         lines = []
@@ -126,6 +128,11 @@ class StandingPanel(Panel):
         self._ghost = self._former = None
 
 
+def another_set_up(one: Scene, other: Scene) -> bool:
+    """Whether bodies or rig are others, so that their piles are not held against each other."""
+    return (one.bodies, one.rig) != (other.bodies, other.rig)
+
+
 def watched(rest: Rest, status: Status) -> bool:
     """Whether the pile had the time to move since it was changed: ``WATCHED``, or until it came to rest again."""
     return status.state == SessionState.ENDED or status.time >= rest.time + WATCHED
@@ -143,7 +150,7 @@ def shifts(before: Frame, now: Frame) -> npt.NDArray[np.float32]:
 def standing_text(before: Scene, now: Scene, moved: npt.NDArray[np.float32]) -> str:
     """One line (HTML): whether the pile stood while its bodies ``moved`` [m], and when what was changed acts."""
     found = list(differences(before, now))
-    loose, furthest = int((moved > STOOD).sum()), f"{1e3 * float(moved.max()):.1g} mm"
+    loose, furthest = int((moved > STOOD).sum()), millimetres(float(moved.max()))
     many = f"{loose} of {len(moved)} bodies by more than {1e3 * STOOD:g} mm, up to {furthest}"
     names = escape(changes_in_words(found))
     if loose > FEW * len(moved):
@@ -151,6 +158,11 @@ def standing_text(before: Scene, now: Scene, moved: npt.NDArray[np.float32]) -> 
     acts = dict.fromkeys(WHEN.get(one.path.rpartition(".")[2], OTHERWISE) for one in found)
     little = many if loose else f"no body moved by more than {furthest}"
     return f"{names}: <b>the pile stands; {', '.join(acts)}</b> ({little}). Shake it, tap it, or pour again."
+
+
+def millimetres(length: float) -> str:
+    """``length`` [m] to a tenth of a millimetre, or to the first digit below."""
+    return f"{1e3 * length:.1f} mm" if length >= 1e-4 else f"{1e3 * length:.1g} mm"
 
 
 def changes_in_words(found: Sequence[Difference]) -> str:

@@ -69,7 +69,7 @@ def test_each_parameter_says_when_it_acts(table):
 def test_a_pile_that_moved_is_not_said_to_stand(table):
     table.session.set_parameters({FRICTION: 0.0})
     said = table.pass_time(WATCHED, moved=4e-3)
-    assert "the pile moved, 1 of 2 bodies by more than 0.5 mm, up to 4 mm" in said
+    assert "the pile moved, 1 of 2 bodies by more than 0.5 mm, up to 4.0 mm" in said
     assert "stands" not in said
 
 
@@ -96,9 +96,20 @@ def test_poured_again_the_former_pile_stays_as_a_ghost_until_it_is_dismissed(tab
     node = table.server.scene._handle_from_node_name[f"{ROOT}/bodies/1"]
     assert node.batched_positions[0] == pytest.approx(PLACES[1])
     assert 0.0 < node.opacity < 0.5
+    table.session.restart(with_values(table.session.now.scene, {FRICTION: 0.5}))
+    assert table.look() != ""
     table.panel._take_ghost_away()
     assert ghosts(table.server) == []
     assert table.look() == ""
+
+
+def test_a_ghost_goes_with_its_set_up(table):
+    table.session.set_parameters({FRICTION: 0.39})
+    table.pass_time(WATCHED)
+    table.panel._pour_again()
+    table.session.restart(with_values(table.session.now.scene, {"rig.mass": "20g"}))
+    assert table.look() == ""
+    assert ghosts(table.server) == []
 
 
 def test_the_shift_is_that_of_the_bodies_in_the_domain():
@@ -112,7 +123,7 @@ def test_a_pile_of_which_a_few_bodies_slipped_still_stands():
     moved = np.full(40, 1e-5)
     moved[:3] = 1.1e-3
     assert "the pile stands" in standing_text(SOURCE.scene, smooth, moved)
-    assert "(3 of 40 bodies by more than 0.5 mm, up to 1 mm)" in standing_text(SOURCE.scene, smooth, moved)
+    assert "(3 of 40 bodies by more than 0.5 mm, up to 1.1 mm)" in standing_text(SOURCE.scene, smooth, moved)
     moved[:5] = 1.1e-3
     assert "the pile moved" in standing_text(SOURCE.scene, smooth, moved)
 
