@@ -57,7 +57,7 @@ def _listed(heading: str, lines: list[str]) -> str:
 
 def write_audit(audit: Audit, folder: Path, about: About = NOBODY) -> None:
     """Write ``audit.json`` and the report into ``folder``; each appears complete or not at all."""
-    content = audit.to_dict() | {"about": about.to_dict()}
+    content = audit.to_dict() | ({"about": about.to_dict()} if about.author or about.notes else {})
     write_report(audit_report(audit, about), folder, {"audit.json": json_text(content) + "\n"})
 
 

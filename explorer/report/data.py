@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from doe.analysis.surface_anova import SurfaceAnova
 from doe.studies.study_result import StudyResult
-from explorer.design.result import DesignResult
-from explorer.diagnosis.result import DiagnosisResult
 from explorer.report.content import DataTable
 from explorer.report.identified import is_identified
 from explorer.report.set_up import is_assumed
 from explorer.units import parameter_units
+
+if TYPE_CHECKING:  # both draw on this package themselves
+    from explorer.design.result import DesignResult
+    from explorer.diagnosis.result import DiagnosisResult
 
 SETTING = ("numerics", "contact", "insertion")
 """Parameters of the calculation: nobody measures them."""

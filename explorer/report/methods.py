@@ -8,9 +8,9 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from doe.studies.study_result import StudyResult
-from explorer.diagnosis.result import DiagnosisResult
 from explorer.report.content import Bullets, Reference, Section, Text
 from explorer.units import (
     enumeration,
@@ -23,6 +23,9 @@ from explorer.units import (
     parameter_value,
 )
 from solver.laws import CONTACT_LAWS, HertzMindlin, LinearSpringDashpot
+
+if TYPE_CHECKING:
+    from explorer.diagnosis.result import DiagnosisResult
 
 
 def _article(

@@ -495,7 +495,7 @@ def _settings(result: StudyResult, reference_name: str) -> Table:
     found, good = result.optimum, holds(result)
     rows = tuple(
         (
-            *(cell if good or k < ANSWER else Struck(cell) for k, cell in enumerate(setting.cells)),
+            *(cell if good or k < ANSWER or cell == MISSING else Struck(cell) for k, cell in enumerate(setting.cells)),
             parameter_value(factor.path, factor.reference),
             parameter_range(factor.path, factor.low, factor.high),
         )

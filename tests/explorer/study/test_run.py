@@ -9,6 +9,7 @@ import pytest
 
 from doe.pour_runner import TRIES
 from doe.studies.study_result import OWN_STAGES
+from explorer.report import folder
 from explorer.study import run as study_run
 from solver import asset_path
 from solver.pours.record import Spheres
@@ -40,6 +41,8 @@ class Formula(FormulaRunner):
 @pytest.fixture
 def formula(monkeypatch):
     monkeypatch.setattr(study_run, "PourRunner", Formula)
+    # Figures for print take half a minute; tests/explorer/report/test_report_files.py has them.
+    monkeypatch.setattr(folder, "find_spec", lambda name: None)
 
 
 def calibrate(tmp_path, *options):
