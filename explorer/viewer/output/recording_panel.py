@@ -1,9 +1,14 @@
-"""Recordings of the moving scene: begun, ended and taken along by a person."""
+"""Recordings of the moving scene: begun, ended, taken along and replayed by a person.
+
+A replay is a page of its own, beside the live page and in its process: no other program has to be started.
+"""
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from html import escape
+from pathlib import Path
 from typing import Any
 
 import viser
@@ -11,8 +16,8 @@ import viser
 from explorer.errors import CommandError
 from explorer.files.exports import zipped
 from explorer.logs.recording import recorded_lines
+from explorer.viewer.guarded_server import address, guarded_server
 from explorer.viewer.output.recording_switch import HTML, RRD, RecordingSwitch
-from explorer.viewer.output.replay_beside import ReplayBeside
 from explorer.viewer.output.send_file import send_file
 from explorer.viewer.panel import TAKE_ALONG, Now, PageContext, Panel
 from explorer.viewer.view import small_html
@@ -98,6 +103,33 @@ class RecordingPanel(Panel):
         for replay in self._replays:
             replay.close()
         self._replays = replays
+
+
+class ReplayBeside:
+    """Serves ``recording`` on a free port of ``host`` until it is closed; plays when the first browser comes.
+
+    Raises :class:`explorer.errors.CommandError` where it cannot be read.
+    """
+
+    def __init__(self, recording: Path, host: str) -> None:
+        # Imported here: rerun takes a second to load, and most sessions are not replayed.
+        from explorer.logs.recording_reader import read_recording
+        from explorer.viewer.replay.replay_page import ReplayPage
+
+        read = read_recording(recording)
+        self._server, self._stop = guarded_server(host, 0, "Replay"), threading.Event()
+        page = ReplayPage(self._server, read, recording.name)
+        self.address = f"http://{address(host)}:{self._server.get_port()}"
+        self.seconds = float(read.times[-1]) - read.zero
+        """How much it holds [s]."""
+        self._loop = threading.Thread(target=page.run, args=(self._stop,), daemon=True, name="explorer-replay")
+        self._loop.start()
+
+    def close(self) -> None:
+        """End the page."""
+        self._stop.set()
+        self._loop.join()
+        self._server.stop()
 
 
 def replay_links(replays: Sequence[ReplayBeside]) -> str:
