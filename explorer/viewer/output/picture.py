@@ -18,7 +18,7 @@ from explorer.viewer.actions import BackgroundWork, Post
 from explorer.viewer.look.colour_by import ColourKey, written
 from explorer.viewer.look.look_settings import one_of
 from explorer.viewer.output.send_file import send_file
-from explorer.viewer.palette import HALO, STILL, Colour, mapped
+from explorer.viewer.palette import CORE, HALO, STILL, Colour, mapped
 
 LARGEST_PICTURE = (4320, 7680)
 """Height and width [pixels]."""
@@ -33,8 +33,12 @@ GROUNDS: Mapping[str, tuple[int, int, int, int]] = {
     NO_GROUND: (255, 255, 255, 0),
 }
 """What is behind the scene, RGBA."""
-INK: Mapping[str, Colour] = {DARK_GROUND: (236, 238, 240), WHITE_GROUND: HALO, NO_GROUND: HALO}
-"""What is written with on each."""
+INK: Mapping[str, tuple[Colour, Colour]] = {
+    DARK_GROUND: (CORE, HALO),
+    WHITE_GROUND: (HALO, CORE),
+    NO_GROUND: (HALO, CORE),
+}
+"""What is written with on each, and its rim: the plate, which is dark, may be behind it."""
 TEXT = 15
 """Height of letters [pixels at 1×]; other lengths are multiples of it."""
 BAR_SHARE = 0.25
@@ -95,7 +99,7 @@ def composed(pixels: npt.NDArray[np.uint8], ground: str, per_metre: float, legen
     """``pixels`` (RGBA) before a ``ground`` with scale bar and key, as PNG; ``unit``: pixels per one of the screen."""
     image = Image.new("RGBA", (pixels.shape[1], pixels.shape[0]), GROUNDS[ground])
     image.alpha_composite(Image.fromarray(pixels, "RGBA"))
-    sheet = Sheet(image, INK[ground], unit * TEXT)
+    sheet = Sheet(image, *INK[ground], unit * TEXT)
     sheet.scale_bar(per_metre)
     sheet.key(legend)
     made = io.BytesIO()
@@ -104,10 +108,10 @@ def composed(pixels: npt.NDArray[np.uint8], ground: str, per_metre: float, legen
 
 
 class Sheet:
-    """Draws onto ``image`` in the colour ``ink``, letters ``size`` pixels high."""
+    """Draws onto ``image`` in the colour ``ink`` with a ``rim``, letters ``size`` pixels high."""
 
-    def __init__(self, image: Image.Image, ink: Colour, size: float) -> None:
-        self._image, self._ink, self._size = image, ink, size
+    def __init__(self, image: Image.Image, ink: Colour, rim: Colour, size: float) -> None:
+        self._image, self._ink, self._rim, self._size = image, ink, rim, size
         self._draw, self._font = ImageDraw.Draw(image), ImageFont.load_default(size)
 
     def scale_bar(self, per_metre: float) -> None:
@@ -115,8 +119,10 @@ class Sheet:
         length, size = bar_length(per_metre, self._image.width), self._size
         left, foot = 1.5 * size, self._image.height - 1.5 * size
         right = left + length * per_metre
+        rim = 0.12 * size
+        self._draw.rectangle((left - rim, foot - 0.3 * size - rim, right + rim, foot + rim), fill=self._rim)
         self._draw.rectangle((left, foot - 0.3 * size, right, foot), fill=self._ink)
-        self._draw.text((0.5 * (left + right), foot - 0.6 * size), length_words(length), self._ink, self._font, "mb")
+        self._write((0.5 * (left + right), foot - 0.6 * size), length_words(length), "mb")
 
     def key(self, legend: Legend) -> None:
         """In the upper right corner: components, or the colours of a quantity; thickness of lines."""
@@ -146,13 +152,17 @@ class Sheet:
         size = self._size
         box = (left, top + 0.1 * size, left + 0.9 * size, top + size)
         self._draw.rectangle(box, fill=colour, outline=self._ink, width=max(1, round(0.06 * size)))
-        self._draw.text((left + 1.5 * size, top + 0.55 * size), words, self._ink, self._font, "lm")
+        self._write((left + 1.5 * size, top + 0.55 * size), words, "lm")
+
+    def _write(self, place: tuple[float, float], words: str, anchor: str) -> None:
+        rim = max(1, round(0.12 * self._size))
+        self._draw.text(place, words, self._ink, self._font, anchor, stroke_width=rim, stroke_fill=self._rim)
 
     def _numbers(self, left: float, top: float, wide: float, numbers: Sequence[float], title: str) -> float:
         """Numbers below a bar and their title; where the next entry begins."""
         for share, anchor, number in zip((0.0, 0.5, 1.0), ("la", "ma", "ra"), numbers, strict=True):
-            self._draw.text((left + share * wide, top), written(number), self._ink, self._font, anchor)
-        self._draw.text((left, top + 1.3 * self._size), title, self._ink, self._font, "la")
+            self._write((left + share * wide, top), written(number), anchor)
+        self._write((left, top + 1.3 * self._size), title, "la")
         return top + 3.2 * self._size
 
 

@@ -1,8 +1,14 @@
-"""Recordings of the moving scene: begun, ended and taken along by a person."""
+"""Recordings of the moving scene: begun, ended, taken along and replayed by a person.
+
+A replay is a page of its own, beside the live page and in its process: no other program has to be started.
+"""
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Sequence
 from html import escape
+from pathlib import Path
 from typing import Any
 
 import viser
@@ -10,6 +16,7 @@ import viser
 from explorer.errors import CommandError
 from explorer.files.exports import zipped
 from explorer.logs.recording import recorded_lines
+from explorer.viewer.guarded_server import address, guarded_server
 from explorer.viewer.output.recording_switch import HTML, RRD, RecordingSwitch
 from explorer.viewer.output.send_file import send_file
 from explorer.viewer.panel import EXPORT, Now, PageContext, Panel
@@ -17,7 +24,7 @@ from explorer.viewer.view import small_html
 
 MOST_SENT = 200_000_000
 """Bytes of a recording that are sent to a browser."""
-START, STOP, DOWNLOAD = "Start", "Stop", "Download"
+START, STOP, DOWNLOAD, REPLAY = "Start", "Stop", "Download", "Replay here"
 
 
 class RecordingPanel(Panel):
@@ -36,10 +43,12 @@ class RecordingPanel(Panel):
         )
         self._switch = gui.add_button_group(
             "Record",
-            (START, STOP, DOWNLOAD),
+            (START, STOP, DOWNLOAD, REPLAY),
             hint="Every pour that is begun meanwhile has a file of its own; Download sends several as a ZIP file. "
-            "Recordings stay in the folder named below.",
+            "Replay here gives a link to a page for each, which opens beside this one. Recordings stay in the folder "
+            "named below.",
         )
+        self._host, self._replays = page.server.get_host(), list[ReplayBeside]()
         self._state = gui.add_html("")
 
         @self._switch.on_click
@@ -51,18 +60,29 @@ class RecordingPanel(Panel):
     def show(self, now: Now) -> None:
         """State of the recording, or the page's last message."""
         state = recording_html(self._recording, self._background.busy_with, now.notice)
+        state += small_html(replay_links(self._replays)) if self._replays else ""
         if self._state.content != state:
             self._state.content = state
 
     def close(self) -> None:
-        """End a recording that was begun on the page, with its file whole."""
+        """End a recording that was begun on the page, with its file whole, and the pages that replay one."""
         self._recording.close()
+        self._show_replays([])
 
     def _record(self, client: Any, chosen: str) -> None:
         if chosen == START:
             self._recording.begin(str(self._kind.value))
         elif chosen == STOP:
             self._recording.end()
+        elif chosen == REPLAY:
+            pours = [path for path in self._recording.files() if path.suffix == ".rrd"]
+            if not pours:
+                raise CommandError("recording: a web page replays itself; download and open it")
+            self._background.start(
+                "reading the recording",
+                lambda: [ReplayBeside(path, self._host) for path in pours],
+                self._show_replays,
+            )
         elif chosen == DOWNLOAD and client is not None:
             files = self._recording.files()
             size = sum(file.stat().st_size for file in files)
@@ -78,14 +98,55 @@ class RecordingPanel(Panel):
                     lambda made: send_file(client, f"{files[0].stem}.zip", made),
                 )
 
+    def _show_replays(self, replays: list[ReplayBeside]) -> None:
+        """Of the last recording only: those before it are ended."""
+        for replay in self._replays:
+            replay.close()
+        self._replays = replays
+
+
+class ReplayBeside:
+    """Serves ``recording`` on a free port of ``host`` until it is closed; plays when the first browser comes.
+
+    Raises :class:`explorer.errors.CommandError` where it cannot be read.
+    """
+
+    def __init__(self, recording: Path, host: str) -> None:
+        # Imported here: rerun takes a second to load, and most sessions are not replayed.
+        from explorer.logs.recording_reader import read_recording
+        from explorer.viewer.replay.replay_page import ReplayPage
+
+        read = read_recording(recording)
+        self._server, self._stop = guarded_server(host, 0, "Replay"), threading.Event()
+        page = ReplayPage(self._server, read, recording.name)
+        self.address = f"http://{address(host)}:{self._server.get_port()}"
+        self.seconds = float(read.times[-1]) - read.zero
+        """How much it holds [s]."""
+        self._loop = threading.Thread(target=page.run, args=(self._stop,), daemon=True, name="explorer-replay")
+        self._loop.start()
+
+    def close(self) -> None:
+        """End the page."""
+        self._stop.set()
+        self._loop.join()
+        self._server.stop()
+
+
+def replay_links(replays: Sequence[ReplayBeside]) -> str:
+    """Links to the pages of the pours of a recording."""
+    links = (
+        f"<a href='{escape(one.address)}' target='_blank' rel='noopener'>Replay pour {k}</a> ({one.seconds:.3f} s)"
+        for k, one in enumerate(replays, start=1)
+    )
+    return "<br>".join(links)
+
 
 def recording_html(recording: RecordingSwitch, busy_with: str, notice: str) -> str:
     """What is being recorded or done, and where the files are."""
     lines = [notice, f"Busy {busy_with}." if busy_with else ""]
     pours = recording.pours
     if recording.running:
-        so_far = f" (pour {len(pours)} of this recording)" if len(pours) > 1 else ""
-        lines.append(f"Recording into {pours[-1].path if pours else recording.path}{so_far}")
+        lines.append(f"● {recording.state.words}: into {pours[-1].path if pours else recording.path}")
     elif pours:
         lines += recorded_lines(pours)
         if len(pours) > 1 and not busy_with:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any, Protocol
@@ -26,6 +27,27 @@ BYTES_PER_BODY = 32
 LONGEST_PAUSE = 0.5
 """A pause in the pour takes no longer than this [s] in the playback."""
 RRD, HTML = "rerun (.rrd)", "web page (.html)"
+
+
+@dataclass(frozen=True)
+class RecordingState:
+    """What is being recorded."""
+
+    running: bool
+    kind: str = ""
+    """One of ``RRD`` and ``HTML``; empty before the first recording."""
+    pours: int = 0
+    """Of the present or last recording, so far."""
+    seconds: float = 0.0
+    """Wall time since it was begun; 0 where none is running."""
+
+    @property
+    def words(self) -> str:
+        """``REC 1:05``, and the number of the pour from the second on; empty where none is running."""
+        if not self.running:
+            return ""
+        minutes, seconds = divmod(int(self.seconds), 60)
+        return f"REC {minutes}:{seconds:02d}" + (f" · pour {self.pours}" if self.pours > 1 else "")
 
 
 class Recorder(Protocol):
@@ -64,6 +86,14 @@ class RecordingSwitch:
         self._recorder: Recorder | ScenePlayback | None = None
         self._path: Path | None = None
         self._pours: tuple[RecordedPour, ...] = ()
+        self._began = 0.0
+
+    @property
+    def state(self) -> RecordingState:
+        """What is being recorded, for whoever tells it on the page."""
+        kind = "" if self._path is None else RRD if self._path.suffix == ".rrd" else HTML
+        since = time.monotonic() - self._began if self.running else 0.0
+        return RecordingState(self.running, kind, len(self.pours), since)
 
     @property
     def running(self) -> bool:
@@ -122,14 +152,13 @@ class RecordingSwitch:
             self.end()
 
     def files(self) -> tuple[Path, ...]:
-        """What a person takes along of the last recording: all its files, or the one that plays if only one does.
+        """What a person takes along of the last recording: a file per pour since its beginning, or the web page.
 
         CommandError where there is none, or while it is being written.
         """
         if self.running or self._background.busy_with:
             raise CommandError("recording: stop it first, and wait until it is written")
-        that_play = [pour for pour in self._pours if pour.plays]
-        found = [pour.path for pour in (that_play if len(that_play) == 1 else self._pours)]
+        found = [pour.path for pour in self._pours]
         if not found and self._path is not None and self._path.is_file():
             found = [self._path]  # a web page
         if not found:
@@ -146,6 +175,7 @@ class RecordingSwitch:
 
     def _take_up(self, path: Path, recorder: Recorder | ScenePlayback) -> None:
         self._path, self._recorder, self._pours = path, recorder, ()
+        self._began = time.monotonic()
 
 
 class ScenePlayback:

@@ -99,6 +99,8 @@ class ReplayPage:
                     server.gui.add_markdown(recording.outcome)
         with tabs.add_tab("Look", viser.Icon.EYE):
             self._look = ReplayLook(server, recording, colour_bar, self._actions.post)
+        self._seen = False
+        server.on_client_connect(lambda _: self._actions.post(self._begin))
         # viser's charts are drawn for both.
         ThemeSwitch(server, self._actions.post, lambda dark: None)
 
@@ -144,6 +146,12 @@ class ReplayPage:
             before = now
             self.show()
             frames.wait(stop)
+
+    def _begin(self) -> None:
+        """Play from the beginning for the first browser: until then nobody has seen anything."""
+        if not self._seen:
+            self._seen, self._timeline.time = True, self._timeline.first
+            self._timeline.playing = True
 
     def show(self) -> None:
         """Draw the present moment; what is drawn already is left alone."""

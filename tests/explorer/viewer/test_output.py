@@ -2,6 +2,9 @@
 
 import io
 import math
+import re
+import urllib.error
+import urllib.request
 import zipfile
 from dataclasses import replace
 from pathlib import Path
@@ -32,8 +35,8 @@ from explorer.viewer.output.picture import (
     pixels_per_metre,
     rendered,
 )
-from explorer.viewer.output.recording_panel import DOWNLOAD, START, STOP, RecordingPanel
-from explorer.viewer.output.recording_switch import BYTES_PER_BODY, HTML, RRD, session_recorder
+from explorer.viewer.output.recording_panel import DOWNLOAD, REPLAY, START, STOP, RecordingPanel
+from explorer.viewer.output.recording_switch import BYTES_PER_BODY, HTML, RRD, RecordingState, session_recorder
 from explorer.viewer.palette import BODY_COLOURS, STILL, VIRIDIS
 from explorer.viewer.panel import Now
 from tests.explorer.viewer.page_session import PageSession, event, finished, frame_of, page_context
@@ -258,7 +261,7 @@ def test_a_recording_is_begun_ended_and_sent(bench):
     assert "one is running" in bench.record(START)
     bench.take(3)
     bench.switch.show(Now(bench.session.status()))
-    assert f"Recording into {bench.recording.path}" in bench.switch._state.content
+    assert re.search(rf"● REC \d:\d\d: into {re.escape(str(bench.recording.path))}", bench.switch._state.content)
     assert "stop it first" in bench.record(DOWNLOAD)
     assert bench.record(STOP) == ""
     bench.take(2)
@@ -276,25 +279,61 @@ def test_a_pour_that_is_begun_while_recording_is_what_is_downloaded(recorded, tm
     recorded.pour([0.0, 0.02, 0.05, 0.06])
     first = recorded.recording.path
     second = first.with_stem(f"{first.stem}_2")
-    assert f"Recording into {second} (pour 2 of this recording)" in recorded.told()
+    assert re.search(rf"● REC \d:\d\d · pour 2: into {re.escape(str(second))}", recorded.told())
     assert recorded.record(STOP) == ""
     told = recorded.told()
     assert "2 pours recorded:" in told
     assert f"{first}: a single moment, at 1.911 s" in told
     assert f"{second}: 0.060 s, from 0.000 to 0.060 s" in told
-    assert f"Download sends {second.name}" in told
+    assert "Download sends all in one ZIP file" in told
 
     assert recorded.record(DOWNLOAD) == ""
     ((name, content),) = recorded.browser.sent.items()
-    assert name == second.name
-    (tmp_path / name).write_bytes(content)
-    found = read_recording(tmp_path / name)
+    assert name == f"{first.stem}.zip"
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        archive.extractall(tmp_path)
+    found = read_recording(tmp_path / second.name)
     assert found.times == pytest.approx([0.0, 0.02, 0.05, 0.06])
     (body,) = found.components
     # From its first body on.
     assert [len(body.at(time).scale) for time in found.times] == [1, 2, 3, 4]
     # The moment before the restart is not lost either.
-    assert read_recording(first).times == pytest.approx([1.911])
+    assert read_recording(tmp_path / first.name).times == pytest.approx([1.911])
+
+
+def test_what_is_recorded_is_replayed_without_another_server(recorded):
+    """Record, restart, stop, replay: both pours have a page, and the page shows what was recorded."""
+    assert recorded.record(REPLAY) == "recording: nothing was recorded yet"
+    assert recorded.record(START) == ""
+    recorded.pour([0.0, 0.1, 0.2])
+    recorded.session.restart()
+    recorded.pour([0.0, 0.05])
+    assert "stop it first" in recorded.record(REPLAY)
+    assert recorded.record(STOP) == ""
+    assert recorded.record(REPLAY) == ""
+    replays = recorded.switch._replays
+    assert [one.seconds for one in replays] == pytest.approx([0.2, 0.05])
+    for one in replays:
+        assert f"<a href='{one.address}'" in recorded.told()
+        with urllib.request.urlopen(one.address, timeout=10.0) as answer:
+            assert b"<html" in answer.read()
+    recorded.switch.close()
+    assert recorded.switch._replays == []
+    with pytest.raises(urllib.error.URLError):
+        urllib.request.urlopen(replays[0].address, timeout=10.0)
+
+
+def test_the_state_of_a_recording_is_told_in_words(bench):
+    assert bench.recording.state == RecordingState(False)
+    assert bench.recording.state.words == ""
+    assert bench.record(START) == ""
+    bench.take(1)
+    state = bench.recording.state
+    assert (state.running, state.kind, state.pours) == (True, RRD, 1)
+    assert replace(state, seconds=65.9).words == "REC 1:05"
+    assert replace(state, seconds=605.0, pours=3).words == "REC 10:05 · pour 3"
+    assert bench.record(STOP) == ""
+    assert bench.recording.state == RecordingState(False, RRD, 1)
 
 
 def test_several_pours_are_downloaded_in_one_file(recorded, tmp_path):

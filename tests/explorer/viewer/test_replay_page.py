@@ -301,3 +301,17 @@ def test_the_curve_is_marked_where_time_stands():
 def test_a_moment_s_chart_has_an_axis_that_can_be_read():
     """A recording of a millisecond: its ticks would all say the same."""
     assert columns(np.zeros(1), np.ones(1), 0.0, 0.001)[0][-1] == pytest.approx(0.1, abs=1e-5)
+
+
+def test_it_plays_from_the_beginning_when_the_first_browser_comes(page):
+    page._timeline.go_to(9.0)
+    page._timeline.playing = False
+    for callback in page._server._client_connect_cb:
+        callback(None)
+    page._actions.carry_out()
+    assert (page._timeline.time, page._timeline.playing) == (0.0, True)
+    page._timeline.go_to(0.04)
+    for callback in page._server._client_connect_cb:
+        callback(None)
+    page._actions.carry_out()
+    assert page._timeline.time == 0.04
