@@ -99,7 +99,7 @@ def replay(
 
     read = read_recording(recording)
     with stopped_by_signals() as stop, ExitStack() as ending:
-        server = guarded_server(host, port, LABEL)
+        server = guarded_server(host, port, LABEL, WebPages(f"{recording.name} · {LABEL}", around=False))
         ending.callback(server.stop)
         page = ReplayPage(server, read, recording.name)
         ready(f"http://{address(host)}:{server.get_port()}")

@@ -27,27 +27,6 @@ FILL = 0.68
 """Share of the height of the window that rig and feed take."""
 MIDDLE = 0.42
 """Height that the camera looks at, as a share of the height of rig and feed."""
-TEXT_STYLE = """<style>
-body { letter-spacing: normal; }
-body label, body .mantine-Title-root, body .mantine-Paper-root div { letter-spacing: normal !important; }
-.mantine-Button-label, [role=tab], .mantine-Code-root, .mantine-Text-root, .mantine-Input-input,
-.mantine-InputWrapper-label, .mantine-Slider-markLabel, .mantine-Slider-label, .u-legend, .u-legend .u-value,
-body label { font-size: 13px !important; }
-.mantine-Button-root { height: auto; min-height: 1.9em; padding-inline: 0.4em; }
-.mantine-Button-label { white-space: normal; line-height: 1.2; }
-[data-mantine-color-scheme] { --quiet-text: #b9c0c7; --chosen-text: #7db8e4; }
-[data-mantine-color-scheme=light] { --quiet-text: #4f565d; --chosen-text: #1f6ea5;
---mantine-primary-color-filled: #1f6ea5 !important; --mantine-color-custom-filled: #1f6ea5 !important;
---mantine-primary-color-filled-hover: #185a88 !important; --mantine-color-custom-filled-hover: #185a88 !important; }
-body label, .mantine-Slider-markLabel, .u-legend .u-value, .mantine-Notification-description
-{ color: var(--quiet-text) !important; }
-[role=tab] { color: var(--quiet-text) !important; opacity: 1 !important; }
-[role=tab][aria-selected=true], .mantine-Button-root[data-variant=outline] { color: var(--chosen-text) !important; }
-.mantine-Input-wrapper:not([data-with-right-section]) .mantine-NumberInput-input { padding-inline: 0.2em !important; }
-</style>"""
-"""Sizes of type (13 px; 15 px the title and 28 px the number of a pour by their own styles), its spacing, and text that
-is told from its background by 4.5 : 1 on a dark and on a light page (WCAG 2.2, 1.4.3). viser 1.1.1 has 4.0, and 2.5 for
-a tab on a light page."""
 SKY = 0.7
 """Light from everywhere, so that what lies in the shade is not black."""
 
@@ -95,7 +74,6 @@ class ThemeSwitch:
 
     def __init__(self, server: viser.ViserServer, post: Post, follow: Callable[[bool], None]) -> None:
         self._server, self._follow = server, follow
-        server.gui.add_html(TEXT_STYLE)
         self._dark = server.gui.add_checkbox("Dark page", DARK, hint="Dark or light, charts included.")
 
         @self._dark.on_update

@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from tests.browser.test_page import address, page, positions, simulated_time, state, wait_for  # noqa: F401
+from tests.browser.test_page import address, page, positions, room, simulated_time, state, wait_for  # noqa: F401
 
 pytestmark = pytest.mark.browser
 
@@ -59,11 +59,11 @@ def test_the_left_arrow_leads_back_to_the_same_positions(page):  # noqa: F811
 
 def test_a_pile_at_rest_says_so_in_a_word(page):  # noqa: F811
     wait_for(lambda: state(page) == "ended")
-    assert page.locator(".pour .condition").inner_text() == "at rest"
+    assert "at rest" in page.locator("#timeline .chip").inner_text()
 
 
 def test_keys_colour_the_bodies_and_draw_the_forces(page):  # noqa: F811
-    page.get_by_role("tab", name="Look").click()
+    room(page, "Look")
     plain = colours(page)
     for _ in range(2):  # speed, then contact force: a pile at rest has no speeds that differ
         press(page, "c")

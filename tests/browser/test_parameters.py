@@ -12,7 +12,7 @@ import trimesh
 
 from explorer.logs.recording_reader import read_recording
 from tests.browser import test_page as shared
-from tests.browser.test_page import SMALL_POUR, positions, simulated_time, slider, state, wait_for
+from tests.browser.test_page import SMALL_POUR, positions, room, simulated_time, slider, state, wait_for
 
 pytestmark = pytest.mark.browser
 
@@ -91,13 +91,14 @@ def test_a_mesh_with_a_hole_is_refused_in_words_and_the_pour_goes_on(page, tmp_p
         page.get_by_role("button", name="Upload a body and pour").click()
     chooser.value.set_files(tmp_path / "open.stl")
     page.get_by_text("open.stl: ").first.wait_for()
-    assert "not watertight" in page.locator(".pour").inner_text()
+    room(page, "Controls")
+    page.locator(".pour", has_text="not watertight").wait_for()
     before = simulated_time(page)
     wait_for(lambda: simulated_time(page) > before or state(page) == "ended")
 
 
 def test_the_scene_file_is_downloaded(page):
-    page.get_by_role("tab", name="Take along").click()
+    room(page, "Export")
     page.get_by_text("explorer simulate sunflower_extract").wait_for()
     with page.expect_download() as download:
         page.get_by_role("button", name="Scene (TOML)").click()
@@ -105,23 +106,17 @@ def test_the_scene_file_is_downloaded(page):
 
 
 def test_record_restart_stop_and_download_gives_the_whole_pour(page, tmp_path):
-    def tab(name):
-        page.get_by_role("tab", name=name).click()
-
     def record(button):
         page.get_by_role("button", name=button, exact=True).click()
 
-    tab("Pour")
     wait_for(lambda: state(page) == "ended")
-    tab("Take along")
+    room(page, "Export")
     record("Start")
     page.get_by_text("Recording into").wait_for()
     press(page, "r")
     page.get_by_text("(pour 2 of this recording)").wait_for()
-    tab("Pour")
     wait_for(lambda: state(page) == "ended")
     end = simulated_time(page)
-    tab("Take along")
     record("Stop")
     page.get_by_text("2 pours recorded:").wait_for()
     with page.expect_download() as download:

@@ -9,14 +9,13 @@ import time
 
 import pytest
 
-from tests.browser.test_page import FLAGS, PATIENCE, SMALL_POUR, positions, slider, wait_for
+from tests.browser.test_page import BEGUN, FLAGS, PATIENCE, SMALL_POUR, positions, room, slider, wait_for
 from tests.explorer import reported_studies
 
 pytestmark = pytest.mark.browser
 
 COMPILED = 300.0
 """Seconds: the first run of a study comes after its workers have compiled the solver, at low priority."""
-TRACES = "() => document.querySelector('.js-plotly-plot').data.map(trace => trace.name ?? '')"
 HERE = (
     """() => document.querySelector('.js-plotly-plot').data.filter(trace => trace.name === 'here').map(t => t.x[0])"""
 )
@@ -58,6 +57,7 @@ def page(address, chromium):
         page = browser.new_page(viewport={"width": 1280, "height": 1400})
         page.set_default_timeout(PATIENCE)
         page.complaints = []
+        page.add_init_script(BEGUN)
         page.on("console", lambda said: page.complaints.append(said.text) if said.type == "error" else None)
         page.on("pageerror", lambda error: page.complaints.append(str(error)))
         opened(page, address)
@@ -69,8 +69,13 @@ def page(address, chromium):
 
 def opened(page, address, tab="Calibrate"):
     page.goto(address)
-    page.get_by_role("tab", name=tab).click()
-    page.get_by_text("Profile" if tab == "Calibrate" else "Which physical effect").first.wait_for()
+    room(page, tab)
+    page.get_by_text("Profile" if tab == "Calibrate" else "Measured data").first.wait_for()
+
+
+def board(page, title):
+    """The board in the open tab."""
+    return page.frame_locator(f'iframe[title="{title}"]')
 
 
 def press(page, button):
@@ -87,28 +92,36 @@ def cancel_resume_cancel(page):
     """What runs in the open tab is cancelled, goes on, and is cancelled for good."""
     press(page, "Cancel")
     shown(page, "Cancelled.")
-    press(page, "Resume")
+    press(page, "Resume last")
     shown(page, "Running at low priority")
     press(page, "Cancel")
     shown(page, "Cancelled.")
 
 
-def choose(page, label, option):
-    page.get_by_label(label, exact=True).click()
-    page.get_by_role("option", name=option, exact=True).click()
-
-
-def test_the_newest_finished_study_is_drawn_and_another_chart_can_be_chosen(page):
-    page.locator(".js-plotly-plot").first.wait_for()
-    choose(page, "Chart", "Ascent path")
-    wait_for(lambda: "mean, 95 % interval" in page.evaluate(TRACES))
-    assert page.locator(".js-plotly-plot").count() == 1
+def test_the_newest_finished_study_is_a_board_with_its_verdict_and_charts(page):
+    shown = board(page, "Study")
+    shown.locator(".banner strong").wait_for()
+    assert "CALIBRATED WITHIN" in shown.locator(".banner strong").inner_text()
+    shown.locator("figure .js-plotly-plot").first.wait_for()
+    page.locator("#state-line").get_by_text("calibrated within").wait_for()
+    # A column is sorted by its head, and a row opens its run in the scene.
+    shown.locator("summary", has_text="Runs").click()
+    runs = shown.locator("details[open] tbody tr")
+    before = runs.first.inner_text()
+    shown.locator("details[open] th button", has_text="Seed").click()
+    shown.locator("details[open] th[aria-sort=ascending]").wait_for()
+    seeds = [int(text) for text in shown.locator("details[open] tbody td:nth-child(3)").all_inner_texts()]
+    assert seeds == sorted(seeds)
+    assert before
+    shown.locator("details[open] input").fill("point 4")
+    wait_for(lambda: all("point 4" in text for text in runs.all_inner_texts()))
+    runs.first.click()
+    page.get_by_text("this pour may differ").first.wait_for()
 
 
 def test_a_slider_of_the_profiler_moves_its_chart_by_keyboard(page):
-    choose(page, "Chart", "Profiler")
-    # The name stands in the chooser's list too, which is hidden now.
-    page.get_by_text("Profiler", exact=True).filter(visible=True).last.click()
+    page.get_by_text("Profiler", exact=True).filter(visible=True).first.click()
+    page.locator(".js-plotly-plot").first.wait_for()
     thumb = slider(page, "X7")
     thumb.scroll_into_view_if_needed()
     thumb.focus()
@@ -134,7 +147,7 @@ def test_a_study_is_started_paused_cancelled_and_resumed(page, address, data):
     time.sleep(1.0)
     before = positions(page)
     wait_for(lambda: len(positions(page)) > len(before) or (positions(page) != before).any())
-    page.get_by_role("button", name="Pause / go on").first.click()
+    press(page, "Pause")
     shown(page, "Paused: it stands still")
     standing = re.search(r"(\d+) of \d+ runs", page.inner_text("body"))[1]
     time.sleep(5.0)

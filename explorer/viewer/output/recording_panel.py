@@ -20,6 +20,7 @@ from explorer.viewer.guarded_server import address, guarded_server
 from explorer.viewer.output.recording_switch import HTML, RRD, RecordingSwitch
 from explorer.viewer.output.send_file import send_file
 from explorer.viewer.panel import EXPORT, Now, PageContext, Panel
+from explorer.viewer.shell.web_pages import WebPages
 from explorer.viewer.view import small_html
 
 MOST_SENT = 200_000_000
@@ -117,7 +118,10 @@ class ReplayBeside:
         from explorer.viewer.replay.replay_page import ReplayPage
 
         read = read_recording(recording)
-        self._server, self._stop = guarded_server(host, 0, "Replay"), threading.Event()
+        self._server, self._stop = (
+            guarded_server(host, 0, "Replay", WebPages("Replay", around=False)),
+            threading.Event(),
+        )
         page = ReplayPage(self._server, read, recording.name)
         self.address = f"http://{address(host)}:{self._server.get_port()}"
         self.seconds = float(read.times[-1]) - read.zero

@@ -133,7 +133,7 @@ function showTimeline(now) {
   if (document.activeElement !== speed) speed.value = now.speed;
   condition.textContent = now.condition;
   condition.classList.toggle("trouble", now.trouble);
-  recording.textContent = now.recording ? `● REC ${now.recording}` : "";
+  recording.textContent = now.recording ? `● ${now.recording}` : "";
 }
 
 const show = {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Mapping
 from functools import partial
 from typing import Any
@@ -35,7 +34,6 @@ class Timeline(Panel):
     def __init__(self, page: PageContext) -> None:
         session, post = page.session, page.post
         self._page, self._session = page, session
-        self._recording_since: float | None = None
         acts = {PLAY_PAUSE: self._toggle, BACK: session.step_back, STEP: session.step, RESTART: session.restart}
         page.channel.offer("toggle", lambda _: post(self._toggle))
         page.channel.offer("back", lambda _: post(session.step_back))
@@ -48,16 +46,7 @@ class Timeline(Panel):
 
     def show(self, now: Now) -> None:
         """Tell the browsers where the pour is."""
-        self._page.channel.tell("timeline", timeline_state(now, self._recorded()))
-
-    def _recorded(self) -> str:
-        """How long the page has been recording, such as "0:12"; empty where it is not."""
-        if not self._page.recording.running:
-            self._recording_since = None
-            return ""
-        self._recording_since = self._recording_since or time.monotonic()
-        minutes, seconds = divmod(int(time.monotonic() - self._recording_since), 60)
-        return f"{minutes}:{seconds:02d}"
+        self._page.channel.tell("timeline", timeline_state(now, self._page.recording.state.words))
 
     def _toggle(self) -> None:
         if self._session.status().state == SessionState.PAUSED:

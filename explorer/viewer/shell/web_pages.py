@@ -23,7 +23,8 @@ from explorer.errors import CommandError
 HERE = Path(__file__).parent
 TITLE = "<title>Viser</title>"
 """Of viser's first page; in its place come our title, style and script."""
-OWN = """<title>{title}</title>
+TEXT = '<title>{title}</title>\n    <link rel="stylesheet" href="/shell/text.css" />'
+AROUND = """
     <link rel="stylesheet" href="/shell/shell.css" />
     <script src="/shell/shell.js" defer></script>"""
 HTML, JSON = "text/html; charset=utf-8", "application/json"
@@ -70,13 +71,17 @@ class WebPage:
 
 
 class WebPages:
-    """Addresses and what makes their pages; ``title`` is that of the first page."""
+    """Addresses and what makes their pages.
 
-    def __init__(self, title: str) -> None:
-        self._title = title
+    ``title`` is that of the first page; ``around``: it has a state line and a timeline, and so a channel.
+    """
+
+    def __init__(self, title: str, around: bool = True) -> None:
+        self._title, self._around = title, around
         self._pages: dict[str, Callable[[], WebPage]] = {
             "/": self._first,
             "/index.html": self._first,
+            "/shell/text.css": lambda: _shipped("text.css"),
             "/shell/shell.js": lambda: _shipped("shell.js"),
             "/shell/shell.css": lambda: _shipped("shell.css"),
             "/shell/board.html": lambda: _shipped("board.html"),
@@ -123,7 +128,7 @@ class WebPages:
             return _refusal(HTTPStatus.NOT_FOUND)
 
     def _first(self) -> WebPage:
-        return WebPage(HTML, _first_page(self._title))
+        return WebPage(HTML, _first_page(self._title, self._around))
 
 
 def folder_id(folder: Path) -> str:
@@ -131,17 +136,20 @@ def folder_id(folder: Path) -> str:
     return sha256(str(folder.absolute()).encode()).hexdigest()[:LETTERS]
 
 
-def first_page(title: str, viser_page: str) -> str:
-    """viser's first page with our title, style and script. Raises CommandError where it is not the page known here."""
+def first_page(title: str, viser_page: str, around: bool = True) -> str:
+    """viser's first page with our title and style, and the script of what stands ``around`` it.
+
+    Raises CommandError where it is not the page known here.
+    """
     if viser_page.count(TITLE) != 1:
         raise CommandError(f"viser {viser.__version__}: its first page has no {TITLE}, another version is needed")
-    return viser_page.replace(TITLE, OWN.format(title=escape(title)))
+    return viser_page.replace(TITLE, TEXT.format(title=escape(title)) + (AROUND if around else ""))
 
 
 @cache
-def _first_page(title: str) -> bytes:
+def _first_page(title: str, around: bool) -> bytes:
     file = Path(viser.__file__).parent / "client" / "build" / "index.html"
-    return first_page(title, file.read_text(encoding="utf-8")).encode()
+    return first_page(title, file.read_text(encoding="utf-8"), around).encode()
 
 
 @cache
