@@ -1,5 +1,7 @@
 """The pictures of README and docs/page.md, taken from the running program in headless Chromium: `make pictures`.
 
+Every room at 1280 × 800 on the dark page; the first view, *Calibrate* and *Diagnose* also at the other sizes, light.
+
 A quick study is run first, so that its tab has something to show, and the diagnosis that `make diagnose` has left is
 taken where there is one; everything is written to a data folder of its own.
 """
@@ -17,17 +19,16 @@ from pathlib import Path
 
 from playwright.sync_api import Page, sync_playwright
 
-from tests.browser.test_page import FLAGS
+from tests.browser.test_page import BEGUN, FLAGS, room
 from tests.conftest import find_chromium
 
 FOLDER = Path("assets/pictures")
 DIAGNOSIS = Path("results/diagnosis")
-SIZE = {"width": 1500, "height": 1000}
+WIDE, USUAL, SMALL, PHONE = (1920, 1080), (1280, 800), (1024, 768), (390, 844)
+"""Sizes of the window [px]."""
 PATIENCE_MS = 120_000
-ALL_TABS = tuple(
-    (name, name.lower().replace(" ", "_")) for name in ("Pour", "Look", "Take along", "Calibrate", "Diagnose")
-)
-SETTLED = ("at rest", "no heap", "ended", "jammed", "obstructed")
+STUDY_ROOMS, CONTROL_ROOMS = ("Pour", "Calibrate", "Diagnose", "Laboratory", "Reports"), ("Set-up", "Look", "Export")
+SETTLED = ("at rest", "no heap", "jammed", "obstructed")
 
 
 @contextmanager
@@ -46,18 +47,16 @@ def served(home: str, *arguments: str) -> Iterator[str]:
         server.wait(30)
 
 
-def opened(browser: object, address: str, text: str) -> Page:
-    """The page at ``address`` once it shows ``text``."""
-    page = browser.new_page(viewport=SIZE)  # type: ignore[attr-defined]
+def opened(browser: object, address: str, size: tuple[int, int], begun: bool = True) -> Page:
+    """The page at ``address``, with or without the start dialogue of a first visit."""
+    page = browser.new_page(viewport={"width": size[0], "height": size[1]})  # type: ignore[attr-defined]
     page.set_default_timeout(PATIENCE_MS)
+    if begun:
+        page.add_init_script(BEGUN)
     page.goto(address)
-    page.get_by_text(text).first.wait_for()
+    page.locator("#timeline .chip").filter(has_text=re.compile(".")).wait_for(state="attached")
+    without_notifications(page)
     return page
-
-
-def tab(page: Page, name: str) -> None:
-    page.get_by_role("tab", name=name).click()
-    time.sleep(2.0)
 
 
 def shot(page: Page, name: str) -> None:
@@ -83,47 +82,56 @@ def without_notifications(page: Page) -> None:
 def settled(page: Page) -> None:
     """Wait until the pile lies."""
     end = time.monotonic() + PATIENCE_MS / 1000
-    while page.locator(".pour .state").inner_text() not in SETTLED and time.monotonic() < end:
+    while time.monotonic() < end:
+        if any(word in page.locator("#timeline .chip").inner_text() for word in SETTLED):
+            return
         time.sleep(1.0)
 
 
 def live_pictures(browser: object, home: str) -> None:
-    with served(home, "--set", "body.spheres=coarse") as address:
-        page = opened(browser, address, "Static friction")
-        without_notifications(page)
+    with served(home, "--set", "body.spheres=coarse", "--store", f"{home}/runs.sqlite") as address:
+        page = opened(browser, address, USUAL, begun=False)
+        shot(page, "start_1280")
+        page.close()
+        page = opened(browser, address, USUAL)
         settled(page)
         page.keyboard.press("r")
-        page.wait_for_function("() => /Simulated time\\s*1\\.[0-9]+ s/.test(document.querySelector('.pour').innerText)")
+        page.wait_for_function("() => parseFloat(document.querySelector('#timeline .time').innerText) > 1")
         shot(page, "pouring")
         settled(page)
-        shot(page, "pour_dark")
-        tab(page, "Look")
+        shot(page, "controls_1280")
+        for name in STUDY_ROOMS:
+            room(page, name)
+            time.sleep(6.0)
+            shot(page, f"{name.lower()}_1280")
+        room(page, "Laboratory")
+        answered(page, "Photograph → angle of repose", "Read the angle", "explorer measure")
+        page.get_by_text("explorer measure").first.scroll_into_view_if_needed()
+        shot(page, "photograph_1280")
+        for name in CONTROL_ROOMS:
+            room(page, name)
+            shot(page, f"{name.lower().replace('-', '_')}_1280")
         page.keyboard.press("Escape")
+        page.evaluate("document.activeElement?.blur()")
+        room(page, "Look")
         page.evaluate("document.activeElement?.blur()")
         for key in "cck":  # speed, contact force, force chains
             page.keyboard.press(key)
-        shot(page, "look_dark")
+        shot(page, "forces_1280")
         for key in "ccck":  # coordination number, residence time, and back to the components
             page.keyboard.press(key)
-        for name, file in ALL_TABS[2:]:
-            tab(page, name)
-            time.sleep(4.0)
-            shot(page, f"{file}_dark")
-        tab(page, "Laboratory")
-        answered(page, "Photograph → angle of repose", "Read the angle", "explorer measure")
-        shot(page, "laboratory_dark")
-        page.get_by_text("Photograph → angle of repose").click()
-        page.get_by_text("Dark page").click()
-        for name, file in ALL_TABS:
-            tab(page, name)
-            time.sleep(4.0)
-            shot(page, f"{file}_light")
-        tab(page, "Laboratory")
-        answered(page, "Filled sheet → model and optimum", "Analyse", "explorer analyse")
-        page.get_by_text("On the command line:").last.scroll_into_view_if_needed()
-        time.sleep(4.0)
-        shot(page, "laboratory_light")
+        page.locator("#state-line").get_by_label("Dark or light page").click()
         page.close()
+        for size in (WIDE, SMALL, PHONE):
+            page = opened(browser, address, size)
+            time.sleep(6.0)
+            shot(page, f"controls_{size[0]}")
+            if size != PHONE:
+                for name in ("Calibrate", "Diagnose"):
+                    room(page, name)
+                    time.sleep(6.0)
+                    shot(page, f"{name.lower()}_{size[0]}")
+            page.close()
 
 
 def replay_picture(browser: object, home: str) -> None:
@@ -131,17 +139,20 @@ def replay_picture(browser: object, home: str) -> None:
     command = [sys.executable, "-m", "explorer", "simulate", "funnel", "--set", "body.spheres=coarse"]
     subprocess.run([*command, "--record", str(recording)], check=True, stdout=subprocess.DEVNULL)
     with served(home, "--replay", str(recording)) as address:
-        page = opened(browser, address, "Replay")
+        page = browser.new_page(viewport={"width": USUAL[0], "height": USUAL[1]})  # type: ignore[attr-defined]
+        page.set_default_timeout(PATIENCE_MS)
+        page.goto(address)
+        page.get_by_text("Replay").first.wait_for()
         without_notifications(page)
-        time.sleep(6.0)
-        shot(page, "replay")
-        page.get_by_text("Dark page").click()
-        shot(page, "replay_light")
+        time.sleep(12.0)
+        shot(page, "replay_1280")
         page.close()
 
 
 def main() -> None:
     FOLDER.mkdir(parents=True, exist_ok=True)
+    for stale in FOLDER.glob("*.png"):
+        stale.unlink()
     with tempfile.TemporaryDirectory() as home, sync_playwright() as playwright:
         study = Path(home) / "repose-explorer" / "studies" / "sunflower_extract-quick-20260101-000000"
         study.parent.mkdir(parents=True)
