@@ -10,17 +10,18 @@ import viser
 from doe.studies.study import Factor, Study
 from explorer.study.edit import RANGE_KEYS, StudyEdits, edited_study, listed_edits
 from explorer.units import checked, number, observable_label, parameter_label, unit_of_observable, unit_of_parameter
-from explorer.viewer.actions import Post
+from explorer.viewer.actions import Action, Post
 from explorer.viewer.study.process_view import escaped
 from solver import parameters
 
-WORDS = {"low": "Low", "high": "High", "reference": "Measured", "mean": "Target", "sd": "Its sd", "margin": "Margin"}
+TARGET_WORDS = {"mean": "mean", "sd": "SD", "margin": "margin of equivalence"}
+COLUMNS = "Low, high and measured value of each factor; the study starts from these ranges."
 LARGEST = 1e12
 """No number of a target is beyond this."""
 
 
 class OrderPanel:
-    """Inputs for one factor at a time, and for the first target; ``edits`` is what was changed.
+    """Low, high and reference of every factor in a row of its own, and the first target; ``edits`` is what was changed.
 
     ``study`` is that of ``file``, None where it cannot be read.
     """
@@ -31,21 +32,19 @@ class OrderPanel:
         self._ranges: dict[str, dict[str, float]] = {}
         self._target: dict[str, float] = {}
         self._told = gui.add_markdown("")
-        self._inputs: dict[str, Any] = {}
+        self._rows: dict[str, Any] = {}
         self._goal: dict[str, Any] = {}
         if self._study is None:
             self._told.content = f"{escaped(str(file))} cannot be read; start it to see why."
             return
-        self._factors = {f"{f.name} · {parameter_label(f.path)}": f for f in self._study.factors}
-        self._choice = gui.add_dropdown("Factor", tuple(self._factors), hint="Its range, from which the study starts.")
-        first = self._study.factors[0]
-        self._inputs = {key: gui.add_number(WORDS[key], self._shown(first, key)) for key in RANGE_KEYS}
-        self._label()
         self._add_target(gui)
-        back = gui.add_button("All as in the file")
-        self._choice.on_update(lambda event: post(self._show_factor) if event.client_id is not None else None)
-        for handle in (*self._inputs.values(), *self._goal.values()):
-            handle.on_update(lambda event: post(self._take) if event.client_id is not None else None)
+        gui.add_markdown(COLUMNS)
+        self._rows = {factor.name: self._row(gui, factor) for factor in self._study.factors}
+        back = gui.add_button("Reset to file")
+        for name, handle in self._rows.items():
+            handle.on_update(lambda event, name=name: self._posted(post, event, lambda: self._take_range(name)))
+        for handle in self._goal.values():
+            handle.on_update(lambda event: self._posted(post, event, self._take_target))
         back.on_click(lambda _: post(self._forget))
         self._tell()
 
@@ -54,47 +53,53 @@ class OrderPanel:
         """What is asked otherwise than in the file; SI."""
         return StudyEdits({name: dict(values) for name, values in self._ranges.items()}, dict(self._target))
 
+    @staticmethod
+    def _posted(post: Post, event: viser.GuiEvent[Any], act: Action) -> None:
+        if event.client_id is not None:  # not what the panel itself sets
+            post(act)
+
     def _add_target(self, gui: viser.GuiApi) -> None:
         assert self._study is not None
         target = self._study.targets[0]
         unit = unit_of_observable(target.observable)
-        words = f"{observable_label(target.observable)}{f' [{unit.symbol}]' if unit.symbol else ''}"
-        for key in ("mean", "sd", "margin"):
+        symbol = f" [{unit.symbol}]" if unit.symbol else ""
+        name = observable_label(target.observable)
+        for key, word in TARGET_WORDS.items():
             value = getattr(target, key)
             if value is not None:
-                self._goal[key] = gui.add_number(WORDS[key], float(number_on_screen(unit.of(value))), hint=words)
+                label = f"Target: {word}{symbol}"
+                self._goal[key] = gui.add_number(label, float(number_on_screen(unit.of(value))), hint=f"Of {name}.")
         if target.n is not None:
-            self._goal["n"] = gui.add_number("Measurements", target.n, min=2, step=1, hint="Number of measured piles.")
+            hint = f"Number of measured piles behind the mean and the SD of {name}."
+            self._goal["n"] = gui.add_number("Target: measured piles", target.n, min=2, step=1, hint=hint)
 
-    def _factor(self) -> Factor:
+    def _row(self, gui: viser.GuiApi, factor: Factor) -> Any:
+        """Three boxes for one factor."""
+        symbol = unit_of_parameter(factor.path).symbol
+        label = f"{factor.name} · {parameter_label(factor.path)}{f' [{symbol}]' if symbol else ''}"
+        return gui.add_vector3(label, self._in_file(factor), hint=COLUMNS)
+
+    def _in_file(self, factor: Factor) -> tuple[float, float, float]:
+        unit = unit_of_parameter(factor.path)
+        low, high, reference = (number_on_screen(unit.of(float(getattr(factor, key)))) for key in RANGE_KEYS)
+        return low, high, reference
+
+    def _take_range(self, name: str) -> None:
+        """Read one row; what stands there as in the file is no change."""
         assert self._study is not None
-        return self._factors.get(str(self._choice.value), self._study.factors[0])
-
-    def _shown(self, factor: Factor, key: str) -> float:
-        value = self._ranges.get(factor.name, {}).get(key, float(getattr(factor, key)))
-        return number_on_screen(unit_of_parameter(factor.path).of(value))
-
-    def _show_factor(self) -> None:
-        for key, handle in self._inputs.items():
-            handle.value = self._shown(self._factor(), key)
-        self._label()
-
-    def _label(self) -> None:
-        symbol = unit_of_parameter(self._factor().path).symbol
-        for key, handle in self._inputs.items():
-            handle.label = f"{WORDS[key]} [{symbol}]" if symbol else WORDS[key]
-
-    def _take(self) -> None:
-        """Read the inputs; what stands there as in the file is no change."""
-        assert self._study is not None
-        factor = self._factor()
+        factor = next(one for one in self._study.factors if one.name == name)
         unit, declared = unit_of_parameter(factor.path), parameters(self._study.scene)[factor.path]
         changed = {}
-        for key, handle in self._inputs.items():
-            entered = checked(handle.value, unit.of(declared.low), unit.of(declared.high), f"{factor.name} {key}")
-            if entered != number_on_screen(unit.of(float(getattr(factor, key)))):
+        for key, sent, before in zip(RANGE_KEYS, self._rows[name].value, self._in_file(factor), strict=True):
+            entered = checked(sent, unit.of(declared.low), unit.of(declared.high), f"{factor.name} {key}")
+            if number_on_screen(entered) != before:
                 changed[key] = min(max(entered * unit.size, declared.low), declared.high)
         self._ranges[factor.name] = changed
+        self._tell()
+
+    def _take_target(self) -> None:
+        """Read the target."""
+        assert self._study is not None
         target = self._study.targets[0]
         size = unit_of_observable(target.observable).size
         self._target = {}
@@ -108,7 +113,8 @@ class OrderPanel:
     def _forget(self) -> None:
         assert self._study is not None
         self._ranges, self._target = {}, {}
-        self._show_factor()
+        for factor in self._study.factors:
+            self._rows[factor.name].value = self._in_file(factor)
         target = self._study.targets[0]
         size = unit_of_observable(target.observable).size
         for key, handle in self._goal.items():

@@ -13,7 +13,6 @@ from explorer.background.command_process import CommandStatus
 from explorer.background.progress import StageProgress, TriedRun
 from explorer.report.sections.answer import banner as study_banner
 from explorer.report.study_charts import Plot
-from explorer.units import InputError
 from explorer.viewer.actions import Actions
 from explorer.viewer.panel import Now
 from explorer.viewer.study.order_panel import number_on_screen
@@ -237,39 +236,36 @@ def test_a_study_that_runs_shows_what_it_has(table, result, tmp_path):
 def test_ranges_and_target_are_asked_for_as_entered(table):
     order = table.panel._order
     assert not order.edits
-    table.enter(order._choice, next(text for text in order._factors if text.startswith("X4 ")))
-    assert order._inputs["low"].label == "Low [MPa]"
-    assert [order._inputs[key].value for key in ("low", "high", "reference")] == [40.1, 70.5, 56.3]
-    table.enter(order._inputs["low"], 30.0)
+    row = order._rows["X4"]
+    assert row.label == "X4 · shear modulus seed [MPa]"
+    assert row.value == (40.1, 70.5, 56.3)
+    assert table.enter(row, (30.0, 70.5, 56.3)) == ""
     table.enter(order._goal["mean"], 26.0)
+    assert order._goal["sd"].label == "Target: SD [°]"
     assert dict(order.edits.factors) == {"X4": {"low": 30e6}}
     assert dict(order.edits.target) == {"mean": 26.0}
     assert "| X4 low | 40.1 MPa | 30 MPa |" in order._told.content
-    table.press("Start")
+    table.press(START)
     assert table.study.asked[0][2] == order.edits
-    # another factor and back: the change is still there
-    table.enter(order._choice, next(text for text in order._factors if text.startswith("X7 ")))
-    assert order._inputs["low"].label == "Low"
-    assert order._inputs["low"].value == 0.47
-    table.enter(order._choice, next(text for text in order._factors if text.startswith("X4 ")))
-    assert order._inputs["low"].value == 30.0
-    table.enter(order._inputs["low"], 90.0)
+    # another factor beside it: both changes hold
+    table.enter(order._rows["X7"], (0.5, *order._rows["X7"].value[1:]))
+    assert set(order.edits.factors) == {"X4", "X7"}
+    table.enter(row, (90.0, 70.5, 56.3))
     assert "**This study cannot start:** " in order._told.content
     assert "is not below high" in order._told.content
-    order._inputs["low"].value = math.nan
-    with pytest.raises(InputError, match="X4 low"):
-        order._take()
+    assert "X4 low" in table.enter(row, (math.nan, 70.5, 56.3))
     order._forget()
     assert not order.edits
-    assert order._inputs["low"].value == 40.1
+    assert row.value == (40.1, 70.5, 56.3)
     assert order._goal["mean"].value == 24.68
 
 
-def test_what_is_shown_as_in_the_file_is_no_change(table):
+def test_every_factor_has_a_row_and_what_is_shown_as_in_the_file_is_no_change(table):
     order = table.panel._order
-    for text in order._factors:
-        table.enter(order._choice, text)
-        order._take()
+    assert len(order._rows) == len(load_study(str(table.study.study_file)).factors)
+    for name, row in order._rows.items():
+        assert table.enter(row, row.value) == "", name
+    order._take_target()
     assert not order.edits
     assert number_on_screen(1 / 3) == 0.333333
 
