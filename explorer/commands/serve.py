@@ -21,6 +21,9 @@ def serve(
         metavar="FILE.rrd",
         help="Record the session: the first pour here, the k-th in FILE_k.rrd. Ctrl-C names them.",
     ),
+    rerun: str | None = typer.Option(
+        None, metavar="URL", help="Send the session to a running rerun viewer: `rerun` tells its URL."
+    ),
     replay: Path | None = typer.Option(None, metavar="FILE.rrd", help="Play a recording on the page instead."),
 ) -> None:
     """Open the page: watch a pour, turn its parameters, calibrate; or play a recording."""
@@ -30,7 +33,7 @@ def serve(
     from explorer.viewer.app import replay as replay_page
     from explorer.viewer.app import serve as serve_page
 
-    if replay and (project or study or material or set_ or record):
+    if replay and (project or study or material or set_ or record or rerun):
         raise CommandError(f"--replay {replay}: a recording has its own material and parameters; leave the others out")
     if replay:
         replay_page(replay, host=host, port=port)
@@ -46,4 +49,6 @@ def serve(
     else:
         opened = study_project(study or DEFAULT_STUDY)
     scene = with_settings(opened.source.scene, set_)
-    serve_page(opened, scene, host=host, port=port, seed=seed, store=store, record_path=record)
+    serve_page(
+        opened, scene, host=host, port=port, seed=seed, store=store, record_path=record, rerun_viewer=rerun or ""
+    )

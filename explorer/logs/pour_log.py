@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 import time as clock
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Protocol, Self
@@ -75,14 +76,22 @@ class Poses(Protocol):
         """Linear size relative to the declared one, shape (n,)."""
 
 
+@dataclass(frozen=True)
+class RunningViewer:
+    """A rerun viewer that is open, such as ``rerun+http://127.0.0.1:9876/proxy``."""
+
+    url: str
+
+
 class PourLog:
-    """Writes one pour into a new file ``path``. Use as a context manager, or end with :meth:`close`.
+    """Writes one pour into a new file ``to``, or to a viewer. Use as a context manager, or end with :meth:`close`.
 
     Raises :class:`explorer.errors.CommandError` if the file exists, has another suffix or no folder to be in.
     """
 
-    def __init__(self, path: Path, scene: Scene, seed: int) -> None:
-        check_new_file(path, suffix=".rrd")
+    def __init__(self, to: Path | RunningViewer, scene: Scene, seed: int) -> None:
+        if isinstance(to, Path):
+            check_new_file(to, suffix=".rrd")
         # Otherwise rerun drops bad data with no more than a warning.
         rr.set_strict_mode(True)
         self._scene = scene
@@ -92,7 +101,7 @@ class PourLog:
         self._poses = rig_poses(scene.rig)
         self._placed = np.tile(IN_PLACE, (len(self._poses), 1))
         self._stream = rr.RecordingStream(APPLICATION)
-        self._stream.set_sinks(rr.FileSink(str(path)))
+        self._stream.set_sinks(rr.FileSink(str(to)) if isinstance(to, Path) else rr.GrpcSink(to.url))
         self._stream.send_blueprint(blueprint(eye_distance=2.3 * scene_height(scene)))
         self._static(seed)
         self.flush()

@@ -11,7 +11,7 @@ from explorer.files.output_file import check_new_file
 from explorer.live.frames import Frame
 from explorer.live.messages import SessionState, Status
 from explorer.logs.blueprint import motion_curves
-from explorer.logs.pour_log import PourLog
+from explorer.logs.pour_log import PourLog, RunningViewer
 from explorer.logs.recording import FRAME_INTERVAL, RecordedPour
 from explorer.outcomes import outcome_text
 from explorer.scene.source import changes
@@ -32,6 +32,10 @@ class SessionRecorder:
     def __init__(self, path: Path) -> None:
         check_new_file(path, suffix=".rrd")
         self._path = path
+        self._begun()
+
+    def _begun(self) -> None:
+        """Nothing is recorded yet."""
         self._pours: list[RecordedPour] = []
         self._log: PourLog | None = None
         self._last: Status | None = None
@@ -91,7 +95,7 @@ class SessionRecorder:
         curves |= motion_curves(status.entered_mass, status.discharged_mass, status.kinetic_energy, status.contacts)
         self._log.frame(frame.time, frame, curves, gate_shut=status.gate_shut, surfaces=frame.surfaces)
         self._logged = frame.time
-        if frame.inside.any():
+        if self._pours and frame.inside.any():
             self._pours[-1] = self._pours[-1].with_frame(frame.time)
 
     def _recorded_scene(self, time: float) -> Scene:
@@ -104,6 +108,10 @@ class SessionRecorder:
         self._newest = None
         self._frame_due = self._until = self._logged = -math.inf
         self._scenes = [(status.time, status.scene)]
+        return self._open(status)
+
+    def _open(self, status: Status) -> PourLog:
+        """The file of another pour."""
         path = self._path if not self._pours else self._next_path()
         log = PourLog(path, status.scene, status.seed)
         self._pours.append(RecordedPour(path))
@@ -113,6 +121,17 @@ class SessionRecorder:
         """The next name of a file that is not there yet."""
         names = (self._path.with_stem(f"{self._path.stem}_{k}") for k in count(len(self._pours) + 1))
         return next(path for path in names if not path.exists())
+
+
+class SessionStream(SessionRecorder):
+    """Sends a live session to a running rerun viewer, one recording there for every pour; no file is kept."""
+
+    def __init__(self, viewer: RunningViewer) -> None:
+        self._viewer = viewer
+        self._begun()
+
+    def _open(self, status: Status) -> PourLog:
+        return PourLog(self._viewer, status.scene, status.seed)
 
 
 def news(before: Status, now: Status) -> Iterator[str]:

@@ -17,7 +17,7 @@ from explorer.study.process import CalibrationProcess
 from explorer.viewer.board.board import board_json
 from explorer.viewer.board.folder_board import FolderBoard
 from explorer.viewer.guarded_server import address, guarded_server
-from explorer.viewer.output.recording_switch import session_recorder
+from explorer.viewer.output.recording_switch import session_recorder, viewer_stream
 from explorer.viewer.page import Page
 from explorer.viewer.shell.channel import ShellChannel
 from explorer.viewer.shell.web_pages import JSON, WebPage, WebPages, folder_id
@@ -43,6 +43,7 @@ def serve(
     seed: int = 1,
     store: Path | None = None,
     record_path: Path | None = None,
+    rerun_viewer: str = "",
     ready: Callable[[str], None] = print_address,
 ) -> None:
     """Serve the page of a live pour of ``scene``; blocks until SIGINT or SIGTERM (main thread only).
@@ -56,6 +57,7 @@ def serve(
         store: file of the runs of study and diagnosis; None for the default store.
         record_path: new file (``.rrd``) that the session is recorded into; a restart begins another beside
             it. All of them are named on the terminal at the end.
+        rerun_viewer: address of a running rerun viewer that the session is sent to; empty: none.
         ready: called with the address once the page can be opened.
 
     Raises:
@@ -69,6 +71,9 @@ def serve(
         if recorder:
             ending.callback(lambda: print("\n".join(recorded_lines(recorder.pours)), flush=True))
             ending.enter_context(closing(recorder))
+        recorders = [recorder] if recorder else []
+        if rerun_viewer:
+            recorders.append(ending.enter_context(closing(viewer_stream(rerun_viewer))))
         pages, channel = WebPages(f"{project.title} · {LABEL}"), ShellChannel()
         server = guarded_server(host, port, LABEL, pages, channel)
         ending.callback(server.stop)
@@ -78,7 +83,7 @@ def serve(
         ending.callback(diagnosis.close)
         session = ending.enter_context(closing(Session()))
         session.start(scene, seed, project.source)
-        page = Page(server, session, project, study, diagnosis, channel, pages, recorder)
+        page = Page(server, session, project, study, diagnosis, channel, pages, recorders)
         ending.enter_context(closing(page))
         ready(f"http://{address(host)}:{server.get_port()}")
         page.run(stop)

@@ -12,7 +12,7 @@ import math
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any, Protocol
@@ -63,9 +63,9 @@ class Page:
         diagnosis: DiagnosisProcess,
         channel: ShellChannel,
         pages: WebPages,
-        recorder: Recorder | None = None,
+        recorders: Sequence[Recorder] = (),
     ) -> None:
-        self._server, self._session, self._recorder = server, session, recorder
+        self._server, self._session, self._recorders = server, session, tuple(recorders)
         self._events: deque[Event] = deque(maxlen=EVENTS_REMEMBERED)
         self._actions, self._people = Actions(), People(server)
         self._orders = OrderEvents({"diagnosis": diagnosis, "study": study})
@@ -131,7 +131,7 @@ class Page:
             preview = None if frame is not None else self._previewed(status)
             if frame is not None:
                 # Before it is drawn: a playback keeps the messages to browsers, and the time between them.
-                for recorder in filter(None, (self._recorder, self._context.recording)):
+                for recorder in (*self._recorders, self._context.recording):
                     recorder.take(frame, status)
             with self._server.atomic():
                 now = Now(status, frame or preview, self._events, self._notice, preview is not None)

@@ -72,6 +72,15 @@ def session_recorder(path: Path) -> Recorder:
     return SessionRecorder(path)
 
 
+def viewer_stream(url: str) -> Recorder:
+    """The session, sent to the running rerun viewer at ``url``."""
+    # Imported here, as above.
+    from explorer.logs.pour_log import RunningViewer
+    from explorer.logs.session_recorder import SessionStream
+
+    return SessionStream(RunningViewer(url))
+
+
 class RecordingSwitch:
     """A recording at a time, into ``folder``; ``open_rrd`` begins one of rerun's."""
 

@@ -121,7 +121,7 @@ class RestartedPage:
     """Stands in for the page: it hands its recorder two pours, and ends."""
 
     def __init__(self, *others):
-        self._recorder = others[-1]
+        (self._recorder,) = others[-1]
 
     def run(self, stop):
         for generation, times in ((1, (1.0,)), (2, (0.0, 0.5))):
