@@ -15,6 +15,7 @@ from explorer.project.project import Project
 from explorer.session import Session
 from explorer.study.process import CalibrationProcess
 from explorer.viewer.board.board import board_json
+from explorer.viewer.board.board_view import REPORT
 from explorer.viewer.board.folder_board import FolderBoard
 from explorer.viewer.guarded_server import address, guarded_server
 from explorer.viewer.output.recording_switch import session_recorder, viewer_stream
@@ -24,7 +25,6 @@ from explorer.viewer.shell.web_pages import JSON, WebPage, WebPages, folder_id
 from solver.scenes.scene import Scene
 
 LABEL = "Granular material explorer"
-REPORT = "report.html"
 FOLLOW_INTERVAL = 2.0
 """Seconds between two looks at the folder of a board."""
 

@@ -5,12 +5,15 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Hashable
 from html import escape
+from pathlib import Path
 
 import viser
 
+from explorer.background.command_process import CommandStatus
 from explorer.viewer.board.board import Board, board_json
 from explorer.viewer.shell.web_pages import JSON, WebPage, WebPages
 
+REPORT = "report.html"
 HEIGHT = "calc(100dvh - 330px)"
 
 
@@ -31,6 +34,25 @@ class BoardView:
     def busy(self) -> bool:
         """Whether a board is being made."""
         return self._worker is not None and self._worker.is_alive()
+
+    def show(
+        self,
+        shown: Hashable,
+        folder: Path | None,
+        status: CommandStatus | None,
+        make: Callable[[CommandStatus | None, str], Board],
+    ) -> None:
+        """The board of the result ``shown`` in ``folder``, anew where it, or how far its command is, has changed.
+
+        ``status`` of the command that works on it, None for a result from elsewhere; ``make`` takes that and the
+        address of the report, empty where there is none.
+        """
+        alive = status is not None and status.alive
+        progress = (status.state, status.stage, status.done) if status is not None and alive else None
+        report = ""
+        if folder is not None and not alive and (folder / REPORT).is_file():
+            report = self._pages.publish_folder(folder) + REPORT
+        self.offer((shown, progress, report), lambda: make(status, report))
 
     def offer(self, version: Hashable, make: Callable[[], Board]) -> None:
         """Show what ``make`` gives, unless ``version`` is shown already; put off while another is being made."""

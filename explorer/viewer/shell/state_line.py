@@ -27,9 +27,8 @@ from explorer.report.content import Banner
 from explorer.report.diagnosis.answer import banner as diagnosis_banner
 from explorer.report.sections.answer import banner as study_banner
 from explorer.study.process import RESULT as STUDY_RESULT
+from explorer.viewer.board.board_view import REPORT
 from explorer.viewer.panel import AROUND, SELDOM, Now, PageContext, Panel
-
-REPORT = "report.html"
 
 
 class StateLine(Panel):

@@ -46,7 +46,6 @@ FIRST = "trefoil_2"
 """Chosen at first, where it is shipped: the data set of `make diagnose`."""
 OWN = "folder below"
 """Choice of the list that takes the folder in the text field."""
-REPORT = "report.html"
 PRESENT = "present or newest diagnosis"
 
 
@@ -86,7 +85,6 @@ class DiagnosisPanel(Panel):
         with gui.add_folder("Other results", expand_by_default=False):
             self._chooser = ResultChooser(server, "Result", PRESENT, RESULT, post, self._follow)
         self._trouble = gui.add_markdown("")
-        self._pages = page.pages
         self._result: DiagnosisResult | None = None
         self._page = page
         button_group(
@@ -177,16 +175,16 @@ class DiagnosisPanel(Panel):
         return self._result
 
     def _show_board(self) -> None:
-        """The board of what is chosen, anew where result or progress is another."""
-        chosen = self._chooser.folder
+        """The board of what is chosen."""
+        chosen, result = self._chooser.folder, self._result
         status = self._diagnosis.status() if chosen is None else None
-        alive = status is not None and status.alive
-        progress = (status.state, status.stage, status.done) if status is not None and alive else None
-        result = None if alive else self._result
-        folder, report = chosen or self._diagnosis.out or next(iter(self._diagnosis.finished()), None), ""
-        if folder is not None and not alive and (folder / REPORT).is_file():
-            report = self._pages.publish_folder(folder) + REPORT
-        self._board.offer((self._shown, progress, report), lambda: diagnosis_board(result, status, report))
+        self._board.show(
+            self._shown,
+            chosen or self._diagnosis.out or next(iter(self._diagnosis.finished()), None),
+            status,
+            # While it works, what it has found before is no answer to what was asked now.
+            lambda status, report: diagnosis_board(None if status and status.alive else result, status, report),
+        )
 
 
 class CandidateEffects:

@@ -5,11 +5,10 @@ from __future__ import annotations
 from html import escape
 from pathlib import Path
 
-from explorer.viewer.board.board_view import HEIGHT
+from explorer.viewer.board.board_view import HEIGHT, REPORT
 from explorer.viewer.panel import REPORTS, SELDOM, Now, PageContext, Panel
 from explorer.viewer.study.result_chooser import title
 
-REPORT = "report.html"
 NONE = "(no report yet)"
 EMPTY = (
     "A report is written at the end of a calibration and of a diagnosis. It is one file that needs nothing else: "

@@ -40,7 +40,6 @@ from solver import Scene, canonical, parameters, with_values
 
 PRESENT = "present or newest study"
 NONE = "(the study cannot be read)"
-REPORT = "report.html"
 PROFILED = "Move a slider: the charts follow."
 
 
@@ -77,7 +76,7 @@ class StudyPanel(Panel):
         self._view = ProcessView(server, "Study", acts, post)
         with gui.add_folder("Other results", expand_by_default=False):
             self._chooser = ResultChooser(server, "Result", PRESENT, RESULT, post, self._follow)
-        self._pages, self._channel = page.pages, page.channel
+        self._channel = page.channel
         self._board = BoardView(server, page.pages, "/study/page.json", "Study")
         self._channel.offer("open_run", lambda asked: post(lambda: self._open_run(asked)))
         with gui.add_folder("Profiler", expand_by_default=False):
@@ -136,15 +135,15 @@ class StudyPanel(Panel):
         self._comparison.show(result, name, version)
 
     def _show_board(self) -> None:
-        """The board of what is chosen, anew where result or progress is another."""
-        status = self._study.status() if self._chooser.folder is None else None
-        alive = status is not None and status.alive
-        progress = (status.state, status.stage, status.done) if status is not None and alive else None
-        result, folder = self._result, self._chooser.folder or self._present()
-        report = ""
-        if folder is not None and not alive and (folder / REPORT).is_file():
-            report = self._pages.publish_folder(folder) + REPORT
-        self._board.offer((self._shown, progress, report), lambda: study_board(result, status, report))
+        """The board of what is chosen."""
+        chosen, result = self._chooser.folder, self._result
+        status = self._study.status() if chosen is None else None
+        self._board.show(
+            self._shown,
+            chosen or self._present(),
+            status,
+            lambda status, report: study_board(result, status, report),
+        )
 
     def _open_run(self, asked: Mapping[str, object]) -> None:
         """Pour a run of the result in the scene, as its row of the board asks."""

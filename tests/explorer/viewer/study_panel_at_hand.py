@@ -105,7 +105,7 @@ def board_at(panel, address="/study/page.json"):
     panel._board._worker.join(60)
     panel._show_board()
     panel._board._worker.join(60)
-    return json.loads(panel._pages.page(address).body)
+    return json.loads(panel._board._pages.page(address).body)
 
 
 def written(folder, content, name="result.json"):

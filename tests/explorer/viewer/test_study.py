@@ -145,7 +145,7 @@ def test_a_finished_study_is_a_board_of_verdict_charts_answers_and_runs(table, r
     answers, runs = (next(one for one in board["tables"] if one["title"].startswith(name)) for name in ("Par", "Runs"))
     assert len(answers["rows"]) == len(result["surface"]["factors"])
     assert len(runs["rows"]) == len(runs["opens"]) == result["runs"]["total"]
-    assert table.panel._pages.page(board["report"]).body == b"report"
+    assert table.panel._board._pages.page(board["report"]).body == b"report"
     (folder / "result.json").write_text(json.dumps(result | {"scan": None}))
     assert "Scan of an assumption" not in [chart["title"] for chart in table.board()["charts"]]
 
