@@ -202,12 +202,12 @@ from pathlib import Path
 from explorer.diagnosis.process import DiagnoseProcess
 from explorer.scene.source import material_source
 from explorer.viewer.guarded_server import guarded_server
-from explorer.viewer.page import Page
+from tests.explorer.viewer.page_session import page_of
 from tests.explorer.viewer.test_page import Session
 folder = Path(sys.argv[1])
 server = guarded_server("127.0.0.1", 0, "test")
 diagnosis = DiagnoseProcess(folder / "diagnoses", folder / "runs.sqlite")
-page = Page(server, Session(material_source("sunflower_extract")), None, diagnosis)
+page = page_of(server, Session(material_source("sunflower_extract")), diagnosis, folder)
 notes = page.panels["notes"]
 notes._text.value = "the seed hangs"
 stop = threading.Event()
@@ -219,7 +219,7 @@ def watched(now):
 notes.show = watched
 page.run(stop)
 handles = server.gui._container_handle_from_uuid.values()
-tabs = next(one._parent for one in handles if hasattr(one, "_parent"))
+tabs = [one._parent for one in handles if hasattr(one, "_parent")][-1]
 print(json.dumps([[tab._label for tab in tabs._tab_handles], shown[-1]]))
 page.close()
 diagnosis.close()

@@ -5,8 +5,8 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from tests.browser.test_page import FLAGS, PATIENCE, wait_for
-from tests.browser.test_study_page import TRACES, address, choose, data, opened  # noqa: F401
+from tests.browser.test_page import BEGUN, FLAGS, PATIENCE
+from tests.browser.test_study_page import address, data, opened  # noqa: F401
 from tests.explorer.report.test_charts_stay_private import PAGES
 
 pytestmark = pytest.mark.browser
@@ -74,12 +74,15 @@ def test_a_report_offers_no_upload_and_asks_no_other_host(kind, page, tmp_path):
 
 
 def test_the_live_page_offers_no_upload_and_asks_no_other_host(page, address):  # noqa: F811
+    page.add_init_script(BEGUN)
     opened(page, address)
+    # The board in its frame, then the profiler, whose enlarged chart is drawn anew.
+    frame = page.frame_locator('iframe[title="Study"]')
+    frame.locator(".js-plotly-plot .modebar").first.wait_for(state="attached")
+    assert_no_upload(next(one for one in page.frames if "board.html" in one.url))
+    page.get_by_text("Profiler", exact=True).filter(visible=True).first.click()
     page.locator(".js-plotly-plot .modebar").first.wait_for(state="attached")
     assert_no_upload(page)
-    # Another chart takes the first one's place; the enlarged one is drawn anew.
-    choose(page, "Chart", "Ascent path")
-    wait_for(lambda: "mean, 95 % interval" in page.evaluate(TRACES))
     page.locator(".js-plotly-plot").hover()
     page.locator(".js-plotly-plot + button").click()
     page.locator(".mantine-Modal-body .js-plotly-plot .modebar").wait_for(state="attached")

@@ -1,10 +1,8 @@
 """A panel of the page: a place for a line of text, which says when it was written."""
 
-import viser
-
 from explorer.viewer.panel import Now, PageContext, Panel, Tab
 
-NOTES = Tab("Notes", viser.Icon.PENCIL)
+NOTES = Tab("Notes")
 
 
 class Notes(Panel):

@@ -5,7 +5,7 @@ import json
 from doe.declared.pours import Ended
 from explorer.background.command_process import CommandStatus
 from explorer.background.progress import PourProgress, ProgressEvent, failures, with_event, with_run
-from explorer.viewer.study.process_view import stages_markdown
+from explorer.viewer.study.process_view import state_markdown
 from solver import Outcome
 
 
@@ -19,5 +19,5 @@ def test_a_pour_that_broke_off_is_told_with_its_seed(tmp_path):
         stages, tried = with_event(stages, event), with_run(tried, event)
     (lost,) = failures(tried)
     assert (lost.run.label, lost.run.seed, lost.replaced_by) == ("air_drag@2 1, fast", 12, None)
-    shown = stages_markdown(CommandStatus("running", stages=stages, tried=tried), "diagnosis", "Pours")
+    shown = state_markdown(CommandStatus("running", stages=stages, tried=tried), "diagnosis", "pours")
     assert r"| screening | air\_drag@2 1, fast | jammed: the outlet is blocked | 12 | none |" in shown

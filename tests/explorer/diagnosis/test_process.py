@@ -11,16 +11,21 @@ from explorer.background.command_process import BackgroundError, CommandStatus
 from explorer.background.progress import StageProgress
 from explorer.diagnosis.process import DiagnoseProcess, Question
 from explorer.diagnosis.result import DiagnosisResult
+from explorer.errors import CommandError
 from explorer.priority import BACKGROUND
+from explorer.report.content import Word
 from explorer.viewer.actions import Actions
+from explorer.viewer.board.board import board_json
+from explorer.viewer.board.diagnosis_board import diagnosis_board
 from explorer.viewer.panel import Now
-from explorer.viewer.study.diagnosis_panel import OWN, DiagnosisPanel, answer_markdown
-from explorer.viewer.study.plot_view import NOTHING
+from explorer.viewer.study.diagnosis_panel import OWN, DiagnosisPanel
+from explorer.viewer.study.process_view import CANCEL, CLEAR, CONTINUE, PAUSE, QUEUE, RESUME, START
 from solver import EFFECTS, AssetNotFoundError
 from solver.assets import measurement_folder
 from tests.explorer.background.waiting import only_folder, wait_for
 from tests.explorer.diagnosed import result_of_case, typed
 from tests.explorer.viewer.page_session import page_context
+from tests.explorer.viewer.study_panel_at_hand import board_at
 
 PROGRAM = """
 import json, os, pathlib, sys, time
@@ -185,23 +190,27 @@ class FakeDiagnosis:
 
 def press(panel, button):
     click = type("Event", (), {"client_id": 0, "target": type("Group", (), {"value": button})})
-    for row in panel._view._buttons:
-        for callback in row._impl.update_cb:
-            callback(click)
+    for callback in panel._view._buttons._impl.update_cb:
+        callback(click)
+
+
+def board(panel):
+    """What the board of ``panel`` draws."""
+    return board_at(panel, "/diagnosis/page.json")
 
 
 def test_the_panel_asks_and_shows(server, tmp_path):
     process, actions = FakeDiagnosis(), Actions()
     panel = DiagnosisPanel(page_context(server, post=actions.post, data=tmp_path, diagnosis=process))
     panel._data.value = "trefoil_2"
-    for button in ("Start", "Pause / go on", "Cancel", "Delete everything"):
+    for button in (START, PAUSE, CANCEL, "Delete everything"):
         press(panel, button)
     actions.carry_out()
     panel._data.value = OWN
     panel._folder.value = "/home/me/my data"
     process.now = CommandStatus("paused")
-    press(panel, "Resume")
-    press(panel, "Pause / go on")
+    press(panel, RESUME)
+    press(panel, CONTINUE)
     actions.carry_out()
     mine = Question("/home/me/my data")
     assert process.asked == [("start", Question("trefoil_2")), "pause", "cancel", ("resume", mine), "go on"]
@@ -210,20 +219,23 @@ def test_the_panel_asks_and_shows(server, tmp_path):
     panel.show(Now(None, notice="no such folder"))
     assert panel._view._bar.value == 25.0
     text = panel._view._text.content
-    assert "Known of this stage: 5 of 20 pours, time left 2 min 05 s" in text
-    assert r"| base model | 30 of 30 | done | \*64\* settings |" in text
-    assert "| screening | 5 of 20 | ▶ |" in text
+    assert "known of this stage: 5 of 20 pours, time left 2 min 05 s" in text
     assert "no such folder" in text
-    assert "Choose measured data above and press *Start*" in panel._plots._caption.content
+    assert [(one["name"], one["count"], one["mark"], one["found"]) for one in board(panel)["stages"]] == [
+        ("base model", "30 of 30", "done", "*64* settings"),
+        ("screening", "5 of 20", "▶", ""),
+    ]
+    for act in (panel._show_piles, panel._pour_corrected):
+        with pytest.raises(CommandError, match="no finished diagnosis yet"):
+            act()
     process.now = CommandStatus("finished", message="report: /home/me/out/report.html")
     process.out = tmp_path
     (tmp_path / "diagnosis.json").write_text(json.dumps(result_of_case("effect")))
     panel.show(Now(None))
-    assert panel._answer.content.startswith(r"**effect:adhesion\_sjkr**")
     assert "/home/me/out/report.html" in panel._view._text.content
-    assert "Residuals before and after" in panel._plots._choice.options
-    shown = json.loads(panel._plots._chart._plotly_json_str)
-    assert shown["layout"]["xaxis"]["title"]["text"] == "probability [%]"
+    shown = board(panel)
+    assert shown["banner"]["headline"].startswith(Word.EFFECT_FOUND)
+    assert "Residuals before and after" in [chart["title"] for chart in shown["charts"]]
 
 
 def test_an_uploaded_data_set_can_be_diagnosed(server, tmp_path):
@@ -234,7 +246,7 @@ def test_an_uploaded_data_set_can_be_diagnosed(server, tmp_path):
     panel.show(Now(None))
     assert "mine-0123456789ab" in panel._data.options
     panel._data.value = "mine-0123456789ab"
-    press(panel, "Start")
+    press(panel, START)
     actions.carry_out()
     assert process.asked == [("start", Question(str(kept)))]
 
@@ -247,8 +259,8 @@ def test_effects_budget_and_queue_are_asked_for_on_the_page(server, tmp_path):
     for name in EFFECTS:
         boxes[name].value = name in ("air_drag", "twisting")
     panel._candidates._pours.value = 300
-    press(panel, "Queue")
-    press(panel, "Clear queue")
+    press(panel, QUEUE)
+    press(panel, CLEAR)
     actions.carry_out()
     assert process.asked == [("queue", Question("trefoil_2", ("air_drag", "twisting"), 300)), "clear queue"]
     panel.show(Now(None))
@@ -265,14 +277,14 @@ def test_a_file_that_is_no_diagnosis_is_one_line(server, tmp_path):
     (tmp_path / "diagnosis.json").write_text(json.dumps({"schema": DiagnosisResult.SCHEMA, "verdict": "<script>"}))
     process.out = tmp_path
     panel.show(Now(None))
-    assert panel._answer.content.endswith("diagnosis.json: statement: is missing")
+    assert panel._trouble.content.endswith("diagnosis.json: statement: is missing")
     content = result_of_case("effect")
     content["names"] = []
     (tmp_path / "diagnosis.json").write_text(json.dumps(content))
     panel.show(Now(None))
-    assert "cannot be shown" in panel._answer.content
-    assert "<script>" not in panel._answer.content
-    assert panel._plots._choice.options == (NOTHING,)
+    shown = board(panel)
+    assert shown["title"] == "This result cannot be shown"
+    assert shown["charts"] == []
 
 
 def test_a_diagnosis_of_an_older_version_is_one_line(server, tmp_path):
@@ -281,29 +293,18 @@ def test_a_diagnosis_of_an_older_version_is_one_line(server, tmp_path):
     (tmp_path / "diagnosis.json").write_text('{"schema": 1, "verdict": "no_missing_effect", "gates": []}')
     process.out = tmp_path
     panel.show(Now(None))
-    assert "made by an older version of the program" in panel._answer.content
-    assert "\n" not in panel._answer.content
-    assert panel._plots._choice.options == (NOTHING,)
+    assert "made by an older version of the program" in panel._trouble.content
+    assert "\n" not in panel._trouble.content
 
 
 def test_the_answer_holds_probabilities_and_errors_before_after_and_by_noise_alone():
     for case, role in (("effect", "holdout"), ("no holdout", "fit")):
-        result = result_of_case(case)
-        odds, _, errors = answer_markdown(typed(result)).partition("| Error on")
-        shown = [line.strip("| ").split(" | ") for line in odds.splitlines() if line.startswith("| ")]
-        assert shown[0] == ["Answer", "Probability"]
-        first = result["effects"][0]
-        assert (first["name"], result["verdict"]) == ("adhesion_sjkr", "effect:adhesion_sjkr")
-        assert shown[1] == [r"adhesion\_sjkr", f"{100.0 * first['probability']:.1f} %"]
-        assert 4 <= len(shown) <= 6
-        rows = [line.split(" | ") for line in f"| Error on{errors}".splitlines() if line.startswith("| ")]
-        assert rows[0] == [
-            f"| Error on {'held-out' if role == 'holdout' else 'fitted'} data",
-            "Before",
-            "After",
-            "Noise floor |",
-        ]
-        assert len(rows) == 1 + len(result["error"][role])
-        overall = result["error"][role][-1]
-        for cell, key in zip(rows[-1][1:], ("before", "after", "noise_floor"), strict=True):
-            assert float(cell.split()[0]) == pytest.approx(overall[key], rel=6e-3)  # three printed digits
+        content = result_of_case(case)
+        shown = json.loads(board_json(diagnosis_board(typed(content), None)))
+        answers, errors = shown["tables"]
+        first = content["effects"][0]
+        assert (first["name"], content["verdict"]) == ("adhesion_sjkr", "effect:adhesion_sjkr")
+        assert answers["rows"][0] == ["adhesion_sjkr", f"{100.0 * first['probability']:.1f} %"]
+        assert errors["title"] == f"Error on {'held-out' if role == 'holdout' else 'fitted'} data"
+        assert errors["header"] == ["Observable", "Before", "After", "Noise floor"]
+        assert len(errors["rows"]) == len(content["error"][role])

@@ -198,7 +198,7 @@ def test_a_panel_of_a_plug_in_stands_in_its_tab_and_follows_the_page(plugged_in,
     groups = {id(one._parent): one._parent._tab_handles for one in containers if hasattr(one, "_parent")}
     controls, study = groups.values()
     assert [tab._label for tab in controls] == ["Controls", "Set-up", "Look", "Export"]
-    assert [tab._label for tab in study] == ["Pour", "Calibrate", "Diagnose", "Laboratory", "Magnets"]
+    assert [tab._label for tab in study] == ["Pour", "Calibrate", "Diagnose", "Laboratory", "Reports", "Magnets"]
     (folder,) = study[-1]._children.values()
     assert (folder.label, list(folder._children.values())) == ("Pull", [magnets.text])
     assert list(controls[2]._children.values())[-1] is poles.text
