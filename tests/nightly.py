@@ -43,6 +43,7 @@ PARTS = {
     ),
     "validation campaign, small": Part((*SLOW, "tests/doe/validation")),
     "other engines, short": Part((*PYTEST, "-m", "slow or not slow", "tests/peers/test_short_pour.py")),
+    "commands and plug-ins": Part((*SLOW, "tests/explorer/commands/test_limit.py", "tests/test_plugins.py")),
     "page speed": Part((sys.executable, "-m", "tests.browser.page_speed")),
     "README, whole": Part((*SLOW, "tests/test_readme.py")),
     "trefoils": Part((*SLOW, "tests/explorer/diagnosis/test_trefoils.py"), nightly=False),

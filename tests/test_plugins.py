@@ -149,6 +149,7 @@ main()
 """
 
 
+@pytest.mark.slow
 def test_a_stage_runs_in_the_study_that_names_it_with_a_design_of_the_package(site, tmp_path):
     shipped = (ROOT / "assets/studies/sunflower_extract.toml").read_text()
     study = tmp_path / "study.toml"

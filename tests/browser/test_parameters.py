@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import time
+import zipfile
 
 import numpy as np
 import pytest
@@ -90,9 +91,8 @@ def test_a_mesh_with_a_hole_is_refused_in_words_and_the_pour_goes_on(page, tmp_p
     with page.expect_file_chooser() as chooser:
         page.get_by_role("button", name="Upload a body and pour").click()
     chooser.value.set_files(tmp_path / "open.stl")
-    page.get_by_text("open.stl: ").first.wait_for()
-    room(page, "Controls")
-    page.locator(".pour", has_text="not watertight").wait_for()
+    page.locator("#timeline .notice", has_text="open.stl: ").wait_for()
+    assert "not watertight" in page.locator("#timeline .notice").inner_text()
     before = simulated_time(page)
     wait_for(lambda: simulated_time(page) > before or state(page) == "ended")
 
@@ -112,9 +112,9 @@ def test_record_restart_stop_and_download_gives_the_whole_pour(page, tmp_path):
     wait_for(lambda: state(page) == "ended")
     room(page, "Export")
     record("Start")
-    page.get_by_text("Recording into").wait_for()
+    page.locator("#timeline .recording", has_text="REC").wait_for()
     press(page, "r")
-    page.get_by_text("(pour 2 of this recording)").wait_for()
+    page.locator("#timeline .recording", has_text="pour 2").wait_for()
     wait_for(lambda: state(page) == "ended")
     end = simulated_time(page)
     record("Stop")
@@ -122,9 +122,12 @@ def test_record_restart_stop_and_download_gives_the_whole_pour(page, tmp_path):
     with page.expect_download() as download:
         record("Download")
     # The pile that lay there before the restart is no more than a moment, in a file of its own.
-    assert download.value.suggested_filename.endswith("_2.rrd")
-    download.value.save_as(tmp_path / "pour.rrd")
-    found = read_recording(tmp_path / "pour.rrd")
+    assert download.value.suggested_filename.endswith(".zip")
+    download.value.save_as(tmp_path / "pours.zip")
+    with zipfile.ZipFile(tmp_path / "pours.zip") as packed:
+        (name,) = (name for name in packed.namelist() if name.endswith("_2.rrd"))
+        packed.extract(name, tmp_path)
+    found = read_recording(tmp_path / name)
     there = [sum(len(one.at(moment).scale) for one in found.components) for moment in (found.times[0], found.times[-1])]
     assert 0 < there[0] < 0.2 * there[1]
     # The page shows milliseconds.

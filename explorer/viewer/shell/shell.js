@@ -102,7 +102,7 @@ const speed = element("select", { "aria-label": "Speed", title: "Simulated secon
   onchange: () => send({ do: "speed", factor: Number(speed.value) }) });
 const condition = element("span", { class: "chip", role: "status" });
 const recording = element("span", { class: "recording", role: "status" });
-const lastEvent = element("span", { class: "event-text" });
+const lastEvent = element("span", { class: "event-text", role: "status" });
 let seeking = false;
 seek.addEventListener("pointerdown", () => { seeking = true; });
 seek.addEventListener("pointerup", () => { seeking = false; });
@@ -124,7 +124,8 @@ function showTimeline(now) {
     mark.style.left = `${100 * (one.time - now.earliest) / span}%`;
     return mark;
   }));
-  lastEvent.textContent = now.events.length ? now.events[now.events.length - 1].text : "";
+  lastEvent.textContent = now.notice || (now.events.length ? now.events[now.events.length - 1].text : "");
+  lastEvent.classList.toggle("notice", Boolean(now.notice));
   lastEvent.title = lastEvent.textContent;
   if (speed.dataset.choices !== String(now.speeds)) {
     speed.dataset.choices = String(now.speeds);

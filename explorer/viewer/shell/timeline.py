@@ -22,7 +22,7 @@ SPEEDS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0)
 MOST_EVENTS = 60
 """Events on the timeline; older ones are left out."""
 PREVIEWED = "recording of this pour, while the solver loads"
-LONGEST_EVENT = 120
+LONGEST_EVENT, LONGEST_NOTICE = 120, 400
 """Characters."""
 
 
@@ -82,6 +82,7 @@ def timeline_state(now: Now, recording: str) -> Mapping[str, Any]:
         "condition": condition_words(now),
         "trouble": status.state in TROUBLE,
         "recording": recording,
+        "notice": now.notice[:LONGEST_NOTICE],
         "events": [{"time": event.time, "text": event.text[:LONGEST_EVENT]} for event in mine[-MOST_EVENTS:]],
     }
 

@@ -163,11 +163,12 @@ def test_the_timeline_goes_back_to_a_moment_that_is_kept_and_no_further(at_hand)
 def test_the_timeline_shows_this_pour_s_events_up_to_now():
     status = Status(SessionState.RUNNING, "", SCENE, 1, 2, 1.0, time=1.0, earliest=math.nan, real_time_factor=0.5)
     events = [Event(1, 0.5, "before"), Event(2, 0.4, "friction"), Event(2, 1.5, "to come")]
-    state = timeline_state(Now(status, events=events), "")
+    state = timeline_state(Now(status, events=events, notice="no such folder"), "")
     assert [one["text"] for one in state["events"]] == ["friction"]
     assert state["playing"]
     assert state["earliest"] == 0.0
     assert "0.50 × real time" in state["condition"]
+    assert state["notice"] == "no such folder"
     json.dumps(state, allow_nan=False)
 
 

@@ -118,6 +118,7 @@ def test_looking_changes_nothing(alone):
     assert digest(record) == alone
 
 
+@pytest.mark.slow
 def test_an_interrupted_pour_with_sleepers_ends_in_the_same_bits():
     """A pile some of which sleeps, kept and put back into another slot: bits of bodies, sums, and forces on walls."""
     pour = Pour(Batch(room(1)), 0, HEAP, 1)

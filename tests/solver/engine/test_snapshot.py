@@ -38,7 +38,7 @@ def run(batch, w, steps):
     return batch.advance(todo)[w]
 
 
-@pytest.mark.parametrize(("worlds", "w", "bodies"), [(1, 0, 128), (3, 2, 256)])
+@pytest.mark.parametrize(("worlds", "w", "bodies"), [(1, 0, 128), pytest.param(3, 2, 256, marks=pytest.mark.slow)])
 def test_an_interrupted_run_ends_in_the_same_bits(worlds, w, bodies):
     whole = crowd(1, 0)
     drop(whole, 0)
