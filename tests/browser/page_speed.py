@@ -149,13 +149,22 @@ def real_time(page):
     ]
 
 
+async def slider_of_one_value(page):
+    """The friction of all pairs, once they have been scaled to one value, none."""
+    mixed = next(uuid for label, uuid in page.labels.items() if label and label.startswith("Static friction (mixed)"))
+    await page.send({"type": "GuiUpdateMessage", "uuid": mixed, "updates": {"value": 0.0}})
+    while "Static friction" not in page.labels:
+        await asyncio.wait_for(page.window(), 20.0)
+    return page.labels["Static friction"]
+
+
 async def measure(port):
     async with connected(port) as socket:
         page = Socket(socket)
         await page.send(CAMERA)
         await until(page, lambda text: re.search(r"Real-time factor</span><span>[0-9.]", text))
         frames, factor = await whole_pour(page)
-        slider = page.labels["Static friction"]
+        slider = await slider_of_one_value(page)
         echoes = [await echo_ms(page, slider, round(0.3 + 0.01 * k, 2)) for k in range(ECHOES)]
         return frames, factor, echoes
 

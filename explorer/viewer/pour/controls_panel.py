@@ -12,8 +12,9 @@ from explorer.live.messages import Status
 from explorer.units import checked, screen_unit
 from explorer.viewer.actions import button_group
 from explorer.viewer.panel import CONTROLS, PageContext
-from explorer.viewer.pour.live_panel import LiveControl, live_control, screen_range
+from explorer.viewer.pour.live_panel import LiveControl, agree, live_control, screen_range
 from explorer.viewer.pour.rebuilt_panel import RebuiltPanel
+from explorer.viewer.view import small_html
 from solver.scenes.material import Pair
 from solver.scenes.scene import Scene, parameters, value, with_values
 
@@ -40,6 +41,7 @@ class Controls:
         self._page, self._session = page, session
         known = parameters(scene)
         self._place = gui.add_folder(None)
+        self._mixed = gui.add_html(small_html("×: the values are mixed; the slider scales all of them."), visible=False)
         self._live: list[LiveControl] = []
         self._build(scene)
         self._feed = None
@@ -89,6 +91,7 @@ class Controls:
                 )
                 for label, paths in quantities(scene).items()
             ]
+        self._mixed.visible = not all(agree(scene, paths) for paths in quantities(scene).values())
 
     def _keep(self) -> None:
         status = self._session.status()

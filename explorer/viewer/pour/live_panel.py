@@ -238,15 +238,15 @@ class ScalingControl(LiveControl):
     def _made(self, gui: viser.GuiApi, scene: Scene) -> tuple[Face, ...]:
         self._factor = 1.0
         self._base = {path: float(value(scene, path)) for path in self._paths}
-        parameter, name = self._parameter, self._label or title(self._parameter).split(" [")[0]
+        parameter, name = self._parameter, self._label or f"{title(self._parameter).split(' [')[0]} (mixed)"
         largest = LARGEST_POWER if parameter.scale == "log" else LARGEST_FACTOR
         low, high = factor_range(list(self._base.values()), parameter.low, parameter.high, largest)
         hint = f"The values differ. All are multiplied by this factor, so that their ratios stay. {parameter.doc}"
         if parameter.scale == "log":
             bottom, top = (round(math.log10(end), POWER_DIGITS) for end in (max(low, 1.0 / LARGEST_POWER), high))
-            slider = gui.add_slider(f"{name} (mixed) × 10^", bottom, top, LINEAR_STEP, 0.0, hint=hint)
+            slider = gui.add_slider(f"{name} × 10^", bottom, top, LINEAR_STEP, 0.0, hint=hint)
             return (Face(slider, math.log10, lambda entered: 10.0 ** checked(entered, bottom, top, name)),)
-        slider = gui.add_slider(f"{name} (mixed) ×", low, high, LINEAR_STEP, 1.0, hint=hint)
+        slider = gui.add_slider(f"{name} ×", low, high, LINEAR_STEP, 1.0, hint=hint)
         return (Face(slider, lambda factor: factor, lambda entered: checked(entered, low, high, name)),)
 
     def _number(self, scene: Scene) -> float:

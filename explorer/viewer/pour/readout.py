@@ -17,7 +17,7 @@ from explorer.viewer.panel import CONTROLS, Now, PageContext, Panel
 from solver.pours.record import Outcome, Phase
 from solver.scenes.scene import Scene
 
-EVENTS_SHOWN = 3
+EVENTS_SHOWN = 1
 FORMED_FOR = 0.5
 """Simulated time [s] over which readings have to agree within their spread before an angle counts as that of a pile."""
 READINGS_KEPT = 200

@@ -115,7 +115,8 @@ def test_texts_from_outside_cannot_bring_html():
 
 def test_events_of_one_moment_take_one_line_and_the_newest_comes_first():
     events = [Event(1, 0.5, f"change {k}") for k in range(9)] + [Event(1, 0.7, "at rest"), Event(2, 0.1, "later")]
-    assert recent(events, 1) == ["0.700 s  at rest", "0.500 s  change 8 (and 8 more)"]
+    assert recent(events, 1) == ["0.700 s  at rest"]
+    assert recent(events[:9], 1) == ["0.500 s  change 8 (and 8 more)"]
 
 
 def test_a_number_that_means_nothing_yet_is_not_shown():
