@@ -120,23 +120,22 @@ def report_step(results: Sequence[Finished | None]) -> Step:
     return Step("Report", state, "", "What was done and found, as a page to read, print and send.", Room.REPORTS)
 
 
-def next_step(steps: Sequence[Step]) -> str:
-    """What to do next, in a sentence."""
+def next_step(steps: Sequence[Step]) -> tuple[str, Room]:
+    """What to do next, in a sentence, and where."""
     by_name = {step.name: step for step in steps}
     measured, calibrate, diagnose = (by_name[name] for name in ("Measured", "Calibrate", "Diagnose"))
-    for name in ("Calibrate", "Diagnose"):
-        if by_name[name].state == StepState.RUNNING:
-            return f"wait for {name.lower()}, or look at what it has found so far"
+    for step in (calibrate, diagnose):
+        if step.state == StepState.RUNNING:
+            return f"see what {step.name} has found so far", step.room
     if by_name["Pour"].state == StepState.FAILED:
-        return "see under Pour why there is no pile, and pour again"
+        return "see under Pour why there is no pile", Room.POUR
     if measured.state == StepState.EMPTY:
-        return "measure a pile: read its angle from photographs under Laboratory"
+        return "read the angle of a measured pile off photographs", Room.LABORATORY
     if calibrate.state == StepState.EMPTY:
-        if measured.state == StepState.ASSUMED:
-            return "measure a pile, or start a calibration with the assumed target"
-        return "start the calibration"
+        assumed = measured.state == StepState.ASSUMED
+        return "start the calibration" + (" (the target is assumed)" if assumed else ""), Room.CALIBRATE
     if calibrate.state == StepState.FAILED and diagnose.state == StepState.EMPTY:
-        return "ask under Diagnose which effect the model lacks"
+        return "ask which effect the model lacks", Room.DIAGNOSE
     if diagnose.state == StepState.EMPTY:
-        return "read the report, or test the model against measured data under Diagnose"
-    return "read the report"
+        return "read the report, or test the model by measured data", Room.REPORTS
+    return "read the report", Room.REPORTS

@@ -17,14 +17,17 @@ from explorer.diagnosis.piles import HeightSurface
 from explorer.live.messages import SessionState, Status
 from explorer.scene.meshes import scene_height
 from explorer.session import Session
+from explorer.viewer.look.camera import go_to_place
 from explorer.viewer.palette import MEASURED, RIM
 from explorer.viewer.scene_nodes import LINE, PLATE_RADIUS, SceneNodes, circle
-from explorer.viewer.view import MIDDLE
+from explorer.viewer.view import MIDDLE, CameraView
 from solver.scenes.scene import Scene
 
 ROOT = "/second"
 BESIDE = 2.15 * PLATE_RADIUS
 """Distance of two rigs' axes [m]."""
+SQUARE = 1.3
+"""Width by height of a window from which on its height decides how far the camera has to stand."""
 
 
 class BesidePile:
@@ -145,7 +148,7 @@ def step_aside(server: viser.ViserServer, scene: Scene, middle: float = 0.5 * BE
     aim = np.array([middle, 0.0, MIDDLE * scene_height(scene)])
     for client in server.get_clients().values():
         away = np.array(client.camera.position) - np.array(client.camera.look_at)
-        least = (2.2 if middle else 3.2) * BESIDE
+        # Where the window is higher than wide, its width decides: both panels may be open.
+        least = (2.2 if middle else 3.2) * BESIDE * max(1.0, SQUARE / max(client.camera.aspect, 0.1))
         away *= max(1.0, least / max(float(np.linalg.norm(away)), 1e-6))
-        client.camera.look_at = aim
-        client.camera.position = aim + away
+        go_to_place(client, CameraView(aim + away, aim))

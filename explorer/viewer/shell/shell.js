@@ -33,6 +33,15 @@ function openRoom(name) {
   requestAnimationFrame(() => { const opened = found(); if (opened) press(opened); });
 }
 
+// A section of the room that was just opened, once it is there: unfolded, and in sight.
+function openSection(name, tries = 20) {
+  const head = [...document.querySelectorAll("#root .mantine-Paper-root > .mantine-Paper-root")].find(
+    one => one.style.cursor === "pointer" && one.textContent.trim().startsWith(name));
+  if (!head) { if (tries) setTimeout(() => openSection(name, tries - 1), 250); return; }
+  if (head.parentElement.getBoundingClientRect().height < 60) head.click();
+  head.scrollIntoView({ block: "start" });
+}
+
 // viser's movable tabs answer to a key, those inside a panel to a click.
 function press(target) {
   target.focus();
@@ -42,7 +51,7 @@ function press(target) {
 
 const name = element("h1", { class: "name" });
 const steps = element("ol");
-const next = element("span", { class: "next", role: "status" });
+const next = element("button", { class: "next", onclick: () => openRoom(next.dataset.room) });
 const help = element("button", { title: "Where to begin, and keys (?)", "aria-label": "Where to begin, and keys",
   onclick: () => beginning.showModal() }, "?");
 const shade = element("button", { title: "Dark or light page", "aria-label": "Dark or light page",
@@ -62,23 +71,27 @@ function showSteps(project) {
   if (focused >= 0) steps.querySelectorAll("button")[focused]?.focus();
   next.replaceChildren("Next: ", element("b", {}, project.next));
   next.title = project.next;
+  next.dataset.room = project.next_room;
 }
 
 // The first visit of a browser begins with four ways to begin; later they are behind "?".
 const WAYS = [
   ["I have a grain and a photograph", "Give the grain's shape and sizes, read the angle off photographs of your pile, " +
-    "and calibrate against it.", "Laboratory"],
+    "and calibrate against it.", "Laboratory", "Photograph → angle of repose"],
   ["Just play", "Watch a pile of sunflower seeds form, and move its friction, stiffness and restitution.", "Controls"],
   ["Plan an experiment", "A screening or response-surface design as a sheet to fill in, with its power told before you " +
-    "measure.", "Laboratory"],
+    "measure.", "Laboratory", "Your own design"],
   ["Let a hidden effect be found", "Measured data of trefoil bodies with an effect that their model lacks: start the " +
     "diagnosis, and see it named.", "Diagnose"],
 ];
 const keys = element("ul", { class: "keys" });
 const beginning = element("dialog", { id: "beginning", "aria-labelledby": "beginning-title" },
   element("form", { method: "dialog" }, element("h2", { id: "beginning-title" }, "Where do you want to begin?"),
-    element("div", { class: "cards" }, ...WAYS.map(([title, text, room]) => element("button",
-      { class: "card", value: title, onclick: () => requestAnimationFrame(() => openRoom(room)) },
+    element("div", { class: "cards" }, ...WAYS.map(([title, text, room, section]) => element("button",
+      { class: "card", value: title, onclick: () => requestAnimationFrame(() => {
+        openRoom(room);
+        if (section) openSection(section);
+      }) },
       element("b", {}, title), element("span", {}, text)))),
     element("details", {}, element("summary", {}, "Keys"), keys),
     element("button", { class: "close", value: "close" }, "Close")));
@@ -95,7 +108,8 @@ function showKeys(all) {
 const act = (label, title, command, kind = "") =>
   element("button", { title, "aria-label": title, class: kind, onclick: () => send({ do: command }) }, label);
 const toggle = act("▶ Play", "Play or pause (space)", "toggle", "main");
-const seek = element("input", { type: "range", min: "0", max: "1", step: "any", value: "0", "aria-label": "Time" });
+const seek = element("input", { type: "range", min: "0", max: "1", step: "any", value: "0", "aria-label": "Time",
+  title: "Back to any moment that is kept. From there the pour goes on anew: what came later is forgotten." });
 const events = element("div", { "aria-hidden": "true" });
 const clock = element("output", { class: "time" });
 const speed = element("select", { "aria-label": "Speed", title: "Simulated seconds per second aimed at", class: "seldom",

@@ -47,11 +47,13 @@ class StateLine(Panel):
     def show(self, now: Now) -> None:
         """Tell the browsers how far the project is."""
         steps = self._steps(now)
+        text, room = next_step(steps)
         self._page.channel.tell(
             "project",
             {
                 "name": self._page.project.title,
-                "next": next_step(steps),
+                "next": text,
+                "next_room": room,
                 "steps": [
                     {"name": one.name, "state": one.state, "said": one.said, "hint": one.hint, "room": one.room}
                     for one in steps

@@ -1,5 +1,6 @@
 """The second pile: poured as the first is, drawn beside it, in step with it, and gone when it is taken away."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -12,7 +13,7 @@ from explorer.live.messages import SessionState, Status
 from explorer.scene.file import load_scene
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.panel import Now
-from explorer.viewer.pour.beside_pile import BESIDE, ROOT, BesidePile
+from explorer.viewer.pour.beside_pile import BESIDE, ROOT, BesidePile, step_aside
 from explorer.viewer.pour.second_pile import NONE, SecondPile, comparison_markdown
 from solver import Outcome, with_values
 from solver.observables import Value
@@ -186,3 +187,33 @@ def test_a_measured_pile_stands_on_the_other_side_with_names_above_all_three(ben
     ]
     bench.panel.close()
     assert not {"/measured", "/measured/plate", "/names/measured"} & set(made)
+
+
+class Camera:
+    """As viser's: a new position takes the point that is looked at along."""
+
+    aspect = 0.6
+
+    def __init__(self):
+        self._position, self.look_at = np.array([0.3, -0.4, 0.2]), np.array([0.0, 0.0, 0.05])
+
+    @property
+    def position(self):
+        return self._position
+
+    @position.setter
+    def position(self, position):
+        self.look_at = self.look_at + (np.asarray(position) - self._position)
+        self._position = np.asarray(position)
+
+
+def test_every_camera_looks_between_the_piles_from_where_both_are_in_sight():
+    client = SimpleNamespace(camera=Camera(), atomic=nullcontext)
+    before = client.camera.position - client.camera.look_at
+    step_aside(SimpleNamespace(get_clients=lambda: {0: client}), SCENE)
+    assert client.camera.look_at[0] == pytest.approx(0.5 * BESIDE)
+    away = client.camera.position - client.camera.look_at
+    np.testing.assert_allclose(away / np.linalg.norm(away), before / np.linalg.norm(before))
+    # Half the field of view in height is 0.3 rad; a narrow window sees 0.6 of that across.
+    reach = np.linalg.norm(away) * np.tan(0.3) * client.camera.aspect
+    assert reach > 0.5 * BESIDE

@@ -185,6 +185,7 @@ def test_the_state_line_says_how_far_a_project_is(at_hand):
         ("Report", "empty"),
     ]
     assert "calibration" in told["next"]
+    assert told["next_room"] == "Calibrate"
 
 
 def test_a_pour_without_a_pile_is_a_failed_step_that_comes_first():
@@ -195,7 +196,7 @@ def test_a_pour_without_a_pile_is_a_failed_step_that_comes_first():
     assert measured_step(()).state == StepState.EMPTY
     before = [measured_step(()), command_step("Calibrate", "", Room.CALIBRATE, IDLE, None)]
     after = [command_step("Diagnose", "", Room.DIAGNOSE, IDLE, None)]
-    assert "why there is no pile" in next_step([*before, pour_step(jammed), *after])
-    assert "measure a pile" in next_step([*before, pour_step(heap), *after])
+    assert next_step([*before, pour_step(jammed), *after]) == ("see under Pour why there is no pile", Room.POUR)
+    assert next_step([*before, pour_step(heap), *after])[1] == Room.LABORATORY
     running = command_step("Calibrate", "", Room.CALIBRATE, CommandStatus("running", done=17, planned=50), None)
     assert (running.state, running.said) == (StepState.RUNNING, "34%")
