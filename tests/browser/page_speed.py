@@ -57,7 +57,7 @@ rate = 10.0
 region_height = 0.18
 """
 ECHOES = 40
-PROFILED = "X7"
+PROFILED = "X7:"
 """Factor whose slider is moved, from end to end of the region."""
 QUIET = 3.0
 """Seconds without a window, or at rest, after which a pour is over."""
@@ -72,7 +72,7 @@ async def echo_ms(page, slider, value):
     """Milliseconds until the solver's own line tells ``value``."""
     began = time.perf_counter()
     await page.send({"type": "GuiUpdateMessage", "uuid": slider, "updates": {"value": value}})
-    await until(page, lambda text: f"Static friction</span> {value:g} " in text, 20.0)
+    await until(page, lambda text: f"Rolling friction</span> {value:g} " in text, 20.0)
     return 1e3 * (time.perf_counter() - began)
 
 
@@ -149,22 +149,13 @@ def real_time(page):
     ]
 
 
-async def slider_of_one_value(page):
-    """The friction of all pairs, once they have been scaled to one value, none."""
-    mixed = next(uuid for label, uuid in page.labels.items() if label and label.startswith("Static friction (mixed)"))
-    await page.send({"type": "GuiUpdateMessage", "uuid": mixed, "updates": {"value": 0.0}})
-    while "Static friction" not in page.labels:
-        await asyncio.wait_for(page.window(), 20.0)
-    return page.labels["Static friction"]
-
-
 async def measure(port):
     async with connected(port) as socket:
         page = Socket(socket)
         await page.send(CAMERA)
         await until(page, lambda text: re.search(r"Real-time factor</span><span>[0-9.]", text))
         frames, factor = await whole_pour(page)
-        slider = await slider_of_one_value(page)
+        slider = page.labels["Rolling friction"]
         echoes = [await echo_ms(page, slider, round(0.3 + 0.01 * k, 2)) for k in range(ECHOES)]
         return frames, factor, echoes
 
