@@ -72,7 +72,7 @@ async def echo_ms(page, slider, value):
     """Milliseconds until the solver's own line tells ``value``."""
     began = time.perf_counter()
     await page.send({"type": "GuiUpdateMessage", "uuid": slider, "updates": {"value": value}})
-    await until(page, lambda text: f"Rolling friction</span> {value:g} " in text, 20.0)
+    await until(page, lambda text: f"Static friction</span> {value:g} " in text, 20.0)
     return 1e3 * (time.perf_counter() - began)
 
 
@@ -149,13 +149,21 @@ def real_time(page):
     ]
 
 
+async def friction_of_one_pair(page):
+    """The slider of a pair that has been chosen; that of all pairs scales their values."""
+    await page.send({"type": "GuiUpdateMessage", "uuid": page.labels["Pair"], "updates": {"value": "seed – seed"}})
+    while "Static friction" not in page.labels:
+        await asyncio.wait_for(page.window(), 20.0)
+    return page.labels["Static friction"]
+
+
 async def measure(port):
     async with connected(port) as socket:
         page = Socket(socket)
         await page.send(CAMERA)
         await until(page, lambda text: re.search(r"Real-time factor</span><span>[0-9.]", text))
         frames, factor = await whole_pour(page)
-        slider = page.labels["Rolling friction"]
+        slider = await friction_of_one_pair(page)
         echoes = [await echo_ms(page, slider, round(0.3 + 0.01 * k, 2)) for k in range(ECHOES)]
         return frames, factor, echoes
 
