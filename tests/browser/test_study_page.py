@@ -123,14 +123,14 @@ def test_a_section_opens_by_keyboard(page):
     head = page.get_by_role("button", name="Other results").filter(visible=True).first
     head.focus()
     page.keyboard.press("Enter")
-    page.get_by_label("From a folder").filter(visible=True).first.wait_for()
+    page.get_by_text("From a folder").filter(visible=True).first.wait_for()
     page.keyboard.press("Enter")
 
 
 def test_a_slider_of_the_profiler_moves_its_chart_by_keyboard(page):
     page.get_by_text("Profiler", exact=True).filter(visible=True).first.click()
     page.locator(".js-plotly-plot").first.wait_for()
-    thumb = slider(page, "X7")
+    thumb = slider(page, "X7:")
     thumb.scroll_into_view_if_needed()
     thumb.focus()
     page.keyboard.press("Home")
