@@ -271,6 +271,12 @@ def tube_places(
     return InstancePoses(poses.position, poses.quaternion, scale)
 
 
+def another_set_up(one: Scene, other: Scene) -> bool:
+    """Whether bodies or rig are others: they are drawn by other nodes, and their piles are not held against each
+    other."""
+    return (one.bodies, one.rig) != (other.bodies, other.rig)
+
+
 class BodyNodes:
     """Nodes of all bodies, below the node ``root``; none for a component without bodies."""
 

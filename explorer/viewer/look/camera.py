@@ -92,8 +92,7 @@ class CameraPanel:
             raise InputError("frame the pile: no body is there yet")
         self._leaves(client)
         camera = client.camera
-        aspect = camera.image_width / max(camera.image_height, 1) or 1.0
-        go_to_place(client, framing(points, camera.position - camera.look_at, camera.fov, aspect))
+        go_to_place(client, framing(points, camera.position - camera.look_at, camera.fov, aspect_of(camera)))
 
     def _show_link(self, client: Any) -> None:
         self._link.value = link_to(self._server, client.camera)
@@ -102,6 +101,11 @@ class CameraPanel:
 def view_of(height: float, name: str) -> CameraView:
     """The preset ``name``: everything up to ``height`` [m] in one picture."""
     return view_from(DIRECTIONS[name], height)
+
+
+def aspect_of(camera: Any) -> float:
+    """Width of a browser's picture over its height; 1 where the browser has not told it yet."""
+    return camera.image_width / max(camera.image_height, 1) or 1.0
 
 
 def framing(points: Array, direction: Array, field: float, aspect: float) -> CameraView:

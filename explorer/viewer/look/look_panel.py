@@ -21,7 +21,7 @@ from explorer.viewer.look.inspector import body_html, nearest_hit
 from explorer.viewer.look.look import in_sight
 from explorer.viewer.look.look_settings import CutPanel
 from explorer.viewer.panel import LOOK, Now, PageContext, Panel
-from explorer.viewer.scene_nodes import SceneNodes
+from explorer.viewer.scene_nodes import SceneNodes, another_set_up
 from explorer.viewer.view import look_at_height
 from solver.scenes.scene import Scene
 
@@ -98,7 +98,7 @@ class LookPanel(Panel):
 
     def _clear(self, scene: Scene) -> None:
         """Another pour: no bodies yet, and another rig where it has one."""
-        if (scene.bodies, scene.rig) != (self._scene.bodies, self._scene.rig):
+        if another_set_up(scene, self._scene):
             self._nodes.remove()
             self._nodes, self._scene, self._drawn = SceneNodes(self._server, scene), scene, None
             look_at_height(self._server, scene_height(scene))

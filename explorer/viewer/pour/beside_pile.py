@@ -17,9 +17,9 @@ from explorer.diagnosis.piles import HeightSurface
 from explorer.live.messages import SessionState, Status
 from explorer.scene.meshes import scene_height
 from explorer.session import Session
-from explorer.viewer.look.camera import go_to_place
+from explorer.viewer.look.camera import aspect_of, go_to_place
 from explorer.viewer.palette import MEASURED, RIM
-from explorer.viewer.scene_nodes import LINE, PLATE_RADIUS, SceneNodes, circle
+from explorer.viewer.scene_nodes import LINE, PLATE_RADIUS, SceneNodes, another_set_up, circle
 from explorer.viewer.view import MIDDLE, CameraView
 from solver.scenes.scene import Scene
 
@@ -92,7 +92,7 @@ class BesidePile:
         if self._second is None:
             return
         status, frame = self._second.status(), self._second.frame()
-        if self._drawn is None or (status.scene.bodies, status.scene.rig) != (self._drawn.bodies, self._drawn.rig):
+        if self._drawn is None or another_set_up(status.scene, self._drawn):
             self._remove_nodes()
             self._nodes, self._drawn = SceneNodes(self._server, status.scene, ROOT), status.scene
         if self._nodes is not None and frame is not None and frame.number != self._frame_number:
@@ -149,6 +149,6 @@ def step_aside(server: viser.ViserServer, scene: Scene, middle: float = 0.5 * BE
     for client in server.get_clients().values():
         away = np.array(client.camera.position) - np.array(client.camera.look_at)
         # Where the window is higher than wide, its width decides: both panels may be open.
-        least = (2.2 if middle else 3.2) * BESIDE * max(1.0, SQUARE / max(client.camera.aspect, 0.1))
+        least = (2.2 if middle else 3.2) * BESIDE * max(1.0, SQUARE / aspect_of(client.camera))
         away *= max(1.0, least / max(float(np.linalg.norm(away)), 1e-6))
         go_to_place(client, CameraView(aim + away, aim))

@@ -9,18 +9,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from explorer.live.messages import Status
-from explorer.units import checked, screen_unit
 from explorer.viewer.actions import button_group
 from explorer.viewer.panel import CONTROLS, PageContext
-from explorer.viewer.pour.live_panel import LiveControl, agree, live_control, screen_range
+from explorer.viewer.pour.live_panel import LiveControl, agree, control_for, screen_range, titled
 from explorer.viewer.pour.rebuilt_panel import RebuiltPanel
+from explorer.viewer.pour.restart_panel import LARGEST_SEED, entered, on_screen, same_value
 from explorer.viewer.view import small_html
 from solver.scenes.material import Pair
 from solver.scenes.scene import Scene, parameters, value, with_values
 
 AGAIN, SAME_SEED = "Pour again", "Same seed"
 FEED_RATE = "insertion.rate"
-LARGEST_SEED = 2**31 - 1
 
 
 class ControlsPanel(RebuiltPanel["Controls"]):
@@ -39,6 +38,7 @@ class Controls:
     def __init__(self, page: PageContext, scene: Scene) -> None:
         gui, session, post = page.server.gui, page.session, page.post
         self._page, self._session = page, session
+        self._generation = session.status().generation
         known = parameters(scene)
         self._place = gui.add_folder(None)
         self._mixed = gui.add_html(small_html("×: the values are mixed; the slider scales all of them."), visible=False)
@@ -47,11 +47,9 @@ class Controls:
         self._feed = None
         if FEED_RATE in known:
             low, high = screen_range(known[FEED_RATE])
-            unit = screen_unit(known[FEED_RATE])
-            shown = unit.to_screen(float(value(scene, FEED_RATE)))
             self._feed = gui.add_number(
-                f"Feed rate [{unit.symbol}]",
-                shown,
+                titled(known[FEED_RATE], "Feed rate"),
+                on_screen(known[FEED_RATE], scene),
                 min=low,
                 max=high,
                 hint=f"Acts on the next pour. {known[FEED_RATE].doc}",
@@ -73,7 +71,10 @@ class Controls:
         )
 
     def show(self, status: Status) -> None:
-        """Follow the solver's values."""
+        """Follow the solver's values, and the feed of a pour that was begun elsewhere."""
+        if self._feed is not None and status.generation != self._generation:
+            self._feed.value = on_screen(parameters(status.scene)[FEED_RATE], status.scene)  # type: ignore[misc]
+        self._generation = status.generation
         if not all(control.fits(status.scene) for control in self._live):
             self._build(status.scene)
         for control in self._live:
@@ -86,7 +87,7 @@ class Controls:
         known, page = parameters(scene), self._page
         with self._place:
             self._live = [
-                live_control(
+                control_for(scene, paths)(
                     page.server.gui, known[paths[0]], paths, scene, page.post, page.session.set_parameters, label
                 )
                 for label, paths in quantities(scene).items()
@@ -101,10 +102,8 @@ class Controls:
         status = self._session.status()
         scene = status.scene
         if self._feed is not None:
-            parameter = parameters(scene)[FEED_RATE]
-            low, high = screen_range(parameter)
-            wanted = screen_unit(parameter).to_si(checked(self._feed.value, low, high, "feed rate"))
-            if abs(wanted - float(value(scene, FEED_RATE))) > 1e-6 * wanted:
+            wanted = entered(parameters(scene)[FEED_RATE], self._feed.value)
+            if not same_value(value(scene, FEED_RATE), wanted):
                 scene = with_values(scene, {FEED_RATE: wanted})
         self._session.restart(scene, (status.seed + step) % LARGEST_SEED)
 

@@ -108,7 +108,9 @@ class _Section:
         self._chosen = chosen
         with self._folder:
             self._live = [
-                live_control(self._server.gui, parameter, paths, scene, self._post, self._session.set_parameters)
+                control_for(scene, paths)(
+                    self._server.gui, parameter, paths, scene, self._post, self._session.set_parameters
+                )
                 for parameter, paths in live_parameters(scene, self._targets[chosen])
             ]
 
@@ -261,18 +263,9 @@ class ScalingControl(LiveControl):
         return {path: min(max(factor * base, low), high) for path, base in self._base.items()}
 
 
-def live_control(
-    gui: viser.GuiApi,
-    parameter: Parameter,
-    paths: Sequence[str],
-    scene: Scene,
-    post: Post,
-    apply: Apply,
-    label: str = "",
-) -> LiveControl:
-    """A control for ``parameter`` at ``paths``: their value, or a factor where they have several."""
-    kind = LiveControl if agree(scene, paths) else ScalingControl
-    return kind(gui, parameter, paths, scene, post, apply, label)
+def control_for(scene: Scene, paths: Sequence[str]) -> type[LiveControl]:
+    """The control of a parameter at ``paths``: of their value, or of a factor where they have several."""
+    return LiveControl if agree(scene, paths) else ScalingControl
 
 
 @dataclass(frozen=True)

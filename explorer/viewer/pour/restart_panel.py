@@ -101,7 +101,7 @@ class SetUpInputs:
         seed = int(checked(self._seed.value, 0, LARGEST_SEED, "seed"))
         present = self._session.status().scene
         # What was not touched stays to the last digit: a number box shows six.
-        changed = {path: new for path, new in values.items() if not _same(value(present, path), new)}
+        changed = {path: new for path, new in values.items() if not same_value(value(present, path), new)}
         self._session.restart(with_values(present, changed), seed)
 
 
@@ -150,7 +150,8 @@ def parameter_input(gui: viser.GuiApi, parameter: Parameter, scene: Scene) -> An
     )
 
 
-def _same(old: float | str, new: float | str) -> bool:
+def same_value(old: float | str, new: float | str) -> bool:
+    """Whether a box that shows six digits was left as it was."""
     if isinstance(old, str) or isinstance(new, str):
         return old == new
     return abs(old - new) <= 1e-6 * abs(old)

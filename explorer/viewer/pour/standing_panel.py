@@ -20,7 +20,7 @@ from explorer.scene.source import Difference, differences, shown
 from explorer.viewer.palette import Colour
 from explorer.viewer.panel import CONTROLS, Now, PageContext, Panel
 from explorer.viewer.pour.readout import angle_of_repose_deg
-from explorer.viewer.scene_nodes import BodyNodes, DrawnComponent
+from explorer.viewer.scene_nodes import BodyNodes, DrawnComponent, another_set_up
 from explorer.viewer.view import small_html
 from solver import Scene, body_counts
 
@@ -126,11 +126,6 @@ class StandingPanel(Panel):
         if self._ghost is not None:
             self._ghost.remove()
         self._ghost = self._former = None
-
-
-def another_set_up(one: Scene, other: Scene) -> bool:
-    """Whether bodies or rig are others, so that their piles are not held against each other."""
-    return (one.bodies, one.rig) != (other.bodies, other.rig)
 
 
 def watched(rest: Rest, status: Status) -> bool:

@@ -10,6 +10,8 @@ from explorer.live.messages import SessionState, Status
 from explorer.scene.source import material_source
 from explorer.units import InputError, checked, quantity, screen_unit, title
 from explorer.viewer.actions import Actions
+from explorer.viewer.panel import Now
+from explorer.viewer.pour.controls_panel import ControlsPanel
 from explorer.viewer.pour.live_panel import (
     LiveControl,
     LiveSections,
@@ -27,7 +29,7 @@ from solver import load_material, parameters, with_values
 from solver.rigs import RIGS
 from solver.scenes.scene import value, with_rig
 from solver.scenes.sizes import SizeDistribution
-from tests.explorer.viewer.page_session import PageSession, event
+from tests.explorer.viewer.page_session import PageSession, event, page_context
 
 SCENE = load_material("sunflower_extract")
 KNOWN = parameters(SCENE)
@@ -290,3 +292,19 @@ def test_a_mistake_in_the_program_is_not_taken_for_bad_input():
     actions.post(lambda: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         actions.carry_out()
+
+
+def test_the_feed_rate_beside_the_sliders_is_that_of_the_pour_whoever_began_it(server):
+    session = PageSession(material_source("sunflower_extract"))
+    panel = ControlsPanel(page_context(server, session))
+    controls, path = panel._controls, "insertion.rate"
+    assert controls._feed.value == pytest.approx(1e3 * value(session.now.scene, path))
+    # Another browser, or Set-up, pours with another feed; pouring again here keeps it.
+    session.restart(with_values(session.now.scene, {path: 0.035}))
+    panel.show(Now(session.now))
+    assert controls._feed.value == pytest.approx(35.0)
+    controls._pour(1)
+    assert value(session.now.scene, path) == 0.035
+    controls._feed.value = 15.0
+    controls._pour(0)
+    assert value(session.now.scene, path) == pytest.approx(0.015)

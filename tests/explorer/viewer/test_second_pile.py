@@ -192,7 +192,7 @@ def test_a_measured_pile_stands_on_the_other_side_with_names_above_all_three(ben
 class Camera:
     """As viser's: a new position takes the point that is looked at along."""
 
-    aspect = 0.6
+    image_width, image_height = 600, 1000
 
     def __init__(self):
         self._position, self.look_at = np.array([0.3, -0.4, 0.2]), np.array([0.0, 0.0, 0.05])
@@ -215,5 +215,5 @@ def test_every_camera_looks_between_the_piles_from_where_both_are_in_sight():
     away = client.camera.position - client.camera.look_at
     np.testing.assert_allclose(away / np.linalg.norm(away), before / np.linalg.norm(before))
     # Half the field of view in height is 0.3 rad; a narrow window sees 0.6 of that across.
-    reach = np.linalg.norm(away) * np.tan(0.3) * client.camera.aspect
+    reach = np.linalg.norm(away) * np.tan(0.3) * client.camera.image_width / client.camera.image_height
     assert reach > 0.5 * BESIDE
