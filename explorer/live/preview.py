@@ -1,6 +1,6 @@
 """A recorded pour that is shown while the solver loads: the very scene and seed, or nothing.
 
-``make preview`` pours the shipped study's scene and writes ``assets/previews/<first digits of its key>.npz``; a test
+``make preview`` pours the shipped study's scene and writes ``explorer/previews/<first digits of its key>.npz``; a test
 holds the file to the key (`solver.pours.pour_key`) of what ``explorer serve`` begins with.
 """
 

@@ -16,7 +16,6 @@ from __future__ import annotations
 import math
 import time as clock
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Protocol, Self
@@ -29,6 +28,7 @@ import rerun as rr
 from explorer.files.output_file import check_new_file
 from explorer.files.run_result import parameter_values, versions
 from explorer.logs.blueprint import CURVES, TIMELINE, blueprint, curve_entity
+from explorer.logs.recording import RunningViewer
 from explorer.scene.meshes import (
     GATE_NAME,
     PLATE_NAME,
@@ -74,13 +74,6 @@ class Poses(Protocol):
     @property
     def scale(self) -> npt.NDArray[np.floating]:
         """Linear size relative to the declared one, shape (n,)."""
-
-
-@dataclass(frozen=True)
-class RunningViewer:
-    """A rerun viewer that is open, such as ``rerun+http://127.0.0.1:9876/proxy``."""
-
-    url: str
 
 
 class PourLog:

@@ -25,6 +25,13 @@ BODIES = "/world/bodies/"
 WORLD = "/world/"
 
 
+@dataclass(frozen=True)
+class RunningViewer:
+    """A rerun viewer that is open, to record into; such as ``rerun+http://127.0.0.1:9876/proxy``."""
+
+    url: str
+
+
 @dataclass(frozen=True, eq=False)
 class Shape:
     """A mesh [m] with its colour, RGB 0 … 255, and opacity 0 … 1."""

@@ -1,4 +1,4 @@
-"""Recordings of a live session: a file per pour, fed with the frames and statuses that the page shows."""
+"""Recordings of a live session: a file per pour or a viewer, fed with the frames and statuses that the page shows."""
 
 from __future__ import annotations
 
@@ -11,31 +11,29 @@ from explorer.files.output_file import check_new_file
 from explorer.live.frames import Frame
 from explorer.live.messages import SessionState, Status
 from explorer.logs.blueprint import motion_curves
-from explorer.logs.pour_log import PourLog, RunningViewer
-from explorer.logs.recording import FRAME_INTERVAL, RecordedPour
+from explorer.logs.pour_log import PourLog
+from explorer.logs.recording import FRAME_INTERVAL, RecordedPour, RunningViewer
 from explorer.outcomes import outcome_text
 from explorer.scene.source import changes
 from solver.scenes.scene import Scene
 
 
 class SessionRecorder:
-    """Records into ``path``; the k-th pour of the session (a restart begins one) into ``<stem>_<k>.rrd``.
+    """Records into the file ``to``; the k-th pour of the session (a restart begins one) into ``<stem>_<k>.rrd``.
 
-    A name that is taken is passed over. ``pours`` names the files.
+    A name that is taken is passed over. ``pours`` names the files. Into a running viewer every pour is a recording of
+    its own there, and no file is kept.
 
     A pour that is brought back repeats what has been recorded, so nothing is added until it is past that. Where it has
     other parameters than were recorded for its time, it is another pour, with a file of its own from there on.
 
-    Raises :class:`explorer.errors.CommandError` at once if ``path`` cannot be a new recording.
+    Raises :class:`explorer.errors.CommandError` at once if a file ``to`` cannot be a new recording.
     """
 
-    def __init__(self, path: Path) -> None:
-        check_new_file(path, suffix=".rrd")
-        self._path = path
-        self._begun()
-
-    def _begun(self) -> None:
-        """Nothing is recorded yet."""
+    def __init__(self, to: Path | RunningViewer) -> None:
+        if isinstance(to, Path):
+            check_new_file(to, suffix=".rrd")
+        self._to = to
         self._pours: list[RecordedPour] = []
         self._log: PourLog | None = None
         self._last: Status | None = None
@@ -108,30 +106,17 @@ class SessionRecorder:
         self._newest = None
         self._frame_due = self._until = self._logged = -math.inf
         self._scenes = [(status.time, status.scene)]
-        return self._open(status)
-
-    def _open(self, status: Status) -> PourLog:
-        """The file of another pour."""
-        path = self._path if not self._pours else self._next_path()
+        if isinstance(self._to, RunningViewer):
+            return PourLog(self._to, status.scene, status.seed)
+        path = self._to if not self._pours else self._next_path(self._to)
         log = PourLog(path, status.scene, status.seed)
         self._pours.append(RecordedPour(path))
         return log
 
-    def _next_path(self) -> Path:
+    def _next_path(self, first: Path) -> Path:
         """The next name of a file that is not there yet."""
-        names = (self._path.with_stem(f"{self._path.stem}_{k}") for k in count(len(self._pours) + 1))
+        names = (first.with_stem(f"{first.stem}_{k}") for k in count(len(self._pours) + 1))
         return next(path for path in names if not path.exists())
-
-
-class SessionStream(SessionRecorder):
-    """Sends a live session to a running rerun viewer, one recording there for every pour; no file is kept."""
-
-    def __init__(self, viewer: RunningViewer) -> None:
-        self._viewer = viewer
-        self._begun()
-
-    def _open(self, status: Status) -> PourLog:
-        return PourLog(self._viewer, status.scene, status.seed)
 
 
 def news(before: Status, now: Status) -> Iterator[str]:

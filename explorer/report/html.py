@@ -14,15 +14,17 @@ import re
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from explorer.report.content import Drawing, Figure, Picture, Report, Shown, Spec, Strong, Struck, Table
 from explorer.report.figures.style import CONFIG
 from explorer.units import MISSING
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:"
 """Content security policy: what would load something from elsewhere is refused by the browser."""
@@ -37,12 +39,16 @@ def page(report: Report) -> str:
     """The whole page; a report without a chart has no plotly.js."""
     has_charts = any(isinstance(one, Figure) for one in report.shown.values())
     numbers = {name: k for k, name in enumerate(report.shown, start=1)}
-    return TEMPLATES.get_template("page.html.j2").render(
-        report=report,
-        numbers=numbers,
-        policy=Markup(POLICY),
-        config=CONFIG,
-        plotly=packed_plotly() if has_charts else "",
+    return (
+        templates()
+        .get_template("page.html.j2")
+        .render(
+            report=report,
+            numbers=numbers,
+            policy=Markup(POLICY),
+            config=CONFIG,
+            plotly=packed_plotly() if has_charts else "",
+        )
     )
 
 
@@ -121,22 +127,29 @@ def drawn(drawing: Drawing) -> Markup:
     return Markup(drawing.svg)
 
 
-TEMPLATES = Environment(
-    loader=FileSystemLoader(Path(__file__).parent / "templates"),
-    autoescape=True,
-    undefined=StrictUndefined,
-    keep_trailing_newline=True,
-    trim_blocks=True,
-    lstrip_blocks=True,
-)
-TEMPLATES.filters |= {
-    "inline": escaped,
-    "anchor": anchor,
-    "embedded": embedded,
-    "alt": alt,
-    "captioned": captioned,
-    "columns": column_classes,
-    "data_uri": data_uri,
-    "drawn": drawn,
-    "kind": lambda block: type(block).__name__,
-}
+@cache
+def templates() -> Environment:
+    """The templates with their filters."""
+    # Imported here: the page draws reports' charts without ever making one.
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    made = Environment(
+        loader=FileSystemLoader(Path(__file__).parent / "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        keep_trailing_newline=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    made.filters |= {
+        "inline": escaped,
+        "anchor": anchor,
+        "embedded": embedded,
+        "alt": alt,
+        "captioned": captioned,
+        "columns": column_classes,
+        "data_uri": data_uri,
+        "drawn": drawn,
+        "kind": lambda block: type(block).__name__,
+    }
+    return made

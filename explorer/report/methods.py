@@ -163,8 +163,7 @@ def _model(result: StudyResult) -> str:
     fraction = number(float(found.values["numerics.rayleigh_fraction"]))
     text += (
         f", at a time step of {number(1e6 * found.dt)} µs (at most {fraction} of the Rayleigh time of the smallest "
-        "sphere"
-        ")."
+        "sphere)."
     )
     bodies = Counter(found.materials.values()).total()
     shapes = [f"{shape.body} ({shape.fit.n_spheres} spheres)" for shape in result.shapes]

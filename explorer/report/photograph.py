@@ -108,8 +108,7 @@ def photograph_report(result: PhotographResult, picture: bytes | None) -> Report
                 picture,
                 f"Photographs of piles with the outline, both flank lines and the base line drawn over them: {names}",
                 f"n = {len(result.piles) + len(result.refused)} pictures, read by one silhouette each. White: outline; "
-                "orange: "
-                "flank lines (least squares); blue: base line.",
+                "orange: flank lines (least squares); blue: base line.",
             )
         )
     sections = [Section("Angle of repose", tuple(blocks))]

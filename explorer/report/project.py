@@ -158,8 +158,7 @@ def _side_by_side(parts: list[Part]) -> list[Section]:
     n = enumeration([f"{pile.pours} pours at the {pile.name}" for pile in studies[0].piles])
     caption = (
         f"Photographed outlines (n = {len(measured)}) over mean silhouettes of n = {n}; bands: ± 1 SD between pours; "
-        "both axes "
-        "on one scale."
+        "both axes on one scale."
     )
     return [
         Section(

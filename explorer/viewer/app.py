@@ -10,18 +10,16 @@ from pathlib import Path
 from types import FrameType
 
 from explorer.diagnosis.process import DiagnoseProcess
-from explorer.logs.recording import recorded_lines
+from explorer.logs.recording import RunningViewer, recorded_lines
 from explorer.project.project import Project
 from explorer.session import Session
 from explorer.study.process import CalibrationProcess
-from explorer.viewer.board.board import board_json
-from explorer.viewer.board.board_view import REPORT
 from explorer.viewer.board.folder_board import FolderBoard
 from explorer.viewer.guarded_server import address, guarded_server
-from explorer.viewer.output.recording_switch import session_recorder, viewer_stream
+from explorer.viewer.output.recording_switch import session_recorder
 from explorer.viewer.page import Page
 from explorer.viewer.shell.channel import ShellChannel
-from explorer.viewer.shell.web_pages import JSON, WebPage, WebPages, folder_id
+from explorer.viewer.shell.web_pages import WebPages
 from solver.scenes.scene import Scene
 
 LABEL = "Granular material explorer"
@@ -73,7 +71,7 @@ def serve(
             ending.enter_context(closing(recorder))
         recorders = [recorder] if recorder else []
         if rerun_viewer:
-            recorders.append(ending.enter_context(closing(viewer_stream(rerun_viewer))))
+            recorders.append(ending.enter_context(closing(session_recorder(RunningViewer(rerun_viewer)))))
         pages, channel = WebPages(f"{project.title} · {LABEL}"), ShellChannel()
         server = guarded_server(host, port, LABEL, pages, channel)
         ending.callback(server.stop)
@@ -120,20 +118,15 @@ def board(
         CommandError: the folder holds no result, or one of another version.
         PortError: the port is busy or the host is not of this machine.
     """
-    found = FolderBoard(folder)
     pages = WebPages(LABEL)
+    # Before the address is told: what cannot be shown is refused at once.
+    found = FolderBoard(folder, pages)
     with stopped_by_signals() as stop, ExitStack() as ending:
-        # Made before the address is told: what cannot be shown is refused at once.
-        shown, address_of = found.version(), f"/study/{folder_id(folder)}.json"
-        report = pages.publish_folder(folder) + REPORT if (folder / REPORT).is_file() else ""
-        pages.publish(address_of, WebPage(JSON, board_json(found.board(report))))
         server = guarded_server(host, port, LABEL, pages)
         ending.callback(server.stop)
-        ready(f"http://{address(host)}:{server.get_port()}/shell/board.html#{address_of}")
+        ready(f"http://{address(host)}:{server.get_port()}/shell/board.html#{found.address}")
         while not stop.wait(FOLLOW_INTERVAL):
-            if found.version() != shown:
-                shown = found.version()
-                pages.publish(address_of, WebPage(JSON, board_json(found.board(report))))
+            found.follow()
 
 
 @contextmanager

@@ -51,8 +51,10 @@ def guarded_server(
 
     def serve(handler: Any, serve_host: str, serve_port: int, **options: Any) -> Any:
         async def either(connection: Any) -> None:
-            ours = channel is not None and connection.request.path == PATH
-            await (channel.handle if ours and channel is not None else handler)(connection)
+            if channel is not None and connection.request.path == PATH:
+                await channel.handle(connection)
+            else:
+                await handler(connection)
 
         options["process_request"] = _for_hosts(hosts, pages, options["process_request"])
         return real_serve(either, serve_host, serve_port, origins=origins, **options)

@@ -62,8 +62,7 @@ def target(result: DesignResult) -> Section | None:
     if 1 < len(result.factors) <= MOST_PANELS:
         caption = (
             f"n = {len(found.bootstrap_points)} refits to resampled {found.resampling} (bootstrap); each dot is the "
-            "solution "
-            f"nearest the reference. {percent(found.share_reached)} of the refits reach the target. "
+            f"solution nearest the reference. {percent(found.share_reached)} of the refits reach the target. "
             + cloud_caution(optimum)
         )
         blocks.append(Figure("cloud", cloud(fitted), caption.rstrip()))
@@ -96,8 +95,7 @@ def shape(result: DesignResult) -> Section | None:
         blocks.append(path_table(result, path, words, response))
     caption = (
         f"n = {result.runs.valid} runs. Band: 95 % of the mean (t). The path ends at the distance of the furthest run "
-        "and "
-        "may leave low … high."
+        "and may leave low … high."
     )
     return Section("Shape and ridge", (*blocks, Figure("ridge", ridge(result, model), caption)))
 

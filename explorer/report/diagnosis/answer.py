@@ -82,8 +82,7 @@ def in_short(result: DiagnosisResult) -> Section:
             probability_chart(result),
             f"Posterior probability of each answer (n = {sum(row.features for row in result.offered)} features of "
             f"{sum(row.replicates for row in result.measured if row.role == 'fit')} measured pours); dashed: "
-            f"{percent(result.threshold)}, from which on an effect is "
-            "named.",
+            f"{percent(result.threshold)}, from which on an effect is named.",
         ),
         _probability_table(result),
     ]

@@ -132,8 +132,7 @@ def pile(result: DiagnosisResult) -> Section | None:
                 f"pile-{k}",
                 pile_chart(picture),
                 f"Condition {picture.condition}, {_role(picture)}, {pours_of(result, picture.condition)}; bands: ± 1 "
-                "SD "
-                "between pours.",
+                "SD between pours.",
             )
         )
     return Section("The pile", tuple(blocks))

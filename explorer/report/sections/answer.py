@@ -73,8 +73,7 @@ def banner(result: StudyResult) -> Banner:
             "",
             f"{poured[0].upper()}{poured[1:]}: {verdict(target, test)}",
             "Start again around the point found, with narrower ranges; if it stays, ask `explorer diagnose` whether "
-            "the "
-            "model lacks an effect.",
+            "the model lacks an effect.",
         )
     if verdicts != {"equivalent"}:
         return Banner(
@@ -311,8 +310,7 @@ def _of_target(stage: VerificationResult, index: int, target: Target, test: Veri
     words = observable_label(name)
     caption = (
         f"n = {test.simulated.n} valid fresh pours, one point each; diamonds: means with 95 % intervals (t); band: "
-        "target ± "
-        "equivalence margin, fixed before any run."
+        "target ± equivalence margin, fixed before any run."
     )
     return [
         Text(f"{words[0].upper()}{words[1:]}: {verdict(target, test)}"),
@@ -449,8 +447,7 @@ def ranges_caption(found: OptimumResult) -> str:
     """What the bars of the ranges are."""
     return (
         "The narrower a bar, the better a factor is known: wide, the region of the surface; middle, where the fitted "
-        "model "
-        f"gives the target; narrow, the 95 % set over n = {len(found.single.bootstrap_points)} bootstrap refits."
+        f"model gives the target; narrow, the 95 % set over n = {len(found.single.bootstrap_points)} bootstrap refits."
     )
 
 

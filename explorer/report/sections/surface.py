@@ -50,8 +50,7 @@ def ascent(result: StudyResult) -> Section:
             f"n = {sum(len(valid_values(runs, observable)) for runs in walk.runs)} valid pours, one faint point each; "
             "means "
             "with 95 % intervals (z) from the pilot’s σ and the number of valid pours of a step; band: the target and "
-            "its "
-            "margin.",
+            "its margin.",
         ),
         _steps(walk),
     ]
@@ -155,8 +154,7 @@ def _of_target(place: int, fitted: FittedTarget, canonical: Canonical) -> list[B
     n = f"n = {len(fitted.model.observed)} valid pours at {len(fitted.design)} points of the design"
     caption = (
         f"{n}; second-order model by least squares, cut through the optimum; the points of the design are projected on "
-        "each "
-        "panel. Thick line: model = target."
+        "each panel. Thick line: model = target."
     )
     blocks.append(Figure(f"contours-{place}", contours(fitted), caption))
     blocks.append(Figure(f"fit-{place}", fit(fitted), f"{n}, one mark each; residuals are studentized externally."))

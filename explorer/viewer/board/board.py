@@ -11,8 +11,6 @@ from typing import Any
 from explorer.report.content import Banner, Spec, Table
 from explorer.report.study_charts import Plots
 
-WIDE = 1.0
-"""Height by width from which on a chart of several panels gets the board's whole width on a wide screen."""
 CODE = re.compile(r"`([^`]*)`")
 
 
@@ -53,9 +51,6 @@ class Board:
     title: str
     subtitle: str
     banner: Banner | None = None
-    lead: str = ""
-    """A sentence above all else, such as what is missing and how sure that is."""
-    facts: tuple[tuple[str, str], ...] = ()
     stages: tuple[Stage, ...] = ()
     charts: tuple[BoardChart, ...] = ()
     tables: tuple[BoardTable, ...] = ()
@@ -75,8 +70,6 @@ def board_json(board: Board) -> bytes:
         "title": board.title,
         "subtitle": board.subtitle,
         "banner": None if board.banner is None else _banner(board.banner),
-        "lead": _plain(board.lead),
-        "facts": [[name, _plain(value)] for name, value in board.facts],
         "stages": [vars(stage) for stage in board.stages],
         "charts": [vars(chart) for chart in board.charts],
         "tables": [

@@ -17,6 +17,11 @@ REPORT = "report.html"
 HEIGHT = "calc(100dvh - 330px)"
 
 
+def published_report(pages: WebPages, folder: Path | None) -> str:
+    """Address of the report in ``folder``, which is served from now on; empty where there is none."""
+    return "" if folder is None or not (folder / REPORT).is_file() else pages.publish_folder(folder) + REPORT
+
+
 class BoardView:
     """Publishes boards at ``address`` (``/study/page.json``); they are made in a thread, one at a time."""
 
@@ -49,10 +54,8 @@ class BoardView:
         """
         alive = status is not None and status.alive
         progress = (status.state, status.stage, status.done) if status is not None and alive else None
-        report = ""
-        if folder is not None and not alive and (folder / REPORT).is_file():
-            report = self._pages.publish_folder(folder) + REPORT
-        self.offer((shown, progress, report), lambda: make(status, report))
+        reported = None if folder is None or alive or not (folder / REPORT).is_file() else folder
+        self.offer((shown, progress, reported), lambda: make(status, published_report(self._pages, reported)))
 
     def offer(self, version: Hashable, make: Callable[[], Board]) -> None:
         """Show what ``make`` gives, unless ``version`` is shown already; put off while another is being made."""

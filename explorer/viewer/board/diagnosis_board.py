@@ -7,7 +7,7 @@ from functools import partial
 from explorer.background.command_process import CommandStatus
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.report.content import Table
-from explorer.report.diagnosis.answer import banner, verdict_sentence
+from explorer.report.diagnosis.answer import banner
 from explorer.report.diagnosis.charts import diagnosis_plots, likely, map_chart
 from explorer.report.diagnosis.wording import chance, feature_label, feature_value, spelled
 from explorer.report.study_charts import Plot
@@ -34,7 +34,6 @@ def diagnosis_board(result: DiagnosisResult | None, status: CommandStatus | None
         title=result.data.title or result.data.folder,
         subtitle=subtitle,
         banner=banner(result),
-        lead=verdict_sentence(result),
         stages=stages_of(status) if alive else (),
         charts=made_charts(first | maps | rest),
         tables=(_answers(result), _errors(result)),

@@ -13,32 +13,41 @@ from explorer.diagnosis.result import DiagnosisResult
 from explorer.errors import CommandError
 from explorer.study.process import PARTIAL
 from explorer.study.process import RESULT as STUDY
-from explorer.viewer.board.board import Board
+from explorer.viewer.board.board import board_json
+from explorer.viewer.board.board_view import REPORT, published_report
 from explorer.viewer.board.diagnosis_board import diagnosis_board
 from explorer.viewer.board.study_board import study_board
+from explorer.viewer.shell.web_pages import JSON, WebPage, WebPages, folder_id
 
 
 class FolderBoard:
-    """The board of ``folder``. Raises CommandError where it holds neither a study nor a diagnosis."""
+    """Publishes the board of ``folder`` at ``address``.
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    Raises CommandError, in one line, where it holds neither a study nor a diagnosis, or one of another version.
+    """
+
+    def __init__(self, folder: Path, pages: WebPages) -> None:
+        self._folder, self._pages = folder, pages
         self._study, self._diagnosis = ResultFile(STUDY, PARTIAL), ResultFile(DIAGNOSIS)
+        self._shown: Hashable = None
+        self.address = f"/study/{folder_id(folder)}.json"
         if self._study.read(folder) is None and self._diagnosis.read(folder) is None:
             raise CommandError(f"{folder}: holds no {STUDY}, {PARTIAL} or {DIAGNOSIS}")
+        self.follow()
 
-    def version(self) -> Hashable:
-        """Changes whenever a result does."""
-        for file in (self._study, self._diagnosis):
-            file.read(self._folder)
-        return self._study.version, self._diagnosis.version
-
-    def board(self, report: str = "") -> Board:
-        """What there is now. Raises CommandError, in one line, for a result of another version."""
+    def follow(self) -> None:
+        """Publish the board anew where a result, or its report, has changed."""
         study, diagnosis = self._study.read(self._folder), self._diagnosis.read(self._folder)
+        shown = (self._study.version, self._diagnosis.version, (self._folder / REPORT).is_file())
+        if shown == self._shown:
+            return
+        self._shown = shown
+        report = published_report(self._pages, self._folder)
         try:
             if diagnosis is not None:
-                return diagnosis_board(DiagnosisResult.from_dict(diagnosis), None, report)
-            return study_board(None if study is None else study_from(study), None, report)
+                board = diagnosis_board(DiagnosisResult.from_dict(diagnosis), None, report)
+            else:
+                board = study_board(None if study is None else study_from(study), None, report)
         except RecordError as error:
             raise CommandError(f"{self._folder}: {error}") from None
+        self._pages.publish(self.address, WebPage(JSON, board_json(board)))

@@ -18,7 +18,7 @@ from explorer.errors import CommandError
 from explorer.files.output_file import write_whole
 from explorer.live.frames import Frame
 from explorer.live.messages import Status
-from explorer.logs.recording import RecordedPour
+from explorer.logs.recording import RecordedPour, RunningViewer
 from explorer.viewer.actions import BackgroundWork
 
 MOST_BYTES = 150e6
@@ -64,21 +64,12 @@ class Recorder(Protocol):
         """End the recording; its files are then whole."""
 
 
-def session_recorder(path: Path) -> Recorder:
-    """A recording of rerun's into the new file ``path``."""
+def session_recorder(to: Path | RunningViewer) -> Recorder:
+    """A recording of rerun's into the new file ``to``, or into a viewer that is open."""
     # Imported here: rerun takes a second to load, and most sessions are not recorded.
     from explorer.logs.session_recorder import SessionRecorder
 
-    return SessionRecorder(path)
-
-
-def viewer_stream(url: str) -> Recorder:
-    """The session, sent to the running rerun viewer at ``url``."""
-    # Imported here, as above.
-    from explorer.logs.pour_log import RunningViewer
-    from explorer.logs.session_recorder import SessionStream
-
-    return SessionStream(RunningViewer(url))
+    return SessionRecorder(to)
 
 
 class RecordingSwitch:

@@ -1,21 +1,10 @@
 // A board draws what its address (#/study/ID.json) says, and asks every two seconds whether that has changed.
-"use strict";
+import { element } from "/shell/element.js";
 
 const ASK_MS = 2000;
 const place = document.getElementById("board");
 const outer = window.parent !== window ? window.parent : null;
 let tag = "", shown = null;
-
-function element(name, attributes = {}, ...children) {
-  const made = document.createElement(name);
-  for (const [key, value] of Object.entries(attributes)) {
-    if (key.startsWith("on")) made.addEventListener(key.slice(2), value);
-    else if (key === "class") made.className = value;
-    else made.setAttribute(key, value);
-  }
-  made.append(...children);
-  return made;
-}
 
 function isLight() {
   if (outer) return outer.document.documentElement.classList.contains("light");
@@ -101,7 +90,6 @@ function show(board) {
   if (board.banner) parts.push(element("div", { class: `banner ${board.banner.tone}`, role: "status" },
     element("strong", {}, board.banner.headline), element("p", {}, board.banner.why),
     element("p", {}, element("b", {}, "Next: "), board.banner.then)));
-  if (board.lead && !board.banner) parts.push(element("p", {}, board.lead));
   if (board.report) parts.push(element("p", {}, element("a", { href: board.report, target: "_blank", rel: "noopener" },
     "Open the report")));
   if (board.stages.length) parts.push(table({ title: "Stages", header: ["Stage", "Pours", "", "Found"], caption: "",

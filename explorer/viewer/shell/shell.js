@@ -1,6 +1,6 @@
 // What stands around viser's page: the state line on top, the timeline at the bottom. States come by a WebSocket of
 // their own; what is clicked goes back as a named command. Rooms are viser's own tabs, opened in this browser only.
-"use strict";
+import { element } from "/shell/element.js";
 
 const MARKS = { empty: "○", assumed: "◌", measured: "●", running: "◐", done: "✓", failed: "✕" };
 const RECONNECT_MS = 1000;
@@ -8,17 +8,6 @@ let channel = null;
 
 function send(command) {
   if (channel && channel.readyState === WebSocket.OPEN) channel.send(JSON.stringify(command));
-}
-
-function element(tag, attributes = {}, ...children) {
-  const made = document.createElement(tag);
-  for (const [name, value] of Object.entries(attributes)) {
-    if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
-    else if (name === "class") made.className = value;
-    else made.setAttribute(name, value);
-  }
-  made.append(...children);
-  return made;
 }
 
 // A tab by its name: in a panel that is open, folded to the edge of the window, or in a small window's bottom sheet.

@@ -8,7 +8,7 @@ from __future__ import annotations
 import gzip
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property, lru_cache
+from functools import cache, cached_property, lru_cache, partial
 from hashlib import sha256
 from html import escape
 from http import HTTPStatus
@@ -26,7 +26,9 @@ TITLE = "<title>Viser</title>"
 TEXT = '<title>{title}</title>\n    <link rel="stylesheet" href="/shell/text.css" />'
 AROUND = """
     <link rel="stylesheet" href="/shell/shell.css" />
-    <script src="/shell/shell.js" defer></script>"""
+    <script src="/shell/shell.js" type="module"></script>"""
+SHIPPED = ("element.js", "text.css", "shell.js", "shell.css", "board.html", "board.js", "board.css")
+"""Files beside this one that are served."""
 HTML, JSON = "text/html; charset=utf-8", "application/json"
 KINDS: Mapping[str, str] = {
     ".html": HTML,
@@ -77,17 +79,11 @@ class WebPages:
     """
 
     def __init__(self, title: str, around: bool = True) -> None:
-        self._title, self._around = title, around
         self._pages: dict[str, Callable[[], WebPage]] = {
-            "/": self._first,
-            "/index.html": self._first,
-            "/shell/text.css": lambda: _shipped("text.css"),
-            "/shell/shell.js": lambda: _shipped("shell.js"),
-            "/shell/shell.css": lambda: _shipped("shell.css"),
-            "/shell/board.html": lambda: _shipped("board.html"),
-            "/shell/board.js": lambda: _shipped("board.js"),
-            "/shell/board.css": lambda: _shipped("board.css"),
+            "/": lambda: _first_page(title, around),
+            "/index.html": lambda: _first_page(title, around),
             "/shell/plotly.js": _plotly,
+            **{f"/shell/{name}": partial(_shipped, name) for name in SHIPPED},
         }
 
     def publish(self, address: str, page: WebPage) -> None:
@@ -127,9 +123,6 @@ class WebPages:
         except OSError:  # a file that is not there any more
             return _refusal(HTTPStatus.NOT_FOUND)
 
-    def _first(self) -> WebPage:
-        return WebPage(HTML, _first_page(self._title, self._around))
-
 
 def folder_id(folder: Path) -> str:
     """Id of a folder in an address: the same each time, and without its name."""
@@ -147,9 +140,9 @@ def first_page(title: str, viser_page: str, around: bool = True) -> str:
 
 
 @cache
-def _first_page(title: str, around: bool) -> bytes:
+def _first_page(title: str, around: bool) -> WebPage:
     file = Path(viser.__file__).parent / "client" / "build" / "index.html"
-    return first_page(title, file.read_text(encoding="utf-8"), around).encode()
+    return WebPage(HTML, first_page(title, file.read_text(encoding="utf-8"), around).encode())
 
 
 @cache

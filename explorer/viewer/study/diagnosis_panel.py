@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
+from pathlib import Path
 
 import viser
 
@@ -20,19 +21,7 @@ from explorer.viewer.actions import button_group
 from explorer.viewer.board.board_view import BoardView
 from explorer.viewer.board.diagnosis_board import diagnosis_board
 from explorer.viewer.panel import DIAGNOSE, SELDOM, Now, PageContext, Panel
-from explorer.viewer.study.process_view import (
-    CANCEL,
-    CLEAR,
-    CONTINUE,
-    PAUSE,
-    QUEUE,
-    RESUME,
-    START,
-    ProcessView,
-    escaped,
-    state_markdown,
-    waiting_markdown,
-)
+from explorer.viewer.study.process_view import ProcessView, escaped, orders, state_markdown, waiting_markdown
 from explorer.viewer.study.result_chooser import ResultChooser
 from solver import EFFECTS
 from solver.assets import shipped_measurements
@@ -72,15 +61,7 @@ class DiagnosisPanel(Panel):
         )
         with gui.add_folder("Effects in question, and how much is poured", expand_by_default=False):
             self._candidates = CandidateEffects(server)
-        acts = {
-            START: self._start,
-            PAUSE: diagnosis.pause,
-            CONTINUE: diagnosis.go_on,
-            CANCEL: diagnosis.cancel,
-            RESUME: self._resume,
-            QUEUE: self._queue,
-            CLEAR: diagnosis.clear_queue,
-        }
+        acts = orders(diagnosis, self._start, self._resume, self._queue)
         self._view = ProcessView(server, "Diagnosis", acts, post)
         with gui.add_folder("Other results", expand_by_default=False):
             self._chooser = ResultChooser(server, "Result", PRESENT, RESULT, post, self._follow)
@@ -131,9 +112,7 @@ class DiagnosisPanel(Panel):
 
     def _follow(self) -> None:
         """Show the chosen result where it is another one than before."""
-        folder = self._chooser.folder
-        if folder is None:
-            folder = self._diagnosis.out or next(iter(self._diagnosis.finished()), None)
+        folder = self._chooser.folder or self._present()
         content = self._file.read(folder)
         shown = (folder, self._file.version)
         if shown == self._shown:
@@ -169,6 +148,10 @@ class DiagnosisPanel(Panel):
 
         self._page.background.start("reading the measured data", lambda: answer_piles(result), begin)
 
+    def _present(self) -> Path | None:
+        """Folder of the diagnosis that was started last, or before any the newest finished one."""
+        return self._diagnosis.out or next(iter(self._diagnosis.finished()), None)
+
     def _found(self) -> DiagnosisResult:
         if self._result is None:
             raise CommandError("there is no finished diagnosis yet: start one, or choose one under Other results")
@@ -180,7 +163,7 @@ class DiagnosisPanel(Panel):
         status = self._diagnosis.status() if chosen is None else None
         self._board.show(
             self._shown,
-            chosen or self._diagnosis.out or next(iter(self._diagnosis.finished()), None),
+            chosen or self._present(),
             status,
             # While it works, what it has found before is no answer to what was asked now.
             lambda status, report: diagnosis_board(None if status and status.alive else result, status, report),

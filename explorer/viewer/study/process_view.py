@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from typing import Protocol
 
 import viser
 
@@ -30,6 +31,35 @@ STATE_WORDS = {
 
 FAILURES_SHOWN = 6
 DONE, AT_WORK, TO_COME = "done", "▶", "–"
+
+
+class Orderly(Protocol):
+    """A command in the background that obeys."""
+
+    def pause(self) -> None:
+        """Let it stand still."""
+
+    def go_on(self) -> None:
+        """Let it go on."""
+
+    def cancel(self) -> None:
+        """Stop it."""
+
+    def clear_queue(self) -> None:
+        """Forget the orders that wait."""
+
+
+def orders(process: Orderly, start: Action, resume: Action, queue: Action) -> dict[str, Action]:
+    """What the buttons of ``process`` do; ``start``, ``resume`` and ``queue`` read what was chosen in the panel."""
+    return {
+        START: start,
+        PAUSE: process.pause,
+        CONTINUE: process.go_on,
+        CANCEL: process.cancel,
+        RESUME: resume,
+        QUEUE: queue,
+        CLEAR: process.clear_queue,
+    }
 
 
 class ProcessView:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 from pathlib import Path
 
-from explorer.viewer.board.board_view import HEIGHT, REPORT
+from explorer.viewer.board.board_view import HEIGHT, REPORT, published_report
 from explorer.viewer.panel import REPORTS, SELDOM, Now, PageContext, Panel
 from explorer.viewer.study.result_chooser import title
 
@@ -51,7 +51,7 @@ class ReportsPanel(Panel):
         if folder is None:
             self._frame.content = ""
             return
-        address = self._page.pages.publish_folder(folder) + REPORT
+        address = published_report(self._page.pages, folder)
         self._frame.content = (
             f'<p style="padding:0 0.75em; font-size:13px"><a href="{address}" target="_blank" rel="noopener">'
             f'Open {escape(title(folder))} in a tab of its own</a></p><iframe title="Report" src="{address}" '

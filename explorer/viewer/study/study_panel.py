@@ -21,16 +21,10 @@ from explorer.viewer.study.comparison_panel import ComparisonPanel
 from explorer.viewer.study.order_panel import OrderPanel
 from explorer.viewer.study.plot_view import PlotView
 from explorer.viewer.study.process_view import (
-    CANCEL,
-    CLEAR,
-    CONTINUE,
-    PAUSE,
-    QUEUE,
-    RESUME,
     RETRY,
-    START,
     ProcessView,
     escaped,
+    orders,
     state_markdown,
     waiting_markdown,
 )
@@ -63,16 +57,7 @@ class StudyPanel(Panel):
         )
         with gui.add_folder("Ranges and target of the next study", expand_by_default=False):
             self._order = OrderPanel(server, study.study_file, loaded, post)
-        acts = {
-            START: self._start,
-            PAUSE: study.pause,
-            CONTINUE: study.go_on,
-            CANCEL: study.cancel,
-            RESUME: study.resume,
-            RETRY: study.retry,
-            QUEUE: self._queue,
-            CLEAR: study.clear_queue,
-        }
+        acts = orders(study, self._start, study.resume, self._queue) | {RETRY: study.retry}
         self._view = ProcessView(server, "Study", acts, post)
         with gui.add_folder("Other results", expand_by_default=False):
             self._chooser = ResultChooser(server, "Result", PRESENT, RESULT, post, self._follow)

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from explorer.live.messages import SessionState, Status
-from explorer.logs.pour_log import RunningViewer
+from explorer.logs.recording import RunningViewer
 from explorer.logs.recording_reader import read_recording
-from explorer.logs.session_recorder import SessionStream
+from explorer.logs.session_recorder import SessionRecorder
 from explorer.scene.source import material_source
 from explorer.viewer.guarded_server import free_port
 from tests.explorer.viewer.page_session import frame_of
@@ -36,7 +36,7 @@ def viewer(tmp_path):
 
 def test_bodies_and_changes_arrive_at_the_viewer(viewer):
     url, path, process = viewer
-    stream = SessionStream(RunningViewer(url))
+    stream = SessionRecorder(RunningViewer(url))
     status = Status(SessionState.RUNNING, "", SCENE, seed=1, generation=1, speed=1.0)
     places = np.array([[0.0, 0.0, 0.01], [0.0, 0.02, 0.01]])
     for k in range(3):

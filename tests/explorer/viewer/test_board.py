@@ -13,6 +13,7 @@ from explorer.viewer.board.board import Board, board_json
 from explorer.viewer.board.diagnosis_board import diagnosis_board
 from explorer.viewer.board.folder_board import FolderBoard
 from explorer.viewer.board.study_board import study_board
+from explorer.viewer.shell.web_pages import WebPages
 from tests.explorer import diagnosed, reported_studies
 
 
@@ -36,7 +37,7 @@ def test_every_kind_of_diagnosis_says_what_is_missing_and_shows_the_piles(case):
     result = diagnosed.typed(diagnosed.result_of_case(case))
     shown = json.loads(board_json(diagnosis_board(result, None)))
     assert shown["banner"]["headline"].startswith(tuple(Word))
-    assert shown["lead"]
+    assert shown["banner"]["why"]
     titles = [chart["title"] for chart in shown["charts"]]
     assert len([one for one in titles if one.startswith("Pile")]) == len(result.piles)
     assert len([one for one in titles if one.startswith("Where the pile is off")]) == len(result.maps)
@@ -52,17 +53,25 @@ def test_without_a_result_a_board_says_where_the_command_is():
 
 
 def test_a_folder_is_a_board_that_follows_its_files(tmp_path):
+    pages = WebPages("test")
     with pytest.raises(CommandError, match=r"holds no result\.json, partial\.json or diagnosis\.json"):
-        FolderBoard(tmp_path)
+        FolderBoard(tmp_path, pages)
     result = reported_studies.result_of_case("planted")
     partial = {key: result[key] for key in ("schema", "study", "pilot")} | {"partial": "pilot", "line": "so far"}
     (tmp_path / "partial.json").write_text(json.dumps(partial), encoding="utf-8")
-    folder = FolderBoard(tmp_path)
-    first = folder.version()
-    assert folder.board().banner is None
+    folder = FolderBoard(tmp_path, pages)
+    first = pages.page(folder.address)
+    assert json.loads(first.body)["banner"] is None
+    folder.follow()
+    assert pages.page(folder.address) is first
     (tmp_path / "result.json").write_text(json.dumps(result), encoding="utf-8")
-    assert folder.version() != first
-    assert folder.board().banner is not None
+    folder.follow()
+    shown = json.loads(pages.page(folder.address).body)
+    assert shown["banner"] is not None
+    assert shown["report"] == ""
+    (tmp_path / "report.html").write_text("written last", encoding="utf-8")
+    folder.follow()
+    assert pages.page(json.loads(pages.page(folder.address).body)["report"]).body == b"written last"
     (tmp_path / "result.json").write_text('{"runs": 1}', encoding="utf-8")
     with pytest.raises(CommandError, match=str(tmp_path)):
-        folder.board()
+        folder.follow()
