@@ -39,7 +39,7 @@ from explorer.live.messages import (
 )
 from explorer.live.throttle import Throttle
 from explorer.outcomes import outcome_text
-from explorer.scene.source import changes
+from explorer.scene.source import change_lines, differences
 from solver.effects.columns import kernel_effects
 from solver.engine.world import Batch
 from solver.params import ParameterError
@@ -217,7 +217,7 @@ class LivePour:
         while (left := self._whole_steps(until)) > 0 and (steps := self._pour.steps_due(left)) > 0:
             launch(self._pour, steps)
         self._keep()
-        for line in changes(before, self._scene):
+        for line in change_lines(differences(before, self._scene)):
             self._event(line)
         self._publish()
 
@@ -227,7 +227,7 @@ class LivePour:
         except ParameterError as error:
             self._event(f"refused: {error}")
             return
-        for line in changes(self._scene, changed):
+        for line in change_lines(differences(self._scene, changed)):
             self._report(Event(self._generation, self._pour.time, line, is_change=True))
         if changed == self._scene:
             return

@@ -14,7 +14,7 @@ from explorer.logs.blueprint import motion_curves
 from explorer.logs.pour_log import PourLog
 from explorer.logs.recording import FRAME_INTERVAL, RecordedPour, RunningViewer
 from explorer.outcomes import outcome_text
-from explorer.scene.source import changes
+from explorer.scene.source import differences
 from solver.scenes.scene import Scene
 
 
@@ -124,4 +124,4 @@ def news(before: Status, now: Status) -> Iterator[str]:
     if now.phase != before.phase:
         yield f"phase: {now.phase}"
     if now.scene != before.scene:
-        yield from changes(before.scene, now.scene)
+        yield from map(str, differences(before.scene, now.scene))

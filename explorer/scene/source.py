@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -132,11 +132,15 @@ class Difference:
     """Whether a running pour takes a new value at once."""
 
     def __str__(self) -> str:
-        """``path: before → now`` with the units of the screen."""
+        return f"{self.path}: {self.change}"
+
+    @property
+    def change(self) -> str:
+        """``before → now`` with the units of the screen, in full where they are alike to its digits."""
         before, now = shown(self.before, self.unit), shown(self.now, self.unit)
-        if before == now:  # alike to the digits of the screen
+        if before == now:
             before, now = str(self.before), f"{self.now} {'' if self.unit == '1' else self.unit}".strip()
-        return f"{self.path}: {before} → {now}"
+        return f"{before} → {now}"
 
 
 def differences(before: Scene, now: Scene) -> Iterator[Difference]:
@@ -148,9 +152,26 @@ def differences(before: Scene, now: Scene) -> Iterator[Difference]:
             yield Difference(path, old[path], new, declared[path].unit, declared[path].live)
 
 
-def changes(before: Scene, now: Scene) -> Iterator[str]:
-    """Parameters that differ between two scenes of the same materials and bodies, with both values and their unit."""
-    return map(str, differences(before, now))
+def change_lines(found: Iterable[Difference]) -> list[str]:
+    """A line per quantity, such as "friction seed–seed 0.57 → 0.4" and "restitution of 9 0.4 … 0.67 → 0.2 … 0.3"."""
+    by_name: dict[str, list[Difference]] = {}
+    for one in found:
+        by_name.setdefault(one.path.rpartition(".")[2], []).append(one)
+    lines = []
+    for name, mine in by_name.items():
+        words = name.replace("_", " ")
+        if len(mine) == 1:
+            lines.append(f"{' '.join([words, '–'.join(mine[0].path.split('.')[1:-1])]).strip()} {mine[0].change}")
+        else:
+            before, now = span(mine, [one.before for one in mine]), span(mine, [one.now for one in mine])
+            lines.append(f"{words} of {len(mine)} {before} → {now}")
+    return lines
+
+
+def span(found: Sequence[Difference], values: Sequence[float | str]) -> str:
+    """``values`` of one parameter of many things: one of them, or the smallest and the largest, with their unit."""
+    numbers: list[float | str] = [*sorted(one for one in values if not isinstance(one, str))] or list(values)
+    return " … ".join(dict.fromkeys(shown(one, found[0].unit) for one in (numbers[0], numbers[-1])))
 
 
 def shown(number: float | str, unit: str) -> str:

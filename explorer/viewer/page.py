@@ -1,14 +1,14 @@
 """The page: one loop that takes actions, asks the session, and shows the panels what there is. They do the rest.
 
 Several browsers share one pour. viser tells a callback who moved a control, but a change comes back from the solver's
-process later; so every message of a browser is noted as it arrives, and a change is signed by the browser that sent one
-last. What people asked for beside parameters (another pour, a study, a diagnosis) becomes an event that every browser
-sees. The handlers are private names of viser, which is why it is pinned and a test watches them.
+process later, and on a busy machine much later; so every message of a browser is noted as it arrives, and a change is
+signed by the browser that sent one last. What people asked for beside parameters (another pour, a study, a diagnosis)
+becomes an event that every browser sees. The handlers are private names of viser, which is why it is pinned and a test
+watches them.
 """
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 from collections import deque
@@ -38,8 +38,6 @@ from explorer.viewer.shell.channel import ShellChannel
 from explorer.viewer.shell.web_pages import WebPages
 from explorer.viewer.view import DARK, apply_theme, light
 
-ACTED_WITHIN = 2.0
-"""A change that comes back within this time [s] of a browser's message is taken for that browser's."""
 ACTS = (_messages.GuiUpdateMessage, _messages.CommandTriggerMessage)
 """Messages by which a person acts."""
 ASKED_FOR = ("running", "paused", "cancelled")
@@ -68,6 +66,7 @@ class Page:
         self._server, self._session, self._recorders = server, session, tuple(recorders)
         self._events: deque[Event] = deque(maxlen=EVENTS_REMEMBERED)
         self._actions, self._people = Actions(), People(server)
+        channel.on_command(self._people.acted_in_the_frame)
         self._orders = OrderEvents({"diagnosis": diagnosis, "study": study})
         begun = session.status()
         self._notice, self._time = "", begun.time
@@ -180,7 +179,7 @@ class People:
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
-        self._last, self._at = 0, -math.inf
+        self._last: int | None = None
         for kind in ACTS:
             server._websock_server.register_handler(kind, self._acted)
 
@@ -200,12 +199,16 @@ class People:
 
     def signed(self, event: Event) -> Event:
         """``event``, a change or an order with the browser behind its text where there are several."""
-        if not (event.is_change or event.is_order) or self.present < 2 or time.monotonic() > self._at + ACTED_WITHIN:
+        if not (event.is_change or event.is_order) or self.present < 2 or self._last is None:
             return event
         return replace(event, text=f"{event.text} · browser {self._last}")
 
+    def acted_in_the_frame(self) -> None:
+        """A command came from the state line or the timeline, whose channel does not know viser's browsers."""
+        self._last = None
+
     def _acted(self, client_id: int, message: Any) -> None:
-        self._last, self._at = browser_number(client_id), time.monotonic()
+        self._last = browser_number(client_id)
 
 
 def browser_number(client_id: int) -> int:

@@ -13,7 +13,7 @@ import trimesh
 
 from explorer.logs.recording_reader import read_recording
 from tests.browser import test_page as shared
-from tests.browser.test_page import SMALL_POUR, positions, room, simulated_time, slider, state, wait_for
+from tests.browser.test_page import SMALL_POUR, positions, room, simulated_time, slider, state, to_its_end, wait_for
 
 pytestmark = pytest.mark.browser
 
@@ -57,11 +57,8 @@ def test_a_slider_moved_by_key_is_undone_and_made_again(page):
     page.get_by_text(DECLARED).wait_for()
     time.sleep(1.0)
     resting = positions(page)
-    thumb = slider(page, "Static friction")
-    thumb.scroll_into_view_if_needed()
-    thumb.focus()
-    page.keyboard.press("Home")
-    page.get_by_text(NONE).wait_for()
+    slider(page, "Static friction").scroll_into_view_if_needed()
+    to_its_end(page, "Static friction", "Home", NONE)
     # Nothing holds the pile any more: the bodies slide by more than half a seed's thickness.
     wait_for(lambda: np.median(np.linalg.norm(positions(page) - resting, axis=1)) > 3e-3)
     press(page, "z")

@@ -15,12 +15,11 @@ from html import escape
 from doe.population import Comparison, Population, compared
 from explorer.background.command_process import CommandStatus
 from explorer.population.process import PopulationProcess
-from explorer.scene.source import differences
+from explorer.scene.source import change_lines, differences
 from explorer.viewer.actions import BackgroundWork
 from explorer.viewer.palette import FLANK, css
 from explorer.viewer.panel import CONTROLS, SELDOM, Now, PageContext, Panel
 from explorer.viewer.pour.readout import AngleDoubt, angle_of_repose_deg
-from explorer.viewer.pour.standing_panel import changes_in_words
 from explorer.viewer.study.process_view import time_left
 from solver import Scene
 
@@ -140,7 +139,7 @@ def told_difference(former: Scene, scene: Scene) -> str:
     """What was changed, in words; empty where nothing was that can be compared."""
     if former.rig.name != scene.rig.name:
         return ""
-    return changes_in_words(list(differences(former, scene)))
+    return "; ".join(change_lines(differences(former, scene)))
 
 
 def population_html(

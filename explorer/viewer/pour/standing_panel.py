@@ -6,7 +6,6 @@ Friction, restitution and stiffness act on what moves. The former pile then stay
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
@@ -16,7 +15,7 @@ import numpy.typing as npt
 from explorer.live.frames import Frame
 from explorer.live.messages import SessionState, Status
 from explorer.scene.meshes import body_triangles
-from explorer.scene.source import Difference, differences, shown
+from explorer.scene.source import change_lines, differences
 from explorer.viewer.palette import Colour
 from explorer.viewer.panel import CONTROLS, Now, PageContext, Panel
 from explorer.viewer.pour.readout import angle_of_repose_deg
@@ -147,7 +146,7 @@ def standing_text(before: Scene, now: Scene, moved: npt.NDArray[np.float32]) -> 
     found = list(differences(before, now))
     loose, furthest = int((moved > STOOD).sum()), millimetres(float(moved.max()))
     many = f"{loose} of {len(moved)} bodies by more than {1e3 * STOOD:g} mm, up to {furthest}"
-    names = escape(changes_in_words(found))
+    names = escape("; ".join(change_lines(found)))
     if loose > FEW * len(moved):
         return f"{names}: the pile moved, {many}. It was not poured with these values."
     acts = dict.fromkeys(WHEN.get(one.path.rpartition(".")[2], OTHERWISE) for one in found)
@@ -160,26 +159,9 @@ def millimetres(length: float) -> str:
     return f"{1e3 * length:.1f} mm" if length >= 1e-4 else f"{1e3 * length:.1g} mm"
 
 
-def changes_in_words(found: Sequence[Difference]) -> str:
-    """E.g. "static friction seed–seed 0.57 → 0.4; restitution of 9 0.4 … 0.67 → 0.2 … 0.33"."""
-    words = []
-    for name in dict.fromkeys(one.path.rpartition(".")[2] for one in found):
-        mine = [one for one in found if one.path.rpartition(".")[2] == name]
-        of_what = "–".join(mine[0].path.split(".")[1:-1]) if len(mine) == 1 else f"of {len(mine)}"
-        before, now = (span(mine, values) for values in ([one.before for one in mine], [one.now for one in mine]))
-        words.append(" ".join(part for part in (name.replace("_", " "), of_what, f"{before} → {now}") if part))
-    return "; ".join(words)
-
-
-def span(found: Sequence[Difference], values: Sequence[float | str]) -> str:
-    """``values`` of one parameter of many things: one of them, or the smallest and the largest, with their unit."""
-    numbers: list[float | str] = [*sorted(one for one in values if not isinstance(one, str))] or list(values)
-    return " … ".join(dict.fromkeys(shown(one, found[0].unit) for one in (numbers[0], numbers[-1])))
-
-
 def ghost_text(former: Rest, status: Status) -> str:
     """What the ghost is, in HTML."""
     angle = f"{former.angle:.1f}°" if math.isfinite(former.angle) else "no angle"
-    found = list(differences(former.scene, status.scene))
-    since = f"; since then {escape(changes_in_words(found))}" if found else ""
+    found = "; ".join(change_lines(differences(former.scene, status.scene)))
+    since = f"; since then {escape(found)}" if found else ""
     return f"Grey: the former pile, {angle} in one pour{since}."

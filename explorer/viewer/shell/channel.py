@@ -31,11 +31,16 @@ class ShellChannel:
         self._lock = threading.Lock()
         self._told: dict[str, str] = {}
         self._acts: dict[str, Callable[[Command], None]] = {}
+        self._noted: Callable[[], None] = lambda: None
         self._waiting: dict[ServerConnection, tuple[asyncio.AbstractEventLoop, asyncio.Event]] = {}
 
     def offer(self, name: str, act: Callable[[Command], None]) -> None:
         """Call ``act`` with every command ``name``, in the server's thread: it should only leave an action."""
         self._acts[name] = act
+
+    def on_command(self, note: Callable[[], None]) -> None:
+        """Call ``note`` before every command, in the server's thread."""
+        self._noted = note
 
     def tell(self, key: str, value: Any) -> None:
         """Show ``value`` (JSON) under ``key`` in every browser; what is shown already is left alone. Any thread."""
@@ -65,6 +70,7 @@ class ShellChannel:
             return
         act = self._acts.get(str(command.get("do"))) if isinstance(command, dict) else None
         if act is not None:
+            self._noted()
             act(command)
 
     async def handle(self, connection: ServerConnection) -> None:

@@ -165,7 +165,9 @@ def test_going_back_past_a_change_of_parameters_undoes_it_and_says_so(live):
     status = live.pour.status()
     assert value(status.scene, FRICTION) == 0.3
     assert status.energy_put_in is None
-    assert [report.text for report in live.reports if isinstance(report, Event)] == [f"{FRICTION}: 0.05 → 0.3"]
+    assert [report.text for report in live.reports if isinstance(report, Event)] == [
+        "static friction bead–steel 0.05 → 0.3"
+    ]
     assert isinstance(live.reports[-1], Status)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, SessionState, Status
 from explorer.project.project import study_project
-from explorer.scene.source import SceneSource, changes
+from explorer.scene.source import SceneSource, change_lines, differences
 from explorer.study.process import CalibrationProcess
 from explorer.viewer.actions import Actions, BackgroundWork
 from explorer.viewer.page import Page
@@ -45,7 +45,8 @@ class PageSession:
         self.asked.append("set_parameters")
         changed = with_values(self.now.scene, dict(values))
         self.events += [
-            Event(self.now.generation, self.now.time, line, True) for line in changes(self.now.scene, changed)
+            Event(self.now.generation, self.now.time, line, True)
+            for line in change_lines(differences(self.now.scene, changed))
         ]
         self.now = replace(self.now, scene=changed)
 

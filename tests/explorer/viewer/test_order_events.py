@@ -60,3 +60,11 @@ def test_an_order_is_signed_and_what_happens_by_itself_is_not():
     assert people(2).signed(order).text == "poured anew · browser 2"
     assert people(2).signed(ending) == ending
     assert people(1).signed(order) == order
+
+
+def test_a_change_that_comes_back_late_is_its_browser_s_and_one_from_the_timeline_nobody_s():
+    change = Event(1, 0.2, "static friction 0.5 → 0.6", is_change=True)
+    made = people(2)
+    assert made.signed(change).text.endswith(" · browser 2")
+    made.acted_in_the_frame()
+    assert made.signed(change) == change

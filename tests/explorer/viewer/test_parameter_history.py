@@ -3,7 +3,7 @@
 import pytest
 
 from explorer.errors import CommandError
-from explorer.scene.source import changes, differences
+from explorer.scene.source import change_lines, differences
 from explorer.viewer.pour.changes_panel import MERGED, ParameterHistory, live_values
 from solver import load_material, parameters, value, with_values
 from solver.scenes.scene import values
@@ -91,4 +91,4 @@ def test_differences_tell_old_and_new_with_units_and_what_acts_now():
     assert [str(one) for one in found] == [f"{A}: 0.57 → 0.1", "rig.mass: 30 g → 12 g"]
     assert [one.live for one in found] == [True, False]
     # A change that the four digits of the screen do not show is told in full.
-    assert list(changes(SCENE, put(SCENE, a=0.5700001))) == [f"{A}: 0.57 → 0.5700001"]
+    assert change_lines(differences(SCENE, put(SCENE, a=0.5700001))) == ["static friction seed–seed 0.57 → 0.5700001"]

@@ -104,7 +104,7 @@ def test_it_stays_as_it_was_while_the_first_is_changed_and_the_difference_is_tol
     rougher = with_values(SCENE, {"pair.seed.seed.static_friction": 0.9})
     bench.first.now = replace(bench.first.now, scene=rougher)
     bench.panel.show(Now(bench.first.now))
-    assert "pair.seed.seed.static_friction: 0.57 → 0.9" in bench.panel._text.content
+    assert "static friction seed–seed 0.57 → 0.9" in bench.panel._text.content
     assert bench.second.now.scene == SCENE
 
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from explorer.live.messages import SessionState
-from explorer.scene.source import differences, material_source
+from explorer.scene.source import change_lines, differences, material_source
 from explorer.viewer.panel import Now
-from explorer.viewer.pour.standing_panel import ROOT, WATCHED, StandingPanel, changes_in_words, shifts, standing_text
+from explorer.viewer.pour.standing_panel import ROOT, WATCHED, StandingPanel, shifts, standing_text
 from solver import Outcome, with_values
 from solver.observables import Value
 from tests.explorer.viewer.page_session import PageSession, frame_of, page_context
@@ -132,4 +132,4 @@ def test_many_changes_of_one_parameter_are_told_as_their_span():
     smooth = {f"pair.{pair.a}.{pair.b}.static_friction": 0.2 for pair in SOURCE.scene.pairs}
     found = list(differences(SOURCE.scene, with_values(SOURCE.scene, {**smooth, "rig.mass": "20g"})))
     # Table 3 of the article: static friction between 0.54 and 0.83.
-    assert changes_in_words(found) == "static friction of 9 0.54 … 0.83 → 0.2; mass 30 g → 20 g"
+    assert change_lines(found) == ["static friction of 9 0.54 … 0.83 → 0.2", "mass 30 g → 20 g"]
