@@ -3,15 +3,10 @@
 viser calls back on many threads. A callback only leaves an action here; the one thread that owns session and page
 carries it out, and shows the one line of whatever was refused, by us or by the machine. What the program itself sets
 is no click. Work that takes seconds (reading scans, fitting spheres) is done off the loop, one thing at a time.
-
-Arrow keys that a slider takes for itself reach the page as a command as well: viser keeps a command's key from acting
-in a text field, but a slider's thumb is none. A browser tells a slider's new value up to a tenth of a second after the
-key, so a command waits for that before it is carried out, or dropped.
 """
 
 from __future__ import annotations
 
-import math
 import queue
 import threading
 import time
@@ -20,7 +15,6 @@ from functools import partial
 from typing import Any, TypeVar
 
 import viser
-from viser import _messages
 
 from explorer.errors import CommandError
 
@@ -29,13 +23,6 @@ Post = Callable[[Action], None]
 ClientAction = Callable[[Any], None]
 """Something that is done to one browser."""
 Found = TypeVar("Found")
-
-ARROW_WAIT, AT_A_SLIDER_WAIT = 0.2, 0.6
-"""How long an arrow key waits [s], and how near to it in time a slider's new value is the slider's own answer: usually,
-and where a slider was moved not long before, whose thumb then probably still has the keys. A browser that draws without
-a graphics card may take half a second to tell its value."""
-AT_A_SLIDER = 60.0
-"""Time [s] that counts as not long before."""
 
 
 class Actions:
@@ -123,36 +110,6 @@ def _posting(action: Action, post: Post) -> Any:
         post(action)
 
     return pressed
-
-
-class SliderHands:
-    """Notes when a browser last moved a slider of ``server``."""
-
-    def __init__(self, server: viser.ViserServer) -> None:
-        self._moved = -math.inf
-        server._websock_server.register_handler(_messages.GuiUpdateMessage, self._note)
-
-    def unless_on_a_slider(self, post: Post) -> Post:
-        """``post`` for arrow keys: a moment later, or not at all if a slider was moved about then."""
-
-        def later(action: Action) -> None:
-            pressed = time.monotonic()
-            wait = AT_A_SLIDER_WAIT if pressed - self._moved < AT_A_SLIDER else ARROW_WAIT
-
-            def decide() -> None:
-                if not -ARROW_WAIT <= self._moved - pressed <= wait:
-                    post(action)
-
-            timer = threading.Timer(wait, decide)
-            timer.daemon = True
-            timer.start()
-
-        return later
-
-    def _note(self, client_id: int, message: Any) -> None:
-        value = message.updates.get("value")
-        if isinstance(value, int | float) and not isinstance(value, bool):
-            self._moved = time.monotonic()
 
 
 def on_upload(button: viser.GuiUploadButtonHandle, take: Callable[[str, bytes], None], post: Post) -> None:

@@ -43,6 +43,8 @@ BEGUN = "try { localStorage.setItem('explorer-begun', 'yes') } catch { /* an emp
 POSITIONS = """() => Object.entries(window.__viserSceneTree.getState())
     .filter(([name, node]) => /^.bodies.\\d+$/.test(name) && node?.message?.props?.batched_positions)
     .sort().flatMap(([name, node]) => Array.from(node.message.props.batched_positions))"""
+MIDDLE = {"x": 400, "y": 400, "width": 240, "height": 240}
+"""Of the scene [px]."""
 PATIENCE = 120_000
 """Milliseconds: software rendering, a solver that compiles its kernels and other work share two cores."""
 
@@ -188,14 +190,16 @@ def test_an_arrow_on_a_slider_moves_the_slider_only(page):
     page.keyboard.press("Space")
     wait_for(lambda: state(page) == "paused")
     time.sleep(1.0)
-    paused_at = simulated_time(page)
+    paused_at, seen = simulated_time(page), page.screenshot(clip=MIDDLE)
     slider(page, "Static friction").focus()
     page.keyboard.press("ArrowRight")
     page.get_by_text(re.compile(r"In the solver: Static friction 0\.0\d")).wait_for()
-    page.keyboard.press("ArrowLeft")
+    page.keyboard.press("ArrowRight", delay=500)  # held down it would turn the camera
+    page.keyboard.press("Home")
     page.get_by_text(re.compile(r"In the solver: Static friction 0\s")).wait_for()
     time.sleep(1.0)
     assert (state(page), simulated_time(page)) == ("paused", paused_at)
+    assert page.screenshot(clip=MIDDLE) == seen
     page.evaluate("document.activeElement?.blur()")
     page.keyboard.press("Space")
     wait_for(lambda: state(page) == "running")

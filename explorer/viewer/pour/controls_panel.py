@@ -11,10 +11,9 @@ from collections.abc import Mapping
 from explorer.live.messages import Status
 from explorer.viewer.actions import button_group
 from explorer.viewer.panel import CONTROLS, PageContext
-from explorer.viewer.pour.live_panel import LiveControl, agree, control_for, screen_range, titled
+from explorer.viewer.pour.live_panel import LiveControl, control_for, screen_range, titled
 from explorer.viewer.pour.rebuilt_panel import RebuiltPanel
 from explorer.viewer.pour.restart_panel import LARGEST_SEED, entered, on_screen, same_value
-from explorer.viewer.view import small_html
 from solver.scenes.material import Pair
 from solver.scenes.scene import Scene, parameters, value, with_values
 
@@ -41,7 +40,6 @@ class Controls:
         self._generation = session.status().generation
         known = parameters(scene)
         self._place = gui.add_folder(None)
-        self._mixed = gui.add_html(small_html("×: the values are mixed; the slider scales all of them."), visible=False)
         self._live: list[LiveControl] = []
         self._build(scene)
         self._feed = None
@@ -92,7 +90,6 @@ class Controls:
                 )
                 for label, paths in quantities(scene).items()
             ]
-        self._mixed.visible = not all(agree(scene, paths) for paths in quantities(scene).values())
 
     def _keep(self) -> None:
         status = self._session.status()

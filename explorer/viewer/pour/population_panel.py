@@ -32,8 +32,10 @@ AGAIN = 4.0
 """Least wall time [s] between two looks at the same parameters, while pours are added to the store."""
 TRUSTED = 10
 """From so many values on the standard deviation is told without its own uncertainty."""
-WIDTH, HEIGHT, MARGIN, BASE = 300.0, 74.0, 14.0, 46.0
+WIDTH, HEIGHT, MARGIN, BASE = 300.0, 54.0, 14.0, 27.0
 """Of the strip; ``BASE``: height of its axis."""
+BOX_HEIGHT = "7.2em"
+"""Always the same: what stands below must not move under a person's hand."""
 DOT = 3.2
 """Radius of a dot."""
 HINT = (
@@ -150,11 +152,11 @@ def population_html(
     if population is None:
         lines.insert(0, "Looking for other pours with these parameters …")
         return _block("", lines)
-    lines = [_few(population), _of_this_pour(population, pour), _compared_line(population, changed, comparison), *lines]
+    lines = [_compared_line(population, changed, comparison), _of_this_pour(population, pour), *lines]
     sample = population.sample
-    head = "" if population.n < 2 else f"<b>{sample.mean:.1f} ± {sample.sd:.1f}°</b> over {population.n} seeds"
+    head = "" if population.n < 2 else f"<b>{sample.mean:.1f} ± {sample.sd:.1f}°</b> over {population.n} seeds; "
     drawn = strip_svg(population, pour) if population.n else ""
-    return _block(f"{head}{drawn}", lines)
+    return _block(f"<div>{head}{_few(population)}</div>{drawn}", lines)
 
 
 def strip_svg(population: Population, pour: ThisPour) -> str:
@@ -238,7 +240,7 @@ def _compared_line(population: Population, changed: str, found: Comparison | Non
     if not changed:
         return ""
     if found is None:
-        return f"{escape(changed)}: no two stored pours of the former parameters, so nothing tells chance from effect."
+        return f"{escape(changed)}: under two stored pours of the former parameters, nothing to compare with."
     pours = "one pour" if population.n < 2 else f"{found.pours} pours"
     sides = f"{found.difference:+.1f} ± {found.half_width:.1f}° (95 %)"
     verdict = "distinguishable" if found.distinguishable else "not distinguishable"
@@ -257,5 +259,5 @@ def _block(head: str, lines: Sequence[str]) -> str:
     said = "".join(f"<div style='opacity:0.8'>{line}</div>" for line in lines if line)
     return (
         "<div class='population' style='padding:0 0.9em 0.2em 0.75em; font-size:0.82em; line-height:1.4; "
-        f"font-variant-numeric:tabular-nums'>{head}{said}</div>"
+        f"height:{BOX_HEIGHT}; overflow-y:auto; font-variant-numeric:tabular-nums'>{head}{said}</div>"
     )

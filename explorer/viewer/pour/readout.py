@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from html import escape
-from itertools import groupby
 
 from explorer.live.angle_reader import LEAST_SHARE_BELOW
 from explorer.live.messages import Event, SessionState, Status
@@ -17,7 +16,6 @@ from explorer.viewer.panel import CONTROLS, Now, PageContext, Panel
 from solver.pours.record import Outcome, Phase
 from solver.scenes.scene import Scene
 
-EVENTS_SHOWN = 1
 FORMED_FOR = 0.5
 """Simulated time [s] over which readings have to agree within their spread before an angle counts as that of a pile."""
 READINGS_KEPT = 200
@@ -48,12 +46,10 @@ STYLE = """<style>
 .pour .trouble {background: rgba(213,94,0,0.55);}
 .pour .big {font-size: 2.4em; font-weight: 600; line-height: 1.2; font-variant-numeric: tabular-nums;}
 .pour .doubt {font-size: 1.2em; line-height: 2.4em; opacity: 0.65; font-variant-numeric: tabular-nums;}
-.pour .dim {opacity: 0.65;}
+.pour .dim {opacity: 0.65; height: 2.9em; overflow: hidden;}
 .pour .top {display: flex; justify-content: space-between; align-items: center;}
 .pour .dot {display: inline-block; width: 0.7em; height: 0.7em; border-radius: 50%;
   margin: 0 0.3em 0 0.8em;}
-.pour .note {margin-top: 0.4em; padding: 0.25em 0.5em; border-radius: 0.3em;
-  background: rgba(128,150,170,0.14); overflow-wrap: anywhere;}
 </style>"""
 
 
@@ -67,9 +63,9 @@ class Readout(Panel):
         self._angle = AngleDoubt()
 
     def show(self, now: Now) -> None:
-        """Tell what the pour is doing, and what was refused last."""
+        """Tell what the pour is doing."""
         by_component, doubt = self._look.look.colour_by == COMPONENT, self._angle.doubt(now.status)
-        html = readout_html(now.status, now.events, now.notice, by_component, doubt)
+        html = readout_html(now.status, by_component, doubt)
         if self._html.content != html:
             self._html.content = html
 
@@ -106,18 +102,15 @@ class AngleDoubt:
         return "" if status.phase in (Phase.PILE, Phase.RUN) and long_enough and agree else FORMING
 
 
-def readout_html(
-    status: Status, events: Sequence[Event], notice: str, by_component: bool = True, doubt: str = ""
-) -> str:
-    """The readout; ``notice`` is the page's own last message (a refused input, for instance).
+def readout_html(status: Status, by_component: bool = True, doubt: str = "") -> str:
+    """The readout. Its height is always the same: what stands below must not move under a person's hand.
 
     ``by_component``: whether a body's colour says what it is; a legend of components would be wrong otherwise.
     ``doubt``: of :class:`AngleDoubt`; an angle in doubt is small and grey.
     """
-    lines = "".join(f"<div class='note'>{escape(text)}</div>" for text in notes(status, events, notice))
     components = legend(status.scene) if by_component else ""
     top = f"<div class='top'>{_state(status)}<span>{components}</span></div>"
-    return f"{STYLE}<div class='pour'>{top}{_angle(status, doubt)}{lines}</div>"
+    return f"{STYLE}<div class='pour'>{top}{_angle(status, doubt)}</div>"
 
 
 def condition(status: Status) -> str:
@@ -130,13 +123,6 @@ def not_later(events: Iterable[Event], status: Status) -> list[Event]:
     return [event for event in events if event.generation != status.generation or event.time <= status.time]
 
 
-def notes(status: Status, events: Sequence[Event], notice: str) -> list[str]:
-    """Lines below the readings, each once: what was refused, what the solver says, what happened last."""
-    happened = recent(events, status.generation)
-    said = "" if any(status.message in line for line in happened) else status.message
-    return [text for text in dict.fromkeys((notice, said, *happened)) if text]
-
-
 def legend(scene: Scene) -> str:
     """Coloured dots with the components' names, as HTML."""
     dots = [
@@ -144,17 +130,6 @@ def legend(scene: Scene) -> str:
         for k, body in enumerate(scene.bodies)
     ]
     return "".join(dots)
-
-
-def recent(events: Sequence[Event], generation: int) -> list[str]:
-    """The last moments at which something happened, newest first, one line for each."""
-    mine = [event for event in events if event.generation == generation]
-    moments = [list(group) for _, group in groupby(mine, key=lambda event: event.time)]
-    lines = []
-    for moment in moments[: -EVENTS_SHOWN - 1 : -1]:
-        more = f" (and {len(moment) - 1} more)" if len(moment) > 1 else ""
-        lines.append(f"{moment[-1].time:.3f} s  {moment[-1].text}{more}")
-    return lines
 
 
 def angle_of_repose_deg(status: Status) -> float:

@@ -1,11 +1,13 @@
-"""What a change does to a pile that stands: told by how far its bodies moved, with *Pour again* where it did nothing.
+"""What happened last, in a box beside the controls; after a change of a pile that stands, whether its bodies moved.
 
-Friction, restitution and stiffness act on what moves. The former pile then stays as a ghost, to compare with the new.
+Friction, restitution and stiffness act on what moves. Poured again with other parameters, the former pile stays as a
+ghost, to compare with the new.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
@@ -13,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from explorer.live.frames import Frame
-from explorer.live.messages import SessionState, Status
+from explorer.live.messages import Event, SessionState, Status
 from explorer.scene.meshes import body_triangles
 from explorer.scene.source import change_lines, differences
 from explorer.viewer.palette import Colour
@@ -30,6 +32,13 @@ WATCHED = 0.3
 GHOST: Colour = (170, 178, 186)
 GHOST_OPACITY = 0.28
 ROOT = "/ghost"
+AT_THE_END = 1e9
+"""Order among the controls of the room."""
+BOX = (
+    "height:4.5em; overflow-y:auto; margin:0.2em 0; padding:0.25em 0.5em; border-radius:0.3em; line-height:1.35; "
+    "background:rgba(128,150,170,0.14)"
+)
+"""Style: three lines high."""
 WHEN = {
     "static_friction": "friction acts when something moves",
     "restitution": "restitution acts when bodies hit each other",
@@ -53,46 +62,42 @@ class Rest:
 
 
 class StandingPanel(Panel):
-    """The line, *Pour again*, and the ghost."""
+    """The box; at the end of the room the ghost's line, and *Dismiss the ghost*."""
 
     name, tab = "standing", CONTROLS
 
     def __init__(self, page: PageContext) -> None:
         gui = page.server.gui
-        self._server, self._session = page.server, page.session
+        self._server = page.server
         self._rest: Rest | None = None
         self._frame: Frame | None = None
         self._ghost: BodyNodes | None = None
         self._former: Rest | None = None
-        self._text = gui.add_html("", visible=False)
-        self._again = gui.add_button(
-            "Pour again with this", visible=False, hint="The same seed; the pile as it is stays as a ghost."
-        )
-        self._dismiss = gui.add_button("Dismiss the ghost", visible=False)
-        self._again.on_click(lambda _: page.post(self._pour_again))
+        self._box = gui.add_html("")
+        self._about_ghost = gui.add_html("", visible=False, order=AT_THE_END)
+        self._dismiss = gui.add_button("Dismiss the ghost", visible=False, order=AT_THE_END)
         self._dismiss.on_click(lambda _: page.post(self._take_ghost_away))
 
     def show(self, now: Now) -> None:
-        """Keep the pile while it rests; after a change say whether it stood."""
+        """Keep the pile while it rests; after a change say whether it stood, otherwise what happened last."""
         status = now.status
-        self._frame = now.frame
+        if self._rest is not None and status.generation != self._rest.generation:
+            self._leave_a_ghost(self._rest, status.scene)
         if self._former is not None and another_set_up(self._former.scene, status.scene):
             self._take_ghost_away()
+        self._frame = now.frame
         self._follow(status, now.frame)
-        changed = self._rest is not None and self._rest.scene != status.scene
-        lines = []
-        if changed and self._rest is not None and now.frame is not None and watched(self._rest, status):
-            moved = shifts(self._rest.frame, now.frame)
-            lines += [standing_text(self._rest.scene, status.scene, moved)] if moved.size else []
-        if self._former is not None:
-            lines.append(ghost_text(self._former, status))
-        html = small_html("".join(f"<div>{line}</div>" for line in lines))
-        offered = bool(lines) and changed
-        for handle, seen in ((self._text, bool(lines)), (self._again, offered), (self._dismiss, bool(self._ghost))):
-            if handle.visible != seen:
-                handle.visible = seen
-        if self._text.content != html:
-            self._text.content = html
+        lines = [escape(text) for text in notes(status, now.events, now.notice)]
+        if said := self._what_the_change_did(status, now.frame):
+            # In place of the change itself, which it names.
+            lines[-1:] = [said]
+        box = box_html(lines)
+        if self._box.content != box:
+            self._box.content = box
+        ghost = small_html(ghost_text(self._former, status)) if self._former is not None else ""
+        if self._about_ghost.content != ghost:
+            self._about_ghost.content = ghost
+            self._about_ghost.visible = self._dismiss.visible = bool(ghost)
 
     def close(self) -> None:
         """Take the ghost off the page."""
@@ -107,24 +112,53 @@ class StandingPanel(Panel):
             rest = Rest(status.scene, status.generation, status.time, frame, angle_of_repose_deg(status))
         self._rest = rest
 
-    def _pour_again(self) -> None:
-        status = self._session.status()
-        if self._rest is not None:
-            frame = self._frame if self._frame is not None else self._rest.frame
-            self._take_ghost_away()
-            kinds = zip(self._rest.scene.bodies, body_counts(self._rest.scene), strict=True)
-            drawn = [DrawnComponent(body_triangles(body), GHOST, most) for body, most in kinds]
-            with self._server.atomic():
-                self._ghost = BodyNodes(self._server, drawn, ROOT)
-                self._ghost.fade(GHOST_OPACITY)
-                self._ghost.show(frame)
-            self._former = self._rest
-        self._session.restart(status.scene)
+    def _what_the_change_did(self, status: Status, frame: Frame | None) -> str:
+        rest = self._rest
+        if rest is None or frame is None or rest.scene == status.scene or not watched(rest, status):
+            return ""
+        moved = shifts(rest.frame, frame)
+        return standing_text(rest.scene, status.scene, moved) if moved.size else ""
+
+    def _leave_a_ghost(self, rest: Rest, scene: Scene) -> None:
+        """Of a pile that stood, before it is poured again with other parameters."""
+        if rest.scene == scene or another_set_up(rest.scene, scene):
+            return
+        self._take_ghost_away()
+        kinds = zip(rest.scene.bodies, body_counts(rest.scene), strict=True)
+        self._ghost = BodyNodes(
+            self._server, [DrawnComponent(body_triangles(body), GHOST, most) for body, most in kinds], ROOT
+        )
+        self._ghost.fade(GHOST_OPACITY)
+        self._ghost.show(self._frame if self._frame is not None else rest.frame)
+        self._former = rest
 
     def _take_ghost_away(self) -> None:
         if self._ghost is not None:
             self._ghost.remove()
         self._ghost = self._former = None
+
+
+def box_html(lines: Sequence[str]) -> str:
+    """``lines`` (HTML) in a box of always the same height, so that the controls below it stay where they are."""
+    said = "".join(f"<div>{line}</div>" for line in lines)
+    return small_html(f"<div class='note' style='{BOX}' role='status'>{said}</div>")
+
+
+def notes(status: Status, events: Sequence[Event], notice: str) -> list[str]:
+    """Each once: what was refused, what the solver says, what happened last."""
+    happened = recent(events, status.generation)
+    said = "" if status.message in happened else status.message
+    return [text for text in dict.fromkeys((notice, said, happened)) if text]
+
+
+def recent(events: Sequence[Event], generation: int) -> str:
+    """The last moment at which something happened, in one line; empty where nothing did."""
+    mine = [event for event in events if event.generation == generation]
+    if not mine:
+        return ""
+    last = mine[-1]
+    others = sum(event.time == last.time for event in mine) - 1
+    return f"{last.time:.3f} s  {last.text}" + (f" (and {others} more)" if others else "")
 
 
 def watched(rest: Rest, status: Status) -> bool:
@@ -151,7 +185,7 @@ def standing_text(before: Scene, now: Scene, moved: npt.NDArray[np.float32]) -> 
         return f"{names}: the pile moved, {many}. It was not poured with these values."
     acts = dict.fromkeys(WHEN.get(one.path.rpartition(".")[2], OTHERWISE) for one in found)
     little = many if loose else f"no body moved by more than {furthest}"
-    return f"{names}: <b>the pile stands; {', '.join(acts)}</b> ({little}). Shake it, tap it, or pour again."
+    return f"{names}: <b>the pile stands</b> ({little}); {', '.join(acts)}: shake it, tap it, or pour again."
 
 
 def millimetres(length: float) -> str:

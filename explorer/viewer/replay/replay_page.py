@@ -24,7 +24,7 @@ from explorer.live.frames import Frame
 from explorer.logs.recording import SAME_TIME, RecordedSurface, Recording
 from explorer.scene.meshes import GATE_NAME, PLATE_NAME, outlet_height, scene_height
 from explorer.units import checked
-from explorer.viewer.actions import Action, Actions, FrameClock, Post, SliderHands, add_keys, button_group
+from explorer.viewer.actions import Action, Actions, FrameClock, Post, add_keys, button_group
 from explorer.viewer.look.camera import CameraPanel, pile_points
 from explorer.viewer.look.colour_by import ColourPanel
 from explorer.viewer.look.drawn_look import DrawnLook, DrawnNodes
@@ -114,9 +114,7 @@ class ReplayPage:
         }
         post = self._actions.post
         button_group(gui, "Time", acts, post, hint="Arrows on a slider move the slider only.")
-        add_keys(gui, acts, {PLAY_PAUSE: "space", TO_START: "R"}, post)
-        arrows = {BACK: "arrowleft", STEP: "arrowright"}
-        add_keys(gui, acts, arrows, SliderHands(self._server).unless_on_a_slider(post))
+        add_keys(gui, acts, {PLAY_PAUSE: "space", TO_START: "R", BACK: "arrowleft", STEP: "arrowright"}, post)
         # A whole number of steps: viser writes the ends, and what is in the box, with as many digits as they have.
         last = round(SLIDER_STEP * max(1, math.ceil((timeline.last - SAME_TIME) / SLIDER_STEP)), 3)
         self._slider = gui.add_slider("Time [s]", 0.0, last, SLIDER_STEP, 0.0)

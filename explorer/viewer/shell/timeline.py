@@ -9,13 +9,12 @@ from typing import Any
 
 from explorer.live.messages import SessionState
 from explorer.units import checked
-from explorer.viewer.actions import SliderHands, add_keys
+from explorer.viewer.actions import add_keys
 from explorer.viewer.panel import AROUND, Now, PageContext, Panel
 from explorer.viewer.pour.readout import PHASE_WORDS, STATE_WORDS, TROUBLE, condition
 
 PLAY_PAUSE, BACK, STEP, RESTART = "Play / pause (space)", "◀ Back (←)", "Step ▶ (→)", "Pour again (R)"
-KEYS: dict[str, Any] = {PLAY_PAUSE: "space", RESTART: "R"}
-ARROWS: dict[str, Any] = {BACK: "arrowleft", STEP: "arrowright"}
+KEYS: dict[str, Any] = {PLAY_PAUSE: "space", RESTART: "R", BACK: "arrowleft", STEP: "arrowright"}
 SLOWEST, FASTEST = 0.05, 2.0
 """Range of the speed: simulated seconds per second."""
 SPEEDS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0)
@@ -42,7 +41,6 @@ class Timeline(Panel):
         page.channel.offer("seek", lambda command: post(partial(self._seek, command.get("time"))))
         page.channel.offer("speed", lambda command: post(partial(self._set_speed, command.get("factor"))))
         add_keys(page.server.gui, acts, KEYS, post)
-        add_keys(page.server.gui, acts, ARROWS, SliderHands(page.server).unless_on_a_slider(post))
 
     def show(self, now: Now) -> None:
         """Tell the browsers where the pour is."""

@@ -23,11 +23,12 @@ from explorer.errors import CommandError
 HERE = Path(__file__).parent
 TITLE = "<title>Viser</title>"
 """Of viser's first page; in its place come our title, style and script."""
-TEXT = '<title>{title}</title>\n    <link rel="stylesheet" href="/shell/text.css" />'
+TEXT = """<title>{title}</title>\n    <link rel="stylesheet" href="/shell/text.css" />
+    <script src="/shell/keys.js" type="module"></script>"""
 AROUND = """
     <link rel="stylesheet" href="/shell/shell.css" />
     <script src="/shell/shell.js" type="module"></script>"""
-SHIPPED = ("element.js", "text.css", "shell.js", "shell.css", "board.html", "board.js", "board.css")
+SHIPPED = ("element.js", "keys.js", "text.css", "shell.js", "shell.css", "board.html", "board.js", "board.css")
 """Files beside this one that are served."""
 HTML, JSON = "text/html; charset=utf-8", "application/json"
 KINDS: Mapping[str, str] = {

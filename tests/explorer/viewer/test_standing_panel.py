@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from explorer.live.messages import SessionState
+from explorer.live.messages import Event, SessionState
 from explorer.scene.source import change_lines, differences, material_source
 from explorer.viewer.panel import Now
 from explorer.viewer.pour.standing_panel import ROOT, WATCHED, StandingPanel, shifts, standing_text
@@ -34,7 +34,8 @@ def table(server):
 
     def look():
         panel.show(Now(session.now, session.newest))
-        return re.sub(r"<[^>]*>", "", panel._text.content) if panel._text.visible else ""
+        shown = [one.content for one in (panel._box, panel._about_ghost) if one.visible]
+        return re.sub(r"<[^>]*>", "", " ".join(shown)).strip()
 
     def pass_time(seconds, moved=0.0):
         places = PLACES + np.array([[moved, 0.0, 0.0], [0.0, 0.0, 0.0], [5.0, 0.0, 0.0]])
@@ -54,9 +55,8 @@ def test_a_change_that_moves_nothing_says_that_the_pile_stands(table):
     table.session.set_parameters({FRICTION: 0.39})
     assert table.pass_time(0.5 * WATCHED) == ""
     said = table.pass_time(WATCHED, moved=5e-5)
-    assert "static friction seed–seed 0.57 → 0.39: the pile stands; friction acts when something moves" in said
-    assert "no body moved by more than 0.05 mm" in said
-    assert table.panel._again.visible
+    assert "static friction seed–seed 0.57 → 0.39: the pile stands (no body moved by more than 0.05 mm)" in said
+    assert "friction acts when something moves: shake it, tap it, or pour again." in said
 
 
 def test_each_parameter_says_when_it_acts(table):
@@ -78,18 +78,30 @@ def test_a_change_taken_back_and_a_new_pour_are_silent(table):
     table.pass_time(WATCHED)
     table.session.set_parameters({FRICTION: 0.57})
     assert table.look() == ""
-    assert not table.panel._again.visible
     table.session.set_parameters({FRICTION: 0.39})
-    assert table.look() != ""
+    assert "the pile stands" in table.look()
     table.session.restart()
-    assert table.look() == ""
+    assert "the pile stands" not in table.look()
+
+
+def test_what_happened_last_stands_there_and_makes_room_for_what_a_change_did(table):
+    evil = "<img src=x onerror=alert(1)>"
+    happened = Event(table.session.now.generation, 3.0, f"{evil} at rest")
+    table.panel.show(Now(table.session.now, table.session.newest, [happened], f"{evil} refused"))
+    assert "<img" not in table.panel._box.content
+    assert table.panel._box.content.count("&lt;img") == 2
+    table.session.set_parameters({FRICTION: 0.39})
+    table.pass_time(WATCHED)
+    table.panel.show(Now(table.session.now, table.session.newest, table.session.events, "refused"))
+    said = re.sub(r"<[^>]*>", "\n", table.panel._box.content)
+    assert "refused" in said
+    assert said.count("0.57 → 0.39") == 1
 
 
 def test_poured_again_the_former_pile_stays_as_a_ghost_until_it_is_dismissed(table):
     table.session.set_parameters({FRICTION: 0.39})
     table.pass_time(WATCHED, moved=1e-4)
-    table.panel._pour_again()
-    assert table.session.asked[-1] == "start"
+    table.session.restart()
     said = table.look()
     assert "Grey: the former pile, 21.7° in one pour" in said
     assert "since then static friction seed–seed 0.57 → 0.39" in said
@@ -106,7 +118,8 @@ def test_poured_again_the_former_pile_stays_as_a_ghost_until_it_is_dismissed(tab
 def test_a_ghost_goes_with_its_set_up(table):
     table.session.set_parameters({FRICTION: 0.39})
     table.pass_time(WATCHED)
-    table.panel._pour_again()
+    table.session.restart()
+    assert table.look() != ""
     table.session.restart(with_values(table.session.now.scene, {"rig.mass": "20g"}))
     assert table.look() == ""
     assert ghosts(table.server) == []
