@@ -13,6 +13,7 @@ import time
 import numpy as np
 import pytest
 
+from explorer.viewer.panel import TABS
 from explorer.viewer.pour.readout import PHASE_WORDS
 
 pytestmark = pytest.mark.browser
@@ -45,6 +46,8 @@ POSITIONS = """() => Object.entries(window.__viserSceneTree.getState())
     .sort().flatMap(([name, node]) => Array.from(node.message.props.batched_positions))"""
 MIDDLE = {"x": 400, "y": 400, "width": 240, "height": 240}
 """Of the scene [px]."""
+SERIOUS = ("serious", "critical")
+"""Impacts of what axe-core finds."""
 PATIENCE = 120_000
 """Milliseconds: software rendering, a solver that compiles its kernels and other work share two cores."""
 
@@ -233,6 +236,39 @@ def test_a_slider_moved_by_keyboard_in_one_browser_is_seen_in_another(page, addr
     if state(page) == "running":
         wait_for(lambda: simulated_time(page) > before)
     assert state(page) in ("running", "ended")
+
+
+@pytest.mark.parametrize("tab", [tab.name for tab in TABS])
+def test_axe_finds_no_serious_fault_in_a_room(page, tab):
+    from axe_playwright_python.sync_playwright import Axe
+
+    def faults():
+        found = Axe().run(page, options={"resultTypes": ["violations"]}).response["violations"]
+        return [(one["id"], node["html"]) for one in found if one["impact"] in SERIOUS for node in one["nodes"]]
+
+    room(page, tab)
+    # Controls that were made a moment ago get their names a moment later.
+    found = []
+
+    def clean():
+        found[:] = faults()
+        return not found
+
+    try:
+        wait_for(clean)
+    except AssertionError:
+        assert found == []
+
+
+def test_a_section_tells_whether_it_is_open(page):
+    room(page, "Set-up")
+    head = page.get_by_role("button", name="Material (acts now)").filter(visible=True).first
+    before = head.get_attribute("aria-expanded")
+    head.focus()
+    page.keyboard.press("Enter")
+    wait_for(lambda: head.get_attribute("aria-expanded") not in (before, None))
+    page.keyboard.press("Enter")
+    wait_for(lambda: head.get_attribute("aria-expanded") == before)
 
 
 def test_the_console_has_nothing_to_complain_about(page):

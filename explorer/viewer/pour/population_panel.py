@@ -258,6 +258,6 @@ def _process_line(command: CommandStatus) -> str:
 def _block(head: str, lines: Sequence[str]) -> str:
     said = "".join(f"<div style='opacity:0.8'>{line}</div>" for line in lines if line)
     return (
-        "<div class='population' style='padding:0 0.9em 0.2em 0.75em; font-size:0.82em; line-height:1.4; "
+        "<div class='population' tabindex='0' style='padding:0 0.9em 0.2em 0.75em; font-size:0.82em; line-height:1.4; "
         f"height:{BOX_HEIGHT}; overflow-y:auto; font-variant-numeric:tabular-nums'>{head}{said}</div>"
     )

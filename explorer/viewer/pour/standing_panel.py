@@ -141,7 +141,7 @@ class StandingPanel(Panel):
 def box_html(lines: Sequence[str]) -> str:
     """``lines`` (HTML) in a box of always the same height, so that the controls below it stay where they are."""
     said = "".join(f"<div>{line}</div>" for line in lines)
-    return small_html(f"<div class='note' style='{BOX}' role='status'>{said}</div>")
+    return small_html(f"<div class='note' tabindex='0' style='{BOX}' role='status'>{said}</div>")
 
 
 def notes(status: Status, events: Sequence[Event], notice: str) -> list[str]:

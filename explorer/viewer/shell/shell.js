@@ -157,28 +157,5 @@ function connect() {
 connect();
 if (!localStorage.getItem("explorer-begun")) beginning.showModal();
 
-// viser's sections open by a click on their head only; here by Tab and Enter too.
-function reachable() {
-  for (const head of document.querySelectorAll("#root .mantine-Paper-root > .mantine-Paper-root")) {
-    if (head.style.cursor !== "pointer" || head.tabIndex >= 0) continue;
-    head.tabIndex = 0;
-    head.setAttribute("role", "button");
-    head.addEventListener("keydown", event => {
-      if (event.target !== head || (event.key !== "Enter" && event.key !== " ")) return;
-      event.preventDefault();
-      event.stopPropagation();
-      head.click();
-    });
-  }
-  for (const button of document.querySelectorAll(".mantine-CloseButton-root:not([aria-label])")) {
-    button.setAttribute("aria-label", "Close");
-  }
-}
-let looked = 0;
-new MutationObserver(() => {
-  if (looked) return;
-  looked = setTimeout(() => { looked = 0; reachable(); }, 300);
-}).observe(document.getElementById("root"), { childList: true, subtree: true });
-
 // For the boards in the study panel, which are pages of this server and of the same origin.
 window.explorer = { send, openRoom };

@@ -24,11 +24,11 @@ HERE = Path(__file__).parent
 TITLE = "<title>Viser</title>"
 """Of viser's first page; in its place come our title, style and script."""
 TEXT = """<title>{title}</title>\n    <link rel="stylesheet" href="/shell/text.css" />
-    <script src="/shell/keys.js" type="module"></script>"""
+    <script src="/shell/accessibility.js" type="module"></script>"""
 AROUND = """
     <link rel="stylesheet" href="/shell/shell.css" />
     <script src="/shell/shell.js" type="module"></script>"""
-SHIPPED = ("element.js", "keys.js", "text.css", "shell.js", "shell.css", "board.html", "board.js", "board.css")
+SHIPPED = ("element.js", "accessibility.js", "text.css", "shell.js", "shell.css", "board.html", "board.js", "board.css")
 """Files beside this one that are served."""
 HTML, JSON = "text/html; charset=utf-8", "application/json"
 KINDS: Mapping[str, str] = {
