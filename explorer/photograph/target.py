@@ -1,8 +1,8 @@
 """Photographs as the measured target of a study: a folder that keeps them, and what was read off them.
 
-photograph.json             what was read (`explorer.report.photograph`); a folder without it is no target
-NAME-DIGEST.jpg             every photograph as it came
-NAME-DIGEST.upright.jpg     where its scale is known: the part around its pile, upright, to stand behind its outline
+photograph.json              what was read (`explorer.report.photograph`); a folder without it is no target
+NAME-DIGEST.png              every photograph as it came
+NAME-DIGEST.png.upright.jpg  where its scale is known: the part around its pile, upright, to stand behind its outline
 
 One photograph tells an angle, and how well that was read; how piles differ among each other is seen on several, each of
 another pile. Files of pictures are named by their content and ``photograph.json`` is written last and taken away first,

@@ -86,7 +86,7 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> StudyResult:
     Finished runs are kept in the store, so a study that was interrupted goes on where it stopped.
     """
     study, profile = with_profile(load_study(order.study), order.profile)
-    photographed = None if order.target is None else given_target(order.target)
+    photographed = given_target(order)
     if photographed is not None:
         study = replace(study, targets=photographed.of_study(study.targets))
     own = [study.file, *([order.target] if order.target else [])]
@@ -179,12 +179,18 @@ def _silhouettes(run: StoredRun | None) -> list[tuple[FloatArray, FloatArray]]:
     return found
 
 
-def given_target(folder: Path) -> PhotographedTarget:
-    """The photographed target in ``folder``. Raises CommandError in one line where there is none."""
-    found = load_target(folder)
+def given_target(order: StudyOrder) -> PhotographedTarget | None:
+    """The photographs that ``order`` names, or that the study it goes on with was started with; None without them.
+
+    Raises CommandError in one line where the folder that is named holds none.
+    """
+    named = order.target
+    if named is None:
+        return load_target(order.out / FOLDER) if order.resume else None
+    found = load_target(named)
     if found is None:
         raise CommandError(
-            f"--target {folder}: holds no {PhotographResult.NAME}; `explorer measure PHOTO --target {folder}` makes it"
+            f"--target {named}: holds no {PhotographResult.NAME}; `explorer measure PHOTO --target {named}` makes it"
         )
     return found
 
