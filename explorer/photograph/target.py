@@ -81,8 +81,8 @@ class PhotographedTarget:
     @property
     def short(self) -> str:
         """The angle for a narrow place."""
-        of = "photograph" if self.n == 1 else f"{self.n} photographs"
-        return f"{fixed(self.mean, 1)} ± {fixed(self.sd, 1 if self.sd >= 0.05 else 2)}° · {of}"
+        of, places = "photograph" if self.n == 1 else f"{self.n} photographs", 1 if self.sd >= 0.1 else 2
+        return f"{fixed(self.mean, places)} ± {fixed(self.sd, places)}° · {of}"
 
     @property
     def line(self) -> str:
