@@ -268,7 +268,7 @@ def _digest(name: str) -> str:
 def _window(pile: ReadPile) -> tuple[float, float, float, float]:
     """Left, right, lower and upper end of the upright picture of ``pile`` [its unit]."""
     margin = MARGIN * (pile.u[-1] - pile.u[0])
-    return pile.u[0] - margin, pile.u[-1] + margin, -margin, max(pile.z) + margin
+    return pile.u[0] - margin, pile.u[-1] + margin, -0.5 * margin, max(pile.z) + margin
 
 
 def _upright(picture: Picture, pile: PhotographedPile, read: ReadPile) -> bytes:
