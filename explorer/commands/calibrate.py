@@ -16,6 +16,9 @@ def calibrate(
     ),
     study: str = typer.Option("sunflower_extract", help="A shipped study or the path of a study file."),
     profile: str = typer.Option("standard", help="Size of the study: a [profile.NAME] of the study file."),
+    target: Path | None = typer.Option(
+        None, metavar="DIR", help="Photographs in place of the study's angle: a folder of `explorer measure --target`."
+    ),
     out: Path = typer.Option(Path("results"), help="Folder for result.json, the report, its figures and data."),
     resume: bool = typer.Option(False, "--resume", help="Go on in a folder that is not empty."),
     store: Path | None = typer.Option(None, help="SQLite file that keeps every run."),
@@ -35,7 +38,7 @@ def calibrate(
         raise CommandError("calibrate: add --headless to run here, or start it from the panel of `explorer serve`")
     # The page cancels with SIGTERM; that has to end like Ctrl-C, with the store closed and finished runs kept.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    order = StudyOrder(study, profile, out, resume, store, record, threads, tries, author, notes)
+    order = StudyOrder(study, profile, out, resume, store, record, threads, tries, author, notes, target)
     try:
         result = run_study(order, typer.echo)
     except StudyStopped as stopped:

@@ -28,6 +28,9 @@ def measure(
     outline: Path | None = typer.Option(
         None, metavar="FILE.csv", help="New file: the outline, for the page to lay over a simulated pile."
     ),
+    target: Path | None = typer.Option(
+        None, metavar="DIR", help="Keep the pictures in this folder, for `calibrate --target`; others there stay."
+    ),
     report: Path | None = typer.Option(None, metavar="DIR", help="New folder for the report, its figures and data."),
     author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
     notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
@@ -57,6 +60,10 @@ def measure(
         text = json_text(result.to_dict()) + "\n"
         with appearing(report, "--report") as folder:
             write_report(photograph_report(result, read_picture(order, measured)), folder, {result.NAME: text})
+    if target is not None and not measured.refusals:
+        from explorer.photograph.target import keep_target
+
+        typer.echo(f"{target}: {keep_target(target, order.pictures, measured).line}", err=json)
     if json:
         typer.echo(json_text(measure_result(measured)))
     else:

@@ -10,7 +10,7 @@ import io
 import json
 import shlex
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -21,6 +21,7 @@ import numpy.typing as npt
 from PIL import Image
 
 from doe.audit import audit_study
+from doe.target import Target
 from explorer.audit.read_study import read_study, shipped_study
 from explorer.audit.report import audit_html, audit_text
 from explorer.background.command_output import command_output, kept_scene
@@ -33,6 +34,7 @@ from explorer.laboratory.part import part_table
 from explorer.laboratory.run import LabOrder, analysed, part_file
 from explorer.photograph.annotated import sheet
 from explorer.photograph.run import measure_order, outline_text, run_measure
+from explorer.photograph.target import PhotographedTarget, check_targets, keep_target
 from explorer.report.bench import bench_charts, curve_charts
 from explorer.report.design import design_html
 from explorer.report.design.charts import design_plots
@@ -144,6 +146,18 @@ def compared_result(photo: str, ruler: Ruler, scene: Scene, folder: Path) -> Com
         with Image.open(drawn) as picture:
             pixels = np.asarray(picture.convert("RGB"), dtype=np.uint8)
     return CommandResult(said, shlex.join(["explorer", *words]), {}, {PLOT: content}, pixels)
+
+
+def measured_target(
+    photo: str, ruler: Ruler, folder: Path, targets: Sequence[Target], anew: bool
+) -> PhotographedTarget:
+    """`explorer measure --target`: the photograph kept in ``folder`` as a target of the study of ``targets``.
+
+    ``anew``: in place of what is kept there, or else beside it. Raises CommandError, with nothing changed.
+    """
+    check_targets(targets)
+    order = measure_order([photo], ruler.scale_mm, ruler.reference_mm, None, "auto", None, None, None)
+    return keep_target(folder, order.pictures, run_measure(order), anew)
 
 
 def measure_words(photo: str, ruler: Ruler) -> list[str]:

@@ -4,15 +4,19 @@ format = 1
 title = "Lentils, lot 7"
 study = "lentil_study.toml"     # relative to this file; it names the material
 measured = "measured"           # folder with measurement.toml, for the diagnosis; may be left out
+
+Photographs that were made its target are kept in the folder ``target``.
 """
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 
 from explorer.errors import CommandError
 from explorer.files.output_file import write_whole
+from explorer.photograph.target import FOLDER
 from explorer.scene.file import load_scene, study_path
 from explorer.scene.presets import data_folder
 from explorer.scene.source import SceneSource, material_source, study_source
@@ -63,6 +67,15 @@ class Project:
     def diagnoses(self) -> Path:
         """Output folders of the project's diagnoses are made in here."""
         return self.results / "diagnoses"
+
+    @property
+    def target(self) -> Path:
+        """Folder of the photographs that are its measured target, where there are any (`explorer.photograph.target`).
+
+        Studies of the same name from several places share the folder of results, but no target.
+        """
+        place = hashlib.sha256(str(self.study.absolute()).encode()).hexdigest()[:8]
+        return (self.folder or self.results / "targets" / f"{self.study.stem}-{place}") / FOLDER
 
 
 def new_project(folder: Path, material: str | None = None) -> list[Path]:

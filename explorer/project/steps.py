@@ -10,6 +10,7 @@ from doe.target import Target
 from explorer.background.command_process import CommandStatus
 from explorer.live.messages import SessionState, Status
 from explorer.outcomes import OUTCOME_WORDS
+from explorer.photograph.target import PhotographedTarget
 from explorer.units import observed
 from solver.pours.record import Outcome
 from solver.scenes.scene import Scene
@@ -75,9 +76,11 @@ def material_step(scene: Scene) -> Step:
     )
 
 
-def measured_step(targets: Sequence[Target]) -> Step:
-    """Of the measured pile: the first target of the study."""
+def measured_step(targets: Sequence[Target], photographed: PhotographedTarget | None = None) -> Step:
+    """Of the measured pile: the photographs that were made the target, or the first target of the study."""
     hint = "What was measured in the laboratory: the target of the calibration."
+    if photographed is not None:
+        return Step("Measured", StepState.MEASURED, photographed.short, f"{hint} {photographed.line}", Room.LABORATORY)
     if not targets:
         return Step("Measured", StepState.EMPTY, "", hint, Room.LABORATORY)
     target = targets[0]

@@ -25,9 +25,8 @@ from explorer.report.bench import bench_report
 from explorer.report.content import Banner, Block, Drawing, Figure, Folded, Picture, Report, Section, Strong, Table
 from explorer.report.design import design_report
 from explorer.report.diagnosis import diagnosis_report
-from explorer.report.figures.pours import pile_outlines
+from explorer.report.figures.pours import outlines_caption, pile_outlines
 from explorer.report.photograph import READ, PhotographResult, photograph_report
-from explorer.units import enumeration
 
 Content = Mapping[str, Any]
 
@@ -155,16 +154,9 @@ def _side_by_side(parts: list[Part]) -> list[Section]:
     measured = {pile.name: (pile.u, pile.z) for one in photographs for pile in one.piles if pile.unit == "m"}
     if not studies or not measured:
         return []
-    n = enumeration([f"{pile.pours} pours at the {pile.name}" for pile in studies[0].piles])
-    caption = (
-        f"Photographed outlines (n = {len(measured)}) over mean silhouettes of n = {n}; bands: ± 1 SD between pours; "
-        "both axes on one scale."
-    )
-    return [
-        Section(
-            "Photograph, reference and optimum", (Figure("piles", pile_outlines(studies[0].piles, measured), caption),)
-        )
-    ]
+    piles = studies[0].piles
+    figure = Figure("piles", pile_outlines(piles, measured), outlines_caption(piles, len(measured)))
+    return [Section("Photograph, reference and optimum", (figure,))]
 
 
 def _renamed(section: Section, before: str, prefix: str) -> Section:

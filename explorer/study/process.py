@@ -16,6 +16,7 @@ from explorer.background.command_process import PROGRAM, BackgroundError, Comman
 from explorer.background.output_folder import finished, new_folder, newest_unfinished
 from explorer.background.progress import given_up
 from explorer.files.output_file import write_whole
+from explorer.photograph.target import FOLDER, PhotographedTarget, load_target
 from explorer.study.edit import StudyEdits, edited_study
 
 ENDINGS = {0: "report", 3: "above the error limit; report"}
@@ -77,6 +78,8 @@ class QueuedStudy:
     edits: StudyEdits
     text: str
     """Content of its own study file; empty for the file as it is."""
+    photographed: PhotographedTarget | None
+    """Photographs in place of the study's own target."""
 
 
 class CalibrationProcess:
@@ -87,12 +90,18 @@ class CalibrationProcess:
         folder: output folders are made in here, one per start: ``<study>-<profile>-<date>-<time>``.
         store: file of the store of runs; None for the default store.
         program: how the command line is called.
+        target: folder of the photographs that are the target of every study that is ordered while they are there.
     """
 
     def __init__(
-        self, study_file: Path, folder: Path, store: Path | None = None, program: Sequence[str] = PROGRAM
+        self,
+        study_file: Path,
+        folder: Path,
+        store: Path | None = None,
+        program: Sequence[str] = PROGRAM,
+        target: Path | None = None,
     ) -> None:
-        self.study_file, self._folder, self._store = study_file, folder, store
+        self.study_file, self._folder, self._store, self._target = study_file, folder, store, target
         self._process = CommandProcess("study", ENDINGS, program)
         self._profile, self._tries = "", TRIES
         self._line: WaitingLine[QueuedStudy] = WaitingLine(self._process, self._begin, "studies")
@@ -148,7 +157,10 @@ class CalibrationProcess:
     def _order(self, profile: str, edits: StudyEdits) -> QueuedStudy:
         text, study = edited_study(self.study_file, edits) if edits else ("", load_study(str(self.study_file)))
         with_profile(study, profile)
-        return QueuedStudy(profile, edits, text)
+        photographed = None if self._target is None else load_target(self._target)
+        if photographed is not None:
+            photographed.of_study(study.targets)
+        return QueuedStudy(profile, edits, text, photographed)
 
     def _begin(self, order: QueuedStudy) -> None:
         self._profile, self._tries = order.profile, TRIES
@@ -156,6 +168,8 @@ class CalibrationProcess:
         if order.text:
             out.mkdir()
             write_whole(out / self._edited_name, order.text)
+        if order.photographed is not None:
+            order.photographed.copied(out / FOLDER)
         self._process.start(out, self._arguments(out))
         self._line.begun()
 
@@ -184,6 +198,7 @@ class CalibrationProcess:
         """The command line that is run, as a person would type it."""
         store = () if self._store is None else ("--store", str(self._store))
         own = out / self._edited_name
-        study = ("--study", str(own if own.is_file() else self.study_file), "--profile", self._profile)
+        study = ["--study", str(own if own.is_file() else self.study_file), "--profile", self._profile]
+        study += ["--target", str(out / FOLDER)] if (out / FOLDER).is_dir() else []
         tries = () if self._tries == TRIES else ("--tries", str(self._tries))
         return ["calibrate", "--headless", *study, "--out", str(out), *store, *tries]

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -41,7 +41,9 @@ from explorer.background.progress import PROGRESS, RunProgress, told_of_pauses
 from explorer.errors import CommandError
 from explorer.files.output_file import write_whole
 from explorer.files.run_result import made_today, versions
+from explorer.photograph.target import FOLDER, PhotographedTarget, load_target
 from explorer.report import write_report
+from explorer.report.photograph import PhotographResult
 from explorer.report.set_up import set_up_of
 from explorer.study.process import PARTIAL
 from solver import WorkerPool, pour_rig, unpacked
@@ -74,6 +76,8 @@ class StudyOrder:
     tries: int = TRIES
     author: str = ""
     notes: str = ""
+    target: Path | None = None
+    """Folder of photographs that take the place of the study's own angle of repose (`explorer.photograph.target`)."""
 
 
 def run_study(order: StudyOrder, say: Callable[[str], None]) -> StudyResult:
@@ -82,12 +86,19 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> StudyResult:
     Finished runs are kept in the store, so a study that was interrupted goes on where it stopped.
     """
     study, profile = with_profile(load_study(order.study), order.profile)
-    if order.out.is_file() or (holds_more_than(order.out, study.file) and not order.resume):
+    photographed = given_target(order)
+    if photographed is not None:
+        study = replace(study, targets=photographed.of_study(study.targets))
+    own = [study.file, *([order.target] if order.target else [])]
+    if order.out.is_file() or (holds_more_than(order.out, own) and not order.resume):
         raise CommandError(f"--out {order.out}: is not empty; name a new folder, or add --resume to go on there")
     planned = planned_runs(study, profile)
     path = order.store or default_store()
     store = Store(path)
     order.out.mkdir(parents=True, exist_ok=True)
+    if photographed is not None:
+        photographed.copied(order.out / FOLDER)
+        say(f"target: {photographed.line}")
     say(f"{study.name}, profile {profile.name}: {sum(planned.values())} runs of {1e3 * profile.mass:g} g; store {path}")
     progress = RunProgress(order.out / PROGRESS, planned, say, terminal=sys.stdout.isatty())
     progress.compiling()
@@ -168,9 +179,26 @@ def _silhouettes(run: StoredRun | None) -> list[tuple[FloatArray, FloatArray]]:
     return found
 
 
-def holds_more_than(folder: Path, study_file: Path) -> bool:
-    """True if ``folder`` holds anything but the study's own file, which the page writes there before the start."""
-    return folder.is_dir() and any(entry.resolve() != study_file.resolve() for entry in folder.iterdir())
+def given_target(order: StudyOrder) -> PhotographedTarget | None:
+    """The photographs that ``order`` names, or that the study it goes on with was started with; None without them.
+
+    Raises CommandError in one line where the folder that is named holds none.
+    """
+    named = order.target
+    if named is None:
+        return load_target(order.out / FOLDER) if order.resume else None
+    found = load_target(named)
+    if found is None:
+        raise CommandError(
+            f"--target {named}: holds no {PhotographResult.NAME}; `explorer measure PHOTO --target {named}` makes it"
+        )
+    return found
+
+
+def holds_more_than(folder: Path, own: Sequence[Path]) -> bool:
+    """True if ``folder`` holds anything but the study's ``own`` files, which the page puts there before the start."""
+    known = {path.resolve() for path in own}
+    return folder.is_dir() and any(entry.resolve() not in known for entry in folder.iterdir())
 
 
 def _recorder(folder: Path) -> StudyRecorder:

@@ -75,7 +75,7 @@ def serve(
         pages, channel = WebPages(f"{project.title} · {LABEL}"), ShellChannel()
         server = guarded_server(host, port, LABEL, pages, channel)
         ending.callback(server.stop)
-        study = CalibrationProcess(project.study, project.studies, store)
+        study = CalibrationProcess(project.study, project.studies, store, target=project.target)
         ending.callback(study.close)
         diagnosis = DiagnoseProcess(project.diagnoses, store)
         ending.callback(diagnosis.close)

@@ -16,6 +16,7 @@ import viser
 from explorer.diagnosis.process import DiagnosisProcess
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, Status
+from explorer.photograph.target import TargetFile
 from explorer.project.project import Project
 from explorer.project.steps import Room
 from explorer.session import Session
@@ -95,6 +96,11 @@ class PageContext:
     def bench_work(self) -> BackgroundWork:
         """Work of the laboratory, beside the other."""
         return BackgroundWork(self.post)
+
+    @cached_property
+    def target(self) -> TargetFile:
+        """Photographs that were made the target of the project's study."""
+        return TargetFile(self.project.target)
 
     @cached_property
     def recording(self) -> RecordingSwitch:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from doe.analysis.pilot import EstimatorChoice
 from doe.provenance import PouredPile
@@ -38,6 +39,7 @@ from explorer.report.figures.style import (
     vertical_line,
 )
 from explorer.units import (
+    enumeration,
     observable_label,
     observable_title,
     parameter_label,
@@ -212,7 +214,23 @@ def profile(words: str, x: Sequence[float], mean: Sequence[float], sd: Sequence[
     return [edge, {"type": "scatter", "mode": "lines", "x": list(x), "y": finite(mean), "name": words, "line": stroke}]
 
 
-def pile_outlines(piles: Sequence[PouredPile], measured: Mapping[str, tuple[Sequence[float], Sequence[float]]]) -> Spec:
+@dataclass(frozen=True)
+class Backdrop:
+    """A picture behind a chart: ``source`` is its ``data:`` address; the ends of its sides [m]."""
+
+    name: str
+    source: str
+    left: float
+    right: float
+    low: float
+    high: float
+
+
+def pile_outlines(
+    piles: Sequence[PouredPile],
+    measured: Mapping[str, tuple[Sequence[float], Sequence[float]]],
+    behind: Backdrop | None = None,
+) -> Spec:
     """Mean silhouettes with bands, and photographed outlines (name → u, z [m]) over them, on one scale [mm]."""
     looks = {"reference": (ASSUMPTION, REFERENCE_BAND, "dot"), "optimum": (FACTOR, INTERVAL_BAND, "dash")}
     traces: list[Json] = []
@@ -222,11 +240,24 @@ def pile_outlines(piles: Sequence[PouredPile], measured: Mapping[str, tuple[Sequ
     for name, (across, up) in measured.items():
         x, y = ([1e3 * value for value in row] for row in (across, up))
         traces.append({"type": "scatter", "mode": "lines", "x": x, "y": y, "name": label(name), "line": line(TARGET)})
-    layout = {
+    layout: Json = {
         "xaxis": axis("distance from the pile’s middle [mm]"),
         "yaxis": axis("height [mm]", scaleanchor="x", rangemode="tozero"),
     }
+    if behind is not None:
+        place: Json = {"xref": "x", "yref": "y", "x": 1e3 * behind.left, "y": 1e3 * behind.high, "layer": "below"}
+        size = {"sizex": 1e3 * (behind.right - behind.left), "sizey": 1e3 * (behind.high - behind.low)}
+        layout["images"] = [{"source": behind.source, "sizing": "stretch", **place, **size}]
     return chart(traces, layout, 340)
+
+
+def outlines_caption(piles: Sequence[PouredPile], photographed: int) -> str:
+    """What the marks of :func:`pile_outlines` mean."""
+    n = enumeration([f"{pile.pours} pours at the {pile.name}" for pile in piles])
+    return (
+        f"Photographed outlines (n = {photographed}) over mean silhouettes of n = {n}; bands: ± 1 SD between pours; "
+        "both axes on one scale."
+    )
 
 
 def scan(scanned: ScanResult, target: Target) -> Spec:

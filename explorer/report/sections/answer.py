@@ -179,8 +179,8 @@ def precision_cautions(target: Target, test: Verification) -> list[str]:
     if target.sd is not None and target.sd_source != "measured":
         found.append(
             f"{name[0].upper()}{name[1:]}: the measurement's standard deviation "
-            f"{observed(target.observable, target.sd)} is {target.sd_source}, not measured; the Welch and "
-            "equivalence tests lean on it."
+            f"{observed(target.observable, target.sd)} is {target.sd_source}, not measured; "
+            + ("the Welch and equivalence tests lean on it." if target.n else "the tests take its mean as exact.")
         )
     return found
 

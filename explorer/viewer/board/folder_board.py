@@ -16,7 +16,7 @@ from explorer.study.process import RESULT as STUDY
 from explorer.viewer.board.board import board_json
 from explorer.viewer.board.board_view import REPORT, published_report
 from explorer.viewer.board.diagnosis_board import diagnosis_board
-from explorer.viewer.board.study_board import study_board
+from explorer.viewer.board.study_board import photographed_of, study_board
 from explorer.viewer.shell.web_pages import JSON, WebPage, WebPages, folder_id
 
 
@@ -47,7 +47,9 @@ class FolderBoard:
             if diagnosis is not None:
                 board = diagnosis_board(DiagnosisResult.from_dict(diagnosis), None, report)
             else:
-                board = study_board(None if study is None else study_from(study), None, report)
+                board = study_board(
+                    None if study is None else study_from(study), None, report, photographed_of(self._folder)
+                )
         except RecordError as error:
             raise CommandError(f"{self._folder}: {error}") from None
         self._pages.publish(self.address, WebPage(JSON, board_json(board)))

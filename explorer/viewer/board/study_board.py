@@ -2,24 +2,38 @@
 
 from __future__ import annotations
 
+from functools import partial
+from pathlib import Path
+
 from doe.run_records import Run
 from doe.studies.study_result import AnyStudy, PartialStudy, StudyResult
 from explorer.background.command_process import CommandStatus
 from explorer.outcomes import outcome_text
+from explorer.photograph.target import FOLDER, PhotographedTarget, load_target
 from explorer.report.content import Table
+from explorer.report.figures.pours import outlines_caption, pile_outlines
 from explorer.report.identified import settings
 from explorer.report.sections.answer import banner
-from explorer.report.study_charts import study_plots
+from explorer.report.study_charts import Plot, Plots, study_plots
 from explorer.study.runs import stages_with_runs
-from explorer.units import MISSING, observable_label, observed
+from explorer.units import MISSING, number, observable_label, observed
 from explorer.viewer.board.board import Board, BoardTable, Stage, made_charts
 from explorer.viewer.study.process_view import AT_WORK, DONE, TO_COME, time_left
 
+PHOTOGRAPHED = "Photographed pile and poured ones"
 RUN_HEADER = ("Stage", "Setting", "Seed", "Outcome", "Value")
 
 
-def study_board(result: AnyStudy | None, status: CommandStatus | None, report: str = "") -> Board:
-    """The board of ``result``; ``status`` of the process that works on it, None where none does."""
+def study_board(
+    result: AnyStudy | None,
+    status: CommandStatus | None,
+    report: str = "",
+    photographed: PhotographedTarget | None = None,
+) -> Board:
+    """The board of ``result``; ``status`` of the process that works on it, None where none does.
+
+    ``photographed``: the photographs that it was calibrated against.
+    """
     alive = status is not None and status.alive
     so_far = (result.partial or "", result.line) if isinstance(result, PartialStudy) else ("", "")
     if result is None:
@@ -30,10 +44,26 @@ def study_board(result: AnyStudy | None, status: CommandStatus | None, report: s
         subtitle=working(status) if status is not None and alive else f"profile {study.profile.name}",
         banner=banner(result) if isinstance(result, StudyResult) else None,
         stages=stages_of(status, so_far) if alive else (),
-        charts=made_charts(study_plots(result))[:: -1 if finished else 1],
+        charts=made_charts(_beside_photographs(result, photographed))
+        + made_charts(study_plots(result))[:: -1 if finished else 1],
         tables=(*_answers(result), _runs(result)),
         report=report,
     )
+
+
+def photographed_of(folder: Path | None) -> PhotographedTarget | None:
+    """The photographs that the study in ``folder`` is calibrated against; None where it is another target."""
+    return None if folder is None else load_target(folder / FOLDER)
+
+
+def _beside_photographs(result: AnyStudy, photographed: PhotographedTarget | None) -> Plots:
+    """Measured silhouettes, a photograph behind them, over the poured ones; empty before there are both."""
+    if photographed is None or not isinstance(result, StudyResult) or not result.piles or not photographed.outlines:
+        return {}
+    outlines, behind = photographed.outlines, photographed.backdrop
+    caption = outlines_caption(result.piles, len(outlines)) + (f" Behind: {behind.name}." if behind else "")
+    caption += f" {number(1e3 * result.study.profile.mass)} g were poured; sizes compare with a pile of that mass only."
+    return {PHOTOGRAPHED: Plot(partial(pile_outlines, result.piles, outlines, behind), caption, 0.6)}
 
 
 def working(status: CommandStatus) -> str:

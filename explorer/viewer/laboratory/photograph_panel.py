@@ -1,27 +1,41 @@
-"""The angle of repose on a photograph, with what was read drawn over it."""
+"""The angle of repose on photographs, with what was read drawn over it, and as the target of the page's study."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from html import escape
 
+from doe.studies.study import load_study
+from explorer.errors import CommandError
 from explorer.files.measured_curves import PICTURES
-from explorer.laboratory.command_results import CommandResult, Ruler, compared_result, photograph_result
+from explorer.laboratory.command_results import (
+    CommandResult,
+    Ruler,
+    compared_result,
+    measured_target,
+    photograph_result,
+)
+from explorer.photograph.target import PhotographedTarget, remove_target
 from explorer.viewer.laboratory.answer_view import AnswerView
 from explorer.viewer.laboratory.inputs import UploadSlot, positive
-from explorer.viewer.panel import LABORATORY, PageContext, Panel
+from explorer.viewer.panel import LABORATORY, SELDOM, Now, PageContext, Panel
+from explorer.viewer.view import small_html
 from solver.assets import shipped_assets
 
 WAITING = "Camera level, the plate's edge in view. Choose a shipped picture or upload one, then: Read the angle."
+OWN = "The study's target is that of its file. What is read off a photograph can take its place."
 
 
 class PhotographPanel(Panel):
-    """Picture, scale, answer; uploads are kept, and the pours that pictures are compared with."""
+    """Picture, scale, answer, target; uploads are kept, and the pours that pictures are compared with."""
 
-    name, tab, title = "photograph", LABORATORY, "Photograph → angle of repose"
+    name, tab, title, every = "photograph", LABORATORY, "Photograph → angle of repose", SELDOM
 
     def __init__(self, page: PageContext) -> None:
         server, gui, folder, post = page.server, page.server.gui, page.uploads, page.post
         self._session, self._folder, self._background = page.session, folder, page.bench_work
+        self._target, self._study = page.target, page.project.study
+        self._shown: tuple[str, Ruler] | None = None
         self._photo = UploadSlot(
             server, "Photograph", shipped_assets("photographs"), PICTURES, folder, post, "One pile, from the side."
         )
@@ -42,19 +56,70 @@ class PhotographPanel(Panel):
             hint="Pours what is on the screen once more, in the background, and reads both piles by the same fit.",
         )
         self.view = AnswerView(server, WAITING, post)
+        self._told = gui.add_html(small_html(escape(OWN)))
+        self._use = gui.add_button(
+            "Use as target",
+            disabled=True,
+            hint="What was read is what Calibrate aims at, in place of the study's own angle, also after a restart.",
+        )
+        self._add = gui.add_button(
+            "Add to the target",
+            disabled=True,
+            hint="Another pile of the same material: mean over all of them, and the standard deviation between them.",
+        )
+        self._remove = gui.add_button("Remove the target", disabled=True, hint="The study's own holds again.")
         read.on_click(lambda _: post(self._read))
         beside.on_click(lambda _: post(self._compare))
+        self._use.on_click(lambda _: post(lambda: self._keep(anew=True)))
+        self._add.on_click(lambda _: post(lambda: self._keep(anew=False)))
+        self._remove.on_click(lambda _: post(self._forget))
+
+    def show(self, now: Now) -> None:
+        """Tell the target, and which of the buttons mean something now."""
+        target = self._target.now
+        kept = "" if target is None else f"Target of the study: {target.line} Kept in {target.folder}."
+        text = small_html(escape(kept or OWN))
+        if self._told.content != text:
+            self._told.content = text
+        offered = (
+            (self._use, self._shown is not None),
+            (self._add, self._shown is not None and target is not None),
+            (self._remove, self._target.there),
+        )
+        for button, able in offered:
+            if button.disabled == able:
+                button.disabled = not able
 
     def _read(self) -> None:
         photo, ruler = self._photo.chosen, self._ruler()
-        self._answer("reading the photograph", lambda: photograph_result(photo, ruler))
+        self._answer("reading the photograph", lambda: photograph_result(photo, ruler), (photo, ruler))
 
     def _compare(self) -> None:
         photo, ruler, scene, folder = self._photo.chosen, self._ruler(), self._session.status().scene, self._folder
-        self._answer("pouring beside the photograph", lambda: compared_result(photo, ruler, scene, folder))
+        self._answer(
+            "pouring beside the photograph", lambda: compared_result(photo, ruler, scene, folder), (photo, ruler)
+        )
 
-    def _answer(self, what: str, find: Callable[[], CommandResult]) -> None:
-        self._background.start(what, find, self.view.show)
+    def _answer(self, what: str, find: Callable[[], CommandResult], of: tuple[str, Ruler]) -> None:
+        def done(answer: CommandResult) -> None:
+            self._shown = of
+            self.view.show(answer)
+
+        self._background.start(what, find, done)
+
+    def _keep(self, anew: bool) -> None:
+        """Make the photograph that is shown the target, or one of its photographs."""
+        if self._shown is None:
+            raise CommandError("read a photograph first: what is read becomes the target")
+        (photo, ruler), folder, study = self._shown, self._target.folder, self._study
+
+        def keep() -> PhotographedTarget:
+            return measured_target(photo, ruler, folder, load_study(str(study)).targets, anew)
+
+        self._background.start("keeping the photograph", keep, lambda _: None)
+
+    def _forget(self) -> None:
+        remove_target(self._target.folder)
 
     def _ruler(self) -> Ruler:
         return Ruler(positive(self._scale.value), positive(self._bar.value))

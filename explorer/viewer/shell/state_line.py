@@ -67,7 +67,7 @@ class StateLine(Panel):
         diagnosed = self._diagnosis.of(diagnosis.finished()[:1], diagnosis_finished)
         return (
             material_step(now.status.scene),
-            measured_step(self._targets),
+            measured_step(self._targets, self._page.target.now),
             pour_step(now.status),
             command_step(
                 "Calibrate",

@@ -8,6 +8,7 @@ from typing import Any
 import viser
 
 from doe.studies.study import Factor, Study
+from explorer.photograph.target import OBSERVABLE
 from explorer.study.edit import RANGE_KEYS, StudyEdits, edited_study, listed_edits
 from explorer.units import checked, number, observable_label, parameter_label, unit_of_observable, unit_of_parameter
 from explorer.viewer.actions import Action, Post
@@ -15,6 +16,8 @@ from explorer.viewer.study.process_view import escaped
 from solver import parameters
 
 TARGET_WORDS = {"mean": "mean", "sd": "SD", "margin": "margin of equivalence"}
+MEASURED_KEYS = ("mean", "sd", "n")
+"""Of a target, what photographs give."""
 COLUMNS = "Low, high and measured value of each factor; the study starts from these ranges."
 LARGEST = 1e12
 """No number of a target is beyond this."""
@@ -31,6 +34,7 @@ class OrderPanel:
         self._file, self._study = file, study
         self._ranges: dict[str, dict[str, float]] = {}
         self._target: dict[str, float] = {}
+        self._photographed: tuple[str, ...] = ()
         self._told = gui.add_markdown("")
         self._rows: dict[str, Any] = {}
         self._goal: dict[str, Any] = {}
@@ -50,8 +54,21 @@ class OrderPanel:
 
     @property
     def edits(self) -> StudyEdits:
-        """What is asked otherwise than in the file; SI."""
-        return StudyEdits({name: dict(values) for name, values in self._ranges.items()}, dict(self._target))
+        """What is asked otherwise than in the file; SI. Photographs have the word on what they measured."""
+        target = {key: value for key, value in self._target.items() if key not in self._photographed}
+        return StudyEdits({name: dict(values) for name, values in self._ranges.items()}, target)
+
+    def follow(self, photographed: bool) -> None:
+        """Show mean, SD and number of the target only while they are those of the file."""
+        first = OBSERVABLE if self._study is None else self._study.targets[0].observable
+        hidden = MEASURED_KEYS if photographed and first == OBSERVABLE else ()
+        if hidden == self._photographed:
+            return
+        self._photographed = hidden
+        for key, handle in self._goal.items():
+            handle.visible = key not in hidden
+        if self._study is not None:
+            self._tell()
 
     @staticmethod
     def _posted(post: Post, event: viser.GuiEvent[Any], act: Action) -> None:

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Hashable, Mapping, Sequence
 from pathlib import Path
 
 from doe.record import RecordError
 from doe.stages import planned_runs
 from doe.studies.study import Study, load_study
 from doe.studies.study_result import AnyStudy, study_from
+from doe.target import Target
 from explorer.background.output_folder import ResultFile
 from explorer.errors import CommandError
+from explorer.photograph.target import PhotographedTarget
 from explorer.session import Session
 from explorer.study.process import PARTIAL, RESULT
 from explorer.study.runs import scene_of
+from explorer.units import observable_label, observed
 from explorer.viewer.board.board_view import BoardView
-from explorer.viewer.board.study_board import listed_runs, study_board
+from explorer.viewer.board.study_board import listed_runs, photographed_of, study_board
 from explorer.viewer.panel import CALIBRATE, SELDOM, Now, PageContext, Panel
 from explorer.viewer.study.comparison_panel import ComparisonPanel
 from explorer.viewer.study.order_panel import OrderPanel
@@ -55,6 +58,8 @@ class StudyPanel(Panel):
             (NONE,) if loaded is None else tuple(loaded.profiles),
             hint=None if loaded is None else "; ".join(profile_text(loaded, name) for name in loaded.profiles),
         )
+        self._targets, self._kept = () if loaded is None else loaded.targets, page.target
+        self._target = gui.add_markdown("")
         with gui.add_folder("Ranges and target of the next study", expand_by_default=False):
             self._order = OrderPanel(server, study.study_file, loaded, post)
         acts = orders(study, self._start, study.resume, self._queue) | {RETRY: study.retry}
@@ -76,6 +81,10 @@ class StudyPanel(Panel):
 
     def show(self, now: Now) -> None:
         """Ask the study how far it is."""
+        photographed = self._kept.now
+        if self._target.content != (target := target_markdown(self._targets, photographed)):
+            self._target.content = target
+        self._order.follow(photographed is not None)
         status = self._study.status()
         waiting = self._study.waiting()
         text = state_markdown(status, "study", "runs", now.notice) + waiting_markdown(waiting)
@@ -123,11 +132,12 @@ class StudyPanel(Panel):
         """The board of what is chosen."""
         chosen, result = self._chooser.folder, self._result
         status = self._study.status() if chosen is None else None
+        folder = chosen or self._present()
         self._board.show(
             self._shown,
-            chosen or self._present(),
+            folder,
             status,
-            lambda status, report: study_board(result, status, report),
+            lambda status, report: study_board(result, status, report, photographed_of(folder)),
         )
 
     def _open_run(self, asked: Mapping[str, object]) -> None:
@@ -158,6 +168,19 @@ def profile_text(study: Study, name: str) -> str:
     if profile.resolution_deg is None:
         runs = f"{sum(planned_runs(study, profile).values())} runs"
     return f"{name}: {profile.spheres} shapes, {runs}"
+
+
+def target_markdown(targets: Sequence[Target], photographed: PhotographedTarget | None) -> str:
+    """The target of the next study, and where it is from."""
+    if photographed is not None:
+        return f"**Target:** {escaped(photographed.line)}"
+    if not targets:
+        return ""
+    target = targets[0]
+    spread = "" if target.sd is None else f" ± {observed(target.observable, target.sd)} ({target.sd_source})"
+    number = "" if target.n is None else f", n = {target.n}"
+    of = f"{observed(target.observable, target.mean)}{spread}{number}, {observable_label(target.observable)}"
+    return f"**Target:** {escaped(of)}, as in the study's file; photographs can take its place (*Laboratory*)."
 
 
 def set_live(session: Session, values: Mapping[str, float | str]) -> None:

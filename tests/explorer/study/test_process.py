@@ -11,11 +11,13 @@ import pytest
 from doe.studies.study import load_study
 from explorer.background.command_process import MOST_WAITING, BackgroundError, CommandStatus, advanced
 from explorer.background.progress import ProgressEvent, StageProgress, failures, given_up, with_event
+from explorer.photograph.target import load_target, remove_target
 from explorer.priority import BACKGROUND
 from explorer.study.edit import StudyEdits
 from explorer.study.process import CalibrationProcess
 from solver import asset_path
 from tests.explorer.background.waiting import only_folder, wait_for
+from tests.explorer.command_line import explorer
 from tests.explorer.viewer.study_panel_at_hand import study_with_own_profiles
 
 PROGRAM = """
@@ -295,6 +297,45 @@ def test_a_change_that_is_not_allowed_starts_nothing(tmp_path):
         process.start("quick", StudyEdits({"X4": {"low": 90e6}}))
     assert not (tmp_path / "out").exists()
     assert process.status().state == "idle"
+
+
+def test_photographs_that_are_the_target_go_with_the_study_that_was_ordered(tmp_path):
+    target = tmp_path / "target"
+    assert explorer("measure", "cone_25_30", "--reference-length", 100, "--target", target).exit_code == 0
+    shutil.copy(asset_path("studies", "sunflower_extract"), tmp_path / "mine.toml")
+    program = tmp_path / "program.py"
+    # The folder is there before the command, with the photographs in it.
+    text = PROGRAM.replace('exist_ok="--resume" in arguments', "exist_ok=True")
+    program.write_text(text.replace("BEHAVIOUR", "time.sleep(0 if '--resume' in arguments else 60)"))
+
+    def page():
+        command = (sys.executable, str(program))
+        return CalibrationProcess(tmp_path / "mine.toml", tmp_path / "out", tmp_path / "runs", command, target)
+
+    process = page()
+    process.start("quick")
+    wait_for(lambda: process.status().done == 3)
+    kept = load_target(target)
+    remove_target(target)  # of no concern to what was ordered
+    folder = only_folder(tmp_path)
+    arguments = json.loads((folder / "arguments.json").read_text())
+    assert arguments[arguments.index("--target") + 1] == str(folder / "target")
+    assert load_target(folder / "target").result == kept.result
+    process.close()
+    later = page()  # the page was started again
+    later.resume()
+    wait_for(lambda: later.status().state == "finished")
+    arguments = json.loads((folder / "arguments.json").read_text())
+    assert ("--target" in arguments, arguments[-1]) == (True, "--resume")
+
+
+def test_a_damaged_target_is_told_before_a_study_starts(tmp_path):
+    (tmp_path / "photograph.json").write_text("{}")
+    file = asset_path("studies", "sunflower_extract")
+    process = CalibrationProcess(file, tmp_path / "out", target=tmp_path)
+    with pytest.raises(ValueError, match=r"photograph\.json"):
+        process.start("quick")
+    assert not (tmp_path / "out").exists()
 
 
 def shipped(tmp_path):

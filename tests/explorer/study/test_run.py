@@ -9,6 +9,7 @@ import pytest
 
 from doe.pour_runner import TRIES
 from doe.studies.study_result import OWN_STAGES
+from explorer.photograph.target import FOLDER, load_target, remove_target
 from explorer.report import folder
 from explorer.study import run as study_run
 from solver import asset_path
@@ -174,3 +175,27 @@ def test_piles_of_reference_and_optimum_are_read_off_the_store(monkeypatch):
     inside = np.abs(u) < 0.9 * radius
     assert np.array(pile.mean)[inside] == pytest.approx(height * (1.0 - np.abs(u[inside]) / radius), abs=1.5e-3)
     assert np.allclose(pile.sd, 0.0)
+
+
+@pytest.mark.usefixtures("formula")
+def test_a_study_against_a_photograph_keeps_it_and_says_what_its_spread_is(tmp_path):
+    target = tmp_path / "target"
+    assert explorer("measure", "cone_25_30", "--reference-length", 100, "--target", target).exit_code == 0
+    done = calibrate(tmp_path, "--target", str(target))
+    assert done.exit_code == 0, done.output
+    assert "read off cone_25_30.jpg" in done.stdout
+    result = json.loads((tmp_path / "out" / "result.json").read_text())
+    (first, *_) = result["study"]["targets"]
+    # A solid of 25° and 30°.
+    assert (first["mean"], first["n"]) == (pytest.approx(27.5, abs=0.1), None)
+    test = result["verification"]["tests"][0]
+    assert (test["target"]["mean"], test["welch"]) == (first["mean"], None)
+    report = (tmp_path / "out" / "report.md").read_text()
+    assert "is of reading one photograph, not measured; the tests take its mean as exact." in report
+    assert load_target(tmp_path / "out" / FOLDER).result == load_target(target).result
+    # What it was started with holds when it goes on, whether or not it is named again.
+    remove_target(target)
+    assert calibrate(tmp_path).exit_code == 2
+    assert calibrate(tmp_path, "--resume").exit_code == 0
+    again = json.loads((tmp_path / "out" / "result.json").read_text())
+    assert again["study"]["targets"] == result["study"]["targets"]

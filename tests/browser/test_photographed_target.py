@@ -1,0 +1,116 @@
+"""A photograph made the target of a project in headless Chromium, and still that after the server was started again."""
+
+import os
+import re
+import subprocess
+import sys
+from contextlib import contextmanager
+
+import pytest
+
+from explorer.project.project import new_project
+from tests.browser.test_page import BEGUN, FLAGS, PATIENCE, SMALL_POUR, room
+
+pytestmark = pytest.mark.browser
+
+
+@contextmanager
+def served(project, data):
+    """Address of the page of ``project``."""
+    settings = [part for one in SMALL_POUR for part in ("--set", one)]
+    server = subprocess.Popen(
+        [sys.executable, "-m", "explorer", "serve", str(project), "--port", "0", *settings],
+        stdout=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"XDG_DATA_HOME": str(data)},
+    )
+    try:
+        found = re.search(r"http://\S+", server.stdout.readline())
+        assert found, "the server did not tell its address"
+        yield found[0]
+    finally:
+        server.terminate()
+        assert server.wait(30) == 0
+
+
+@pytest.fixture(scope="module")
+def browser(chromium):
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("project") / "seeds"
+    new_project(folder, "sunflower_extract")
+    return folder
+
+
+@contextmanager
+def opened(browser, project):
+    """The page; its console has nothing to complain about."""
+    with served(project, project.parent) as address:
+        page = browser.new_page(viewport={"width": 1280, "height": 800})
+        page.set_default_timeout(PATIENCE)
+        complaints = []
+        page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.add_init_script(BEGUN)
+        page.goto(address)
+        yield page
+        page.close()
+        assert complaints == []
+
+
+def seen(page, text):
+    page.get_by_text(text).filter(visible=True).first.wait_for()
+
+
+def shot(page, name):
+    if folder := os.environ.get("REPOSE_SCREENSHOTS"):
+        page.screenshot(path=f"{folder}/{name}.png")
+
+
+def test_a_photograph_is_read_and_made_the_target(browser, project):
+    with opened(browser, project) as page:
+        room(page, "Laboratory")
+        page.get_by_text("Photograph → angle of repose").click()
+        bar = page.get_by_label("Reference bar [mm]")
+        bar.wait_for()
+        bar.fill("100")
+        bar.press("Enter")
+        use = page.get_by_role("button", name="Use as target", exact=True)
+        use.wait_for()
+        assert use.is_disabled()
+        page.get_by_role("button", name="Read the angle", exact=True).click()
+        page.wait_for_function(
+            "[...document.querySelectorAll('button')].some(b => b.innerText === 'Use as target' && !b.disabled)"
+        )
+        use.click()
+        # A solid of 25° and 30°.
+        said = page.locator("#state-line").get_by_text(re.compile(r"27\.\d\d ± 0\.\d\d° · photograph"))
+        said.wait_for()
+        use.scroll_into_view_if_needed()
+        seen(page, "Target of the study: 27.")
+        shot(page, "laboratory")
+        room(page, "Calibrate")
+        seen(page, re.compile(r"27\.\d\d ± 0\.\d\d° read off cone_25_30\.jpg"))
+        shot(page, "calibrate")
+    assert (project / "target" / "photograph.json").is_file()
+
+
+def test_it_is_there_after_a_restart_until_it_is_removed(browser, project):
+    with opened(browser, project) as page:
+        page.locator("#state-line").get_by_text("° · photograph").wait_for()
+        room(page, "Laboratory")
+        page.get_by_text("Photograph → angle of repose").click()
+        page.get_by_role("button", name="Remove the target", exact=True).click()
+        page.locator("#state-line").get_by_text("25.00° ± 2.00°").wait_for()
+        room(page, "Calibrate")
+        seen(page, "as in the study's file")
+        shot(page, "removed")
+    assert not (project / "target").exists()

@@ -1,0 +1,244 @@
+"""A photograph made the target on the page: the laboratory, the state line, the room Calibrate, a study's board."""
+
+import io
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from doe.provenance import PouredPile
+from doe.studies.study import load_study
+from explorer.photograph.target import FOLDER, load_target
+from explorer.project.project import load_project, new_project
+from explorer.scene.source import material_source
+from explorer.study.edit import StudyEdits
+from explorer.viewer.actions import Actions
+from explorer.viewer.board.board import board_json
+from explorer.viewer.board.folder_board import FolderBoard
+from explorer.viewer.board.study_board import PHOTOGRAPHED, photographed_of, study_board
+from explorer.viewer.laboratory.photograph_panel import PhotographPanel
+from explorer.viewer.panel import Now
+from explorer.viewer.shell.state_line import StateLine
+from explorer.viewer.shell.web_pages import WebPages
+from explorer.viewer.study.study_panel import StudyPanel
+from tests.explorer import reported_studies
+from tests.explorer.viewer.page_session import PageSession, event, finished, page_context
+from tests.explorer.viewer.study_panel_at_hand import FakeStudy
+from tests.solver.photograph.rendered import Look, photograph, solid_cover
+
+
+def picture(angle, seed=0):
+    """A solid with both flanks at ``angle``, as PNG."""
+    file = io.BytesIO()
+    Image.fromarray(photograph(solid_cover(angle, angle, 110), Look(width=700, seed=seed))).save(file, "PNG")
+    return file.getvalue()
+
+
+class ProjectPage:
+    """Laboratory, Calibrate and state line of a project in ``folder``, as after a start of the server."""
+
+    def __init__(self, server, folder):
+        self.project = load_project(folder)
+        study = FakeStudy()
+        study.study_file = self.project.study
+        self.actions, self.session = Actions(), PageSession(material_source("sunflower_extract"))
+        page = page_context(server, self.session, self.actions.post, folder / "data", study, FakeStudy())
+        self.page = replace(page, project=self.project)
+        self.photograph, self.calibrate = PhotographPanel(self.page), StudyPanel(self.page)
+        self.line = StateLine(self.page)
+        self.show()
+
+    def show(self):
+        for panel in (self.photograph, self.calibrate, self.line):
+            panel.show(Now(self.session.now))
+
+    def do(self, act):
+        self.actions.post(act)
+        notice = finished(self.actions, self.page.bench_work)
+        self.show()
+        return notice
+
+    def press(self, button):
+        event(button, True)
+        notice = finished(self.actions, self.page.bench_work)
+        self.show()
+        return notice
+
+    def read(self, content, name="pile.png", scale=0.5):
+        assert self.do(lambda: self.photograph._photo._take(name, content)) == ""
+        self.photograph._scale.value = scale
+        return self.do(self.photograph._read)
+
+    @property
+    def measured(self):
+        steps = {one["name"]: one for one in self.page.channel.told["project"]["steps"]}
+        return steps["Measured"]
+
+    @property
+    def disabled(self):
+        panel = self.photograph
+        return [button.disabled for button in (panel._use, panel._add, panel._remove)]
+
+
+@pytest.fixture
+def folder(tmp_path):
+    new_project(tmp_path / "lentil")
+    return tmp_path / "lentil"
+
+
+def test_what_was_read_becomes_the_target_and_is_there_after_a_restart(server, folder):
+    page = ProjectPage(server, folder)
+    assert (page.measured["state"], page.measured["said"]) == ("assumed", "25.00° ± 2.00°")
+    assert "25.00° ± 2.00° \\(assumed\\), n = 10" in page.calibrate._target.content
+    assert page.disabled == [True, True, True]
+    assert page.read(picture(27.0)) == ""
+    assert page.disabled == [False, True, True]
+    assert page.press(page.photograph._use) == ""
+    target = load_target(folder / FOLDER)
+    assert (target.n, target.mean) == (1, pytest.approx(27.0, abs=0.15))
+    for shown in (page, ProjectPage(server, folder)):
+        assert shown.measured["state"] == "measured"
+        assert shown.measured["said"] == f"{target.mean:.2f} ± {target.sd:.2f}° · photograph"
+        assert "how piles differ among each other is not in this ±" in shown.measured["hint"]
+        assert "read off pile.png" in shown.calibrate._target.content
+        assert "One photograph" in shown.photograph._told.content
+        assert shown.disabled[2] is False
+    assert (folder / FOLDER / target.result.piles[0].name).read_bytes() == picture(27.0)
+
+
+def test_more_piles_are_added_and_the_target_removed(server, folder):
+    page = ProjectPage(server, folder)
+    for k, (angle, button) in enumerate(((24.0, "_use"), (27.0, "_add"), (30.0, "_add")), start=1):
+        assert page.read(picture(angle, k), f"pile {k}.png") == ""
+        assert page.press(getattr(page.photograph, button)) == ""
+    target = load_target(folder / FOLDER)
+    # Of 24, 27 and 30: mean 27, SD 3.
+    assert (target.n, target.mean, target.sd) == (3, pytest.approx(27.0, abs=0.15), pytest.approx(3.0, abs=0.2))
+    assert page.measured["said"] == f"27.0 ± {target.sd:.1f}° · 3 photographs"
+    assert "Standard error of the mean" in page.calibrate._target.content
+    assert "is in the target already" in page.press(page.photograph._add)
+    assert load_target(folder / FOLDER).n == 3
+    assert page.press(page.photograph._use) == ""  # the last one alone
+    assert load_target(folder / FOLDER).mean == pytest.approx(30.0, abs=0.15)
+    assert page.press(page.photograph._remove) == ""
+    assert not (folder / FOLDER).exists()
+    assert (page.measured["state"], page.disabled) == ("assumed", [False, True, True])
+    assert "as in the study's file" in page.calibrate._target.content
+
+
+def test_what_shows_no_pile_is_refused_in_a_line(server, folder):
+    page = ProjectPage(server, folder)
+    assert "read a photograph first" in page.do(lambda: page.photograph._keep(anew=True))
+    blank = io.BytesIO()
+    Image.fromarray(np.full((200, 300), 150, dtype=np.uint8)).save(blank, "PNG")
+    assert page.read(blank.getvalue(), "blank.png") == ""
+    notice = page.press(page.photograph._use)
+    assert "no angle: blank" in notice
+    assert "\n" not in notice
+    assert not (folder / FOLDER).exists()
+    assert page.measured["state"] == "assumed"
+
+
+def test_what_is_kept_is_what_was_read_and_not_what_is_chosen_since(server, folder):
+    page = ProjectPage(server, folder)
+    assert page.read(picture(24.0), "first.png") == ""
+    page.do(lambda: page.photograph._photo._take("second.png", picture(30.0)))
+    page.photograph._scale.value = 0.0
+    assert page.press(page.photograph._use) == ""
+    target = load_target(folder / FOLDER)
+    assert (target.mean, target.result.piles[0].unit) == (pytest.approx(24.0, abs=0.15), "m")
+
+
+def test_the_boxes_of_the_target_are_hidden_while_photographs_hold(server, folder):
+    page = ProjectPage(server, folder)
+    order = page.calibrate._order
+    order._goal["mean"].value, order._goal["margin"].value = 20.0, 1.5
+    event(order._goal["mean"], 20.0)
+    page.actions.carry_out()
+    assert order.edits == StudyEdits({}, {"mean": 20.0, "margin": 1.5})
+    page.read(picture(27.0))
+    page.press(page.photograph._use)
+    assert order.edits == StudyEdits({}, {"margin": 1.5})
+    assert {key: box.visible for key, box in order._goal.items()} == {
+        "mean": False,
+        "sd": False,
+        "n": False,
+        "margin": True,
+    }
+    page.press(page.photograph._remove)
+    assert all(box.visible for box in order._goal.values())
+    assert order.edits.target == {"mean": 20.0, "margin": 1.5}
+
+
+def test_a_study_of_another_observable_refuses_before_anything_is_kept(server, folder):
+    page = ProjectPage(server, folder)
+    study = folder / "lentil_study.toml"
+    text = study.read_text()
+    assert "angle_of_repose_deg" in text
+    study.write_text(text.replace('observable = "angle_of_repose_deg"', 'observable = "bulk_density_kg_m3"'))
+    assert load_study(str(study)).targets[0].observable == "bulk_density_kg_m3"
+    page.read(picture(27.0))
+    assert "a photograph gives angle_of_repose_deg" in page.press(page.photograph._use)
+    assert not (folder / FOLDER).exists()
+
+
+@pytest.fixture(scope="module")
+def study_folder(tmp_path_factory):
+    """Output of a study against a cone of 40 mm, with piles of 38 mm at its optimum."""
+    from tests.explorer.command_line import explorer
+
+    folder = tmp_path_factory.mktemp("study")
+    done = explorer("measure", "cone_25_30", "--reference-length", 100, "--target", folder / FOLDER)
+    assert done.exit_code == 0, done.output
+    u = np.linspace(-0.08, 0.08, 41)
+    top = np.clip(0.038 - 0.5 * np.abs(u), 0.0, None)
+    piles = [PouredPile(name, 6, tuple(u), tuple(top), tuple(0.001 + 0 * u)) for name in ("reference", "optimum")]
+    result = reported_studies.result_of_case("planted") | {"piles": [pile.to_dict() for pile in piles]}
+    (folder / "result.json").write_text(json.dumps(result))
+    return folder
+
+
+def charts(board):
+    return {chart["title"]: chart for chart in json.loads(board_json(board))["charts"]}
+
+
+def test_a_board_lays_the_photograph_behind_measured_and_poured_outlines(study_folder):
+    result = reported_studies.typed(json.loads((study_folder / "result.json").read_text()))
+    target = photographed_of(study_folder)
+    found = charts(study_board(result, None, "", target))
+    assert next(iter(found)) == PHOTOGRAPHED
+    spec, caption = found[PHOTOGRAPHED]["spec"], found[PHOTOGRAPHED]["caption"]
+    traces = {trace["name"]: trace for trace in spec["data"]}
+    assert traces["optimum, n = 6"]["y"] == pytest.approx([1e3 * z for z in result.piles[1].mean])
+    assert {"reference ± sd", "optimum ± sd"} <= {name.replace(", n = 6", "") for name in traces}
+    measured = traces["cone_25_30.jpg"]
+    # The cone is 40 mm high, with flanks of 25° and 30°.
+    assert max(measured["y"]) == pytest.approx(40.0, abs=0.5)
+    assert max(measured["x"]) - min(measured["x"]) == pytest.approx(
+        40.0 * sum(1 / np.tan(np.radians([25, 30]))), rel=0.05
+    )
+    (image,) = spec["layout"]["images"]
+    assert image["source"].startswith("data:image/jpeg;base64,")
+    assert image["layer"] == "below"
+    # It reaches around the outline, and below the plate.
+    assert image["x"] < min(measured["x"])
+    assert image["x"] + image["sizex"] > max(measured["x"])
+    assert image["y"] > 40.0
+    assert image["y"] - image["sizey"] < 0.0
+    assert "Behind: cone_25_30.jpg" in caption
+    assert f"{1e3 * result.study.profile.mass:g} g were poured" in caption
+
+
+def test_a_board_has_that_chart_only_where_there_are_both(study_folder, tmp_path):
+    result = reported_studies.typed(json.loads((study_folder / "result.json").read_text()))
+    target = photographed_of(study_folder)
+    assert PHOTOGRAPHED not in charts(study_board(result, None))
+    assert PHOTOGRAPHED not in charts(study_board(replace(result, piles=()), None, "", target))
+    without_scale = replace(target, result=replace(target.result, piles=(replace(target.result.piles[0], unit="px"),)))
+    assert PHOTOGRAPHED not in charts(study_board(result, None, "", without_scale))
+    assert photographed_of(tmp_path) is None
+    pages = WebPages("test")
+    shown = json.loads(pages.page(FolderBoard(study_folder, pages).address).body)
+    assert shown["charts"][0]["title"] == PHOTOGRAPHED
