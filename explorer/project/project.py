@@ -26,7 +26,7 @@ from solver.toml_file import TomlTable, checked, read_toml
 
 FILE = "project.toml"
 FORMAT = 1
-RESULTS = "results"
+RESULTS, REPORT = "results", "report.html"
 
 
 class ProjectFile(TomlTable):
@@ -76,6 +76,20 @@ class Project:
         """
         place = hashlib.sha256(str(self.study.absolute()).encode()).hexdigest()[:8]
         return (self.folder or self.results / "targets" / f"{self.study.stem}-{place}") / FOLDER
+
+    @property
+    def laboratory(self) -> Path:
+        """Reports of the laboratory are kept in here, in a folder each."""
+        return self.results / "laboratory"
+
+    @property
+    def reports(self) -> tuple[Path, ...]:
+        """Folders of this project that hold a report, newest first."""
+        places = [self.results.glob(f"*/*/{REPORT}")]
+        if self.folder is not None:  # what commands left beside its results
+            places += [self.folder.glob(f"{deep}{REPORT}") for deep in ("*/", "*/*/")]
+        found = {file.parent.resolve(): file.stat().st_mtime for place in places for file in place}
+        return tuple(sorted(found, key=lambda folder: found[folder], reverse=True))
 
 
 def new_project(folder: Path, material: str | None = None) -> list[Path]:

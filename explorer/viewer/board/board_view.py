@@ -10,10 +10,10 @@ from pathlib import Path
 import viser
 
 from explorer.background.command_process import CommandStatus
+from explorer.project.project import REPORT
 from explorer.viewer.board.board import Board, board_json
 from explorer.viewer.shell.web_pages import JSON, WebPage, WebPages
 
-REPORT = "report.html"
 HEIGHT = "calc(100dvh - 330px)"
 
 

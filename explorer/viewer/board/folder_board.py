@@ -11,10 +11,11 @@ from explorer.background.output_folder import ResultFile
 from explorer.diagnosis.process import RESULT as DIAGNOSIS
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.errors import CommandError
+from explorer.project.project import REPORT
 from explorer.study.process import PARTIAL
 from explorer.study.process import RESULT as STUDY
 from explorer.viewer.board.board import board_json
-from explorer.viewer.board.board_view import REPORT, published_report
+from explorer.viewer.board.board_view import published_report
 from explorer.viewer.board.diagnosis_board import diagnosis_board
 from explorer.viewer.board.study_board import photographed_of, study_board
 from explorer.viewer.shell.web_pages import JSON, WebPage, WebPages, folder_id

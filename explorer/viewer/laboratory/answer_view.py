@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from html import escape
+from pathlib import Path
 from typing import Any
 
 import viser
 
+from explorer.background.output_folder import new_folder
 from explorer.errors import CommandError
+from explorer.files.output_file import write_whole_bytes
 from explorer.laboratory.command_results import CommandResult
+from explorer.project.project import REPORT
 from explorer.viewer.actions import Post
 from explorer.viewer.output.send_file import send_file
 from explorer.viewer.study.plot_view import PlotView
@@ -18,10 +22,15 @@ NO_CHARTS = "Charts come with an answer that has any."
 
 
 class AnswerView:
-    """Shows one :class:`CommandResult` at a time; ``waiting`` (plain text) stands there before the first."""
+    """Shows one :class:`CommandResult` at a time; ``waiting`` (plain text) stands there before the first.
 
-    def __init__(self, server: viser.ViserServer, waiting: str, post: Post, charts: bool = False) -> None:
-        self._gui, self._versions = server.gui, 0
+    An answer that comes with a report leaves it in a new folder in ``reports``, where the room of reports finds it.
+    """
+
+    def __init__(
+        self, server: viser.ViserServer, waiting: str, post: Post, charts: bool = False, reports: Path | None = None
+    ) -> None:
+        self._gui, self._versions, self._reports = server.gui, 0, reports
         self._answer: CommandResult | None = None
         self._text = server.gui.add_html(small_html(escape(waiting)))
         self._place = server.gui.add_folder(None)
@@ -41,7 +50,7 @@ class AnswerView:
         """Show ``answer`` in place of the one before."""
         self._answer = answer
         self._versions += 1
-        self._text.content = answer_html(answer)
+        self._text.content = answer_html(answer, self._kept(answer))
         self._take.disabled = not answer.files
         if self._plots is not None:
             self._plots.offer(answer.plots, self._versions)
@@ -57,6 +66,16 @@ class AnswerView:
         if self._plots is not None:
             self._plots.dark = dark
 
+    def _kept(self, answer: CommandResult) -> str:
+        """Keep the report of ``answer``; what a person is told of it, empty where there is none."""
+        made = [content for name, content in answer.files.items() if name.endswith(".html")]
+        if self._reports is None or not made:
+            return ""
+        folder = new_folder(self._reports, answer.command.split()[1])
+        folder.mkdir()
+        write_whole_bytes(folder / REPORT, made[0])
+        return f"Its report is in the room Reports: {folder.name}."
+
     def _send(self, client: Any) -> None:
         if self._answer is None:
             raise CommandError("there is no answer yet")
@@ -64,11 +83,14 @@ class AnswerView:
             send_file(client, name, content)
 
 
-def answer_html(answer: CommandResult) -> str:
-    """Text in columns, which a narrow panel scrolls, and the command line, which one click selects as a whole."""
+def answer_html(answer: CommandResult, kept: str = "") -> str:
+    """Text in columns, which a narrow panel scrolls, and the command line, which one click selects as a whole.
+
+    ``kept``: where its report is, in words.
+    """
     box = "padding:0.4em; margin:0.3em 0; background:rgba(128,150,170,0.14)"
     return small_html(
         f"<pre style='{box}; overflow-x:auto; max-height:26em; white-space:pre; user-select:text'>"
-        f"{escape(answer.text)}</pre>On the command line:"
+        f"{escape(answer.text)}</pre>{escape(kept)} On the command line:"
         f"<code style='{box}; display:block; user-select:all; white-space:pre-wrap'>{escape(answer.command)}</code>"
     )

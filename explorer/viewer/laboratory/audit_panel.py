@@ -25,7 +25,7 @@ class AuditPanel(Panel):
         upload = gui.add_upload_button(
             "Upload tables and audit", mime_type=".zip", hint=f"A folder with {FILE} and its tables, as .zip."
         )
-        self.view = AnswerView(server, WAITING, post)
+        self.view = AnswerView(server, WAITING, post, reports=page.project.laboratory)
         audit.on_click(
             lambda _: post(lambda: self._background.start("auditing", lambda: audit_result(None), self.view.show))
         )

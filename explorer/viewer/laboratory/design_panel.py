@@ -53,7 +53,7 @@ class DesignPanel(Panel):
             self._response = gui.add_text("Response", "", hint="Column to analyse; empty where there is only one.")
             self._target = gui.add_text("Target", "", hint="Value that the response should have; empty: none.")
             analyse = gui.add_button("Analyse", hint="Effects, equations, ANOVA, diagnostics, canonical analysis.")
-            self.analysis = AnswerView(server, FILLED, post, charts=True)
+            self.analysis = AnswerView(server, FILLED, post, charts=True, reports=page.project.laboratory)
         make.on_click(lambda _: post(self._make))
         analyse.on_click(lambda _: post(self._analyse))
 

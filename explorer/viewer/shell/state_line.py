@@ -12,6 +12,7 @@ from doe.studies.study_result import StudyResult
 from explorer.background.output_folder import ResultFile
 from explorer.diagnosis.process import RESULT as DIAGNOSIS_RESULT
 from explorer.diagnosis.result import DiagnosisResult
+from explorer.project.project import REPORT
 from explorer.project.steps import (
     Finished,
     Room,
@@ -27,7 +28,6 @@ from explorer.report.content import Banner
 from explorer.report.diagnosis.answer import banner as diagnosis_banner
 from explorer.report.sections.answer import banner as study_banner
 from explorer.study.process import RESULT as STUDY_RESULT
-from explorer.viewer.board.board_view import REPORT
 from explorer.viewer.panel import AROUND, SELDOM, Now, PageContext, Panel
 
 

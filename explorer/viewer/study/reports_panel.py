@@ -5,14 +5,14 @@ from __future__ import annotations
 from html import escape
 from pathlib import Path
 
-from explorer.viewer.board.board_view import HEIGHT, REPORT, published_report
+from explorer.viewer.board.board_view import HEIGHT, published_report
 from explorer.viewer.panel import REPORTS, SELDOM, Now, PageContext, Panel
 from explorer.viewer.study.result_chooser import title
 
 NONE = "(no report yet)"
 EMPTY = (
-    "A report is written at the end of a calibration and of a diagnosis. It is one file that needs nothing else: "
-    "verdict, figures, tables, and a paragraph of methods."
+    "A report is written at the end of a calibration, of a diagnosis, of the analysis of a sheet and of an audit. It "
+    "is one file that needs nothing else: verdict, figures, tables, and a paragraph of methods."
 )
 
 
@@ -24,7 +24,7 @@ class ReportsPanel(Panel):
     def __init__(self, page: PageContext) -> None:
         gui = page.server.gui
         self._page = page
-        self._list = gui.add_dropdown("Report", (NONE,), hint="Of finished studies and diagnoses, newest first.")
+        self._list = gui.add_dropdown("Report", (NONE,), hint="Of this project, newest first.")
         self._frame = gui.add_html("")
         self._text = gui.add_markdown(EMPTY)
         self._folders: dict[str, Path] = {}
@@ -33,10 +33,7 @@ class ReportsPanel(Panel):
 
     def show(self, now: Now) -> None:
         """Offer what there is."""
-        found = [*self._page.study.finished(), *self._page.diagnosis.finished()]
-        reports = [folder for folder in found if (folder / REPORT).is_file()]
-        reports.sort(key=lambda folder: (folder / REPORT).stat().st_mtime, reverse=True)
-        self._folders = {title(folder): folder for folder in reports}
+        self._folders = {title(folder): folder for folder in self._page.project.reports}
         options = tuple(self._folders) or (NONE,)
         if tuple(self._list.options) != options:
             self._list.options = options

@@ -70,7 +70,8 @@ def page_context(server, session=None, post=None, data=Path("nowhere"), study=No
     """What panels are made with; without ``post`` an action is carried out at once."""
     post = post or (lambda action: action())
     bar = server.gui.add_html("", visible=False)
-    return PageContext(server, session, post, study, diagnosis, data, bar, PROJECT, ShellChannel(), WebPages("test"))
+    project = replace(PROJECT, results=data / "results")
+    return PageContext(server, session, post, study, diagnosis, data, bar, project, ShellChannel(), WebPages("test"))
 
 
 def page_of(server, session, diagnosis, data):

@@ -2,6 +2,7 @@
 
 import io
 import zipfile
+from dataclasses import replace
 
 import pytest
 from viser import UploadedFile
@@ -18,6 +19,7 @@ from explorer.viewer.laboratory.laboratory_panel import LaboratoryPanel
 from explorer.viewer.laboratory.photograph_panel import PhotographPanel
 from explorer.viewer.laboratory.rig_panel import RigPanel
 from explorer.viewer.panel import Now
+from explorer.viewer.study.reports_panel import NONE, ReportsPanel
 from solver.assets import asset_path
 from tests.explorer.viewer.page_session import PageSession, event, finished, page_context
 
@@ -31,7 +33,8 @@ class Bench:
         page = page_context(server, self.session, self.actions.post, folder)
         self.background = page.bench_work
         self.bench, self.rig, self.photograph = BenchPanel(page), RigPanel(page), PhotographPanel(page)
-        self.design, self.audit = DesignPanel(page), AuditPanel(page)
+        self.design, self.audit, self.reports = DesignPanel(page), AuditPanel(page), ReportsPanel(page)
+        self.page = page
 
     def do(self, act):
         self.actions.post(act)
@@ -221,3 +224,22 @@ def test_another_test_offers_its_own_example(bench):
     event(bench.bench._test, "shear")
     finished(bench.actions, bench.background)
     assert bench.bench._readings.chosen.endswith(".csv")  # what was sent stays chosen
+
+
+def test_reports_of_the_laboratory_and_of_commands_are_in_the_room_of_reports(bench, tmp_path):
+    bench.reports.show(Now(bench.session.now))
+    assert bench.reports._list.options == (NONE,)
+    bench.design._analyse()
+    assert finished(bench.actions, bench.background) == ""
+    (folder,) = bench.page.project.laboratory.iterdir()
+    assert folder.name in text_of(bench.design.analysis)
+    bench.reports.show(Now(bench.session.now))
+    assert bench.reports._list.options == (folder.name,)
+    address = bench.reports._frame.content.split('href="')[1].split('"')[0]
+    assert bench.page.pages.page(address).body == (folder / "report.html").read_bytes()
+    # Beside a project's file, where its commands leave their folders.
+    own = tmp_path / "lentils"
+    (own / "audit_2").mkdir(parents=True)
+    (own / "audit_2" / "report.html").write_text("<p>an audit</p>")
+    project = replace(bench.page.project, folder=own)
+    assert [one.name for one in project.reports] == ["audit_2", folder.name]
