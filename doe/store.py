@@ -206,6 +206,14 @@ class Store:
             seeds = [seed for (seed,) in self._db.execute("SELECT DISTINCT seed FROM pours ORDER BY seed")]
         return tuple(run for key in pour_keys(scene, seeds).values() if (run := self.find(key)) is not None)
 
+    def wall_times(self, study: str, parameters: Mapping[str, float | str]) -> list[float]:
+        """Wall times [s] of the pours of ``study`` that have these ``parameters``, or lack them."""
+        kept = " AND ".join("ifnull(json_extract(parameters, ?), ?) = ?" for _ in parameters)
+        values = [entry for path, value in parameters.items() for entry in (f'$."{path}"', value, value)]
+        with self._told():
+            found = self._db.execute(f"SELECT wall_s FROM pours WHERE study = ? AND {kept or 1}", [study, *values])
+            return [float(wall_s) for (wall_s,) in found]
+
     def add(self, run: StoredRun) -> None:
         """Keep a run; on disk when this returns."""
         values = dataclasses.asdict(run)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from doe.record import RecordError
 from doe.stages import planned_runs
+from doe.store import default_store
 from doe.studies.study import Study, load_study
 from doe.studies.study_result import AnyStudy, study_from
 from doe.target import Target
@@ -14,6 +15,7 @@ from explorer.background.output_folder import ResultFile
 from explorer.errors import CommandError
 from explorer.photograph.target import PhotographedTarget
 from explorer.session import Session
+from explorer.study.duration import duration_text
 from explorer.study.process import PARTIAL, RESULT
 from explorer.study.runs import scene_of
 from explorer.units import observable_label, observed
@@ -58,6 +60,9 @@ class StudyPanel(Panel):
             (NONE,) if loaded is None else tuple(loaded.profiles),
             hint=None if loaded is None else "; ".join(profile_text(loaded, name) for name in loaded.profiles),
         )
+        self._loaded, self._store = loaded, page.diagnosis.store or default_store()
+        self._asked: tuple[str, str] | None = None
+        self._takes = ""
         self._targets, self._kept = () if loaded is None else loaded.targets, page.target
         self._target = gui.add_markdown("")
         with gui.add_folder("Ranges and target of the next study", expand_by_default=False):
@@ -88,6 +93,8 @@ class StudyPanel(Panel):
         status = self._study.status()
         waiting = self._study.waiting()
         text = state_markdown(status, "study", "runs", now.notice) + waiting_markdown(waiting)
+        if not status.alive:
+            text = f"{self._expected(status.state)}\n\n{text}"
         if self._trouble:
             text += f"\n\n{escaped(self._trouble)}"
         self._view.show(status, text, waiting)
@@ -96,6 +103,15 @@ class StudyPanel(Panel):
         self._comparison.offer(folders)
         self._follow()
         self._show_board()
+
+    def _expected(self, state: str) -> str:
+        """What the chosen profile takes; read anew when another one is chosen, and when a study ends."""
+        asked = str(self._profile.value), state
+        if asked != self._asked:
+            study, self._asked = self._loaded, asked
+            known = study is not None and asked[0] in study.profiles
+            self._takes = duration_text(study, study.profiles[asked[0]], self._store) if study and known else ""
+        return self._takes
 
     def _start(self) -> None:
         self._study.start(str(self._profile.value), self._order.edits)

@@ -1,6 +1,8 @@
 """A panel of studies with a study and a session that only remember, and a person at its controls."""
 
 import json
+from pathlib import Path
+from types import SimpleNamespace
 
 from explorer.background.command_process import CommandStatus
 from explorer.live.messages import SessionState, Status
@@ -25,6 +27,9 @@ def study_with_own_profiles(folder):
     path = folder / "my study.toml"
     path.write_text(text, encoding="utf-8")
     return path
+
+
+STORELESS = SimpleNamespace(store=Path("nowhere.sqlite"))
 
 
 class FakeStudy:
@@ -75,7 +80,9 @@ class PanelAtHand:
 
     def __init__(self, server):
         self.study, self.session, self.actions = FakeStudy(), FakeSession(), Actions()
-        self.panel = StudyPanel(page_context(server, self.session, self.actions.post, study=self.study))
+        self.panel = StudyPanel(
+            page_context(server, self.session, self.actions.post, study=self.study, diagnosis=STORELESS)
+        )
 
     def show(self, notice=""):
         self.panel.show(Now(self.session.status(), notice=notice))

@@ -34,6 +34,7 @@ from solver.scenes.scene import value
 from tests.explorer.viewer.page_session import page_context
 from tests.explorer.viewer.study_panel_at_hand import (
     OWN_PROFILES,
+    STORELESS,
     FakeSession,
     FakeStudy,
     PanelAtHand,
@@ -273,7 +274,7 @@ def test_every_factor_has_a_row_and_what_is_shown_as_in_the_file_is_no_change(ta
 def test_a_study_file_that_cannot_be_read_leaves_the_page_standing(server, tmp_path):
     table = FakeStudy()
     table.study_file = tmp_path / "gone.toml"
-    panel = StudyPanel(page_context(server, FakeSession(), Actions().post, study=table))
+    panel = StudyPanel(page_context(server, FakeSession(), Actions().post, study=table, diagnosis=STORELESS))
     assert "cannot be read" in panel._order._told.content
     assert panel._profile.options == (NONE,)
     assert not panel._order.edits

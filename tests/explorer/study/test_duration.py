@@ -1,0 +1,56 @@
+"""What a study takes is told before it starts, by what stored pours of its kind took."""
+
+from dataclasses import replace
+
+import pytest
+
+from doe.stages import planned_runs
+from doe.store import Store, StoredRun
+from doe.studies.study import load_study
+from explorer.study.duration import duration_text
+from solver import PHYSICS
+
+STUDY = load_study("sunflower_extract")
+QUICK, STANDARD = STUDY.profiles["quick"], STUDY.profiles["standard"]
+
+
+@pytest.fixture
+def store(tmp_path):
+    """Four pours of the quick profile that took 2, 4, 6 and 8 s, and others that say nothing of it."""
+    file = tmp_path / "runs.sqlite"
+    kept = Store(file)
+    rows = [(2.0, STUDY.name, "coarse", QUICK.mass), (4.0, STUDY.name, "coarse", QUICK.mass)]
+    rows += [(6.0, STUDY.name, "coarse", QUICK.mass), (8.0, STUDY.name, "coarse", QUICK.mass)]
+    rows += [(100.0, STUDY.name, "standard", QUICK.mass), (100.0, STUDY.name, "coarse", 2.0 * QUICK.mass)]
+    rows += [(100.0, "another", "coarse", QUICK.mass)]
+    for k, (wall_s, study, spheres, mass) in enumerate(rows):
+        parameters = {"body.spheres": spheres, "rig.mass": mass}
+        kept.add(
+            StoredRun(
+                f"{k}", study, "pilot", "reference", k, PHYSICS, "at_rest", "", parameters, 1, {}, 1e-5, 1, wall_s, b""
+            )
+        )
+    kept.close()
+    return file
+
+
+def test_the_time_is_runs_times_mean_over_cores(store):
+    runs = sum(planned_runs(STUDY, QUICK).values())
+    said = duration_text(STUDY, QUICK, store, 2)
+    # (2 + 4 + 6 + 8) s / 4 for every run, two at a time.
+    assert f"about {runs * 5.0 / 2 / 60:.0f} min on 2 cores (5.0 s a pour, mean of 4 stored ones)" in said
+    assert "0.5 GB" in said
+
+
+def test_what_nothing_tells_is_not_told(store, tmp_path):
+    for file in (store, tmp_path / "none.sqlite"):
+        said = duration_text(STUDY, STANDARD, file, 2)
+        assert "how long is told after the first pours" in said
+        assert " min" not in said
+    assert not (tmp_path / "none.sqlite").exists()
+
+
+def test_a_study_whose_pilot_sizes_it_takes_at_least_that(store):
+    sized = replace(QUICK, resolution_deg=2.0)
+    assert duration_text(STUDY, sized, store, 2).startswith("at least ")
+    assert "at least about" in duration_text(STUDY, sized, store, 2)
