@@ -45,7 +45,8 @@ PARTS = {
     "other engines, short": Part((*PYTEST, "-m", "slow or not slow", "tests/peers/test_short_pour.py")),
     "commands and plug-ins": Part((*SLOW, "tests/explorer/commands/test_limit.py", "tests/test_plugins.py")),
     "page speed": Part((sys.executable, "-m", "tests.browser.page_speed")),
-    "README, whole": Part((*SLOW, "tests/test_readme.py")),
+    "documents": Part((*SLOW, "tests/test_readme.py", "-k", "as_they_are_written")),
+    "README, whole": Part((*SLOW, "tests/test_readme.py", "-k", "to_their_ends")),
     "trefoils": Part((*SLOW, "tests/explorer/diagnosis/test_trefoils.py"), nightly=False),
     "other engines, 18 pours each": Part((*SLOW, "-s", "tests/peers/test_same_pile.py"), nightly=False),
     "benchmark": Part(

@@ -15,10 +15,11 @@ import subprocess
 import sys
 import threading
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -52,6 +53,8 @@ NEVER_WHOLE = (*(command for command in BEGUN if "serve" in command), *(c for c 
 """Commands without an end, and a second calibration, which takes as long as `make calibrate`."""
 AFTER = {"explorer simulate results/diagnosis/corrected.toml --replicates 10": "make diagnose"}
 """Commands that need what one of ``BEGUN`` leaves at its end."""
+AT_NIGHT = ("docs/laboratory.md", "docs/own_material.md", "explorer/design/README.md")
+"""Documents whose commands run in the night: 25 to 70 s of processor time each."""
 SCRIPTS = ("README.md", "docs/python.md")
 """Documents whose Python blocks, one after the other, are a script; those of others only name what there is."""
 PATIENCE = 300.0
@@ -75,6 +78,11 @@ class Block:
         """What a reader types: lines that begin with ``$``, without the comments behind them."""
         typed = [line[2:] for line in self.text.splitlines() if line.startswith("$ ")]
         return [line.split("  #")[0].split(" #")[0].strip() for line in typed]
+
+
+def in_their_time(found: Sequence[Block]) -> list[Any]:
+    """``found`` as parameters, those of ``AT_NIGHT`` marked slow."""
+    return [pytest.param(one, marks=[pytest.mark.slow] if one.document in AT_NIGHT else []) for one in found]
 
 
 def blocks() -> Iterator[Block]:
@@ -167,7 +175,7 @@ def prepare(block, folder):
         (folder / name).write_text("\n".join(tables), encoding="utf-8")
 
 
-@pytest.mark.parametrize("block", TYPED, ids=str)
+@pytest.mark.parametrize("block", in_their_time(TYPED), ids=str)
 def test_the_commands_of_a_block_run_as_they_are_written(block, checkout):
     prepare(block, checkout)
     for command in block.commands:

@@ -25,6 +25,7 @@ from tests.doe.validation.small_model import small_laboratory
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_laboratories_pour_with_and_without_an_effect_and_nothing_twice(tmp_path):
     laboratory = read_laboratory(small_laboratory(tmp_path / "laboratory"))
     measurement = laboratory.declared

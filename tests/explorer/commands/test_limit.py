@@ -46,6 +46,7 @@ def made_up(model, physics=PHYSICS):
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_tables_and_file_follow_from_the_reference(model, tmp_path):
     save(made_up(model), tmp_path / "reference.npz")
     out = tmp_path / "limit.json"

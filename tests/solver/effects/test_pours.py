@@ -53,6 +53,7 @@ def test_the_account_of_the_pour_closes(moist):
     assert np.abs(moist.trace.energy_error).max() < 0.01
 
 
+@pytest.mark.slow
 def test_a_checkpoint_in_between_changes_no_bit(moist, tmp_path):
     batch = Batch(ROOM_WITH_EFFECTS)
     path = tmp_path / "pour.npz"

@@ -91,6 +91,7 @@ def test_the_list_may_be_built_often_or_seldom(whole):
     assert rebuilds[0] > 5 * rebuilds[1] > 0
 
 
+@pytest.mark.slow
 def test_from_a_batch_without_effects_into_one_that_others_have_used():
     """The trajectory up to the switch, and beyond it as long as no effect is on, is that of the batch without."""
     plain = scene_with(gravity=EARTH)

@@ -185,6 +185,7 @@ def test_a_running_pile_approaches_stiffness_and_damping_and_takes_friction_at_o
 SMALL = with_values(QUICK, {"rig.mass": "4g"})
 
 
+@pytest.mark.slow
 def test_pours_of_two_laws_run_side_by_side_with_the_bits_that_each_has_alone():
     scenes = [under(law, SMALL) for law in LAWS]
     jobs = [Job(scene, seed) for seed in (1, 2) for scene in scenes]

@@ -107,6 +107,7 @@ def test_the_file_is_a_parameter_like_others(tmp_path):
         own.rig.surfaces()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("taichi")
 def test_a_pour_through_the_mesh_of_a_cone_is_that_through_the_cone(tmp_path):
     """Both come to rest with everything on the plate; mean times of discharge agree within 3.5 of their errors."""
