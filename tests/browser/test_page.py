@@ -238,6 +238,20 @@ def test_a_slider_moved_by_keyboard_in_one_browser_is_seen_in_another(page, addr
     assert state(page) in ("running", "ended")
 
 
+def test_rooms_are_reached_in_the_window_of_a_phone(page, address):
+    phone = page.context.browser.new_page(viewport={"width": 390, "height": 844}, has_touch=True)
+    phone.set_default_timeout(PATIENCE)
+    phone.add_init_script(BEGUN)
+    phone.goto(address)
+    phone.get_by_role("tab", name="Controls").wait_for()
+    for name in ("Calibrate", "Controls", "Reports"):
+        phone.evaluate(f"window.explorer.openRoom('{name}')")
+        tab = phone.get_by_role("tab", name=name)
+        wait_for(lambda tab=tab: tab.count() and 0 < tab.bounding_box()["y"] < 600)
+        assert tab.get_attribute("aria-selected") == "true"
+    phone.close()
+
+
 @pytest.mark.parametrize("tab", [tab.name for tab in TABS])
 def test_axe_finds_no_serious_fault_in_a_room(page, tab):
     from axe_playwright_python.sync_playwright import Axe

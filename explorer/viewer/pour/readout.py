@@ -43,7 +43,7 @@ TROUBLE = (SessionState.FAILED, SessionState.DIED)
 STYLE = """<style>
 .pour {padding: 0.2em 1.1em 0.4em 0.75em; font-size: 0.82em; line-height: 1.45;}
 .pour .state, .pour .condition {padding: 0.1em 0.7em; border-radius: 0.8em; background: rgba(128,150,170,0.22);}
-.pour .trouble {background: rgba(213,94,0,0.55);}
+.pour .trouble {background: #9a4400; color: white;}
 .pour .big {font-size: 2.4em; font-weight: 600; line-height: 1.2; font-variant-numeric: tabular-nums;}
 .pour .doubt {font-size: 1.2em; line-height: 2.4em; opacity: 0.65; font-variant-numeric: tabular-nums;}
 .pour .dim {opacity: 0.65; height: 2.9em; overflow: hidden;}

@@ -4,6 +4,7 @@ import { element } from "/shell/element.js";
 
 const MARKS = { empty: "○", assumed: "◌", measured: "●", running: "◐", done: "✓", failed: "✕" };
 const RECONNECT_MS = 1000;
+const SMALL_WINDOW = 700;  // pixels, as viser's own
 let channel = null;
 
 function send(command) {
@@ -12,23 +13,35 @@ function send(command) {
 
 // A tab by its name: in a panel that is open, folded to the edge of the window, or in a small window's bottom sheet.
 function openRoom(name) {
-  const found = () => [...document.querySelectorAll("#root [role=tab]")].find(tab => tab.textContent.trim() === name);
-  const tab = found();
-  if (tab) { press(tab); return; }
-  const sheet = [...document.querySelectorAll("#root [role=button]")].find(
+  const tab = () => [...document.querySelectorAll("#root [role=tab]")].find(one => one.textContent.trim() === name);
+  const sheet = () => [...document.querySelectorAll("#root [role=button]")].find(
     one => (one.getAttribute("aria-label") || "").startsWith("Expand panel") && one.textContent.includes(name));
-  if (!sheet) return;
-  press(sheet);
-  requestAnimationFrame(() => { const opened = found(); if (opened) press(opened); });
+  const open = one => {
+    press(one);
+    // In a small window all panels stand below each other; what is opened is drawn a moment later.
+    if (window.innerWidth < SMALL_WINDOW) setTimeout(() => tab()?.scrollIntoView({ block: "start" }), 500);
+  };
+  soon(() => tab() || sheet(), found => {
+    if (found.getAttribute("role") === "tab") { open(found); return; }
+    press(found);
+    soon(tab, open);
+  });
+}
+
+// Does something with what is not there yet, but within seconds.
+function soon(find, act, tries = 20) {
+  const found = find();
+  if (found) act(found);
+  else if (tries) setTimeout(() => soon(find, act, tries - 1), 250);
 }
 
 // A section of the room that was just opened, once it is there: unfolded, and in sight.
-function openSection(name, tries = 20) {
-  const head = [...document.querySelectorAll("#root .mantine-Paper-root > .mantine-Paper-root")].find(
-    one => one.style.cursor === "pointer" && one.textContent.trim().startsWith(name));
-  if (!head) { if (tries) setTimeout(() => openSection(name, tries - 1), 250); return; }
-  if (head.parentElement.getBoundingClientRect().height < 60) head.click();
-  head.scrollIntoView({ block: "start" });
+function openSection(name) {
+  const heads = () => [...document.querySelectorAll("#root .mantine-Paper-root > .mantine-Paper-root")];
+  soon(() => heads().find(one => one.style.cursor === "pointer" && one.textContent.trim().startsWith(name)), head => {
+    if (head.parentElement.getBoundingClientRect().height < 60) head.click();
+    head.scrollIntoView({ block: "start" });
+  });
 }
 
 // viser's movable tabs answer to a key, those inside a panel to a click.
