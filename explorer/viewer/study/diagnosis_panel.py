@@ -136,7 +136,7 @@ class DiagnosisPanel(Panel):
         self._page.session.start(piles.before, seed, SceneSource((), piles.before))
         self._page.beside.pour(piles.after, seed)
         measured = "measured, mean profile" if piles.measured and piles.measured.of_revolution else "measured"
-        names = (f"{measured} ({piles.condition})", "calibrated model", "corrected model")
+        names = (f"{measured} ({piles.condition.name})", "calibrated model", "corrected model")
         self._page.beside.show_measured(piles.measured, names, piles.before)
 
     def _pour_corrected(self) -> None:
