@@ -329,6 +329,7 @@ def _strips(outline: Outline) -> rr.LineStrips2D:
         radii=rr.Radius.ui_points([1.5, 0.5, 0.5]),
         colors=[*COLOURS[outline.name], 255],
         labels=outline.name,
+        show_labels=False,
     )
 
 

@@ -92,7 +92,7 @@ def answer_blueprint(
         for plot, names in {"angle": ["angle_of_repose_deg"], "mass": ["discharged_mass_g"]}.items()
     ]
     if outlines:
-        charts.append(rrb.Spatial2DView(origin="outlines", name="Outlines [mm], height negative"))
+        charts.append(rrb.Spatial2DView(origin="outlines", name="Outlines [mm]"))
     charts += [rrb.BarChartView(origin=f"errors/{of}", name=f"Error / noise, {of}") for of in errors]
     texts = rrb.Tabs(
         rrb.TextDocumentView(origin="answer", name="Answer"),
