@@ -22,7 +22,11 @@ def calibrate(
     out: Path = typer.Option(Path("results"), help="Folder for result.json, the report, its figures and data."),
     resume: bool = typer.Option(False, "--resume", help="Go on in a folder that is not empty."),
     store: Path | None = typer.Option(None, help="SQLite file that keeps every run."),
-    record: Path | None = typer.Option(None, help="Folder for .rrd recordings of the verification pours."),
+    record: Path | None = typer.Option(
+        None,
+        metavar="FILE.rrd|DIR",
+        help="New recording of the piles, a finished OUT is only recorded; or a folder for all verification pours.",
+    ),
     threads: int | None = typer.Option(None, min=1, help="CPU threads; all if not given."),
     tries: int = typer.Option(3, min=1, max=20, help="Seeds tried for one replicate that gives no valid pour."),
     author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
@@ -38,7 +42,9 @@ def calibrate(
         raise CommandError("calibrate: add --headless to run here, or start it from the panel of `explorer serve`")
     # The page cancels with SIGTERM; that has to end like Ctrl-C, with the store closed and finished runs kept.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    order = StudyOrder(study, profile, out, resume, store, record, threads, tries, author, notes, target)
+    one_file = record is not None and record.suffix == ".rrd"
+    folder, piles = (None, record) if one_file else (record, None)
+    order = StudyOrder(study, profile, out, resume, store, folder, threads, tries, author, notes, target, piles)
     try:
         result = run_study(order, typer.echo)
     except StudyStopped as stopped:

@@ -25,6 +25,9 @@ def diagnose(
     author: str = typer.Option("", metavar="NAME", help="Who made it, for the report."),
     notes: str = typer.Option("", metavar="TEXT", help="Notes for the report."),
     apply: bool = typer.Option(False, "--apply", help="Also write the corrected material as OUT/corrected.toml."),
+    record: Path | None = typer.Option(
+        None, metavar="FILE.rrd", help="New recording of the piles; a finished OUT is only recorded."
+    ),
 ) -> None:
     """Calibrate the declared model, test what is left, name the missing effect, confirm it by fresh pours."""
     from explorer.diagnosis.run import DiagnoseOrder, run_diagnose
@@ -46,5 +49,6 @@ def diagnose(
         follow_up=follow_up,
         author=author,
         notes=notes,
+        record=record,
     )
     run_diagnose(order, typer.echo)

@@ -32,11 +32,11 @@ class HeightSurface:
     """It was made of a mean profile, where no scan was measured."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class AnswerPiles:
     """What is drawn side by side in one condition of the data."""
 
-    condition: str
+    condition: Condition
     before: Scene
     """The calibrated declared model."""
     after: Scene
@@ -53,7 +53,7 @@ def answer_piles(result: DiagnosisResult) -> AnswerPiles:
     measurement = load_measurement(folder)
     condition = measurement.fit[0]
     return AnswerPiles(
-        condition.name,
+        condition,
         model_scene(measurement, condition, result.confirmation.before),
         model_scene(measurement, condition, result.confirmation.after),
         measured_surface(result, condition.name),

@@ -24,7 +24,9 @@ from doe.holdout import HoldoutError
 from doe.measurement.load import load_measurement
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.summaries import summaries
+from doe.record import RecordError
 from doe.store import Store, default_store
+from explorer.background.output_folder import ResultFile
 from explorer.background.progress import PROGRESS, PourProgress
 from explorer.diagnosis.corrected import corrected_toml, study_toml
 from explorer.diagnosis.next_folder import read_next, write_next
@@ -46,7 +48,7 @@ from explorer.diagnosis.result import (
     Rule,
 )
 from explorer.errors import CommandError
-from explorer.files.output_file import write_whole
+from explorer.files.output_file import check_new_file, write_whole
 from explorer.files.run_result import made_today, versions
 from explorer.report.diagnosis import diagnosis_report
 from explorer.report.folder import write_report
@@ -81,13 +83,22 @@ class DiagnoseOrder:
     follow_up: Path | None = None
     author: str = ""
     notes: str = ""
+    record: Path | None = None
+    """New file for the answer as a recording."""
 
 
 def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> DiagnosisResult:
     """Run the loop and write the files; returns the content of ``diagnosis.json``.
 
-    Finished pours are kept in the store, so an interrupted one goes on.
+    Finished pours are kept in the store, so an interrupted one goes on. With ``record`` the answer that stands in the
+    folder already, if there is one, is only recorded.
     """
+    if order.record is not None:
+        check_new_file(order.record, suffix=".rrd")
+        if (finished := None if order.resume else _finished(order)) is not None:
+            say(f"{order.out}: finished already; only recorded")
+            _recorded(order.record, finished, say)
+            return finished
     unknown = [name for name in order.effects if name not in EFFECTS]
     if unknown:
         raise CommandError(f"--effects: {unknown[0]!r} is not one of {', '.join(EFFECTS)}")
@@ -136,7 +147,34 @@ def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> DiagnosisR
             say(f"{path}: its calibration, the effect among the factors: explorer calibrate --headless --study {path}")
     for line in error_lines(result):
         say(line)
+    if order.record is not None:
+        _recorded(order.record, result, say)
     return result
+
+
+def _finished(order: DiagnoseOrder) -> DiagnosisResult | None:
+    """The answer in the folder; None where there is none. CommandError where it is that of another question."""
+    content = ResultFile(DiagnosisResult.NAME).read(order.out)
+    if content is None:
+        return None
+    try:
+        result = DiagnosisResult.from_dict(content)
+    except RecordError as error:
+        raise CommandError(f"{order.out / DiagnosisResult.NAME}: {error}") from None
+    asked = DiagnosisOrder(
+        result.order.out, order.effects, order.budget, order.seed, str(order.follow_up) if order.follow_up else None
+    )
+    usual = DiagnosisOrder(result.order.out, (), None, 0, None)
+    if Path(result.data.folder).absolute() != order.folder.absolute() or asked not in (usual, result.order):
+        raise CommandError(f"--out {order.out}: holds the answer to another question")
+    return result
+
+
+def _recorded(path: Path, result: DiagnosisResult, say: Callable[[str], None]) -> None:
+    # rerun takes a second to import; only those who record pay for it.
+    from explorer.logs.answer_recording import record_diagnosis
+
+    record_diagnosis(path, result, say)
 
 
 def result_of(measurement: Measurement, order: DiagnoseOrder, found: Diagnosis, total_s: float) -> DiagnosisResult:

@@ -9,6 +9,7 @@
     scene                       the scene at the beginning, as the text of a material file
 
 Timelines: ``sim_time`` [s] and ``step``. Poses are single precision: an f32 position of 0.1 m resolves 7 nm.
+A recording of several pours has each of them below an entity of its own (`explorer.logs.answer_recording`).
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa  # type: ignore[import-untyped]
 import rerun as rr
+import rerun.blueprint as rrb
 
 from explorer.files.output_file import check_new_file
 from explorer.files.run_result import parameter_values, versions
@@ -48,6 +50,8 @@ FLUSH_INTERVAL = 1.0
 """Wall time [s] after which what was logged is written out: a killed program loses no more than this."""
 PLATE_COLOUR, CONE_COLOUR = (*PLATE, 255), (*GLASS, 70)
 """RGBA, 0 … 255; the colours of the page, all but the plate as if of glass."""
+EYE = 2.3
+"""Distance of the eye from the outlet, in heights of the scene."""
 IN_PLACE = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 """Pose of a surface that nobody has placed."""
 
@@ -76,26 +80,37 @@ class Poses(Protocol):
         """Linear size relative to the declared one, shape (n,)."""
 
 
-class PourLog:
-    """Writes one pour into a new file ``to``, or to a viewer. Use as a context manager, or end with :meth:`close`.
+def opened(to: Path | RunningViewer, layout: rrb.Blueprint) -> rr.RecordingStream:
+    """A stream into a new file ``to``, or to a viewer, that opens as ``layout`` says.
 
     Raises :class:`explorer.errors.CommandError` if the file exists, has another suffix or no folder to be in.
     """
+    if isinstance(to, Path):
+        check_new_file(to, suffix=".rrd")
+    # Otherwise rerun drops bad data with no more than a warning.
+    rr.set_strict_mode(True)
+    stream = rr.RecordingStream(APPLICATION)
+    stream.set_sinks(rr.FileSink(str(to)) if isinstance(to, Path) else rr.GrpcSink(to.url))
+    stream.send_blueprint(layout)
+    return stream
 
-    def __init__(self, to: Path | RunningViewer, scene: Scene, seed: int) -> None:
-        if isinstance(to, Path):
-            check_new_file(to, suffix=".rrd")
-        # Otherwise rerun drops bad data with no more than a warning.
-        rr.set_strict_mode(True)
-        self._scene = scene
+
+class PourLog:
+    """Writes one pour. Use as a context manager, or end with :meth:`close`.
+
+    ``to``: a new file or a viewer, as :func:`opened` takes them, or an open stream, in which the entities of the pour
+    stand below ``under`` ("corrected/") and which is left open.
+    """
+
+    def __init__(self, to: Path | RunningViewer | rr.RecordingStream, scene: Scene, seed: int, under: str = "") -> None:
+        self._scene, self._under = scene, under
         self._shown: set[int] = set()
         self._left: dict[int, npt.NDArray[np.int32]] = {}
         self._gate_shown = False
         self._poses = rig_poses(scene.rig)
         self._placed = np.tile(IN_PLACE, (len(self._poses), 1))
-        self._stream = rr.RecordingStream(APPLICATION)
-        self._stream.set_sinks(rr.FileSink(str(to)) if isinstance(to, Path) else rr.GrpcSink(to.url))
-        self._stream.send_blueprint(blueprint(eye_distance=2.3 * scene_height(scene)))
+        self._borrowed = isinstance(to, rr.RecordingStream)
+        self._stream = to if isinstance(to, rr.RecordingStream) else opened(to, blueprint(EYE * scene_height(scene)))
         self._static(seed)
         self.flush()
 
@@ -121,20 +136,20 @@ class PourLog:
         for curve in CURVES:
             number = curves.get(curve.name, np.nan)
             if np.isfinite(number):
-                self._stream.log(curve_entity(curve), rr.Scalars(number))
+                self._log(curve_entity(curve), rr.Scalars(number))
         if clock.perf_counter() - self._flushed >= FLUSH_INTERVAL:
             self.flush()
 
     def event(self, time: float, text: str, *, step: int | None = None, level: str = "INFO") -> None:
         """Log something that happened at ``time`` [s]."""
         self._at(time, step)
-        self._stream.log("log", rr.TextLog(text, level=level))
+        self._log("log", rr.TextLog(text, level=level))
 
     def outcome(self, time: float, text: str, observed: Mapping[str, Value], *, step: int | None = None) -> None:
         """Log how the pour ended and what was read off its pile."""
         self.event(time, text, step=step)
         document = outcome_document(text, observed)
-        self._stream.log("outcome", rr.TextDocument(document, media_type="text/markdown"))
+        self._log("outcome", rr.TextDocument(document, media_type="text/markdown"))
 
     def flush(self) -> None:
         """Write out what was logged so far: from here on it survives the end of the program."""
@@ -144,7 +159,8 @@ class PourLog:
     def close(self) -> None:
         """Write out the rest and end the file."""
         self._stream.flush()
-        self._stream.disconnect()
+        if not self._borrowed:
+            self._stream.disconnect()
 
     def __enter__(self) -> Self:
         return self
@@ -155,17 +171,20 @@ class PourLog:
         self.close()
 
     def _static(self, seed: int) -> None:
-        self._stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        self._log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         document = parameters_document(self._scene, seed)
-        self._stream.log("parameters", rr.TextDocument(document, media_type="text/markdown"), static=True)
-        self._stream.log("scene", rr.TextDocument(material_toml(self._scene)), static=True)
+        self._log("parameters", rr.TextDocument(document, media_type="text/markdown"), static=True)
+        self._log("scene", rr.TextDocument(material_toml(self._scene)), static=True)
         for curve in CURVES:
-            self._stream.log(curve_entity(curve), rr.SeriesLines(names=curve.name), static=True)
+            self._log(curve_entity(curve), rr.SeriesLines(names=curve.name), static=True)
         self._rig = rig_triangles(self._scene.rig)
         for name, triangles in self._rig.items():
             if name != GATE_NAME:
                 colour = PLATE_COLOUR if name == PLATE_NAME else CONE_COLOUR
-                self._stream.log(f"world/{name}", _mesh(triangles, colour), static=True)
+                self._log(f"world/{name}", mesh(triangles, colour), static=True)
+
+    def _log(self, entity: str, what: rr.AsComponents, static: bool = False) -> None:
+        self._stream.log(self._under + entity, what, static=static)
 
     def _at(self, time: float, step: int | None) -> None:
         self._stream.set_time(TIMELINE, duration=time)
@@ -183,17 +202,17 @@ class PourLog:
         chosen = mine & poses.inside
         if not chosen.any():
             if k in self._shown:
-                self._stream.log(entity, rr.Clear(recursive=False))
+                self._log(entity, rr.Clear(recursive=False))
                 self._shown.remove(k)
             return
         if k not in self._shown:
             colour = component_colour(k)
-            self._stream.log(entity, _mesh(body_triangles(body), (*colour, 255)))
+            self._log(entity, mesh(body_triangles(body), (*colour, 255)))
             self._shown.add(k)
         self._departed(k, entity, np.flatnonzero(~poses.inside[mine]).astype(np.int32))
         # wxyz here, xyzw in rerun
         turned = poses.quaternion[chosen][:, [1, 2, 3, 0]].astype(np.float32)
-        self._stream.log(
+        self._log(
             entity,
             rr.InstancePoses3D(
                 translations=poses.position[chosen].astype(np.float32),
@@ -209,15 +228,15 @@ class PourLog:
         if k not in self._left or not np.array_equal(left, self._left[k]):
             self._left[k] = left
             # Typed: rerun drops an empty list of no type.
-            self._stream.log(entity, rr.DynamicArchetype("Departed", components={"left": pa.array(left)}))
+            self._log(entity, rr.DynamicArchetype("Departed", components={"left": pa.array(left)}))
 
     def _gate(self, shut: bool) -> None:
         if GATE_NAME not in self._rig:
             return
         if shut and not self._gate_shown:
-            self._stream.log(f"world/{GATE_NAME}", _mesh(self._rig[GATE_NAME], PLATE_COLOUR))
+            self._log(f"world/{GATE_NAME}", mesh(self._rig[GATE_NAME], PLATE_COLOUR))
         elif self._gate_shown and not shut:
-            self._stream.log(f"world/{GATE_NAME}", rr.Clear(recursive=False))
+            self._log(f"world/{GATE_NAME}", rr.Clear(recursive=False))
         self._gate_shown = shut
 
     def _surfaces(self, poses: npt.NDArray[np.float64]) -> None:
@@ -226,11 +245,12 @@ class PourLog:
             if not np.array_equal(pose, before):
                 # wxyz here, xyzw in rerun
                 turned = rr.Quaternion(xyzw=pose[[4, 5, 6, 3]])
-                self._stream.log(f"world/{name}", rr.Transform3D(translation=pose[:3], quaternion=turned))
+                self._log(f"world/{name}", rr.Transform3D(translation=pose[:3], quaternion=turned))
         self._placed = self._poses = poses
 
 
-def _mesh(triangles: Triangles, colour: tuple[int, int, int, int]) -> rr.Mesh3D:
+def mesh(triangles: Triangles, colour: tuple[int, int, int, int]) -> rr.Mesh3D:
+    """``triangles`` in one colour, RGBA 0 … 255."""
     return rr.Mesh3D(
         vertex_positions=triangles.vertices,
         vertex_normals=triangles.normals,

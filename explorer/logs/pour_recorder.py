@@ -45,7 +45,7 @@ class PourRecorder:
 
     def __init__(self, paths: Sequence[Path]) -> None:
         self._paths = paths
-        self._open: dict[int, _Recording] = {}
+        self._open: dict[int, FollowedPour] = {}
         self._pours: dict[int, RecordedPour] = {}
 
     @property
@@ -56,17 +56,16 @@ class PourRecorder:
     def sample(self, k: int, pour: Pour) -> None:
         """Log the present state of pour ``k`` if a frame is due (always when it has ended)."""
         if k not in self._open:
-            self._open[k] = _Recording(PourLog(self._paths[k], pour.scene, pour.seed))
+            self._open[k] = FollowedPour(PourLog(self._paths[k], pour.scene, pour.seed))
             self._pours[k] = RecordedPour(self._paths[k])
         if self._open[k].sample(pour):
             self._pours[k] = self._pours[k].with_frame(pour.time)
 
     def finish(self, k: int, record: Record) -> None:
         """Log the outcome of pour ``k`` and close its file."""
-        recording = self._open.pop(k)
-        text = outcome_text(record.outcome, record.message)
-        with recording.log as log:
-            log.outcome(recording.time, text, observe(record), step=record.steps)
+        followed = self._open.pop(k)
+        with followed.log:
+            followed.finish(record)
 
     def __enter__(self) -> Self:
         return self
@@ -75,13 +74,13 @@ class PourRecorder:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         with ExitStack() as stack:
-            for recording in self._open.values():
-                stack.enter_context(recording.log)
+            for followed in self._open.values():
+                stack.enter_context(followed.log)
         self._open.clear()
 
 
-class _Recording:
-    """One file and what was logged last."""
+class FollowedPour:
+    """The log of one pour and what was logged last."""
 
     def __init__(self, log: PourLog) -> None:
         self.log = log
@@ -112,6 +111,11 @@ class _Recording:
         bodies, surfaces = pour.bodies(), pour.surface_poses()
         self.log.frame(pour.time, bodies, curves, step=pour.steps, gate_shut=pour.gate_shut, surfaces=surfaces)
         return bool(bodies.inside.any())
+
+    def finish(self, record: Record) -> None:
+        """Log the outcome and what was read off the pile."""
+        text = outcome_text(record.outcome, record.message)
+        self.log.outcome(self.time, text, observe(record), step=record.steps)
 
 
 def _curves(sample: Mapping[str, float]) -> Mapping[str, float]:

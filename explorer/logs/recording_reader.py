@@ -45,11 +45,14 @@ class _Rows:
     values: pa.Array
 
 
-def read_recording(path: Path) -> Recording:
-    """Read ``path``. Raises :class:`CommandError` where it is no recording of a pour, in one line."""
+def read_recording(path: Path, under: str = "") -> Recording:
+    """Read ``path``; of several pours in it the one below the entity ``under`` ("corrected").
+
+    Raises :class:`CommandError` where it is no recording of a pour, in one line.
+    """
     check_recording(path)
     try:
-        found = _columns(path)
+        found = _below(under, _columns(path))
     except Exception as error:  # the reader raises several kinds for a file that is cut within a chunk
         raise CommandError(f"{path}: cannot be read as a recording: {str(error).splitlines()[0]}") from None
     components = tuple(_component(name, found[name]) for name in found if name.startswith(BODIES))
@@ -89,6 +92,12 @@ def _scene(text: str, poured: set[str]) -> Scene | None:
     except (ValueError, OSError):
         return None
     return scene if scene is not None and poured <= {body.name for body in scene.bodies} else None
+
+
+def _below(under: str, found: Mapping[str, dict[str, _Rows]]) -> dict[str, dict[str, _Rows]]:
+    """The entities below ``under``, named as if it were the root."""
+    root = f"/{under}" if under else ""
+    return {name.removeprefix(root): columns for name, columns in found.items() if name.startswith(f"{root}/")}
 
 
 def _columns(path: Path) -> dict[str, dict[str, _Rows]]:

@@ -21,6 +21,7 @@ import numpy.typing as npt
 
 from doe.pour_runner import PourRunner
 from doe.provenance import About, PouredPile
+from doe.record import RecordError
 from doe.run_records import Run
 from doe.stages import planned_runs
 from doe.store import Store, StoredRun, default_store
@@ -37,15 +38,16 @@ from doe.studies.study_result import (
     StudyResult,
     Timing,
 )
+from explorer.background.output_folder import ResultFile
 from explorer.background.progress import PROGRESS, RunProgress, told_of_pauses
 from explorer.errors import CommandError
-from explorer.files.output_file import write_whole
+from explorer.files.output_file import check_new_file, write_whole
 from explorer.files.run_result import made_today, versions
 from explorer.photograph.target import FOLDER, PhotographedTarget, load_target
 from explorer.report import write_report
 from explorer.report.photograph import PhotographResult
 from explorer.report.set_up import set_up_of
-from explorer.study.process import PARTIAL
+from explorer.study.process import PARTIAL, RESULT
 from solver import WorkerPool, pour_rig, unpacked
 from solver.arch import chosen
 from solver.observables.made_up import estimator_bias
@@ -78,14 +80,23 @@ class StudyOrder:
     notes: str = ""
     target: Path | None = None
     """Folder of photographs that take the place of the study's own angle of repose (`explorer.photograph.target`)."""
+    piles: Path | None = None
+    """New file for the answer as a recording; ``record``: folder for all pours of the verification."""
 
 
 def run_study(order: StudyOrder, say: Callable[[str], None]) -> StudyResult:
     """Run the whole chain and write the files; returns the content of ``result.json``.
 
-    Finished runs are kept in the store, so a study that was interrupted goes on where it stopped.
+    Finished runs are kept in the store, so a study that was interrupted goes on where it stopped. With ``piles`` the
+    result that stands in the folder already, if there is one, is only recorded.
     """
     study, profile = with_profile(load_study(order.study), order.profile)
+    if order.piles is not None:
+        check_new_file(order.piles, suffix=".rrd")
+        if (finished := None if order.resume else _finished(order.out, study.file, profile.name)) is not None:
+            say(f"{order.out}: finished already; only recorded")
+            _record_piles(order.piles, finished, say)
+            return finished
     photographed = given_target(order)
     if photographed is not None:
         study = replace(study, targets=photographed.of_study(study.targets))
@@ -140,6 +151,8 @@ def run_study(order: StudyOrder, say: Callable[[str], None]) -> StudyResult:
     say(f"{order.out}/report.html, report.md, result.json")
     if missing:
         say(missing)
+    if order.piles is not None:
+        _record_piles(order.piles, result, say)
     return result
 
 
@@ -206,6 +219,27 @@ def _recorder(folder: Path) -> StudyRecorder:
     from explorer.logs.pour_recorder import StudyRecorder
 
     return StudyRecorder(folder)
+
+
+def _record_piles(path: Path, result: StudyResult, say: Callable[[str], None]) -> None:
+    from explorer.logs.answer_recording import record_study
+
+    record_study(path, result, say)
+
+
+def _finished(out: Path, file: Path, profile: str) -> StudyResult | None:
+    """The result in the folder; None where there is none. CommandError where it is of another study or profile."""
+    content = ResultFile(RESULT).read(out)
+    if content is None:
+        return None
+    try:
+        result = StudyResult.from_dict(content)
+    except RecordError as error:
+        raise CommandError(f"{out / RESULT}: {error}") from None
+    found = result.study
+    if (Path(found.file).absolute(), found.profile.name) != (file.absolute(), profile):
+        raise CommandError(f"--out {out}: holds the result of {found.file}, profile {found.profile.name}")
+    return result
 
 
 class PartialResult:

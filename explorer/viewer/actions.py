@@ -79,14 +79,19 @@ def button_group(gui: viser.GuiApi, title: str, acts: Mapping[str, Action], post
 
 def client_buttons(
     gui: viser.GuiApi, title: str, acts: Mapping[str, ClientAction], post: Post, hint: str | None = None
-) -> None:
-    """A row of buttons named by the keys of ``acts``; a click posts the action with the browser that it came from."""
+) -> Any:
+    """A row of buttons named by the keys of ``acts``; a click posts the action with the browser that it came from.
+
+    Returns viser's handle.
+    """
     buttons = gui.add_button_group(title, tuple(acts), hint=hint)
 
     @buttons.on_click
     def _(event: viser.GuiEvent[Any]) -> None:
         if event.client is not None and event.target.value in acts:
             post(partial(acts[event.target.value], event.client))
+
+    return buttons
 
 
 def add_keys(gui: viser.GuiApi, acts: Mapping[str, Action], keys: Mapping[str, Any], post: Post) -> None:

@@ -18,13 +18,11 @@ from explorer.files.exports import zipped
 from explorer.logs.recording import recorded_lines
 from explorer.viewer.guarded_server import address, guarded_server
 from explorer.viewer.output.recording_switch import HTML, RRD, RecordingSwitch
-from explorer.viewer.output.send_file import send_file
+from explorer.viewer.output.send_file import refuse_large, send_file
 from explorer.viewer.panel import EXPORT, Now, PageContext, Panel
 from explorer.viewer.shell.web_pages import WebPages
 from explorer.viewer.view import small_html
 
-MOST_SENT = 200_000_000
-"""Bytes of a recording that are sent to a browser."""
 START, STOP, DOWNLOAD, REPLAY = "Start", "Stop", "Download", "Replay here"
 
 
@@ -86,10 +84,7 @@ class RecordingPanel(Panel):
             )
         elif chosen == DOWNLOAD and client is not None:
             files = self._recording.files()
-            size = sum(file.stat().st_size for file in files)
-            if size > MOST_SENT:
-                listed = ", ".join(map(str, files))
-                raise CommandError(f"recording: {size / 1e6:.0f} MB are too much to send; fetch {listed}")
+            refuse_large(files)
             if len(files) == 1:
                 send_file(client, files[0].name, files[0].read_bytes())
             else:

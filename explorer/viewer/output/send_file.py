@@ -1,11 +1,26 @@
-"""A file for the person at a browser."""
+"""A file for the person at a browser, unless it is too large."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
+
+from explorer.errors import CommandError
+
+MOST_SENT = 200_000_000
+"""Bytes of a recording that are sent to a browser."""
 
 
 def send_file(client: Any, name: str, content: bytes) -> None:
     """Have a browser keep ``content`` as a file called ``name``."""
     # At once: otherwise a person gets a link in a notification, and has to press it.
     client.send_file_download(name, content, save_immediately=True)
+
+
+def refuse_large(files: Sequence[Path]) -> None:
+    """Raise CommandError where recordings are too much to send together; it says where they are."""
+    size = sum(file.stat().st_size for file in files)
+    if size > MOST_SENT:
+        listed = ", ".join(map(str, files))
+        raise CommandError(f"recording: {size / 1e6:.0f} MB are too much to send; fetch {listed}")

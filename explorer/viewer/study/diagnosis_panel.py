@@ -20,6 +20,7 @@ from explorer.units import checked
 from explorer.viewer.actions import button_group
 from explorer.viewer.board.board_view import BoardView
 from explorer.viewer.board.diagnosis_board import diagnosis_board
+from explorer.viewer.output.pile_recording import PileRecording
 from explorer.viewer.panel import DIAGNOSE, SELDOM, Now, PageContext, Panel
 from explorer.viewer.study.process_view import ProcessView, escaped, orders, state_markdown, waiting_markdown
 from explorer.viewer.study.result_chooser import ResultChooser
@@ -76,6 +77,7 @@ class DiagnosisPanel(Panel):
             hint="Measured pile, calibrated model and corrected model in the scene, with one clock and one camera; or "
             "the corrected model alone, as the pour that the controls act on.",
         )
+        self._recording = PileRecording(page, self._record_order)
         self._board = BoardView(server, page.pages, "/diagnosis/page.json", "Diagnosis")
 
     def _start(self) -> None:
@@ -108,6 +110,7 @@ class DiagnosisPanel(Panel):
         self._view.show(status, text + waiting_markdown(waiting), waiting)
         self._chooser.offer(self._diagnosis.finished())
         self._follow()
+        self._recording.show()
         self._show_board()
 
     def _follow(self) -> None:
@@ -136,7 +139,7 @@ class DiagnosisPanel(Panel):
         self._page.session.start(piles.before, seed, SceneSource((), piles.before))
         self._page.beside.pour(piles.after, seed)
         measured = "measured, mean profile" if piles.measured and piles.measured.of_revolution else "measured"
-        names = (f"{measured} ({piles.condition})", "calibrated model", "corrected model")
+        names = (f"{measured} ({piles.condition.name})", "calibrated model", "corrected model")
         self._page.beside.show_measured(piles.measured, names, piles.before)
 
     def _pour_corrected(self) -> None:
@@ -147,6 +150,12 @@ class DiagnosisPanel(Panel):
             session.start(piles.after, session.status().seed, SceneSource((), piles.after))
 
         self._page.background.start("reading the measured data", lambda: answer_piles(result), begin)
+
+    def _record_order(self) -> tuple[Path, list[str]]:
+        """Folder of the shown diagnosis, and its command line."""
+        result, folder = self._found(), self._chooser.folder or self._present()
+        assert folder is not None
+        return folder, ["diagnose", result.data.folder]
 
     def _present(self) -> Path | None:
         """Folder of the diagnosis that was started last, or before any the newest finished one."""

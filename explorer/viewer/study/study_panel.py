@@ -9,7 +9,7 @@ from doe.record import RecordError
 from doe.stages import planned_runs
 from doe.store import default_store
 from doe.studies.study import Study, load_study
-from doe.studies.study_result import AnyStudy, study_from
+from doe.studies.study_result import AnyStudy, StudyResult, study_from
 from doe.target import Target
 from explorer.background.output_folder import ResultFile
 from explorer.errors import CommandError
@@ -21,6 +21,7 @@ from explorer.study.runs import scene_of
 from explorer.units import observable_label, observed
 from explorer.viewer.board.board_view import BoardView
 from explorer.viewer.board.study_board import listed_runs, photographed_of, study_board
+from explorer.viewer.output.pile_recording import PileRecording
 from explorer.viewer.panel import CALIBRATE, SELDOM, Now, PageContext, Panel
 from explorer.viewer.study.comparison_panel import ComparisonPanel
 from explorer.viewer.study.order_panel import OrderPanel
@@ -71,6 +72,7 @@ class StudyPanel(Panel):
         self._view = ProcessView(server, "Study", acts, post)
         with gui.add_folder("Other results", expand_by_default=False):
             self._chooser = ResultChooser(server, "Result", PRESENT, RESULT, post, self._follow)
+        self._recording = PileRecording(page, self._record_order)
         self._channel = page.channel
         self._board = BoardView(server, page.pages, "/study/page.json", "Study")
         self._channel.offer("open_run", lambda asked: post(lambda: self._open_run(asked)))
@@ -102,6 +104,7 @@ class StudyPanel(Panel):
         self._chooser.offer(folders)
         self._comparison.offer(folders)
         self._follow()
+        self._recording.show()
         self._show_board()
 
     def _expected(self, state: str) -> str:
@@ -168,6 +171,14 @@ class StudyPanel(Panel):
         self._session.restart(scene, found[1].seed)
         if not same:
             raise CommandError("program, study file or material have changed since that run: this pour may differ")
+
+    def _record_order(self) -> tuple[Path, list[str]]:
+        """Folder of the shown study, and its command line."""
+        result, folder = self._result, self._chooser.folder or self._present()
+        if not isinstance(result, StudyResult) or folder is None:
+            raise CommandError("there is no finished study yet: start one, or choose one under Other results")
+        study = result.study
+        return folder, ["calibrate", "--headless", "--study", study.file, "--profile", study.profile.name]
 
     def _present(self) -> Path | None:
         """Folder of the study that was started last, or before any the newest finished one."""

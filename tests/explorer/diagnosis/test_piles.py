@@ -55,7 +55,7 @@ def test_both_models_stand_in_the_set_up_of_the_first_fitted_condition():
         after=replace(result.confirmation.after, theta=theta, effects=(effect,)),
     )
     piles = answer_piles(replace(result, data=replace(result.data, folder=str(folder)), confirmation=models))
-    assert piles.condition == measurement.fit[0].name
+    assert piles.condition.name == measurement.fit[0].name
     for one, wanted in zip(measurement.parameters, theta, strict=True):
         assert value(piles.before, one.path) == wanted
     (path, amplitude), *_ = effect_values(*effect).items()

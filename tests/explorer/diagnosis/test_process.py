@@ -225,7 +225,7 @@ def test_the_panel_asks_and_shows(server, tmp_path):
         ("base model", "30 of 30", "done", "*64* settings"),
         ("screening", "5 of 20", "▶", ""),
     ]
-    for act in (panel._show_piles, panel._pour_corrected):
+    for act in (panel._show_piles, panel._pour_corrected, panel._record_order):
         with pytest.raises(CommandError, match="no finished diagnosis yet"):
             act()
     process.now = CommandStatus("finished", message="report: /home/me/out/report.html")
@@ -233,6 +233,7 @@ def test_the_panel_asks_and_shows(server, tmp_path):
     (tmp_path / "diagnosis.json").write_text(json.dumps(result_of_case("effect")))
     panel.show(Now(None))
     assert "/home/me/out/report.html" in panel._view._text.content
+    assert panel._record_order() == (tmp_path, ["diagnose", "data/made up"])
     shown = board(panel)
     assert shown["banner"]["headline"].startswith(Word.EFFECT_FOUND)
     assert "Residuals before and after" in [chart["title"] for chart in shown["charts"]]

@@ -63,6 +63,17 @@ def test_every_target_has_a_profiler(table, tmp_path):
         assert unit in profiler._words.content
 
 
+def test_the_piles_of_the_study_that_is_shown_are_recorded(table, result, tmp_path):
+    table.show()
+    with pytest.raises(ValueError, match="no finished study yet"):
+        table.panel._record_order()
+    table.study.out = written(tmp_path / "study-1", result)
+    table.show()
+    file, profile = result["study"]["file"], result["study"]["profile"]["name"]
+    order = ["calibrate", "--headless", "--study", file, "--profile", profile]
+    assert table.panel._record_order() == (tmp_path / "study-1", order)
+
+
 def test_values_that_act_on_restart_begin_the_pour_anew():
     session = FakeSession()
     set_live(session, {"rig.outlet_height": 0.07, "pair.seed.seed.static_friction": 0.5})
