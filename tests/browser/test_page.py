@@ -245,10 +245,10 @@ def test_rooms_are_reached_in_the_window_of_a_phone(page, address):
     phone.goto(address)
     phone.get_by_role("tab", name="Controls").wait_for()
     for name in ("Calibrate", "Controls", "Reports"):
+        tab = phone.get_by_role("tab", name=name, selected=True)
         phone.evaluate(f"window.explorer.openRoom('{name}')")
-        tab = phone.get_by_role("tab", name=name)
-        wait_for(lambda tab=tab: tab.count() and 0 < tab.bounding_box()["y"] < 600)
-        assert tab.get_attribute("aria-selected") == "true"
+        tab.wait_for()
+        tab.scroll_into_view_if_needed()
     phone.close()
 
 

@@ -55,7 +55,7 @@ WORDS: dict[Kind, Word] = {
 
 def banner(result: DiagnosisResult) -> Banner:
     """The answer as a verdict."""
-    found = enumeration([spelled(one) for one in result.named])
+    found = enumeration([spelled(one).replace("`", "").replace("_", " ") for one in result.named])
     of = f"{found}, {chance(result.probability(result.named[0]))}" if result.named else ""
     return Banner(WORDS[result.kind], of, verdict_sentence(result), _what_next(result))
 
