@@ -164,7 +164,8 @@ def change_lines(found: Iterable[Difference]) -> list[str]:
             lines.append(f"{' '.join([words, '–'.join(mine[0].path.split('.')[1:-1])]).strip()} {mine[0].change}")
         else:
             before, now = span(mine, [one.before for one in mine]), span(mine, [one.now for one in mine])
-            lines.append(f"{words} of {len(mine)} {before} → {now}")
+            kind = mine[0].path.partition(".")[0]
+            lines.append(f"{words} of {len(mine)} {kind}s {before} → {now}")
     return lines
 
 

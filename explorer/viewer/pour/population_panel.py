@@ -139,9 +139,14 @@ class PopulationPanel(Panel):
 
 def told_difference(former: Scene, scene: Scene) -> str:
     """What was changed, in words; empty where nothing was that can be compared."""
-    if former.rig.name != scene.rig.name:
+    if former.rig.name != scene.rig.name or names_of(former) != names_of(scene):
         return ""
     return "; ".join(change_lines(differences(former, scene)))
+
+
+def names_of(scene: Scene) -> tuple[str, ...]:
+    """Names of the bodies that are poured."""
+    return tuple(body.name for body in scene.bodies)
 
 
 def population_html(
@@ -152,11 +157,13 @@ def population_html(
     if population is None:
         lines.insert(0, "Looking for other pours with these parameters …")
         return _block("", lines)
-    lines = [_compared_line(population, changed, comparison), _of_this_pour(population, pour), *lines]
+    lines = [*lines, _compared_line(population, changed, comparison), _of_this_pour(population, pour)]
     sample = population.sample
     head = "" if population.n < 2 else f"<b>{sample.mean:.1f} ± {sample.sd:.1f}°</b> over {population.n} seeds; "
     drawn = strip_svg(population, pour) if population.n else ""
-    return _block(f"<div>{head}{_few(population)}</div>{drawn}", lines)
+    told = f"<div>{head}{_few(population)}</div>{drawn}"
+    # While more are poured, that comes first: the box shows five lines.
+    return _block("", [lines[0], told, *lines[1:]]) if command.alive else _block(told, lines)
 
 
 def strip_svg(population: Population, pour: ThisPour) -> str:

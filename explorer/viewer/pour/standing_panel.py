@@ -62,7 +62,7 @@ class Rest:
 
 
 class StandingPanel(Panel):
-    """The box; at the end of the room the ghost's line, and *Dismiss the ghost*."""
+    """The box; at the end of the room *Dismiss the ghost*."""
 
     name, tab = "standing", CONTROLS
 
@@ -74,7 +74,6 @@ class StandingPanel(Panel):
         self._ghost: BodyNodes | None = None
         self._former: Rest | None = None
         self._box = gui.add_html("")
-        self._about_ghost = gui.add_html("", visible=False, order=AT_THE_END)
         self._dismiss = gui.add_button("Dismiss the ghost", visible=False, order=AT_THE_END)
         self._dismiss.on_click(lambda _: page.post(self._take_ghost_away))
 
@@ -88,16 +87,16 @@ class StandingPanel(Panel):
         self._frame = now.frame
         self._follow(status, now.frame)
         lines = [escape(text) for text in notes(status, now.events, now.notice)]
+        if self._former is not None:
+            lines.insert(0, ghost_text(self._former, status))
         if said := self._what_the_change_did(status, now.frame):
             # In place of the change itself, which it names.
             lines[-1:] = [said]
         box = box_html(lines)
         if self._box.content != box:
             self._box.content = box
-        ghost = small_html(ghost_text(self._former, status)) if self._former is not None else ""
-        if self._about_ghost.content != ghost:
-            self._about_ghost.content = ghost
-            self._about_ghost.visible = self._dismiss.visible = bool(ghost)
+        if self._dismiss.visible != (self._former is not None):
+            self._dismiss.visible = self._former is not None
 
     def close(self) -> None:
         """Take the ghost off the page."""
@@ -182,7 +181,7 @@ def standing_text(before: Scene, now: Scene, moved: npt.NDArray[np.float32]) -> 
     many = f"{loose} of {len(moved)} bodies by more than {1e3 * STOOD:g} mm, up to {furthest}"
     names = escape("; ".join(change_lines(found)))
     if loose > FEW * len(moved):
-        return f"{names}: the pile moved, {many}. It was not poured with these values."
+        return f"<b>Not poured with these values</b>, but moved by them: {many}. {names}."
     acts = dict.fromkeys(WHEN.get(one.path.rpartition(".")[2], OTHERWISE) for one in found)
     little = many if loose else f"no body moved by more than {furthest}"
     return f"{names}: <b>the pile stands</b> ({little}); {', '.join(acts)}: shake it, tap it, or pour again."
@@ -198,4 +197,4 @@ def ghost_text(former: Rest, status: Status) -> str:
     angle = f"{former.angle:.1f}°" if math.isfinite(former.angle) else "no angle"
     found = "; ".join(change_lines(differences(former.scene, status.scene)))
     since = f"; since then {escape(found)}" if found else ""
-    return f"Grey: the former pile, {angle} in one pour{since}."
+    return f"Grey: the former pile, {angle}; one pour each tells no difference{since}."

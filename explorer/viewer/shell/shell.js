@@ -65,7 +65,7 @@ function showSteps(project) {
   name.textContent = project.name;
   const items = project.steps.map(step => element("li", {},
     element("button", { class: step.state, "aria-label": `${step.name}: ${step.said || step.state}`,
-      title: step.hint, onclick: () => openRoom(step.room) },
+      title: step.said ? `${step.said}. ${step.hint}` : step.hint, onclick: () => openRoom(step.room) },
       element("span", { class: "mark", "aria-hidden": "true" }, MARKS[step.state]), step.name,
       ...(step.said ? [element("span", { class: "said" }, " " + step.said)] : []))));
   const focused = [...steps.querySelectorAll("button")].indexOf(document.activeElement);

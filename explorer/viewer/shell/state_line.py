@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -117,8 +118,10 @@ def study_finished(content: Mapping[str, Any], folder: Path) -> Finished:
 
 
 def diagnosis_finished(content: Mapping[str, Any], folder: Path) -> Finished:
-    """What a finished diagnosis found."""
-    return _finished(diagnosis_banner(DiagnosisResult.from_dict(content)), folder)
+    """What a finished diagnosis found, and on which data: they need not be of the material on the screen."""
+    result = DiagnosisResult.from_dict(content)
+    found = _finished(diagnosis_banner(result), folder)
+    return replace(found, said=f"{result.data.title}: {found.said}")
 
 
 def _finished(banner: Banner, folder: Path) -> Finished:

@@ -24,7 +24,7 @@ from explorer.viewer.output.pile_recording import PileRecording
 from explorer.viewer.panel import DIAGNOSE, SELDOM, Now, PageContext, Panel
 from explorer.viewer.study.process_view import ProcessView, escaped, orders, state_markdown, waiting_markdown
 from explorer.viewer.study.result_chooser import ResultChooser
-from solver import EFFECTS
+from solver import EFFECTS, Scene
 from solver.assets import shipped_measurements
 
 MOST_POURS = 100_000
@@ -68,14 +68,21 @@ class DiagnosisPanel(Panel):
             self._chooser = ResultChooser(server, "Result", PRESENT, RESULT, post, self._follow)
         self._trouble = gui.add_markdown("")
         self._result: DiagnosisResult | None = None
+        self._former: tuple[Scene, int, SceneSource] | None = None
+        self._answer: SceneSource | None = None
         self._page = page
         button_group(
             gui,
             "Piles",
-            {"Show side by side": self._show_piles, "Pour the corrected model": self._pour_corrected},
+            {
+                "Show side by side": self._show_piles,
+                "Pour the corrected model": self._pour_corrected,
+                "Back to my pour": self._back,
+            },
             post,
             hint="Measured pile, calibrated model and corrected model in the scene, with one clock and one camera; or "
-            "the corrected model alone, as the pour that the controls act on.",
+            "the corrected model alone, as the pour that the controls act on. Either takes the place of your own "
+            "pour; *Back to my pour* pours that again, with its seed.",
         )
         self._recording = PileRecording(page, self._record_order)
         self._board = BoardView(server, page.pages, "/diagnosis/page.json", "Diagnosis")
@@ -135,19 +142,17 @@ class DiagnosisPanel(Panel):
         self._page.background.start("reading the measured data", lambda: answer_piles(result), self._place_piles)
 
     def _place_piles(self, piles: AnswerPiles) -> None:
-        seed = self._page.session.status().seed
-        self._page.session.start(piles.before, seed, SceneSource((), piles.before))
-        self._page.beside.pour(piles.after, seed)
+        self._page.beside.pour(piles.after, self._pour(piles.before))
         measured = "measured, mean profile" if piles.measured and piles.measured.of_revolution else "measured"
         names = (f"{measured} ({piles.condition.name})", "calibrated model", "corrected model")
         self._page.beside.show_measured(piles.measured, names, piles.before)
 
     def _pour_corrected(self) -> None:
         """The corrected model as the page's own pour."""
-        result, session = self._found(), self._page.session
+        result = self._found()
 
         def begin(piles: AnswerPiles) -> None:
-            session.start(piles.after, session.status().seed, SceneSource((), piles.after))
+            self._pour(piles.after)
 
         self._page.background.start("reading the measured data", lambda: answer_piles(result), begin)
 
@@ -156,6 +161,24 @@ class DiagnosisPanel(Panel):
         result, folder = self._found(), self._chooser.folder or self._present()
         assert folder is not None
         return folder, ["diagnose", result.data.folder]
+
+    def _pour(self, scene: Scene) -> int:
+        """Pour a scene of the answer with the seed on the screen, and remember the person's own pour; the seed."""
+        session = self._page.session
+        status = session.status()
+        if session.source != self._answer:
+            self._former = status.scene, status.seed, session.source
+        self._answer = SceneSource((), scene)
+        session.start(scene, status.seed, self._answer)
+        return status.seed
+
+    def _back(self) -> None:
+        """The pour that was on the screen before an answer took its place, once more."""
+        if self._former is None:
+            raise CommandError("your own pour is on the screen")
+        self._page.beside.close()
+        self._page.session.start(*self._former)
+        self._former = None
 
     def _present(self) -> Path | None:
         """Folder of the diagnosis that was started last, or before any the newest finished one."""

@@ -142,9 +142,9 @@ class OrderPanel:
         assert self._study is not None
         edits = self.edits
         if not edits:
-            self._told.content = (
-                "Ranges and target are those of the file. What is changed here holds for the next start."
-            )
+            what = "Ranges are those of the file, the target that of the photographs."
+            what = what if self._photographed else "Ranges and target are those of the file."
+            self._told.content = f"{what} What is changed here holds for the next start."
             return
         text = edits_markdown(self._study, edits)
         try:

@@ -14,17 +14,19 @@ from explorer.diagnosis.result import DiagnosisResult
 from explorer.errors import CommandError
 from explorer.priority import BACKGROUND
 from explorer.report.content import Word
+from explorer.scene.file import material_scene
+from explorer.scene.source import material_source
 from explorer.viewer.actions import Actions
 from explorer.viewer.board.board import board_json
 from explorer.viewer.board.diagnosis_board import diagnosis_board
 from explorer.viewer.panel import Now
 from explorer.viewer.study.diagnosis_panel import OWN, DiagnosisPanel
 from explorer.viewer.study.process_view import CANCEL, CLEAR, CONTINUE, PAUSE, QUEUE, RESUME, START
-from solver import EFFECTS, AssetNotFoundError
+from solver import EFFECTS, AssetNotFoundError, with_values
 from solver.assets import measurement_folder
 from tests.explorer.background.waiting import only_folder, wait_for
 from tests.explorer.diagnosed import result_of_case, typed
-from tests.explorer.viewer.page_session import page_context
+from tests.explorer.viewer.page_session import PageSession, page_context
 from tests.explorer.viewer.study_panel_at_hand import board_at
 
 PROGRAM = """
@@ -309,3 +311,19 @@ def test_the_answer_holds_probabilities_and_errors_before_after_and_by_noise_alo
         assert errors["title"] == f"Error on {'held-out' if role == 'holdout' else 'fitted'} data"
         assert errors["header"] == ["Observable", "Before", "After", "Noise floor"]
         assert len(errors["rows"]) == len(content["error"][role])
+
+
+def test_a_pour_of_an_answer_leaves_a_way_back_to_one_s_own(server):
+    session = PageSession(material_source("sunflower_extract"))
+    own, other = session.now.scene, material_scene("nine_sphere_seed")
+    panel = DiagnosisPanel(page_context(server, session, diagnosis=FakeDiagnosis()))
+    with pytest.raises(CommandError, match="your own pour is on the screen"):
+        panel._back()
+    session.restart(with_values(own, {"rig.mass": "20g"}), 7)
+    mine = session.now.scene
+    # One model, then the other in its place: what comes back is the person's own, with its seed and its source.
+    panel._pour(other)
+    panel._pour(with_values(other, {"rig.mass": "10g"}))
+    assert session.now.scene != mine
+    panel._back()
+    assert (session.now.scene, session.now.seed, session.source) == (mine, 7, material_source("sunflower_extract"))
