@@ -26,8 +26,6 @@ from solver.scenes.scene import Scene
 ROOT = "/second"
 BESIDE = 2.15 * PLATE_RADIUS
 """Distance of two rigs' axes [m]."""
-SQUARE = 1.3
-"""Width by height of a window from which on its height decides how far the camera has to stand."""
 
 
 class BesidePile:
@@ -144,11 +142,18 @@ def _come_to(session: Session, second: Status, time: float) -> None:
 
 
 def step_aside(server: viser.ViserServer, scene: Scene, middle: float = 0.5 * BESIDE) -> None:
-    """Move every camera so that all piles, about ``middle`` [m] along x, are in the picture."""
+    """Move every camera away until all plates, about ``middle`` [m] along x, are in the picture across.
+
+    With a = unit vector from the piles to the camera, e = x axis, ℓ = distance of the outermost axis from the middle,
+    and R = radius of a plate: the plate nearest to the camera is a·e ℓ nearer than the middle and reaches
+    √(1 − (a·e)²) ℓ + R to the side, which half the width of the picture has to hold: depth · tan(fov/2) · aspect.
+    """
     aim = np.array([middle, 0.0, MIDDLE * scene_height(scene)])
     for client in server.get_clients().values():
         away = np.array(client.camera.position) - np.array(client.camera.look_at)
-        # Where the window is higher than wide, its width decides: both panels may be open.
-        least = (2.2 if middle else 3.2) * BESIDE * max(1.0, SQUARE / aspect_of(client.camera))
-        away *= max(1.0, least / max(float(np.linalg.norm(away)), 1e-6))
+        now = max(float(np.linalg.norm(away)), 1e-6)
+        along, outermost = abs(float(away[0])) / now, BESIDE - middle
+        half_width = math.tan(0.5 * client.camera.fov) * aspect_of(client.camera)
+        least = along * outermost + (math.sqrt(1.0 - along**2) * outermost + PLATE_RADIUS) / half_width
+        away *= max(1.0, least / now)
         go_to_place(client, CameraView(aim + away, aim))

@@ -15,6 +15,7 @@ from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.panel import Now
 from explorer.viewer.pour.beside_pile import BESIDE, ROOT, BesidePile, step_aside
 from explorer.viewer.pour.second_pile import NONE, SecondPile, comparison_markdown
+from explorer.viewer.scene_nodes import PLATE_RADIUS
 from solver import Outcome, with_values
 from solver.observables import Value
 from tests.explorer.viewer.page_session import page_context
@@ -192,7 +193,7 @@ def test_a_measured_pile_stands_on_the_other_side_with_names_above_all_three(ben
 class Camera:
     """As viser's: a new position takes the point that is looked at along."""
 
-    image_width, image_height = 600, 1000
+    image_width, image_height, fov = 600, 1000, 0.6
 
     def __init__(self):
         self._position, self.look_at = np.array([0.3, -0.4, 0.2]), np.array([0.0, 0.0, 0.05])
@@ -207,13 +208,23 @@ class Camera:
         self._position = np.asarray(position)
 
 
-def test_every_camera_looks_between_the_piles_from_where_both_are_in_sight():
+@pytest.mark.parametrize(("middle", "axes"), [(0.5 * BESIDE, (0.0, BESIDE)), (0.0, (-BESIDE, 0.0, BESIDE))])
+@pytest.mark.parametrize("width", [390, 1280])
+def test_every_camera_looks_at_the_middle_from_where_all_plates_are_in_the_picture(middle, axes, width):
     client = SimpleNamespace(camera=Camera(), atomic=nullcontext)
+    client.camera.image_width = width
     before = client.camera.position - client.camera.look_at
-    step_aside(SimpleNamespace(get_clients=lambda: {0: client}), SCENE)
-    assert client.camera.look_at[0] == pytest.approx(0.5 * BESIDE)
-    away = client.camera.position - client.camera.look_at
+    step_aside(SimpleNamespace(get_clients=lambda: {0: client}), SCENE, middle)
+    camera = client.camera
+    assert camera.look_at[0] == pytest.approx(middle)
+    away = camera.position - camera.look_at
     np.testing.assert_allclose(away / np.linalg.norm(away), before / np.linalg.norm(before))
-    # Half the field of view in height is 0.3 rad; a narrow window sees 0.6 of that across.
-    reach = np.linalg.norm(away) * np.tan(0.3) * client.camera.image_width / client.camera.image_height
-    assert reach > 0.5 * BESIDE
+    # The picture of a pinhole: across over depth, for points all around every plate.
+    forward = -away / np.linalg.norm(away)
+    right = np.cross(forward, [0.0, 0.0, 1.0]) / np.linalg.norm(np.cross(forward, [0.0, 0.0, 1.0]))
+    around = np.linspace(0.0, 2.0 * np.pi, 100)
+    for axis in axes:
+        rim = np.stack([axis + PLATE_RADIUS * np.cos(around), PLATE_RADIUS * np.sin(around), 0.0 * around], axis=1)
+        seen = rim - camera.position
+        across = (seen @ right) / (seen @ forward)
+        assert np.abs(across).max() < 1.1 * np.tan(0.5 * camera.fov) * width / camera.image_height
