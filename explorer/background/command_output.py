@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import atexit
 import subprocess
-from collections.abc import Sequence
+import tempfile
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from explorer.background.command_process import PROGRAM
@@ -23,28 +24,42 @@ LONGEST_LINE = 300
 TITLE_LETTERS = 20
 
 
-def command_output(arguments: Sequence[str], program: Sequence[str] = PROGRAM) -> str:
+def command_output(
+    arguments: Sequence[str], program: Sequence[str] = PROGRAM, hear: Callable[[str], None] = lambda line: None
+) -> str:
     """Standard output of ``program arguments``, which gives way to everything that a person looks at.
 
+    ``hear`` is called with every line of it as it comes, in the caller's thread.
     A command that ends with ``FAILURE`` and has printed something has an answer too. Raises CommandError with the last
     line of any other that does not end well. The command does not outlive this process.
     """
-    with subprocess.Popen(
-        lowered((*program, *arguments), BACKGROUND),
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    ) as process:
+    lines = []
+    with (
+        tempfile.TemporaryFile("w+") as errors,
+        subprocess.Popen(
+            lowered((*program, *arguments), BACKGROUND),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=errors,
+            text=True,
+            start_new_session=True,
+        ) as process,
+    ):
         atexit.register(process.kill)
         session_gives_way(process.pid, BACKGROUND)
-        said, refused = process.communicate()
+        assert process.stdout is not None
+        for line in process.stdout:
+            lines.append(line)
+            hear(line.strip())
+        process.wait()
         atexit.unregister(process.kill)
+        errors.seek(0)
+        refused = errors.read()
+    said = "".join(lines)
     if process.returncode == 0 or (process.returncode == FAILURE and said.strip()):
         return said.strip()
-    lines = refused.strip().splitlines() or [f"{arguments[0]} ended with exit code {process.returncode}"]
-    raise CommandError(lines[-1].removeprefix("error: ")[:LONGEST_LINE])
+    last = refused.strip().splitlines() or [f"{arguments[0]} ended with exit code {process.returncode}"]
+    raise CommandError(last[-1].removeprefix("error: ")[:LONGEST_LINE])
 
 
 def kept_scene(scene: Scene, folder: Path) -> Path:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from datetime import datetime
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -38,12 +39,18 @@ class PileRecording:
             "and errors: one file for `explorer replay` or rerun. Pours both models, in the background: up to minutes.",
         )
         self._line = page.server.gui.add_html("", visible=False)
+        self._now = ""
 
     def show(self) -> None:
         """Say whether one is being made."""
         busy = self._work.busy_with
-        if self._line.visible != bool(busy):
-            self._line.content, self._line.visible = small_html(f"Busy {busy}."), bool(busy)
+        said = small_html(escape(f"Busy {busy}: {self._now}")) if busy else ""
+        if self._line.content != said:
+            self._line.content, self._line.visible = said, bool(busy)
+
+    def _hear(self, line: str) -> None:
+        """What the command is at, in its own words."""
+        self._now = line
 
     def _record(self, client: Any) -> None:
         out, arguments = self._order()
@@ -51,11 +58,12 @@ class PileRecording:
         def made() -> Path:
             self._folder.mkdir(parents=True, exist_ok=True)
             path = self._folder / f"{out.name}-piles-{datetime.now():%Y%m%d-%H%M%S-%f}.rrd"
-            command_output([*arguments, "--out", str(out), "--record", str(path)], self._program)
+            command_output([*arguments, "--out", str(out), "--record", str(path)], self._program, self._hear)
             return path
 
         def send(path: Path) -> None:
             refuse_large([path])
             send_file(client, path.name, path.read_bytes())
 
+        self._now = "the solver loads"
         self._work.start("recording the piles", made, send)

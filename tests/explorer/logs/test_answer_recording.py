@@ -23,6 +23,7 @@ from solver import asset_path, run_pour, with_values
 from solver.assets import measurement_folder
 from solver.observables import observe
 from tests.explorer import diagnosed
+from tests.explorer.background.waiting import wait_for
 from tests.explorer.command_line import explorer, refused
 from tests.explorer.logs.test_pour_log import rows
 from tests.explorer.study.test_run import Formula
@@ -260,3 +261,33 @@ def test_the_page_sends_the_recording_to_the_browser_that_asked(server, tmp_path
     assert name.startswith("out.1-piles-")
     assert content.decode() == f"diagnose data --out {tmp_path / 'out.1'}"
     assert [one.name for one in (tmp_path / "kept" / "recordings").iterdir()] == [name]
+
+
+TOLD = """
+import os, sys, time
+print("pouring the <after> model", flush=True)
+while not os.path.exists(sys.argv[1]):
+    time.sleep(0.01)
+print("x" * 200_000, file=sys.stderr)
+open(sys.argv[sys.argv.index("--record") + 1], "w").write("a recording")
+"""
+
+
+def test_what_the_recording_is_at_is_told_while_it_pours(server, tmp_path):
+    (tmp_path / "program.py").write_text(TOLD)
+    program, actions, browser = (sys.executable, str(tmp_path / "program.py")), Actions(), Browser()
+    page = page_context(server, post=actions.post, data=tmp_path)
+    panel = PileRecording(page, lambda: (tmp_path / "out", [str(tmp_path / "go on")]), program)
+    event(panel._buttons, RECORD, client=browser)
+
+    def told():
+        actions.carry_out()
+        panel.show()
+        return "recording the piles: pouring the &lt;after&gt; model" in panel._line.content
+
+    wait_for(told)
+    (tmp_path / "go on").touch()
+    assert finished(actions, panel._work) == ""
+    panel.show()
+    assert not panel._line.visible
+    assert list(browser.sent.values()) == [b"a recording"]
