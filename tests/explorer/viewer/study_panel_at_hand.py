@@ -36,6 +36,7 @@ class FakeStudy:
     """Keeps what it was asked; its status and its folders are what the test says."""
 
     study_file = asset_path("studies", "sunflower_extract")
+    store = STORELESS.store
 
     def __init__(self):
         self.asked, self.now, self.out, self.queued, self.done = [], CommandStatus("idle"), None, (), ()

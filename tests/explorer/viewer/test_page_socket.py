@@ -121,8 +121,9 @@ def browser(page):
     return Browser(page.server)
 
 
-def readout(page):
-    return page.page.panels["readout"]._html.content
+def told(page):
+    """What happened last, beside the controls."""
+    return page.page.panels["standing"]._box.content
 
 
 def status(page):
@@ -188,7 +189,7 @@ def test_keys_move_the_camera_of_the_browser_that_pressed_them(page, browser):
 
 def test_following_nobody_is_told_in_a_line(page, browser):
     browser.press("Follow the body that was clicked")
-    wait_for(lambda: "click a body first" in readout(page))
+    wait_for(lambda: "click a body first" in told(page))
 
 
 def move_slider(page, browser, label, value):
@@ -202,15 +203,15 @@ def test_two_browsers_share_one_pour_and_a_change_tells_whose_it_was(page, brows
     second = Browser(page.server)
     wait_for(lambda: page.page._people.present == 2)
     move_slider(page, second, "Static friction", 0.21)
-    wait_for(lambda: "· browser 2" in readout(page))
-    assert "0.21" in readout(page)
+    wait_for(lambda: "· browser 2" in told(page))
+    assert "0.21" in told(page)
     move_slider(page, browser, "Static friction", 0.33)
-    wait_for(lambda: "· browser 1" in readout(page))
+    wait_for(lambda: "· browser 1" in told(page))
     # The first one leaves in the middle of it all: nothing ends, and who is alone is not named.
     second.leave()
     wait_for(lambda: page.page._people.present == 1)
     move_slider(page, browser, "Static friction", 0.44)
-    wait_for(lambda: "0.44" in readout(page).split("· browser")[0])
+    wait_for(lambda: "0.44" in told(page).split("· browser")[0])
     assert status(page).state in (SessionState.RUNNING, SessionState.PAUSED, SessionState.ENDED)
 
 
