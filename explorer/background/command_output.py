@@ -58,8 +58,8 @@ def command_output(
     said = "".join(lines)
     if process.returncode == 0 or (process.returncode == FAILURE and said.strip()):
         return said.strip()
-    last = refused.strip().splitlines() or [f"{arguments[0]} ended with exit code {process.returncode}"]
-    raise CommandError(last[-1].removeprefix("error: ")[:LONGEST_LINE])
+    *_, last = refused.strip().splitlines() or [f"{arguments[0]} ended with exit code {process.returncode}"]
+    raise CommandError(last.removeprefix("error: ")[:LONGEST_LINE])
 
 
 def kept_scene(scene: Scene, folder: Path) -> Path:

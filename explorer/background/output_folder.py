@@ -7,9 +7,12 @@ import re
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
+from doe.record import Document, RecordError
 from explorer.errors import CommandError
+
+Read = TypeVar("Read", bound=Document)
 
 STAMP = r"\d{8}-\d{6}(?:-\d+)?"
 """Date, time and perhaps a number: the end of an output folder's name."""
@@ -69,6 +72,18 @@ class ResultFile:
             self._content = None
         self._stamp = stamp
         return self._content
+
+
+def read_result(kind: type[Read], folder: Path, name: str) -> Read | None:
+    """The result in the file ``name`` of ``folder``; None where there is none.
+
+    Raises CommandError, in one line, for one of another version.
+    """
+    content = ResultFile(name).read(folder)
+    try:
+        return None if content is None else kind.from_dict(content)
+    except RecordError as error:
+        raise CommandError(f"{folder / name}: {error}") from None
 
 
 def checked_folder(text: str, name: str) -> Path:

@@ -24,9 +24,8 @@ from doe.holdout import HoldoutError
 from doe.measurement.load import load_measurement
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.summaries import summaries
-from doe.record import RecordError
 from doe.store import Store, default_store
-from explorer.background.output_folder import ResultFile
+from explorer.background.output_folder import read_result
 from explorer.background.progress import PROGRESS, PourProgress
 from explorer.diagnosis.corrected import corrected_toml, study_toml
 from explorer.diagnosis.next_folder import read_next, write_next
@@ -154,13 +153,9 @@ def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> DiagnosisR
 
 def _finished(order: DiagnoseOrder) -> DiagnosisResult | None:
     """The answer in the folder; None where there is none. CommandError where it is that of another question."""
-    content = ResultFile(DiagnosisResult.NAME).read(order.out)
-    if content is None:
+    result = read_result(DiagnosisResult, order.out, DiagnosisResult.NAME)
+    if result is None:
         return None
-    try:
-        result = DiagnosisResult.from_dict(content)
-    except RecordError as error:
-        raise CommandError(f"{order.out / DiagnosisResult.NAME}: {error}") from None
     asked = DiagnosisOrder(
         result.order.out, order.effects, order.budget, order.seed, str(order.follow_up) if order.follow_up else None
     )

@@ -9,10 +9,10 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any, TypeVar
 
-from doe.record import Document, RecordError
+from doe.record import Document
 from doe.studies.study import TRIES
 from doe.studies.study_result import StudyResult
-from explorer.background.output_folder import ResultFile, checked_folder
+from explorer.background.output_folder import checked_folder, read_result
 from explorer.diagnosis import run as diagnosis_run
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.errors import CommandError
@@ -248,7 +248,7 @@ def _inline(drawn: Iterable[Chart]) -> str:
 
 def _read(kind: type[Read], folder: str | Path, name: str) -> Read:
     place = checked_folder(str(folder), name)
-    try:
-        return kind.from_dict(ResultFile(name).read(place) or {})
-    except RecordError as error:
-        raise CommandError(f"{place / name}: {error}") from None
+    found = read_result(kind, place, name)
+    if found is None:  # taken away a moment ago
+        raise CommandError(f"{place}: holds no {name}")
+    return found

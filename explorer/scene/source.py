@@ -16,6 +16,8 @@ from solver.scenes.scene import Scene, parameters, values, with_rig
 from solver.toml_file import read_toml
 
 PROGRAM = ("explorer", "simulate")
+PLURALS = {"body": "bodies"}
+"""Of the first word of a parameter's path, where it is more than an s."""
 
 
 @dataclass(frozen=True)
@@ -152,8 +154,13 @@ def differences(before: Scene, now: Scene) -> Iterator[Difference]:
             yield Difference(path, old[path], new, declared[path].unit, declared[path].live)
 
 
+def same_bodies(one: Scene, other: Scene) -> bool:
+    """Whether both scenes pour bodies of the same names, so that their parameters can be held against each other."""
+    return [body.name for body in one.bodies] == [body.name for body in other.bodies]
+
+
 def change_lines(found: Iterable[Difference]) -> list[str]:
-    """A line per quantity, such as "friction seed–seed 0.57 → 0.4" and "restitution of 9 0.4 … 0.67 → 0.2 … 0.3"."""
+    """A line per quantity, such as "friction seed–seed 0.57 → 0.4" and "restitution of 9 pairs 0.4 → 0.2"."""
     by_name: dict[str, list[Difference]] = {}
     for one in found:
         by_name.setdefault(one.path.rpartition(".")[2], []).append(one)
@@ -165,7 +172,7 @@ def change_lines(found: Iterable[Difference]) -> list[str]:
         else:
             before, now = span(mine, [one.before for one in mine]), span(mine, [one.now for one in mine])
             kind = mine[0].path.partition(".")[0]
-            lines.append(f"{words} of {len(mine)} {kind}s {before} → {now}")
+            lines.append(f"{words} of {len(mine)} {PLURALS.get(kind, f'{kind}s')} {before} → {now}")
     return lines
 
 

@@ -21,7 +21,6 @@ import numpy.typing as npt
 
 from doe.pour_runner import PourRunner
 from doe.provenance import About, PouredPile
-from doe.record import RecordError
 from doe.run_records import Run
 from doe.stages import planned_runs
 from doe.store import Store, StoredRun, default_store
@@ -38,7 +37,7 @@ from doe.studies.study_result import (
     StudyResult,
     Timing,
 )
-from explorer.background.output_folder import ResultFile
+from explorer.background.output_folder import read_result
 from explorer.background.progress import PROGRESS, RunProgress, told_of_pauses
 from explorer.errors import CommandError
 from explorer.files.output_file import check_new_file, write_whole
@@ -229,13 +228,9 @@ def _record_piles(path: Path, result: StudyResult, say: Callable[[str], None]) -
 
 def _finished(out: Path, file: Path, profile: str) -> StudyResult | None:
     """The result in the folder; None where there is none. CommandError where it is of another study or profile."""
-    content = ResultFile(RESULT).read(out)
-    if content is None:
+    result = read_result(StudyResult, out, RESULT)
+    if result is None:
         return None
-    try:
-        result = StudyResult.from_dict(content)
-    except RecordError as error:
-        raise CommandError(f"{out / RESULT}: {error}") from None
     found = result.study
     if (Path(found.file).absolute(), found.profile.name) != (file.absolute(), profile):
         raise CommandError(f"--out {out}: holds the result of {found.file}, profile {found.profile.name}")

@@ -6,19 +6,17 @@ The quick study of `make calibrate-quick` is taken, or run first, so that *Calib
 diagnosis that `make diagnose` has left where there is one; everything is written to a data folder of its own.
 """
 
-import os
 import re
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 from playwright.sync_api import Page, sync_playwright
 
+from tests.browser.served import served
 from tests.browser.test_page import BEGUN, FLAGS, room
 from tests.conftest import find_chromium
 
@@ -29,22 +27,6 @@ WIDE, USUAL, SMALL, PHONE = (1920, 1080), (1280, 800), (1024, 768), (390, 844)
 PATIENCE_MS = 120_000
 STUDY_ROOMS, CONTROL_ROOMS = ("Pour", "Calibrate", "Diagnose", "Laboratory", "Reports"), ("Set-up", "Look", "Export")
 SETTLED = ("at rest", "no heap", "jammed", "obstructed")
-
-
-@contextmanager
-def served(home: str, *arguments: str) -> Iterator[str]:
-    """Address of `explorer serve` with these arguments and its own data folder."""
-    environment = {**os.environ, "XDG_DATA_HOME": home}
-    command = [sys.executable, "-m", "explorer", "serve", "--port", "0", *arguments]
-    server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment)
-    try:
-        assert server.stdout is not None
-        found = re.search(r"http://\S+", server.stdout.readline())
-        assert found, "the server did not tell its address"
-        yield found[0]
-    finally:
-        server.terminate()
-        server.wait(30)
 
 
 def opened(browser: object, address: str, size: tuple[int, int], begun: bool = True) -> Page:
@@ -91,7 +73,7 @@ def settled(page: Page) -> None:
 
 
 def live_pictures(browser: object, home: str) -> None:
-    with served(home, "--set", "body.spheres=coarse", "--store", f"{home}/runs.sqlite") as address:
+    with served("--set", "body.spheres=coarse", "--store", f"{home}/runs.sqlite", data=home, patience=30) as address:
         page = opened(browser, address, USUAL, begun=False)
         shot(page, "start_1280")
         page.close()
@@ -140,7 +122,7 @@ def replay_picture(browser: object, home: str) -> None:
     recording = Path(home) / "pour.rrd"
     command = [sys.executable, "-m", "explorer", "simulate", "funnel", "--set", "body.spheres=coarse"]
     subprocess.run([*command, "--record", str(recording)], check=True, stdout=subprocess.DEVNULL)
-    with served(home, "--replay", str(recording)) as address:
+    with served("--replay", recording, data=home, patience=30) as address:
         page = browser.new_page(viewport={"width": USUAL[0], "height": USUAL[1]})  # type: ignore[attr-defined]
         page.set_default_timeout(PATIENCE_MS)
         page.goto(address)

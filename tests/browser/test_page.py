@@ -6,8 +6,6 @@ test fails at its first use.
 
 import os
 import re
-import subprocess
-import sys
 import time
 
 import numpy as np
@@ -15,6 +13,7 @@ import pytest
 
 from explorer.viewer.panel import TABS
 from explorer.viewer.pour.readout import PHASE_WORDS
+from tests.browser.served import served
 
 pytestmark = pytest.mark.browser
 
@@ -39,6 +38,7 @@ SMALL_POUR = (
     "rig.outlet_diameter=50mm",
     "rig.outlet_height=40mm",
 )
+SETTINGS = tuple(part for one in SMALL_POUR for part in ("--set", one))
 BEGUN = "try { localStorage.setItem('explorer-begun', 'yes') } catch { /* an empty page has none */ }"
 """Of a browser that has seen the start dialogue."""
 POSITIONS = """() => Object.entries(window.__viserSceneTree.getState())
@@ -55,15 +55,8 @@ PATIENCE = 120_000
 @pytest.fixture(scope="module")
 def address():
     """Address of the page of ``explorer serve``, started as a user does."""
-    settings = [part for one in SMALL_POUR for part in ("--set", one)]
-    server = subprocess.Popen(
-        [sys.executable, "-m", "explorer", "serve", "--port", "0", *settings], stdout=subprocess.PIPE, text=True
-    )
-    found = re.search(r"http://\S+", server.stdout.readline())
-    assert found, "the server did not tell its address"
-    yield found[0]
-    server.terminate()
-    assert server.wait(20) == 0
+    with served(*SETTINGS) as found:
+        yield found
 
 
 @pytest.fixture(scope="module")

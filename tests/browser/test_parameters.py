@@ -1,9 +1,6 @@
 """Changing, undoing and taking along in headless Chromium: what only a browser can show."""
 
-import os
 import re
-import subprocess
-import sys
 import time
 import zipfile
 
@@ -13,7 +10,8 @@ import trimesh
 
 from explorer.logs.recording_reader import read_recording
 from tests.browser import test_page as shared
-from tests.browser.test_page import SMALL_POUR, positions, room, simulated_time, slider, state, to_its_end, wait_for
+from tests.browser.served import served
+from tests.browser.test_page import SETTINGS, positions, room, simulated_time, slider, state, to_its_end, wait_for
 
 pytestmark = pytest.mark.browser
 
@@ -25,18 +23,8 @@ NONE = re.compile(r"In the solver: Static friction 0\s")
 @pytest.fixture(scope="module")
 def address(tmp_path_factory):
     """Address of a page that keeps presets and uploads in a folder of the test."""
-    settings = [part for one in SMALL_POUR for part in ("--set", one)]
-    server = subprocess.Popen(
-        [sys.executable, "-m", "explorer", "serve", "--port", "0", *settings],
-        stdout=subprocess.PIPE,
-        text=True,
-        env=os.environ | {"XDG_DATA_HOME": str(tmp_path_factory.mktemp("data"))},
-    )
-    found = re.search(r"http://\S+", server.stdout.readline())
-    assert found, "the server did not tell its address"
-    yield found[0]
-    server.terminate()
-    assert server.wait(20) == 0
+    with served(*SETTINGS, data=tmp_path_factory.mktemp("data")) as found:
+        yield found
 
 
 def choose(page, label, option):

@@ -2,45 +2,15 @@
 
 import os
 import re
-import subprocess
-import sys
 from contextlib import contextmanager
 
 import pytest
 
 from explorer.project.project import new_project
-from tests.browser.test_page import BEGUN, FLAGS, PATIENCE, SMALL_POUR, room
+from tests.browser.served import served
+from tests.browser.test_page import BEGUN, PATIENCE, SETTINGS, room
 
 pytestmark = pytest.mark.browser
-
-
-@contextmanager
-def served(project, data):
-    """Address of the page of ``project``."""
-    settings = [part for one in SMALL_POUR for part in ("--set", one)]
-    server = subprocess.Popen(
-        [sys.executable, "-m", "explorer", "serve", str(project), "--port", "0", *settings],
-        stdout=subprocess.PIPE,
-        text=True,
-        env=os.environ | {"XDG_DATA_HOME": str(data)},
-    )
-    try:
-        found = re.search(r"http://\S+", server.stdout.readline())
-        assert found, "the server did not tell its address"
-        yield found[0]
-    finally:
-        server.terminate()
-        assert server.wait(30) == 0
-
-
-@pytest.fixture(scope="module")
-def browser(chromium):
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
-        yield browser
-        browser.close()
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +23,7 @@ def project(tmp_path_factory):
 @contextmanager
 def opened(browser, project):
     """The page; its console has nothing to complain about."""
-    with served(project, project.parent) as address:
+    with served(project, *SETTINGS, data=project.parent, patience=30) as address:
         page = browser.new_page(viewport={"width": 1280, "height": 800})
         page.set_default_timeout(PATIENCE)
         complaints = []

@@ -5,7 +5,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from tests.browser.test_page import BEGUN, FLAGS, PATIENCE
+from tests.browser.test_page import BEGUN, PATIENCE
 from tests.browser.test_study_page import address, data, opened  # noqa: F401
 from tests.explorer.report.test_charts_stay_private import PAGES
 
@@ -20,16 +20,6 @@ CONTEXTS = """() => [...document.querySelectorAll('.js-plotly-plot')].map(
 LINKS = "() => [...document.querySelectorAll('a[href]')].map(link => link.href)"
 LOCAL_HOSTS = {"127.0.0.1", "localhost"}
 LOCAL_SCHEMES = {"file", "data", "blob"}
-
-
-@pytest.fixture(scope="module")
-def browser(chromium):
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
-        yield browser
-        browser.close()
 
 
 @pytest.fixture

@@ -1,13 +1,12 @@
 """A recording on the page in headless Chromium: scrubbed by keyboard, played, stepped and looked at by keys."""
 
 import re
-import subprocess
-import sys
 
 import pytest
 
 from explorer.logs.pour_log import PourLog
 from explorer.scene.file import load_scene
+from tests.browser.served import served
 from tests.browser.test_look import colours, press
 from tests.browser.test_page import FLAGS, PATIENCE, positions, slider, wait_for
 from tests.explorer.logs.test_pour_log import poses
@@ -33,20 +32,14 @@ def page(chromium, tmp_path_factory):
     with PourLog(path, load_scene("funnel"), seed=1) as log:
         for k in range(FRAMES):
             log.frame(0.02 * k, state_at(k), {"angle_of_repose_deg": 20.0 + 0.1 * k})
-    command = [sys.executable, "-m", "explorer", "serve", "--port", "0", "--replay", str(path)]
-    server = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-    found = re.search(r"http://\S+", server.stdout.readline())
-    assert found, "the server did not tell its address"
-    with sync_playwright() as playwright:
+    with served("--replay", path) as address, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
         page = browser.new_page(viewport={"width": 1280, "height": 900})
         page.set_default_timeout(PATIENCE)
-        page.goto(found[0])
+        page.goto(address)
         page.get_by_text("rise.rrd").first.wait_for()
         yield page
         browser.close()
-    server.terminate()
-    assert server.wait(20) == 0
 
 
 AXES = "() => Object.values(window.__viserTestpoints.uplots).map(one => one.chart.axes.map(axis => axis._found[1]))"

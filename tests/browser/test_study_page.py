@@ -3,13 +3,12 @@
 import json
 import os
 import re
-import subprocess
-import sys
 import time
 
 import pytest
 
-from tests.browser.test_page import BEGUN, FLAGS, PATIENCE, SMALL_POUR, positions, room, slider, wait_for
+from tests.browser.served import served
+from tests.browser.test_page import BEGUN, FLAGS, PATIENCE, SETTINGS, positions, room, slider, wait_for
 from tests.explorer import reported_studies
 
 pytestmark = pytest.mark.browser
@@ -33,18 +32,8 @@ def address(data):
     study = data / "repose-explorer" / "studies" / "sunflower_extract-quick-20260101-101010"
     study.mkdir(parents=True)
     (study / "result.json").write_text(json.dumps(reported_studies.result_of_case("planted")))
-    settings = [part for one in SMALL_POUR for part in ("--set", one)]
-    server = subprocess.Popen(
-        [sys.executable, "-m", "explorer", "serve", "--port", "0", "--store", str(data / "runs.sqlite"), *settings],
-        stdout=subprocess.PIPE,
-        text=True,
-        env=os.environ | {"XDG_DATA_HOME": str(data)},
-    )
-    found = re.search(r"http://\S+", server.stdout.readline())
-    assert found, "the server did not tell its address"
-    yield found[0]
-    server.terminate()
-    assert server.wait(30) == 0
+    with served("--store", data / "runs.sqlite", *SETTINGS, data=data, patience=30) as found:
+        yield found
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ from html import escape
 from doe.population import Comparison, Population, compared
 from explorer.background.command_process import CommandStatus
 from explorer.population.process import PopulationProcess
-from explorer.scene.source import change_lines, differences
+from explorer.scene.source import change_lines, differences, same_bodies
 from explorer.viewer.actions import BackgroundWork
 from explorer.viewer.palette import FLANK, css
 from explorer.viewer.panel import CONTROLS, SELDOM, Now, PageContext, Panel
@@ -139,14 +139,9 @@ class PopulationPanel(Panel):
 
 def told_difference(former: Scene, scene: Scene) -> str:
     """What was changed, in words; empty where nothing was that can be compared."""
-    if former.rig.name != scene.rig.name or names_of(former) != names_of(scene):
+    if former.rig.name != scene.rig.name or not same_bodies(former, scene):
         return ""
     return "; ".join(change_lines(differences(former, scene)))
-
-
-def names_of(scene: Scene) -> tuple[str, ...]:
-    """Names of the bodies that are poured."""
-    return tuple(body.name for body in scene.bodies)
 
 
 def population_html(

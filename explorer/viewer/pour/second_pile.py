@@ -7,7 +7,7 @@ from html import escape
 
 from explorer.live.messages import SessionState, Status
 from explorer.outcomes import OUTCOME_SENTENCES
-from explorer.scene.source import change_lines, differences
+from explorer.scene.source import change_lines, differences, same_bodies
 from explorer.viewer.actions import button_group
 from explorer.viewer.panel import POUR, Now, PageContext, Panel
 from explorer.viewer.pour.readout import STATE_WORDS, angle_of_repose_deg
@@ -70,7 +70,7 @@ def comparison_markdown(first: Status, second: Status) -> str:
         lines.append(f"First − second: **{difference:+.1f}°**. One pour each: seeds alone scatter by degrees.")
     if second.state in (SessionState.FAILED, SessionState.DIED):
         lines.append(escape(second.message))
-    if tuple(b.name for b in first.scene.bodies) == tuple(b.name for b in second.scene.bodies):
+    if same_bodies(first.scene, second.scene):
         found = change_lines(differences(second.scene, first.scene))
         shown = [f"- {line}" for line in found[:DIFFERENCES_SHOWN]]
         more = [f"- and {len(found) - len(shown)} more"] if len(found) > len(shown) else []

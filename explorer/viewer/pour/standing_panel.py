@@ -86,13 +86,11 @@ class StandingPanel(Panel):
             self._take_ghost_away()
         self._frame = now.frame
         self._follow(status, now.frame)
-        lines = [escape(text) for text in notes(status, now.events, now.notice)]
-        if self._former is not None:
-            lines.insert(0, ghost_text(self._former, status))
-        if said := self._what_the_change_did(status, now.frame):
-            # In place of the change itself, which it names.
-            lines[-1:] = [said]
-        box = box_html(lines)
+        did = self._what_the_change_did(status, now.frame)
+        # It names the change, and stands in its place.
+        told = map(escape, notes(status, () if did else now.events, now.notice))
+        ghost = "" if self._former is None else ghost_text(self._former, status)
+        box = box_html([line for line in (ghost, *told, did) if line])
         if self._box.content != box:
             self._box.content = box
         if self._dismiss.visible != (self._former is not None):

@@ -7,7 +7,12 @@ root.addEventListener("keydown", event => {
   if (event.key.startsWith("Arrow") && event.target.closest("[role=slider]")) event.stopPropagation();
 });
 
-const SECTION = "#root .mantine-Paper-root > .mantine-Paper-root";
+// Heads of viser's sections, open or not.
+export function sectionHeads() {
+  const boxes = document.querySelectorAll("#root .mantine-Paper-root > .mantine-Paper-root");
+  return [...boxes].filter(box => box.style.cursor === "pointer");
+}
+
 const ICONS = { "list-search": "Commands", "adjustments": "Settings of the view", "arrow-back": "Back" };
 
 // viser's sections open by a click on their head only.
@@ -31,8 +36,7 @@ function nameRow(label) {
 }
 
 function look() {
-  for (const head of document.querySelectorAll(SECTION)) {
-    if (head.style.cursor !== "pointer") continue;
+  for (const head of sectionHeads()) {
     if (head.tabIndex < 0) makeButton(head);
     head.setAttribute("aria-expanded", String(head.querySelector(".tabler-icon-chevron-up") !== null));
   }

@@ -1,5 +1,6 @@
 // What stands around viser's page: the state line on top, the timeline at the bottom. States come by a WebSocket of
 // their own; what is clicked goes back as a named command. Rooms are viser's own tabs, opened in this browser only.
+import { sectionHeads } from "/shell/accessibility.js";
 import { element } from "/shell/element.js";
 
 const MARKS = { empty: "○", assumed: "◌", measured: "●", running: "◐", done: "✓", failed: "✕" };
@@ -37,8 +38,7 @@ function soon(find, act, tries = 20) {
 
 // A section of the room that was just opened, once it is there: unfolded, and in sight.
 function openSection(name) {
-  const heads = () => [...document.querySelectorAll("#root .mantine-Paper-root > .mantine-Paper-root")];
-  soon(() => heads().find(one => one.style.cursor === "pointer" && one.textContent.trim().startsWith(name)), head => {
+  soon(() => sectionHeads().find(one => one.textContent.trim().startsWith(name)), head => {
     if (head.parentElement.getBoundingClientRect().height < 60) head.click();
     head.scrollIntoView({ block: "start" });
   });

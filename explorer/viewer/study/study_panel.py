@@ -112,8 +112,8 @@ class StudyPanel(Panel):
         asked = str(self._profile.value), state
         if asked != self._asked:
             study, self._asked = self._loaded, asked
-            known = study is not None and asked[0] in study.profiles
-            self._takes = duration_text(study, study.profiles[asked[0]], self._store) if study and known else ""
+            profile = study.profiles.get(asked[0]) if study else None
+            self._takes = duration_text(study, profile, self._store) if study and profile else ""
         return self._takes
 
     def _start(self) -> None:

@@ -114,6 +114,19 @@ def test_poured_again_the_former_pile_stays_as_a_ghost_until_it_is_dismissed(tab
     assert table.look() == ""
 
 
+def test_a_change_of_the_new_pile_is_told_beside_the_ghost(table):
+    table.session.set_parameters({FRICTION: 0.39})
+    table.pass_time(WATCHED)
+    table.session.restart()
+    table.session.newest = frame_of([0, 1, 0], PLACES, INSIDE)
+    table.session.now = replace(table.session.now, state=SessionState.ENDED, outcome=Outcome.AT_REST, time=3.0)
+    table.look()
+    table.session.set_parameters({FRICTION: 0.3})
+    said = table.pass_time(WATCHED)
+    assert "Grey: the former pile" in said
+    assert "0.39 → 0.3: the pile stands" in said
+
+
 def test_a_ghost_goes_with_its_set_up(table):
     table.session.set_parameters({FRICTION: 0.39})
     table.pass_time(WATCHED)
@@ -145,3 +158,7 @@ def test_many_changes_of_one_parameter_are_told_as_their_span():
     found = list(differences(SOURCE.scene, with_values(SOURCE.scene, {**smooth, "rig.mass": "20g"})))
     # Table 3 of the article: static friction between 0.54 and 0.83.
     assert change_lines(found) == ["static friction of 9 pairs 0.54 … 0.83 → 0.2", "mass 30 g → 20 g"]
+    wider = {f"body.{body.name}.size_spread": 0.1 for body in SOURCE.scene.bodies}
+    assert change_lines(differences(SOURCE.scene, with_values(SOURCE.scene, wider))) == [
+        "size spread of 3 bodies 0 → 0.1"
+    ]

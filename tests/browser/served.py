@@ -1,0 +1,28 @@
+"""`explorer serve` as a user starts it, for browsers to come to."""
+
+import os
+import re
+import subprocess
+import sys
+from contextlib import contextmanager
+
+
+@contextmanager
+def served(*arguments, data=None, patience=20.0):
+    """Address of a page of ``explorer serve`` with ``arguments``; it has to end well within ``patience`` [s].
+
+    ``data`` stands in for the folder of the user's data.
+    """
+    server = subprocess.Popen(
+        [sys.executable, "-m", "explorer", "serve", "--port", "0", *map(str, arguments)],
+        stdout=subprocess.PIPE,
+        text=True,
+        env=os.environ | ({} if data is None else {"XDG_DATA_HOME": str(data)}),
+    )
+    try:
+        found = re.search(r"http://\S+", server.stdout.readline())
+        assert found, "the server did not tell its address"
+        yield found[0]
+    finally:
+        server.terminate()
+        assert server.wait(patience) == 0
