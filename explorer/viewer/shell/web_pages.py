@@ -23,7 +23,8 @@ from explorer.errors import CommandError
 HERE = Path(__file__).parent
 TITLE = "<title>Viser</title>"
 """Of viser's first page; in its place come our title, style and script."""
-TEXT = """<title>{title}</title>\n    <link rel="stylesheet" href="/shell/text.css" />
+TEXT = """<title>{title}</title>
+    <link rel="stylesheet" href="/shell/text.css" />
     <script src="/shell/accessibility.js" type="module"></script>"""
 AROUND = """
     <link rel="stylesheet" href="/shell/shell.css" />

@@ -162,8 +162,9 @@ def test_keys_colour_the_bodies_and_the_solver_sends_what_that_takes(page, brows
 
 
 def test_a_click_into_the_scene_finds_a_body_and_one_beside_lets_it_go(page, browser):
-    # Drawn anew after the colours of the test before.
-    wait_for(lambda: page.look._drawn is not None)
+    # The step of the first test has ended and its last frame is on the page: from here on no body moves.
+    wait_for(lambda: status(page).state in (SessionState.PAUSED, SessionState.ENDED))
+    wait_for(lambda: page.look._drawn is not None and page.look._drawn.time == status(page).time)
     frame = page.look._drawn
     top = int(np.argmax(frame.position[:, 2]))
     browser.click(frame.position[top] + [0, 0, 1.0], (0, 0, -1))
