@@ -25,11 +25,15 @@ TITLE_LETTERS = 20
 
 
 def command_output(
-    arguments: Sequence[str], program: Sequence[str] = PROGRAM, hear: Callable[[str], None] = lambda line: None
+    arguments: Sequence[str],
+    program: Sequence[str] = PROGRAM,
+    hear: Callable[[str], None] = lambda line: None,
+    begun: Callable[[subprocess.Popen[str]], None] = lambda process: None,
 ) -> str:
     """Standard output of ``program arguments``, which gives way to everything that a person looks at.
 
-    ``hear`` is called with every line of it as it comes, in the caller's thread.
+    ``hear`` is called with every line of it as it comes, in the caller's thread, and before them ``begun`` with the
+    process, which may be killed from another one.
     A command that ends with ``FAILURE`` and has printed something has an answer too. Raises CommandError with the last
     line of any other that does not end well. The command does not outlive this process.
     """
@@ -46,6 +50,7 @@ def command_output(
         ) as process,
     ):
         atexit.register(process.kill)
+        begun(process)
         session_gives_way(process.pid, BACKGROUND)
         assert process.stdout is not None
         for line in process.stdout:

@@ -16,13 +16,14 @@ from doe.diagnose.diagnosis import Diagnosis, complete_rows
 from doe.measurement.measurement import Condition, Measurement
 from doe.measurement.summaries import summary_names
 from doe.studies.study import CALIBRATED
+from explorer.diagnosis.result import SHORT_PROFILE
 from explorer.scene.text import material_toml
 from solver import EFFECTS, Scene, observable_names, parameters, value, with_values
 
 SHORT = {"pilot_runs": 6, "change_runs": 3, "ascent_replicates": 1, "verification_runs": 6} | {
     f"{part}_replicates": 1 for part in ("screening", "assumption", "scan", "surface")
 }
-"""Runs of the profile ``quick``."""
+"""Runs of the profile ``SHORT_PROFILE``."""
 TARGETS = 2
 """Targets of the study at most: each takes part in every stage."""
 
@@ -66,7 +67,7 @@ def study_toml(measurement: Measurement, diagnosis: Diagnosis, material: str) ->
         "fallback": [factor["name"] for factor in factors[-CALIBRATED:]],
         "target": targets,
         "factor": factors,
-        "profile": {"quick": profile | SHORT, "standard": profile},
+        "profile": {SHORT_PROFILE: profile | SHORT, "standard": profile},
     }
     return (
         f"# {named} beside the declared parameters, calibrated against condition {condition.name}. SI.\n"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -43,6 +44,8 @@ class AnswerPiles:
     """The final model; the same where nothing is added."""
     measured: HeightSurface | None
     """None where the data hold neither scans nor profiles of this condition."""
+    angle: tuple[float, float]
+    """Mean and standard deviation of the measured angles of repose [°]; NaN where none were, or only one."""
 
 
 def answer_piles(result: DiagnosisResult) -> AnswerPiles:
@@ -57,6 +60,18 @@ def answer_piles(result: DiagnosisResult) -> AnswerPiles:
         model_scene(measurement, condition, result.confirmation.before),
         model_scene(measurement, condition, result.confirmation.after),
         measured_surface(result, condition.name),
+        measured_angle(condition),
+    )
+
+
+def measured_angle(condition: Condition) -> tuple[float, float]:
+    """Mean and standard deviation of the angles of repose that were measured in ``condition`` [°]; NaN without."""
+    found = condition.offered.get("angle_of_repose_deg")
+    known = np.empty(0) if found is None else np.asarray(found.values, dtype=float)
+    known = known[np.isfinite(known)]
+    return (
+        float(known.mean()) if known.size else math.nan,
+        float(known.std(ddof=1)) if known.size > 1 else math.nan,
     )
 
 

@@ -32,6 +32,8 @@ from doe.record import Document, Record
 
 FloatArray = npt.NDArray[np.float64]
 Kind = Literal["no_missing_effect", "effect", "effects", "ambiguous", "unexplained"]
+CORRECTED, CORRECTED_STUDY, SHORT_PROFILE = "corrected.toml", "corrected_study.toml", "quick"
+"""Material of the corrected model, the study that calibrates it, and that study's short profile."""
 Confirmation = Literal["no holdout", "within noise", "confirmed", "not certain", "not confirmed"]
 
 

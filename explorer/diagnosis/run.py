@@ -30,6 +30,8 @@ from explorer.background.progress import PROGRESS, PourProgress
 from explorer.diagnosis.corrected import corrected_toml, study_toml
 from explorer.diagnosis.next_folder import read_next, write_next
 from explorer.diagnosis.result import (
+    CORRECTED,
+    CORRECTED_STUDY,
     BeforeAndAfter,
     DataRead,
     DiagnosisOrder,
@@ -137,11 +139,11 @@ def run_diagnose(order: DiagnoseOrder, say: Callable[[str], None]) -> DiagnosisR
         write_next(order.out / "next", order.folder, measurement, found.suggestions[0])
         say(f"{order.out}/next: what to measure next, to be filled in; then --follow-up {order.out}/next")
     if order.apply:
-        write_whole(order.out / "corrected.toml", corrected_toml(measurement, found))
-        say(f"{order.out}/corrected.toml: the corrected model, for every command that takes a material")
-        text = study_toml(measurement, found, "corrected.toml")
+        write_whole(order.out / CORRECTED, corrected_toml(measurement, found))
+        say(f"{order.out}/{CORRECTED}: the corrected model, for every command that takes a material")
+        text = study_toml(measurement, found, CORRECTED)
         if text:
-            path = order.out / "corrected_study.toml"
+            path = order.out / CORRECTED_STUDY
             write_whole(path, text)
             say(f"{path}: its calibration, the effect among the factors: explorer calibrate --headless --study {path}")
     for line in error_lines(result):

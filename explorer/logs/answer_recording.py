@@ -142,7 +142,7 @@ def diagnosis_answer(result: DiagnosisResult) -> Answer:
         models=models,
         measured=piles.measured,
         measured_words=measured_words,
-        angle=_measured_angle(condition),
+        angle=piles.angle[0],
         discharge=_measured_discharge(condition),
         outlines=tuple(
             Outline(name, one.radius, band.mean, band.sd)
@@ -205,11 +205,6 @@ def study_answer(result: StudyResult) -> Answer:
             ]
         },
     )
-
-
-def _measured_angle(condition: Condition) -> float:
-    found = condition.offered.get(ANGLE.name)
-    return math.nan if found is None or np.isnan(found.values).all() else float(np.nanmean(found.values))
 
 
 def _measured_discharge(condition: Condition) -> tuple[Array, Array] | None:

@@ -76,4 +76,5 @@ def listed_edits(study: Study, edits: StudyEdits) -> list[tuple[str, str, float 
 
 def _heading(file: Path, edits: StudyEdits) -> str:
     changed = [*(name for name, values in edits.factors.items() if values), *(["target"] if edits.target else [])]
-    return f"# {file.name}, changed on the page: {', '.join(changed)}. SI unless a unit is written.\n\n"
+    how = f"changed on the page: {', '.join(changed)}" if changed else "as it was started on the page"
+    return f"# {file.name}, {how}. SI unless a unit is written.\n\n"

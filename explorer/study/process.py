@@ -23,6 +23,8 @@ ENDINGS = {0: "report", 3: "above the error limit; report"}
 """Exit codes of ``calibrate`` after a complete chain."""
 RESULT, PARTIAL = "result.json", "partial.json"
 NO_EDITS = StudyEdits()
+CHANGED = "_changed.toml"
+"""End of the name of a study's own file in its output folder."""
 
 
 class StudyProcess(Protocol):
@@ -36,8 +38,11 @@ class StudyProcess(Protocol):
     def out(self) -> Path | None:
         """Output folder of the study started last, None before the first."""
 
-    def start(self, profile: str, edits: StudyEdits = NO_EDITS) -> None:
-        """Start a new study. Raises a ValueError where one runs already or the order cannot be carried out."""
+    def start(self, profile: str, edits: StudyEdits = NO_EDITS, file: Path | None = None) -> None:
+        """Start a new study, of another ``file`` than ``study_file`` where one is given.
+
+        Raises a ValueError where one runs already or the order cannot be carried out.
+        """
 
     def queue(self, profile: str, edits: StudyEdits = NO_EDITS) -> None:
         """Start it after those before it; at once if none runs and none waits."""
@@ -74,10 +79,12 @@ class StudyProcess(Protocol):
 class QueuedStudy:
     """One study that was asked for."""
 
+    stem: str
+    """Of its study file's name."""
     profile: str
     edits: StudyEdits
     text: str
-    """Content of its own study file; empty for the file as it is."""
+    """Content of its own study file; empty for the page's file as it is."""
     photographed: PhotographedTarget | None
     """Photographs in place of the study's own target."""
 
@@ -113,9 +120,12 @@ class CalibrationProcess:
         """Output folder of the study started last."""
         return self._process.out
 
-    def start(self, profile: str, edits: StudyEdits = NO_EDITS) -> None:
-        """Start a new calibration with ``profile``."""
-        order = self._order(profile, edits)
+    def start(self, profile: str, edits: StudyEdits = NO_EDITS, file: Path | None = None) -> None:
+        """Start a new calibration with ``profile``.
+
+        A copy of another study's ``file`` is kept in the output folder; the photographs are not its target.
+        """
+        order = self._order(profile, edits, file)
         self._process.refuse_while_running()
         self._begin(order)
 
@@ -154,20 +164,21 @@ class CalibrationProcess:
         """Output folders of finished studies, of any study file, newest first."""
         return finished(self._folder, RESULT)
 
-    def _order(self, profile: str, edits: StudyEdits) -> QueuedStudy:
-        text, study = edited_study(self.study_file, edits) if edits else ("", load_study(str(self.study_file)))
+    def _order(self, profile: str, edits: StudyEdits, other: Path | None = None) -> QueuedStudy:
+        file = other or self.study_file
+        text, study = edited_study(file, edits) if edits or other else ("", load_study(str(file)))
         with_profile(study, profile)
-        photographed = None if self._target is None else load_target(self._target)
+        photographed = None if self._target is None or other else load_target(self._target)
         if photographed is not None:
             photographed.of_study(study.targets)
-        return QueuedStudy(profile, edits, text, photographed)
+        return QueuedStudy(file.stem, profile, edits, text, photographed)
 
     def _begin(self, order: QueuedStudy) -> None:
         self._profile, self._tries = order.profile, TRIES
-        out = new_folder(self._folder, self._stem(order.profile))
+        out = new_folder(self._folder, f"{order.stem}-{order.profile}")
         if order.text:
             out.mkdir()
-            write_whole(out / self._edited_name, order.text)
+            write_whole(out / f"{order.stem}{CHANGED}", order.text)
         if order.photographed is not None:
             order.photographed.copied(out / FOLDER)
         self._process.start(out, self._arguments(out))
@@ -176,7 +187,8 @@ class CalibrationProcess:
     def _last(self) -> Path:
         out = self._process.out
         if out is None:
-            stems = {self._stem(profile): profile for profile in load_study(str(self.study_file)).profiles}
+            profiles = load_study(str(self.study_file)).profiles
+            stems = {f"{self.study_file.stem}-{profile}": profile for profile in profiles}
             found = newest_unfinished(self._folder, tuple(stems), RESULT)
             if found is None:
                 raise BackgroundError("no study has been stopped before its end; there is nothing to resume")
@@ -187,18 +199,11 @@ class CalibrationProcess:
         self._process.resume(out, self._arguments(out))
         self._line.begun()
 
-    @property
-    def _edited_name(self) -> str:
-        return f"{self.study_file.stem}_changed.toml"
-
-    def _stem(self, profile: str) -> str:
-        return f"{self.study_file.stem}-{profile}"
-
     def _arguments(self, out: Path) -> list[str]:
         """The command line that is run, as a person would type it."""
         store = () if self._store is None else ("--store", str(self._store))
-        own = out / self._edited_name
-        study = ["--study", str(own if own.is_file() else self.study_file), "--profile", self._profile]
+        own = next(out.glob(f"*{CHANGED}"), self.study_file)
+        study = ["--study", str(own), "--profile", self._profile]
         study += ["--target", str(out / FOLDER)] if (out / FOLDER).is_dir() else []
         tries = () if self._tries == TRIES else ("--tries", str(self._tries))
         return ["calibrate", "--headless", *study, "--out", str(out), *store, *tries]

@@ -90,7 +90,7 @@ class Page:
     def _made(self) -> Iterator[Panel]:
         """Make the panels that this page has, each in its place."""
         gui, kinds = self._server.gui, [kind for kind in PANELS.values() if kind.offered(self._context)]
-        controls, study = gui.add_tab_group(), gui.add_panel()
+        controls, study = gui.add_tab_group(), self._context.study_panel
         gui.main_panel.dock_right()
         gui.main_panel.set_width(CONTROLS_WIDTH)
         study.dock_left()

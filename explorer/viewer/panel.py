@@ -25,6 +25,7 @@ from explorer.viewer.actions import BackgroundWork, Post
 from explorer.viewer.look.look_settings import LookSettings
 from explorer.viewer.output.recording_switch import RecordingSwitch
 from explorer.viewer.pour.beside_pile import BesidePile
+from explorer.viewer.pour.ghost import Ghost
 from explorer.viewer.shell.channel import ShellChannel
 from explorer.viewer.shell.web_pages import WebPages
 
@@ -88,6 +89,11 @@ class PageContext:
         return self.data / "uploads"
 
     @cached_property
+    def study_panel(self) -> viser.PanelHandle:
+        """Left of the scene, with the tabs of ``Place.STUDY``."""
+        return self.server.gui.add_panel()
+
+    @cached_property
     def background(self) -> BackgroundWork:
         """Work about the pour and its files that takes seconds."""
         return BackgroundWork(self.post)
@@ -111,6 +117,11 @@ class PageContext:
     def beside(self) -> BesidePile:
         """A second pour beside the first."""
         return BesidePile(self.server, self.session)
+
+    @cached_property
+    def ghost(self) -> Ghost:
+        """The pile that stood before this pour."""
+        return Ghost(self.server)
 
     @cached_property
     def look(self) -> LookSettings:

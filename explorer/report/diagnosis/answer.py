@@ -7,7 +7,7 @@ import math
 from doe.diagnose.next_experiment import SURE
 from doe.diagnose.result import NO_EFFECT, UNEXPLAINED, EffectRow, HeldOut, Place
 from doe.holdout import OVERALL
-from explorer.diagnosis.result import DiagnosisResult, ErrorRow, Kind, answers
+from explorer.diagnosis.result import CORRECTED, CORRECTED_STUDY, DiagnosisResult, ErrorRow, Kind, answers
 from explorer.report.content import Banner, Block, Bullets, Caution, Facts, Figure, Section, Table, Text, Word
 from explorer.report.diagnosis.charts import likely, probability_chart
 from explorer.report.diagnosis.evidence import strained
@@ -65,7 +65,10 @@ def _what_next(result: DiagnosisResult) -> str:
         case "no_missing_effect":
             return "Use the calibrated model; the section on what could have been seen says what may still hide."
         case "effect" | "effects":
-            return "Take the corrected material, and the study that calibrates it: `explorer diagnose … --apply`."
+            return (
+                f"Pour the corrected material, and calibrate it with its study: `{CORRECTED}` and "
+                f"`{CORRECTED_STUDY}`, which `explorer diagnose … --apply` writes beside this report."
+            )
         case "ambiguous":
             return f"{_asked_for(result)} `explorer diagnose … --follow-up` takes them."
         case "unexplained":

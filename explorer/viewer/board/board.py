@@ -10,6 +10,7 @@ from typing import Any
 
 from explorer.report.content import Banner, Spec, Table
 from explorer.report.study_charts import Plots
+from solver import EFFECTS
 
 CODE = re.compile(r"`([^`]*)`")
 
@@ -45,12 +46,22 @@ class Stage:
 
 
 @dataclass(frozen=True)
+class BoardAct:
+    """A button below the verdict: its label, and the command that it sends (`explorer.viewer.shell.channel`)."""
+
+    label: str
+    command: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
 class Board:
     """All of a board."""
 
     title: str
     subtitle: str
     banner: Banner | None = None
+    acts: tuple[BoardAct, ...] = ()
+    """What can be done next; not offered where the board stands in no page."""
     stages: tuple[Stage, ...] = ()
     charts: tuple[BoardChart, ...] = ()
     tables: tuple[BoardTable, ...] = ()
@@ -70,6 +81,7 @@ def board_json(board: Board) -> bytes:
         "title": board.title,
         "subtitle": board.subtitle,
         "banner": None if board.banner is None else _banner(board.banner),
+        "acts": [vars(act) for act in board.acts],
         "stages": [vars(stage) for stage in board.stages],
         "charts": [vars(chart) for chart in board.charts],
         "tables": [
@@ -94,4 +106,4 @@ def _banner(banner: Banner) -> dict[str, str]:
 
 
 def _plain(text: str) -> str:
-    return CODE.sub(r"\1", text)
+    return CODE.sub(lambda found: found[1].replace("_", " ") if found[1] in EFFECTS else found[1], text)

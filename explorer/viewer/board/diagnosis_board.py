@@ -11,8 +11,16 @@ from explorer.report.diagnosis.answer import banner
 from explorer.report.diagnosis.charts import diagnosis_plots, likely, map_chart
 from explorer.report.diagnosis.wording import chance, feature_label, feature_value, spelled
 from explorer.report.study_charts import Plot
-from explorer.viewer.board.board import Board, BoardTable, made_charts
+from explorer.viewer.board.board import Board, BoardAct, BoardTable, made_charts
 from explorer.viewer.board.study_board import stages_of, working
+
+SIDE_BY_SIDE, POUR_CORRECTED, CALIBRATE_CORRECTED = "show_piles", "pour_corrected", "calibrate_corrected"
+"""Commands of a board's buttons."""
+SIDE_BY_SIDE_ACT = BoardAct("Show side by side", {"do": SIDE_BY_SIDE})
+CORRECTED_ACTS = (
+    BoardAct("Pour the corrected model", {"do": POUR_CORRECTED}),
+    BoardAct("Calibrate the corrected model", {"do": CALIBRATE_CORRECTED}),
+)
 
 
 def diagnosis_board(result: DiagnosisResult | None, status: CommandStatus | None, report: str = "") -> Board:
@@ -34,6 +42,7 @@ def diagnosis_board(result: DiagnosisResult | None, status: CommandStatus | None
         title=result.data.title or result.data.folder,
         subtitle=subtitle,
         banner=banner(result),
+        acts=(SIDE_BY_SIDE_ACT, *(CORRECTED_ACTS if result.added else ())),
         stages=stages_of(status) if alive else (),
         charts=made_charts(first | maps | rest),
         tables=(_answers(result), _errors(result)),

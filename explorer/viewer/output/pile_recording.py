@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 from collections.abc import Callable, Sequence
 from datetime import datetime
 from html import escape
@@ -10,12 +11,13 @@ from typing import Any
 
 from explorer.background.command_output import command_output
 from explorer.background.command_process import PROGRAM
+from explorer.errors import CommandError
 from explorer.viewer.actions import BackgroundWork, client_buttons
 from explorer.viewer.output.send_file import refuse_large, send_file
 from explorer.viewer.panel import PageContext
 from explorer.viewer.view import small_html
 
-RECORD = "Record the piles (.rrd)"
+RECORD, CANCEL = "Record the piles (.rrd)", "Cancel the recording"
 
 
 class PileRecording:
@@ -30,10 +32,12 @@ class PileRecording:
         self._folder, self._order, self._program = page.data / "recordings", order, program
         # Of its own: it may take minutes, and nothing else of the page waits for it.
         self._work = BackgroundWork(page.post)
+        self._process: subprocess.Popen[str] | None = None
+        self._cancelled = False
         self._buttons = client_buttons(
             page.server.gui,
             "Recording",
-            {RECORD: self._record},
+            {RECORD: self._record, CANCEL: self._cancel},
             page.post,
             hint="Measured pile and the piles before and after, pouring side by side, with outlines, angle, discharge "
             "and errors: one file for `explorer replay` or rerun. Pours both models, in the background: up to minutes.",
@@ -44,6 +48,9 @@ class PileRecording:
     def show(self) -> None:
         """Say whether one is being made."""
         busy = self._work.busy_with
+        offered = (CANCEL,) if busy else (RECORD,)
+        if tuple(self._buttons.options) != offered:
+            self._buttons.options = offered
         said = small_html(escape(f"Busy {busy}: {self._now}")) if busy else ""
         if self._line.content != said:
             self._line.content, self._line.visible = said, bool(busy)
@@ -52,18 +59,35 @@ class PileRecording:
         """What the command is at, in its own words."""
         self._now = line
 
+    def _begun(self, process: subprocess.Popen[str]) -> None:
+        self._process = process
+        if self._cancelled:  # before the process was there
+            process.kill()
+
+    def _cancel(self, client: Any) -> None:
+        self._cancelled = True
+        if self._process is not None:
+            self._process.kill()
+
     def _record(self, client: Any) -> None:
         out, arguments = self._order()
 
         def made() -> Path:
             self._folder.mkdir(parents=True, exist_ok=True)
             path = self._folder / f"{out.name}-piles-{datetime.now():%Y%m%d-%H%M%S-%f}.rrd"
-            command_output([*arguments, "--out", str(out), "--record", str(path)], self._program, self._hear)
+            whole = [*arguments, "--out", str(out), "--record", str(path)]
+            try:
+                command_output(whole, self._program, self._hear, self._begun)
+            except CommandError:
+                path.unlink(missing_ok=True)
+                if self._cancelled:
+                    raise CommandError("the recording of the piles was cancelled") from None
+                raise
             return path
 
         def send(path: Path) -> None:
             refuse_large([path])
             send_file(client, path.name, path.read_bytes())
 
-        self._now = "the solver loads"
+        self._now, self._cancelled, self._process = "the solver loads", False, None
         self._work.start("recording the piles", made, send)

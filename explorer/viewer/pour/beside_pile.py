@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import viser
 
 from explorer.diagnosis.piles import HeightSurface
@@ -26,6 +28,28 @@ from solver.scenes.scene import Scene
 ROOT = "/second"
 BESIDE = 2.15 * PLATE_RADIUS
 """Distance of two rigs' axes [m]."""
+
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Aside:
+    """Where a camera was put so that all piles are in its picture."""
+
+    away: Array
+    """From pile to camera before that [m]."""
+    aspect: float
+    """Width of the picture over its height."""
+    position: Array
+    """[m]."""
+    scene: Scene
+    middle: float
+    """Of all piles along x [m]."""
+
+    def holds(self, position: Array) -> bool:
+        """Whether the camera still stands there: less a hair, browsers tell single precision."""
+        return bool(np.allclose(position, self.position, atol=1e-4))
 
 
 class BesidePile:
@@ -44,25 +68,23 @@ class BesidePile:
         self._frame_number = 0
         self._kept_for: object = None
         self._signs: list[Any] = []
+        self._names: dict[str, viser.LabelHandle] = {}
+        self._aside: dict[int, Aside] = {}
         server.scene.add_frame(ROOT, show_axes=False, position=(BESIDE, 0.0, 0.0))
 
-    def pour(self, scene: Scene, seed: int) -> None:
-        """Begin the second pour, in place of one before it."""
+    def pour(self, scene: Scene, seed: int, names: tuple[str, str] = ("first pour", "second pour")) -> None:
+        """Begin the second pour, in place of one before it; ``names`` stand above both, with what they have come to."""
         self._take_signs_away()
         if self._second is None:
             self._second = self._open()
-            step_aside(self._server, scene)
+            self._step_aside(scene, 0.5 * BESIDE)
         self._second.start(scene, seed)
+        self._names = {name: self._sign(name, x, scene) for name, x in zip(names, (0.0, BESIDE), strict=True)}
 
-    def show_measured(self, surface: HeightSurface | None, names: tuple[str, str, str], scene: Scene) -> None:
-        """Draw the measured pile left of the first one, and the three names above them."""
-        self._take_signs_away()
-        height = scene_height(scene)
-        places = ((-BESIDE, names[0]), (0.0, names[1]), (BESIDE, names[2]))
-        for x, name in places if surface is not None else places[1:]:
-            label = self._server.scene.add_label(f"/names/{name}", name, position=(x, 0.0, 1.08 * height))
-            self._signs.append(label)
+    def show_measured(self, surface: HeightSurface | None, text: str, scene: Scene) -> None:
+        """Draw the measured pile left of the first one, and ``text`` above it; once the second is poured."""
         if surface is not None:
+            self._sign(text, -BESIDE, scene)
             plate = circle(PLATE_RADIUS, LINE)  # below the surface's node, and so beside the first pile with it
             self._signs += [
                 self._server.scene.add_mesh_simple(
@@ -75,11 +97,12 @@ class BesidePile:
                 ),
                 self._server.scene.add_line_segments("/measured/plate", plate, RIM, thickness=LINE),
             ]
-        step_aside(self._server, scene, 0.0 if surface is not None else 0.5 * BESIDE)
+        self._step_aside(scene, 0.0 if surface is not None else 0.5 * BESIDE)
 
     def close(self) -> None:
         """End the second pour and take all of it off the page."""
         self._take_signs_away()
+        self._aside = {}
         if self._second is not None:
             self._second.close()
             self._second = None
@@ -89,6 +112,7 @@ class BesidePile:
         """Draw its newest frame."""
         if self._second is None:
             return
+        self._follow_windows()
         status, frame = self._second.status(), self._second.frame()
         if self._drawn is None or another_set_up(status.scene, self._drawn):
             self._remove_nodes()
@@ -108,10 +132,46 @@ class BesidePile:
             keep_time(self._second, second, first)
         return second
 
+    def say(self, first: str, second: str) -> None:
+        """What both pours have come to, below their names."""
+        for (name, sign), said in zip(self._names.items(), (first, second), strict=False):
+            text = f"{name}\n{said}"
+            if sign.text != text:
+                sign.text = text
+
+    def _step_aside(self, scene: Scene, middle: float) -> None:
+        """Move every camera away until all plates are in its picture; from where a person had it."""
+        self._aside, former = {}, self._aside
+        for number, client in self._server.get_clients().items():
+            camera, before = client.camera, former.get(number)
+            at = np.array(camera.position)
+            away = before.away if before and before.holds(at) else at - np.array(camera.look_at)
+            view = stand_aside(camera, away, scene, middle)
+            go_to_place(client, view)
+            self._aside[number] = Aside(away, aspect_of(camera), np.array(view.position), scene, middle)
+
+    def _follow_windows(self) -> None:
+        """A picture that has another shape now, of a camera that no person has moved since, holds all plates again."""
+        clients = self._server.get_clients()
+        for number, aside in self._aside.items():
+            client = clients.get(number)
+            if client is None or aspect_of(client.camera) == aside.aspect or not aside.holds(client.camera.position):
+                continue
+            view = stand_aside(client.camera, aside.away, aside.scene, aside.middle)
+            go_to_place(client, view)
+            self._aside[number] = replace(aside, aspect=aspect_of(client.camera), position=np.array(view.position))
+
+    def _sign(self, text: str, x: float, scene: Scene) -> viser.LabelHandle:
+        """``text`` above a pile."""
+        at = (x, 0.0, 1.08 * scene_height(scene))
+        sign = self._server.scene.add_label(f"/names/{len(self._signs)}", text, position=at, anchor="bottom-center")
+        self._signs.append(sign)
+        return sign
+
     def _take_signs_away(self) -> None:
-        for sign in self._signs:
+        for sign in reversed(self._signs):  # what stands below another node goes with that
             sign.remove()
-        self._signs = []
+        self._signs, self._names = [], {}
 
     def _remove_nodes(self) -> None:
         if self._nodes is not None:
@@ -141,19 +201,17 @@ def _come_to(session: Session, second: Status, time: float) -> None:
         session.step_back(ahead)
 
 
-def step_aside(server: viser.ViserServer, scene: Scene, middle: float = 0.5 * BESIDE) -> None:
-    """Move every camera away until all plates, about ``middle`` [m] along x, are in the picture across.
+def stand_aside(camera: Any, away: Array, scene: Scene, middle: float) -> CameraView:
+    """The view along ``away`` (pile to camera [m]) with all plates, about ``middle`` [m] along x, in the picture.
 
     With a = unit vector from the piles to the camera, e = x axis, ℓ = distance of the outermost axis from the middle,
     and R = radius of a plate: the plate nearest to the camera is a·e ℓ nearer than the middle and reaches
     √(1 − (a·e)²) ℓ + R to the side, which half the width of the picture has to hold: depth · tan(fov/2) · aspect.
+    The camera comes no nearer than ``away``.
     """
     aim = np.array([middle, 0.0, MIDDLE * scene_height(scene)])
-    for client in server.get_clients().values():
-        away = np.array(client.camera.position) - np.array(client.camera.look_at)
-        now = max(float(np.linalg.norm(away)), 1e-6)
-        along, outermost = abs(float(away[0])) / now, BESIDE - middle
-        half_width = math.tan(0.5 * client.camera.fov) * aspect_of(client.camera)
-        least = along * outermost + (math.sqrt(1.0 - along**2) * outermost + PLATE_RADIUS) / half_width
-        away *= max(1.0, least / now)
-        go_to_place(client, CameraView(aim + away, aim))
+    now = max(float(np.linalg.norm(away)), 1e-6)
+    along, outermost = abs(float(away[0])) / now, BESIDE - middle
+    half_width = math.tan(0.5 * camera.fov) * aspect_of(camera)
+    least = along * outermost + (math.sqrt(1.0 - along**2) * outermost + PLATE_RADIUS) / half_width
+    return CameraView(aim + away * max(1.0, least / now), aim)

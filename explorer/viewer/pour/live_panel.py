@@ -38,6 +38,7 @@ POWER_DIGITS = 2
 """Decimals of a power of ten: as fine as the slider's step, and no more than its box can show."""
 LARGEST_FACTOR, LARGEST_POWER = 4.0, 100.0
 """By which values that differ are scaled at most in one go, on a linear and on a logarithmic slider."""
+SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 DECADES = 1.0
 """A logarithmic slider reaches this far to either side of the present value, then out to whole decades."""
 HANDS_OFF = 1.5
@@ -287,7 +288,10 @@ def linear_faces(gui: viser.GuiApi, parameter: Parameter, start: float, label: s
 
 
 def log_faces(gui: viser.GuiApi, parameter: Parameter, start: float, label: str = "") -> tuple[Face, ...]:
-    """A number box in the unit of the screen, and below it a slider over its power of ten."""
+    """A number box in the unit of the screen, and below it a slider over its power of ten.
+
+    With a ``label`` the slider alone, in one row of the narrow panel.
+    """
     name, (low, high) = titled(parameter, label), screen_range(parameter)
     unit = screen_unit(parameter).symbol
     bottom, top = decades_around(start, low, high)
@@ -295,24 +299,24 @@ def log_faces(gui: viser.GuiApi, parameter: Parameter, start: float, label: str 
     def power_of(number: float) -> float:
         return min(max(round(math.log10(number), POWER_DIGITS), bottom), top)
 
-    box = gui.add_number(name, start, min=low, max=high, hint=parameter.doc)
+    box = None if label else gui.add_number(name, start, min=low, max=high, hint=parameter.doc)
     slider = gui.add_slider(
-        f"log₁₀ of {unit or name}",
+        f"{label} [log {unit}]" if label else f"log₁₀ of {unit or name}",
         float(bottom),
         float(top),
         LINEAR_STEP,
         power_of(start),
-        marks=tuple((power, decade_mark(power, unit)) for power in range(bottom, top + 1)),
-        hint=f"The same value as a power of ten. {parameter.doc}",
+        marks=tuple((power, decade_mark(power)) for power in range(bottom, top + 1)),
+        hint=f"As a power of ten. {parameter.doc}",
     )
 
     def number_from(power: object) -> float:
         return min(max(10.0 ** checked(power, bottom, top, name), low), high)
 
-    return (
-        Face(box, lambda number: number, lambda entered: checked(entered, low, high, name)),
-        Face(slider, power_of, number_from),
-    )
+    power = Face(slider, power_of, number_from)
+    if box is None:
+        return (power,)
+    return Face(box, lambda number: number, lambda entered: checked(entered, low, high, name)), power
 
 
 def titled(parameter: Parameter, label: str) -> str:
@@ -350,11 +354,9 @@ def decades_around(number: float, low: float, high: float) -> tuple[int, int]:
     return bottom, top
 
 
-def decade_mark(power: int, unit: str) -> str:
-    """Text of a mark at 10^power, e.g. 2, "MPa" → "100"; from a thousand MPa on in GPa."""
-    if unit == "MPa" and power >= 3:
-        return f"{10 ** (power - 3)} GPa"
-    return f"{10.0**power:g}"
+def decade_mark(power: int) -> str:
+    """Text of a mark at 10^power, e.g. 2 → "100"; beyond that as a power: room is scarce at a slider's end."""
+    return f"{10.0**power:g}" if power <= 2 else f"10{str(power).translate(SUPERSCRIPT)}"
 
 
 class PairMatrix:

@@ -46,6 +46,7 @@ STYLE = """<style>
 .pour .trouble {background: #9a4400; color: white;}
 .pour .big {font-size: 2.4em; font-weight: 600; line-height: 1.2; font-variant-numeric: tabular-nums;}
 .pour .doubt {font-size: 1.2em; line-height: 2.4em; opacity: 0.65; font-variant-numeric: tabular-nums;}
+.pour .former {font-size: 0.9rem; font-weight: 400; white-space: nowrap; line-height: 1;}
 .pour .dim {opacity: 0.65; height: 2.9em; overflow: hidden;}
 .pour .top {display: flex; justify-content: space-between; align-items: center;}
 .pour .dot {display: inline-block; width: 0.7em; height: 0.7em; border-radius: 50%;
@@ -59,13 +60,14 @@ class Readout(Panel):
     name, tab = "readout", CONTROLS
 
     def __init__(self, page: PageContext) -> None:
-        self._look, self._html = page.look, page.server.gui.add_html("")
+        self._look, self._ghost, self._html = page.look, page.ghost, page.server.gui.add_html("")
         self._angle = AngleDoubt()
 
     def show(self, now: Now) -> None:
         """Tell what the pour is doing."""
         by_component, doubt = self._look.look.colour_by == COMPONENT, self._angle.doubt(now.status)
-        html = readout_html(now.status, by_component, doubt)
+        former = self._ghost.former
+        html = readout_html(now.status, by_component, doubt, math.nan if former is None else former.angle)
         if self._html.content != html:
             self._html.content = html
 
@@ -102,15 +104,15 @@ class AngleDoubt:
         return "" if status.phase in (Phase.PILE, Phase.RUN) and long_enough and agree else FORMING
 
 
-def readout_html(status: Status, by_component: bool = True, doubt: str = "") -> str:
+def readout_html(status: Status, by_component: bool = True, doubt: str = "", former: float = math.nan) -> str:
     """The readout. Its height is always the same: what stands below must not move under a person's hand.
 
     ``by_component``: whether a body's colour says what it is; a legend of components would be wrong otherwise.
-    ``doubt``: of :class:`AngleDoubt`; an angle in doubt is small and grey.
+    ``doubt``: of :class:`AngleDoubt`; an angle in doubt is small and grey. ``former``: angle of the pile before [°].
     """
     components = legend(status.scene) if by_component else ""
     top = f"<div class='top'>{_state(status)}<span>{components}</span></div>"
-    return f"{STYLE}<div class='pour'>{top}{_angle(status, doubt)}</div>"
+    return f"{STYLE}<div class='pour'>{top}{_angle(status, doubt, former)}</div>"
 
 
 def condition(status: Status) -> str:
@@ -147,7 +149,7 @@ def _state(status: Status) -> str:
     return f"<span>{pills}</span>"
 
 
-def _angle(status: Status, doubt: str) -> str:
+def _angle(status: Status, doubt: str, former: float) -> str:
     values = status.observables
     found = values.get("angle_of_repose_deg")
     if found is None:
@@ -158,7 +160,10 @@ def _angle(status: Status, doubt: str) -> str:
         spread = "" if found.spread is None else f" ± {found.spread:.1f}° over flanks"
         words = f"angle of repose{spread} · one view: left {_degrees(left)}, right {_degrees(right)}"
     angle = _degrees(angle_of_repose_deg(status))
-    number = f"<div class='doubt'>{angle} · {doubt}</div>" if doubt else f"<div class='big'>{angle}</div>"
+    before = f" <span class='former'>before: {former:.1f}°, one pour each</span>" if math.isfinite(former) else ""
+    number = (
+        f"<div class='doubt'>{angle} · {doubt}{before}</div>" if doubt else f"<div class='big'>{angle}{before}</div>"
+    )
     return f"{number}<div class='dim'>{words}</div>"
 
 

@@ -6,11 +6,11 @@ import math
 from html import escape
 
 from explorer.live.messages import SessionState, Status
-from explorer.outcomes import OUTCOME_SENTENCES
+from explorer.outcomes import OUTCOME_SENTENCES, OUTCOME_WORDS
 from explorer.scene.source import change_lines, differences, same_bodies
 from explorer.viewer.actions import button_group
 from explorer.viewer.panel import POUR, Now, PageContext, Panel
-from explorer.viewer.pour.readout import STATE_WORDS, angle_of_repose_deg
+from explorer.viewer.pour.readout import STATE_WORDS, TROUBLE, angle_of_repose_deg
 from solver.pours.record import Outcome
 
 DIFFERENCES_SHOWN = 6
@@ -49,9 +49,22 @@ class SecondPile(Panel):
     def show(self, now: Now) -> None:
         """Tell both results, and let time go or stand as in the first."""
         second = self._beside.follow(now.status)
-        text = NONE if second is None else comparison_markdown(now.status, second)
+        text = NONE
+        if second is not None:
+            text = comparison_markdown(now.status, second)
+            self._beside.say(come_to(now.status), come_to(second))
         if self._text.content != text:
             self._text.content = text
+
+
+def come_to(status: Status) -> str:
+    """In a few words how far a pour is: its angle once it has ended."""
+    if status.outcome == Outcome.RUNNING:
+        return STATE_WORDS[status.state] if status.state in TROUBLE else f"pouring, {status.time:.1f} s"
+    angle = angle_of_repose_deg(status)
+    if not status.outcome.valid:
+        return OUTCOME_WORDS.get(status.outcome, str(status.outcome))
+    return f"{angle:.1f}°, one pour" if math.isfinite(angle) else "at rest, no angle"
 
 
 def comparison_markdown(first: Status, second: Status) -> str:

@@ -6,9 +6,7 @@ ghost, to compare with the new.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from html import escape
 
 import numpy as np
@@ -16,22 +14,18 @@ import numpy.typing as npt
 
 from explorer.live.frames import Frame
 from explorer.live.messages import Event, SessionState, Status
-from explorer.scene.meshes import body_triangles
 from explorer.scene.source import change_lines, differences
-from explorer.viewer.palette import Colour
 from explorer.viewer.panel import CONTROLS, Now, PageContext, Panel
+from explorer.viewer.pour.ghost import Rest
 from explorer.viewer.pour.readout import angle_of_repose_deg
-from explorer.viewer.scene_nodes import BodyNodes, DrawnComponent, another_set_up
+from explorer.viewer.scene_nodes import another_set_up
 from explorer.viewer.view import small_html
-from solver import Scene, body_counts
+from solver import Scene
 
 STOOD, FEW = 5e-4, 0.1
 """A pile is said to stand where at most this share of its bodies moved by more than this [m], a tenth of a seed."""
 WATCHED = 0.3
 """Simulated time [s] after a change before that is said."""
-GHOST: Colour = (170, 178, 186)
-GHOST_OPACITY = 0.28
-ROOT = "/ghost"
 AT_THE_END = 1e9
 """Order among the controls of the room."""
 BOX = (
@@ -49,18 +43,6 @@ WHEN = {
 OTHERWISE = "it acts when something moves"
 
 
-@dataclass(frozen=True)
-class Rest:
-    """A pile as it came to rest."""
-
-    scene: Scene
-    generation: int
-    time: float
-    frame: Frame
-    angle: float
-    """[°]; NaN where there is none."""
-
-
 class StandingPanel(Panel):
     """The box; at the end of the room *Dismiss the ghost*."""
 
@@ -68,37 +50,37 @@ class StandingPanel(Panel):
 
     def __init__(self, page: PageContext) -> None:
         gui = page.server.gui
-        self._server = page.server
+        self._ghost = page.ghost
         self._rest: Rest | None = None
         self._frame: Frame | None = None
-        self._ghost: BodyNodes | None = None
-        self._former: Rest | None = None
         self._box = gui.add_html("")
         self._dismiss = gui.add_button("Dismiss the ghost", visible=False, order=AT_THE_END)
-        self._dismiss.on_click(lambda _: page.post(self._take_ghost_away))
+        self._dismiss.on_click(lambda _: page.post(self._ghost.take_away))
 
     def show(self, now: Now) -> None:
         """Keep the pile while it rests; after a change say whether it stood, otherwise what happened last."""
         status = now.status
         if self._rest is not None and status.generation != self._rest.generation:
             self._leave_a_ghost(self._rest, status.scene)
-        if self._former is not None and another_set_up(self._former.scene, status.scene):
-            self._take_ghost_away()
+        former = self._ghost.former
+        if former is not None and another_set_up(former.scene, status.scene):
+            self._ghost.take_away()
+            former = None
         self._frame = now.frame
         self._follow(status, now.frame)
         did = self._what_the_change_did(status, now.frame)
         # It names the change, and stands in its place.
         told = map(escape, notes(status, () if did else now.events, now.notice))
-        ghost = "" if self._former is None else ghost_text(self._former, status)
+        ghost = "" if former is None else ghost_text(former, status)
         box = box_html([line for line in (ghost, *told, did) if line])
         if self._box.content != box:
             self._box.content = box
-        if self._dismiss.visible != (self._former is not None):
-            self._dismiss.visible = self._former is not None
+        if self._dismiss.visible != (former is not None):
+            self._dismiss.visible = former is not None
 
     def close(self) -> None:
         """Take the ghost off the page."""
-        self._take_ghost_away()
+        self._ghost.take_away()
 
     def _follow(self, status: Status, frame: Frame | None) -> None:
         rest = self._rest
@@ -120,19 +102,7 @@ class StandingPanel(Panel):
         """Of a pile that stood, before it is poured again with other parameters."""
         if rest.scene == scene or another_set_up(rest.scene, scene):
             return
-        self._take_ghost_away()
-        kinds = zip(rest.scene.bodies, body_counts(rest.scene), strict=True)
-        self._ghost = BodyNodes(
-            self._server, [DrawnComponent(body_triangles(body), GHOST, most) for body, most in kinds], ROOT
-        )
-        self._ghost.fade(GHOST_OPACITY)
-        self._ghost.show(self._frame if self._frame is not None else rest.frame)
-        self._former = rest
-
-    def _take_ghost_away(self) -> None:
-        if self._ghost is not None:
-            self._ghost.remove()
-        self._ghost = self._former = None
+        self._ghost.leave(rest, self._frame if self._frame is not None else rest.frame)
 
 
 def box_html(lines: Sequence[str]) -> str:
@@ -191,8 +161,6 @@ def millimetres(length: float) -> str:
 
 
 def ghost_text(former: Rest, status: Status) -> str:
-    """What the ghost is, in HTML."""
-    angle = f"{former.angle:.1f}°" if math.isfinite(former.angle) else "no angle"
+    """What the ghost is, in HTML; its angle stands beside that of the pour."""
     found = "; ".join(change_lines(differences(former.scene, status.scene)))
-    since = f"; since then {escape(found)}" if found else ""
-    return f"Grey: the former pile, {angle}; one pour each tells no difference{since}."
+    return "Grey: the former pile" + (f"; since then {escape(found)}" if found else "") + "."

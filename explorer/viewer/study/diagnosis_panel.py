@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable
 from pathlib import Path
 
@@ -12,14 +13,20 @@ from doe.record import RecordError
 from explorer.background.output_folder import ResultFile
 from explorer.diagnosis.piles import AnswerPiles, answer_piles
 from explorer.diagnosis.process import RESULT, Question
-from explorer.diagnosis.result import DiagnosisResult
+from explorer.diagnosis.result import CORRECTED_STUDY, SHORT_PROFILE, DiagnosisResult
 from explorer.errors import CommandError
 from explorer.files.uploads import kept_measurements
 from explorer.scene.source import SceneSource
 from explorer.units import checked
 from explorer.viewer.actions import button_group
 from explorer.viewer.board.board_view import BoardView
-from explorer.viewer.board.diagnosis_board import diagnosis_board
+from explorer.viewer.board.diagnosis_board import (
+    CALIBRATE_CORRECTED,
+    POUR_CORRECTED,
+    SIDE_BY_SIDE,
+    SIDE_BY_SIDE_ACT,
+    diagnosis_board,
+)
 from explorer.viewer.output.pile_recording import PileRecording
 from explorer.viewer.panel import DIAGNOSE, SELDOM, Now, PageContext, Panel
 from explorer.viewer.study.process_view import ProcessView, escaped, orders, state_markdown, waiting_markdown
@@ -37,6 +44,8 @@ FIRST = "trefoil_2"
 OWN = "folder below"
 """Choice of the list that takes the folder in the text field."""
 PRESENT = "present or newest diagnosis"
+NARROW = 900
+"""Pixels of a picture in which three piles stand too close to be told apart."""
 
 
 class DiagnosisPanel(Panel):
@@ -75,15 +84,27 @@ class DiagnosisPanel(Panel):
             gui,
             "Piles",
             {
-                "Show side by side": self._show_piles,
-                "Pour the corrected model": self._pour_corrected,
+                SIDE_BY_SIDE_ACT.label: self._show_piles,
                 "Back to my pour": self._back,
             },
             post,
-            hint="Measured pile, calibrated model and corrected model in the scene, with one clock and one camera; or "
-            "the corrected model alone, as the pour that the controls act on. Either takes the place of your own "
-            "pour; *Back to my pour* pours that again, with its seed.",
+            hint="Measured pile, calibrated model and corrected model in the scene, with one clock and one camera. "
+            "They take the place of your own pour; *Back to my pour* pours that again, with its seed.",
         )
+        button_group(
+            gui,
+            "Corrected model",
+            {"Pour it": self._pour_corrected, "Calibrate it": self._calibrate_corrected},
+            post,
+            hint="The corrected model alone, as the pour that the controls act on; or a study of it in the background "
+            "(*Calibrate*), with its quick profile.",
+        )
+        for name, act in {
+            SIDE_BY_SIDE: self._show_piles,
+            POUR_CORRECTED: self._pour_corrected,
+            CALIBRATE_CORRECTED: self._calibrate_corrected,
+        }.items():
+            page.channel.offer(name, lambda _, act=act: post(act))  # type: ignore[misc]
         self._recording = PileRecording(page, self._record_order)
         self._board = BoardView(server, page.pages, "/diagnosis/page.json", "Diagnosis")
 
@@ -142,10 +163,9 @@ class DiagnosisPanel(Panel):
         self._page.background.start("reading the measured data", lambda: answer_piles(result), self._place_piles)
 
     def _place_piles(self, piles: AnswerPiles) -> None:
-        self._page.beside.pour(piles.after, self._pour(piles.before))
-        measured = "measured, mean profile" if piles.measured and piles.measured.of_revolution else "measured"
-        names = (f"{measured} ({piles.condition.name})", "calibrated model", "corrected model")
-        self._page.beside.show_measured(piles.measured, names, piles.before)
+        fold_beside_narrow(self._page)
+        self._page.beside.pour(piles.after, self._pour(piles.before), ("calibrated model", "corrected model"))
+        self._page.beside.show_measured(piles.measured, measured_sign(piles), piles.before)
 
     def _pour_corrected(self) -> None:
         """The corrected model as the page's own pour."""
@@ -155,6 +175,18 @@ class DiagnosisPanel(Panel):
             self._pour(piles.after)
 
         self._page.background.start("reading the measured data", lambda: answer_piles(result), begin)
+
+    def _calibrate_corrected(self) -> None:
+        """Start the study of the corrected model that the diagnosis has written."""
+        result, folder = self._found(), self._chooser.folder or self._present()
+        assert folder is not None
+        file = folder / CORRECTED_STUDY
+        if not file.is_file():
+            why = (
+                "nothing is added" if not result.added else f"{folder} holds no {CORRECTED_STUDY}: run it with --apply"
+            )
+            raise CommandError(f"there is no corrected model to calibrate: {why}")
+        self._page.study.start(SHORT_PROFILE, file=file)
 
     def _record_order(self) -> tuple[Path, list[str]]:
         """Folder of the shown diagnosis, and its command line."""
@@ -177,6 +209,7 @@ class DiagnosisPanel(Panel):
         if self._former is None:
             raise CommandError("your own pour is on the screen")
         self._page.beside.close()
+        self._page.study_panel.expand()
         self._page.session.start(*self._former)
         self._former = None
 
@@ -200,6 +233,22 @@ class DiagnosisPanel(Panel):
             # While it works, what it has found before is no answer to what was asked now.
             lambda status, report: diagnosis_board(None if status and status.alive else result, status, report),
         )
+
+
+def fold_beside_narrow(page: PageContext) -> None:
+    """Fold the study panel away where it leaves a browser too little width for three piles."""
+    widths = [client.camera.image_width for client in page.server.get_clients().values()]
+    if any(0 < width < NARROW for width in widths):
+        page.study_panel.minimize()
+
+
+def measured_sign(piles: AnswerPiles) -> str:
+    """What stands above the measured pile: its condition and its angle, mean ± standard deviation over pours."""
+    shown = "measured, mean profile" if piles.measured and piles.measured.of_revolution else "measured"
+    mean, sd = piles.angle
+    spread = f" ± {sd:.1f}°" if math.isfinite(sd) else ""
+    angle = f"\n{mean:.1f}°{spread}" if math.isfinite(mean) else ""
+    return f"{shown} ({piles.condition.name}){angle}"
 
 
 class CandidateEffects:

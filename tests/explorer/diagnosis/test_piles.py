@@ -60,5 +60,7 @@ def test_both_models_stand_in_the_set_up_of_the_first_fitted_condition():
         assert value(piles.before, one.path) == wanted
     (path, amplitude), *_ = effect_values(*effect).items()
     assert (value(piles.before, path), value(piles.after, path)) == (0.0, amplitude)
+    angles = measurement.fit[0].offered["angle_of_repose_deg"].values
+    assert piles.angle == (pytest.approx(angles.mean()), pytest.approx(angles.std(ddof=1)))
     with pytest.raises(CommandError, match="not there any more"):
         answer_piles(replace(result, data=replace(result.data, folder="/nowhere")))

@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 import sys
+from types import SimpleNamespace
 
 import pytest
 
@@ -20,13 +21,13 @@ from explorer.viewer.actions import Actions
 from explorer.viewer.board.board import board_json
 from explorer.viewer.board.diagnosis_board import diagnosis_board
 from explorer.viewer.panel import Now
-from explorer.viewer.study.diagnosis_panel import OWN, DiagnosisPanel
+from explorer.viewer.study.diagnosis_panel import OWN, DiagnosisPanel, fold_beside_narrow
 from explorer.viewer.study.process_view import CANCEL, CLEAR, CONTINUE, PAUSE, QUEUE, RESUME, START
 from solver import EFFECTS, AssetNotFoundError, with_values
 from solver.assets import measurement_folder
 from tests.explorer.background.waiting import only_folder, wait_for
 from tests.explorer.diagnosed import result_of_case, typed
-from tests.explorer.viewer.page_session import PageSession, page_context
+from tests.explorer.viewer.page_session import PageSession, finished, page_context
 from tests.explorer.viewer.study_panel_at_hand import board_at
 
 PROGRAM = """
@@ -227,7 +228,7 @@ def test_the_panel_asks_and_shows(server, tmp_path):
         ("base model", "30 of 30", "done", "*64* settings"),
         ("screening", "5 of 20", "▶", ""),
     ]
-    for act in (panel._show_piles, panel._pour_corrected, panel._record_order):
+    for act in (panel._show_piles, panel._pour_corrected, panel._calibrate_corrected, panel._record_order):
         with pytest.raises(CommandError, match="no finished diagnosis yet"):
             act()
     process.now = CommandStatus("finished", message="report: /home/me/out/report.html")
@@ -307,7 +308,7 @@ def test_the_answer_holds_probabilities_and_errors_before_after_and_by_noise_alo
         answers, errors = shown["tables"]
         first = content["effects"][0]
         assert (first["name"], content["verdict"]) == ("adhesion_sjkr", "effect:adhesion_sjkr")
-        assert answers["rows"][0] == ["adhesion_sjkr", f"{100.0 * first['probability']:.1f} %"]
+        assert answers["rows"][0] == ["adhesion sjkr", f"{100.0 * first['probability']:.1f} %"]
         assert errors["title"] == f"Error on {'held-out' if role == 'holdout' else 'fitted'} data"
         assert errors["header"] == ["Observable", "Before", "After", "Noise floor"]
         assert len(errors["rows"]) == len(content["error"][role])
@@ -327,3 +328,41 @@ def test_a_pour_of_an_answer_leaves_a_way_back_to_one_s_own(server):
     assert session.now.scene != mine
     panel._back()
     assert (session.now.scene, session.now.seed, session.source) == (mine, 7, material_source("sunflower_extract"))
+
+
+def test_the_answer_s_buttons_pour_and_calibrate_the_corrected_model(server, tmp_path):
+    process, actions, started = FakeDiagnosis(), Actions(), []
+    study = SimpleNamespace(start=lambda profile, file: started.append((profile, file)))
+    page = page_context(server, post=actions.post, data=tmp_path, study=study, diagnosis=process)
+    panel = DiagnosisPanel(page)
+    process.out = tmp_path
+    (tmp_path / "diagnosis.json").write_text(json.dumps(result_of_case("effect")))
+    panel.show(Now(None))
+    acts = {one["label"]: one["command"] for one in board(panel)["acts"]}
+    assert tuple(acts) == ("Show side by side", "Pour the corrected model", "Calibrate the corrected model")
+
+    def press_on_the_board(label):
+        page.channel.take(json.dumps(acts[label]))
+        return actions.carry_out()
+
+    said = press_on_the_board("Calibrate the corrected model")
+    assert said.endswith(f"{tmp_path} holds no corrected_study.toml: run it with --apply")
+    (tmp_path / "corrected_study.toml").touch()
+    assert press_on_the_board("Calibrate the corrected model") == ""
+    assert started == [("quick", tmp_path / "corrected_study.toml")]
+    for label in ("Show side by side", "Pour the corrected model"):
+        page.channel.take(json.dumps(acts[label]))
+        assert "not there any more" in finished(actions, page.background)  # the data of this made-up result
+    (tmp_path / "diagnosis.json").write_text(json.dumps(result_of_case("nothing")))
+    panel.show(Now(None))
+    assert [one["label"] for one in board(panel)["acts"]] == ["Show side by side"]
+
+
+@pytest.mark.parametrize(("width", "folded"), [(390, True), (1200, False)])
+def test_the_study_panel_makes_room_for_three_piles_in_a_narrow_picture(server, monkeypatch, width, folded):
+    page, done = page_context(server), []
+    client = SimpleNamespace(camera=SimpleNamespace(image_width=width))
+    monkeypatch.setattr(server, "get_clients", lambda: {0: client})
+    monkeypatch.setattr(type(page.study_panel), "minimize", lambda panel: done.append(panel))
+    fold_beside_narrow(page)
+    assert done == [page.study_panel] * folded

@@ -18,7 +18,7 @@ from explorer.logs.recording_reader import read_recording
 from explorer.report import folder as report_folder
 from explorer.study import run as study_run
 from explorer.viewer.actions import Actions
-from explorer.viewer.output.pile_recording import RECORD, PileRecording
+from explorer.viewer.output.pile_recording import CANCEL, RECORD, PileRecording
 from solver import asset_path, run_pour, with_values
 from solver.assets import measurement_folder
 from solver.observables import observe
@@ -291,3 +291,22 @@ def test_what_the_recording_is_at_is_told_while_it_pours(server, tmp_path):
     panel.show()
     assert not panel._line.visible
     assert list(browser.sent.values()) == [b"a recording"]
+
+
+def test_a_recording_is_cancelled_and_leaves_nothing(server, tmp_path):
+    (tmp_path / "program.py").write_text(TOLD)
+    program, actions, browser = (sys.executable, str(tmp_path / "program.py")), Actions(), Browser()
+    page = page_context(server, post=actions.post, data=tmp_path)
+    panel = PileRecording(page, lambda: (tmp_path / "out", [str(tmp_path / "never")]), program)
+    panel.show()
+    assert tuple(panel._buttons.options) == (RECORD,)
+    event(panel._buttons, RECORD, client=browser)
+    actions.carry_out()
+    panel.show()
+    assert tuple(panel._buttons.options) == (CANCEL,)
+    event(panel._buttons, CANCEL, client=browser)
+    assert finished(actions, panel._work) == "the recording of the piles was cancelled"
+    panel.show()
+    assert tuple(panel._buttons.options) == (RECORD,)
+    assert list((tmp_path / "recordings").iterdir()) == []
+    assert not browser.sent

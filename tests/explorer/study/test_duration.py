@@ -6,9 +6,10 @@ import pytest
 
 from doe.stages import planned_runs
 from doe.store import Store, StoredRun
-from doe.studies.study import load_study
-from explorer.study.duration import duration_text
-from solver import PHYSICS
+from doe.studies.study import load_study, with_profile
+from explorer.study.duration import PACE, SETTLING, duration_text
+from solver import PHYSICS, body_counts, with_rig
+from solver.scenes.time_step import time_step
 
 STUDY = load_study("sunflower_extract")
 QUICK, STANDARD = STUDY.profiles["quick"], STUDY.profiles["standard"]
@@ -42,12 +43,23 @@ def test_the_time_is_runs_times_mean_over_cores(store):
     assert "0.5 GB" in said
 
 
-def test_what_nothing_tells_is_not_told(store, tmp_path):
+def test_before_the_first_pours_it_is_reckoned_from_spheres_and_steps(store, tmp_path):
+    scene = with_profile(STUDY, "standard")[0].scene
+    spheres = sum(n * len(body.clump.radii) for n, body in zip(body_counts(scene), scene.bodies, strict=True))
+    # 30 g at 20 g/s, then it settles.
+    seconds = spheres * (1.5 + SETTLING) / time_step(scene) / PACE
+    minutes = sum(planned_runs(STUDY, STANDARD).values()) * seconds / 2 / 60.0
     for file in (store, tmp_path / "none.sqlite"):
         said = duration_text(STUDY, STANDARD, file, 2)
-        assert "how long is told after the first pours" in said
-        assert " min" not in said
+        assert f"roughly {minutes:.0f} min on 2 cores ({seconds:.0f} s a pour, from spheres and steps" in said
     assert not (tmp_path / "none.sqlite").exists()
+
+
+def test_a_rig_without_a_feed_tells_no_time(tmp_path):
+    drum = replace(STUDY, scene=with_rig(STUDY.scene, "rotating_drum"))
+    said = duration_text(drum, STANDARD, tmp_path / "none.sqlite", 2)
+    assert "how long is told after the first pours" in said
+    assert " min" not in said
 
 
 def test_a_study_whose_pilot_sizes_it_takes_at_least_that(store):

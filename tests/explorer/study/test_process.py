@@ -400,3 +400,25 @@ def test_a_command_that_counts_its_present_stage_only_has_a_row_for_each():
         planned = 2 if name == "base" else 0
         stages = with_event(stages, ProgressEvent(stage=name, done=done, planned=planned, line=line))
     assert stages == (StageProgress("base", 2, 2, "ok; really"),)
+
+
+def test_another_study_is_started_from_a_copy_and_resumed(tmp_path):
+    process, folder = shipped(tmp_path), tmp_path / "diagnosis"
+    folder.mkdir()
+    text = asset_path("studies", "sunflower_extract").read_text(encoding="utf-8")
+    named = text.replace('material = "sunflower_extract"', 'material = "corrected.toml"')
+    assert named != text
+    (folder / "corrected_study.toml").write_text(named, encoding="utf-8")
+    shutil.copy(asset_path("materials", "sunflower_extract"), folder / "corrected.toml")
+    process.start("quick", file=folder / "corrected_study.toml")
+    wait_for(lambda: process.status().state == "finished")
+    out = only_folder(tmp_path)
+    assert out.name.startswith("corrected_study-quick-")
+    copy = out / "corrected_study_changed.toml"
+    # Where the copy stands, its material is still the one beside the original.
+    assert load_study(str(copy)).scene == load_study(str(folder / "corrected_study.toml")).scene
+    process.resume()
+    wait_for(lambda: process.status().state == "finished")
+    arguments = json.loads((out / "arguments.json").read_text())
+    assert arguments[arguments.index("--study") + 1] == str(copy)
+    assert arguments[-1] == "--resume"

@@ -12,8 +12,9 @@ from explorer.live.frames import Frame
 from explorer.live.messages import SessionState, Status
 from explorer.scene.file import load_scene
 from explorer.viewer.guarded_server import guarded_server
+from explorer.viewer.look.camera import go_to_place
 from explorer.viewer.panel import Now
-from explorer.viewer.pour.beside_pile import BESIDE, ROOT, BesidePile, step_aside
+from explorer.viewer.pour.beside_pile import BESIDE, ROOT, BesidePile, stand_aside
 from explorer.viewer.pour.second_pile import NONE, SecondPile, comparison_markdown
 from explorer.viewer.scene_nodes import PLATE_RADIUS
 from solver import Outcome, with_values
@@ -177,17 +178,34 @@ def test_a_solver_that_died_says_so_without_markup():
 
 def test_a_measured_pile_stands_on_the_other_side_with_names_above_all_three(bench):
     surface = surface_of_revolution(np.array([0.01, 0.03]), np.array([0.02, 0.0]))
-    bench.panel._beside.pour(SCENE, 4)
-    bench.panel._beside.show_measured(surface, ("measured", "calibrated model", "corrected model"), SCENE)
+    bench.panel._beside.pour(SCENE, 4, ("calibrated model", "corrected model"))
+    bench.panel._beside.show_measured(surface, "measured\n18.0°", SCENE)
     made = bench.server.scene._handle_from_node_name
     assert made["/measured"].position[0] == -BESIDE
-    assert [made[f"/names/{name}"].position[0] for name in ("measured", "calibrated model", "corrected model")] == [
-        -BESIDE,
-        0.0,
-        BESIDE,
-    ]
+    names = {sign.text.split("\n")[0]: sign.position[0] for name, sign in made.items() if name.startswith("/names/")}
+    assert names == {"measured": -BESIDE, "calibrated model": 0.0, "corrected model": BESIDE}
     bench.panel.close()
-    assert not {"/measured", "/measured/plate", "/names/measured"} & set(made)
+    assert not [name for name in made if name.startswith(("/measured", "/names/"))]
+
+
+def test_each_name_says_what_its_pour_has_come_to(bench):
+    bench.panel._pour()
+    rest = {"angle_of_repose_deg": Value(24.0, "deg", 3.0)}
+    ended = replace(bench.first.now, state=SessionState.ENDED, outcome=Outcome.AT_REST, observables=rest)
+    bench.second.now = replace(bench.second.now, time=0.52)
+
+    def signs():
+        made = bench.server.scene._handle_from_node_name
+        return [sign.text.replace("\n", ": ") for name, sign in made.items() if name.startswith("/names/")]
+
+    bench.panel.show(Now(ended))
+    assert signs() == ["first pour: 24.0°, one pour", "second pour: pouring, 0.5 s"]
+    bench.second.now = replace(ended, outcome=Outcome.JAMMED)
+    bench.panel.show(Now(ended))
+    assert signs()[1] == "second pour: jammed"
+    bench.second.now = replace(ended, observables={})
+    bench.panel.show(Now(replace(bench.first.now, state=SessionState.DIED)))
+    assert signs() == ["first pour: solver gone", "second pour: at rest, no angle"]
 
 
 class Camera:
@@ -214,7 +232,7 @@ def test_every_camera_looks_at_the_middle_from_where_all_plates_are_in_the_pictu
     client = SimpleNamespace(camera=Camera(), atomic=nullcontext)
     client.camera.image_width = width
     before = client.camera.position - client.camera.look_at
-    step_aside(SimpleNamespace(get_clients=lambda: {0: client}), SCENE, middle)
+    go_to_place(client, stand_aside(client.camera, before, SCENE, middle))
     camera = client.camera
     assert camera.look_at[0] == pytest.approx(middle)
     away = camera.position - camera.look_at
@@ -228,3 +246,19 @@ def test_every_camera_looks_at_the_middle_from_where_all_plates_are_in_the_pictu
         seen = rim - camera.position
         across = (seen @ right) / (seen @ forward)
         assert np.abs(across).max() < 1.1 * np.tan(0.5 * camera.fov) * width / camera.image_height
+
+
+def test_a_picture_of_another_shape_holds_all_plates_again_unless_a_person_moved_the_camera(bench, monkeypatch):
+    client = SimpleNamespace(camera=Camera(), atomic=nullcontext)
+    monkeypatch.setattr(bench.server, "get_clients", lambda: {3: client})
+    bench.panel._pour()
+    narrow = np.linalg.norm(client.camera.position - client.camera.look_at)
+    client.camera.image_width *= 2  # a panel was folded away
+    bench.panel.draw(Now(bench.first.now))
+    wide = np.linalg.norm(client.camera.position - client.camera.look_at)
+    assert wide < 0.7 * narrow
+    client.camera.position = client.camera.position + np.array([0.0, 0.0, 0.1])
+    moved = client.camera.position
+    client.camera.image_width *= 2
+    bench.panel.draw(Now(bench.first.now))
+    np.testing.assert_array_equal(client.camera.position, moved)

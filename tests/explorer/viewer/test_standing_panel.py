@@ -10,7 +10,8 @@ import pytest
 from explorer.live.messages import Event, SessionState
 from explorer.scene.source import change_lines, differences, material_source
 from explorer.viewer.panel import Now
-from explorer.viewer.pour.standing_panel import ROOT, WATCHED, StandingPanel, shifts, standing_text
+from explorer.viewer.pour.ghost import ROOT
+from explorer.viewer.pour.standing_panel import WATCHED, StandingPanel, shifts, standing_text
 from solver import Outcome, with_values
 from solver.observables import Value
 from tests.explorer.viewer.page_session import PageSession, frame_of, page_context
@@ -102,14 +103,14 @@ def test_poured_again_the_former_pile_stays_as_a_ghost_until_it_is_dismissed(tab
     table.pass_time(WATCHED, moved=1e-4)
     table.session.restart()
     said = table.look()
-    assert "Grey: the former pile, 21.7°; one pour each tells no difference" in said
-    assert "since then static friction seed–seed 0.57 → 0.39" in said
+    assert table.panel._ghost.former.angle == 21.7
+    assert "Grey: the former pile; since then static friction seed–seed 0.57 → 0.39" in said
     node = table.server.scene._handle_from_node_name[f"{ROOT}/bodies/1"]
     assert node.batched_positions[0] == pytest.approx(PLACES[1])
     assert 0.0 < node.opacity < 0.5
     table.session.restart(with_values(table.session.now.scene, {FRICTION: 0.5}))
     assert table.look() != ""
-    table.panel._take_ghost_away()
+    table.panel._ghost.take_away()
     assert ghosts(table.server) == []
     assert table.look() == ""
 

@@ -268,3 +268,5 @@ def test_an_angle_in_doubt_is_small_and_says_why():
     assert re.search(r"class='doubt'>[\d.–°]+ · forming<", forming)
     assert "class='big'" not in forming
     assert "class='big'" in readout_html(STATUS)
+    assert "before: 16.9°, one pour each" in readout_html(STATUS, former=16.9)
+    assert "before" not in readout_html(STATUS)

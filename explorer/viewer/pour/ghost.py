@@ -1,0 +1,55 @@
+"""The former pile, grey and half transparent, where a pile that stood is poured again with other parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import viser
+
+from explorer.live.frames import Frame
+from explorer.scene.meshes import body_triangles
+from explorer.viewer.palette import Colour
+from explorer.viewer.scene_nodes import BodyNodes, DrawnComponent
+from solver import Scene, body_counts
+
+COLOUR: Colour = (170, 178, 186)
+OPACITY = 0.28
+ROOT = "/ghost"
+
+
+@dataclass(frozen=True)
+class Rest:
+    """A pile as it came to rest."""
+
+    scene: Scene
+    generation: int
+    time: float
+    frame: Frame
+    angle: float
+    """[°]; NaN where there is none."""
+
+
+class Ghost:
+    """The pile that stood before this pour; ``former`` is None where none is drawn."""
+
+    def __init__(self, server: viser.ViserServer) -> None:
+        self._server = server
+        self._nodes: BodyNodes | None = None
+        self.former: Rest | None = None
+
+    def leave(self, rest: Rest, frame: Frame) -> None:
+        """Draw ``rest`` as it was seen last, in ``frame``, in place of one before it."""
+        self.take_away()
+        kinds = zip(rest.scene.bodies, body_counts(rest.scene), strict=True)
+        self._nodes = BodyNodes(
+            self._server, [DrawnComponent(body_triangles(body), COLOUR, most) for body, most in kinds], ROOT
+        )
+        self._nodes.fade(OPACITY)
+        self._nodes.show(frame)
+        self.former = rest
+
+    def take_away(self) -> None:
+        """Off the page."""
+        if self._nodes is not None:
+            self._nodes.remove()
+        self._nodes = self.former = None
