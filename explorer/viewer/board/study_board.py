@@ -70,7 +70,7 @@ def working(status: CommandStatus) -> str:
     """Where a command is, in a line."""
     words = "Paused" if status.state == "paused" else "Running"
     if not status.planned:
-        return f"{words}: {status.stage}"
+        return f"{words}: {status.stage or 'the program loads'}"
     return f"{words}: {status.stage}, {status.done} of {status.planned}, time left {time_left(status.eta_s)}"
 
 
