@@ -1,8 +1,9 @@
 """A scene as the text of a material file, and a body as that of a body file: both are read back as they were.
 
-A material file (`solver.scenes.material_file`) has everything in SI: materials, bodies, pairs, rig, insertion, numerics,
-what of the contact law is not as usual, and the effects that are on. Numbers keep all their digits; meshes are named by their full path. A body file, which
-`explorer shape` writes and a material file takes in, declares one body by its spheres.
+A material file (`solver.scenes.material_file`) has everything in SI: materials, bodies, pairs, rig, insertion,
+numerics, what of the contact law is not as usual, and the effects that are on. Numbers keep all their digits; meshes
+are named by their full path. A body file, which `explorer shape` writes and a material file takes in, declares one body
+by its spheres.
 """
 
 from __future__ import annotations

@@ -62,20 +62,22 @@ def test_a_photograph_is_read_and_made_the_target(browser, project):
         )
         use.click()
         # A solid of 25° and 30°.
-        said = page.locator("#state-line").get_by_text(re.compile(r"27\.\d\d ± 0\.\d\d° · photograph"))
+        said = page.locator("#state-line").get_by_text(
+            re.compile(r"27\.\d\d° \(standard error 0\.\d\d°\) · photograph")
+        )
         said.wait_for()
         use.scroll_into_view_if_needed()
         seen(page, "Target of the study: 27.")
         shot(page, "laboratory")
         room(page, "Calibrate")
-        seen(page, re.compile(r"27\.\d\d ± 0\.\d\d° read off cone_25_30\.jpg"))
+        seen(page, re.compile(r"standard error 0\.\d\d°\), read off cone_25_30\.jpg"))
         shot(page, "calibrate")
     assert (project / "target" / "photograph.json").is_file()
 
 
 def test_it_is_there_after_a_restart_until_it_is_removed(browser, project):
     with opened(browser, project) as page:
-        page.locator("#state-line").get_by_text("° · photograph").wait_for()
+        page.locator("#state-line").get_by_text("· photograph").wait_for()
         room(page, "Laboratory")
         page.get_by_text("Photograph → angle of repose").click()
         page.get_by_role("button", name="Remove the target", exact=True).click()
