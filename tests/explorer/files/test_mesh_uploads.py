@@ -1,4 +1,4 @@
-"""Meshes and materials from a browser, as a body's shape, the funnel or the whole scene: a scene that every command takes, or one line."""
+"""Meshes and materials from a browser: a scene that every command takes, or one line."""
 
 import pytest
 import trimesh
@@ -101,16 +101,17 @@ def test_a_bad_funnel_is_refused_in_one_line_and_leaves_nothing(name, content, u
     assert list(tmp_path.iterdir()) == []
 
 
+MATERIAL = with_values(load_scene("sunflower_extract"), {"pair.seed.seed.static_friction": 0.123})
+WHOLE = material_toml(MATERIAL)
+
+
 def test_a_material_is_kept_as_it_came_and_is_what_every_command_takes(tmp_path):
-    content = material_toml(SCENE).encode()
+    content = WHOLE.encode()
     source = uploaded_material("../../my beads.TOML", content, tmp_path)
-    assert load_scene(*source.arguments) == source.scene == SCENE
+    assert load_scene(*source.arguments) == source.scene == MATERIAL
     (path,) = tmp_path.iterdir()
     assert path.read_bytes() == content
-    assert uploaded_material("my beads.toml", content, tmp_path).scene == SCENE
-
-
-WHOLE = material_toml(SCENE)
+    assert uploaded_material("my beads.toml", content, tmp_path).scene == MATERIAL
 
 
 @pytest.mark.parametrize(
