@@ -40,7 +40,7 @@ class GrainPanel(Panel):
         starter = starter_scene(STARTER)
         self._declared = parameters(starter)
         length, width, thickness = (1e3 * extent for extent in starter.bodies[0].extents)
-        self._name = gui.add_text("Name", STARTER.stem, hint="Letters, digits, - and _; of the file, too.")
+        self._name = gui.add_text("Name of the grain", STARTER.stem, hint="Letters, digits, - and _; of the file, too.")
         self._shape = gui.add_dropdown("Shape", tuple(SHAPES), hint="Its sizes are full lengths.")
         usual = {"Diameter": width, "Length": length, "Width": width, "Thickness": thickness}
         self._sizes = {
