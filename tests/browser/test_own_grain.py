@@ -45,7 +45,9 @@ def test_the_first_card_leads_to_the_form_and_what_stands_in_it_is_poured(page):
 def test_a_material_file_of_the_browser_is_poured(page, tmp_path):
     own = with_values(load_material("nine_sphere_seed"), {"rig.mass": "5g"})
     (tmp_path / "from home.toml").write_text(material_toml(own))
+    page.keyboard.press("Escape")  # the start dialogue, where it is still open
     room(page, "Set-up")
+    page.get_by_text("Rig and material", exact=True).click()
     with page.expect_file_chooser() as chooser:
         page.get_by_role("button", name="Upload a material and pour", exact=True).click()
     chooser.value.set_files(tmp_path / "from home.toml")
