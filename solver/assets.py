@@ -102,6 +102,11 @@ def measurement_folder(name: str) -> Path:
     )
 
 
+def photograph_scales() -> Path:
+    """File with what tells lengths on every shipped photograph."""
+    return _folder("photographs") / "scales.toml"
+
+
 def shipped_fits() -> Path:
     """Folder of the member spheres of shipped bodies (`solver.shapes.clump`)."""
     return _folder("clumps")

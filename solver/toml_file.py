@@ -43,7 +43,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise ParameterError(f"{path}: {error.strerror}") from None
     except UnicodeDecodeError:
         raise ParameterError(f"{path}: not a text file in UTF-8") from None
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, RecursionError) as error:  # nested deeper than the parser goes
         raise ParameterError(f"{path}: {error}") from None
 
 

@@ -15,9 +15,10 @@ import shutil
 import stat
 import tempfile
 import zipfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 from doe.measurement.load import FILE as MEASUREMENT_FILE
 from doe.measurement.load import load_measurement
@@ -30,12 +31,15 @@ from solver.rigs import MeshFunnel
 from solver.scenes.scene import Scene, check, with_rig, with_values
 from solver.shapes.mesh_file import SUFFIXES
 from solver.shapes.solid import Solid, surface_mesh
+from solver.toml_file import read_toml
 
 MOST_FILE_BYTES = 30_000_000
 MOST_ZIP_BYTES, MOST_UNPACKED_BYTES, MOST_MEMBERS = 50_000_000, 200_000_000, 1000
 LABEL = re.compile(r"[^A-Za-z0-9_-]+")
 PART = re.compile(r"[A-Za-z0-9_. -]+")
 """What a part of a path in an archive may consist of."""
+FILES = ("file", "mesh")
+"""Keys of a material file that name another file."""
 KEPT_IN_FUNNEL = ("mass", "outlet_height", "domain_half_width")
 """Parameters of the rig of before that the funnel has as well."""
 FEED_SHARE = 0.8
@@ -184,20 +188,53 @@ def funnel_source(present: Scene, name: str, content: bytes, unit: str | None, f
 
 def _kept(name: str, content: bytes, folder: Path, what: str, make: Callable[[Path], Scene]) -> SceneSource:
     """The scene that ``make`` builds with the mesh, written beside it as a material."""
-    mesh = place(name, content, folder, SUFFIXES)
+    with _tried(name, content, folder, SUFFIXES) as mesh:
+        scene = make(mesh)
+        check(scene)
     material = folder / f"{mesh.stem}-{label(what)}.toml"
-    new = not mesh.exists()
-    with named(name, mesh):
-        try:
-            write_whole_bytes(mesh, content)
-            scene = make(mesh)
-            check(scene)
-        except ValueError:
-            if new:
-                mesh.unlink(missing_ok=True)
-            raise
     write_whole(material, material_toml(scene, f"{scene.title}, with {mesh.name} as its {what}. SI."))
     return material_source(str(material))
+
+
+def uploaded_material(name: str, content: bytes, folder: Path) -> SceneSource:
+    """The material file ``content``, in the rig that it says itself, kept in ``folder``.
+
+    It has to be whole by itself: a path in it would be one of this machine, and not of the browser's. Raises
+    CommandError in one line, with nothing left behind.
+    """
+    with _tried(name, content, folder, (".toml",)) as file:
+        for other in _files_named_in(read_toml(file)):
+            raise CommandError(
+                f"names the file {str(other)[:80]!r}; allowed is a material that is whole by itself: upload its mesh "
+                "under Shape or funnel from a mesh"
+            )
+        source = material_source(str(file))
+        check(source.scene)
+    return source
+
+
+def _files_named_in(table: Mapping[str, Any]) -> Iterator[object]:
+    """What a parsed material file names as files, be it well-formed or not."""
+    bodies = table.get("body")
+    tables = [table.get("rig"), *(bodies if isinstance(bodies, list) else [bodies])]
+    for one in [entry for entry in tables if isinstance(entry, dict)]:
+        shape = one.get("shape")
+        yield from (inner[key] for inner in (one, shape) if isinstance(inner, dict) for key in FILES if key in inner)
+
+
+@contextmanager
+def _tried(name: str, content: bytes, folder: Path, suffixes: Sequence[str]) -> Iterator[Path]:
+    """The file ``content`` kept in ``folder``, unless what is done with it is refused; then it is taken away again."""
+    path = place(name, content, folder, suffixes)
+    new = not path.exists()
+    with named(name, path):
+        try:
+            write_whole_bytes(path, content)
+            yield path
+        except ValueError:
+            if new:
+                path.unlink(missing_ok=True)
+            raise
 
 
 def place(name: str, content: bytes, folder: Path, suffixes: Sequence[str]) -> Path:

@@ -33,7 +33,7 @@ from explorer.files.run_folder import json_text
 from explorer.laboratory.part import part_table
 from explorer.laboratory.run import LabOrder, analysed, part_file
 from explorer.photograph.annotated import sheet
-from explorer.photograph.run import measure_order, outline_text, run_measure
+from explorer.photograph.run import MeasuredPhotographs, MeasureOrder, measure_order, outline_text, run_measure
 from explorer.photograph.target import PhotographedTarget, check_targets, keep_target
 from explorer.report.bench import bench_charts, curve_charts
 from explorer.report.design import design_html
@@ -41,10 +41,10 @@ from explorer.report.design.charts import design_plots
 from explorer.report.study_charts import Plot, Plots
 from explorer.scene.source import command_line, rig_source
 from explorer.tables.laboratory import lab_text
-from explorer.tables.photograph import measure_text, refusal_lines
+from explorer.tables.photograph import NOTE, Rows, measure_result, measure_tables
 from explorer.tables.pours import bench_text
-from solver import Scene, with_values
-from solver.assets import asset_path
+from solver import Scene, read_toml, with_values
+from solver.assets import asset_path, photograph_scales
 from solver.photograph import open_picture
 
 STRAIGHT = "Points of every replicate; the line is the part taken as straight, drawn on to zero force."
@@ -57,7 +57,8 @@ PLOT = "beside.png"
 class CommandResult:
     """What a command gives.
 
-    ``files``: name → content, to be taken along. ``picture``: RGB, (height, width, 3), where there is one.
+    ``text``: as on the terminal; empty where ``tables`` (caption → rows) say it, with ``note`` below them. ``files``:
+    name → content, to be taken along. ``picture``: RGB, (height, width, 3), where there is one.
     """
 
     text: str
@@ -65,6 +66,8 @@ class CommandResult:
     plots: Plots = field(default_factory=dict)
     files: Mapping[str, bytes] = field(default_factory=dict)
     picture: npt.NDArray[np.uint8] | None = None
+    tables: Mapping[str, Rows] = field(default_factory=dict)
+    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -78,6 +81,22 @@ class Ruler:
     def known(self) -> bool:
         """Whether lengths are in millimetres."""
         return self.scale_mm is not None or self.reference_mm is not None
+
+
+@dataclass(frozen=True, eq=False)
+class PhotographReading:
+    """What was read off one photograph: what is shown of it, and kept as a target, is this."""
+
+    photo: str
+    """File, or a shipped one's name."""
+    ruler: Ruler
+    order: MeasureOrder
+    measured: MeasuredPhotographs
+
+
+def example_rulers() -> dict[str, Ruler]:
+    """What tells lengths on the shipped photographs, by name."""
+    return {name: Ruler(**known) for name, known in read_toml(photograph_scales()).items()}
 
 
 def bench_result(order: LabOrder) -> CommandResult:
@@ -120,50 +139,52 @@ def rig_result(scene: Scene, rig: str, values: Mapping[str, float | str], seed: 
     return CommandResult(bench_text(data), line, plots, files)
 
 
-def photograph_result(photo: str, ruler: Ruler) -> CommandResult:
-    """`explorer measure`: the angle of repose on a photograph (file, or a shipped one's name), or why there is none."""
+def photograph_reading(photo: str, ruler: Ruler) -> PhotographReading:
+    """The one reading of ``photo`` (file, or a shipped one's name). Raises CommandError, or PhotographError."""
     order = measure_order([photo], ruler.scale_mm, ruler.reference_mm, None, "auto", None, None, None)
-    measured = run_measure(order)
-    words = ["explorer", *measure_words(photo, ruler)]
+    return PhotographReading(photo, ruler, order, run_measure(order))
+
+
+def photograph_result(read: PhotographReading) -> CommandResult:
+    """`explorer measure`: the angle of repose on a photograph, or why there is none."""
+    order, measured = read.order, read.measured
+    words = ["explorer", *measure_words(read)]
     drawn = sheet([open_picture(order.pictures[0])], measured.readings, None)
     file = io.BytesIO()
     drawn.save(file, "PNG")
     stem = order.pictures[0].stem
     files = {f"{stem}_read.png": file.getvalue()}
-    if measured.piles and ruler.known:
+    if measured.piles and read.ruler.known:
         files[f"{stem}_outline.csv"] = outline_text(measured.piles[0]).encode()
-    text = "\n".join([measure_text(measured), *refusal_lines(measured.refusals)]).strip()
-    return CommandResult(text, shlex.join(words), {}, files, np.asarray(drawn, dtype=np.uint8))
+    picture = np.asarray(drawn, dtype=np.uint8)
+    return CommandResult("", shlex.join(words), {}, files, picture, measure_tables(measure_result(measured)), NOTE)
 
 
-def compared_result(photo: str, ruler: Ruler, scene: Scene, folder: Path) -> CommandResult:
+def compared_result(read: PhotographReading, scene: Scene, folder: Path) -> CommandResult:
     """`explorer measure --from-simulation`: the photograph, and beside it a pour of ``scene`` read by the same fit."""
-    words = [*measure_words(photo, ruler), "--from-simulation", str(kept_scene(scene, folder))]
+    words = [*measure_words(read), "--from-simulation", str(kept_scene(scene, folder))]
     with tempfile.TemporaryDirectory() as apart:
         drawn = Path(apart) / PLOT
-        said = command_output([*words, "--plot", str(drawn)])
+        data = json.loads(command_output([*words, "--plot", str(drawn), "--json"]))
         content = drawn.read_bytes()
         with Image.open(drawn) as picture:
             pixels = np.asarray(picture.convert("RGB"), dtype=np.uint8)
-    return CommandResult(said, shlex.join(["explorer", *words]), {}, {PLOT: content}, pixels)
+    return CommandResult("", shlex.join(["explorer", *words]), {}, {PLOT: content}, pixels, measure_tables(data), NOTE)
 
 
-def measured_target(
-    photo: str, ruler: Ruler, folder: Path, targets: Sequence[Target], anew: bool
-) -> PhotographedTarget:
+def measured_target(read: PhotographReading, folder: Path, targets: Sequence[Target], anew: bool) -> PhotographedTarget:
     """`explorer measure --target`: the photograph kept in ``folder`` as a target of the study of ``targets``.
 
     ``anew``: in place of what is kept there, or else beside it. Raises CommandError, with nothing changed.
     """
     check_targets(targets)
-    order = measure_order([photo], ruler.scale_mm, ruler.reference_mm, None, "auto", None, None, None)
-    return keep_target(folder, order.pictures, run_measure(order), anew)
+    return keep_target(folder, read.order.pictures, read.measured, anew)
 
 
-def measure_words(photo: str, ruler: Ruler) -> list[str]:
-    """The command line that reads ``photo``, without the program's name."""
-    words = ["measure", photo]
-    for option, length in (("--scale", ruler.scale_mm), ("--reference-length", ruler.reference_mm)):
+def measure_words(read: PhotographReading) -> list[str]:
+    """The command line that reads a photograph so, without the program's name."""
+    words = ["measure", read.photo]
+    for option, length in (("--scale", read.ruler.scale_mm), ("--reference-length", read.ruler.reference_mm)):
         words += [] if length is None else [option, f"{length:g}"]
     return words
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -21,10 +20,9 @@ from doe.laboratory.result import CONDITIONS
 from explorer.errors import CommandError
 from explorer.files.uploads import kept_file
 from explorer.scene.source import SceneSource, material_source
-from explorer.scene.starter_files import material_text, new_path
+from explorer.scene.starter_files import new_path, starter_scene, write_new
 from explorer.scene.text import material_toml, toml_key, toml_value
 from solver import ParameterError, Scene, asset_path, load_material, read_toml, with_values
-from solver.scenes.material_file import scene_from
 from solver.toml_file import Number, Scalar, TomlTable, checked
 
 Table = dict[str, Any]
@@ -109,17 +107,13 @@ def write_measured_material(folder: Path, name: str, like: str | None, parts: Se
         measured = merged(measured, table.get("measured", {}))
     names = ", ".join(part.name for part in parts) or "nothing"
     heading = f"{path.stem}: {like or STARTER}, with measured: {names}. SI; where numbers come from: [measured] below."
-    text = material_toml(scene, heading) + measured_text(measured)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("x", encoding="utf-8") as file:
-        file.write(text)
-    return path
+    return write_new(path, material_toml(scene, heading) + measured_text(measured))
 
 
 def _base(path: Path, like: str | None) -> tuple[Scene, dict[str, Any]]:
     """The scene to start from, and what its file says was measured."""
     if like is None:
-        return scene_from(tomllib.loads(material_text(path)), path), {}
+        return starter_scene(path), {}
     return load_material(like), read_toml(asset_path("materials", like)).get("measured", {})
 
 

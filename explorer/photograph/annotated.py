@@ -57,8 +57,8 @@ def _panel(picture: Picture, reading: PhotographedPile | Refusal) -> Image.Image
         _write(draw, picture.name, f"no angle: {reading.reason}")
         return panel
     angles = reading.angles
-    flanks = f"left {angle_text(angles.left)}, right {angle_text(angles.right)}, mean {angle_text(angles.mean)}"
-    _write(draw, picture.name, flanks)
+    flanks = ", ".join(f"{name} {angle_text(getattr(angles, name))}°" for name in ("left", "right", "mean"))
+    _write(draw, picture.name, f"{flanks} (±: 95 %)")
     zoom = WIDTH / picture.width
 
     def place(u: Array, z: Array) -> Array:

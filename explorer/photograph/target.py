@@ -34,6 +34,7 @@ from explorer.files.uploads import label
 from explorer.photograph.run import MeasuredPhotographs
 from explorer.report.figures.pours import Backdrop
 from explorer.report.photograph import PhotographResult, ReadPile, photograph_result
+from explorer.tables.photograph import angle_words
 from explorer.units import enumeration, fixed
 from solver.photograph import PhotographedPile, Picture, open_picture
 from solver.photograph.reading_error import COVERAGE
@@ -80,21 +81,22 @@ class PhotographedTarget:
 
     @property
     def short(self) -> str:
-        """The angle for a narrow place."""
+        """The angle for a narrow place, with what is known of its error, by name."""
         of, places = "photograph" if self.n == 1 else f"{self.n} photographs", 1 if self.sd >= 0.1 else 2
-        return f"{fixed(self.mean, places)} ± {fixed(self.sd, places)}° · {of}"
+        error = "standard error" if self.n == 1 else "standard deviation"
+        return f"{fixed(self.mean, places)}° ({error} {fixed(self.sd, places)}°) · {of}"
 
     @property
     def line(self) -> str:
-        """The angle, where it is from, and what its ± is."""
+        """The angle, where it is from, and what each number beside it is."""
         if self.n == 1:
             return (
-                f"{fixed(self.mean)} ± {fixed(self.sd)}° read off {self.names[0]}; ±: standard error of reading it. "
-                "One photograph: how piles differ among each other is not in this ±."
+                f"{angle_words(self.mean, self.sd)}, read off {self.names[0]}: both of reading it. One photograph: how "
+                "piles differ among each other is in neither."
             )
         return (
-            f"{fixed(self.mean)} ± {fixed(self.sd)}°, n = {self.n}, read off {enumeration(self.names)}; ±: standard "
-            f"deviation between piles. Standard error of the mean: {fixed(self.sd / self.n**0.5)}°."
+            f"{fixed(self.mean)}° (standard deviation between piles {fixed(self.sd)}°; standard error of the mean "
+            f"{fixed(self.sd / self.n**0.5)}°), n = {self.n}, read off {enumeration(self.names)}."
         )
 
     def of_study(self, targets: Sequence[Target]) -> tuple[Target, ...]:

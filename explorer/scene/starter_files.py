@@ -6,12 +6,14 @@ The texts are templates beside this file; a study's factors are read off the mat
 from __future__ import annotations
 
 import re
+import tomllib
 from pathlib import Path
 
 from explorer.errors import CommandError
 from explorer.scene.file import load_scene
 from solver import Parameter, Scene, is_material, parameters, read_toml, value
 from solver.assets import shipped_assets
+from solver.scenes.material_file import scene_from
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
 NAME = re.compile(r"[A-Za-z0-9_-]+")
@@ -23,13 +25,13 @@ MOST_FACTORS = 8
 
 def write_material(folder: Path, name: str) -> Path:
     """Write ``NAME.toml`` into ``folder``; :class:`CommandError` if it exists or the name is not allowed."""
-    path = folder / f"{_checked(name)}.toml"
-    return _write_new(path, material_text(path))
+    path = folder / f"{check_name(name)}.toml"
+    return write_new(path, material_text(path))
 
 
 def new_path(folder: Path, name: str) -> Path:
     """Path of a new material ``NAME.toml``; :class:`CommandError` if it exists or the name is not allowed."""
-    path = folder / f"{_checked(name)}.toml"
+    path = folder / f"{check_name(name)}.toml"
     if path.exists():
         raise CommandError(f"{path}: exists already; choose another name")
     return path
@@ -42,22 +44,27 @@ def write_study(folder: Path, name: str, material: str | None) -> list[Path]:
     name of what to calibrate; None means ``NAME.toml`` in ``folder``.
     """
     name = name.removesuffix(STUDY_ENDING) or name
-    study = folder / f"{_checked(name)}{STUDY_ENDING}.toml"
+    study = folder / f"{check_name(name)}{STUDY_ENDING}.toml"
     if study.exists():
         raise CommandError(f"{study}: exists already; choose another name")
     if material is not None:
         named = material if _is_shipped(material) else str(Path(material).expanduser().absolute())
-        return [_write_new(study, study_text(study, named, load_scene("funnel", material)))]
+        return [write_new(study, study_text(study, named, load_scene("funnel", material)))]
     own = folder / f"{name}.toml"
     if own.exists() and not is_material(read_toml(own)):
         raise CommandError(f"{own} is there and is not a material; choose another name, or name one with --material")
     written = [] if own.exists() else [write_material(folder, name)]
-    return [*written, _write_new(study, study_text(study, own.name, load_scene("funnel", str(own))))]
+    return [*written, write_new(study, study_text(study, own.name, load_scene("funnel", str(own))))]
 
 
 def material_text(path: Path) -> str:
     """The commented material file."""
     return _filled("material.toml", NAME=path.stem, FILE=path.name)
+
+
+def starter_scene(path: Path) -> Scene:
+    """The scene of the material file that :func:`write_material` would write as ``path``."""
+    return scene_from(tomllib.loads(material_text(path)), path)
 
 
 def study_text(path: Path, material: str, scene: Scene) -> str:
@@ -110,13 +117,15 @@ def _filled(template: str, **words: str) -> str:
     return text
 
 
-def _checked(name: str) -> str:
+def check_name(name: str) -> str:
+    """``name``, where it may be that of a file; :class:`CommandError` otherwise."""
     if not NAME.fullmatch(name):
         raise CommandError(f"NAME {name!r}: letters, digits, - and _ are allowed")
     return name
 
 
-def _write_new(path: Path, text: str) -> Path:
+def write_new(path: Path, text: str) -> Path:
+    """Write ``path``, its folder with it; :class:`CommandError` if it exists."""
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
         with path.open("x", encoding="utf-8") as file:

@@ -1,8 +1,9 @@
 """A scene as the text of a material file, and a body as that of a body file: both are read back as they were.
 
-A material file (`solver.scenes.material_file`) has everything in SI: materials, bodies, pairs, rig, insertion, numerics
-and the effects that are on. Numbers keep all their digits; meshes are named by their full path. A body file, which
-`explorer shape` writes and a material file takes in, declares one body by its spheres.
+A material file (`solver.scenes.material_file`) has everything in SI: materials, bodies, pairs, rig, insertion,
+numerics, what of the contact law is not as usual, and the effects that are on. Numbers keep all their digits; meshes
+are named by their full path. A body file, which `explorer shape` writes and a material file takes in, declares one body
+by its spheres.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy.typing as npt
 
 from solver import Scene, parameters, value
 from solver.scenes.body import Body, Members
+from solver.scenes.contact_model import ContactModel
 from solver.shapes.clump_error import measured_fit
 from solver.shapes.solid import Solid, mass_properties
 
@@ -36,6 +38,7 @@ def material_toml(scene: Scene, heading: str = "") -> str:
     parts += [_table(f"pair.{toml_key(p.a)}.{toml_key(p.b)}", _fields(p, ("static_friction", "restitution")))
               for p in scene.pairs]  # fmt: skip
     parts += [_table(kind, _set_up(scene, kind)) for kind in SET_UP]
+    parts.append(_table("contact", _contact(scene)))
     parts += [_table(f"effect.{effect.name}", _of_effect(scene, effect.name)) for effect in scene.effects]
     return "\n".join(part for part in parts if part)
 
@@ -87,6 +90,12 @@ def _set_up(scene: Scene, kind: str) -> dict[str, Any]:
     known = (path for path in parameters(scene) if path.split(".")[0] == kind)
     table = {path.removeprefix(f"{kind}."): value(scene, path) for path in known}
     return {"name": scene.rig.name} | table if kind == "rig" else table
+
+
+def _contact(scene: Scene) -> dict[str, Any]:
+    """What differs from the conventions of a file that names none."""
+    usual = ContactModel()
+    return {key: entry for key, entry in _set_up(scene, "contact").items() if entry != getattr(usual, key)}
 
 
 def _of_effect(scene: Scene, name: str) -> dict[str, Any]:

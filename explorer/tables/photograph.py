@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy.typing as npt
 from scipy import stats
 
 from explorer.tables.text_table import text_table
+from explorer.units import fixed, signed
 from solver.photograph import PhotographedPile, Refusal
 from solver.photograph.reading_error import COVERAGE, Angle
 
@@ -20,6 +22,12 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 MOST_POINTS = 400
 """Of a profile in plain data."""
+Rows = Sequence[tuple[str, str]]
+"""What was read → its value, with its unit."""
+NOTE = (
+    "95 % and standard error: of reading this silhouette; another pour differs by far more. Roughness: RMS distance of "
+    "the outline from its lines."
+)
 BASES = {"plate": "the plate beside the pile", "foot": "the foot of the pile", "given": "--baseline"}
 
 
@@ -53,6 +61,65 @@ def measure_text(measured: MeasuredPhotographs) -> str:
     if measured.simulated is not None:
         parts.append(_comparison(measured))
     return "\n\n".join(parts)
+
+
+def angle_words(value_deg: float, error_deg: float) -> str:
+    """An angle with its interval and its standard error, both named [°]."""
+    reach = COVERAGE * error_deg
+    return (
+        f"{fixed(value_deg)}° (95 % {fixed(value_deg - reach)} … {fixed(value_deg + reach)}°; standard error "
+        f"{fixed(error_deg)}°)"
+    )
+
+
+def measure_tables(result: Mapping[str, Any]) -> dict[str, Rows]:
+    """What :func:`measure_result` gave, for a place too narrow for one line a picture: picture → its rows."""
+    tables: dict[str, Rows] = {}
+    for picture in result["pictures"]:
+        tables[picture["picture"]] = _pile_rows(picture) if picture["pile"] else _refusal_rows(picture)
+    simulation = result["simulation"]
+    if simulation is not None:
+        means = [picture["angles"]["mean"]["value_deg"] for picture in result["pictures"] if picture["pile"]]
+        tables[f"simulated: {Path(simulation['source']).name}"] = _simulated_rows(simulation, means)
+    return tables
+
+
+def _pile_rows(picture: Mapping[str, Any]) -> Rows:
+    unit, base, rough = picture["length_unit"], picture["base_line"], picture["roughness"]
+    places = 2 if unit == "mm" else 1
+    angles = {name: angle_words(one["value_deg"], one["error_deg"]) for name, one in picture["angles"].items()}
+    roughness = float(np.sqrt(np.mean(np.square([rough["left"], rough["right"]]))))
+    return (
+        ("angle of repose", angles["mean"]),
+        ("left flank", angles["left"]),
+        ("right flank", angles["right"]),
+        ("height", f"{fixed(picture['height'], places)} {unit}"),
+        ("half-width", f"{fixed(picture['half_width'], places)} {unit}"),
+        ("roughness", f"{fixed(roughness, places)} {unit}"),
+        ("base line", f"{BASES[base['found_by']]}, tilted by {signed(base['tilt_deg'])}°"),
+    )
+
+
+def _refusal_rows(picture: Mapping[str, Any]) -> Rows:
+    return (("no angle", f"{picture['reason']}: {picture['detail']}"),)
+
+
+def _simulated_rows(simulation: Mapping[str, Any], photographed_deg: Sequence[float]) -> Rows:
+    def row(name: str, key: str, unit: str) -> tuple[str, str]:
+        of = simulation[key]
+        spread = "" if of["sd"] is None else f" (standard deviation {fixed(of['sd'])}{unit})"
+        return name, f"{fixed(of['mean'])}{unit}{spread}"
+
+    less = float(np.mean(photographed_deg)) - simulation["mean_deg"]["mean"] if photographed_deg else None
+    return (
+        row("angle of repose", "mean_deg", "°"),
+        row("left flank", "left_deg", "°"),
+        row("right flank", "right_deg", "°"),
+        row("height", "height_mm", " mm"),
+        row("half-width", "half_width_mm", " mm"),
+        ("read on", f"{simulation['views']} views of {simulation['piles']} pile{'s' * (simulation['piles'] > 1)}"),
+        *([] if less is None else [("photographed less simulated", f"{signed(less)}°, both by the same fit")]),
+    )
 
 
 def refusal_lines(refusals: Sequence[Refusal]) -> list[str]:

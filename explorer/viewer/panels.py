@@ -17,6 +17,7 @@ from explorer.viewer.pour.changes_panel import ChangesPanel
 from explorer.viewer.pour.chart import Chart
 from explorer.viewer.pour.controls_panel import ControlsPanel
 from explorer.viewer.pour.disturb_panel import DisturbPanel
+from explorer.viewer.pour.grain_panel import GrainPanel
 from explorer.viewer.pour.live_panel import LivePanel
 from explorer.viewer.pour.motion_chart import MotionChart
 from explorer.viewer.pour.outline_panel import OutlinePanel
@@ -51,6 +52,7 @@ PANELS: Registry[type[Panel]] = Registry(
         DisturbPanel,
         ChangesPanel,
         ScenePanel,
+        GrainPanel,
         RestartPanel,
         SecondPile,
         LookPanel,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -13,11 +14,14 @@ from explorer.errors import CommandError
 from explorer.files.output_file import write_whole_bytes
 from explorer.laboratory.command_results import CommandResult
 from explorer.project.project import REPORT
+from explorer.tables.photograph import Rows
 from explorer.viewer.actions import Post
 from explorer.viewer.output.send_file import send_file
 from explorer.viewer.study.plot_view import PlotView
 from explorer.viewer.view import small_html
 
+TIED = re.compile(r"(?<=\d) (?=\S)")
+"""The blank behind a number, which a narrow table must not break at."""
 NO_CHARTS = "Charts come with an answer that has any."
 
 
@@ -84,13 +88,27 @@ class AnswerView:
 
 
 def answer_html(answer: CommandResult, kept: str = "") -> str:
-    """Text in columns, which a narrow panel scrolls, and the command line, which one click selects as a whole.
+    """Tables that fit a narrow panel, or text in columns, which it scrolls; the command line, selected by one click.
 
     ``kept``: where its report is, in words.
     """
     box = "padding:0.4em; margin:0.3em 0; background:rgba(128,150,170,0.14)"
+    text = f"<pre style='{box}; overflow-x:auto; max-height:26em; white-space:pre; user-select:text'>"
+    text += f"{escape(answer.text)}</pre>"
+    tables = "".join(_table_html(caption, rows) for caption, rows in answer.tables.items())
     return small_html(
-        f"<pre style='{box}; overflow-x:auto; max-height:26em; white-space:pre; user-select:text'>"
-        f"{escape(answer.text)}</pre>{escape(kept)} On the command line:"
+        f"{tables or text}<p>{escape(answer.note)}</p>{escape(kept)} On the command line:"
         f"<code style='{box}; display:block; user-select:all; white-space:pre-wrap'>{escape(answer.command)}</code>"
     )
+
+
+def _table_html(caption: str, rows: Rows) -> str:
+    """Two columns; lines end between words, and within no number."""
+    cell = "padding:0.15em 0.6em 0.15em 0; text-align:left; vertical-align:top; overflow-wrap:normal"
+    lines = "".join(
+        f"<tr><th scope='row' style='{cell}; font-weight:normal; opacity:0.8'>{escape(name)}</th>"
+        f"<td style='{cell}; font-variant-numeric:tabular-nums'>{TIED.sub(chr(0xA0), escape(said))}</td></tr>"
+        for name, said in rows
+    )
+    head = f"<caption style='text-align:left; font-weight:bold; padding:0.3em 0'>{escape(caption)}</caption>"
+    return f"<table style='width:100%; border-collapse:collapse; user-select:text'>{head}{lines}</table>"

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import viser
 
@@ -14,7 +15,10 @@ from explorer.viewer.actions import Post, on_upload
 
 
 class UploadSlot:
-    """A list of examples, to which every upload is added and chosen. ``folder`` keeps what was sent."""
+    """A list of examples, to which every upload is added and chosen. ``folder`` keeps what was sent.
+
+    ``follow`` is called with the choice that a person made, by the list or by an upload.
+    """
 
     def __init__(
         self,
@@ -25,14 +29,21 @@ class UploadSlot:
         folder: Path,
         post: Post,
         hint: str,
+        follow: Callable[[str], None] = lambda chosen: None,
     ) -> None:
-        self._suffixes, self._folder = tuple(suffixes), folder
+        self._suffixes, self._folder, self._follow = tuple(suffixes), folder, follow
         self._sent: dict[str, Path] = {}
         self._examples = tuple(examples)
         self._choice = server.gui.add_dropdown(label, self._examples, hint=hint)
         self.upload = server.gui.add_upload_button(
             f"Upload: {label.lower()}", mime_type=",".join(suffixes), hint=f"A file ending in {', '.join(suffixes)}."
         )
+
+        @self._choice.on_update
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client_id is not None:
+                chosen = str(event.target.value)
+                post(lambda: follow(chosen))
 
         on_upload(self.upload, self._take, post)
 
@@ -51,6 +62,7 @@ class UploadSlot:
         path = kept_file(name, content, self._folder, self._suffixes)
         self._sent[path.name] = path
         self._list(path.name)
+        self._follow(path.name)
 
     def _list(self, chosen: str) -> None:
         self._choice.options = (*self._examples, *self._sent)

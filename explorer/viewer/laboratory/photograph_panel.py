@@ -10,9 +10,12 @@ from explorer.errors import CommandError
 from explorer.files.measured_curves import PICTURES
 from explorer.laboratory.command_results import (
     CommandResult,
+    PhotographReading,
     Ruler,
     compared_result,
+    example_rulers,
     measured_target,
+    photograph_reading,
     photograph_result,
 )
 from explorer.photograph.target import PhotographedTarget, remove_target
@@ -23,6 +26,10 @@ from explorer.viewer.view import small_html
 from solver.assets import shipped_assets
 
 WAITING = "Camera level, the plate's edge in view. Choose a shipped picture or upload one, then: Read the angle."
+NO_RULER = (
+    "Give the length of a pixel, or of a straight bar in the picture; without either, lengths stay in pixels. Angles "
+    "need neither."
+)
 OWN = "The study's target is that of its file. What is read off a photograph can take its place."
 
 
@@ -35,10 +42,12 @@ class PhotographPanel(Panel):
         server, gui, folder, post = page.server, page.server.gui, page.uploads, page.post
         self._session, self._folder, self._background = page.session, folder, page.bench_work
         self._target, self._study = page.target, page.project.study
-        self._shown: tuple[str, Ruler] | None = None
+        self._shown: PhotographReading | None = None
+        self._rulers, examples = example_rulers(), shipped_assets("photographs")
         self._photo = UploadSlot(
-            server, "Photograph", shipped_assets("photographs"), PICTURES, folder, post, "One pile, from the side."
+            server, "Photograph", examples, PICTURES, folder, post, "One pile, from the side.", self._follow
         )
+        self._ruler_said = gui.add_html("")
         self._scale = gui.add_number(
             "Scale [mm per pixel]", 0.0, min=0.0, max=10.0, step=0.001, hint="0: lengths stay in pixels."
         )
@@ -50,6 +59,8 @@ class PhotographPanel(Panel):
             step=0.1,
             hint="Length of the one straight bar in the picture, in place of the scale; 0: there is none.",
         )
+        self._given = Ruler()
+        self._follow(examples[0])
         read = gui.add_button("Read the angle", hint="By the estimator of the simulated piles.")
         beside = gui.add_button(
             "Read it beside a pour",
@@ -90,19 +101,32 @@ class PhotographPanel(Panel):
             if button.disabled == able:
                 button.disabled = not able
 
+    def _follow(self, chosen: str) -> None:
+        """Say what tells lengths on an example; what a person entered stays for his own photographs."""
+        ruler = self._rulers.get(chosen, Ruler())
+        if chosen in self._rulers or self._ruler() == self._given:
+            self._scale.value = ruler.scale_mm or 0.0  # type: ignore[misc]
+            self._bar.value = ruler.reference_mm or 0.0  # type: ignore[misc]
+        self._given = ruler
+        self._ruler_said.content = small_html(escape(ruler_words(ruler)))
+
     def _read(self) -> None:
-        photo, ruler = self._photo.chosen, self._ruler()
-        self._answer("reading the photograph", lambda: photograph_result(photo, ruler), (photo, ruler))
+        self._answer("reading the photograph", photograph_result)
 
     def _compare(self) -> None:
-        photo, ruler, scene, folder = self._photo.chosen, self._ruler(), self._session.status().scene, self._folder
-        self._answer(
-            "pouring beside the photograph", lambda: compared_result(photo, ruler, scene, folder), (photo, ruler)
-        )
+        scene, folder = self._session.status().scene, self._folder
+        self._answer("pouring beside the photograph", lambda read: compared_result(read, scene, folder))
 
-    def _answer(self, what: str, find: Callable[[], CommandResult], of: tuple[str, Ruler]) -> None:
-        def done(answer: CommandResult) -> None:
-            self._shown = of
+    def _answer(self, what: str, result_of: Callable[[PhotographReading], CommandResult]) -> None:
+        """Read the photograph, and show what comes of it; the reading stays for the target."""
+        photo, ruler = self._photo.chosen, self._ruler()
+
+        def find() -> tuple[PhotographReading, CommandResult]:
+            read = photograph_reading(photo, ruler)
+            return read, result_of(read)
+
+        def done(found: tuple[PhotographReading, CommandResult]) -> None:
+            self._shown, answer = found
             self.view.show(answer)
 
         self._background.start(what, find, done)
@@ -111,10 +135,10 @@ class PhotographPanel(Panel):
         """Make the photograph that is shown the target, or one of its photographs."""
         if self._shown is None:
             raise CommandError("read a photograph first: what is read becomes the target")
-        (photo, ruler), folder, study = self._shown, self._target.folder, self._study
+        read, folder, study = self._shown, self._target.folder, self._study
 
         def keep() -> PhotographedTarget:
-            return measured_target(photo, ruler, folder, load_study(str(study)).targets, anew)
+            return measured_target(read, folder, load_study(str(study)).targets, anew)
 
         self._background.start("keeping the photograph", keep, lambda _: None)
 
@@ -123,3 +147,12 @@ class PhotographPanel(Panel):
 
     def _ruler(self) -> Ruler:
         return Ruler(positive(self._scale.value), positive(self._bar.value))
+
+
+def ruler_words(ruler: Ruler) -> str:
+    """What tells lengths on a photograph, in a sentence."""
+    if ruler.reference_mm is not None:
+        return f"An example: its bar is {ruler.reference_mm:g} mm long, as entered below."
+    if ruler.scale_mm is not None:
+        return f"An example: a pixel of it is {ruler.scale_mm:g} mm, as entered below."
+    return NO_RULER

@@ -8,7 +8,7 @@ from typing import Any
 import viser
 
 from explorer.errors import CommandError
-from explorer.files.uploads import funnel_source, shaped_source
+from explorer.files.uploads import funnel_source, shaped_source, uploaded_material
 from explorer.scene.source import SceneSource, prepared_source, rig_source
 from explorer.viewer.actions import on_upload
 from explorer.viewer.panel import SET_UP, Now, PageContext, Panel
@@ -28,7 +28,7 @@ WORKING = "Reading what was asked for; the pour goes on until that is done."
 
 
 class ScenePanel(Panel):
-    """Choices of rig and material with a button, uploads of a body's shape and of a funnel."""
+    """Choices of rig and material with a button, uploads of a material, of a body's shape and of a funnel."""
 
     name, tab, title = "scene", SET_UP, "Rig and material"
 
@@ -48,6 +48,11 @@ class ScenePanel(Panel):
             hint="A small scene each in which friction, restitution or stiffness is seen at once: move its slider.",
         )
         self._file = gui.add_text("File", "", hint="Material file (TOML), on the machine that serves this page.")
+        self._sent = gui.add_upload_button(
+            "Upload a material and pour",
+            mime_type=".toml",
+            hint="A material file (TOML) of yours, in the rig that it says itself; without one in the funnel.",
+        )
         pour = gui.add_button("Pour this", hint="A new pour; changes are then counted from this material and rig.")
         with gui.add_folder("Shape or funnel from a mesh", expand_by_default=False):
             self._unit = gui.add_dropdown(
@@ -75,6 +80,7 @@ class ScenePanel(Panel):
             if event.client_id is not None and chosen != NO_SCENE:
                 post(lambda: self._pour_prepared(chosen))
 
+        on_upload(self._sent, self._take_material, post)
         on_upload(self._upload, self._take_shape, post)
         on_upload(self._funnel, self._take_funnel, post)
 
@@ -113,6 +119,10 @@ class ScenePanel(Panel):
         if name not in shipped_assets("scenes"):
             raise CommandError(f"scene {name[:60]!r}: there is none of that name")
         self._begin("reading the scene", lambda: _checked(prepared_source(name)))
+
+    def _take_material(self, name: str, content: bytes) -> None:
+        folder = self._folder
+        self._begin("reading the material", lambda: uploaded_material(name, content, folder))
 
     def _take_shape(self, name: str, content: bytes) -> None:
         present, body, unit = self._session.status().scene, str(self._body.value), self._given_unit()

@@ -78,8 +78,9 @@ function showSteps(project) {
 
 // The first visit of a browser begins with four ways to begin; later they are behind "?".
 const WAYS = [
-  ["I have a grain and a photograph", "Give the grain's shape and sizes, read the angle off photographs of your pile, " +
-    "and calibrate against it.", "Laboratory", "Photograph → angle of repose"],
+  ["I have a grain and a photograph", "Give the grain's shape and sizes, pour it and keep it as a file. The Laboratory " +
+    "reads the angle off a photograph of your pile, and the page of that file calibrates against it.", "Set-up",
+    "A grain of your own"],
   ["Just play", "Watch a pile of sunflower seeds form, and move its friction, stiffness and restitution.", "Controls"],
   ["Plan an experiment", "A screening or response-surface design as a sheet to fill in, with its power told before you " +
     "measure.", "Laboratory", "Your own design"],

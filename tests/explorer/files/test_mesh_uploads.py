@@ -1,11 +1,12 @@
-"""Meshes from a browser, as a body's shape or as the funnel: a scene that every command takes, or one line."""
+"""Meshes and materials from a browser: a scene that every command takes, or one line."""
 
 import pytest
 import trimesh
 
 from explorer.errors import CommandError
-from explorer.files.uploads import FEED_SHARE, funnel_source, shaped_source
+from explorer.files.uploads import FEED_SHARE, funnel_source, shaped_source, uploaded_material
 from explorer.scene.file import load_scene
+from explorer.scene.text import material_toml
 from solver.assets import asset_path
 from solver.scenes.scene import with_values
 from solver.shapes.solid import mass_properties
@@ -95,6 +96,44 @@ def test_a_mesh_becomes_the_funnel_with_the_feed_drawn_in_and_the_rest_as_it_was
 def test_a_bad_funnel_is_refused_in_one_line_and_leaves_nothing(name, content, unit, words, tmp_path):
     with pytest.raises(CommandError, match=words) as refused:
         funnel_source(SCENE, name, content, unit, tmp_path)
+    assert "\n" not in str(refused.value)
+    assert str(tmp_path) not in str(refused.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+MATERIAL = with_values(load_scene("sunflower_extract"), {"pair.seed.seed.static_friction": 0.123})
+WHOLE = material_toml(MATERIAL)
+
+
+def test_a_material_is_kept_as_it_came_and_is_what_every_command_takes(tmp_path):
+    content = WHOLE.encode()
+    source = uploaded_material("../../my beads.TOML", content, tmp_path)
+    assert load_scene(*source.arguments) == source.scene == MATERIAL
+    (path,) = tmp_path.iterdir()
+    assert path.read_bytes() == content
+    assert uploaded_material("my beads.toml", content, tmp_path).scene == MATERIAL
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("own.txt", WHOLE, "ending in .toml"),
+        ("own.toml", "", "0 bytes"),
+        ("own.toml", "format = ", "own.toml: "),
+        ("own.toml", "format = 1\n", "own.toml: "),
+        ("own.toml", "a = " + "[" * 5000, "own.toml: "),
+        ("own.toml", "\udcff", "UTF-8"),
+        ("own.toml", WHOLE.replace("format = 1", "format = 2"), "format"),
+        ("own.toml", WHOLE.replace("restitution", "bounciness"), "unknown key"),
+        ("own.toml", WHOLE.replace("shape = {", 'shape = { mesh = "/etc/passwd", '), "names the file '/etc/passwd'"),
+        ("own.toml", WHOLE + '\n[[body]]\nfile = "../secret.toml"\n', "names the file '../secret.toml'"),
+        ("own.toml", WHOLE.replace("[rig]", '[rig]\nmesh = "~/x.stl"'), "names the file '~/x.stl'"),
+        ("own.toml", 'body = { mesh = "x.stl" }', "names the file 'x.stl'"),
+    ],
+)
+def test_a_bad_material_is_refused_in_one_line_and_leaves_nothing(name, text, words, tmp_path):
+    with pytest.raises(CommandError, match=words) as refused:
+        uploaded_material(name, text.encode(errors="surrogateescape"), tmp_path)
     assert "\n" not in str(refused.value)
     assert str(tmp_path) not in str(refused.value)
     assert list(tmp_path.iterdir()) == []

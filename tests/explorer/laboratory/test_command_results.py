@@ -1,5 +1,6 @@
 """What the tab "Laboratory" tells: the words of the terminal, by the command line that it says repeats them."""
 
+import re
 import shlex
 
 import numpy as np
@@ -14,14 +15,17 @@ from explorer.laboratory.command_results import (
     analysis_result,
     audit_result,
     bench_result,
+    example_rulers,
+    photograph_reading,
     photograph_result,
     sheet_result,
 )
 from explorer.laboratory.part import measured_source, read_part
 from explorer.laboratory.run import LabOrder, analysed
 from solver import ParameterError, load_material, value
-from solver.assets import asset_path
+from solver.assets import asset_path, shipped_assets
 from tests.explorer.command_line import explorer
+from tests.solver.photograph.examples import BAR_MM, EXAMPLES, MM_PER_PX
 
 
 def told(answer, *more):
@@ -50,28 +54,60 @@ def test_options_are_part_of_the_command_line():
     assert rest.text != bench_result(LabOrder("composition", "composition")).text
 
 
+def read(photo, **ruler):
+    return photograph_result(photograph_reading(str(photo), Ruler(**ruler)))
+
+
 def test_a_photograph_is_read_and_drawn():
-    answer = photograph_result("cone_25_30", Ruler(scale_mm=0.2))
-    assert answer.text == told(answer)
+    answer = read("cone_25_30", scale_mm=0.2)
     assert answer.picture.ndim == 3
     assert np.ptp(answer.picture) > 100
     assert {name.split(".")[-1] for name in answer.files} == {"png", "csv"}
-    assert "outline" not in "".join(photograph_result(str(asset_path("photographs", "cone_25_30")), Ruler()).files)
+    assert "outline" not in "".join(read(asset_path("photographs", "cone_25_30")).files)
+
+
+@pytest.mark.parametrize(("ruler", "unit"), [({"reference_mm": 100.0}, "mm"), ({"scale_mm": 0.2}, "mm"), ({}, "px")])
+def test_what_was_read_off_a_photograph_has_a_unit_at_every_number(ruler, unit):
+    answer = read("cone_25_30", **ruler)
+    ((caption, rows),) = answer.tables.items()
+    said = dict(rows)
+    # A solid of 25° and 30°, 40 mm or 200 pixels high.
+    for name, angle in (("left flank", 25.0), ("right flank", 30.0), ("angle of repose", 27.5)):
+        form = re.fullmatch(r"(\S+)° \(95 % (\S+) … (\S+)°; standard error (\S+)°\)", said[name])
+        value, low, high, error = map(float, form.groups())
+        assert value == pytest.approx(angle, abs=0.2)
+        assert (low, high) == (pytest.approx(value - 2 * error, abs=0.02), pytest.approx(value + 2 * error, abs=0.02))
+    number, its = said["height"].split(" ")
+    assert (float(number), its) == (pytest.approx(40.0 if unit == "mm" else 200.0, rel=0.01), unit)
+    assert all(re.fullmatch(rf"[\d.]+ {unit}", said[name]) for name in ("height", "half-width", "roughness"))
+    assert said["base line"].endswith("°")
+    # The terminal's numbers, in its line of the picture.
+    line = told(answer).splitlines()[1].split("  ")
+    assert caption == line[0].strip()
+    numbers = {part.split(" ±")[0].strip() for part in line if re.match(r"\d", part.strip())}
+    assert len(numbers) >= 6
+    assert all(number in " ".join(said.values()) for number in numbers)
 
 
 def test_a_bar_in_the_picture_gives_lengths_too():
-    answer = photograph_result("cone_25_30", Ruler(reference_mm=100.0))
-    assert answer.text == told(answer)
+    answer = read("cone_25_30", reference_mm=100.0)
     assert "--reference-length 100" in answer.command
     assert "cone_25_30_outline.csv" in answer.files
+
+
+def test_every_shipped_photograph_has_the_scale_that_it_was_rendered_at():
+    assert set(example_rulers()) == set(shipped_assets("photographs")) == set(EXAMPLES)
+    for name, ruler in example_rulers().items():
+        assert (ruler.scale_mm or ruler.reference_mm) == (BAR_MM if name == "cone_25_30" else MM_PER_PX)
+        assert ruler.known
 
 
 def test_a_picture_of_nothing_says_so(tmp_path):
     from PIL import Image
 
     Image.new("L", (640, 480), 128).save(tmp_path / "nothing.png")
-    answer = photograph_result(str(tmp_path / "nothing.png"), Ruler())
-    assert answer.text.startswith("nothing.png: no angle: ")
+    (((what, _why),),) = read(tmp_path / "nothing.png").tables.values()
+    assert what == "no angle"
 
 
 def test_a_sheet_is_that_of_the_command(tmp_path, monkeypatch):

@@ -10,9 +10,17 @@ import pytest
 
 from explorer.background.command_output import command_output, kept_scene
 from explorer.errors import CommandError
-from explorer.laboratory.command_results import Ruler, compared_result, rig_result, twin_result
+from explorer.laboratory.command_results import (
+    Ruler,
+    compared_result,
+    photograph_reading,
+    photograph_result,
+    rig_result,
+    twin_result,
+)
 from explorer.laboratory.run import LabOrder
 from explorer.scene.file import load_scene
+from explorer.tables.photograph import measure_result
 from explorer.viewer.output.engine_export import packed_export
 from solver import load_material, with_values
 from tests.explorer.command_line import explorer
@@ -103,19 +111,31 @@ def test_the_bias_of_a_formula_is_the_commands():
     assert told.stdout.strip() == answer.text
 
 
-def test_a_photograph_beside_a_pour_has_both_in_its_picture(tmp_path, monkeypatch):
+def test_a_photograph_beside_a_pour_has_both_in_its_picture_and_its_table(tmp_path, monkeypatch):
     from PIL import Image
+
+    read = photograph_reading("cone_25_30", Ruler(scale_mm=0.2))
+    spread = {"mean": 20.5, "sd": 0.25}
+    keys = ("left_deg", "right_deg", "mean_deg", "height_mm", "half_width_mm")
+    asked = []
 
     def drawn(words):
         Image.new("RGB", (30, 20), "red").save(words[words.index("--plot") + 1])
-        return f"beside {words[words.index('--from-simulation') + 1]}"
+        asked.append(words[words.index("--from-simulation") + 1])
+        simulation = {"source": asked[0], "piles": 1, "views": 12, **dict.fromkeys(keys, spread)}
+        return json.dumps(measure_result(read.measured) | {"simulation": simulation})
 
     monkeypatch.setattr("explorer.laboratory.command_results.command_output", drawn)
-    answer = compared_result("cone_25_30", Ruler(scale_mm=0.2), MATERIAL, tmp_path)
-    kept = answer.text.removeprefix("beside ")
-    assert load_scene(kept) == MATERIAL
+    answer = compared_result(read, MATERIAL, tmp_path)
+    assert load_scene(asked[0]) == MATERIAL
     assert answer.picture.shape == (20, 30, 3)
-    assert answer.command == f"explorer measure cone_25_30 --scale 0.2 --from-simulation {kept}"
+    assert answer.command == f"explorer measure cone_25_30 --scale 0.2 --from-simulation {asked[0]}"
+    photographed, simulated = map(dict, answer.tables.values())
+    assert photographed == dict(*photograph_result(read).tables.values())
+    assert simulated["angle of repose"] == "20.50° (standard deviation 0.25°)"
+    assert simulated["height"] == "20.50 mm (standard deviation 0.25 mm)"
+    assert simulated["read on"] == "12 views of 1 pile"
+    assert simulated["photographed less simulated"].startswith("+7.0")  # 27.5° less 20.5°
 
 
 def test_a_scene_is_kept_under_a_name_of_its_contents(tmp_path):

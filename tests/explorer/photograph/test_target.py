@@ -72,9 +72,9 @@ def test_several_photographs_are_a_mean_and_the_spread_between_piles(piles, tmp_
     assert target.mean == pytest.approx(sum(read) / 3)
     assert target.sd == pytest.approx(math.sqrt(sum((one - target.mean) ** 2 for one in read) / 2))
     assert target.names == ("pile_1.png", "pile_2.png", "pile_3.png")
-    assert f"Standard error of the mean: {target.sd / math.sqrt(3):.2f}°" in target.line
+    assert f"standard error of the mean {target.sd / math.sqrt(3):.2f}°" in target.line
     assert "standard deviation between piles" in target.line
-    assert target.short == f"{target.mean:.1f} ± {target.sd:.1f}° · 3 photographs"
+    assert target.short == f"{target.mean:.1f}° (standard deviation {target.sd:.1f}°) · 3 photographs"
     study = load_study("sunflower_extract")
     own = study.targets[0]
     (first, *rest) = target.of_study(study.targets)
@@ -89,7 +89,7 @@ def test_one_photograph_says_that_it_knows_no_spread_between_piles(piles, tmp_pa
     (read,) = run_measure(order).piles
     assert target.mean == pytest.approx(27.0, abs=0.15)
     assert target.sd == pytest.approx(read.angles.mean.error_deg)  # one standard error, not the 95 % of the reading
-    assert "One photograph: how piles differ among each other is not in this ±." in target.line
+    assert "One photograph: how piles differ among each other is in neither." in target.line
     (first,) = target.of_study(load_study("sunflower_extract").targets)
     assert (first.n, first.sd_source) == (None, OF_ONE)
 

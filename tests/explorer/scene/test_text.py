@@ -38,6 +38,21 @@ def test_another_rig_its_settings_and_awkward_numbers_come_back(tmp_path):
     assert read_back(material_toml(scene), tmp_path) == scene
 
 
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"law": "linear_spring_dashpot", "characteristic_velocity": 1.0 / 3.0},
+        {"clump_rule": "local_mass_shared"},
+        {"tangential_law": "mindlin", "tangential_dashpot": "uncapped"},
+    ],
+)
+def test_every_convention_of_contact_comes_back(values, tmp_path):
+    usual = load_material(str(TREFOIL))
+    assert "[contact]" not in material_toml(usual)
+    scene = with_values(usual, {f"contact.{name}": chosen for name, chosen in values.items()})
+    assert read_back(material_toml(scene), tmp_path) == scene
+
+
 @pytest.mark.parametrize("effect", EFFECTS)
 def test_every_effect_comes_back(effect, tmp_path):
     kind = EFFECTS[effect]

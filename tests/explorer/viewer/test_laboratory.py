@@ -101,6 +101,29 @@ def test_a_photograph_from_the_browser_is_read_and_shown(bench):
     assert "text" in bench.do(bench.photograph._read)
 
 
+def test_an_example_comes_with_its_scale_and_ones_own_photograph_with_what_was_entered(bench):
+    panel = bench.photograph
+
+    def choose(name):
+        event(panel._photo._choice, name)
+        assert finished(bench.actions, bench.background) == ""
+        return panel._scale.value, panel._bar.value, panel._ruler_said.content
+
+    assert (panel._scale.value, panel._bar.value) == (0.0, 100.0)
+    assert "its bar is 100 mm long" in panel._ruler_said.content
+    scale, bar, said = choose("trefoil_2_fit_1")
+    assert (scale, bar) == (0.2, 0.0)
+    assert "a pixel of it is 0.2 mm" in said
+    # The scale of an example is no one's own.
+    assert bench.do(lambda: panel._photo._take("mine.jpg", b"a picture")) == ""
+    assert (panel._scale.value, panel._bar.value) == (0.0, 0.0)
+    assert "lengths stay in pixels" in panel._ruler_said.content
+    panel._scale.value = 0.35
+    assert bench.do(lambda: panel._photo._take("another.jpg", b"another picture")) == ""
+    assert panel._scale.value == 0.35
+    assert choose("cone_25_30")[:2] == (0.0, 100.0)
+
+
 def test_a_rig_shows_its_own_parameters_and_the_bodies_that_are_poured(bench):
     panel = bench.rig
     assert {"rig.tilt_rate", "rig.body"} == set(panel._inputs)
@@ -149,8 +172,8 @@ def test_a_bench_test_is_repeated_on_the_solver_with_the_material_that_is_poured
 def test_a_photograph_is_compared_with_what_is_poured(bench, monkeypatch):
     asked = []
 
-    def answered(photo, ruler, scene, folder):
-        asked.append((photo, ruler.reference_mm, scene))
+    def answered(read, scene, folder):
+        asked.append((read.photo, read.ruler.reference_mm, scene))
         return CommandResult("beside", "explorer measure")
 
     monkeypatch.setattr("explorer.viewer.laboratory.photograph_panel.compared_result", answered)
@@ -212,6 +235,13 @@ def test_a_command_line_is_selected_as_a_whole():
     html = answer_html(CommandResult("one & two", "explorer audit"))
     assert "one &amp; two" in html
     assert "user-select:all" in html
+    rows = (("height", "40.0 mm (95 % 39 … 41 mm)"), ("<b>", "&"))
+    html = answer_html(CommandResult("", "explorer measure", tables={"a <b>.png": rows}, note="both > 0"))
+    # Lines end between words, and not between a number and its unit.
+    assert "40.0\u00a0mm (95\u00a0% 39\u00a0… 41\u00a0mm)" in html
+    assert "<b>" not in html
+    assert "both &gt; 0" in html
+    assert "<pre" not in html
 
 
 def test_another_test_offers_its_own_example(bench):

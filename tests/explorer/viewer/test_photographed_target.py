@@ -10,6 +10,7 @@ from PIL import Image
 
 from doe.provenance import PouredPile
 from doe.studies.study import load_study
+from explorer.photograph.run import run_measure
 from explorer.photograph.target import FOLDER, load_target
 from explorer.project.project import load_project, new_project
 from explorer.scene.source import material_source
@@ -100,12 +101,33 @@ def test_what_was_read_becomes_the_target_and_is_there_after_a_restart(server, f
     assert (target.n, target.mean) == (1, pytest.approx(27.0, abs=0.15))
     for shown in (page, ProjectPage(server, folder)):
         assert shown.measured["state"] == "measured"
-        assert shown.measured["said"] == f"{target.mean:.2f} ± {target.sd:.2f}° · photograph"
-        assert "how piles differ among each other is not in this ±" in shown.measured["hint"]
+        assert shown.measured["said"] == f"{target.mean:.2f}° (standard error {target.sd:.2f}°) · photograph"
+        assert "how piles differ among each other is in neither" in shown.measured["hint"]
         assert "read off pile.png" in shown.calibrate._target.content
+        # The answer and the target give the same two numbers the same names.
+        shown_twice = f"{target.mean:.2f}° (95 % {target.mean - 2 * target.sd:.2f} … "
+        shown_twice += f"{target.mean + 2 * target.sd:.2f}°; standard error {target.sd:.2f}°)"
+        assert shown_twice in shown.measured["hint"]
+        assert shown_twice in page.photograph.view._text.content.replace("\u00a0", " ")
         assert "One photograph" in shown.photograph._told.content
         assert shown.disabled[2] is False
     assert (folder / FOLDER / target.result.piles[0].name).read_bytes() == picture(27.0)
+
+
+def test_a_photograph_is_read_once_for_its_answer_and_its_target(server, folder, monkeypatch):
+    readings = []
+
+    def counted(order):
+        readings.append(order)
+        return run_measure(order)
+
+    monkeypatch.setattr("explorer.laboratory.command_results.run_measure", counted)
+    page = ProjectPage(server, folder)
+    assert page.read(picture(27.0)) == ""
+    assert page.press(page.photograph._use) == ""
+    assert page.press(page.photograph._remove) == ""
+    assert page.press(page.photograph._use) == ""
+    assert len(readings) == 1
 
 
 def test_more_piles_are_added_and_the_target_removed(server, folder):
@@ -116,8 +138,8 @@ def test_more_piles_are_added_and_the_target_removed(server, folder):
     target = load_target(folder / FOLDER)
     # Of 24, 27 and 30: mean 27, SD 3.
     assert (target.n, target.mean, target.sd) == (3, pytest.approx(27.0, abs=0.15), pytest.approx(3.0, abs=0.2))
-    assert page.measured["said"] == f"27.0 ± {target.sd:.1f}° · 3 photographs"
-    assert "Standard error of the mean" in page.calibrate._target.content
+    assert page.measured["said"] == f"27.0° (standard deviation {target.sd:.1f}°) · 3 photographs"
+    assert "standard error of the mean" in page.calibrate._target.content
     assert "is in the target already" in page.press(page.photograph._add)
     assert load_target(folder / FOLDER).n == 3
     assert page.press(page.photograph._use) == ""  # the last one alone

@@ -1,5 +1,7 @@
 """Choosers of rig and material, and a shape from the browser: a new pour, or one line and nothing changed."""
 
+from pathlib import Path
+
 import pytest
 from viser import UploadedFile
 
@@ -11,7 +13,7 @@ from explorer.viewer.panel import Now
 from explorer.viewer.pour.scene_panel import NO_SCENE, OWN, ScenePanel
 from solver.assets import asset_path, shipped_assets
 from solver.rigs import RIGS
-from solver.scenes.scene import with_values
+from solver.scenes.scene import with_rig, with_values
 from tests.explorer.beads import bead_scene
 from tests.explorer.files.test_uploads import stl
 from tests.explorer.viewer.page_session import PageSession, event, finished, page_context
@@ -24,7 +26,7 @@ class Bench:
     def __init__(self, server, data):
         self.session, self.actions = PageSession(SOURCE), Actions()
         page = page_context(server, self.session, self.actions.post, data)
-        self.panel, self.background = ScenePanel(page), page.background
+        self.panel, self.background, self.folder = ScenePanel(page), page.background, page.uploads
 
     def pour(self):
         self.actions.post(self.panel._pour)
@@ -77,6 +79,23 @@ def test_a_file_of_ones_own_is_poured(bench, tmp_path):
     bench.panel._material.value, bench.panel._file.value = OWN, f" {tmp_path / 'own.toml'} "
     assert bench.pour() == ""
     assert bench.session.now.scene == scene
+
+
+def test_a_material_from_the_browser_is_poured_in_its_own_rig(bench):
+    scene = with_values(with_rig(SOURCE.scene, "lifting_cylinder"), {"contact.clump_rule": "local_mass"})
+    content = material_toml(scene).encode()
+    assert bench.upload("../../my own.toml", content, "_sent") == ""
+    assert bench.session.now.scene == scene
+    bench.panel.show(Now(bench.session.status()))
+    assert (bench.panel._rig.value, bench.panel._material.value) == ("lifting_cylinder", OWN)
+    assert Path(bench.panel._file.value).parent == bench.folder
+    assert Path(bench.panel._file.value).read_bytes() == content
+
+
+def test_a_bad_material_from_the_browser_changes_nothing(bench):
+    assert "names the file" in bench.upload("x.toml", b'format = 1\n[[body]]\nfile = "/etc/passwd"\n', "_sent")
+    assert bench.session.asked == []
+    assert list(bench.folder.iterdir()) == []
 
 
 @pytest.mark.parametrize(
