@@ -63,6 +63,9 @@ class DiagnosisProcess(Protocol):
     def resume(self, question: Question) -> None:
         """Go on with the newest one of its data that was stopped. Raises a ValueError where there is none."""
 
+    def resumable(self, question: Question) -> bool:
+        """Whether :meth:`resume` has something to go on with."""
+
     def status(self) -> CommandStatus:
         """State, progress and what the parts have found."""
 
@@ -111,12 +114,18 @@ class DiagnoseProcess:
         """
         checked = _checked(question)
         self._process.refuse_while_running()
-        name = Path(checked.data).name
-        found = newest_unfinished(self._folder, (name,), RESULT)
+        found = self._unfinished(checked)
         if found is None:
-            raise BackgroundError(f"no diagnosis of {name} has been stopped before its end")
+            raise BackgroundError(f"no diagnosis of {Path(checked.data).name} has been stopped before its end")
         self._process.resume(found[0], self._arguments(checked, found[0]))
         self._line.begun()
+
+    def resumable(self, question: Question) -> bool:
+        """Whether a diagnosis of these data was stopped before its end."""
+        return self._unfinished(question) is not None
+
+    def _unfinished(self, question: Question) -> tuple[Path, str] | None:
+        return newest_unfinished(self._folder, (Path(question.data).name,), RESULT)
 
     def close(self) -> None:
         """Cancel what runs and wait for its end."""

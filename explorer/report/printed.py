@@ -277,7 +277,7 @@ def _finish(axes: Axes, x: Json, y: Json, size: tuple[float, float]) -> None:
         if hasattr(side, "names") and letter == "y":
             axes.set_ylim(-0.6, len(side.names) - 0.4)
         if layout.get("zeroline"):
-            (axes.axvline if letter == "x" else axes.axhline)(0.0, color="#8d949c", linewidth=0.6, zorder=0.5)
+            (axes.axvline if letter == "x" else axes.axhline)(0.0, color="#8b86a3", linewidth=0.6, zorder=0.5)
         if "scaleanchor" in layout:
             axes.set_aspect("equal", adjustable="box")
 
@@ -341,7 +341,7 @@ def _scatter(axes: Axes, trace: Json, sides: tuple[Json, Json], order: float, on
     if "fill" in trace:
         axes.fill(x, y, color=_rgba(trace["fillcolor"]), linewidth=0.0, zorder=order - 1.0)
         return
-    colour = marker.get("color", stroke.get("color", "#4c5dd1"))
+    colour = marker.get("color", stroke.get("color", "#656ee0"))
     for key in ("error_x", "error_y"):
         error = trace.get(key)
         if error is not None:
@@ -543,7 +543,7 @@ def _key(trace: Json) -> Any:
         opacity = trace.get("opacity", 1.0)
         key = Line2D([], [], color=_rgba(stroke["color"], opacity), linestyle=dash, linewidth=min(6.0, _stroke(stroke)))
     if "markers" in mode:
-        colour = marker.get("color", "#4c5dd1")
+        colour = marker.get("color", "#656ee0")
         look = _mark(marker, colour[0] if isinstance(colour, list) else colour, trace.get("opacity", 1.0))
         face = look["facecolors"] if look["facecolors"] == "none" else look["facecolors"][0]
         edge = look["edgecolors"][0] if isinstance(look["edgecolors"], list) else look["edgecolors"]

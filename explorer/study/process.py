@@ -65,6 +65,9 @@ class StudyProcess(Protocol):
     def resume(self) -> None:
         """Go on with the study started last, also before this page. Raises BackgroundError where there is none."""
 
+    def resumable(self) -> bool:
+        """Whether :meth:`resume` has something to go on with."""
+
     def retry(self) -> None:
         """Run it again with more seeds for replicates without a valid run. Raises BackgroundError where none is."""
 
@@ -145,6 +148,10 @@ class CalibrationProcess:
         self._process.refuse_while_running()
         self._resume(self._last())
 
+    def resumable(self) -> bool:
+        """Whether the last one was stopped, in this session of the page or before."""
+        return self.status().state in ("cancelled", "failed") or self._unfinished() is not None
+
     def retry(self) -> None:
         """Run the last calibration again, with more seeds for replicates that are left without a valid run."""
         self._process.refuse_while_running()
@@ -187,13 +194,18 @@ class CalibrationProcess:
     def _last(self) -> Path:
         out = self._process.out
         if out is None:
-            profiles = load_study(str(self.study_file)).profiles
-            stems = {f"{self.study_file.stem}-{profile}": profile for profile in profiles}
-            found = newest_unfinished(self._folder, tuple(stems), RESULT)
+            found = self._unfinished()
             if found is None:
                 raise BackgroundError("no study has been stopped before its end; there is nothing to resume")
-            out, self._profile = found[0], stems[found[1]]
+            out, self._profile = found
         return out
+
+    def _unfinished(self) -> tuple[Path, str] | None:
+        """Folder and profile of the newest study of the page's file that was stopped before its end."""
+        profiles = load_study(str(self.study_file)).profiles
+        stems = {f"{self.study_file.stem}-{profile}": profile for profile in profiles}
+        found = newest_unfinished(self._folder, tuple(stems), RESULT)
+        return None if found is None else (found[0], stems[found[1]])
 
     def _resume(self, out: Path) -> None:
         self._process.resume(out, self._arguments(out))

@@ -354,7 +354,7 @@ def _probability_table(result: DiagnosisResult) -> Table:
 
 
 def _sure(p: float) -> str:
-    return "over 99 %" if p >= 0.995 else percent(p)
+    return "over 99 %" if p >= 0.995 else percent(p, 1)
 
 
 # What else could look the same

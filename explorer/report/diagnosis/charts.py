@@ -39,7 +39,7 @@ from explorer.report.study_charts import Plot, Plots
 BEFORE, AFTER, MEASURED = ASSUMPTION, FACTOR, TARGET
 ROW_HEIGHT = 30
 """Height of one row with two bars [px]."""
-BAND = {TARGET: "rgba(77, 173, 112, 0.18)", FACTOR: "rgba(76, 93, 209, 0.18)", ASSUMPTION: "rgba(212, 126, 44, 0.18)"}
+BAND = {TARGET: "rgba(39, 164, 119, 0.18)", FACTOR: "rgba(101, 110, 224, 0.18)", ASSUMPTION: "rgba(212, 120, 40, 0.18)"}
 MM = 1e3
 FEWEST, LEAST = 3, 0.005
 """Answers that are drawn or listed: so many at least, and all of this probability."""
@@ -62,7 +62,7 @@ def diagnosis_plots(result: DiagnosisResult) -> Plots:
     for picture in sorted(result.piles, key=lambda row: row.role != "holdout"):
         words = ROLES[picture.role]
         caption = "Mean height from the pile's own middle, mirrored; a band is one standard deviation between pours."
-        plots[f"Pile, {picture.condition} ({words})"] = Plot(partial(pile_chart, picture), caption, 0.6)
+        plots[f"Pile, {words} condition {picture.condition}"] = Plot(partial(pile_chart, picture), caption, 0.6)
     return plots
 
 
@@ -173,9 +173,10 @@ def pile_chart(picture: PileProfiles) -> Spec:
     ):
         mean, sd = ([MM * h for h in _mirrored(one)] for one in (found.mean, found.sd))
         traces += profile(words, x, mean, sd, (colour, BAND[colour], dash))
+    # Not at equal scales: a pile a third as high as wide would leave nothing to be told apart.
     layout: Json = {
         "xaxis": axis("distance from the pile's middle [mm]"),
-        "yaxis": axis("mean height [mm]", scaleanchor="x", rangemode="tozero"),
+        "yaxis": axis("mean height [mm]", rangemode="tozero"),
     }
     return chart(traces, layout, 320)
 

@@ -144,7 +144,7 @@ def _cycle(count: int) -> list[str]:
 
 Look = tuple[str, str, str]
 """Colour of a line, of its band, and dash."""
-REFERENCE_BAND = "rgba(212, 126, 44, 0.18)"
+REFERENCE_BAND = "rgba(212, 120, 40, 0.18)"
 NORMAL_95 = 1.96
 FAINT = 0.45
 MEASURED = 1.0

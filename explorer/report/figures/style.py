@@ -15,16 +15,16 @@ from explorer.report.content import Spec
 
 Json = dict[str, Any]
 
-FACTOR = "#4c5dd1"
-ASSUMPTION = "#d47e2c"
-DUMMY = "#8d949c"
-TARGET = "#4dad70"
-CHOSEN = "#b5292d"
+FACTOR = "#656ee0"
+ASSUMPTION = "#d47828"
+DUMMY = "#8b86a3"
+TARGET = "#27a477"
+CHOSEN = "#d73349"
 INK = "#2b2f34"
 """Lines on a filled ground that is light on every page."""
-MARGIN_BAND = "rgba(77, 173, 112, 0.08)"
-INTERVAL_BAND = "rgba(76, 93, 209, 0.22)"
-CLOUD = "rgba(76, 93, 209, 0.4)"
+MARGIN_BAND = "rgba(39, 164, 119, 0.08)"
+INTERVAL_BAND = "rgba(101, 110, 224, 0.22)"
+CLOUD = "rgba(101, 110, 224, 0.4)"
 BELOW_TO_ABOVE = [[0.0, FACTOR], [0.5, "#efece6"], [1.0, ASSUMPTION]]
 """Colour scale of a surface: below, at and above the target."""
 

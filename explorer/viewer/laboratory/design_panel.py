@@ -44,6 +44,7 @@ class DesignPanel(Panel):
             self._sigma = gui.add_number(
                 "Standard deviation of a run", 0.0, min=0.0, hint="In the response's unit; 0: unknown. For the power."
             )
+            self._follow()
             make = gui.add_button("Make the sheet", hint="Says what is confused with what, and what it will see.")
             self.sheet = AnswerView(server, SHEET, post)
         with gui.add_folder("Filled sheet → model and optimum", expand_by_default=False):
@@ -54,6 +55,7 @@ class DesignPanel(Panel):
             self._target = gui.add_text("Target", "", hint="Value that the response should have; empty: none.")
             analyse = gui.add_button("Analyse", hint="Effects, equations, ANOVA, diagnostics, canonical analysis.")
             self.analysis = AnswerView(server, FILLED, post, charts=True, reports=page.project.laboratory)
+        self._kind.on_update(lambda event: post(self._follow) if event.client_id is not None else None)
         make.on_click(lambda _: post(self._make))
         analyse.on_click(lambda _: post(self._analyse))
 
@@ -61,13 +63,19 @@ class DesignPanel(Panel):
         """Charts for a dark page, or a light one."""
         self.analysis.set_dark(dark)
 
+    def _follow(self) -> None:
+        """Ask for what the chosen kind of design takes."""
+        kind = DESIGNS.get(str(self._kind.value))
+        for name, handle in {"runs": self._size, "fold": self._fold, "generators": self._generators}.items():
+            handle.visible = kind is not None and name in kind.options
+
     def _make(self) -> None:
         order = DesignOrder(
             str(self._kind.value),
-            runs=int(self._size.value) or None,
+            runs=(int(self._size.value) or None) if self._size.visible else None,
             replicates=int(self._replicates.value),
-            fold=bool(self._fold.value),
-            generators=tuple(str(self._generators.value).split()),
+            fold=self._fold.visible and bool(self._fold.value),
+            generators=tuple(str(self._generators.value).split()) if self._generators.visible else (),
         )
         factors = self._factors.chosen
         known = positive(self._sigma.value)

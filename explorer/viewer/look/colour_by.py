@@ -281,6 +281,9 @@ class ColourPanel:
     def show(self, details: Numbered | None, more: str = "") -> None:
         """Draw the bar, and ``more`` below it; call it inside ``server.atomic()``."""
         look, quantity = self._settings.look, self.quantity
+        for box in (self._low, self._high):
+            if box.disabled != look.automatic:
+                box.disabled = look.automatic
         bar = bar_html(look, quantity, details) + more
         if self._bar.content != bar:
             self._bar.content, self._bar.visible = bar, bool(bar)

@@ -61,9 +61,14 @@ def readings(scene: Scene, frame: Frame, details: Details | None, body: int) -> 
         ("Velocity", f"{vector(velocity, '.3f')} m/s"),
         ("Speed", f"{np.linalg.norm(velocity):.3g} m/s"),
         ("Entered at", f"{details.entered[body]:.3f} s"),
-        ("Sum of its normal forces", f"{1e3 * details.load[body]:.3g} mN"),
+        ("Sum of its normal forces", force(details.load[body])),
         ("Coordination number", str(int(details.neighbours[body]))),
     ]
+
+
+def force(newtons: float) -> str:
+    """In mN, from a newton on in N."""
+    return f"{newtons:.3g} N" if abs(newtons) >= 1.0 else f"{1e3 * newtons:.3g} mN"
 
 
 def contacts_html(scene: Scene, frame: Frame, details: Details, body: int) -> str:
@@ -74,12 +79,12 @@ def contacts_html(scene: Scene, frame: Frame, details: Details, body: int) -> st
     order = mine[np.argsort(-np.abs(details.normal_force[mine]), kind="stable")]
     rows = "".join(
         f"<tr><td>{partner_name(scene, frame, details, contact, body)}</td>"
-        f"<td>{1e3 * details.normal_force[contact]:.3g}</td><td>{1e3 * details.tangential_force[contact]:.3g}</td></tr>"
+        f"<td>{force(details.normal_force[contact])}</td><td>{force(details.tangential_force[contact])}</td></tr>"
         for contact in order[:CONTACTS_SHOWN]
     )
     more = len(order) - CONTACTS_SHOWN
     rest = f"<div class='dim'>and {more} weaker ones</div>" if more > 0 else ""
-    return f"<table><tr><th>Touches</th><th>normal [mN]</th><th>tangential [mN]</th></tr>{rows}</table>{rest}"
+    return f"<table><tr><th>Touches</th><th>normal</th><th>tangential</th></tr>{rows}</table>{rest}"
 
 
 def partner_name(scene: Scene, frame: Frame, details: Details, contact: int, body: int) -> str:

@@ -45,6 +45,10 @@ class PileRecording:
         self._line = page.server.gui.add_html("", visible=False)
         self._now = ""
 
+    def offer(self, able: bool) -> None:
+        """Whether there is an answer to record."""
+        self._buttons.visible = able
+
     def show(self) -> None:
         """Say whether one is being made."""
         busy = self._work.busy_with

@@ -42,7 +42,7 @@ class RecordingPanel(Panel):
         )
         self._switch = gui.add_button_group(
             "Record",
-            (START, STOP, DOWNLOAD, REPLAY),
+            (START,),
             hint="Every pour that is begun meanwhile has a file of its own; Download sends several as a ZIP file. "
             "Replay here gives a link to a page for each, which opens beside this one. Recordings stay in the folder "
             "named below.",
@@ -58,6 +58,10 @@ class RecordingPanel(Panel):
 
     def show(self, now: Now) -> None:
         """State of the recording, or the page's last message."""
+        running, kept = self._recording.running, self._recording.path is not None
+        options = (STOP,) if running else (START, DOWNLOAD, REPLAY) if kept else (START,)
+        if tuple(self._switch.options) != options:
+            self._switch.options = options
         state = recording_html(self._recording, self._background.busy_with, now.notice)
         state += small_html(replay_links(self._replays)) if self._replays else ""
         if self._state.content != state:

@@ -104,7 +104,7 @@ def disturbance_html(tap: Tap, shake: Shake, present: str) -> str:
 
 
 def motion_text(name: str, motion: PlateMotion) -> str:
-    """E.g. "Tap: up by 1 mm and back within 30 ms; up to 0.105 m/s and 2.24 g"."""
+    """E.g. "Tap: up by 1 mm and back within 30 ms; up to 0.105 m/s and 2.24 × gravity"."""
     what = str(motion).partition(": ")[2]
-    peak = f"{motion.largest_velocity:.3g} m/s and {motion.largest_acceleration / STANDARD_GRAVITY:.3g} g"
+    peak = f"{motion.largest_velocity:.3g} m/s and {motion.largest_acceleration / STANDARD_GRAVITY:.3g} × gravity"
     return f"{name}: {what}; up to {peak}."

@@ -222,7 +222,7 @@ def _few(population: Population) -> str:
     n, void = population.n, population.void
     lost = f" {void} more gave no valid pile." if void else ""
     if n == 0:
-        return "No other pour with these parameters is stored: this number is one draw, its scatter unknown." + lost
+        return "No other pour with these parameters is stored: one pour tells no scatter." + lost
     if n == 1:
         return f"One stored pour, {population.values[0]:.1f}°: how far seeds scatter is unknown." + lost
     low, high = population.interval

@@ -99,7 +99,7 @@ function show(board) {
   const folded = board.tables.filter(one => one.folded), first = board.tables.filter(one => !one.folded);
   parts.push(...first.map(table), element("div", { class: "grid" }, ...board.charts.map(figure)), ...folded.map(table));
   if (!parts.length || (!board.title && !board.subtitle)) {
-    parts.unshift(element("p", { class: "empty" }, "Nothing to show yet. Start one above, or choose a finished one."));
+    parts.unshift(element("p", { class: "empty" }, "Nothing to show yet. What is started above appears here, and so does what is chosen under Other results."));
   }
   place.replaceChildren(...parts);
   for (const one of place.querySelectorAll("details")) if (open.has(one.firstChild.textContent)) one.open = true;

@@ -10,6 +10,7 @@ import viser
 
 from doe.diagnose.budget import Budget
 from doe.record import RecordError
+from explorer.background.command_process import CommandStatus
 from explorer.background.output_folder import ResultFile
 from explorer.diagnosis.piles import AnswerPiles, answer_piles
 from explorer.diagnosis.process import RESULT, Question
@@ -58,6 +59,7 @@ class DiagnosisPanel(Panel):
         self._diagnosis, self._file = diagnosis, ResultFile(RESULT)
         self._shipped, self._uploads = shipped_measurements(), page.uploads
         self._shown: Hashable = None
+        self._looked, self._stopped = ("", ""), False
         self._data = gui.add_dropdown(
             "Measured data",
             self._offered(),
@@ -80,7 +82,7 @@ class DiagnosisPanel(Panel):
         self._former: tuple[Scene, int, SceneSource] | None = None
         self._answer: SceneSource | None = None
         self._page = page
-        button_group(
+        self._piles = button_group(
             gui,
             "Piles",
             {
@@ -91,7 +93,7 @@ class DiagnosisPanel(Panel):
             hint="Measured pile, calibrated model and corrected model in the scene, with one clock and one camera. "
             "They take the place of your own pour; *Back to my pour* pours that again, with its seed.",
         )
-        button_group(
+        self._corrected = button_group(
             gui,
             "Corrected model",
             {"Pour it": self._pour_corrected, "Calibrate it": self._calibrate_corrected},
@@ -106,7 +108,15 @@ class DiagnosisPanel(Panel):
         }.items():
             page.channel.offer(name, lambda _, act=act: post(act))  # type: ignore[misc]
         self._recording = PileRecording(page, self._record_order)
+        self._offer_piles()
         self._board = BoardView(server, page.pages, "/diagnosis/page.json", "Diagnosis")
+
+    def _resumable(self, status: CommandStatus) -> bool:
+        """Looked up anew for other data, and when a diagnosis begins or ends: it reads folders."""
+        chosen = self._chosen_data()
+        if (status.state, chosen) != self._looked:
+            self._looked, self._stopped = (status.state, chosen), self._diagnosis.resumable(Question(chosen))
+        return self._stopped
 
     def _start(self) -> None:
         self._diagnosis.start(self._question())
@@ -121,10 +131,12 @@ class DiagnosisPanel(Panel):
         """What the list of data sets holds now."""
         return (*self._shipped, *kept_measurements(self._uploads), OWN)
 
-    def _question(self) -> Question:
+    def _chosen_data(self) -> str:
         chosen = str(self._folder.value if self._data.value == OWN else self._data.value)
-        data = str(kept_measurements(self._uploads).get(chosen, chosen))
-        return Question(data, self._candidates.effects, self._candidates.budget)
+        return str(kept_measurements(self._uploads).get(chosen, chosen))
+
+    def _question(self) -> Question:
+        return Question(self._chosen_data(), self._candidates.effects, self._candidates.budget)
 
     def show(self, now: Now) -> None:
         """Ask the diagnosis how far it is."""
@@ -135,7 +147,7 @@ class DiagnosisPanel(Panel):
         # How much more is poured, in this stage and after it, is decided by what comes out.
         waiting = self._diagnosis.waiting()
         text = state_markdown(status, "diagnosis", "pours", now.notice, counted="known of this stage")
-        self._view.show(status, text + waiting_markdown(waiting), waiting)
+        self._view.show(status, text + waiting_markdown(waiting), waiting, self._resumable(status))
         self._chooser.offer(self._diagnosis.finished())
         self._follow()
         self._recording.show()
@@ -156,6 +168,13 @@ class DiagnosisPanel(Panel):
             # A folder that somebody named may hold any JSON, also that of another version.
             self._result, trouble = None, escaped(f"{folder}: {error}")
         self._trouble.content = trouble
+        self._offer_piles()
+
+    def _offer_piles(self) -> None:
+        """What there is an answer for."""
+        self._piles.visible = self._result is not None
+        self._corrected.visible = self._result is not None and bool(self._result.added)
+        self._recording.offer(self._result is not None)
 
     def _show_piles(self) -> None:
         """Measured pile, calibrated and corrected model side by side; the middle one is the page's own pour."""

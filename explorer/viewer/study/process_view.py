@@ -18,8 +18,7 @@ MARKDOWN_MARKS = re.compile(r"([\\`*_{}\[\]<>()#+!|~&])")
 START, PAUSE, CONTINUE, CANCEL = "Start", "Pause", "Continue", "Cancel"
 RESUME, RETRY, QUEUE, CLEAR = "Resume last", "Retry", "Queue", "Clear queue"
 OFFERED = {"running": (PAUSE, CANCEL, QUEUE), "paused": (CONTINUE, CANCEL, QUEUE)}
-"""State → buttons while a command is there; otherwise it can be started, resumed or tried again."""
-WITHOUT_ONE = (START, RESUME, RETRY)
+"""State → buttons while a command is there; otherwise one can be started, resumed or tried again."""
 
 STATE_WORDS = {
     "running": "Running at low priority; the pour goes on.",
@@ -71,9 +70,11 @@ class ProcessView:
         self._bar = server.gui.add_progress_bar(0.0)
         self._text = server.gui.add_markdown("")
 
-    def show(self, status: CommandStatus, text: str, waiting: Sequence[str] = ()) -> None:
-        """Buttons, bar and text; call it inside ``server.atomic()``."""
-        wanted = (*OFFERED.get(status.state, WITHOUT_ONE), *((CLEAR,) if waiting else ()))
+    def show(self, status: CommandStatus, text: str, waiting: Sequence[str] = (), resumable: bool = True) -> None:
+        """Buttons, bar and text; call it inside ``server.atomic()``. ``resumable``: one was stopped before its end."""
+        again = (RETRY,) if status.state == "failed" or failures(status.tried) else ()
+        idle = (START, *((RESUME,) if resumable else ()), *again)
+        wanted = (*OFFERED.get(status.state, idle), *((CLEAR,) if waiting else ()))
         options = tuple(label for label in wanted if label in self._acts)
         if tuple(self._buttons.options) != options:
             self._buttons.options = options
@@ -98,18 +99,18 @@ def state_markdown(status: CommandStatus, what: str, runs: str, notice: str = ""
 
     Args:
         status: how far it is.
-        what: what a run of the command is called, such as "study".
+        what: what a run of the command is called, such as "study"; empty to leave out that none is running.
         runs: what is counted, such as "runs".
         notice: the page's own last message, such as a refused click.
         counted: what the numbers done and planned and the time left are of, where it is less than the whole.
     """
-    state = STATE_WORDS.get(status.state, f"No {what} is running.")
+    state = STATE_WORDS.get(status.state, f"No {what} is running." if what else "")
     if status.alive and status.planned:
         part = f"{counted}: " if counted else ""
         state += f" {part}{status.done} of {status.planned} {runs}, time left {time_left(status.eta_s)}."
     if status.alive and status.stage:
         state += f" Now: {escaped(status.stage)}."
-    parts = [state]
+    parts = [state] if state else []
     parts += [escaped(text) for text in dict.fromkeys((notice, status.message)) if text]
     if lost := failures(status.tried):
         parts.append(failures_markdown(lost))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 from pathlib import Path
 
-from explorer.viewer.board.board_view import HEIGHT, published_report
+from explorer.viewer.board.board_view import published_report
 from explorer.viewer.panel import REPORTS, SELDOM, Now, PageContext, Panel
 from explorer.viewer.study.result_chooser import title
 
@@ -52,5 +52,5 @@ class ReportsPanel(Panel):
         self._frame.content = (
             f'<p style="padding:0 0.75em; font-size:13px"><a href="{address}" target="_blank" rel="noopener">'
             f'Open {escape(title(folder))} in a tab of its own</a></p><iframe title="Report" src="{address}" '
-            f'style="width:100%; height:{HEIGHT}; min-height:320px; border:0; background:white"></iframe>'
+            f'style="width:100%; height:calc(100dvh - 245px); min-height:320px; border:0; background:white"></iframe>'
         )

@@ -11,6 +11,7 @@ from doe.store import default_store
 from doe.studies.study import Study, load_study
 from doe.studies.study_result import AnyStudy, StudyResult, study_from
 from doe.target import Target
+from explorer.background.command_process import CommandStatus
 from explorer.background.output_folder import ResultFile
 from explorer.errors import CommandError
 from explorer.photograph.target import PhotographedTarget
@@ -63,6 +64,7 @@ class StudyPanel(Panel):
         )
         self._loaded, self._store = loaded, page.diagnosis.store or default_store()
         self._asked: tuple[str, str] | None = None
+        self._state, self._stopped = "", False
         self._takes = ""
         self._targets, self._kept = () if loaded is None else loaded.targets, page.target
         self._target = gui.add_markdown("")
@@ -73,6 +75,7 @@ class StudyPanel(Panel):
         with gui.add_folder("Other results", expand_by_default=False):
             self._chooser = ResultChooser(server, "Result", PRESENT, RESULT, post, self._follow)
         self._recording = PileRecording(page, self._record_order)
+        self._recording.offer(False)
         self._channel = page.channel
         self._board = BoardView(server, page.pages, "/study/page.json", "Study")
         self._channel.offer("open_run", lambda asked: post(lambda: self._open_run(asked)))
@@ -94,12 +97,13 @@ class StudyPanel(Panel):
         self._order.follow(photographed is not None)
         status = self._study.status()
         waiting = self._study.waiting()
-        text = state_markdown(status, "study", "runs", now.notice) + waiting_markdown(waiting)
+        known = "" if self._result is not None else "study"
+        text = state_markdown(status, known, "runs", now.notice) + waiting_markdown(waiting)
         if not status.alive:
             text = f"{self._expected(status.state)}\n\n{text}"
         if self._trouble:
             text += f"\n\n{escaped(self._trouble)}"
-        self._view.show(status, text, waiting)
+        self._view.show(status, text, waiting, self._resumable(status))
         folders = self._study.finished()
         self._chooser.offer(folders)
         self._comparison.offer(folders)
@@ -115,6 +119,12 @@ class StudyPanel(Panel):
             profile = study.profiles.get(asked[0]) if study else None
             self._takes = duration_text(study, profile, self._store) if study and profile else ""
         return self._takes
+
+    def _resumable(self, status: CommandStatus) -> bool:
+        """Looked up anew when a study begins or ends: it reads folders."""
+        if status.state != self._state:
+            self._state, self._stopped = status.state, self._study.resumable()
+        return self._stopped
 
     def _start(self) -> None:
         self._study.start(str(self._profile.value), self._order.edits)
@@ -143,6 +153,7 @@ class StudyPanel(Panel):
 
     def _show_result(self, result: AnyStudy | None, name: str, version: Hashable) -> None:
         self._result = result
+        self._recording.offer(isinstance(result, StudyResult))
         self._profiler.show(result)
         self._plots.offer(self._profiler.plots(), version)
         self._comparison.show(result, name, version)

@@ -140,7 +140,9 @@ def test_a_queued_diagnosis_starts_after_the_one_before_with_its_own_effects(tmp
     process.queue(Question("trefoil_2", ("air_drag", "twisting"), 300))
     process.queue(Question("trefoil_1", budget=190))
     assert process.waiting() == ("trefoil_2, 2 effects, about 300 pours", "trefoil_1, about 190 pours")
-    wait_for(lambda: process.status().state == "finished" and not process.waiting() and len(process.finished()) == 3)
+    wait_for(
+        lambda: process.status().state == "finished" and not process.waiting() and len(process.finished()) == 3, 120.0
+    )
     asked = [json.loads((folder / "arguments.json").read_text()) for folder in reversed(process.finished())]
     assert [one[one.index("--apply") + 1 : one.index("--store")] for one in asked] == [
         [],
@@ -180,6 +182,9 @@ class FakeDiagnosis:
 
     def go_on(self):
         self.asked.append("go on")
+
+    def resumable(self, question):
+        return True
 
     def resume(self, question):
         self.asked.append(("resume", question))

@@ -53,6 +53,8 @@ XYZ = np.array(
 WHITE = np.array([0.95047, 1.0, 1.08883])
 PAGES = ("#ffffff", "#fdfcfa", "#191b1e", "#1a1b1e")
 """Light and dark: of the report, and of viser."""
+BOARD = ("#fbfaf8", "#272b30")
+"""Ground of a board and its cards, light and dark."""
 
 
 def linear(colour):
@@ -82,6 +84,13 @@ def test_every_line_is_seen_on_light_and_dark(place, page):
         dark, light = sorted(float(XYZ[1] @ linear(one)) for one in (colour, page))
         # WCAG 2.1 asks for 3 for charts; one palette for both pages can hold 2.6.
         assert (light + 0.05) / (dark + 0.05) > 2.6, colour
+
+
+@pytest.mark.parametrize("page", (*PAGES, *BOARD))
+def test_every_chart_of_a_report_has_the_contrast_of_wcag(page):
+    for colour in REPORT:
+        dark, light = sorted(float(XYZ[1] @ linear(one)) for one in (colour, page))
+        assert (light + 0.05) / (dark + 0.05) >= 3.0, colour
 
 
 def test_the_spread_has_the_colour_of_its_angle():

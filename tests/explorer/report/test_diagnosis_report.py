@@ -302,9 +302,9 @@ def probability(result, name):
 def test_what_each_verdict_says(results):
     says = {name: verdict_sentence(result) for name, result in results.items()}
     assert says["nothing"].startswith("Nothing is missing that these data could show")
-    assert f"with probability {100 * results['nothing']['probabilities']['nothing']:.0f} %" in says["nothing"]
+    assert f"with probability {100 * results['nothing']['probabilities']['nothing']:.1f} %" in says["nothing"]
     assert re.match(
-        r"The declared model lacks `adhesion_sjkr`, with probability (over )?99 %\. It agrees", says["effect"]
+        r"The declared model lacks `adhesion_sjkr`, with probability (over 99|9\d\.\d) %\. It agrees", says["effect"]
     )
     amplitude = r"cohesion energy density [\d.]+ kJ/m³ \(95 % [\d.]+ … [\d.]+ kJ/m³\), \d+ % of the strongest"
     assert re.search(f"{amplitude} that the literature supports", says["effect"])

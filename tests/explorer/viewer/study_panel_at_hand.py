@@ -52,6 +52,9 @@ class FakeStudy:
             raise AttributeError(name)
         return lambda: self.asked.append(name)
 
+    def resumable(self):
+        return True
+
     def waiting(self):
         return self.queued
 

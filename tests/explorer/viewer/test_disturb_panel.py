@@ -42,8 +42,10 @@ def test_boxes_in_mm_ms_and_hz_become_si(panel):
 def test_the_motions_are_told_with_their_peaks_and_what_is_done_now(panel):
     said = told(panel)
     # 1 mm in 30 ms: π A/T and 2 π² A/T².
-    assert f"up to {math.pi * 1e-3 / 0.03:.3g} m/s and {2 * math.pi**2 * 1e-3 / 0.03**2 / 9.80665:.3g} g" in said
-    assert "± 1.5 mm at 15 Hz, 10 periods; up to 0.141 m/s and 1.36 g" in said
+    assert (
+        f"up to {math.pi * 1e-3 / 0.03:.3g} m/s and {2 * math.pi**2 * 1e-3 / 0.03**2 / 9.80665:.3g} × gravity" in said
+    )
+    assert "± 1.5 mm at 15 Hz, 10 periods; up to 0.141 m/s and 1.36 × gravity" in said
     assert "Now" not in said
     assert "Now: body 3 is pulled." in told(panel, disturbance="body 3 is pulled")
 

@@ -25,7 +25,7 @@ from explorer.viewer.look.camera import (
     pile_points,
     view_of,
 )
-from explorer.viewer.look.inspector import NOBODY, body_html, first_crossing, nearest_hit
+from explorer.viewer.look.inspector import NOBODY, body_html, first_crossing, force, nearest_hit
 from explorer.viewer.look.look_panel import LookPanel
 from explorer.viewer.palette import SELECTED, linear
 from explorer.viewer.panel import Now
@@ -91,7 +91,7 @@ def test_a_body_is_told_with_its_contacts():
     for part in ("no. 1 of 4", "1 g", "0.0, 0.0, 100.0 mm", "0.000, 0.000, 0.000 m/s", "0.500 s", "5 mN"):
         assert part in text
     # Of contacts the strongest comes first: 5 mN with body 2, then 1.5 mN with the plate (surface 0).
-    assert text.index("no. 2</td><td>5</td><td>1</td>") < text.index("<td>plate</td><td>1.5</td><td>0</td>")
+    assert text.index("no. 2</td><td>5 mN</td><td>1 mN</td>") < text.index("<td>plate</td><td>1.5 mN</td><td>0 mN</td>")
     assert "no. 3</td>" not in text
     assert NOBODY in body_html(scene, BEADS, DETAILS, None)
 
@@ -320,3 +320,7 @@ def test_the_pile_is_what_has_left_the_funnel():
     assert len(pile_points(frame, 0.0)) == 3
     assert len(pile_points(None, 0.0)) == 0
     assert outlet_height(load_scene("lifting_cylinder").rig) == pytest.approx(0.0)
+
+
+def test_a_force_is_told_in_newtons_where_it_is_one():
+    assert [force(one) for one in (0.0042, 0.9994, 3.69)] == ["4.2 mN", "999 mN", "3.69 N"]

@@ -57,7 +57,7 @@ def test_mean_spread_and_number_of_seeds_are_told():
 
 
 def test_with_no_or_one_pour_nothing_is_claimed():
-    assert "one draw, its scatter unknown" in told(population())
+    assert "one pour tells no scatter" in told(population())
     assert "±" not in told(population())
     assert "One stored pour, 17.2°: how far seeds scatter is unknown. 2 more gave no valid pile." in told(
         population(17.2, void=2)
@@ -173,7 +173,7 @@ def test_a_single_pour_of_new_parameters_is_held_against_them_too(table):
     table.session.now = rest(table.session.now, 21.0)
     table.look()
     seen = table.look()
-    assert "one draw" in seen
+    assert "one pour tells no scatter" in seen
     # 21 against 22 ± 2.8 over 2: t(0.975, 1) = 12.7
     assert "-1.0 ± 44.0° (95 %) against 2 former: not distinguishable in one pour; 12 pours of each would show" in seen
 

@@ -59,7 +59,7 @@ def test_the_buttons_ask_for_what_they_say(table):
 @pytest.mark.parametrize(
     ("state", "waiting", "offered"),
     [
-        ("idle", (), (START, RESUME, RETRY)),
+        ("idle", (), (START, RESUME)),
         ("running", (), (PAUSE, CANCEL, QUEUE)),
         ("paused", ("full",), (CONTINUE, CANCEL, QUEUE, CLEAR)),
         ("failed", (), (START, RESUME, RETRY)),
@@ -70,6 +70,19 @@ def test_only_buttons_that_mean_something_now_are_there(table, state, waiting, o
     table.show()
     assert tuple(table.panel._view._buttons.options) == offered
     assert table.panel._view._bar.visible == (state in ("running", "paused"))
+
+
+def test_what_was_not_stopped_is_not_offered_to_be_resumed(table):
+    table.study.resumable = lambda: False
+    table.show()
+    assert tuple(table.panel._view._buttons.options) == (START,)
+    # Looked up once per state: it reads folders.
+    table.study.resumable = lambda: True
+    table.show()
+    assert tuple(table.panel._view._buttons.options) == (START,)
+    table.study.now = CommandStatus("cancelled")
+    table.show()
+    assert tuple(table.panel._view._buttons.options) == (START, RESUME)
 
 
 def test_the_profiles_of_the_study_file_are_offered_and_started(server, tmp_path, monkeypatch):
