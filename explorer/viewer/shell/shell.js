@@ -153,6 +153,23 @@ function showTimeline(now) {
   recording.textContent = now.recording ? `● ${now.recording}` : "";
 }
 
+// A link may hold a pour behind its #. It is offered in words here; nothing is sent before somebody presses the button.
+const offer = element("div", { id: "offer", role: "status", hidden: "" });
+document.body.append(offer);
+function offerPour() {
+  const text = location.hash.slice(1), fields = new URLSearchParams(text);
+  offer.hidden = !fields.has("pour");
+  if (offer.hidden) return;
+  const named = [fields.get("pour"), fields.get("material") || "", ...fields.getAll("set"),
+    `seed ${fields.get("seed") || 0}`, `up to ${Number(fields.get("time") || 0).toFixed(3)} s`];
+  const done = () => { history.replaceState(null, "", location.pathname + location.search); offerPour(); };
+  offer.replaceChildren(element("span", {}, "This link holds another pour: ", element("b", {}, named.filter(Boolean).join(", "))),
+    element("button", { class: "main", onclick: () => { send({ do: "pour_link", text }); done(); } }, "Pour it"),
+    element("button", { onclick: done }, "Leave it"));
+}
+window.addEventListener("hashchange", offerPour);
+offerPour();
+
 const show = {
   project: showSteps,
   timeline: showTimeline,
