@@ -129,35 +129,39 @@ def first_visit(browser: Browser, home: Path) -> None:
         view.take("controls_loading", 0.5)
 
 
+def without_results(browser: Browser, home: Path) -> None:
+    """A project in which nothing was done yet: empty rooms, and what is refused."""
+    with (
+        served(*POUR, "--store", home / "runs.sqlite", data=home, patience=60) as address,
+        camera(browser, address) as view,
+    ):
+        for name in ("Calibrate", "Diagnose", "Laboratory", "Reports"):
+            view.open(name)
+            view.take(f"{name.lower()}_empty")
+        view.open("Laboratory")
+        view.unfold("Photograph → angle of repose")
+        blank = home / "no_pile.png"
+        Image.new("RGB", (640, 480), "white").save(blank)
+        with view.page.expect_file_chooser() as chooser:
+            view.press("Upload: photograph")
+        chooser.value.set_files(blank)
+        time.sleep(2.0)
+        view.press("Read the angle")
+        view.told("no angle")
+        view.take("laboratory_refused")
+        view.open("Diagnose")
+        view.page.get_by_label("Measured data").first.click()
+        view.page.get_by_role("option", name="folder below").click()
+        view.press("Start")
+        view.told("choose measured data")
+        view.take("diagnose_refused")
+
+
 def at_work(browser: Browser, home: Path) -> None:
-    """A project without a result: empty rooms, what is refused, commands at work, and one that fails."""
+    """A study and a diagnosis that run, and a study that fails."""
     store = home / "runs.sqlite"
     with served(*POUR, "--store", store, data=home, patience=60) as address:
-        with camera(browser, address) as view:
-            for name in ("Calibrate", "Diagnose", "Laboratory", "Reports"):
-                view.open(name)
-                view.take(f"{name.lower()}_empty")
-            view.open("Laboratory")
-            view.unfold("Photograph → angle of repose")
-            with view.page.expect_file_chooser() as chooser:
-                view.press("Upload: photograph")
-            blank = home / "no_pile.png"
-            Image.new("RGB", (640, 480), "white").save(blank)
-            chooser.value.set_files(blank)
-            time.sleep(2.0)
-            view.press("Read the angle")
-            time.sleep(4.0)
-            view.take("laboratory_refused")
-            view.open("Diagnose")
-            choice = view.page.get_by_label("Measured data")
-            choice.first.click()
-            view.page.get_by_role("option", name="folder below").click()
-            view.press("Start")
-            view.told("choose measured data")
-            view.take("diagnose_refused")
-            choice.first.click()
-            view.page.get_by_role("option", name="trefoil_2", exact=True).click()
-        for tab, folder, run in (("Calibrate", "studies", "runs"), ("Diagnose", "diagnoses", "pours")):
+        for tab, folder, runs in (("Calibrate", "studies", "runs"), ("Diagnose", "diagnoses", "pours")):
             with camera(browser, address) as view:
                 view.open(tab)
                 view.press("Start")
@@ -165,7 +169,7 @@ def at_work(browser: Browser, home: Path) -> None:
             poured(home / "repose-explorer" / folder)
             with camera(browser, address) as view:
                 view.open(tab)
-                view.told(re.compile(rf"[1-9]\d* of \d+ {run}, time left"))
+                view.told(re.compile(rf"[1-9]\d* of \d+ {runs}, time left"))
                 view.take(f"{tab.lower()}_running", 6.0)
                 view.press("Cancel")
                 view.told("Cancelled.")
@@ -331,7 +335,7 @@ def replay(browser: Browser, home: Path) -> None:
         view.take("replay", 12.0)
 
 
-PARTS = {"first": first_visit, "work": at_work, "results": results, "replay": replay}
+PARTS = {"first": first_visit, "empty": without_results, "work": at_work, "results": results, "replay": replay}
 BEGAN = time.monotonic()
 
 
