@@ -208,10 +208,8 @@ def results(browser: Browser, home: Path) -> None:
     with_results(home)
     with served(*POUR, "--store", home / "runs.sqlite", data=home, patience=60) as address:
         with camera(browser, address) as view:
-            pour_pictures(view)
-            laboratory_pictures(view)
-            finished_pictures(view)
-            view.page.locator("#state-line").get_by_label("Dark or light page").click()
+            for pictures in (finished_pictures, laboratory_pictures, pour_pictures, side_by_side):
+                pictures(view)
         with camera(browser, address, zoom=TWICE) as view:
             view.open("Calibrate")
             view.board("Study")
@@ -224,23 +222,21 @@ def results(browser: Browser, home: Path) -> None:
 def pour_pictures(view: Camera) -> None:
     """The pour, and what acts on it."""
     view.settled()
-    view.keys("r")
-    view.page.wait_for_function("() => parseFloat(document.querySelector('#timeline .time').innerText) > 1")
-    view.take("controls_pouring")
-    view.settled()
+    view.open("Controls")
     view.take("controls_at_rest")
     view.press("Pour 8 more")
-    view.told("over 8 seeds")
-    view.take("controls_population")
     for tab in ("Set-up", "Look", "Export"):
         view.open(tab)
         view.take(tab.lower().replace("-", "_"))
     view.open("Set-up")
-    refused = view.page.get_by_label("Mass poured").filter(visible=True).first
-    refused.fill("1000")
+    view.unfold("More of rig and feed")
+    wide = view.page.get_by_label("Outlet diameter").filter(visible=True).first
+    before = wide.input_value()
+    wide.fill("150")
     view.press("Restart with this set-up")
+    view.told("must be larger")
     view.take("set_up_refused")
-    refused.fill("30")
+    wide.fill(before)
     view.open("Look")
     view.keys("c", "c", "k")  # speed, contact force, force chains
     view.take("look_forces")
@@ -254,12 +250,11 @@ def pour_pictures(view: Camera) -> None:
     view.unfold("Tap, shake, pull")
     view.take("pour_disturb")
     view.open("Controls")
+    view.told("over 8 seeds")
+    view.take("controls_population")
     slider(view.page, "Friction").focus()
     view.page.keyboard.press("Home")
     view.take("controls_changed", 4.0)
-    view.keys("r")
-    time.sleep(3.0)
-    view.settled()
 
 
 def laboratory_pictures(view: Camera) -> None:
@@ -280,7 +275,9 @@ def laboratory_pictures(view: Camera) -> None:
 
 
 def finished_pictures(view: Camera) -> None:
-    """Answers, and both models of the diagnosis beside the measured pile."""
+    """Answers of both commands, over a pour that runs."""
+    view.page.wait_for_function("() => parseFloat(document.querySelector('#timeline .time').innerText) > 1")
+    view.take("controls_pouring")
     view.open("Reports")
     view.take("reports_finished", 6.0)
     view.open("Calibrate")
@@ -296,13 +293,21 @@ def finished_pictures(view: Camera) -> None:
     view.take("diagnose_finished", 4.0)
     view.scroll_board("Diagnosis", 0)
     view.take("diagnose_charts", 4.0)
-    side_by_side(view)
-    view.take("diagnose_side_by_side", 4.0)
 
 
 def side_by_side(view: Camera) -> None:
-    """Both models poured beside the measured pile, until they lie."""
+    """Both models of the diagnosis poured beside the measured pile, dark, and light at the other sizes."""
+    view.open("Diagnose")
     view.press("Show side by side")
+    time.sleep(5.0)
+    view.settled()
+    view.take("diagnose_side_by_side", 4.0)
+    view.page.locator("#state-line").get_by_label("Dark or light page").click()
+    for size in (WIDE, SMALL, PHONE):
+        view.page.set_viewport_size({"width": size[0], "height": size[1]})
+        view.take(f"diagnose_side_by_side_{size[0]}", 4.0)
+    view.page.set_viewport_size({"width": USUAL[0], "height": USUAL[1]})
+    view.press("Back to my pour")
     time.sleep(5.0)
     view.settled()
 
@@ -322,8 +327,6 @@ def sized_pictures(view: Camera, ending: str) -> None:
     view.open("Diagnose")
     view.board("Diagnosis")
     view.take(f"diagnose_finished{ending}", 4.0)
-    side_by_side(view)
-    view.take(f"diagnose_side_by_side{ending}", 4.0)
 
 
 def replay(browser: Browser, home: Path) -> None:
