@@ -187,7 +187,7 @@ async def friction_of_one_pair(page):
 
 
 async def measure(port, browsers, slow):
-    """Least frames/s and real-time factor of ``browsers`` over a new pour, echoes, first frames; ``slow``: such lines."""
+    """Least frames/s and real-time factor of ``browsers`` over a new pour, echoes, first frames; ``slow`` lines."""
     async with AsyncExitStack() as stack:
         through = await stack.enter_async_context(slow_line(port, *SLOW)) if slow else None
         pages = [Socket(await stack.enter_async_context(connected(port, through))) for _ in range(browsers)]

@@ -65,6 +65,12 @@ class Camera:
         """Wait until ``text`` can be read."""
         self.page.get_by_text(text).filter(visible=True).first.wait_for()
 
+    def top(self, text: str) -> None:
+        """Wait for ``text``, and bring it to the top of its room."""
+        self.told(text)
+        found = self.page.get_by_text(text).filter(visible=True).first
+        found.evaluate("text => text.scrollIntoView({block: 'start'})")
+
     def unfold(self, section: str) -> None:
         """Open a section, and bring it to the top."""
         head = self.page.get_by_role("button", name=section).filter(visible=True).first
@@ -268,7 +274,7 @@ def laboratory_pictures(view: Camera) -> None:
     ):
         view.unfold(section)
         view.press(button)
-        view.told(answer)
+        view.top(answer)
         view.take(f"laboratory_{name}")
         view.press(section)
         time.sleep(1.0)
@@ -321,6 +327,7 @@ def sized_pictures(view: Camera, ending: str) -> None:
     view.take(f"calibrate_finished{ending}", 4.0)
     view.open("Laboratory")
     view.unfold("Photograph → angle of repose")
+    view.top("explorer measure")
     view.take(f"laboratory_photograph{ending}")
     view.open("Reports")
     view.take(f"reports_finished{ending}", 4.0)
