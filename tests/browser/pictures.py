@@ -213,8 +213,9 @@ def results(browser: Browser, home: Path) -> None:
     """A pour, a finished study and a finished diagnosis."""
     with_results(home)
     with served(*POUR, "--store", home / "runs.sqlite", data=home, patience=60) as address:
-        with camera(browser, address) as view:
-            for pictures in (finished_pictures, laboratory_pictures, pour_pictures, side_by_side):
+        # A page of its own for each: rooms that one opens stay open beside the next.
+        for pictures in (finished_pictures, laboratory_pictures, pour_pictures, side_by_side):
+            with camera(browser, address) as view:
                 pictures(view)
         with camera(browser, address, zoom=TWICE) as view:
             view.open("Calibrate")
