@@ -58,13 +58,19 @@ async def slow_line(port: int, rate: float, round_trip: float):
     ``round_trip``: what it adds to that of the machine [s], half on the way there and half back.
     """
 
+    carried: list[asyncio.Event] = []
+
     async def connect(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        carried.append(over := asyncio.Event())
         inner_reader, inner_writer = await asyncio.open_connection("127.0.0.1", port, limit=CHUNK)
         await asyncio.gather(
             carry(reader, inner_writer, Line(rate, round_trip / 2)),
             carry(inner_reader, writer, Line(rate, round_trip / 2)),
         )
+        over.set()
 
     server = await asyncio.start_server(connect, "127.0.0.1", 0, limit=CHUNK)
     async with server:
         yield server.sockets[0].getsockname()[1]
+        for over in carried:  # what its user has closed is over a delay later
+            await asyncio.wait_for(over.wait(), 10.0)
