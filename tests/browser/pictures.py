@@ -45,6 +45,7 @@ class Camera:
     def take(self, name: str, wait: float = 2.0) -> None:
         """A picture after ``wait`` [s], in which what was asked for is drawn."""
         self.page.mouse.move(5, 5)
+        self.page.evaluate("document.activeElement?.blur()")  # no hint of what was pressed last
         time.sleep(wait)
         file = FOLDER / f"{name}.png"
         self.page.screenshot(path=file)
@@ -361,9 +362,9 @@ def main(parts: list[str]) -> None:
                 PARTS[part](browser, Path(home))
         browser.close()
     listed = set(re.findall(r"pictures/(\w+)\.png", GALLERY.read_text(encoding="utf-8")))
-    for file in FOLDER.glob("*.png"):
-        if file.stem not in listed:
-            print(f"{GALLERY} does not list {file}")
+    taken = {file.stem for file in FOLDER.glob("*.png")}
+    if wrong := sorted(listed ^ taken):
+        sys.exit(f"{GALLERY} and {FOLDER} differ in {', '.join(wrong)}")
 
 
 if __name__ == "__main__":
