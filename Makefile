@@ -48,13 +48,13 @@ slow: .venv/.ready ## the tests marked slow, but for those of `make peers`
 nightly: .venv/.ready ## what is too long for CI (80 min at most); writes docs/nightly.md
 	$(BIN)/python -m tests.nightly
 
-pictures: .venv/.ready ## the pictures of README and docs, taken from the running program (needs Chromium; 6 min)
+pictures: .venv/.ready ## the pictures of README and docs, taken from the running program (needs Chromium; 15 min)
 	$(BIN)/python -m tests.browser.pictures
 
 preview: .venv/.ready ## record the pour that the page shows while its solver loads (1 min)
 	$(BIN)/python -m tests.browser.preview
 
-page-speed: .venv/.ready ## frames, real-time factor and slider echo of the page, alone and beside a study (2 min)
+page-speed: .venv/.ready ## frames/s and slider echo of the page: one and two browsers, beside a study, over a slow line (6 min)
 	$(BIN)/python -m tests.browser.page_speed
 
 foreign: .venv/.ready ## data sets poured by LIGGGHTS with effects that no file states, judged (an hour)

@@ -23,6 +23,7 @@ from explorer.live.messages import (
     Pause,
     Play,
     Report,
+    RunTo,
     SessionState,
     SetParameters,
     SetPull,
@@ -106,6 +107,10 @@ class Session:
     def step(self) -> None:
         """Go on by one sample interval of the scene (``numerics.sample_interval``), then stand still."""
         self._send(Step(self._present().scene.numerics.sample_interval))
+
+    def run_to(self, time: float) -> None:
+        """Go on to simulated ``time`` [s], then stand still there; asked of a pour that was just started, too."""
+        self._send(RunTo(time))
 
     def step_back(self, duration: float | None = None) -> None:
         """Go back by ``duration`` [s], by default one sample interval, with everything as it was then, parameters too.

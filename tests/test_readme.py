@@ -242,3 +242,8 @@ def test_no_block_that_a_reader_types_is_overlooked():
     for block in ALL:
         if block.language in ("console", "sh", "bash", "shell"):
             assert block.commands, block
+
+
+def test_the_gallery_lists_every_picture():
+    listed = set(re.findall(r"pictures/(\w+)\.png", (ROOT / "docs/pictures.md").read_text(encoding="utf-8")))
+    assert listed >= {file.stem for file in (ROOT / "assets/pictures").glob("*.png")}

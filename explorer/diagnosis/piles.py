@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +15,7 @@ from doe.measurement.measurement import Condition, Measurement
 from explorer.diagnosis.result import DiagnosisResult
 from explorer.errors import CommandError
 from solver import Scene, with_values
+from solver.assets import AssetNotFoundError, measurement_folder
 
 LEAST_HEIGHT = 3e-4
 """Height [m] below which nothing of a measured surface is drawn."""
@@ -50,10 +50,11 @@ class AnswerPiles:
 
 def answer_piles(result: DiagnosisResult) -> AnswerPiles:
     """The piles of the first fitted condition. Raises a ValueError where the data are not there any more."""
-    folder = Path(result.data.folder)
-    if not folder.is_dir():
-        raise CommandError(f"{folder}: the measured data of this diagnosis are not there any more")
-    measurement = load_measurement(folder)
+    try:
+        measurement = load_measurement(measurement_folder(result.data.folder))
+    except AssetNotFoundError:
+        text = f"{result.data.folder}: the measured data of this diagnosis are not there any more"
+        raise CommandError(text) from None
     condition = measurement.fit[0]
     return AnswerPiles(
         condition,

@@ -27,6 +27,7 @@ from explorer.live.messages import (
     Pause,
     Play,
     Report,
+    RunTo,
     SessionState,
     SetParameters,
     SetPull,
@@ -92,6 +93,9 @@ class LivePour:
             case Step(duration=duration):
                 # Steps that are asked for while one runs are added to it.
                 self._paused, self._run_until = True, max(self._run_until, self._pour.time) + duration
+                self._throttle.restart(clock.perf_counter(), self._pour.time)
+            case RunTo(time=time):
+                self._paused, self._run_until = True, time
                 self._throttle.restart(clock.perf_counter(), self._pour.time)
             case StepBack(duration=duration):
                 self._go_back(self._pour.time - duration)

@@ -60,6 +60,13 @@ class Step:
 
 
 @dataclass(frozen=True)
+class RunTo:
+    """Pause at the first step that reaches simulated ``time`` [s]."""
+
+    time: float
+
+
+@dataclass(frozen=True)
 class StepBack:
     """Go back by ``duration`` [s] of simulated time, or to the earliest moment that is kept, and pause there."""
 
@@ -108,7 +115,9 @@ class Close:
     """End the process."""
 
 
-Command = Start | Play | Pause | Step | StepBack | SetParameters | MovePlate | SetPull | SetSpeed | Watch | Close
+Command = (
+    Start | Play | Pause | Step | RunTo | StepBack | SetParameters | MovePlate | SetPull | SetSpeed | Watch | Close
+)
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from explorer.live.messages import Event, Status
 from explorer.photograph.target import TargetFile
 from explorer.project.project import Project
 from explorer.project.steps import Room
+from explorer.scene.link import pour_text
 from explorer.session import Session
 from explorer.study.process import StudyProcess
 from explorer.viewer.actions import BackgroundWork, Post
@@ -87,6 +88,12 @@ class PageContext:
     def uploads(self) -> Path:
         """Folder of the files that browsers sent."""
         return self.data / "uploads"
+
+    def pour_text(self) -> str:
+        """What is on the screen with its moment, as a link holds it. Raises CommandError where a link cannot."""
+        status = self.session.status()
+        text = pour_text(self.session.source, status.scene, status.seed, self.project.source)
+        return f"{text}&time={status.time!r}"
 
     @cached_property
     def study_panel(self) -> viser.PanelHandle:

@@ -28,6 +28,7 @@ from explorer.viewer.pour.restart_panel import RestartPanel
 from explorer.viewer.pour.scene_panel import ScenePanel
 from explorer.viewer.pour.second_pile import SecondPile
 from explorer.viewer.pour.standing_panel import StandingPanel
+from explorer.viewer.shell.pour_link import PourLink
 from explorer.viewer.shell.state_line import StateLine
 from explorer.viewer.shell.timeline import Timeline
 from explorer.viewer.study.diagnosis_panel import DiagnosisPanel
@@ -40,6 +41,7 @@ PANELS: Registry[type[Panel]] = Registry(
     (
         StateLine,
         Timeline,
+        PourLink,
         Readout,
         PopulationPanel,
         StandingPanel,

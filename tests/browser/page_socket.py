@@ -61,13 +61,16 @@ async def until(page, told, patience=120.0):
         await asyncio.wait_for(page.window(), patience)
 
 
-def connected(port):
+def connected(port, through=None):
+    """A socket to the page at ``port``, over the line at ``through`` where there is one."""
     return websockets.connect(
         f"ws://127.0.0.1:{port}",
         subprotocols=[f"viser-v{viser.__version__}"],
         origin=f"http://127.0.0.1:{port}",
         max_size=None,
         compression=None,
+        host="127.0.0.1",
+        port=through or port,
     )
 
 

@@ -3,9 +3,11 @@
     frames/s         windows that move bodies, sent while the coarse pour runs
     real time        simulated seconds per second over the whole pour, from its first second on the page to its rest
     echo             from a slider's new value to the line "In the solver", median and 95th percentile [ms]
+    frame            from it to the first window after that line that moves bodies: drawn with the new value
 
-each alone, and while a study of the quick profile runs at low priority on the same machine; the time from a slider of
-the profiler to its new chart, while the pour runs; and the frames/s of 20 000 spheres that fall into a box.
+with one browser and with two (the slower of both counts), alone, while a study of the quick profile runs at low
+priority on the same machine, and over a line of 20 Mbit/s and 50 ms there and back; the time from a slider of the
+profiler to its new chart, while the pour runs; and the frames/s of 20 000 spheres that fall into a box.
 """
 
 import asyncio
@@ -17,10 +19,15 @@ import subprocess
 import sys
 import tempfile
 import time
+from contextlib import AsyncExitStack, contextmanager
 from pathlib import Path
 
+import websockets
+
 from explorer.priority import BACKGROUND, session_gives_way
+from explorer.viewer.shell.channel import PATH
 from tests.browser.page_socket import CAMERA, Socket, connected, serve, until
+from tests.browser.slow_line import slow_line
 from tests.explorer import reported_studies
 
 POUR = ("body.spheres=coarse", "rig.mass=30g")
@@ -57,23 +64,38 @@ rate = 10.0
 region_height = 0.18
 """
 ECHOES = 40
+SLOW = 20e6 / 8, 0.05
+"""Rate [bytes/s] and round trip [s] of the slow line."""
 PROFILED = "X7:"
 """Factor whose slider is moved, from end to end of the region."""
 QUIET = 3.0
 """Seconds without a window, or at rest, after which a pour is over."""
 POUR_SECONDS = 8.0
+LONGEST_POUR = 40.0
+"""Wall time [s] after which a pour that a busy machine draws out is measured."""
 
 
 def moves_bodies(messages):
     return any(m["type"] == "SceneNodeUpdateMessage" and "batched_positions" in m["updates"] for m in messages)
 
 
-async def echo_ms(page, slider, value):
-    """Milliseconds until the solver's own line tells ``value``."""
+async def echo_ms(pages, slider, value):
+    """Milliseconds until the solver's own line tells ``value``, and until a frame after it; of the last of ``pages``.
+
+    The first of them moves the slider.
+    """
     began = time.perf_counter()
-    await page.send({"type": "GuiUpdateMessage", "uuid": slider, "updates": {"value": value}})
-    await until(page, lambda text: f"Static friction</span> {value:g} " in text, 20.0)
-    return 1e3 * (time.perf_counter() - began)
+
+    async def seen(page):
+        await until(page, lambda text: f"Static friction</span> {value:g} " in text, 20.0)
+        told = time.perf_counter()
+        while not moves_bodies(await asyncio.wait_for(page.window(), 20.0)):
+            pass
+        return told, time.perf_counter()
+
+    await pages[0].send({"type": "GuiUpdateMessage", "uuid": slider, "updates": {"value": value}})
+    told, drawn = zip(*await asyncio.gather(*map(seen, pages)), strict=True)
+    return 1e3 * (max(told) - began), 1e3 * (max(drawn) - began)
 
 
 def redraws(messages):
@@ -126,16 +148,16 @@ def simulated(page):
 
 
 async def whole_pour(page):
-    """Frames/s and simulated over wall time until nothing moves any more."""
+    """Frames/s and simulated over wall time until nothing moves any more, or ``LONGEST_POUR`` is over."""
     began, start, frames, last = time.perf_counter(), simulated(page), 0, 0.0
-    while True:
+    while (now := time.perf_counter()) < began + LONGEST_POUR:
         try:
             frames += moves_bodies(await asyncio.wait_for(page.window(), QUIET))
         except TimeoutError:
             break
         if not any("at rest" in text for text in page.texts.values()):
             last = time.perf_counter()
-        elif time.perf_counter() > last + QUIET:
+        elif now > last + QUIET:
             break
     return frames / (last - began), (simulated(page) - start) / (last - began)
 
@@ -149,6 +171,13 @@ def real_time(page):
     ]
 
 
+async def pour_again(port):
+    """As the button of the timeline does."""
+    address = f"127.0.0.1:{port}"
+    async with websockets.connect(f"ws://{address}{PATH}", origin=f"http://{address}") as channel:
+        await channel.send(json.dumps({"do": "restart"}))
+
+
 async def friction_of_one_pair(page):
     """The slider of a pair that has been chosen; that of all pairs scales their values."""
     await page.send({"type": "GuiUpdateMessage", "uuid": page.labels["Pair"], "updates": {"value": "seed – seed"}})
@@ -157,19 +186,25 @@ async def friction_of_one_pair(page):
     return page.labels["Static friction"]
 
 
-async def measure(port):
-    async with connected(port) as socket:
-        page = Socket(socket)
-        await page.send(CAMERA)
-        await until(page, lambda text: re.search(r"Real-time factor</span><span>[0-9.]", text))
-        frames, factor = await whole_pour(page)
-        slider = await friction_of_one_pair(page)
-        echoes = [await echo_ms(page, slider, round(0.3 + 0.01 * k, 2)) for k in range(ECHOES)]
-        return frames, factor, echoes
+async def measure(port, browsers, slow):
+    """Least frames/s and real-time factor of ``browsers`` over a new pour, echoes, first frames; ``slow`` lines."""
+    async with AsyncExitStack() as stack:
+        through = await stack.enter_async_context(slow_line(port, *SLOW)) if slow else None
+        pages = [Socket(await stack.enter_async_context(connected(port, through))) for _ in range(browsers)]
+        for page in pages:
+            await page.send(CAMERA)
+        await pour_again(port)
+        running = (until(one, lambda text: re.search(r"Simulated time</span><span>0\.[0-2]", text)) for one in pages)
+        await asyncio.gather(*running)
+        frames, factors = zip(*await asyncio.gather(*map(whole_pour, pages)), strict=True)
+        slider = await friction_of_one_pair(pages[0])
+        waits = [await echo_ms(pages, slider, round(0.3 + 0.01 * k, 2)) for k in range(ECHOES)]
+        return min(frames), min(factors), *zip(*waits, strict=True)
 
 
-def tell(name, frames, factor, echoes):
-    print(f"{name:18} {frames:5.1f} frames/s   real time {factor:4.2f}   echo {spread(echoes)}")
+def tell(name, frames, factor, echoes, first_frames):
+    print(f"{name:24} {frames:5.1f} frames/s   real time {factor:4.2f}", flush=True)
+    print(f"{'':24} echo  {spread(echoes)}\n{'':24} frame {spread(first_frames)}", flush=True)
 
 
 def spread(waits):
@@ -190,29 +225,41 @@ def beside_the_profiler():
             server.wait(20)
 
 
+@contextmanager
+def study_at_work(wanted):
+    """A study in the background, as the page starts one; or none."""
+    if not wanted:
+        yield
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        command = ["nice", "-n", str(BACKGROUND), sys.executable, "-m", "explorer", "calibrate", "--headless"]
+        command += ["--profile", "quick", "--out", f"{folder}/out", "--store", f"{folder}/runs.sqlite"]
+        running = subprocess.Popen(command, stdout=subprocess.DEVNULL, start_new_session=True)
+        session_gives_way(running.pid, BACKGROUND)
+        try:
+            while not list(Path(folder).glob("out/progress.jsonl")):
+                time.sleep(0.5)
+            time.sleep(15.0)  # its workers have compiled
+            yield
+        finally:
+            running.terminate()
+            running.wait(30)
+
+
 def main():
     beside_the_profiler()
-    for name, study in (("alone", False), ("beside a study", True)):
-        with tempfile.TemporaryDirectory() as folder:
-            command = ["nice", "-n", str(BACKGROUND), sys.executable, "-m", "explorer", "calibrate", "--headless"]
-            command += ["--profile", "quick", "--out", f"{folder}/out", "--store", f"{folder}/runs.sqlite"]
-            # As the page starts one.
-            running = subprocess.Popen(command, stdout=subprocess.DEVNULL, start_new_session=True) if study else None
-            if running is not None:
-                session_gives_way(running.pid, BACKGROUND)
-            if running:
-                while not list(Path(folder).glob("out/progress.jsonl")):
-                    time.sleep(0.5)
-                time.sleep(15.0)  # its workers have compiled
+    for study, measured in (
+        (False, {"alone": (1, False), "two browsers": (2, False), "slow line": (1, True), "two slow lines": (2, True)}),
+        (True, {"beside a study": (1, False), "two, beside a study": (2, False)}),
+    ):
+        with study_at_work(study):
             server, port = serve(*(part for one in POUR for part in ("--set", one)))
             try:
-                tell(name, *asyncio.run(measure(port)))
+                for name, (browsers, slow) in measured.items():
+                    tell(name, *asyncio.run(measure(port, browsers, slow)))
             finally:
                 server.terminate()
                 server.wait(20)
-                if running:
-                    running.terminate()
-                    running.wait(30)
     with tempfile.TemporaryDirectory() as folder:
         material = Path(folder, "spheres.toml")
         material.write_text(SPHERES, encoding="utf-8")

@@ -1,9 +1,10 @@
-"""The pictures of README and docs/page.md, taken from the running program in headless Chromium: `make pictures`.
+"""The pictures of README and docs, taken from the running program in headless Chromium: `make pictures`.
 
-Every room at 1280 × 800 on the dark page; the first view, *Calibrate* and *Diagnose* also at the other sizes, light.
+Every room in its states at 1280 × 800 on the dark page; the most important ones also at other sizes, light, and one at
+200 %. `docs/pictures.md` lists them all: what is taken here and what stands there have to be the same.
 
-The quick study of `make calibrate-quick` is taken, or run first, so that *Calibrate* has something to show, and the
-diagnosis that `make diagnose` has left where there is one; everything is written to a data folder of its own.
+*Calibrate* shows the quick study of `make calibrate-quick`, which is run first where it is not there; *Diagnose* shows
+`examples/trefoil_2`. Everything is written to data folders of its own. With names of ``PARTS`` only those are taken.
 """
 
 import re
@@ -12,145 +13,359 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from playwright.sync_api import Page, sync_playwright
+from PIL import Image
+from playwright.sync_api import Browser, Page, sync_playwright
 
-from tests.browser.served import served
-from tests.browser.test_page import BEGUN, FLAGS, room
+from tests.browser.served import EXAMPLE, diagnosed, served
+from tests.browser.test_page import BEGUN, FLAGS, room, slider
 from tests.conftest import find_chromium
 
-FOLDER = Path("assets/pictures")
-QUICK, DIAGNOSIS = Path("results/quick"), Path("results/diagnosis")
-WIDE, USUAL, SMALL, PHONE = (1920, 1080), (1280, 800), (1024, 768), (390, 844)
+FOLDER, GALLERY = Path("assets/pictures"), Path("docs/pictures.md")
+QUICK = Path("results/quick")
+USUAL, WIDE, SMALL, PHONE = (1280, 800), (1920, 1080), (1024, 768), (390, 844)
 """Sizes of the window [px]."""
-PATIENCE_MS = 120_000
-STUDY_ROOMS, CONTROL_ROOMS = ("Pour", "Calibrate", "Diagnose", "Laboratory", "Reports"), ("Set-up", "Look", "Export")
+TWICE = 2.0
+"""A browser's zoom of 200 %: half as many pixels of twice the size."""
+PATIENCE_MS = 300_000
+COLOURS = 256
 SETTLED = ("at rest", "no heap", "jammed", "obstructed")
+POUR = ("--set", "body.spheres=coarse")
 
 
-def opened(browser: object, address: str, size: tuple[int, int], begun: bool = True) -> Page:
+class Camera:
+    """Takes pictures of one page."""
+
+    def __init__(self, page: Page) -> None:
+        self.page = page
+
+    def take(self, name: str, wait: float = 2.0) -> None:
+        """A picture after ``wait`` [s], in which what was asked for is drawn."""
+        self.page.mouse.move(5, 5)
+        self.page.evaluate("document.activeElement?.blur()")  # no hint of what was pressed last
+        time.sleep(wait)
+        file = FOLDER / f"{name}.png"
+        self.page.screenshot(path=file)
+        with Image.open(file) as taken:
+            # Not the median cut, which gives rare colours away: those of the key are few pixels.
+            few = taken.convert("RGB").quantize(COLOURS, Image.Quantize.MAXCOVERAGE, kmeans=2, dither=Image.Dither.NONE)
+        few.save(file, optimize=True)
+        print(f"{time.monotonic() - BEGAN:6.0f} s  {file}", flush=True)
+
+    def open(self, tab: str) -> None:
+        room(self.page, tab)
+        time.sleep(2.0)
+
+    def press(self, button: str) -> None:
+        self.page.get_by_role("button", name=button, exact=True).filter(visible=True).first.click()
+
+    def told(self, text: str | re.Pattern[str]) -> None:
+        """Wait until ``text`` can be read."""
+        self.page.get_by_text(text).filter(visible=True).first.wait_for()
+
+    def top(self, text: str) -> None:
+        """Wait for ``text``, and bring it to the top of its room."""
+        self.told(text)
+        found = self.page.get_by_text(text).filter(visible=True).first
+        found.evaluate("text => text.scrollIntoView({block: 'start'})")
+
+    def unfold(self, section: str) -> None:
+        """Open a section, and bring it to the top."""
+        head = self.page.get_by_role("button", name=section).filter(visible=True).first
+        if head.get_attribute("aria-expanded") != "true":
+            head.click()
+        time.sleep(1.0)
+        head.evaluate("head => head.scrollIntoView({block: 'start'})")
+
+    def keys(self, *keys: str) -> None:
+        """Press ``keys`` where no control takes them."""
+        self.page.keyboard.press("Escape")
+        self.page.evaluate("document.activeElement?.blur()")
+        for key in keys:
+            self.page.keyboard.press(key)
+            time.sleep(0.3)
+
+    def settled(self) -> None:
+        """Wait until the pile lies."""
+        words = "|".join(SETTLED)
+        self.page.wait_for_function(f"() => /{words}/.test(document.querySelector('#timeline .chip').innerText)")
+
+    def board(self, title: str) -> None:
+        """Wait for the verdict on a board."""
+        self.page.frame_locator(f'iframe[title="{title}"]').locator(".banner strong").wait_for()
+
+    def scroll_board(self, title: str, figure: int) -> None:
+        """Bring a chart of a board into sight."""
+        shown = self.page.frame_locator(f'iframe[title="{title}"]').locator("figure").nth(figure)
+        shown.evaluate("figure => figure.scrollIntoView({block: 'start'})")
+
+
+@contextmanager
+def camera(
+    browser: Browser, address: str, size: tuple[int, int] = USUAL, begun: bool = True, zoom: float = 1.0
+) -> Iterator[Camera]:
     """The page at ``address``, with or without the start dialogue of a first visit."""
-    page = browser.new_page(viewport={"width": size[0], "height": size[1]})  # type: ignore[attr-defined]
+    width, height = (round(length / zoom) for length in size)
+    page = browser.new_page(viewport={"width": width, "height": height}, device_scale_factor=zoom)
     page.set_default_timeout(PATIENCE_MS)
     if begun:
         page.add_init_script(BEGUN)
     page.goto(address)
-    page.locator("#timeline .chip").filter(has_text=re.compile(".")).wait_for(state="attached")
-    without_notifications(page)
-    return page
-
-
-def shot(page: Page, name: str) -> None:
-    page.mouse.move(5, 5)
-    time.sleep(2.0)
-    page.screenshot(path=FOLDER / f"{name}.png")
-    print(FOLDER / f"{name}.png", flush=True)
-
-
-def answered(page: Page, folder: str, button: str, answer: str) -> None:
-    """Open a folder of the laboratory's tab, press a button in it and wait for its answer."""
-    time.sleep(1.0)  # a folder that is closing still takes the click
-    page.get_by_text(folder).click()
-    page.get_by_role("button", name=button, exact=True).click()
-    page.get_by_text(answer).first.wait_for()
-
-
-def without_notifications(page: Page) -> None:
-    """Close viser's word on software rendering, which a person with a graphics card does not see."""
+    # viser's word on software rendering, which a person with a graphics card does not see; also below the dialogue
     close = page.locator(".mantine-Notification-closeButton").first
     close.wait_for(state="attached")
-    close.evaluate("button => button.click()")  # also below the start dialogue
+    close.evaluate("button => button.click()")
+    try:
+        yield Camera(page)
+    finally:
+        page.close()
 
 
-def settled(page: Page) -> None:
-    """Wait until the pile lies."""
+def first_visit(browser: Browser, home: Path) -> None:
+    """Before the solver is there."""
+    with (
+        served("--store", home / "runs.sqlite", data=home, patience=30) as address,
+        camera(browser, address, begun=False) as view,
+    ):
+        view.take("start")
+        view.page.locator("#beginning .card").filter(has_text="Just play").click()
+        view.told("recording of this pour")
+        view.take("controls_loading", 0.5)
+
+
+def without_results(browser: Browser, home: Path) -> None:
+    """A project in which nothing was done yet: empty rooms, and what is refused."""
+    with (
+        served(*POUR, "--store", home / "runs.sqlite", data=home, patience=60) as address,
+        camera(browser, address) as view,
+    ):
+        for name in ("Calibrate", "Diagnose", "Laboratory", "Reports"):
+            view.open(name)
+            view.take(f"{name.lower()}_empty")
+        view.open("Laboratory")
+        view.unfold("Photograph → angle of repose")
+        blank = home / "no_pile.png"
+        Image.new("RGB", (640, 480), "white").save(blank)
+        with view.page.expect_file_chooser() as chooser:
+            view.press("Upload: photograph")
+        chooser.value.set_files(blank)
+        time.sleep(2.0)
+        view.press("Read the angle")
+        view.told("no angle")
+        view.take("laboratory_refused")
+        view.open("Diagnose")
+        view.page.get_by_label("Measured data").first.click()
+        view.page.get_by_role("option", name="folder below").click()
+        view.press("Start")
+        view.told("choose measured data")
+        view.take("diagnose_refused")
+
+
+def at_work(browser: Browser, home: Path) -> None:
+    """A study and a diagnosis that run, and a study that fails."""
+    store = home / "runs.sqlite"
+    with served(*POUR, "--store", store, data=home, patience=60) as address:
+        for tab, folder, runs in (("Calibrate", "studies", "runs"), ("Diagnose", "diagnoses", "pours")):
+            with camera(browser, address) as view:
+                view.open(tab)
+                view.press("Start")
+                view.told("Running at low priority")
+            poured(home / "repose-explorer" / folder)
+            with camera(browser, address) as view:
+                view.open(tab)
+                view.told(re.compile(rf"[1-9]\d* of \d+ {runs}, time left"))
+                view.take(f"{tab.lower()}_running", 6.0)
+                view.press("Cancel")
+                view.told("Cancelled.")
+        store.write_text("no store\n")
+        with camera(browser, address) as view:
+            view.open("Calibrate")
+            view.press("Start")
+            view.told("Failed.")
+            view.take("calibrate_failed")
+
+
+def poured(folder: Path) -> None:
+    """Wait until a command that writes below ``folder`` has some runs: without a page, which takes the cores."""
     end = time.monotonic() + PATIENCE_MS / 1000
-    while time.monotonic() < end:
-        if any(word in page.locator("#timeline .chip").inner_text() for word in SETTLED):
-            return
+    while not any(len(file.read_text().splitlines()) > 2 for file in folder.rglob("progress.jsonl")):
+        assert time.monotonic() < end, f"{folder}: no run in time"
         time.sleep(1.0)
 
 
-def live_pictures(browser: object, home: str) -> None:
-    with served("--set", "body.spheres=coarse", "--store", f"{home}/runs.sqlite", data=home, patience=30) as address:
-        page = opened(browser, address, USUAL, begun=False)
-        shot(page, "start_1280")
-        page.close()
-        page = opened(browser, address, USUAL)
-        settled(page)
-        page.keyboard.press("r")
-        page.wait_for_function("() => parseFloat(document.querySelector('#timeline .time').innerText) > 1")
-        shot(page, "pouring")
-        settled(page)
-        shot(page, "controls_1280")
-        for name in STUDY_ROOMS:
-            room(page, name)
-            time.sleep(6.0)
-            shot(page, f"{name.lower()}_1280")
-        room(page, "Laboratory")
-        answered(page, "Photograph → angle of repose", "Read the angle", "explorer measure")
-        page.get_by_text("explorer measure").first.scroll_into_view_if_needed()
-        shot(page, "photograph_1280")
-        for name in CONTROL_ROOMS:
-            room(page, name)
-            shot(page, f"{name.lower().replace('-', '_')}_1280")
-        page.keyboard.press("Escape")
-        page.evaluate("document.activeElement?.blur()")
-        room(page, "Look")
-        page.evaluate("document.activeElement?.blur()")
-        for key in "cck":  # speed, contact force, force chains
-            page.keyboard.press(key)
-        shot(page, "forces_1280")
-        for key in "ccck":  # coordination number, residence time, and back to the components
-            page.keyboard.press(key)
-        page.locator("#state-line").get_by_label("Dark or light page").click()
-        page.close()
+def with_results(home: Path) -> None:
+    """Data of a person who has calibrated and diagnosed."""
+    study = home / "repose-explorer" / "studies" / "sunflower_extract-quick-20260101-000000"
+    study.parent.mkdir(parents=True)
+    shutil.copytree(QUICK, study)
+    explorer("report", EXAMPLE, "--out", home / "report")
+    shutil.copytree(home / "report", diagnosed(home), dirs_exist_ok=True)
+
+
+def explorer(*arguments: object) -> None:
+    command = [sys.executable, "-m", "explorer", *map(str, arguments)]
+    subprocess.run(command, check=False, stdout=subprocess.DEVNULL)
+
+
+def results(browser: Browser, home: Path) -> None:
+    """A pour, a finished study and a finished diagnosis."""
+    with_results(home)
+    with served(*POUR, "--store", home / "runs.sqlite", data=home, patience=60) as address:
+        # A page of its own for each: rooms that one opens stay open beside the next.
+        for pictures in (finished_pictures, laboratory_pictures, pour_pictures, side_by_side):
+            with camera(browser, address) as view:
+                pictures(view)
+        with camera(browser, address, zoom=TWICE) as view:
+            view.open("Calibrate")
+            view.board("Study")
+            view.take("calibrate_finished_200_percent", 6.0)
         for size in (WIDE, SMALL, PHONE):
-            page = opened(browser, address, size)
-            time.sleep(6.0)
-            shot(page, f"controls_{size[0]}")
-            if size != PHONE:
-                for name in ("Calibrate", "Diagnose"):
-                    room(page, name)
-                    time.sleep(6.0)
-                    shot(page, f"{name.lower()}_{size[0]}")
-            page.close()
+            with camera(browser, address, size) as view:
+                sized_pictures(view, f"_{size[0]}")
 
 
-def replay_picture(browser: object, home: str) -> None:
-    recording = Path(home) / "pour.rrd"
-    command = [sys.executable, "-m", "explorer", "simulate", "funnel", "--set", "body.spheres=coarse"]
-    subprocess.run([*command, "--record", str(recording)], check=True, stdout=subprocess.DEVNULL)
-    with served("--replay", recording, data=home, patience=30) as address:
-        page = browser.new_page(viewport={"width": USUAL[0], "height": USUAL[1]})  # type: ignore[attr-defined]
-        page.set_default_timeout(PATIENCE_MS)
-        page.goto(address)
-        page.get_by_text("Replay").first.wait_for()
-        without_notifications(page)
-        time.sleep(12.0)
-        shot(page, "replay_1280")
-        page.close()
+def pour_pictures(view: Camera) -> None:
+    """The pour, and what acts on it."""
+    view.settled()
+    view.open("Controls")
+    view.take("controls_at_rest")
+    view.press("Pour 8 more")
+    for tab in ("Set-up", "Look", "Export"):
+        view.open(tab)
+        view.take(tab.lower().replace("-", "_"))
+    view.open("Set-up")
+    view.unfold("More of rig and feed")
+    wide = view.page.get_by_label("Outlet diameter").filter(visible=True).first
+    before = wide.input_value()
+    wide.fill("150")
+    view.press("Restart with this set-up")
+    view.told("must be larger")
+    view.take("set_up_refused")
+    wide.fill(before)
+    view.open("Look")
+    view.keys("c", "c", "k")  # speed, contact force, force chains
+    view.take("look_forces", 6.0)
+    view.keys("c", "c", "c", "k", "n")  # coordination number, residence time, components; a body
+    view.unfold("Body")
+    view.take("look_body", 4.0)
+    view.keys("Escape")
+    view.open("Pour")
+    view.take("pour_at_rest", 6.0)
+    view.unfold("Silhouette and flank fit")
+    view.take("pour_outline", 4.0)
+    view.open("Controls")
+    view.page.get_by_text("Pouring in the background").wait_for(state="hidden")
+    view.told(re.compile(r"over \d seeds"))
+    view.take("controls_population")
+    slider(view.page, "Friction").focus()
+    view.page.keyboard.press("Home")
+    view.take("controls_changed", 4.0)
 
 
-def main() -> None:
+def laboratory_pictures(view: Camera) -> None:
+    """Each piece of the laboratory with an answer."""
+    view.open("Laboratory")
+    for name, section, button, answer in (
+        ("bench", "Bench test → parameters", "Evaluate", "explorer lab"),
+        ("photograph", "Photograph → angle of repose", "Read the angle", "explorer measure"),
+        ("design", "Your own design → runs", "Make the sheet", "explorer design"),
+        ("audit", "Audit of a published study", "Audit the shipped article", "explorer audit"),
+    ):
+        view.unfold(section)
+        view.press(button)
+        view.top(answer)
+        view.take(f"laboratory_{name}")
+        view.press(section)
+        time.sleep(1.0)
+
+
+def finished_pictures(view: Camera) -> None:
+    """Answers of both commands, over a pour that runs."""
+    view.page.wait_for_function("() => parseFloat(document.querySelector('#timeline .time').innerText) > 1")
+    view.take("controls_pouring")
+    view.open("Reports")
+    view.take("reports_finished", 6.0)
+    view.open("Calibrate")
+    view.board("Study")
+    view.take("calibrate_finished", 4.0)
+    view.scroll_board("Study", 0)
+    view.take("calibrate_charts", 4.0)
+    view.unfold("Profiler")
+    view.page.locator(".js-plotly-plot").first.wait_for()
+    view.take("calibrate_profiler", 4.0)
+    view.open("Diagnose")
+    view.board("Diagnosis")
+    view.take("diagnose_finished", 4.0)
+    view.scroll_board("Diagnosis", 0)
+    view.take("diagnose_charts", 4.0)
+
+
+def side_by_side(view: Camera) -> None:
+    """Both models of the diagnosis poured beside the measured pile, dark, and light at the other sizes."""
+    view.open("Diagnose")
+    view.press("Show side by side")
+    time.sleep(5.0)
+    view.settled()
+    view.take("diagnose_side_by_side", 4.0)
+    view.page.locator("#state-line").get_by_label("Dark or light page").click()
+    for size in (WIDE, SMALL, PHONE):
+        view.page.set_viewport_size({"width": size[0], "height": size[1]})
+        view.take(f"diagnose_side_by_side_{size[0]}", 4.0)
+    view.page.set_viewport_size({"width": USUAL[0], "height": USUAL[1]})
+    view.press("Back to my pour")
+    time.sleep(5.0)
+    view.settled()
+
+
+def sized_pictures(view: Camera, ending: str) -> None:
+    """The most important rooms."""
+    view.open("Controls")
+    view.take(f"controls_at_rest{ending}", 4.0)
+    view.open("Calibrate")
+    view.board("Study")
+    view.take(f"calibrate_finished{ending}", 4.0)
+    view.open("Laboratory")
+    view.unfold("Photograph → angle of repose")
+    view.top("explorer measure")
+    view.take(f"laboratory_photograph{ending}")
+    view.open("Reports")
+    view.take(f"reports_finished{ending}", 4.0)
+    view.open("Diagnose")
+    view.board("Diagnosis")
+    view.take(f"diagnose_finished{ending}", 4.0)
+
+
+def replay(browser: Browser, home: Path) -> None:
+    """A recording."""
+    recording = home / "pour.rrd"
+    explorer("simulate", "funnel", *POUR, "--record", recording)
+    with served("--replay", recording, data=home, patience=30) as address, camera(browser, address) as view:
+        view.told("Replay")
+        view.take("replay", 12.0)
+
+
+PARTS = {"first": first_visit, "empty": without_results, "work": at_work, "results": results, "replay": replay}
+BEGAN = time.monotonic()
+
+
+def main(parts: list[str]) -> None:
     FOLDER.mkdir(parents=True, exist_ok=True)
-    for stale in FOLDER.glob("*.png"):
-        stale.unlink()
-    with tempfile.TemporaryDirectory() as home, sync_playwright() as playwright:
-        study = Path(home) / "repose-explorer" / "studies" / "sunflower_extract-quick-20260101-000000"
-        study.parent.mkdir(parents=True)
-        if not (QUICK / "result.json").is_file():
-            command = [sys.executable, "-m", "explorer", "calibrate", "--headless", "--profile", "quick"]
-            subprocess.run([*command, "--out", str(QUICK)], check=False, stdout=subprocess.DEVNULL)
-        shutil.copytree(QUICK, study)
-        if (DIAGNOSIS / "diagnosis.json").is_file():
-            shutil.copytree(DIAGNOSIS, Path(home) / "repose-explorer" / "diagnoses" / "trefoil_2-20260101-000000")
+    if not (QUICK / "result.json").is_file():
+        explorer("calibrate", "--headless", "--profile", "quick", "--out", QUICK)
+    with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=find_chromium(), args=FLAGS)
-        live_pictures(browser, home)
-        replay_picture(browser, home)
+        for part in parts or PARTS:
+            with tempfile.TemporaryDirectory() as home:
+                PARTS[part](browser, Path(home))
         browser.close()
+    listed = set(re.findall(r"pictures/(\w+)\.png", GALLERY.read_text(encoding="utf-8")))
+    taken = {file.stem for file in FOLDER.glob("*.png")}
+    if wrong := sorted(listed ^ taken):
+        sys.exit(f"{GALLERY} and {FOLDER} differ in {', '.join(wrong)}")
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

@@ -2,9 +2,22 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 from contextlib import contextmanager
+from pathlib import Path
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "trefoil_2"
+"""A finished diagnosis."""
+
+
+def diagnosed(data):
+    """The finished diagnosis of ``EXAMPLE`` among the user's data; its folder."""
+    folder = Path(data) / "repose-explorer" / "diagnoses" / "trefoil_2-20260101-000000"
+    folder.mkdir(parents=True)
+    shutil.copy(EXAMPLE / "diagnosis.json", folder)
+    return folder
 
 
 @contextmanager

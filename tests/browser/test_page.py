@@ -231,6 +231,28 @@ def test_a_slider_moved_by_keyboard_in_one_browser_is_seen_in_another(page, addr
     assert state(page) in ("running", "ended")
 
 
+def test_a_pour_in_a_link_is_offered_in_words_and_poured_by_a_click_only(page, address):
+    text = "pour=sunflower_extract&set=body.spheres%3Dcoarse&set=rig.mass%3D10g&seed=4&time=0.01"
+    told = page.locator("#timeline .event[title*='seed 4']")
+    second = page.context.browser.new_page(viewport={"width": 1280, "height": 900})
+    second.set_default_timeout(PATIENCE)
+    second.add_init_script(BEGUN)
+    second.goto(f"{address}#{text}")
+    offer = second.get_by_text("This link holds another pour: ")
+    offer.wait_for()
+    assert offer.inner_text().endswith("sunflower_extract, body.spheres=coarse, rig.mass=10g, seed 4, up to 0.010 s")
+    room(second, "Set-up")
+    second.get_by_text("Static friction").filter(visible=True).first.wait_for()
+    assert told.count() == 0
+    second.get_by_role("button", name="Pour it").click()
+    told.wait_for(state="attached")
+    wait_for(lambda: state(page) == "paused" and simulated_time(page) >= 0.01)
+    assert offer.is_hidden()
+    assert "#" not in second.url
+    second.close()
+    page.keyboard.press("Space")
+
+
 def test_rooms_are_reached_in_the_window_of_a_phone(page, address):
     phone = page.context.browser.new_page(viewport={"width": 390, "height": 844}, has_touch=True)
     phone.set_default_timeout(PATIENCE)

@@ -11,7 +11,9 @@ import numpy as np
 import numpy.typing as npt
 import viser
 
+from explorer.errors import CommandError
 from explorer.live.frames import Frame
+from explorer.scene.link import INSTEAD, LONGEST
 from explorer.units import InputError
 from explorer.viewer.actions import ClientAction, Post, add_client_key, client_buttons
 from explorer.viewer.guarded_server import address
@@ -47,6 +49,7 @@ class CameraPanel:
         height: tells how high it is what has to be in the picture [m].
         pile: tells where the bodies of the pile are [m], shape (n, 3).
         leaves: is told of a browser whose camera goes to a preset.
+        pour: tells the pour and its moment, as what stands behind # in an address; "" where there is none.
     """
 
     def __init__(
@@ -56,8 +59,9 @@ class CameraPanel:
         height: Callable[[], float],
         pile: Callable[[], Array],
         leaves: ClientAction = lambda _: None,
+        pour: Callable[[], str] = str,
     ) -> None:
-        self._server, self._height, self._pile, self._leaves = server, height, pile, leaves
+        self._server, self._height, self._pile, self._pour, self._leaves = server, height, pile, pour, leaves
         gui = server.gui
         acts = {name: partial(self._look_from, name) for name in DIRECTIONS}
         with gui.add_folder("Camera"):
@@ -66,7 +70,12 @@ class CameraPanel:
                 FRAME_PILE, hint=f"The heap and its strays fill the picture, without the rig. Key {FRAME_KEY}."
             )
             link = gui.add_button(LINK, hint="Puts the address of what you see into the field below.")
-            self._link: Any = gui.add_text("Address", "", hint="Opens the page with this view.")
+            self._link: Any = gui.add_text(
+                "Address",
+                "",
+                hint="Opens the page with this view, and offers to pour what is on the screen up to this moment: from "
+                "the start, with the parameters now in force.",
+            )
         for name, key in VIEW_KEYS.items():
             add_client_key(gui, f"View: {name.lower()}", key, acts[name], post)
 
@@ -95,7 +104,14 @@ class CameraPanel:
         go_to_place(client, framing(points, camera.position - camera.look_at, camera.fov, aspect_of(camera)))
 
     def _show_link(self, client: Any) -> None:
-        self._link.value = link_to(self._server, client.camera)
+        self._link.value = view = link_to(self._server, client.camera)
+        try:
+            pour = self._pour()
+        except CommandError as error:
+            raise CommandError(f"the link holds the view only: {error}") from None
+        if len(view) + len(pour) >= LONGEST:
+            raise CommandError(f"the link holds the view only: the pour takes {len(pour)} characters; {INSTEAD}")
+        self._link.value = f"{view}#{pour}" if pour else view
 
 
 def view_of(height: float, name: str) -> CameraView:

@@ -54,7 +54,7 @@ class LookPanel(Panel):
         self._drawn: Frame | None = None
         self._chained_for: object = None
         self._told_for: object = None
-        CameraPanel(server, post, lambda: scene_height(session.status().scene), self._pile, self._stay)
+        CameraPanel(server, post, lambda: scene_height(session.status().scene), self._pile, self._stay, page.pour_text)
         self._add_inspector(post)
 
     def _add_inspector(self, post: Post) -> None:

@@ -17,8 +17,8 @@ import websockets
 from websockets.asyncio.server import ServerConnection
 
 PATH = "/shell/channel"
-LONGEST_COMMAND = 1000
-"""Characters of a command."""
+LONGEST_COMMAND = 2500
+"""Characters of a command: a link's text with what stands around it."""
 
 Command = Mapping[str, Any]
 """What a browser sent: {"do": name, …}. Every value in it may be anything."""

@@ -154,6 +154,27 @@ function showTimeline(now) {
   recording.textContent = now.recording ? `● ${now.recording}` : "";
 }
 
+// A link may hold a pour behind its #. It is offered in words here; nothing is sent before somebody presses the button.
+// The page's head has taken it out of the address, which viser makes that of its socket from.
+const offer = element("div", { id: "offer", role: "status", hidden: "" });
+document.body.append(offer);
+function offerPour(text) {
+  const fields = new URLSearchParams(text);
+  if (!fields.has("pour")) return;
+  const named = [fields.get("pour"), fields.get("material") || "", ...fields.getAll("set"),
+    `seed ${fields.get("seed") || 0}`, `up to ${Number(fields.get("time") || 0).toFixed(3)} s`];
+  const done = () => { offer.hidden = true; };
+  offer.replaceChildren(element("span", {}, "This link holds another pour: ", element("b", {}, named.filter(Boolean).join(", "))),
+    element("button", { class: "main", onclick: () => { send({ do: "pour_link", text }); done(); } }, "Pour it"),
+    element("button", { onclick: done }, "Leave it"));
+  offer.hidden = false;
+}
+offerPour(window.linked.slice(1));
+window.addEventListener("hashchange", () => {
+  offerPour(location.hash.slice(1));
+  history.replaceState(null, "", location.pathname + location.search);
+});
+
 const show = {
   project: showSteps,
   timeline: showTimeline,

@@ -27,8 +27,13 @@ TEXT = """<title>{title}</title>
     <link rel="stylesheet" href="/shell/text.css" />
     <script src="/shell/accessibility.js" type="module"></script>"""
 AROUND = """
+    <script>
+      window.linked = location.hash;
+      if (linked) history.replaceState(null, "", location.pathname + location.search);
+    </script>
     <link rel="stylesheet" href="/shell/shell.css" />
     <script src="/shell/shell.js" type="module"></script>"""
+"""What is behind the # of the address is taken out before viser's script, which makes that of its socket from it."""
 SHIPPED = ("element.js", "accessibility.js", "text.css", "shell.js", "shell.css", "board.html", "board.js", "board.css")
 """Files beside this one that are served."""
 HTML, JSON = "text/html; charset=utf-8", "application/json"

@@ -1,6 +1,8 @@
 """A diagnosis as piles side by side: the surface that was measured, and the scenes of both models."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ import pytest
 from doe.declared.model import effect_values
 from doe.measurement.load import load_measurement
 from explorer.diagnosis.piles import answer_piles, grid_surface, surface_of_revolution
+from explorer.diagnosis.result import DiagnosisResult
 from explorer.errors import CommandError
 from solver.assets import measurement_folder
 from solver.scenes.scene import value
@@ -64,3 +67,14 @@ def test_both_models_stand_in_the_set_up_of_the_first_fitted_condition():
     assert piles.angle == (pytest.approx(angles.mean()), pytest.approx(angles.std(ddof=1)))
     with pytest.raises(CommandError, match="not there any more"):
         answer_piles(replace(result, data=replace(result.data, folder="/nowhere")))
+
+
+def test_the_example_shows_its_piles_by_the_shipped_name_of_its_data():
+    """`examples/trefoil_2` names no folder of the machine that made it."""
+    example = Path(__file__).parents[3] / "examples" / "trefoil_2" / "diagnosis.json"
+    result = DiagnosisResult.from_dict(json.loads(example.read_text()))
+    assert (result.data.folder, result.verdict) == ("trefoil_2", "effect:rolling_resistance")
+    piles = answer_piles(result)
+    path = "effect.rolling_resistance.rolling_friction"
+    assert value(piles.before, path) == 0.0 < value(piles.after, path)
+    assert piles.measured is not None

@@ -74,10 +74,10 @@ def page_context(server, session=None, post=None, data=Path("nowhere"), study=No
     return PageContext(server, session, post, study, diagnosis, data, bar, project, ShellChannel(), WebPages("test"))
 
 
-def page_of(server, session, diagnosis, data):
-    """The page of the shipped study, with results in the folder ``data``."""
+def page_of(server, session, diagnosis, data, channel=None):
+    """The page of the shipped study, with results in the folder ``data``; ``channel``: that of the server."""
     study = CalibrationProcess(PROJECT.study, data / "studies", data / "runs.sqlite")
-    return Page(server, session, PROJECT, study, diagnosis, ShellChannel(), WebPages("test"))
+    return Page(server, session, PROJECT, study, diagnosis, channel or ShellChannel(), WebPages("test"))
 
 
 def finished(actions: Actions, background: BackgroundWork, patience: float = 30.0) -> str:

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import json
 import threading
 import time
 from types import SimpleNamespace
@@ -16,11 +17,14 @@ from viser import _messages
 from explorer.diagnosis.process import DiagnoseProcess
 from explorer.live.messages import SessionState
 from explorer.scene.meshes import scene_height
+from explorer.scene.source import prepared_source
 from explorer.session import Session
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.look import drawn_look
-from explorer.viewer.look.camera import view_of
+from explorer.viewer.look.camera import LINK, view_of
+from explorer.viewer.shell.channel import PATH, ShellChannel
 from explorer.viewer.shell.timeline import BACK, PLAY_PAUSE, STEP
+from solver.scenes.scene import with_values
 from tests.explorer.beads import bead_scene
 from tests.explorer.test_session import wait_for
 from tests.explorer.viewer.page_session import page_of
@@ -29,10 +33,11 @@ from tests.explorer.viewer.page_session import page_of
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
     """A page in a thread of its own, and the session behind it; no one else uses that while the thread runs."""
-    server, session, stop = guarded_server("127.0.0.1", 0, "test"), Session(), threading.Event()
+    channel, session, stop = ShellChannel(), Session(), threading.Event()
+    server = guarded_server("127.0.0.1", 0, "test", channel=channel)
     session.start(bead_scene(), 1)
     data = tmp_path_factory.mktemp("data")
-    page = page_of(server, session, DiagnoseProcess(data / "diagnoses", None), data)
+    page = page_of(server, session, DiagnoseProcess(data / "diagnoses", None), data, channel)
     thread = threading.Thread(target=page.run, args=(stop,))
     thread.start()
     yield SimpleNamespace(server=server, page=page, look=page.panels["look"])
@@ -233,3 +238,69 @@ def test_shadows_are_switched_off_and_on(page, monkeypatch):
         page.page._actions.post(lambda shadows=shadows: settings.change(shadows=shadows))
         wait_for(lambda shadows=shadows: lit[-1:] == [shadows])
     assert lit == [False, True]
+
+
+def command(server, **asked):
+    """Send what the script around the page sends."""
+
+    async def send():
+        address = f"127.0.0.1:{server.get_port()}"
+        async with websockets.connect(f"ws://{address}{PATH}", origin=f"http://{address}") as channel:
+            await channel.send(json.dumps(asked))
+
+    asyncio.run(send())
+
+
+def stands(page, seed, moment, after=0):
+    """The frame of the pour with ``seed``, begun after generation ``after``, once it stands still at ``moment`` [s]."""
+
+    def still():
+        now, frame = status(page), page.look._drawn
+        there = (now.seed, now.state) == (seed, SessionState.PAUSED) and now.generation > after and now.time >= moment
+        return there and frame is not None and (frame.generation, frame.time) == (now.generation, now.time)
+
+    wait_for(still, 60.0)
+    return page.look._drawn
+
+
+def test_a_link_leads_back_to_the_same_scene_and_moment_bit_for_bit(page, browser):
+    post, session = page.page._actions.post, page.page._session
+    source = prepared_source("bouncing_beads")
+    scene = with_values(source.scene, {"pair.bead.bead.restitution": 0.77})
+    post(lambda: session.start(scene, 5, source))
+    post(lambda: session.run_to(0.1234))
+    there, moment = stands(page, 5, 0.1234), status(page).time
+    assert moment == pytest.approx(0.1234, abs=1e-3)
+    move_slider(page, browser, LINK, True)
+    handles = page.server.gui._gui_input_handle_from_uuid.values()
+    address = next(handle for handle in handles if handle._impl.props.label == "Address")
+    wait_for(lambda: "#" in address.value)
+    link, text = address.value.split("#")
+    assert "initialCameraPosition=" in link
+    assert len(address.value) < 400
+
+    post(lambda: session.start(source.scene, 6, source))
+    post(lambda: session.run_to(0.05))
+    stands(page, 6, 0.05)
+    other = status(page).generation
+    # A browser that comes with the link in its address sends nothing of it by itself.
+    again = Browser(page.server)
+    assert status(page).generation == other
+    again.leave()
+    command(page.server, do="pour_link", text=text)
+    back = stands(page, 5, moment, other)
+    assert status(page).scene == scene
+    assert status(page).time == moment
+    np.testing.assert_array_equal(back.position, there.position)
+    np.testing.assert_array_equal(back.quaternion, there.quaternion)
+
+
+@pytest.mark.parametrize("text", ["pour=/etc/passwd", "pour=mesh_funnel&set=rig.mesh%3D/etc/passwd", 7, "x" * 2001])
+def test_a_link_that_is_not_allowed_is_refused_in_a_line_and_pours_nothing(page, browser, text):
+    before = status(page).generation
+    command(page.server, do="pour_link", text=text)
+    wait_for(lambda: told(page).count("link: ") == 1 or page.page._notice.startswith("link: "))
+    assert status(page).generation == before
+    # So that the next refusal is seen to be one of its own.
+    page.page._actions.post(lambda: None)
+    wait_for(lambda: page.page._notice == "")

@@ -1,0 +1,43 @@
+"""A finished diagnosis in headless Chromium: the real answer of `examples/trefoil_2`, and its piles side by side."""
+
+import pytest
+
+from tests.browser.served import diagnosed, served
+from tests.browser.test_page import BEGUN, PATIENCE, SETTINGS, room, wait_for
+
+pytestmark = pytest.mark.browser
+
+NODES = "() => Object.keys(window.__viserSceneTree.getState())"
+
+
+@pytest.fixture(scope="module")
+def page(browser, tmp_path_factory):
+    """The room *Diagnose* of a person who has that diagnosis."""
+    data = tmp_path_factory.mktemp("data")
+    diagnosed(data)
+    with served("--store", data / "runs.sqlite", *SETTINGS, data=data, patience=30) as address:
+        page = browser.new_page(viewport={"width": 1280, "height": 1400})
+        page.set_default_timeout(PATIENCE)
+        page.add_init_script(BEGUN)
+        page.goto(address)
+        room(page, "Diagnose")
+        yield page
+        page.close()
+
+
+def test_the_board_names_the_effect_with_its_charts(page):
+    board = page.frame_locator('iframe[title="Diagnosis"]')
+    board.locator(".banner strong").wait_for()
+    assert "ROLLING RESISTANCE" in board.locator(".banner").inner_text().upper()
+    board.locator("figure .js-plotly-plot").first.wait_for()
+    assert "97 %" in board.locator("body").inner_text()
+    page.locator("#state-line").get_by_text("Trefoil pour 2").wait_for()
+
+
+def test_the_measured_pile_and_both_models_stand_side_by_side(page):
+    before = set(page.evaluate(NODES))
+    assert not any(name.startswith(("/measured", "/second/")) for name in before)
+    page.get_by_role("button", name="Show side by side", exact=True).filter(visible=True).first.click()
+    wait_for(lambda: "/measured" in page.evaluate(NODES))
+    wait_for(lambda: any(name.startswith("/second/") for name in page.evaluate(NODES)))
+    assert {"/names/calibrated model", "/names/corrected model"} <= set(page.evaluate(NODES))
