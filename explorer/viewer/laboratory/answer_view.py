@@ -22,6 +22,8 @@ from explorer.viewer.view import small_html
 
 TIED = re.compile(r"(?<=\d) (?=\S)")
 """The blank behind a number, which a narrow table must not break at."""
+LONGEST_ROW = 90
+"""Characters of a line in columns."""
 NO_CHARTS = "Charts come with an answer that has any."
 
 
@@ -94,12 +96,18 @@ def answer_html(answer: CommandResult, kept: str = "") -> str:
     """
     box = "padding:0.4em; margin:0.3em 0; background:rgba(128,150,170,0.14)"
     text = f"<pre style='{box}; overflow-x:auto; max-height:26em; white-space:pre; user-select:text'>"
-    text += f"{escape(answer.text)}</pre>"
+    text += "".join(map(_line_html, answer.text.splitlines())) + "</pre>"
     tables = "".join(_table_html(caption, rows) for caption, rows in answer.tables.items())
     return small_html(
         f"{tables or text}<p>{escape(answer.note)}</p>{escape(kept)} On the command line:"
         f"<code style='{box}; display:block; user-select:all; white-space:pre-wrap'>{escape(answer.command)}</code>"
     )
+
+
+def _line_html(line: str) -> str:
+    """A line of columns stays as it is; one that is too long for columns is a sentence, and goes on below."""
+    style = " style='white-space:pre-wrap; overflow-wrap:anywhere'" if len(line) > LONGEST_ROW else ""
+    return f"<div{style}>{escape(line) or '&nbsp;'}</div>"
 
 
 def _table_html(caption: str, rows: Rows) -> str:

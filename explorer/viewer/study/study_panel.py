@@ -217,8 +217,8 @@ def target_markdown(targets: Sequence[Target], photographed: PhotographedTarget 
     target = targets[0]
     spread = "" if target.sd is None else f" ± {observed(target.observable, target.sd)} ({target.sd_source})"
     number = "" if target.n is None else f", n = {target.n}"
-    of = f"{observed(target.observable, target.mean)}{spread}{number}, {observable_label(target.observable)}"
-    return f"**Target:** {escaped(of)}, as in the study's file; photographs can take its place (*Laboratory*)."
+    of = f"{observable_label(target.observable)}: {observed(target.observable, target.mean)}{spread}{number}"
+    return f"**Target:** {escaped(of)}. From the study's file; photographs can take its place (*Laboratory*)."
 
 
 def set_live(session: Session, values: Mapping[str, float | str]) -> None:

@@ -234,6 +234,11 @@ def test_the_tab_tells_what_is_done_and_what_was_refused(server, tmp_path):
 def test_a_command_line_is_selected_as_a_whole():
     html = answer_html(CommandResult("one & two", "explorer audit"))
     assert "one &amp; two" in html
+    assert "pre-wrap; overflow-wrap" not in html
+    # A line too long for columns is a sentence, and is not cut.
+    assert "<div style='white-space:pre-wrap; overflow-wrap" in answer_html(
+        CommandResult("word " * 30, "explorer audit")
+    )
     assert "user-select:all" in html
     rows = (("height", "40.0 mm (95 % 39 … 41 mm)"), ("<b>", "&"))
     html = answer_html(CommandResult("", "explorer measure", tables={"a <b>.png": rows}, note="both > 0"))

@@ -147,7 +147,7 @@ def test_more_piles_are_added_and_the_target_removed(server, folder):
     assert page.press(page.photograph._remove) == ""
     assert not (folder / FOLDER).exists()
     assert (page.measured["state"], page.disabled) == ("assumed", [False, True, True])
-    assert "as in the study's file" in page.calibrate._target.content
+    assert "From the study's file" in page.calibrate._target.content
 
 
 def test_what_shows_no_pile_is_refused_in_a_line(server, folder):
