@@ -69,9 +69,9 @@ def compression_bias() -> BiasTable:
         title="a sphere between rigid plates: E = (F/A)/(ΔL/T) against the E of its material, by Hertz",
         columns=("strain", "poisson_ratio", "ratio"),
         rows=tuple((strain, ratio, compression_ratio(strain, ratio)) for strain in STRAINS for ratio in POISSON_RATIOS),
-        statement="no constant of the material: the ratio falls with the root of the strain. A is the area of one contact "
-        "under load, π R δ; with the sphere's cross-section before the test, π R², the ratio is δ/R times that and grows "
-        f"with the root: {least:.2g} at strain {STRAINS[0]:g}, {most:.2g} at {STRAINS[-1]:g} for ν = "
+        statement="no constant of the material: the ratio falls with the root of the strain. A is the area of one "
+        "contact under load, π R δ; with the sphere's cross-section before the test, π R², the ratio is δ/R times that "
+        f"and grows with the root: {least:.2g} at strain {STRAINS[0]:g}, {most:.2g} at {STRAINS[-1]:g} for ν = "
         f"{POISSON_RATIOS[1]:g}. A block with flat faces that the plates cover has ratio 1",
     )
 

@@ -13,7 +13,7 @@ from scipy import stats
 
 from doe.errors import StatisticsError
 from doe.laboratory.hertz import HertzRange, hertz_range
-from doe.laboratory.linear_range import FEWEST_POINTS, LEAST_SPAN, Array, LinearRange, relative_noise, way_up
+from doe.laboratory.linear_range import FEWEST_POINTS, Array, LinearRange, relative_noise, way_up
 from doe.laboratory.result import CurveFit
 
 HERTZIAN = (
@@ -21,6 +21,8 @@ HERTZIAN = (
     "falls with the depth of pressing (--bias)"
 )
 NEEDS_RADIUS = "the columns radius_mm, poisson_ratio and contacts give E by Hertz, from the part before yield"
+LEAST_SHARE = 0.1
+"""Of the largest force, below which a bend at the beginning is a toe, whatever its exponent."""
 LONG_TOE = 0.2
 """Of the displacement up to the end of the part that counts."""
 NOISY = 0.02
@@ -39,22 +41,22 @@ def caveats(test: str, component: str, replicates: Sequence[str], curves: Sequen
 
 
 def _of_lines(test: str, component: str, curves: Sequence[tuple[CurveFit, LinearRange]]) -> list[str]:
-    """Whether there is a curved contact, all the way or below the straight part."""
+    """Whether most show a curved contact, all the way or below the straight part."""
     if sum(fit.hertzian for _, fit in curves) > len(curves) / 2:
         return [f"{HERTZIAN}; {NEEDS_RADIUS}" if test == "compression" else HERTZIAN]
     below = [(one, part) for one, fit in curves if test == "compression" and (part := _hertz_below(one, fit))]
-    if not below:
+    if len(below) <= len(curves) / 2:
         return []
-    which, n = _which(one for one, _ in below), _range([part.exponent for _, part in below])
+    n, force = _range([part.exponent for _, part in below]), _range([part.last_force for _, part in below])
     return [
-        f"{component}: below the straight part of {which} F ∝ δ^n with n = {n}, up to "
-        f"{_range([part.last_force for _, part in below])} N: a curved contact, whose slope after yield is no constant of "
-        f"the material; {NEEDS_RADIUS}"
+        f"{component}: below the straight part F ∝ δ^n with n = {n}, up to {force} N in "
+        f"{_which(one for one, _ in below)}: a curved contact, whose slope after yield is no constant of the material; "
+        f"{NEEDS_RADIUS}"
     ]
 
 
 def _hertz_below(curve: CurveFit, fit: LinearRange) -> HertzRange | None:
-    """The part below the straight one, where that follows Hertz over much of the force, and no line would do."""
+    """The part below the straight one, if it follows Hertz's law up to ``LEAST_SHARE``, and a line would not do."""
     x, f = _way_up(curve)
     below = x < fit.first_displacement
     if below.sum() < FEWEST_POINTS:
@@ -63,7 +65,7 @@ def _hertz_below(curve: CurveFit, fit: LinearRange) -> HertzRange | None:
         found = hertz_range(x[below], f[below])
     except StatisticsError:
         return None
-    return found if found.hertzian and found.resolved and found.last_force >= LEAST_SPAN * f.max() else None
+    return found if found.hertzian and found.resolved and found.last_force >= LEAST_SHARE * f.max() else None
 
 
 def _of_law(component: str, curves: Sequence[tuple[CurveFit, HertzRange]]) -> list[str]:

@@ -40,7 +40,6 @@ from doe.errors import StatisticsError
 from doe.laboratory.linear_range import (
     FEWEST_POINTS,
     LEAST_SPAN,
-    MOST_POINTS,
     NOISE_FACTOR,
     PARTS,
     STRAIGHTNESS,
@@ -58,6 +57,10 @@ EXPONENT_MISS = 0.05
 """… and how far from it the interval of a fitted one may end: a bend of noise alone, or a tolerance of the rule."""
 RESOLVED = 0.25
 """Half-width of the exponent's interval up to which it tells Hertz's contact from flat faces."""
+SEARCHED = 100
+"""Points of the curve for the search; more are averaged in neighbouring groups."""
+LEAST, MOST = 0.2, 8.0
+"""Exponents that are tried."""
 EXACT, S368 = 3.0 / (2.0 * math.sqrt(2.0) * math.pi), 0.338
 """The constant of the law, and as the standard rounds it."""
 DRAWN = 40
@@ -144,7 +147,7 @@ def hertz_range(displacement: npt.ArrayLike, force: npt.ArrayLike) -> HertzRange
     peak, length = float(f.max()), float(x[-1] - x[0])
     if peak <= 0.0:
         raise StatisticsError("no force above zero; allowed: compression counted positive")
-    u, g = averaged((x - x[0]) / length, f / peak, MOST_POINTS)
+    u, g = averaged((x - x[0]) / length, f / peak, SEARCHED)
     end = next((end for end in range(u.size, FEWEST_POINTS - 1, -1) if _holds(u[:end], g[:end])), 0)
     yielded = 0 < end < u.size
     v, h = (x - x[0]) / length, f / peak
@@ -214,10 +217,10 @@ def _fitted(u: Array, g: Array, start: _Law | None = None) -> _Law:
         start = _Law(slope**HERTZ, -float(level) / slope, HERTZ)
 
     def law(at: Array) -> _Law:
-        return _Law(float(at[0]), float(at[1]), float(at[2]) if free else HERTZ)
+        return _Law(float(at[0]), float(at[1]), min(max(float(at[2]), LEAST), MOST) if free else HERTZ)
 
     def slopes(at: Array) -> Array:
-        k, origin, n = at[0], at[1], at[2] if free else HERTZ
+        k, origin, n = law(at).stiffness, law(at).origin, law(at).exponent
         over = np.maximum(u - origin, 1e-12)
         touching = u > origin
         columns = [over**n, -k * n * over ** (n - 1.0)] + ([k * over**n * np.log(over)] if free else [])
