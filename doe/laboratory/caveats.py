@@ -47,7 +47,7 @@ def _of_lines(test: str, component: str, curves: Sequence[tuple[CurveFit, Linear
     below = [(one, part) for one, fit in curves if test == "compression" and (part := _hertz_below(one, fit))]
     if len(below) <= len(curves) / 2:
         return []
-    n, force = _range([part.exponent for _, part in below]), _range([part.last_force for _, part in below])
+    n, force = _range([part.exponent for _, part in below], ".2f"), _range([part.last_force for _, part in below])
     return [
         f"{component}: below the straight part F ∝ δ^n with n = {n}, up to {force} N in "
         f"{_which(one for one, _ in below)}: a curved contact, whose slope after yield is no constant of the material; "
@@ -78,7 +78,7 @@ def _of_law(component: str, curves: Sequence[tuple[CurveFit, HertzRange]]) -> li
         those = [(one, fit) for one, fit in curves if fit.hertzian == hertzian]
         if those:
             low, high = min(fit.exponent_low for _, fit in those), max(fit.exponent_high for _, fit in those)
-            n = f"n = {_range([fit.exponent for _, fit in those])} (95 % {low:.3g} … {high:.3g})"
+            n = f"n = {_range([fit.exponent for _, fit in those], '.2f')} (95 % {low:.2f} … {high:.2f})"
             found.append(f"{component}: F ∝ δ^n with {n} in {_which(one for one, _ in those)} {said}")
     vague = [one for one, fit in curves if fit.hertzian and not fit.resolved]
     if vague:
@@ -141,6 +141,6 @@ def _which(curves: Iterable[CurveFit]) -> str:
     return f"replicate{'s' * (len(names) > 1)} {', '.join(names)}"
 
 
-def _range(values: Sequence[float]) -> str:
-    """The smallest and largest to three digits, once where they agree."""
-    return " … ".join(dict.fromkeys(f"{value:.3g}" for value in (min(values), max(values))))
+def _range(values: Sequence[float], digits: str = ".3g") -> str:
+    """The smallest and the largest, once where they agree."""
+    return " … ".join(dict.fromkeys(f"{value:{digits}}" for value in (min(values), max(values))))

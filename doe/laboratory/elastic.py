@@ -61,7 +61,7 @@ def moduli(table: Table, test: str) -> tuple[tuple[Derived, ...], tuple[CurveFit
         parameter, used = f"materials.{of[0]}.{name}", BY_HERTZ if by_standard else formula
         found.append(derived(table, name, "Pa", of, used, names, values, parameter, notes))
         if by_standard:
-            found.append(derived(table, f"{name}_asae_s368", "Pa", of, BY_S368, names, by_standard))
+            found.append(derived(table, f"{name}_asae_s368", "Pa", of, BY_S368, names, by_standard, "", notes))
         curves += own
     return tuple(found), tuple(curves)
 
