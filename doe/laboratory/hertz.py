@@ -59,8 +59,8 @@ RESOLVED = 0.25
 """Half-width of the exponent's interval up to which it tells Hertz's contact from flat faces."""
 SEARCHED = 100
 """Points of the curve for the search; more are averaged in neighbouring groups."""
-LEAST, MOST = 0.2, 8.0
-"""Exponents that are tried."""
+EXPONENTS = (0.2, 8.0)
+"""Between which a free one is sought."""
 EXACT, S368 = 3.0 / (2.0 * math.sqrt(2.0) * math.pi), 0.338
 """The constant of the law, and as the standard rounds it."""
 DRAWN = 40
@@ -156,6 +156,8 @@ def hertz_range(displacement: npt.ArrayLike, force: npt.ArrayLike) -> HertzRange
         used = v <= contact + (1.0 - TRIMMED) * (u[end - 1] - contact)
         v, h = (v[used], h[used]) if used.sum() >= FEWEST_POINTS else (u[:end], g[:end])
     law = _fitted(v, h)
+    if not (law.stiffness > 0.0 and law.origin < v[-1] and h[-1] > 0.0):
+        raise StatisticsError("no contact: the force does not rise from zero on")
     free = _fitted(v, h, law)
     half = float(stats.t.ppf(0.975, v.size - 3)) * free.exponent_error
     scale = peak / length**HERTZ
@@ -194,7 +196,7 @@ class _Law:
 
 
 def _holds(u: Array, g: Array) -> bool:
-    """Whether a window is high enough, and the law with Hertz's exponent misses none of its fifths beyond noise."""
+    """Whether a window is high enough, and Hertz's law misses none of its fifths by more than noise does."""
     if g.max() < LEAST_SPAN:
         return False
     rest, noise = g - _fitted(u, g).force(u), noise_of(u, g)
@@ -217,7 +219,7 @@ def _fitted(u: Array, g: Array, start: _Law | None = None) -> _Law:
         start = _Law(slope**HERTZ, -float(level) / slope, HERTZ)
 
     def law(at: Array) -> _Law:
-        return _Law(float(at[0]), float(at[1]), min(max(float(at[2]), LEAST), MOST) if free else HERTZ)
+        return _Law(float(at[0]), float(at[1]), float(np.clip(at[2], *EXPONENTS)) if free else HERTZ)
 
     def slopes(at: Array) -> Array:
         k, origin, n = law(at).stiffness, law(at).origin, law(at).exponent

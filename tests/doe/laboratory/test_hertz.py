@@ -118,6 +118,7 @@ def test_noise_that_hides_the_exponent_is_not_taken_for_an_answer():
     [
         (np.linspace(0, 1, 5), np.linspace(0, 1, 5), "5 points"),
         (np.linspace(0, 1, 20), np.linspace(-2, -1, 20), "no force above zero"),
+        (np.linspace(0, 1, 20), np.r_[-3.0, -np.ones(18), 1e-3], "no contact"),
     ],
 )
 def test_what_is_no_curve_is_refused(x, force, word):
