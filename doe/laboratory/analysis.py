@@ -65,7 +65,7 @@ def _dimensions(table: Table) -> LabResult:
 
 
 TESTS: dict[str, BenchTest] = {
-    "compression": BenchTest(tables.FORCE_DISPLACEMENT, _compression),
+    "compression": BenchTest(tables.COMPRESSION, _compression),
     "shear": BenchTest(tables.FORCE_DISPLACEMENT, _shear),
     "inclined_plane": BenchTest(tables.INCLINED_PLANE, _inclined_plane),
     "drop": BenchTest(tables.DROP, _drop),

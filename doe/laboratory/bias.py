@@ -2,7 +2,7 @@
 
     drop          L/(2H) of a rigid sphere against its e, over friction (``contact.py``)
     compression   Equation (1) on a sphere between rigid plates, A = π R δ the area of the contact, ΔL = 2 δ, T = 2 R:
-                  E_app/E = 4/(3 π (1 − ν²) √(δ/R))
+                  E_app/E = 4/(3 π (1 − ν²) √(δ/R));  with the sphere's cross-section A = π R², δ/R times that
     shear         Equation (2) there, on the contact that is sheared with no slip, ΔL twice its slip:
                   G_app/G = 8/(π (2 − ν) √(δ/R))
 
@@ -64,12 +64,15 @@ def drop_bias() -> BiasTable:
 
 def compression_bias() -> BiasTable:
     """Equation (1) over strain and ν."""
+    least, most = (strain * compression_ratio(strain, POISSON_RATIOS[1]) for strain in (STRAINS[0], STRAINS[-1]))
     return BiasTable(
         title="a sphere between rigid plates: E = (F/A)/(ΔL/T) against the E of its material, by Hertz",
         columns=("strain", "poisson_ratio", "ratio"),
         rows=tuple((strain, ratio, compression_ratio(strain, ratio)) for strain in STRAINS for ratio in POISSON_RATIOS),
-        statement="no constant of the material: the ratio falls with the root of the strain. A block with flat faces "
-        "that the plates cover has ratio 1",
+        statement="no constant of the material: the ratio falls with the root of the strain. A is the area of one "
+        "contact under load, π R δ; with the sphere's cross-section before the test, π R², the ratio is δ/R times that "
+        f"and grows with the root: {least:.2g} at strain {STRAINS[0]:g}, {most:.2g} at {STRAINS[-1]:g} for ν = "
+        f"{POISSON_RATIOS[1]:g}. A block with flat faces that the plates cover has ratio 1",
     )
 
 
@@ -79,7 +82,8 @@ def shear_bias() -> BiasTable:
         title="a sphere between rigid plates, sheared: G = (F/A)/(ΔL/T) against the G of its material, by Mindlin",
         columns=("strain", "poisson_ratio", "ratio"),
         rows=tuple((strain, ratio, shear_ratio(strain, ratio)) for strain in STRAINS for ratio in POISSON_RATIOS),
-        statement="strain is that of the squeezing before; the ratio falls with its root",
+        statement="A is the area of one contact under load, π R δ, not the sphere's cross-section; strain is that of "
+        "the squeezing before; the ratio falls with its root",
     )
 
 

@@ -63,6 +63,11 @@ class LinearRange(Record):
     noise: float
     hertzian: bool
 
+    @property
+    def drawn(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """The line from zero force to its last point, displacement [m] and force [N]."""
+        return (self.origin, self.first_displacement, self.last_displacement), (0.0, self.first_force, self.last_force)
+
 
 def linear_range(displacement: npt.ArrayLike, force: npt.ArrayLike) -> LinearRange:
     """The straight part of a curve [m], [N] in the order of time; StatisticsError where there is none."""
@@ -108,13 +113,21 @@ def averaged(x: Array, f: Array, most: int) -> tuple[Array, Array]:
 
 def noise_of(x: Array, f: Array) -> float:
     """Standard deviation of a point, from its distance to the chord between its neighbours; unit of ``f``."""
-    if x.size < 3:
-        return 0.0
+    # The median of |z| of a normal z is 0.6745.
+    return float(np.median(_off_chord(x, f))) / 0.6745 if x.size > 2 else 0.0
+
+
+def relative_noise(x: Array, f: Array) -> float:
+    """Standard deviation of a point over its force, of the points above a tenth of the largest force."""
+    strong = f[1:-1] > 0.1 * f.max()
+    return float(np.median(_off_chord(x, f)[strong] / f[1:-1][strong])) / 0.6745 if strong.any() else 0.0
+
+
+def _off_chord(x: Array, f: Array) -> Array:
+    """|z| of every inner point: its distance to the chord between its neighbours, scaled to that of one point."""
     weight = (x[1:-1] - x[:-2]) / (x[2:] - x[:-2])
     distance = f[1:-1] - (1.0 - weight) * f[:-2] - weight * f[2:]
-    scaled = np.abs(distance) / np.sqrt(1.0 + weight**2 + (1.0 - weight) ** 2)
-    # The median of |z| of a normal z is 0.6745.
-    return float(np.median(scaled)) / 0.6745
+    return np.asarray(np.abs(distance) / np.sqrt(1.0 + weight**2 + (1.0 - weight) ** 2))
 
 
 def widest_straight_window(x: Array, f: Array) -> tuple[int, int] | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from doe.laboratory.hertz import HertzRange
 from doe.laboratory.linear_range import LinearRange
 from doe.laboratory.replicates import ReplicateSummary, summarise
 from doe.laboratory.tables import Reading, Table
@@ -54,14 +55,14 @@ class Estimate(Record):
 
 @dataclass(frozen=True)
 class CurveFit(Record):
-    """One force–displacement curve [m, N], where it was taken as straight, and the modulus [Pa] that follows."""
+    """One force–displacement curve [m, N], the part that counts, straight or Hertzian, and its modulus [Pa]."""
 
     quantity: str
     of: tuple[str, ...]
     replicate: str
     displacement: tuple[float, ...]
     force: tuple[float, ...]
-    fit: LinearRange
+    fit: LinearRange | HertzRange
     modulus: float
 
 

@@ -23,6 +23,8 @@ MASS = {"kg": 1.0, "g": 1e-3, "mg": 1e-6}
 ANGLE = {"deg": math.pi / 180.0, "rad": 1.0}
 SPEED = {"m_s": 1.0, "cm_s": 1e-2, "mm_s": 1e-3}
 DENSITY = {"kg_m3": 1.0, "g_cm3": 1e3}
+NUMBER = {"": 1.0}
+"""Of a column whose name is its stem alone."""
 COMPONENT = ("component",)
 PAIR = ("a", "b")
 MOST_BYTES = 50_000_000
@@ -53,11 +55,11 @@ class Column:
     @property
     def names(self) -> tuple[str, ...]:
         """The names that it may have in a file."""
-        return tuple(f"{self.stem}_{unit}" for unit in self.units)
+        return tuple(f"{self.stem}_{unit}".rstrip("_") for unit in self.units)
 
     def factor(self, name: str) -> float:
         """Factor to SI of the column ``name``."""
-        return self.units[name.removeprefix(f"{self.stem}_")]
+        return self.units[name.removeprefix(self.stem).removeprefix("_")]
 
     def allowed(self, value: float) -> bool:
         """True if ``value`` [SI] may stand in this column."""
@@ -65,11 +67,11 @@ class Column:
 
     def range_text(self, name: str) -> str:
         """What may stand in the column ``name``, in its own unit."""
-        unit = name.removeprefix(f"{self.stem}_").replace("_", "/")
+        unit = name.removeprefix(self.stem).removeprefix("_").replace("_", "/")
         low, high = self.low / self.factor(name), self.high / self.factor(name)
         bounds = [f"above {low:g}"] * math.isfinite(low) + [f"below {high:g}"] * math.isfinite(high)
         number = "a number " + " and ".join(bounds) if bounds else "a finite number"
-        return f"{number} {unit}" if bounds else f"{number} in {unit}"
+        return f"{number} {unit}".rstrip() if bounds else f"{number} in {unit}"
 
 
 @dataclass(frozen=True)
@@ -140,9 +142,9 @@ def read_table(path: Path, layout: Layout) -> Table:
     return table
 
 
-def positive(stem: str, units: dict[str, float], needed: bool = True) -> Column:
+def positive(stem: str, units: dict[str, float], needed: bool = True, blank: bool = False) -> Column:
     """A column of numbers above zero."""
-    return Column(stem, units, low=0.0, needed=needed)
+    return Column(stem, units, low=0.0, needed=needed, blank=blank)
 
 
 FORCE_DISPLACEMENT = Layout(
@@ -152,6 +154,20 @@ FORCE_DISPLACEMENT = Layout(
         positive("area", AREA),
         Column("displacement", LENGTH),
         Column("force", FORCE),
+    ),
+    curves=True,
+)
+COMPRESSION = Layout(
+    COMPONENT,
+    (
+        positive("thickness", LENGTH, needed=False, blank=True),
+        positive("area", AREA, needed=False, blank=True),
+        Column("displacement", LENGTH),
+        Column("force", FORCE),
+        positive("radius", LENGTH, needed=False, blank=True),
+        positive("radius_2", LENGTH, needed=False, blank=True),
+        Column("poisson_ratio", NUMBER, low=0.0, high=0.5, zero=True, needed=False, blank=True),
+        Column("contacts", NUMBER, low=0.0, high=3.0, needed=False, blank=True),
     ),
     curves=True,
 )

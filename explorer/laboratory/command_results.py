@@ -47,7 +47,7 @@ from solver import Scene, read_toml, with_values
 from solver.assets import asset_path, photograph_scales
 from solver.photograph import open_picture
 
-STRAIGHT = "Points of every replicate; the line is the part taken as straight, drawn on to zero force."
+PART = "Points of every replicate; the line is the part that the modulus is taken from, drawn on to zero force."
 ON_THE_SOLVER = "What the solver's own instrument read in the course of the test."
 PLOT = "beside.png"
 """File of the photograph beside the pour."""
@@ -102,7 +102,7 @@ def example_rulers() -> dict[str, Ruler]:
 def bench_result(order: LabOrder) -> CommandResult:
     """`explorer lab`: readings → parameters."""
     result = analysed(order)
-    plots: Plots = {title: Plot(partial(dict, spec), STRAIGHT) for title, spec in curve_charts(result).items()}
+    plots: Plots = {title: Plot(partial(dict, spec), PART) for title, spec in curve_charts(result).items()}
     part = part_file(result, part_table(result)).encode()
     return CommandResult(
         lab_text(result), shlex.join(["explorer", *lab_words(order)]), plots, {f"{order.test}.toml": part}

@@ -52,7 +52,7 @@ class PartFile(TomlTable):
     body: list[PartBody] = Field(default_factory=list)
     """Names, each with a mass_fraction, or with size_distribution and size_spread."""
     measured: dict[str, Any] = Field(default_factory=dict)
-    """The origin of the same numbers: value, unit, n, sd, low_95, high_95, formula, source, sha256."""
+    """The origin of the same numbers: value, unit, n, sd, low_95, high_95, formula, notes, source, sha256."""
 
 
 def part_table(result: LabResult) -> Table:
@@ -235,12 +235,17 @@ def _keep(table: Table, keys: Sequence[str], entries: Mapping[str, Any], root: s
 def _of_derived(one: Derived) -> Table:
     s = one.summary
     numbers = {"value": s.mean, "unit": one.unit, "n": s.n, "sd": s.sd, "low_95": s.low, "high_95": s.high}
-    return _finite(numbers) | {"formula": one.formula} | _origin((one.file,))
+    return _finite(numbers) | _said(one) | _origin((one.file,))
 
 
 def _of_estimate(one: Estimate) -> Table:
     numbers = {"value": one.value, "unit": one.unit, "low_95": one.low, "high_95": one.high}
-    return _finite(numbers) | {"formula": one.formula} | _origin(one.files)
+    return _finite(numbers) | _said(one) | _origin(one.files)
+
+
+def _said(one: Derived | Estimate) -> Table:
+    """The formula, and what speaks against its value."""
+    return {"formula": one.formula} | ({"notes": list(one.notes)} if one.notes else {})
 
 
 def _origin(files: Sequence[str]) -> Table:

@@ -170,7 +170,8 @@ def _compression_bias(found: BenchResult, scene: Scene, of: tuple[str, ...]) -> 
         title=f"{found.body} between plates of {found.wall}: E by Equation (1) over the E of its material",
         columns=("strain", "ratio", "simulated"),
         rows=tuple(rows),
-        statement=f"ν = {material.poisson_ratio:g}; the closed form takes the plates as rigid",
+        statement=f"A is the area of one contact under load, π R δ, not the body's cross-section; ν = "
+        f"{material.poisson_ratio:g}; the closed form takes the plates as rigid",
     )
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from doe.laboratory import CurveFit, Derived, LabResult
+from doe.laboratory.linear_range import LinearRange
 from doe.laboratory.result import CONDITIONS
 from doe.provenance import About
 from explorer.errors import CommandError
@@ -51,7 +52,8 @@ def bench_report(result: LabResult, about: About) -> Report:
         curves = [one for one in result.curves if _group(one) == title]
         points = sum(len(one.force) for one in curves)
         words = title.replace("_", " ")
-        caption = f"{words}: n = {len(curves)} replicates, {points} points. Line: the part taken as straight."
+        part = "the part taken as straight" if _straight(curves[0]) else "Hertz’s law, up to yield"
+        caption = f"{words}: n = {len(curves)} replicates, {points} points. Line: {part}."
         figures.append(Figure(f"curves-{k}", spec, caption))
     if figures:
         sections.append(Section("Curves", tuple(figures)))
@@ -152,7 +154,7 @@ def _group(curve: CurveFit) -> str:
 
 
 def force_displacement(curves: list[CurveFit], title: str) -> Spec:
-    """Points of every replicate and, over them, its straight part, drawn on to zero force."""
+    """Points of every replicate and, over them, the part that counts, straight or Hertzian, drawn on to zero force."""
     traces: list[Json] = []
     for curve in curves:
         first = curve is curves[0]
@@ -169,14 +171,14 @@ def force_displacement(curves: list[CurveFit], title: str) -> Spec:
                 "hovertemplate": f"replicate {label(curve.replicate)}: %{{x:.4g}} mm, %{{y:.4g}} N<extra></extra>",
             }
         )
-        fit = curve.fit
+        x, force = curve.fit.drawn
         traces.append(
             {
                 "type": "scatter",
                 "mode": "lines",
-                "x": [1e3 * x for x in (fit.origin, fit.first_displacement, fit.last_displacement)],
-                "y": [0.0, fit.first_force, fit.last_force],
-                "name": "straight part, on to zero force",
+                "x": [1e3 * at for at in x],
+                "y": list(force),
+                "name": f"{'straight' if _straight(curve) else 'Hertzian'} part, on to zero force",
                 "legendgroup": "straight",
                 "showlegend": first,
                 "line": {"color": CHOSEN, "width": 2},
@@ -190,6 +192,10 @@ def force_displacement(curves: list[CurveFit], title: str) -> Spec:
         "margin": {"l": 60, "r": 24, "t": 80, "b": 52},
     }
     return chart(traces, layout, PANEL_HEIGHT)
+
+
+def _straight(curve: CurveFit) -> bool:
+    return isinstance(curve.fit, LinearRange)
 
 
 def bench_charts(data: dict[str, Any]) -> dict[str, Spec]:

@@ -8,6 +8,8 @@ from typing import Any
 
 from doe.laboratory import Derived, Estimate, LabResult
 from doe.laboratory.bias import BiasTable
+from doe.laboratory.hertz import HertzRange
+from doe.laboratory.linear_range import LinearRange
 from doe.laboratory.result import CONDITIONS
 from explorer.laboratory.twin_row import CLOSES, TwinRow
 from explorer.tables.text_table import text_table
@@ -33,8 +35,7 @@ def lab_text(result: LabResult) -> str:
     parts = [f"{result.test}: {result.file}", _derived_table(result.derived)]
     if result.estimates:
         parts.append(_estimate_table(result.estimates))
-    if result.curves:
-        parts.append(_curve_table(result))
+    parts += [table for table in (_straight_table(result), _hertz_table(result)) if table]
     notes = [f"{_name(one.of)} {one.name}: {text}" for one in result.derived for text in _remarks(one)]
     notes += [f"{_name(one.of)} {one.name}: {text}" for one in result.estimates for text in one.notes]
     notes += [*dict.fromkeys(note for one in result.derived for note in one.notes), *result.notes]
@@ -103,25 +104,51 @@ def _estimate_table(estimates: Sequence[Estimate]) -> str:
     return text_table(("of", "quantity", "value", "SE", "95 %", "unit", "formula"), rows)
 
 
-def _curve_table(result: LabResult) -> str:
+def _straight_table(result: LabResult) -> str:
     rows = [
         (
             _name(curve.of),
             curve.quantity,
             curve.replicate,
-            f"{1e3 * curve.fit.first_displacement:.4g} … {1e3 * curve.fit.last_displacement:.4g}",
-            f"{curve.fit.first_force:.4g} … {curve.fit.last_force:.4g}",
-            f"{1e3 * curve.fit.origin:.3g}",
-            str(curve.fit.points),
-            f"{100.0 * curve.fit.share:.0f}",
-            f"{curve.fit.r_squared:.5f}",
+            f"{1e3 * fit.first_displacement:.4g} … {1e3 * fit.last_displacement:.4g}",
+            f"{fit.first_force:.4g} … {fit.last_force:.4g}",
+            f"{1e3 * fit.origin:.3g}",
+            str(fit.points),
+            f"{100.0 * fit.share:.0f}",
+            f"{fit.r_squared:.5f}",
             f"{1e-6 * curve.modulus:.5g}",
         )
         for curve in result.curves
+        if isinstance(fit := curve.fit, LinearRange)
     ]
     head = ("straight part of", "for", "replicate", "from … to [mm]", "from … to [N]", "toe [mm]", "points",
             "% of peak", "R²", "modulus [MPa]")  # fmt: skip
-    return text_table(head, rows)
+    return text_table(head, rows) if rows else ""
+
+
+def _hertz_table(result: LabResult) -> str:
+    rows = [
+        (
+            _name(curve.of),
+            curve.quantity,
+            curve.replicate,
+            f"{1e3 * fit.origin:.3g}",
+            f"{1e3 * fit.last_displacement:.4g}",
+            f"{fit.last_force:.4g}",
+            str(fit.points),
+            f"{100.0 * fit.share:.0f}",
+            f"{fit.exponent:.3f} ({fit.exponent_low:.3f} … {fit.exponent_high:.3f})",
+            "none"
+            if math.isnan(fit.yield_force)
+            else f"{1e3 * fit.yield_displacement:.4g} mm, {fit.yield_force:.4g} N",
+            f"{1e-6 * curve.modulus:.5g}",
+        )
+        for curve in result.curves
+        if isinstance(fit := curve.fit, HertzRange)
+    ]
+    head = ("Hertz's law of", "for", "replicate", "toe [mm]", "up to [mm]", "up to [N]", "points", "% of peak",
+            "exponent (95 %)", "yield", "modulus [MPa]")  # fmt: skip
+    return text_table(head, rows) if rows else ""
 
 
 def _remarks(one: Derived) -> list[str]:

@@ -56,6 +56,53 @@ def test_the_bias_needs_no_readings():
     assert "0.5456" in both
 
 
+def curved(tmp_path, power=1.5):
+    """Readings of a sphere, R 5 mm, ν 0.3, between two plates: F = 115.834 δ^1.5 (N, mm) is 100 MPa."""
+    path = tmp_path / "curved.csv"
+    rows = [f"seed,{k},5,0.3,2,{0.004 * i:.3f},{115.834 * (0.004 * i) ** power:.5f}" for k in (1, 2) for i in range(51)]
+    path.write_text("component,replicate,radius_mm,poisson_ratio,contacts,displacement_mm,force_N\n" + "\n".join(rows))
+    return path
+
+
+def test_a_curved_body_is_told_by_hertz_and_by_the_standard(tmp_path):
+    shown = explorer("lab", "compression", curved(tmp_path)).stdout
+    (by_hertz,) = [line for line in shown.splitlines() if line.startswith("seed  youngs_modulus   ")]
+    assert " 100 " in by_hertz
+    (by_standard,) = [line for line in shown.splitlines() if line.startswith("seed  youngs_modulus_asae_s368 ")]
+    assert " 100.1 " in by_standard
+    assert "Hertz's law of" in shown
+    assert "1.500 (1.500 … 1.500)  none" in shown
+    assert "straight part of" not in shown
+    (curve, _) = json.loads(explorer("lab", "compression", curved(tmp_path), "--json").stdout)["curves"]
+    assert curve["fit"]["exponent"] == pytest.approx(1.5, abs=1e-3)
+    assert curve["fit"]["yield_force"] is None
+
+
+def test_what_speaks_against_a_modulus_goes_with_it_everywhere(tmp_path):
+    """A curve that is no Hertz's: text, JSON, report, part, and the material that is made with the part."""
+    path, said = curved(tmp_path, power=1.0), "is not Hertz's 1.5"
+    part, report = tmp_path / "part.toml", tmp_path / "report"
+    shown = explorer("lab", "compression", path, "--out", part, "--report", report)
+    assert shown.exit_code == 0, shown.output
+    assert said in shown.stdout
+    assert said in json.loads(explorer("lab", "compression", path, "--json").stdout)["derived"][0]["notes"][0]
+    assert "is not Hertz’s 1.5" in (report / "report.md").read_text().replace("'", "’")
+    assert said in tomllib.loads(part.read_text())["measured"]["materials"]["seed"]["youngs_modulus"]["notes"][0]
+    made = explorer("new", "material", "own", "--like", "sunflower_extract", "--part", part, "--out", tmp_path)
+    assert made.exit_code == 0, made.output
+    measured = tomllib.loads((tmp_path / "own.toml").read_text())["measured"]
+    assert said in measured["materials"]["seed"]["youngs_modulus"]["notes"][0]
+
+
+def test_the_bias_of_compression_says_which_area_it_takes():
+    """4/(3π(1 − ν²)√s) by the contact's area, s times that by the sphere's cross-section: 0.081 at s = 0.03."""
+    shown = explorer("lab", "compression", "--bias").stdout
+    assert "A is the area of one contact under load, π R δ" in shown
+    assert "cross-section before the test, π R²" in shown
+    assert "0.081 at 0.03" in shown
+    assert "π R δ, not the sphere's cross-section" in explorer("lab", "shear", "--bias").stdout
+
+
 def test_from_readings_to_a_material(tmp_path):
     """Parts of six tests over the shipped material: its own numbers, with their origin, and no fraction assumed."""
     orders = {
@@ -116,6 +163,14 @@ def test_a_part_of_another_material_makes_no_file(tmp_path):
     assert not (tmp_path / "lentil.toml").exists()
     assert "exists" in refused(explorer("new", "material", "part", "--part", part, "--out", tmp_path))
     assert "new material" in refused(explorer("new", "study", "lentil", "--part", part, "--out", tmp_path))
+
+
+def test_the_figure_of_a_curved_body_draws_the_law(tmp_path):
+    path = tmp_path / "law.html"
+    assert explorer("lab", "compression", curved(tmp_path), "--plot", path).exit_code == 0
+    page = path.read_text()
+    assert "Hertzian part, on to zero force" in page
+    assert "straight part" not in page
 
 
 def test_the_figure_holds_every_replicate_and_escapes_names(tmp_path):
