@@ -43,7 +43,7 @@ class SurfaceAnova(Record):
 
     rows: model, every term, residual, lack of fit, pure error, total. sigma = sqrt(MSE), unit of the
     response. studentized_residuals: external, shape (runs,). better_than_noise: model p < 0.05 and predicted
-    R^2 > 0.
+    R^2 > 0; by p alone where a run is indispensable to the fit, for then no R^2 can be predicted (NaN).
     """
 
     rows: tuple[AnovaRow, ...]
@@ -92,8 +92,9 @@ def analyse_surface(surface: Surface) -> SurfaceAnova:
     ]
     influence = found.get_influence()
     # A run that is indispensable to the fit cannot be predicted from the others.
-    press = math.inf if (surface.leverage > FULL).any() else float((influence.resid_press**2).sum())
-    predicted_r2 = _ratio(total_ss - press, total_ss)
+    indispensable = bool((surface.leverage > FULL).any())
+    press = math.inf if indispensable else float((influence.resid_press**2).sum())
+    predicted_r2 = math.nan if indispensable else _ratio(total_ss - press, total_ss)
     rows = (
         model_row,
         *term_rows,
@@ -101,7 +102,7 @@ def analyse_surface(surface: Surface) -> SurfaceAnova:
         *_lack_of_fit(surface, residual_ss),
         AnovaRow("total", total_ss, n - 1, total_ss / (n - 1), math.nan, math.nan),
     )
-    better = bool(model_row.p < 0.05 and predicted_r2 > 0)
+    better = bool(model_row.p < 0.05 and (indispensable or predicted_r2 > 0))
     return SurfaceAnova(
         rows=rows,
         mean=mean,
@@ -158,8 +159,8 @@ def _lack_of_fit(surface: Surface, residual_ss: float) -> tuple[AnovaRow, ...]:
 def _press_by_row(surface: Surface, residuals: FloatArray) -> float:
     """Return the sum of squared errors when each row of the design is predicted from all others.
 
-    With H the hat matrix of the runs of a row, their left-out residuals are (I - H)^-1 e. Infinite when a row
-    is indispensable to the fit.
+    With H the hat matrix of the runs of a row, their left-out residuals are (I - H)^-1 e. NaN when a row is
+    indispensable to the fit.
     """
     model = second_order_terms(surface.points)
     total = 0.0
@@ -167,7 +168,7 @@ def _press_by_row(surface: Surface, residuals: FloatArray) -> float:
         runs = surface.row_of_run == row
         kept = np.eye(int(runs.sum())) - model[runs] @ surface.information_inverse @ model[runs].T
         if np.linalg.matrix_rank(kept, tol=1e-9) < kept.shape[0]:
-            return math.inf
+            return math.nan
         left_out = np.linalg.solve(kept, residuals[runs])
         total += float(left_out @ left_out)
     return total
@@ -195,9 +196,10 @@ def _notes(
     if total_ss == 0:
         return ("The response is the same in every run; there is nothing to fit.",)
     if not better_than_noise:
+        predicted = "" if math.isnan(predicted_r2) else f", predicted R² = {predicted_r2:.3g}"
         notes.append(
-            f"The surface is not better than noise (model p = {by_source['model'].p:.3g}, predicted R² = "
-            f"{predicted_r2:.3g}); nothing may be read from its shape."
+            f"The surface is not better than noise (model p = {by_source['model'].p:.3g}{predicted}); nothing may be "
+            "read from its shape."
         )
     if "pure_error" not in by_source:
         notes.append("No point has two valid runs; lack of fit cannot be tested.")

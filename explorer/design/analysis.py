@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from doe.analysis.analyse import ResponseTarget, analyse_design
+from doe.analysis.analyse import DesignAnalysis, ResponseTarget, analyse_design
 from doe.analysis.models import ORDERS, Order
+from doe.analysis.steepest_ascent import Region
+from doe.analysis.surface_anova import FULL
 from doe.designs import DESIGNS, factor_letters
 from doe.errors import StatisticsError
 from explorer.design.choices import ModelOrder
@@ -22,6 +24,13 @@ from explorer.files.run_folder import appearing, json_text
 from explorer.files.run_result import made_today, versions
 from explorer.units import own_path
 from solver.assets import asset_path
+
+SAME = 1e-9
+"""Coded levels that differ by less are one."""
+FAR = 2.5
+"""Half-widths from the middle of a factor's range beyond which a level is likely a slip: the star points of rotatable
+central composite designs of up to five factors stand 2^(5/4) = 2.4 out (Box and Hunter 1957, Ann. Math. Stat. 28,
+195)."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +69,7 @@ def run_analyse(order: AnalyseOrder) -> DesignResult:
 def analyse_runs(runs: Runs, order: AnalyseOrder) -> DesignResult:
     """The analysis of one response."""
     region = region_of(runs.factors)
+    _refuse_dependent(runs, region, order.sheet)
     reference = np.array([factor.reference for factor in runs.factors])
     target = None if order.target is None else ResponseTarget(order.target, order.target_error, reference)
     try:
@@ -77,11 +87,64 @@ def analyse_runs(runs: Runs, order: AnalyseOrder) -> DesignResult:
         factors=_factors(runs),
         coded=runs.coded,
         target=order.target,
-        analysis=found,
+        analysis=replace(found, notes=(*found.notes, *_run_notes(runs, region, found))),
         command=_command(order),
         versions=versions(),
         about=made_today(order.author, order.notes),
     )
+
+
+def _refuse_dependent(runs: Runs, region: Region, sheet: str) -> None:
+    """Raise CommandError where the levels of the valid runs do not tell the factors apart, and name those."""
+    valid = ~np.isnan(runs.responses).all(axis=1)
+    levels = region.natural(runs.coded[valid])
+    names = [factor.name for factor in runs.factors]
+    spread = np.ptp(runs.coded[valid], axis=0)
+    for name, level, width in zip(names, levels[0], spread, strict=True):
+        if width < SAME:
+            raise CommandError(
+                f"{sheet}, column {name}: is {level:.6g} in every run with a result, so that nothing tells what it "
+                f"does; allowed: leave it out with --only {','.join(one for one in names if one != name)}"
+            )
+    if int(valid.sum()) <= len(names):
+        return  # too few runs for anything, which is told where the model is fitted
+    centred = (runs.coded[valid] - runs.coded[valid].mean(axis=0)) / spread
+    *_, singular, vectors = np.linalg.svd(centred, full_matrices=True)
+    if singular[-1] > SAME * singular[0]:
+        return
+    tied = [k for k in range(len(names)) if abs(vectors[-1, k]) > SAME]
+    listed = " and ".join([", ".join(names[k] for k in tied[:-1]), names[tied[-1]]])
+    sums = levels[:, tied].sum(axis=1)
+    if np.ptp(sums) < SAME * np.abs(levels).max():
+        what = f"{listed} add up to {sums[0]:.6g} in every run: a mixture, of which one part follows from the others"
+    else:
+        what = f"{listed} change together in every run, so that their effects cannot be told apart"
+    kept = [name for k, name in enumerate(names) if k != tied[-1]]
+    raise CommandError(f"{sheet}: {what}; allowed: leave one out, as with --only {','.join(kept)}")
+
+
+def _run_notes(runs: Runs, region: Region, found: DesignAnalysis) -> list[str]:
+    """What single runs ask for: levels far outside a factor's range, and runs without which there is no model."""
+    row, _ = np.nonzero(~np.isnan(runs.responses))
+    labels, notes = _labels(runs), []
+    for label, k in zip(labels, row, strict=True):
+        for factor, coded, level in zip(runs.factors, runs.coded[k], region.natural(runs.coded[k]), strict=True):
+            if abs(coded) > FAR:
+                notes.append(
+                    f"{label}: {factor.name} is {level:.6g}, {abs(coded):.1f} half-widths from the middle of "
+                    f"{factor.low:g} … {factor.high:g}: a slip? One such level decides the whole model."
+                )
+    if found.model is not None:
+        alone = [label for label, h in zip(labels, found.model.surface.leverage, strict=True) if h > FULL]
+        if alone:
+            one = len(alone) == 1
+            notes.append(
+                f"{'Run' if one else 'Runs'} {', '.join(alone)}: without {'it' if one else 'any of them'} this model "
+                f"cannot be fitted, so {'it is' if one else 'they are'} fitted exactly, nothing checks "
+                f"{'it' if one else 'them'}, and no R² can be predicted. Repeat {'it' if one else 'them'}, fill the "
+                "lost cells, or take a smaller model (--model interactions)."
+            )
+    return notes
 
 
 def _order(runs: Runs, order: AnalyseOrder) -> Order | None:

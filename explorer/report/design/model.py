@@ -282,7 +282,7 @@ def box_cox_words(found: BoxCox) -> str:
         f"{number(power)} or beyond" if power in ends else number(power)
         for power in (found.best, found.low, found.high)
     )
-    where = f"best power {best}, 95 % {low} … {high}"
+    where = f"best power {best}, 95 % {low} … {high} (t² of the residual degrees of freedom)"
     if found.suggestion == "none":
         return f"{where}; it holds 1, so the response stays as it is"
     return f"{where}; it does not hold 1: {found.suggestion} would fit better"
