@@ -20,7 +20,7 @@ from doe.analysis.models import Order, OrderFit, bearable, fit_summary, hierarch
 from doe.analysis.optimum import Optimum, find_optimum
 from doe.analysis.screening import Screening, analyse_screening
 from doe.analysis.steepest_ascent import Region
-from doe.analysis.surface import Surface, fit_surface, term_names
+from doe.analysis.surface import Blocks, Surface, fit_surface, term_names
 from doe.analysis.surface_anova import SurfaceAnova, analyse_surface
 from doe.record import Record
 
@@ -83,18 +83,20 @@ def analyse_design(
     order: Order | None = None,
     terms: Sequence[str] = (),
     target: ResponseTarget | None = None,
+    blocks: Blocks | None = None,
 ) -> DesignAnalysis:
     """Analyse one response.
 
     coded: settings, shape (rows, k), low = -1, high = +1. responses: (rows, replicates), NaN where a run is missing.
     order: "linear", "interactions" or "quadratic"; None for the highest that the runs bear with 3 degrees of freedom
-    for the error. terms: instead of an order, the terms of the model; what they stand on is added.
+    for the error. terms: instead of an order, the terms of the model; what they stand on is added. blocks: in which the
+    runs were made; they have fixed effects in the model, and the effects of a two-level design are told by that alone.
     Raises StatisticsError where nothing can be estimated, or an order or term is asked for that the runs cannot bear.
     """
     notes: list[str] = []
-    effects = _effects(coded, responses, region.names, notes)
-    chosen = _terms(coded, responses, region.names, order, terms, saturated_is_fine=effects is not None)
-    model = None if chosen is None else _model(fit_surface(coded, responses, region, chosen), region.names)
+    effects = None if blocks is not None else _effects(coded, responses, region.names, notes)
+    chosen = _terms(coded, responses, region.names, order, terms, effects is not None, blocks)
+    model = None if chosen is None else _model(fit_surface(coded, responses, region, chosen, blocks), region.names)
     if model is None:
         notes.append("The runs leave no error for a model: effects stand beside Lenth's margin only.")
     optimum = None
@@ -113,7 +115,7 @@ def analyse_design(
                 target_standard_error=target.standard_error,
             )
             notes += _extrapolation(optimum, model.surface)
-    fits = () if chosen is None else fit_summary(coded, responses, region)
+    fits = () if chosen is None else fit_summary(coded, responses, region, blocks)
     return DesignAnalysis(fits, effects, model, optimum, tuple(notes))
 
 
@@ -124,6 +126,7 @@ def _terms(
     order: Order | None,
     terms: Sequence[str],
     saturated_is_fine: bool,
+    blocks: Blocks | None,
 ) -> tuple[str, ...] | None:
     """Return the terms of the model; None where the runs bear none and their effects are known without."""
     if terms:
@@ -132,7 +135,7 @@ def _terms(
         return terms_of(names, order)
     if saturated_is_fine and not bearable(coded, responses, names, terms_of(names, "linear")):
         return None
-    return terms_of(names, highest_order(coded, responses, names))
+    return terms_of(names, highest_order(coded, responses, names, blocks=blocks))
 
 
 def _model(surface: Surface, names: Sequence[str]) -> FittedModel:

@@ -1,6 +1,11 @@
 """What single runs and levels ask for: lost cells, slips of the pen, factors that nothing tells apart."""
 
+import math
+
+import numpy as np
+import pandas as pd
 import pytest
+import statsmodels.formula.api as smf
 
 from explorer.design.analysis import FAR, AnalyseOrder, run_analyse
 from explorer.errors import CommandError
@@ -88,3 +93,60 @@ def test_a_mixture_is_called_one(tmp_path):
     # One component follows from the others: with one left out it is a plane, which is found.
     found = analysed(tmp_path, runs, head, only=("a", "b"))
     assert found.analysis.fits[0].r_squared == pytest.approx(1.0)
+
+
+BLOCKED = (
+    "# factor | Time | 80 | 90\n# factor | Temp | 170 | 180\nbatch,Time,Temp,y\n"
+    "b1,80,170,80.5\nb1,80,180,81.5\nb1,90,170,82\nb1,90,180,83.5\nb1,85,175,83.9\nb1,85,175,84.3\nb1,85,175,84\n"
+    "b2,85,175,79.7\nb2,85,175,79.8\nb2,85,175,79.5\nb2,92.07,175,78.4\nb2,77.93,175,75.6\nb2,85,182.07,78.5\n"
+    "b2,85,167.93,77\n"
+)
+"""Myers, Montgomery and Anderson-Cook, table 7.6: `ChemReact` of the R package rsm, whose vignette analyses it."""
+
+
+def test_runs_in_blocks_are_analysed_as_rsm_does(tmp_path):
+    found = analysed(tmp_path, BLOCKED, "", block="batch").analysis
+    surface, anova = found.model.surface, found.model.anova
+    # rsm 2.10, rsm(Yield ~ Block + SO(x1, x2)): R² 0.9981; lack of fit F = 0.53 on 3 and 4 df, p = 0.6851.
+    assert anova.r_squared == pytest.approx(0.9981, abs=5e-5)
+    lack = anova.row("lack_of_fit")
+    assert (lack.df, anova.row("pure_error").df, anova.row("block").df) == (3, 4, 1)
+    assert (lack.f, lack.p) == (pytest.approx(0.53, abs=5e-3), pytest.approx(0.6851, abs=5e-5))
+    assert anova.row("block").sum_of_squares == pytest.approx(69.531, abs=5e-4)
+    # Stationary point 0.3722954, 0.3343802 of its canonical analysis, whose levels are rounded as here.
+    assert found.model.canonical.stationary_coded == pytest.approx([0.3723, 0.3344], abs=2e-4)
+    # The blocks' effects cancel, and what is predicted is their mean.
+    assert surface.block_names == ("b1", "b2")
+    assert surface.block_effects.sum() == pytest.approx(0.0, abs=1e-12)
+    assert surface.block_effects[0] > 2.0
+    assert found.notes == ()
+
+
+def test_least_squares_with_blocks_are_those_of_statsmodels(tmp_path):
+    found = analysed(tmp_path, BLOCKED, "", block="batch").analysis.model
+    rows = [line.split(",") for line in BLOCKED.splitlines()[3:]]
+    time, temp, y = (np.array([float(row[k]) for row in rows]) for k in (1, 2, 3))
+    data = {"a": (time - 85) / 5, "b": (temp - 175) / 5, "y": y, "batch": [row[0] for row in rows]}
+    fit = smf.ols("y ~ C(batch, Sum) + a*b + I(a**2) + I(b**2)", pd.DataFrame(data)).fit()
+    names = ("Intercept", "a", "b", "a:b", "I(a ** 2)", "I(b ** 2)")
+    assert found.surface.coefficients == pytest.approx([fit.params[name] for name in names], rel=1e-9)
+    assert found.anova.coefficient_standard_errors == pytest.approx([fit.bse[name] for name in names], rel=1e-9)
+    assert found.anova.press == pytest.approx((fit.get_influence().resid_press ** 2).sum(), rel=1e-9)
+    assert found.diagnostics.cooks_distance == pytest.approx(fit.get_influence().cooks_distance[0], rel=1e-8)
+
+
+def test_blocks_that_nobody_named_are_noticed(tmp_path):
+    notes = analysed(tmp_path, BLOCKED, "").analysis.notes
+    assert any(one.startswith("Not used: batch.") for one in notes)
+    # Seven residuals above zero, then seven below: 2 of C(14, 7) arrangements have two stretches.
+    (drift,) = [one for one in notes if "change their sign 1 times" in one]
+    assert f"(p = {2 / math.comb(14, 7):.2g})" in drift
+
+
+def test_a_block_that_is_none_is_refused_in_one_line(tmp_path):
+    with pytest.raises(CommandError, match=r"--block shift: no column of blocks; the other columns are batch$"):
+        analysed(tmp_path, BLOCKED, "", block="shift")
+    with pytest.raises(CommandError, match="line 4, column batch: is empty"):
+        analysed(tmp_path, BLOCKED.replace("b1,80,170", ",80,170"), "", block="batch")
+    with pytest.raises(CommandError, match="every valid run is in block 'b1'; at least two"):
+        analysed(tmp_path, BLOCKED.replace("b2,", "b1,"), "", block="batch")
