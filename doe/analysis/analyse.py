@@ -15,9 +15,11 @@ import numpy.typing as npt
 
 from doe.analysis.canonical import Canonical, RidgePath, canonical_analysis, ridge_analysis
 from doe.analysis.contrasts import Contrasts, Curvature, curvature, is_regular, regular_contrasts, screening_contrasts
+from doe.analysis.few_terms import FewTermsModel, few_terms
 from doe.analysis.model_adequacy import BoxCox, Diagnostics, box_cox, diagnose_fit
 from doe.analysis.models import Order, OrderFit, bearable, fit_summary, hierarchical, highest_order, terms_of
 from doe.analysis.optimum import Optimum, find_optimum
+from doe.analysis.replicates import row_moments
 from doe.analysis.screening import Screening, analyse_screening
 from doe.analysis.steepest_ascent import Region
 from doe.analysis.surface import Blocks, Surface, fit_surface, term_names
@@ -47,11 +49,15 @@ class FittedModel(Record):
 
 @dataclass(frozen=True)
 class Effects(Record):
-    """The contrasts of a two-level design, their effects, and the centre runs against the corners."""
+    """The contrasts of a two-level design, their effects, and the centre runs against the corners.
+
+    few_terms: models of few main effects and interactions, for a design whose effects share columns in part.
+    """
 
     contrasts: Contrasts
     screening: Screening
     curvature: Curvature | None
+    few_terms: tuple[FewTermsModel, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -175,10 +181,12 @@ def _effects(coded: FloatArray, responses: FloatArray, names: Sequence[str], not
     levels, values = coded[corner].astype(np.int64), responses[corner]
     if np.linalg.matrix_rank(np.column_stack([np.ones(len(levels)), levels])) <= len(names):
         return None
-    contrasts = regular_contrasts(levels, names) if is_regular(levels) else screening_contrasts(levels, names)
+    regular = is_regular(levels)
+    contrasts = regular_contrasts(levels, names) if regular else screening_contrasts(levels, names)
     if np.isnan(values).all(axis=1).any() or len(contrasts.names) < len(names):
         # A lost row ends orthogonality: only what is fitted by least squares can still be told apart.
         contrasts = Contrasts(levels, tuple(names), (), {})
         notes.append("Rows without a valid run: interactions and unused columns are left out of the effects.")
     screening = analyse_screening(contrasts.levels, contrasts.names, values, contrasts.dummies)
-    return Effects(contrasts, screening, curvature(coded, responses))
+    searched = () if regular else few_terms(levels, names, row_moments(values)[0])
+    return Effects(contrasts, screening, curvature(coded, responses), searched)

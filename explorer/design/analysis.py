@@ -66,7 +66,7 @@ def run_analyse(order: AnalyseOrder) -> DesignResult:
     path = asset_path("runs", order.sheet)
     factors = read_factors(asset_path("designs", order.factors)).factors if order.factors else ()
     sheet = read_sheet(path, factors)
-    responses = [name for name in sheet.responses if name != order.block and sheet.has_numbers(name)]
+    responses = [name for name in sheet.responses if name != order.block and not sheet.is_words(name)]
     runs = runs_of(sheet, order.response or _only_response(sheet.path, responses), order.only, order.block)
     result = analyse_runs(runs, order)
     if order.out is not None:
@@ -150,7 +150,8 @@ def _run_notes(runs: Runs, region: Region, found: DesignAnalysis) -> list[str]:
         )
     if found.model is not None:
         model = found.model.surface
-        notes += _drift(runs.place[row, replicate], model.observed - model.predicted)
+        if runs.place.size:
+            notes += _drift(runs.place[row, replicate], model.observed - model.predicted)
         alone = [label for label, h in zip(labels, found.model.surface.leverage, strict=True) if h > FULL]
         if alone:
             one = len(alone) == 1

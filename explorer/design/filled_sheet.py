@@ -11,7 +11,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -49,9 +49,10 @@ class Sheet:
     lines: tuple[int, ...]
     table: CellTable
 
-    def has_numbers(self, column: str) -> bool:
-        """Whether a cell of ``column`` is a number."""
-        return any(not math.isnan(self.table.number(row[self.columns[column]])) for row in self.cells)
+    def is_words(self, column: str) -> bool:
+        """Whether every filled cell of ``column``, and there are any, is no number."""
+        filled = [cell for row in self.cells if (cell := row[self.columns[column]]) not in EMPTY_CELLS]
+        return bool(filled) and all(math.isnan(self.table.number(cell)) for cell in filled)
 
     @property
     def responses(self) -> list[str]:
@@ -166,11 +167,11 @@ class Runs:
     responses: Array
     labels: tuple[tuple[str, ...], ...]
     missing: int
-    place: npt.NDArray[np.int64]
+    place: npt.NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int64))
     """When each run was made, (rows, replicates): its number in the column "run", else its place in the file."""
-    blocks: Blocks | None
+    blocks: Blocks | None = None
     """In which each run was made; None where no column says."""
-    grouping: tuple[str, ...]
+    grouping: tuple[str, ...] = ()
     """Columns without a use whose cells repeat, as those of days, batches or operators do."""
 
 

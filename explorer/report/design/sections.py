@@ -28,6 +28,7 @@ from explorer.units import (
     fixed,
     number,
     observed,
+    p_value,
     parameter_label,
     parameter_value,
     percent,
@@ -233,6 +234,16 @@ def in_short(result: DesignResult) -> Section:
     facts = [("Runs", f"{runs.valid} with a result at {runs.rows} rows, {runs.missing} without")]
     if found.effects is not None:
         facts.append(("Factors that act", acting(found.effects.screening)))
+        if found.effects.few_terms:
+            best = found.effects.few_terms[0]
+            terms = enumeration([term.replace("*", " × ") for term in best.terms])
+            facts.append(
+                (
+                    "Few terms that explain the runs",
+                    f"{terms}: R² {fixed(best.r_squared)}, p = {p_value(best.p)} by permutation of a search that takes "
+                    "interactions; confirm it by further runs",
+                )
+            )
     if found.model is not None:
         anova = found.model.anova
         surface = found.model.surface
