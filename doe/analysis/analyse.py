@@ -15,12 +15,14 @@ import numpy.typing as npt
 
 from doe.analysis.canonical import Canonical, RidgePath, canonical_analysis, ridge_analysis
 from doe.analysis.contrasts import Contrasts, Curvature, curvature, is_regular, regular_contrasts, screening_contrasts
+from doe.analysis.few_terms import FewTermsModel, few_terms
 from doe.analysis.model_adequacy import BoxCox, Diagnostics, box_cox, diagnose_fit
 from doe.analysis.models import Order, OrderFit, bearable, fit_summary, hierarchical, highest_order, terms_of
 from doe.analysis.optimum import Optimum, find_optimum
+from doe.analysis.replicates import row_moments
 from doe.analysis.screening import Screening, analyse_screening
 from doe.analysis.steepest_ascent import Region
-from doe.analysis.surface import Surface, fit_surface, term_names
+from doe.analysis.surface import Blocks, Surface, fit_surface, term_names
 from doe.analysis.surface_anova import SurfaceAnova, analyse_surface
 from doe.record import Record
 
@@ -47,11 +49,15 @@ class FittedModel(Record):
 
 @dataclass(frozen=True)
 class Effects(Record):
-    """The contrasts of a two-level design, their effects, and the centre runs against the corners."""
+    """The contrasts of a two-level design, their effects, and the centre runs against the corners.
+
+    few_terms: models of few main effects and interactions, for a design whose effects share columns in part.
+    """
 
     contrasts: Contrasts
     screening: Screening
     curvature: Curvature | None
+    few_terms: tuple[FewTermsModel, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -83,18 +89,20 @@ def analyse_design(
     order: Order | None = None,
     terms: Sequence[str] = (),
     target: ResponseTarget | None = None,
+    blocks: Blocks | None = None,
 ) -> DesignAnalysis:
     """Analyse one response.
 
     coded: settings, shape (rows, k), low = -1, high = +1. responses: (rows, replicates), NaN where a run is missing.
     order: "linear", "interactions" or "quadratic"; None for the highest that the runs bear with 3 degrees of freedom
-    for the error. terms: instead of an order, the terms of the model; what they stand on is added.
+    for the error. terms: instead of an order, the terms of the model; what they stand on is added. blocks: in which the
+    runs were made; they have fixed effects in the model, and the effects of a two-level design are told by that alone.
     Raises StatisticsError where nothing can be estimated, or an order or term is asked for that the runs cannot bear.
     """
     notes: list[str] = []
-    effects = _effects(coded, responses, region.names, notes)
-    chosen = _terms(coded, responses, region.names, order, terms, saturated_is_fine=effects is not None)
-    model = None if chosen is None else _model(fit_surface(coded, responses, region, chosen), region.names)
+    effects = None if blocks is not None else _effects(coded, responses, region.names, notes)
+    chosen = _terms(coded, responses, region.names, order, terms, effects is not None, blocks)
+    model = None if chosen is None else _model(fit_surface(coded, responses, region, chosen, blocks), region.names)
     if model is None:
         notes.append("The runs leave no error for a model: effects stand beside Lenth's margin only.")
     optimum = None
@@ -113,7 +121,7 @@ def analyse_design(
                 target_standard_error=target.standard_error,
             )
             notes += _extrapolation(optimum, model.surface)
-    fits = () if chosen is None else fit_summary(coded, responses, region)
+    fits = () if chosen is None else fit_summary(coded, responses, region, blocks)
     return DesignAnalysis(fits, effects, model, optimum, tuple(notes))
 
 
@@ -124,6 +132,7 @@ def _terms(
     order: Order | None,
     terms: Sequence[str],
     saturated_is_fine: bool,
+    blocks: Blocks | None,
 ) -> tuple[str, ...] | None:
     """Return the terms of the model; None where the runs bear none and their effects are known without."""
     if terms:
@@ -132,7 +141,7 @@ def _terms(
         return terms_of(names, order)
     if saturated_is_fine and not bearable(coded, responses, names, terms_of(names, "linear")):
         return None
-    return terms_of(names, highest_order(coded, responses, names))
+    return terms_of(names, highest_order(coded, responses, names, blocks=blocks))
 
 
 def _model(surface: Surface, names: Sequence[str]) -> FittedModel:
@@ -172,10 +181,12 @@ def _effects(coded: FloatArray, responses: FloatArray, names: Sequence[str], not
     levels, values = coded[corner].astype(np.int64), responses[corner]
     if np.linalg.matrix_rank(np.column_stack([np.ones(len(levels)), levels])) <= len(names):
         return None
-    contrasts = regular_contrasts(levels, names) if is_regular(levels) else screening_contrasts(levels, names)
+    regular = is_regular(levels)
+    contrasts = regular_contrasts(levels, names) if regular else screening_contrasts(levels, names)
     if np.isnan(values).all(axis=1).any() or len(contrasts.names) < len(names):
         # A lost row ends orthogonality: only what is fitted by least squares can still be told apart.
         contrasts = Contrasts(levels, tuple(names), (), {})
         notes.append("Rows without a valid run: interactions and unused columns are left out of the effects.")
     screening = analyse_screening(contrasts.levels, contrasts.names, values, contrasts.dummies)
-    return Effects(contrasts, screening, curvature(coded, responses))
+    searched = () if regular else few_terms(levels, names, row_moments(values)[0])
+    return Effects(contrasts, screening, curvature(coded, responses), searched)

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
+from doe.analysis.few_terms import partial_aliases
 from doe.analysis.replicates import row_moments
 from doe.designs.plackett_burman import plackett_burman
 from doe.record import Record
@@ -29,7 +30,8 @@ MOST_FACTORS = 10
 class Contrasts(Record):
     """Columns to estimate: levels (rows, columns) of -1/+1 with names; dummies are those that serve as error.
 
-    aliases: column → other effects of up to two factors on the same column, with their sign.
+    aliases: column → other effects of up to two factors on the same column, with their sign, and the part of them that
+    it carries where that is not all.
     """
 
     levels: IntArray
@@ -104,7 +106,7 @@ def screening_contrasts(levels: IntArray, names: Sequence[str]) -> Contrasts:
     """
     unused = _unused_columns(levels)
     dummies = tuple(f"D{j + 1}" for j in range(unused.shape[1]))
-    return Contrasts(np.hstack([levels, unused]), (*names, *dummies), dummies, {})
+    return Contrasts(np.hstack([levels, unused]), (*names, *dummies), dummies, partial_aliases(levels, names))
 
 
 def curvature(levels: FloatArray, responses: FloatArray) -> Curvature | None:

@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from doe.analysis.surface import Surface, least_squares, second_order_terms
+from doe.analysis.surface import Surface, least_squares
 from doe.analysis.surface_anova import FULL, SurfaceAnova
 from doe.record import Record
 
@@ -75,7 +75,7 @@ class BoxCox(Record):
 
 def diagnose_fit(surface: Surface, anova: SurfaceAnova) -> Diagnostics:
     """Return the diagnostics of every run of a fitted surface."""
-    model = second_order_terms(surface.points)[:, surface.included]
+    model = surface.model_matrix
     influence = least_squares(model, surface.observed).get_influence()
     h, (n, p) = surface.leverage, model.shape
     testable = (h < FULL) & (surface.mse > 0)
@@ -119,7 +119,7 @@ def box_cox(surface: Surface, level: float = 0.95) -> BoxCox:
         return _without("needs a response that is positive in every run")
     if np.ptp(y) <= 1e-12 * y.max() or surface.mse <= 1e-20 * float(y.max()) ** 2:
         return _without("needs a response that varies about the model")
-    model = second_order_terms(surface.points)[:, surface.included]
+    model = surface.model_matrix
     sums = np.log(residual_sums(model, y, POWERS))
     limit = float(sums.min() + np.log1p(stats.t.ppf((1 + level) / 2, surface.df_residual) ** 2 / surface.df_residual))
     # The grid is fine enough for the interval; the best is refined by the parabola through its neighbours.

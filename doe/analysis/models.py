@@ -18,7 +18,14 @@ from scipy import stats
 
 from doe.analysis.replicates import require_matrix
 from doe.analysis.steepest_ascent import Region
-from doe.analysis.surface import fit_surface, included_terms, second_order_terms
+from doe.analysis.surface import (
+    Blocks,
+    block_columns,
+    fit_surface,
+    included_terms,
+    second_order_terms,
+    used_blocks,
+)
 from doe.analysis.surface_anova import analyse_surface
 from doe.errors import StatisticsError
 from doe.record import Record
@@ -72,17 +79,19 @@ def hierarchical(names: Sequence[str], terms: Sequence[str]) -> tuple[str, ...]:
     return tuple(term for term, is_in in zip(every, included, strict=True) if is_in and term != "intercept")
 
 
-def fit_summary(coded: FloatArray, responses: FloatArray, region: Region) -> tuple[OrderFit, ...]:
+def fit_summary(
+    coded: FloatArray, responses: FloatArray, region: Region, blocks: Blocks | None = None
+) -> tuple[OrderFit, ...]:
     """Return the three orders on the valid runs; shapes as in `doe.analysis.surface.fit_surface`."""
     found: list[OrderFit] = []
-    before = _mean_only(responses)
+    before = _means_only(responses, blocks)
     for order in ORDERS:
         terms = terms_of(region.names, order)
-        if not bearable(coded, responses, region.names, terms):
+        if not bearable(coded, responses, region.names, terms, blocks):
             nothing = (math.nan,) * 7
             found.append(OrderFit(order, len(terms), False, 0, *nothing))
             continue
-        surface = fit_surface(coded, responses, region, terms)
+        surface = fit_surface(coded, responses, region, terms, blocks)
         anova = analyse_surface(surface)
         residual = anova.row("residual")
         f, p = _added(before, (residual.sum_of_squares, residual.df))
@@ -106,34 +115,53 @@ def fit_summary(coded: FloatArray, responses: FloatArray, region: Region) -> tup
     return tuple(found)
 
 
-def bearable(coded: FloatArray, responses: FloatArray, names: Sequence[str], terms: Sequence[str]) -> bool:
-    """Return whether the valid runs separate `terms` and leave an error."""
+def bearable(
+    coded: FloatArray,
+    responses: FloatArray,
+    names: Sequence[str],
+    terms: Sequence[str],
+    blocks: Blocks | None = None,
+) -> bool:
+    """Return whether the valid runs separate `terms`, and the blocks, and leave an error."""
     values = require_matrix("responses", responses, rows=len(coded))
     row, _ = np.nonzero(~np.isnan(values))
     model = second_order_terms(coded[row])[:, included_terms(names, terms)]
+    if blocks is not None:
+        block_names, block = used_blocks(blocks, values)
+        model = np.column_stack([model, block_columns(block, len(block_names))])
     return bool(len(row) > model.shape[1] and np.linalg.matrix_rank(model) == model.shape[1])
 
 
-def highest_order(coded: FloatArray, responses: FloatArray, names: Sequence[str], least_df: int = 3) -> Order:
+def highest_order(
+    coded: FloatArray,
+    responses: FloatArray,
+    names: Sequence[str],
+    least_df: int = 3,
+    blocks: Blocks | None = None,
+) -> Order:
     """Return the highest order that the runs bear with at least `least_df` degrees of freedom for the error.
 
     Without one, the highest that they bear at all. Raises StatisticsError where not even the linear one is.
     """
     runs = int((~np.isnan(responses)).sum())
-    able = [order for order in ORDERS if bearable(coded, responses, names, terms_of(names, order))]
+    able = [order for order in ORDERS if bearable(coded, responses, names, terms_of(names, order), blocks)]
+    spent = 1 if blocks is None else len(used_blocks(blocks, responses)[0])
     if not able:
         raise StatisticsError(
             f"responses: {runs} valid runs cannot bear a linear model of {len(names)} factors with an error; "
             f"at least {len(names) + 2} runs at different settings are needed"
+            + ("" if blocks is None else ", and one more for every block from the second on")
         )
-    roomy = [order for order in able if runs - 1 - len(terms_of(names, order)) >= least_df]
+    roomy = [order for order in able if runs - spent - len(terms_of(names, order)) >= least_df]
     return (roomy or able)[-1]
 
 
-def _mean_only(responses: FloatArray) -> tuple[float, int]:
-    """Return sum of squares about the mean and its degrees of freedom."""
+def _means_only(responses: FloatArray, blocks: Blocks | None) -> tuple[float, int]:
+    """Return sum of squares about the mean, or the means of the blocks, and its degrees of freedom."""
     values = responses[~np.isnan(responses)]
-    return float(((values - values.mean()) ** 2).sum()), values.size - 1
+    names, block = (("",), np.zeros(values.size, dtype=np.int64)) if blocks is None else used_blocks(blocks, responses)
+    means = np.bincount(block, weights=values) / np.bincount(block)
+    return float(((values - means[block]) ** 2).sum()), values.size - len(names)
 
 
 def _added(before: tuple[float, int], after: tuple[float, int]) -> tuple[float, float]:

@@ -32,7 +32,7 @@ from scipy import stats
 from scipy.optimize import minimize
 
 from doe.analysis.level_set import REFINEMENTS, crossings, extremes, nearest_points
-from doe.analysis.surface import Surface, fitted_coefficients, second_order_terms
+from doe.analysis.surface import Surface, fitted_coefficients
 from doe.analysis.surface_anova import analyse_surface
 from doe.errors import StatisticsError
 from doe.record import Record
@@ -273,8 +273,8 @@ def bootstrap_coefficients(surface: Surface, refits: int, seed: int) -> tuple[Fl
     else:
         resampled, method = _residuals(surface, refits, generator), "residuals"
     coefficients = np.zeros((refits, surface.coefficients.size))
-    model = second_order_terms(surface.points)[:, surface.included]
-    coefficients[:, surface.included] = fitted_coefficients(model, resampled).T
+    fitted = fitted_coefficients(surface.model_matrix, resampled).T
+    coefficients[:, surface.included] = fitted[:, : int(surface.included.sum())]
     return coefficients, method  # type: ignore[return-value]
 
 

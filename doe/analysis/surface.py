@@ -3,14 +3,16 @@ squares.
 
 Factors are coded, x = (value - centre)/half_width, so that the region is the cube [-1, 1]^k. Term order:
 intercept, linear, products (i < j), squares. p = number of these terms, n = number of valid runs. A model with fewer
-terms keeps this layout, with zeros for what it leaves out. Source: Box and
-Wilson 1951; Myers, Montgomery and Anderson-Cook 2016, Response Surface Methodology, ch. 6.
+terms keeps this layout, with zeros for what it leaves out. Runs that were made in blocks (days, batches, operators) add
+a fixed effect per block, with the sum zero over the blocks: the intercept, and what the model predicts, is the mean of
+all blocks. Source: Box and Wilson 1951; Myers, Montgomery and Anderson-Cook 2016, Response Surface Methodology, ch. 6
+and 7.6 (blocks).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any
 
@@ -36,7 +38,8 @@ class Surface(Record):
     natural units. included: which terms are in the model, shape (p,); the others have coefficient and variance zero.
     information_inverse: (X'X)^-1, shape (p, p). mse: residual mean square with df_residual
     degrees of freedom. Per run, shape (n,): points (n, k) coded, row_of_run (row of the design), point_of_run
-    (index of the distinct point), observed, predicted, leverage.
+    (index of the distinct point, within its block), observed, predicted (in its block), leverage. block_names: none
+    where there are no blocks; block_effects of each [unit of the response], block_of_run per run.
     """
 
     region: Region
@@ -54,6 +57,17 @@ class Surface(Record):
     predicted: FloatArray
     leverage: FloatArray
     missing_runs: int
+    block_names: tuple[str, ...] = ()
+    block_effects: FloatArray = field(default_factory=lambda: np.zeros(0))
+    block_of_run: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    @property
+    def model_matrix(self) -> FloatArray:
+        """Return the columns that were fitted, shape (n, terms + blocks - 1): the terms first."""
+        terms = second_order_terms(self.points)[:, self.included]
+        if not self.block_names:
+            return terms
+        return np.column_stack([terms, block_columns(self.block_of_run, len(self.block_names))])
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -79,14 +93,26 @@ class Surface(Record):
         return self.predict(coded) - half, self.predict(coded) + half
 
 
+@dataclass(frozen=True)
+class Blocks:
+    """In which block every run was made: of_run, shape as the responses, numbers of `names`."""
+
+    names: tuple[str, ...]
+    of_run: IntArray
+
+
 def fit_surface(
-    coded: npt.ArrayLike, responses: npt.ArrayLike, region: Region, terms: Sequence[str] | None = None
+    coded: npt.ArrayLike,
+    responses: npt.ArrayLike,
+    region: Region,
+    terms: Sequence[str] | None = None,
+    blocks: Blocks | None = None,
 ) -> Surface:
     """Fit the second-order model, or those of its terms that are named, to every valid run.
 
     coded: design points, shape (points, k); rows may repeat. responses: shape (points, replicates), NaN where
     a run is missing. region: names and natural scale of the k factors. terms: names as of `term_names`, all if None;
-    the intercept is always in.
+    the intercept is always in. blocks: a fixed effect each.
 
     Raises StatisticsError for an unknown term, when shapes disagree, the points left cannot separate the terms, or no
     degree of freedom is left for the error.
@@ -98,23 +124,27 @@ def fit_surface(
     row, replicate = np.nonzero(~np.isnan(values))
     points, observed = design[row], values[row, replicate]
     included = included_terms(region.names, terms)
-    model = second_order_terms(points)[:, included]
-    size = int(included.sum())
-    distinct, point_of_run = np.unique(points, axis=0, return_inverse=True)
-    if np.linalg.matrix_rank(model) < size:
+    names, block = ((), np.zeros(observed.size, dtype=np.int64)) if blocks is None else used_blocks(blocks, values)
+    model = np.column_stack([second_order_terms(points)[:, included], block_columns(block, len(names))])
+    size, columns = int(included.sum()), model.shape[1]
+    distinct, point_of_run = np.unique(np.column_stack([points, block]), axis=0, return_inverse=True)
+    if np.linalg.matrix_rank(model) < columns:
         order = "second-order model" if terms is None else "model"
+        beside = f" beside {len(names)} blocks" if names else ""
         raise StatisticsError(
             f"responses: the {len(distinct)} distinct points with a valid run cannot separate the "
-            f"{size} terms of the {order}"
+            f"{size} terms of the {order}{beside}"
         )
-    df = observed.size - size
+    df = observed.size - columns
     if df < 1:
-        raise StatisticsError(f"responses: {observed.size} valid runs leave no error; {size + 1} are needed")
+        raise StatisticsError(f"responses: {observed.size} valid runs leave no error; {columns + 1} are needed")
     found = least_squares(model, observed)
     predicted = model @ found.params + observed[0]
     coefficients, padded = np.zeros(included.size), np.zeros((included.size, included.size))
-    coefficients[included], padded[np.ix_(included, included)] = found.params, found.normalized_cov_params
+    coefficients[included] = found.params[:size]
+    padded[np.ix_(included, included)] = found.normalized_cov_params[:size, :size]
     coefficients[0] += observed[0]
+    effects = found.params[size:]
     return Surface(
         region=region,
         terms=term_names(region.names),
@@ -131,7 +161,33 @@ def fit_surface(
         predicted=predicted,
         leverage=found.get_influence().hat_matrix_diag,
         missing_runs=int(values.size - observed.size),
+        block_names=names,
+        block_effects=np.append(effects, -effects.sum()) if names else np.zeros(0),
+        block_of_run=block if names else np.zeros(0, dtype=np.int64),
     )
+
+
+def used_blocks(blocks: Blocks, values: FloatArray) -> tuple[tuple[str, ...], IntArray]:
+    """Return the names of the blocks that have a valid run, and each valid run's number among them.
+
+    Raises StatisticsError where there is only one, which is no block.
+    """
+    found, number = np.unique(blocks.of_run[~np.isnan(values)], return_inverse=True)
+    names = tuple(blocks.names[k] for k in found)
+    if len(names) < 2:
+        raise StatisticsError(f"blocks: every valid run is in block {names[0]!r}; at least two blocks are needed")
+    return names, number.reshape(-1).astype(np.int64)
+
+
+def block_columns(block: IntArray, number: int) -> FloatArray:
+    """Return the columns of blocks 0 … number - 2 by effects that sum to zero, shape (n, number - 1): 1 in the block,
+    -1 in the last one; none for fewer than two blocks.
+    """
+    if number < 2:
+        return np.zeros((block.size, 0))
+    columns = (block[:, None] == np.arange(number - 1)).astype(np.float64)
+    columns[block == number - 1] = -1.0
+    return columns
 
 
 def included_terms(names: Sequence[str], terms: Sequence[str] | None) -> BoolArray:

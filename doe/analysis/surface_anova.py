@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import stats
 
-from doe.analysis.surface import Surface, least_squares, second_order_terms
+from doe.analysis.surface import Surface, least_squares
 from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
@@ -41,9 +41,10 @@ class AnovaRow(Record):
 class SurfaceAnova(Record):
     """ANOVA table and fit statistics of a surface.
 
-    rows: model, every term, residual, lack of fit, pure error, total. sigma = sqrt(MSE), unit of the
-    response. studentized_residuals: external, shape (runs,). better_than_noise: model p < 0.05 and predicted
-    R^2 > 0.
+    rows: block where there are any, model (without them), every term, residual, lack of fit, pure error, total. R^2
+    counts what blocks explain as explained. sigma = sqrt(MSE), unit of the response. studentized_residuals: external,
+    shape (runs,). better_than_noise: model p < 0.05 and predicted R^2 > 0; by p alone where a run is indispensable to
+    the fit, for then no R^2 can be predicted (NaN).
     """
 
     rows: tuple[AnovaRow, ...]
@@ -74,40 +75,45 @@ def analyse_surface(surface: Surface) -> SurfaceAnova:
 
     A response without variation gives NaN for every ratio, and a note.
     """
-    model = second_order_terms(surface.points)[:, surface.included]
+    model = surface.model_matrix
     found = least_squares(model, surface.observed)
     residuals = surface.observed - surface.predicted
     n, p = model.shape
     mean = float(surface.observed.mean())
     residual_ss = float(found.ssr)
     total_ss = _total_sum_of_squares(surface.observed)
-    model_ss = max(0.0, total_ss - residual_ss)
+    block_rows = _block(surface, total_ss)
+    explained_ss = max(0.0, total_ss - residual_ss)
+    model_ss = max(0.0, explained_ss - sum(row.sum_of_squares for row in block_rows))
     mse = surface.mse if total_ss > 0 else 0.0
-    model_row = _tested("model", model_ss, p - 1, mse, surface.df_residual)
     chosen = np.flatnonzero(surface.included)[1:]
-    term_ss = found.params[1:] ** 2 / np.diag(found.normalized_cov_params)[1:]
+    model_row = _tested("model", model_ss, len(chosen), mse, surface.df_residual)
+    of_terms = slice(1, 1 + len(chosen))
+    term_ss = found.params[of_terms] ** 2 / np.diag(found.normalized_cov_params)[of_terms]
     term_rows = [
         _tested(surface.terms[k], float(ss) if total_ss > 0 else 0.0, 1, mse, surface.df_residual)
         for k, ss in zip(chosen, term_ss, strict=True)
     ]
     influence = found.get_influence()
     # A run that is indispensable to the fit cannot be predicted from the others.
-    press = math.inf if (surface.leverage > FULL).any() else float((influence.resid_press**2).sum())
-    predicted_r2 = _ratio(total_ss - press, total_ss)
+    indispensable = bool((surface.leverage > FULL).any())
+    press = math.inf if indispensable else float((influence.resid_press**2).sum())
+    predicted_r2 = math.nan if indispensable else _ratio(total_ss - press, total_ss)
     rows = (
+        *block_rows,
         model_row,
         *term_rows,
         AnovaRow("residual", residual_ss, surface.df_residual, mse, math.nan, math.nan),
         *_lack_of_fit(surface, residual_ss),
         AnovaRow("total", total_ss, n - 1, total_ss / (n - 1), math.nan, math.nan),
     )
-    better = bool(model_row.p < 0.05 and predicted_r2 > 0)
+    better = bool(model_row.p < 0.05 and (indispensable or predicted_r2 > 0))
     return SurfaceAnova(
         rows=rows,
         mean=mean,
         sigma=math.sqrt(mse),
         cv_percent=_ratio(100 * math.sqrt(mse), abs(mean)),
-        r_squared=_ratio(model_ss, total_ss),
+        r_squared=_ratio(explained_ss, total_ss),
         r_squared_adjusted=1 - _ratio(mse * (n - 1), total_ss),
         r_squared_predicted=predicted_r2,
         r_squared_predicted_by_row=1 - _ratio(_press_by_row(surface, residuals), total_ss),
@@ -136,6 +142,19 @@ def _tested(source: str, sum_of_squares: float, df: int, error_ms: float, error_
     return AnovaRow(source, sum_of_squares, df, sum_of_squares / df, f, float(stats.f.sf(f, df, error_df)))
 
 
+def _block(surface: Surface, total_ss: float) -> tuple[AnovaRow, ...]:
+    """Return the row "block", between the means of the blocks and before all terms; untested, as blocks were not drawn
+    at random (Box, Hunter and Hunter 2005, ch. 4).
+    """
+    if not surface.block_names:
+        return ()
+    counts = np.bincount(surface.block_of_run)
+    means = np.bincount(surface.block_of_run, weights=surface.observed) / counts
+    between = float(counts @ (means - surface.observed.mean()) ** 2) if total_ss > 0 else 0.0
+    df = counts.size - 1
+    return (AnovaRow("block", between, df, between / df, math.nan, math.nan),)
+
+
 def _lack_of_fit(surface: Surface, residual_ss: float) -> tuple[AnovaRow, ...]:
     """Return the rows "lack_of_fit" and "pure_error" as far as they have degrees of freedom.
 
@@ -146,7 +165,7 @@ def _lack_of_fit(surface: Surface, residual_ss: float) -> tuple[AnovaRow, ...]:
     within = surface.observed - means[surface.point_of_run]
     within[np.abs(within) <= 8 * np.finfo(np.float64).eps * np.abs(surface.observed)] = 0.0
     pure_ss, pure_df = float(within @ within), int(surface.observed.size - counts.size)
-    lack_ss, lack_df = max(0.0, residual_ss - pure_ss), int(counts.size - surface.included.sum())
+    lack_ss, lack_df = max(0.0, residual_ss - pure_ss), int(surface.df_residual - pure_df)
     rows = []
     if lack_df > 0 and pure_df > 0:
         rows.append(_tested("lack_of_fit", lack_ss, lack_df, pure_ss / pure_df, pure_df))
@@ -158,16 +177,17 @@ def _lack_of_fit(surface: Surface, residual_ss: float) -> tuple[AnovaRow, ...]:
 def _press_by_row(surface: Surface, residuals: FloatArray) -> float:
     """Return the sum of squared errors when each row of the design is predicted from all others.
 
-    With H the hat matrix of the runs of a row, their left-out residuals are (I - H)^-1 e. Infinite when a row
-    is indispensable to the fit.
+    With H the hat matrix of the runs of a row, their left-out residuals are (I - H)^-1 e. NaN when a row is
+    indispensable to the fit.
     """
-    model = second_order_terms(surface.points)
+    model = surface.model_matrix
+    inverse = np.linalg.inv(model.T @ model)
     total = 0.0
     for row in np.unique(surface.row_of_run):
         runs = surface.row_of_run == row
-        kept = np.eye(int(runs.sum())) - model[runs] @ surface.information_inverse @ model[runs].T
+        kept = np.eye(int(runs.sum())) - model[runs] @ inverse @ model[runs].T
         if np.linalg.matrix_rank(kept, tol=1e-9) < kept.shape[0]:
-            return math.inf
+            return math.nan
         left_out = np.linalg.solve(kept, residuals[runs])
         total += float(left_out @ left_out)
     return total
@@ -195,9 +215,10 @@ def _notes(
     if total_ss == 0:
         return ("The response is the same in every run; there is nothing to fit.",)
     if not better_than_noise:
+        predicted = "" if math.isnan(predicted_r2) else f", predicted R² = {predicted_r2:.3g}"
         notes.append(
-            f"The surface is not better than noise (model p = {by_source['model'].p:.3g}, predicted R² = "
-            f"{predicted_r2:.3g}); nothing may be read from its shape."
+            f"The surface is not better than noise (model p = {by_source['model'].p:.3g}{predicted}); nothing may be "
+            "read from its shape."
         )
     if "pure_error" not in by_source:
         notes.append("No point has two valid runs; lack of fit cannot be tested.")

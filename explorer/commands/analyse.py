@@ -17,6 +17,7 @@ def analyse(
     model: ModelOrder | None = typer.Option(None, help="By default the highest order that the runs can bear."),
     terms: str = typer.Option("", metavar="A,B,A*B,…", help="Instead of an order, the terms; what they need is added."),
     only: str = typer.Option("", metavar="NAME,…", help="Only these factors; the others count as scatter."),
+    block: str = typer.Option("", metavar="NAME", help="Column of days, batches or operators: a fixed effect each."),
     factors: str | None = typer.Option(None, metavar="FILE", help="Factors file, for a sheet that declares none."),
     out: Path | None = typer.Option(
         None, metavar="DIR", help="New folder for result.json, the report, its figures and data."
@@ -45,6 +46,7 @@ def analyse(
         order=model,
         terms=_names(terms),
         only=_names(only),
+        block=block,
         out=out,
         author=author,
         notes=notes,

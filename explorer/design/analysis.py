@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from doe.analysis.analyse import ResponseTarget, analyse_design
+from doe.analysis.analyse import DesignAnalysis, ResponseTarget, analyse_design
 from doe.analysis.models import ORDERS, Order
+from doe.analysis.steepest_ascent import Region
+from doe.analysis.surface_anova import FULL
 from doe.designs import DESIGNS, factor_letters
 from doe.errors import StatisticsError
 from explorer.design.choices import ModelOrder
@@ -22,6 +26,17 @@ from explorer.files.run_folder import appearing, json_text
 from explorer.files.run_result import made_today, versions
 from explorer.units import own_path
 from solver.assets import asset_path
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+RARE = 0.01
+"""p below which an order of residuals is worth a note."""
+SAME = 1e-9
+"""Coded levels that differ by less are one."""
+FAR = 2.5
+"""Half-widths from the middle of a factor's range beyond which a level is likely a slip: the star points of rotatable
+central composite designs of up to five factors stand 2^(5/4) = 2.4 out (Box and Hunter 1957, Ann. Math. Stat. 28,
+195)."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +51,8 @@ class AnalyseOrder:
     order: ModelOrder | None = None
     terms: tuple[str, ...] = ()
     only: tuple[str, ...] = ()
+    block: str = ""
+    """Column of the block in which each run was made."""
     out: Path | None = field(default=None)
     author: str = ""
     notes: str = ""
@@ -49,7 +66,8 @@ def run_analyse(order: AnalyseOrder) -> DesignResult:
     path = asset_path("runs", order.sheet)
     factors = read_factors(asset_path("designs", order.factors)).factors if order.factors else ()
     sheet = read_sheet(path, factors)
-    runs = runs_of(sheet, order.response or _only_response(sheet.path, sheet.responses), order.only)
+    responses = [name for name in sheet.responses if name != order.block and not sheet.is_words(name)]
+    runs = runs_of(sheet, order.response or _only_response(sheet.path, responses), order.only, order.block)
     result = analyse_runs(runs, order)
     if order.out is not None:
         with appearing(order.out) as folder:
@@ -60,11 +78,12 @@ def run_analyse(order: AnalyseOrder) -> DesignResult:
 def analyse_runs(runs: Runs, order: AnalyseOrder) -> DesignResult:
     """The analysis of one response."""
     region = region_of(runs.factors)
+    _refuse_dependent(runs, region, order.sheet)
     reference = np.array([factor.reference for factor in runs.factors])
     target = None if order.target is None else ResponseTarget(order.target, order.target_error, reference)
     try:
         found = analyse_design(
-            runs.coded, runs.responses, region, _order(runs, order), _symbols(runs, order.terms), target
+            runs.coded, runs.responses, region, _order(runs, order), _symbols(runs, order.terms), target, runs.blocks
         )
     except StatisticsError as error:
         raise CommandError(f"{order.sheet}, column {runs.response}: {error}") from None
@@ -77,11 +96,103 @@ def analyse_runs(runs: Runs, order: AnalyseOrder) -> DesignResult:
         factors=_factors(runs),
         coded=runs.coded,
         target=order.target,
-        analysis=found,
+        analysis=replace(found, notes=(*found.notes, *_run_notes(runs, region, found))),
         command=_command(order),
         versions=versions(),
         about=made_today(order.author, order.notes),
     )
+
+
+def _refuse_dependent(runs: Runs, region: Region, sheet: str) -> None:
+    """Raise CommandError where the levels of the valid runs do not tell the factors apart, and name those."""
+    valid = ~np.isnan(runs.responses).all(axis=1)
+    levels = region.natural(runs.coded[valid])
+    names = [factor.name for factor in runs.factors]
+    spread = np.ptp(runs.coded[valid], axis=0)
+    for name, level, width in zip(names, levels[0], spread, strict=True):
+        if width < SAME:
+            raise CommandError(
+                f"{sheet}, column {name}: is {level:.6g} in every run with a result, so that nothing tells what it "
+                f"does; allowed: leave it out with --only {','.join(one for one in names if one != name)}"
+            )
+    if int(valid.sum()) <= len(names):
+        return  # too few runs for anything, which is told where the model is fitted
+    centred = (runs.coded[valid] - runs.coded[valid].mean(axis=0)) / spread
+    *_, singular, vectors = np.linalg.svd(centred, full_matrices=True)
+    if singular[-1] > SAME * singular[0]:
+        return
+    tied = [k for k in range(len(names)) if abs(vectors[-1, k]) > SAME]
+    listed = " and ".join([", ".join(names[k] for k in tied[:-1]), names[tied[-1]]])
+    sums = levels[:, tied].sum(axis=1)
+    if np.ptp(sums) < SAME * np.abs(levels).max():
+        what = f"{listed} add up to {sums[0]:.6g} in every run: a mixture, of which one part follows from the others"
+    else:
+        what = f"{listed} change together in every run, so that their effects cannot be told apart"
+    kept = [name for k, name in enumerate(names) if k != tied[-1]]
+    raise CommandError(f"{sheet}: {what}; allowed: leave one out, as with --only {','.join(kept)}")
+
+
+def _run_notes(runs: Runs, region: Region, found: DesignAnalysis) -> list[str]:
+    """What single runs ask for: levels far outside a factor's range, and runs without which there is no model."""
+    row, replicate = np.nonzero(~np.isnan(runs.responses))
+    labels, notes = _labels(runs), []
+    for label, k in zip(labels, row, strict=True):
+        for factor, coded, level in zip(runs.factors, runs.coded[k], region.natural(runs.coded[k]), strict=True):
+            if abs(coded) > FAR:
+                notes.append(
+                    f"{label}: {factor.name} is {level:.6g}, {abs(coded):.1f} half-widths from the middle of "
+                    f"{factor.low:g} … {factor.high:g}: a slip? One such level decides the whole model."
+                )
+    if runs.grouping and runs.blocks is None:
+        notes.append(
+            f"Not used: {', '.join(runs.grouping)}. A column that says on which day, from which batch or by whom a run "
+            "was made goes into --block."
+        )
+    if found.model is not None:
+        model = found.model.surface
+        if runs.place.size:
+            notes += _drift(runs.place[row, replicate], model.observed - model.predicted)
+        alone = [label for label, h in zip(labels, found.model.surface.leverage, strict=True) if h > FULL]
+        if alone:
+            one = len(alone) == 1
+            notes.append(
+                f"{'Run' if one else 'Runs'} {', '.join(alone)}: without {'it' if one else 'any of them'} this model "
+                f"cannot be fitted, so {'it is' if one else 'they are'} fitted exactly, nothing checks "
+                f"{'it' if one else 'them'}, and no R² can be predicted. Repeat {'it' if one else 'them'}, fill the "
+                "lost cells, or take a smaller model (--model interactions)."
+            )
+    return notes
+
+
+def _drift(place: IntArray, residual: Array) -> list[str]:
+    """A note where the residuals, in the order of the runs, change their sign too rarely for chance.
+
+    R runs of one sign among n₊ positive and n₋ negative residuals; P(R ≤ r) counts arrangements (Wald and Wolfowitz
+    1940, Ann. Math. Stat. 11:147).
+    """
+    signs = residual[np.argsort(place, kind="stable")]
+    signs = np.sign(signs[np.abs(signs) > SAME * np.abs(residual).max(initial=0.0)])
+    plus, minus = int((signs > 0).sum()), int((signs < 0).sum())
+    if not plus or not minus:
+        return []
+    stretches = 1 + int((signs[1:] != signs[:-1]).sum())
+
+    def arrangements(r: int) -> int:
+        half, odd = divmod(r, 2)
+        if not odd:
+            return 2 * math.comb(plus - 1, half - 1) * math.comb(minus - 1, half - 1)
+        return math.comb(plus - 1, half) * math.comb(minus - 1, half - 1) + math.comb(plus - 1, half - 1) * math.comb(
+            minus - 1, half
+        )
+
+    p = sum(arrangements(r) for r in range(2, stretches + 1)) / math.comb(plus + minus, plus)
+    if p >= RARE:
+        return []
+    return [
+        f"In the order of the runs the residuals change their sign {stretches - 1} times, too rarely for chance "
+        f"(p = {p:.2g}): something drifted, or a day, a batch or a person changed. A column that says which goes into "
+        "--block."
+    ]
 
 
 def _order(runs: Runs, order: AnalyseOrder) -> Order | None:
@@ -164,6 +275,7 @@ def _command(order: AnalyseOrder) -> tuple[str, ...]:
         ("--model", order.order, str),
         ("--terms", order.terms, ",".join),
         ("--only", order.only, ",".join),
+        ("--block", order.block, str),
     ]
     for option, value, write in options:
         if value is not None and value not in ("", ()):

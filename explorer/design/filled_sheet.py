@@ -9,13 +9,15 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
+from doe.analysis.surface import Blocks
 from doe.errors import StudyFileError
 from doe.table_file import CellTable, read_table
 from explorer.design.factors_file import RESERVED, DesignFactor, make_factor, no_repeats, region_of
@@ -46,6 +48,11 @@ class Sheet:
     cells: tuple[tuple[str, ...], ...]
     lines: tuple[int, ...]
     table: CellTable
+
+    def is_words(self, column: str) -> bool:
+        """Whether every filled cell of ``column``, and there are any, is no number."""
+        filled = [cell for row in self.cells if (cell := row[self.columns[column]]) not in EMPTY_CELLS]
+        return bool(filled) and all(math.isnan(self.table.number(cell)) for cell in filled)
 
     @property
     def responses(self) -> list[str]:
@@ -160,11 +167,23 @@ class Runs:
     responses: Array
     labels: tuple[tuple[str, ...], ...]
     missing: int
+    place: npt.NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 0), dtype=np.int64))
+    """When each run was made, (rows, replicates): its number in the column "run", else its place in the file."""
+    blocks: Blocks | None = None
+    """In which each run was made; None where no column says."""
+    grouping: tuple[str, ...] = ()
+    """Columns without a use whose cells repeat, as those of days, batches or operators do."""
 
 
-def runs_of(sheet: Sheet, response: str, only: Sequence[str] = ()) -> Runs:
-    """The runs of one response, with all factors or with ``only`` some; raises CommandError as `read_sheet` does."""
+def runs_of(sheet: Sheet, response: str, only: Sequence[str] = (), block: str = "") -> Runs:
+    """The runs of one response, with all factors or with ``only`` some, and in the blocks of a column.
+
+    Raises CommandError as `read_sheet` does.
+    """
     factors = _kept(sheet, only)
+    if block and (block not in sheet.columns or block == response or block in [factor.name for factor in factors]):
+        offered = ", ".join(name for name in sheet.responses if name != response) or "none"
+        raise CommandError(f"{sheet.path}: --block {block}: no column of blocks; the other columns are {offered}")
     _check_words(sheet, response)
     if response not in sheet.responses:
         offered = ", ".join(sheet.responses) or "none"
@@ -179,10 +198,15 @@ def runs_of(sheet: Sheet, response: str, only: Sequence[str] = ()) -> Runs:
     width = max(map(len, rows))
     responses = np.full((len(rows), width), np.nan)
     labels = [[""] * width for _ in rows]
+    names = _block_names(sheet, block, [int(used[member]) for members in rows for member in members])
+    in_block, place = np.zeros((len(rows), width), dtype=np.int64), np.zeros((len(rows), width), dtype=np.int64)
     for row, members in enumerate(rows):
         for replicate, member in enumerate(members):
             responses[row, replicate] = values[used[member]]
             labels[row][replicate] = _label(sheet, int(used[member]))
+            place[row, replicate] = _place(sheet, int(used[member]))
+            if block:
+                in_block[row, replicate] = names.index(sheet.cells[used[member]][sheet.columns[block]])
     return Runs(
         design=sheet.design,
         factors=factors,
@@ -192,7 +216,20 @@ def runs_of(sheet: Sheet, response: str, only: Sequence[str] = ()) -> Runs:
         responses=responses,
         labels=tuple(map(tuple, labels)),
         missing=sum(map(math.isnan, values)),
+        blocks=Blocks(names, in_block) if block else None,
+        place=place,
+        grouping=tuple(name for name in sheet.responses if name not in (response, block) and _groups(sheet, name)),
     )
+
+
+def _block_names(sheet: Sheet, block: str, positions: Sequence[int]) -> tuple[str, ...]:
+    """What the blocks of the runs at ``positions`` are called, in the order of the sheet."""
+    if not block:
+        return ()
+    for position in positions:
+        if sheet.cells[position][sheet.columns[block]] in EMPTY_CELLS:
+            raise CommandError(f"{sheet.path}, line {sheet.lines[position]}, column {block}: is empty; allowed: a name")
+    return tuple(dict.fromkeys(sheet.cells[position][sheet.columns[block]] for position in sorted(positions)))
 
 
 def _check_words(sheet: Sheet, response: str) -> None:
@@ -243,6 +280,18 @@ def _rows(sheet: Sheet, used: npt.NDArray[np.int64], coded: Array) -> list[list[
     rows = [members[number] for number in sorted(members)] if not any(map(math.isnan, numbers)) else []
     same = all((coded[row] == coded[row[0]]).all() for row in rows)
     return rows if rows and same else [[k] for k in range(len(used))]
+
+
+def _groups(sheet: Sheet, column: str) -> bool:
+    """Whether the cells of ``column`` fall into a few groups, each of several runs."""
+    cells = [row[sheet.columns[column]] for row in sheet.cells]
+    counts = Counter(cell for cell in cells if cell not in EMPTY_CELLS)
+    return len(counts) > 1 and min(counts.values()) > 1
+
+
+def _place(sheet: Sheet, position: int) -> int:
+    number = sheet.number(position, "run") if "run" in sheet.columns else math.nan
+    return position if math.isnan(number) else int(number)
 
 
 def _label(sheet: Sheet, position: int) -> str:

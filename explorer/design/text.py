@@ -18,7 +18,7 @@ from explorer.design.factors_file import FactorsFile, region_of
 from explorer.design.result import DesignResult
 from explorer.design.run_plan import RunPlan
 from explorer.report.content import Facts, Table
-from explorer.report.design.model import curvature, diagnostics, effect_table, fit_summary
+from explorer.report.design.model import curvature, diagnostics, effect_table, few_terms_table, fit_summary
 from explorer.report.design.sections import factor_table, in_short, settings_table, shape, target
 from explorer.report.sections.surface import anova_table
 from explorer.tables.text_table import text_table
@@ -131,6 +131,8 @@ def analysis_text(result: DesignResult) -> str:
     found, effects = result.analysis, result.effects
     if effects is not None:
         parts.append(_table(effect_table(effects)))
+        if found.effects is not None and found.effects.few_terms:
+            parts.append(_table(few_terms_table(found.effects.few_terms)))
         if effects.curvature is not None:
             parts.append(curvature(effects.curvature, effects.response))
     if found.model is not None:

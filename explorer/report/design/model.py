@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from doe.analysis.analyse import DesignAnalysis, FittedModel
 from doe.analysis.contrasts import Curvature
+from doe.analysis.few_terms import FewTermsModel
 from doe.analysis.model_adequacy import BoxCox, Diagnostics
 from doe.analysis.screening import FactorEffect
 from explorer.design.result import DesignResult, DrawnEffects, SheetFactor
@@ -19,6 +20,8 @@ from explorer.report.figures.surface import contours, fit, height_over, residual
 from explorer.report.sections.surface import anova_table, equation
 from explorer.units import MISSING, enumeration, fixed, number, observed, p_value, signed
 
+MOST_ALIASES = 4
+"""Effects that share a column and are listed by name."""
 MOST_DRAWN = 40
 """Contrasts in a chart; the table has all."""
 
@@ -52,6 +55,8 @@ def effects(result: DesignResult) -> Section | None:
             Figure("main-effects", chart, f"{n}. The largest ones; whiskers: 95 % intervals (t); dotted: mean.")
         )
     blocks.append(effect_table(part))
+    if result.analysis.effects is not None and result.analysis.effects.few_terms:
+        blocks += [Text("Few terms that explain the runs:"), few_terms_table(result.analysis.effects.few_terms)]
     if part.curvature is not None:
         blocks.append(Text(curvature(part.curvature, part.response)))
     if part.analysis.notes:
@@ -74,7 +79,7 @@ def effect_table(part: DrawnEffects) -> Table:
         rows.append(
             (
                 name.replace("*", " × ") + (" (error)" if effect.is_dummy else ""),
-                ", ".join(part.aliases.get(name, ())).replace("*", " × ").replace("-", "−") or MISSING,
+                also_holds(part.aliases.get(name, ())),
                 signed(effect.effect, 4),
                 number(effect.sum_of_squares, 5),
                 fixed(effect.contribution_percent, 2),
@@ -89,6 +94,36 @@ def effect_table(part: DrawnEffects) -> Table:
     )
     caption = "Sums of squares of row means; p columns: against the columns marked as error."
     return Table(header, tuple(rows), caption)
+
+
+def also_holds(aliases: Sequence[str]) -> str:
+    """What else stands on the column of an effect; many parts of one size are counted."""
+    parts = {one.lstrip("-").partition(" ")[0] for one in aliases if " " in one}
+    if len(aliases) > MOST_ALIASES and len(parts) == 1:
+        return f"±{parts.pop()} of {len(aliases)} interactions"
+    return ", ".join(aliases).replace("*", " × ").replace("-", "−") or MISSING
+
+
+def few_terms_table(models: Sequence[FewTermsModel]) -> Table:
+    """Models of few terms, the best first."""
+    rows = tuple(
+        (
+            " ".join(
+                f"{signed(b, 4)} {term.replace('*', ' × ')}"
+                for term, b in zip(one.terms, one.coefficients[1:], strict=True)
+            ),
+            *(fixed(value, 4) for value in (one.r_squared, one.r_squared_adjusted)),
+            fixed(one.aicc, 1),
+            p_value(one.p),
+        )
+        for one in models
+    )
+    caption = (
+        "Searched among all models of up to three main effects and interactions, each interaction beside one of its "
+        "factors; coefficients, coded. p: share of permuted responses whose best model of that size explains as much. "
+        "Runs that tell them apart should confirm the choice."
+    )
+    return Table(("model", "R²", "adjusted", "AICc", "p"), rows, caption)
 
 
 def curvature(found: Curvature, response: str) -> str:
@@ -282,7 +317,7 @@ def box_cox_words(found: BoxCox) -> str:
         f"{number(power)} or beyond" if power in ends else number(power)
         for power in (found.best, found.low, found.high)
     )
-    where = f"best power {best}, 95 % {low} … {high}"
+    where = f"best power {best}, 95 % {low} … {high} (t² of the residual degrees of freedom)"
     if found.suggestion == "none":
         return f"{where}; it holds 1, so the response stays as it is"
     return f"{where}; it does not hold 1: {found.suggestion} would fit better"

@@ -22,9 +22,20 @@ from explorer.report.figures.surface import solutions
 from explorer.report.identified import GIVES_TARGET, cloud_caution, rule, settings
 from explorer.report.sections.answer import ranges_caption
 from explorer.report.sections.surface import equation
-from explorer.units import MISSING, enumeration, fixed, number, observed, parameter_label, parameter_value, percent
+from explorer.units import (
+    MISSING,
+    enumeration,
+    fixed,
+    number,
+    observed,
+    p_value,
+    parameter_label,
+    parameter_value,
+    percent,
+    signed,
+)
 
-WHOLE = ("model", "residual", "lack_of_fit", "pure_error", "total")
+WHOLE = ("block", "model", "residual", "lack_of_fit", "pure_error", "total")
 """Rows of an analysis of variance that are no terms."""
 MOST_PANELS = 3
 """Factors up to which every pair of them has a panel."""
@@ -223,8 +234,23 @@ def in_short(result: DesignResult) -> Section:
     facts = [("Runs", f"{runs.valid} with a result at {runs.rows} rows, {runs.missing} without")]
     if found.effects is not None:
         facts.append(("Factors that act", acting(found.effects.screening)))
+        if found.effects.few_terms:
+            best = found.effects.few_terms[0]
+            terms = enumeration([term.replace("*", " × ") for term in best.terms])
+            facts.append(
+                (
+                    "Few terms that explain the runs",
+                    f"{terms}: R² {fixed(best.r_squared)}, p = {p_value(best.p)} by permutation of a search that takes "
+                    "interactions; confirm it by further runs",
+                )
+            )
     if found.model is not None:
         anova = found.model.anova
+        surface = found.model.surface
+        if surface.block_names:
+            effects = zip(surface.block_names, surface.block_effects, strict=True)
+            told = ", ".join(f"{name} {signed(effect)}" for name, effect in effects)
+            facts.append(("Blocks", f"{told}; they add up to zero, and the model is their mean"))
         if found.effects is None:
             facts.append(("Terms that act", terms_that_act(anova)))
         coded, actual = equation(found.model.surface, result.factors, response)

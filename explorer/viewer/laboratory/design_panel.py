@@ -53,6 +53,9 @@ class DesignPanel(Panel):
             )
             self._response = gui.add_text("Response", "", hint="Column to analyse; empty where there is only one.")
             self._target = gui.add_text("Target", "", hint="Value that the response should have; empty: none.")
+            self._block = gui.add_text(
+                "Block", "", hint="Column of days, batches or operators; empty: none. Each has an effect of its own."
+            )
             analyse = gui.add_button("Analyse", hint="Effects, equations, ANOVA, diagnostics, canonical analysis.")
             self.analysis = AnswerView(server, FILLED, post, charts=True, reports=page.project.laboratory)
         self._kind.on_update(lambda event: post(self._follow) if event.client_id is not None else None)
@@ -83,5 +86,6 @@ class DesignPanel(Panel):
 
     def _analyse(self) -> None:
         target = number_or_none(str(self._target.value), "target")
-        order = AnalyseOrder(self._filled.chosen, str(self._response.value).strip(), target)
+        response, block = (str(one.value).strip() for one in (self._response, self._block))
+        order = AnalyseOrder(self._filled.chosen, response, target, block=block)
         self._background.start("analysing the sheet", lambda: analysis_result(order), self.analysis.show)

@@ -261,6 +261,7 @@ def test_a_run_that_the_fit_cannot_do_without_has_no_left_out_residual(recwarn):
     responses = np.array([[1.0, np.nan], [2.0, np.nan], [4.0, np.nan], [3.0, np.nan], [2.5, 2.7], [2.2, np.nan]])
     anova = analyse_surface(fit_surface(points, responses, Region(("a", "b"), np.zeros(2), np.ones(2), ())))
     assert anova.press == np.inf
-    assert anova.r_squared_predicted == -np.inf
+    assert np.isnan(anova.r_squared_predicted)
+    assert np.isnan(anova.r_squared_predicted_by_row)
     assert not anova.better_than_noise
     assert not [warning for warning in recwarn if issubclass(warning.category, RuntimeWarning)]

@@ -196,6 +196,8 @@ def test_a_sheet_is_made_and_a_filled_one_analysed(bench):
     assert "Contours" in bench.design.analysis._plots._choice.options
     bench.design._target.value = "steep"
     assert "target 'steep'" in bench.do(bench.design._analyse)
+    bench.design._target.value, bench.design._block.value = "", "shift"
+    assert "--block shift: no column of blocks" in bench.do(bench.design._analyse)
 
 
 def test_an_audit_of_the_shipped_article_and_of_an_archive(bench):
