@@ -7,7 +7,7 @@ import pytest
 
 from doe.audit.printed import most_agreed, printed, rounding_slack
 from doe.audit.restitution_formula import evaluated, flight, names_in
-from doe.audit.surface_refit import source_name
+from doe.audit.anova_table import source_name
 from doe.errors import AuditError
 
 
