@@ -142,8 +142,8 @@ def require_degrees(lines: Sequence[Line], terms: Sequence[str], factors: tuple[
         wanted = expected.get(line.role, len(line.terms) or None)
         if line.df is not None and wanted is not None and line.df != wanted:
             raise StatisticsError(
-                f"degrees of freedom do not fit: {line.printed.source} has {line.df:g} in the table, but {wanted} if the "
-                f"model has the {len(terms)} terms that the table names ({', '.join(terms)}) and {runs} runs were made"
+                f"degrees of freedom do not fit: {line.printed.source} has {line.df:g} in the table, but {wanted} with "
+                f"{runs} runs and the {len(terms)} terms that it names ({', '.join(terms)})"
             )
     settled = any(line.role in ("model", "residual") and line.df is not None for line in lines)
     if not settled and len(terms) + 1 < len(term_names(factors)):
@@ -330,7 +330,7 @@ def _p_value(line: Line, error: Line, ratios: list[Interval], point: float | Non
     tails = [tuple(float(stats.f.sf(max(0.0, end), *df)) for end in (high, low)) for low, high in ratios]
     agrees = any(print_.meets((low, high)) for low, high in tails)
     value = f.value if f is not None and not f.bound else point
-    if agrees and (tails[0][0] == 0 and tails[0][1] == 1 or value is None):
+    if agrees and ((tails[0][0] == 0 and tails[0][1] == 1) or value is None):
         return None
     how = f"from {how}, on {df[0]:g} and {df[1]:g} degrees of freedom"
     interval = (min(low for low, _ in tails), max(high for _, high in tails))

@@ -202,7 +202,7 @@ def _optimum(study: PublishedStudy) -> Iterator[Finding]:
 
 
 def _verification(study: PublishedStudy) -> Iterator[Finding]:
-    if study.surface is not None and study.surface.responses:
+    if study.surface is not None:
         yield from check_runs_against_model(study.surface, study.ascent, study.optimum, study.verified)
     if study.verified is not None:
         yield from check_verification_error(study.verified, study.target)

@@ -59,13 +59,46 @@ PREDICTION = "prediction at the claimed optimum"
 ON = 1e-6
 """Coded distance within which a setting is on a corner or on a run."""
 LEVEL = 0.95
+AXIAL = 0.005
+"""How far two decimals move a coded distance."""
 
 
 def check_surface(study: SurfaceStudy) -> Iterator[Finding]:
     """All printed figures about a fit, and what its printed equation gives at the design's own runs.
 
-    The figures of the analysis of variance are held against one another first, which needs no runs.
+    The figures of the analysis of variance are held against one another first, which needs no runs. Axial points that
+    are printed with few digits (1.68) count as what they are rounded from (2^(3/4)) if more follows from that.
     """
+    found, design = list(_checked(study)), _unrounded_axes(study)
+    if design is not None:
+        other = list(_checked(replace(study, coded=design)))
+        if _misses(other) < _misses(found):
+            axes = f"axial points at ± {float(np.abs(design).max()):.4f}; {study.where_runs} prints fewer digits"
+            found = [*other, Remark(FROM_RUNS, study.where_anova, f"Its figures follow from {axes}.")]
+    yield from found
+
+
+def _misses(found: list[Finding]) -> tuple[int, int]:
+    """How many figures differ, and how many come out only with a slack."""
+    statuses = [one.status for one in found if isinstance(one, Figure)]
+    return statuses.count("differs"), statuses.count("only if rounded")
+
+
+def _unrounded_axes(study: SurfaceStudy) -> FloatArray | None:
+    """The design with the distance of a rotatable or spherical one, where its own is that but for the rounding."""
+    outside = np.abs(study.coded) > 1 + AXIAL
+    if not outside.any():
+        return None
+    k = len(study.factors)
+    known = [2.0 ** (corners / 4) for corners in range(2, k + 1)] + [k**0.5]
+    for distance in known:
+        off = np.abs(np.abs(study.coded[outside]) - distance)
+        if 0 < off.max() <= AXIAL:
+            return np.where(outside, np.sign(study.coded) * distance, study.coded)
+    return None
+
+
+def _checked(study: SurfaceStudy) -> Iterator[Finding]:
     lines = read_lines(study.anova, study.factors)
     judged, error = consistency(lines)
     try:
@@ -85,7 +118,7 @@ def check_optimum(optimum: Optimum, study: SurfaceStudy, target: Target | None) 
     """Prediction at the claimed optimum, and whether it lies where the design had runs."""
     surface = refit(study)
     point = surface.region.coded(values_of(optimum.values))
-    printed = optimum.predicted or (target and target.mean)
+    printed = optimum.predicted if target is None else optimum.predicted or target.mean
     if printed is None:
         yield unchecked(PREDICTION, optimum.where, "response", "neither a prediction nor a target is stated")
     else:
@@ -101,7 +134,10 @@ def check_runs_against_model(
     study: SurfaceStudy, ascent: Ascent | None, optimum: Optimum | None, verified: Verified | None
 ) -> Iterator[Finding]:
     """Runs outside the design, at settings that the model covers, against its prediction intervals."""
-    surface = refit(study)
+    try:
+        surface = refit(study)
+    except StatisticsError:
+        return  # `check_surface` has said why
     if ascent is not None and set(study.screened) <= set(ascent.factors):
         order = [ascent.factors.index(name) for name in study.screened]
         for step, setting, response in zip(ascent.steps, ascent.settings, ascent.responses, strict=True):

@@ -106,7 +106,7 @@ class TableRefit:
 
     def degrees(self, role: Role) -> int:
         """Degrees of freedom of a line that is no term."""
-        n, points = self._y.size, int(self.surface.point_of_run.max()) + 1
+        n, points = int(self._y.size), int(self.surface.point_of_run.max()) + 1
         p = len(self._names)
         known = {"model": p - 1, "residual": n - p, "lack_of_fit": points - p, "pure_error": n - points, "total": n - 1}
         return known.get(role, 0)

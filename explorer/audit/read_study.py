@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from doe.analysis.surface import term_names
 from doe.audit import Printed, PublishedStudy, printed, printed_or_none
+from doe.audit.anova_table import source_name
 from doe.audit.restitution_formula import names_in
 from doe.audit.study import (
     AnovaLine,
@@ -35,7 +36,6 @@ from doe.audit.study import (
     Total,
     Verified,
 )
-from doe.audit.anova_table import source_name
 from doe.audit.surface_refit import STATISTICS
 from doe.errors import AuditError
 from doe.table_file import read_table as read_cells
@@ -298,9 +298,8 @@ def read_surface(entries: TableEntries, folder: Path, ascent: Ascent | None) -> 
     high = np.array([one.number("high") for one in factors])
     if not (low < high).all():
         raise entries.error("factor", "low must be below high")
-    levels = np.empty((0, len(factors)))
-    if runs is not None:
-        levels = _numbers(runs, tuple(one.text("column") for one in factors))
+    columns = tuple(one.text("column", None if runs is not None else " ") for one in factors)
+    levels = np.empty((0, len(factors))) if runs is None else _numbers(runs, columns)
     screened = tuple(one.text("screened", name) for one, name in zip(factors, names, strict=True))
     for one in factors:
         one.finish()
@@ -340,8 +339,8 @@ def _steps(entries: TableEntries, ascent: Ascent | None) -> DesignSteps:
 
 
 def _anova_lines(table: PrintedTable) -> tuple[AnovaLine, ...]:
-    plain = {"".join(filter(str.isalnum, column.lower())): column for column in reversed(table.columns)}
-    found = {}
+    plain = {"".join(filter(str.isalnum, column.lower())): column for column in reversed([*table.columns])}
+    found: dict[str, str] = {}
     for figure, names in ANOVA_COLUMNS.items():
         column = next((plain[name] for name in names if name in plain), None)
         # "Seq SS" is the sum of squares where no other stands beside it.

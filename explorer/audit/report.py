@@ -27,10 +27,10 @@ HEADINGS: dict[Status, str] = {
 REPRODUCED: tuple[Status, ...] = ("reproduced exactly", "only if rounded")
 NOBODY = About()
 WHAT = (
-    "A figure is reproduced exactly if the recomputed value rounds to the print. The figures of an analysis of variance "
-    "are first held against one another, as far as the rounding of each allows, and then against the runs. What only "
-    "comes out if the runs, or other inputs, were rounded before they were printed is said to, with the slack that this "
-    "gives. Everything is recomputed from the publication's own tables; nothing is simulated."
+    "A figure is reproduced exactly if the recomputed value rounds to the print. The figures of an analysis of "
+    "variance are first held against one another, as far as the rounding of each allows, and then against the runs. "
+    "What comes out only if the runs, or other inputs, were rounded before they were printed is listed with the slack "
+    "that this gives. Everything is recomputed from the publication's own tables; nothing is simulated."
 )
 
 

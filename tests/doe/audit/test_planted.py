@@ -144,7 +144,7 @@ def r_squared(study):
 
 def coefficient(study):
     equation = study.surface.equation
-    wrong = printed(f"{equation.coefficients['A'].value + 0.012:.5f}")
+    wrong = printed(f"{equation.coefficients['A'].value + 0.03:.5f}")
     changed = replace(equation, coefficients={**equation.coefficients, "A": wrong})
     return replace(study, surfaces=(replace(study.surface, equation=changed),), optimum=None)
 
