@@ -39,7 +39,7 @@ WORDS: dict[Column, str] = {
     "p": "p",
 }
 NAMES: dict[str, tuple[str, ...]] = {
-    "model": ("model", "regression", "total_model", "total_regression", "total_regress"),
+    "model": ("model", "corrected_model", "regression", "total_model", "total_regression", "total_regress"),
     "residual": ("residual", "residuals", "residual_error", "total_error"),
     "lack_of_fit": ("lack_of_fit", "lof"),
     "pure_error": ("pure_error",),
@@ -99,6 +99,11 @@ def read_lines(anova: Sequence[AnovaLine], factors: tuple[str, ...]) -> tuple[Li
     if "error" in sources:
         error = "pure_error" if _is_pure(anova, sources, kinds) else "residual"
         sources = [error if source == "error" else source for source in sources]
+    totals = [line.source.strip().lower() for source, line in zip(sources, anova, strict=True) if source == "total"]
+    if len(set(totals)) > 1:
+        # SPSS has an uncorrected "Total" beside the "Corrected Total".
+        plain = [line.source.strip().lower() == "total" for line in anova]
+        sources = ["uncorrected_total" if other else name for name, other in zip(sources, plain, strict=True)]
     lines = []
     for source, line in zip(sources, anova, strict=True):
         if source in kinds:

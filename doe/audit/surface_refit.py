@@ -452,7 +452,7 @@ def _weights(study: SurfaceStudy, equation: Equation, coded: FloatArray) -> dict
 def _by_refit(optimum: Optimum, study: SurfaceStudy, surface: Surface, point: FloatArray, printed: Printed) -> Figure:
     value, error = float(surface.predict(point)), float(surface.standard_error(point))
     slack = _slack_of_setting(optimum, study, surface.predict)
-    of_runs = rounding_slack(
+    of_runs = worst_case(
         lambda y: np.array([float(refit(study, y).predict(point))]),
         values_of(study.responses),
         common_half(study.responses),

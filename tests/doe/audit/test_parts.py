@@ -197,6 +197,11 @@ def test_letters_and_numbers_of_factors_are_those_that_the_table_gives_them():
     assert lines_of("A-Temp", factors=("A", "B")) == [("term", "A")]
 
 
+def test_the_uncorrected_total_of_spss_is_no_total():
+    roles = [role for role, _ in lines_of("Corrected Model", "Temp", "Error", "Total", "Corrected Total")]
+    assert roles == ["model", "term", "residual", "other", "total"]
+
+
 def test_error_is_the_residual_unless_the_table_has_another():
     assert lines_of("Temp", "Error", "Total")[1] == ("residual", "residual")
     assert lines_of("Temp", "Error", "Lack-of-Fit", "Pure Error")[1] == ("residual", "residual")
