@@ -144,8 +144,8 @@ def r_squared(study):
 
 def coefficient(study):
     equation = study.surface.equation
-    wrong = printed(f"{equation.coefficients['A'].value + 0.03:.5f}")
-    changed = replace(equation, coefficients={**equation.coefficients, "A": wrong})
+    wrong = printed(f"{equation.coefficients['A*C'].value + 0.0019:.5f}")
+    changed = replace(equation, coefficients={**equation.coefficients, "A*C": wrong})
     return replace(study, surfaces=(replace(study.surface, equation=changed),), optimum=None)
 
 
@@ -181,7 +181,7 @@ PLANTED = {
     anova_cell: ("analysis of variance from the runs", "Table 8", "sum of squares of B"),
     anova_total: ("sums of squares add up", "Table 8", "sum of squares of total"),
     r_squared: ("statistics of the fit", "section 4", "R²"),
-    coefficient: ("printed equation", "Equation 5", "coefficient of A"),
+    coefficient: ("printed equation", "Equation 5", "coefficient of A*C"),
     verified_mean: ("mean of replicates", "Table 9", "mean response"),
     verified_p: ("two-sample t test", "Table 9", "p"),
 }
