@@ -359,3 +359,16 @@ def test_a_number_that_the_table_prints_as_something_else_is_told():
     (found,) = [f for f in audit_study(replace(study, quotes=(lost,))).figures if f.check == "values said twice"]
     assert (found.status, found.recomputed) == ("differs", among[0].value)
     assert found.how.endswith("it prints 0.31 as nu of seed")
+
+
+def test_without_a_target_all_that_needs_none_is_checked(clean):
+    audit = audit_study(replace(clean, target=None))
+    assert audit.having("differs") == ()
+    unchecked = {(figure.where, figure.quantity) for figure in audit.having("cannot be checked")}
+    assert unchecked == {
+        ("Table 6", "relative errors, nearest step"),
+        ("section 5", "response"),
+        ("Table 9", "relative error [%]"),
+        ("Table 9", "p"),
+    }
+    assert next(figure.quantity for figure in audit.figures if figure.where == "Table 9") == "mean response"

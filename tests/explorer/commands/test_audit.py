@@ -46,7 +46,7 @@ def test_table_9_and_equation_8_reproduce_from_table_8(article):
     cells = of(article, "analysis of variance from the runs", "Table 9")
     coefficients = of(article, "printed equation", "Equation 8")
     assert (len(cells), len(coefficients)) == (52, 10)
-    # -0.026 is the last rounding of -0.0255: of Table 8's angles as printed it comes out as -0.02548.
+    # Of Table 8's angles as printed it is -0.025496, which rounds to -0.025 and not to -0.026.
     (rounded,) = [figure for figure in cells + coefficients if figure.status != "reproduced exactly"]
     assert (rounded.quantity, rounded.status) == ("coefficient of X1^2", "only if rounded")
     assert "only if responses were rounded by up to ± 0.005" in rounded.how
