@@ -169,7 +169,8 @@ def _bench(study: PublishedStudy) -> Iterator[Finding]:
 
 
 def _target(study: PublishedStudy) -> Iterator[Finding]:
-    yield from check_target(study.target)
+    if study.target is not None:
+        yield from check_target(study.target)
 
 
 def _screening(study: PublishedStudy) -> Iterator[Finding]:
@@ -186,10 +187,13 @@ def _ascent(study: PublishedStudy) -> Iterator[Finding]:
 
 
 def _surface(study: PublishedStudy) -> Iterator[Finding]:
-    if study.surface is not None:
-        if study.ascent is not None:
-            yield from check_levels(study.surface, study.ascent)
-        yield from check_surface(study.surface)
+    walked = set[str]()
+    for surface in study.surfaces:
+        # Several responses are often fitted over one design.
+        if study.ascent is not None and surface.responses and surface.where_runs not in walked:
+            yield from check_levels(surface, study.ascent)
+        walked.add(surface.where_runs)
+        yield from check_surface(surface)
 
 
 def _optimum(study: PublishedStudy) -> Iterator[Finding]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from doe.audit.printed import Printed
+from doe.audit.printed import Interval, Printed
 from doe.record import Record
 
-Status = Literal["reproduced", "differs", "cannot be checked"]
+Status = Literal["reproduced exactly", "only if rounded", "differs", "cannot be checked"]
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,8 @@ class Figure(Record):
 
     check: the general check that was made. where: table, equation or section. printed: as printed. recomputed: a
     number in the unit of the print, words, or None. slack: how far rounding of what went in can move it. how: from
-    what it was recomputed, or why it cannot be.
+    what it was recomputed, or why it cannot be. status: "reproduced exactly" where the recomputed value rounds to the
+    print, or a value that the prints of its own table allow; "only if rounded" where it does so within the slack.
     """
 
     check: str
@@ -51,18 +52,39 @@ class Audit(Record):
     figures: tuple[Figure, ...]
     remarks: tuple[Remark, ...]
 
-    def having(self, status: Status) -> tuple[Figure, ...]:
-        """The figures with one status."""
-        return tuple(figure for figure in self.figures if figure.status == status)
+    def having(self, *statuses: Status) -> tuple[Figure, ...]:
+        """The figures with one of these."""
+        return tuple(figure for figure in self.figures if figure.status in statuses)
 
 
 def compared(
-    check: str, where: str, quantity: str, print_: Printed, value: float, how: str, slack: float = 0.0
+    check: str,
+    where: str,
+    quantity: str,
+    print_: Printed,
+    value: float,
+    how: str,
+    slack: float = 0.0,
+    rounded: str = "what it is computed from was rounded",
 ) -> Figure:
-    """A figure held against what was recomputed, known to ± slack."""
-    status: Status = "reproduced" if print_.agrees(value, slack) else "differs"
-    if status == "reproduced" and not print_.agrees(value):
-        how = f"{how}; within the rounding of what it is computed from"
+    """A figure held against what was recomputed, first as it is, then with the slack that rounding of its inputs gives.
+
+    rounded: what has to have been rounded for that.
+    """
+    status: Status = "differs"
+    if print_.agrees(value):
+        status = "reproduced exactly"
+    elif print_.agrees(value, slack):
+        status, how = "only if rounded", f"{how}; only if {rounded}, which moves it by up to ± {slack:.2g}"
+    return Figure(check, where, quantity, status, print_.text, value, slack, how)
+
+
+def within(
+    check: str, where: str, quantity: str, print_: Printed, value: float, interval: Interval, how: str
+) -> Figure:
+    """A figure held against all that the prints of its own table, each within its rounding, can give."""
+    status: Status = "reproduced exactly" if print_.meets(interval) else "differs"
+    slack = max(value - interval[0], interval[1] - value)
     return Figure(check, where, quantity, status, print_.text, value, slack, how)
 
 

@@ -25,6 +25,7 @@ from doe.record import Record
 
 FloatArray = npt.NDArray[np.float64]
 Computation = Callable[[FloatArray], FloatArray]
+Interval = tuple[float, float]
 
 NUMBER = re.compile(r"([<>]?)\s*([+-]?(?:\d+\.?\d*|\.\d+))(?:[eE]([+-]?\d{1,3}))?")
 SMALLEST, LARGEST = 1e-30, 1e30
@@ -48,7 +49,7 @@ class Printed(Record):
         return len(self.text.lower().partition("e")[0].partition(".")[2])
 
     @property
-    def interval(self) -> tuple[float, float]:
+    def interval(self) -> Interval:
         """Least and largest value that it stands for."""
         if self.bound == "<":
             return -math.inf, self.value
@@ -63,10 +64,19 @@ class Printed(Record):
             return value > self.value - room
         return abs(value - self.value) <= self.half + room
 
+    def meets(self, interval: Interval) -> bool:
+        """Whether some value in ``interval`` rounds to the print or lies beyond its bound."""
+        room = DUST * max(abs(end) for end in (*interval, self.value) if math.isfinite(end))
+        least, most = self.interval
+        return interval[0] <= most + room and interval[1] >= least - room
+
 
 def printed(text: str) -> Printed:
-    """Read a figure. Raises AuditError for what is no decimal number, with or without < or >, of ordinary size."""
-    plain = text.strip().replace("\u2212", "-")
+    """Read a figure; stars of significance behind it are no part of it.
+
+    Raises AuditError for what is no decimal number, with or without < or >, of ordinary size.
+    """
+    plain = text.strip().rstrip("* ").replace("\u2212", "-")
     match = NUMBER.fullmatch(plain)
     if match is None:
         raise AuditError(f"{text!r} is not a printed number; allowed: 24.68, 1.2e-3, <0.0001")
@@ -109,16 +119,24 @@ def common_half(prints: Sequence[Printed]) -> FloatArray:
 
 def rounding_slack(compute: Computation, values: FloatArray, halves: FloatArray) -> FloatArray:
     """How far ``compute(values)``, shape (k,), can move when values, shape (n,), are rounded to ± halves."""
+    table = _moves(compute, values, halves)
+    return np.minimum(table.sum(axis=0), np.sqrt(3 * (table**2).sum(axis=0)))
+
+
+def worst_case(compute: Computation, values: FloatArray, halves: FloatArray) -> FloatArray:
+    """The same in the worst case, Σ |g_i|: exact for what is linear in the values."""
+    return np.asarray(_moves(compute, values, halves).sum(axis=0))
+
+
+def _moves(compute: Computation, values: FloatArray, halves: FloatArray) -> FloatArray:
+    """|g_i| of every input that is rounded, shape (inputs, k)."""
     base = compute(values)
-    moves = []
+    moves = [np.zeros_like(base)]
     for i in np.flatnonzero(halves > 0):
         shifted = values.copy()
         shifted[i] += halves[i]
         moves.append(np.abs(compute(shifted) - base))
-    if not moves:
-        return np.zeros_like(base)
-    table = np.array(moves)
-    return np.minimum(table.sum(axis=0), np.sqrt(3 * (table**2).sum(axis=0)))
+    return np.array(moves)
 
 
 def most_agreed(

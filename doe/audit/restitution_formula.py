@@ -112,7 +112,7 @@ def check_drop_test(test: DropTest) -> Iterator[Finding]:
         "formula of the restitution test",
         test.where,
         f"e = {test.formula}, put in {short(e)}",
-        "reproduced" if right else "differs",
+        "reproduced exactly" if right else "differs",
         short(e),
         found,
         0.0,

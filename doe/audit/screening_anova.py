@@ -20,7 +20,7 @@ import numpy.typing as npt
 from scipy import stats
 
 from doe.analysis.screening import holm
-from doe.audit.finding import Figure, Finding, Remark, compared, short, unchecked
+from doe.audit.finding import Figure, Finding, Remark, Status, compared, short, unchecked, within
 from doe.audit.printed import Printed, common_half, halves_of, most_agreed, rounding_slack, values_of
 from doe.audit.study import Screening
 from doe.designs import plackett_burman
@@ -30,6 +30,7 @@ FloatArray = npt.NDArray[np.float64]
 Interval = tuple[float, float]
 
 ADDS_UP = "sums of squares add up"
+F_FROM_SUMS = "F from sums of squares"
 SIGNIFICANCE = "significance"
 ALPHA = 0.05
 
@@ -96,23 +97,18 @@ def total_of_runs(screening: Screening) -> tuple[float, float]:
 def _f_values(screening: Screening, low: float, high: float) -> Iterator[Finding]:
     mse = 0.5 * (low + high)
     for factor, total, ratio in zip(screening.factors, screening.sums, screening.f, strict=True):
-        value = total.value / mse
-        slack = total.half / mse + value * (high - low) / (2 * mse)
+        interval = max(0.0, total.interval[0]) / high, total.interval[1] / low if low > 0 else np.inf
         how = f"SS/MSE, with the MSE of {short(mse)} that the other lines imply"
-        yield compared("F from sums of squares", screening.where_anova, f"F of {factor.name}", ratio, value, how, slack)
+        quantity = f"F of {factor.name}"
+        yield within(F_FROM_SUMS, screening.where_anova, quantity, ratio, total.value / mse, interval, how)
 
 
 def _p_values(screening: Screening) -> Iterator[Finding]:
     df = screening.error_df
     for factor, ratio, p in zip(screening.factors, screening.f, screening.p, strict=True):
-
-        def tail(f: FloatArray) -> FloatArray:
-            return np.asarray(stats.f.sf(np.maximum(f, 0.0), 1, df))
-
-        values = values_of([ratio])
-        slack = float(rounding_slack(tail, values, halves_of([ratio]))[0])
         how = f"from the printed F on 1 and {df} degrees of freedom"
-        yield compared("p from F", screening.where_anova, f"p of {factor.name}", p, float(tail(values)[0]), how, slack)
+        value, interval = float(stats.f.sf(max(0.0, ratio.value), 1, df)), _p_of(ratio.interval, df)
+        yield within("p from F", screening.where_anova, f"p of {factor.name}", p, value, interval, how)
 
 
 def _total(screening: Screening) -> Iterator[Finding]:
@@ -129,14 +125,14 @@ def _adding_up(screening: Screening, low: float, high: float) -> Iterator[Findin
     total, of_runs = total_of_runs(screening)
     error = screening.error_df * 0.5 * (low + high)
     explained, parts = float(factors.sum()), n - 1 - factors.size
-    slack = of_runs + float(np.sqrt(3 * (halves_of(screening.sums) ** 2).sum())) + screening.error_df * (high - low) / 2
+    of_tables = float(np.sqrt(3 * (halves_of(screening.sums) ** 2).sum())) + screening.error_df * (high - low) / 2
+    slack, off = of_tables + of_runs, abs(explained + error - total)
     words = f"{explained:.2f} of the {factors.size} factors + {error:.2f} of the error that the F values imply"
-    closes = abs(explained + error - total) <= slack
     yield Figure(
         check,
         f"{screening.where_runs} and {screening.where_anova}",
         "total sum of squares",
-        "reproduced" if closes else "differs",
+        "differs" if off > slack else "reproduced exactly" if off <= of_tables else "only if rounded",
         f"{explained + error:.2f}",
         total,
         slack,
@@ -169,7 +165,9 @@ def _sums(screening: Screening) -> Iterator[Finding]:
         fits = sum(one.agrees(float(v), float(s)) for one, v, s in zip(screening.sums, values, slack, strict=True))
         if fits == len(screening.sums):
             how = "(Σ x y)²/N with the Plackett–Burman table in standard order"
-            yield Figure(check, where, quantity, "reproduced", "", None, float(slack.max()), how)
+            exact = all(one.agrees(float(v)) for one, v in zip(screening.sums, values, strict=True))
+            status: Status = "reproduced exactly" if exact else "only if rounded"
+            yield Figure(check, where, quantity, status, "", None, float(slack.max()), how)
             return
         why += (
             f"; with the Plackett–Burman table in standard order {fits} of {len(screening.sums)} fit, so the runs are "
@@ -233,7 +231,7 @@ def _claim(
         SIGNIFICANCE,
         screening.where_anova,
         quantity,
-        "differs" if against else "reproduced",
+        "differs" if against else "reproduced exactly",
         claim,
         f"all but {', '.join(one.name for one in against)}" if against else "all of them",
         0.0,

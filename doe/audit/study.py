@@ -1,6 +1,6 @@
 """A published calibration study as plain data: what its tables and its text print, part by part.
 
-Every part but the target may be missing; a check is made where its part is there. `where` names the place in the
+Every part may be missing; a check is made where its part is there. `where` names the place in the
 publication ("Table 7"). Printed numbers keep their digits (`Printed`); levels of a design, which were set and not
 measured, are exact.
 """
@@ -154,7 +154,10 @@ class Ascent:
 
 @dataclass(frozen=True)
 class AnovaLine:
-    """One line of a printed analysis of variance, as far as it is printed."""
+    """One line of a printed analysis of variance, as far as it is printed.
+
+    sequential: the sequential sum of squares, where it is printed beside another one.
+    """
 
     source: str
     sum_of_squares: Printed | None = None
@@ -162,6 +165,7 @@ class AnovaLine:
     mean_square: Printed | None = None
     f: Printed | None = None
     p: Printed | None = None
+    sequential: Printed | None = None
 
 
 @dataclass(frozen=True)
@@ -189,7 +193,7 @@ class SurfaceStudy:
     low, high: natural values of −1 and +1, shape (factors,). screened: names of the factors in the screening and the
     ascent, which may number them otherwise. statistics: "r_squared", "r_squared_adjusted",
     "r_squared_predicted", "cv_percent", "adequate_precision", "sigma" → as printed. steps: None where nothing is said
-    of steps of the ascent.
+    of steps of the ascent. Without printed runs, coded and responses are empty.
     """
 
     where_runs: str
@@ -209,11 +213,15 @@ class SurfaceStudy:
 
 @dataclass(frozen=True)
 class Optimum:
-    """The setting claimed to give the target, in natural units and the order of the surface's factors."""
+    """The setting claimed to give the target, in natural units and the order of the surface's factors.
+
+    surface: position of the surface that it was read from.
+    """
 
     where: str
     values: tuple[Printed, ...]
     predicted: Printed | None = None
+    surface: int = 0
 
 
 @dataclass(frozen=True)
@@ -233,7 +241,7 @@ class PublishedStudy:
 
     title: str
     source: str
-    target: Target
+    target: Target | None = None
     derived: tuple[Derived, ...] = ()
     measured: tuple[Measured, ...] = ()
     totals: tuple[Total, ...] = ()
@@ -241,6 +249,13 @@ class PublishedStudy:
     drop_test: DropTest | None = None
     screening: Screening | None = None
     ascent: Ascent | None = None
-    surface: SurfaceStudy | None = None
+    surfaces: tuple[SurfaceStudy, ...] = ()
     optimum: Optimum | None = None
     verified: Verified | None = None
+
+    @property
+    def surface(self) -> SurfaceStudy | None:
+        """The surface of the response that was walked, optimised and verified: the only one, or the optimum's."""
+        if self.optimum is not None:
+            return self.surfaces[self.optimum.surface]
+        return self.surfaces[0] if len(self.surfaces) == 1 else None

@@ -1,7 +1,9 @@
 """A published response surface refitted from its printed runs: analysis of variance, statistics, equation.
 
-Every refitted number carries the slack that the rounding of the printed responses gives it. The printed equation is
-also put to work: rounded coefficients of large natural values can miss the design's own runs.
+The model has the terms that the table names. What is recomputed is held against the print as it is first. Only what
+differs then gets the slack of responses that were rounded, the worst case over the box around their prints, and says
+so. Of each figure of the analysis of variance the others of its table are asked before the runs (`anova_table.py`).
+The printed equation is also put to work: rounded coefficients of large natural values can miss the design's own runs.
 
 The setting that a study claims to give the target is held against the model that it was read from.
 Prediction: the model refitted from the printed runs, and the equation as printed, at the claimed setting.
@@ -12,7 +14,8 @@ x'(X'X)⁻¹x against the largest of the runs (Myers, Montgomery and Anderson-Co
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from itertools import combinations
+from dataclasses import replace
+from math import isfinite
 from typing import cast
 
 import numpy as np
@@ -22,62 +25,119 @@ from scipy import stats
 from doe.analysis.level_set import nearest_points
 from doe.analysis.steepest_ascent import Region
 from doe.analysis.surface import Surface, fit_surface, second_order_terms, term_names
-from doe.analysis.surface_anova import AnovaRow, SurfaceAnova, analyse_surface
-from doe.audit.finding import Figure, Finding, Remark, compared, short, unchecked
-from doe.audit.printed import Printed, common_half, halves_of, rounding_slack, values_of
+from doe.audit.anova_table import (
+    WORDS,
+    Cell,
+    Column,
+    Judged,
+    Line,
+    Role,
+    consistency,
+    named_terms,
+    read_lines,
+    require_degrees,
+)
+from doe.audit.finding import Figure, Finding, Remark, Status, compared, short, unchecked, within
+from doe.audit.printed import Printed, common_half, halves_of, printed, rounding_slack, values_of, worst_case
 from doe.audit.study import Ascent, Equation, Optimum, SurfaceStudy, Target, Verified
+from doe.audit.table_refit import KINDS, Bounded, TableRefit
+from doe.errors import StatisticsError
 
 FloatArray = npt.NDArray[np.float64]
 
-COLUMNS: dict[str, tuple[str, Callable[[AnovaRow], float]]] = {
-    "sum_of_squares": ("sum of squares", lambda row: row.sum_of_squares),
-    "df": ("degrees of freedom", lambda row: float(row.df)),
-    "mean_square": ("mean square", lambda row: row.mean_square),
-    "f": ("F", lambda row: row.f),
-    "p": ("p", lambda row: row.p),
+STATISTICS = {
+    "r_squared": "R²",
+    "r_squared_adjusted": "adjusted R²",
+    "r_squared_predicted": "predicted R²",
+    "cv_percent": "coefficient of variation [%]",
+    "adequate_precision": "adequate precision",
+    "sigma": "residual standard deviation",
 }
-STATISTICS: dict[str, tuple[str, Callable[[SurfaceAnova], float]]] = {
-    "r_squared": ("R²", lambda anova: anova.r_squared),
-    "r_squared_adjusted": ("adjusted R²", lambda anova: anova.r_squared_adjusted),
-    "r_squared_predicted": ("predicted R²", lambda anova: anova.r_squared_predicted),
-    "cv_percent": ("coefficient of variation [%]", lambda anova: anova.cv_percent),
-    "adequate_precision": ("adequate precision", lambda anova: anova.adequate_precision),
-    "sigma": ("residual standard deviation", lambda anova: anova.sigma),
-}
-"""Key of a study file → words, and the same number of a refit."""
+"""Key of a study file → words."""
+BY_ITSELF, FROM_RUNS = "analysis of variance in itself", "analysis of variance from the runs"
 PREDICTION = "prediction at the claimed optimum"
 ON = 1e-6
 """Coded distance within which a setting is on a corner or on a run."""
 LEVEL = 0.95
+AXIAL = 0.005
+"""How far two decimals move a coded distance."""
 
 
 def check_surface(study: SurfaceStudy) -> Iterator[Finding]:
-    """All printed figures about a second-order fit, and what its printed equation gives at the design's own runs."""
-    yield from _anova(study)
-    yield from _adding_up(study)
-    yield from _statistics(study)
+    """All printed figures about a fit, and what its printed equation gives at the design's own runs.
+
+    The figures of the analysis of variance are held against one another first, which needs no runs. Axial points that
+    are printed with few digits (1.68) count as what they are rounded from (2^(3/4)) if more follows from that.
+    """
+    found, design = list(_checked(study)), _unrounded_axes(study)
+    if design is not None:
+        other = list(_checked(replace(study, coded=design)))
+        if _misses(other) < _misses(found):
+            axes = f"axial points at ± {float(np.abs(design).max()):.4f}; {study.where_runs} prints fewer digits"
+            found = [*other, Remark(FROM_RUNS, study.where_anova, f"Its figures follow from {axes}.")]
+    yield from found
+
+
+def _misses(found: list[Finding]) -> tuple[int, int]:
+    """How many figures differ, and how many come out only with a slack."""
+    statuses = [one.status for one in found if isinstance(one, Figure)]
+    return statuses.count("differs"), statuses.count("only if rounded")
+
+
+def _unrounded_axes(study: SurfaceStudy) -> FloatArray | None:
+    """The design with the distance of a rotatable or spherical one, where its own is that but for the rounding."""
+    outside = np.abs(study.coded) > 1 + AXIAL
+    if not outside.any():
+        return None
+    k = len(study.factors)
+    known = [2.0 ** (corners / 4) for corners in range(2, k + 1)] + [k**0.5]
+    for distance in known:
+        off = np.abs(np.abs(study.coded[outside]) - distance)
+        if 0 < off.max() <= AXIAL:
+            return np.where(outside, np.sign(study.coded) * distance, study.coded)
+    return None
+
+
+def _checked(study: SurfaceStudy) -> Iterator[Finding]:
+    lines = read_lines(study.anova, study.factors)
+    judged, error = consistency(lines)
+    try:
+        fit = TableRefit(refit(study), _half(study))
+    except StatisticsError as why:
+        yield from _without_refit(study, lines, judged, str(why))
+        return
+    yield from _anova(study, fit, lines, judged, error)
+    yield from _adding_up(study, lines)
+    yield from _statistics(study, fit)
     if study.equation is not None:
         yield from _coefficients(study, study.equation)
         yield from _own_runs(study, study.equation)
 
 
-def check_optimum(optimum: Optimum, study: SurfaceStudy, target: Target) -> Iterator[Finding]:
+def check_optimum(optimum: Optimum, study: SurfaceStudy, target: Target | None) -> Iterator[Finding]:
     """Prediction at the claimed optimum, and whether it lies where the design had runs."""
     surface = refit(study)
     point = surface.region.coded(values_of(optimum.values))
-    printed = optimum.predicted or target.mean
-    yield _by_refit(optimum, study, surface, point, printed)
-    if study.equation is not None:
-        yield _by_equation(optimum, study, study.equation, point, printed, float(np.sqrt(surface.mse)))
+    printed = optimum.predicted if target is None else optimum.predicted or target.mean
+    if printed is None:
+        yield unchecked(PREDICTION, optimum.where, "response", "neither a prediction nor a target is stated")
+    else:
+        yield _by_refit(optimum, study, surface, point, printed)
+        if study.equation is not None:
+            yield _by_equation(optimum, study, study.equation, point, printed, float(np.sqrt(surface.mse)))
     yield from _extrapolation(optimum, surface, point)
-    yield from _where_the_target_is(optimum, surface, point, target)
+    if target is not None:
+        yield from _where_the_target_is(optimum, surface, point, target)
 
 
 def check_runs_against_model(
     study: SurfaceStudy, ascent: Ascent | None, optimum: Optimum | None, verified: Verified | None
 ) -> Iterator[Finding]:
     """Runs outside the design, at settings that the model covers, against its prediction intervals."""
-    surface = refit(study)
+    try:
+        surface = refit(study)
+    except StatisticsError:
+        return  # `check_surface` has said why
     if ascent is not None and set(study.screened) <= set(ascent.factors):
         order = [ascent.factors.index(name) for name in study.screened]
         for step, setting, response in zip(ascent.steps, ascent.settings, ascent.responses, strict=True):
@@ -91,14 +151,24 @@ def check_runs_against_model(
         yield from _run_off_the_model(surface, point, float(values.mean()), values.size, verified.where, words)
 
 
-def refit(study: SurfaceStudy, responses: FloatArray | None = None) -> Surface:
-    """The full second-order model fitted to the printed runs, or to others on the same design.
+def refit(study: SurfaceStudy, responses: FloatArray | None = None, terms: tuple[str, ...] | None = None) -> Surface:
+    """The model of the study (or these terms) fitted to the printed runs, or to others on the same design.
 
-    Raises StatisticsError where the runs cannot separate its terms.
+    Its terms are those that the analysis of variance names; where it names none those of the printed equation, and
+    without one all of second order. Raises StatisticsError where there are no runs, where the runs cannot separate the
+    terms, or where the printed degrees of freedom are not those of such a model.
     """
+    if not study.responses:
+        raise StatisticsError("the runs are not printed")
+    lines = read_lines(study.anova, study.factors)
+    equation = () if study.equation is None else _terms_of(study.equation)
+    model = terms or named_terms(lines) or equation or term_names(study.factors)[1:]
     region = Region(study.factors, 0.5 * (study.low + study.high), 0.5 * (study.high - study.low), ())
     values = values_of(study.responses) if responses is None else responses
-    return fit_surface(study.coded, values[:, None], region)
+    surface = fit_surface(study.coded, values[:, None], region, model)
+    if terms is None:
+        require_degrees(lines, model, study.factors, values.size)
+    return surface
 
 
 def equation_terms(equation: Equation, factors: tuple[str, ...]) -> FloatArray:
@@ -121,99 +191,208 @@ def coefficient_slack(study: SurfaceStudy, equation: Equation, coded: FloatArray
     return min(total, root)
 
 
-def source_name(text: str, factors: tuple[str, ...]) -> str:
-    """The source of a printed line as our own table names it: "X1X2", "X1 × X2" → "X1*X2"; "X1²" → "X1^2"."""
-    plain = text.strip().replace("²", "^2")
-    known = {name: name for name in term_names(factors)[1:]}
-    for a, b in combinations(factors, 2):
-        known |= {form.format(a, b): f"{a}*{b}" for form in ("{}{}", "{}·{}", "{} × {}", "{}×{}", "{}:{}", "{} {}")}
-    known |= {f"{name}*{name}": f"{name}^2" for name in factors}
-    words = plain.lower().replace(" ", "_").replace("-", "_")
-    return known.get(plain, {"sum": "total", "cor_total": "total", "error": "pure_error"}.get(words, words))
+def _half(study: SurfaceStudy) -> float:
+    """Half a unit of the last digit of the responses: the finest one, because trailing zeros get lost."""
+    return float(common_half(study.responses)[0])
 
 
-def _analysed(study: SurfaceStudy, responses: FloatArray | None = None) -> SurfaceAnova:
-    """The analysis of variance of a refit; what a run that nothing can replace leaves undefined is NaN or infinite."""
-    return analyse_surface(refit(study, responses))
+def _rounded(study: SurfaceStudy) -> str:
+    """What has to have been rounded where a refit gives the print only so."""
+    return f"responses were rounded by up to ± {_half(study):g}"
 
 
-def _anova(study: SurfaceStudy) -> Iterator[Finding]:
-    """Every printed cell against the refit's."""
-    cells: list[tuple[str, str, Printed]] = []
-    for line in study.anova:
-        source = source_name(line.source, study.factors)
-        cells += [(source, column, cast(Printed, getattr(line, column))) for column in COLUMNS if getattr(line, column)]
-    fitted = {row.source: row for row in _analysed(study).rows}
-    known = [(source, column, cell) for source, column, cell in cells if source in fitted]
+def _terms_of(equation: Equation) -> tuple[str, ...]:
+    return tuple(name for name in equation.coefficients if name != "1")
 
-    def recomputed(responses: FloatArray) -> FloatArray:
-        rows = {row.source: row for row in _analysed(study, responses).rows}
-        return np.array([COLUMNS[column][1](rows[source]) for source, column, _ in known])
 
-    values, slack = _with_slack(study, recomputed)
-    check, how = "analysis of variance from the runs", f"second-order fit to {study.where_runs}"
-    for k, (source, column, cell) in enumerate(known):
-        quantity = f"{COLUMNS[column][0]} of {source}"
-        if not np.isfinite(values[k]):
-            yield unchecked(check, study.where_anova, quantity, "the refit tests this line against nothing", cell.text)
+def _fit_words(study: SurfaceStudy, surface: Surface) -> str:
+    """The model in words."""
+    terms = [name for name, there in zip(surface.terms[1:], surface.included[1:], strict=True) if there]
+    model = "second-order fit" if surface.included.all() else f"fit of {', '.join(terms)}"
+    return f"{model} to {study.where_runs}"
+
+
+def _cells(lines: tuple[Line, ...]) -> list[tuple[Cell, Printed]]:
+    """All printed figures of a table."""
+    cells = (((k, column), line.cell(column)) for k, line in enumerate(lines) for column in WORDS)
+    return [(at, cell) for at, cell in cells if cell is not None]
+
+
+def _named(lines: tuple[Line, ...], at: Cell) -> str:
+    return f"{WORDS[at[1]]} of {lines[at[0]].source}"
+
+
+def _against_itself(study: SurfaceStudy, lines: tuple[Line, ...], at: Cell, cell: Printed, by: Judged) -> Figure:
+    """A figure against others of its table."""
+    low, high = by.interval
+    how = f"{by.how}, which allow {short(low, 5)} … {short(high, 5)}"
+    found = within(BY_ITSELF, study.where_anova, _named(lines, at), cell, by.value, by.interval, how)
+    if by.agrees:
+        return replace(found, status="reproduced exactly")
+    # Some programs, and people, cut a figure off or round it up: less than a whole unit of the last digit is no fault.
+    if replace(cell, half=2.0 * cell.half).meets(by.interval):
+        return replace(
+            found, status="only if rounded", how=f"{how}; only if it was cut off or rounded up at its last digit"
+        )
+    return replace(found, status="differs")
+
+
+def _anova(
+    study: SurfaceStudy, fit: TableRefit, lines: tuple[Line, ...], judged: dict[Cell, Judged], error: Role
+) -> Iterator[Finding]:
+    """Every printed figure: against the others of its table, then against the runs, then against rounded runs."""
+    cells = dict(_cells(lines))
+    broken = {at for at in cells if at in judged and not judged[at].agrees}
+    kind, rows = _kind(fit, lines, {at: cell for at, cell in cells.items() if at not in broken}, error)
+    refitted = {at: rows[at[0]][at[1]] for at in cells if at[1] in rows[at[0]] and isfinite(rows[at[0]][at[1]].value)}
+    exact = {at for at, value in refitted.items() if cells[at].agrees(value.value)}
+    # Where figures exclude each other, runs that give one of them exactly say that the other is wrong.
+    wrong = {at for at in broken if at not in exact}
+    for k, column in broken & exact:
+        wrong |= {at for at in ((k, name) for name in judged[k, column].partners) if at in cells and at not in exact}
+    how = _fit_words(study, fit.surface) + ("" if kind == "partial" else f", {KINDS[kind]}")
+    lost: dict[int, str] = {}
+    for at, cell in cells.items():
+        if at in wrong and at in broken:
+            yield _against_itself(study, lines, at, cell, judged[at])
+        elif _misfit(fit, lines[at[0]]) or at not in refitted:
+            if at in judged:
+                yield _against_itself(study, lines, at, cell, judged[at])
+            elif rows[at[0]].get(at[1]) is not None:
+                why = "the refit tests this line against nothing"
+                yield unchecked(FROM_RUNS, study.where_anova, _named(lines, at), why, cell.text)
+            else:
+                lost[at[0]] = _misfit(fit, lines[at[0]]) or "the model has no such line"
         else:
-            yield compared(check, study.where_anova, quantity, cell, float(values[k]), how, float(slack[k]))
-    for source in dict.fromkeys(source for source, _, _ in cells if source not in fitted):
-        yield unchecked(check, study.where_anova, source, "the full second-order model has no such line")
+            value = refitted[at]
+            slack = 0.0 if at in wrong else _within(cell, value)
+            quantity = _named(lines, at)
+            yield compared(FROM_RUNS, study.where_anova, quantity, cell, value.value, how, slack, _rounded(study))
+    for k, why in lost.items():
+        yield unchecked(FROM_RUNS, study.where_anova, lines[k].source, why)
+    if kind != "partial":
+        yield Remark(
+            FROM_RUNS, study.where_anova, f"Its lines are {KINDS[kind]}: these are the ones that the runs give."
+        )
 
 
-def _adding_up(study: SurfaceStudy) -> Iterator[Finding]:
+def _within(cell: Printed, value: Bounded) -> float:
+    """The slack of a recomputed number on the side of the print, which is what counts where the other is wider."""
+    low, high = value.interval
+    side = high - value.value if cell.value > value.value else value.value - low
+    return side if isfinite(side) else value.slack
+
+
+def _kind(
+    fit: TableRefit, lines: tuple[Line, ...], cells: dict[Cell, Printed], error: Role
+) -> tuple[str, list[dict[Column, Bounded]]]:
+    """How the sums of squares were taken: the first kind that gives most figures exactly, then within rounding."""
+    order = named_terms(lines)
+    if not order:
+        return "partial", fit.rows(lines, order, "partial", error)
+    tried = {kind: fit.rows(lines, order, kind, error) for kind in KINDS}
+
+    def right(kind: str) -> tuple[int, int]:
+        pairs = [(cell, tried[kind][k][column]) for (k, column), cell in cells.items() if column in tried[kind][k]]
+        exact = sum(cell.agrees(value.value) for cell, value in pairs)
+        return sum(cell.agrees(value.value, _within(cell, value)) for cell, value in pairs), exact
+
+    best = max(tried, key=right)
+    return best, tried[best]
+
+
+def _misfit(fit: TableRefit, line: Line) -> str:
+    """Why a lack of fit or pure error cannot be checked; "" where it can."""
+    df = fit.degrees(line.role)
+    if line.role not in ("lack_of_fit", "pure_error") or line.df is None or line.df == df:
+        return ""
+    return f"its {line.df:g} degrees of freedom are not those of the replicates in the runs, {df}"
+
+
+def _without_refit(
+    study: SurfaceStudy, lines: tuple[Line, ...], judged: dict[Cell, Judged], why: str
+) -> Iterator[Finding]:
+    """What a table says of itself, and how many of its figures would need the runs."""
+    cells = _cells(lines)
+    for at, cell in cells:
+        if at in judged:
+            yield _against_itself(study, lines, at, cell, judged[at])
+    left = sum(at not in judged for at, _ in cells)
+    if left:
+        yield unchecked(FROM_RUNS, study.where_anova, f"{left} figures that only the runs can give", why)
+    yield from _adding_up(study, lines)
+    for name, cell in study.statistics.items():
+        yield unchecked("statistics of the fit", study.where_statistics, STATISTICS[name], why, cell.text)
+    if study.equation is not None:
+        quantity = f"{len(study.equation.coefficients)} coefficients"
+        yield unchecked("printed equation", study.equation.where, quantity, why)
+
+
+def _adding_up(study: SurfaceStudy, lines: tuple[Line, ...]) -> Iterator[Finding]:
     """Printed sums of squares and degrees of freedom of the parts against their printed wholes."""
-    lines = {source_name(line.source, study.factors): line for line in study.anova}
+    known = {line.source: line for line in reversed(lines)}
+    columns: tuple[Column, ...] = ("sum_of_squares", "df")
     for whole, parts in (("total", ("model", "residual")), ("residual", ("lack_of_fit", "pure_error"))):
-        if not {whole, *parts} <= lines.keys():
+        if not {whole, *parts} <= known.keys():
             continue
-        for column in ("sum_of_squares", "df"):
-            prints = [cast(Printed | None, getattr(lines[name], column)) for name in (*parts, whole)]
+        for column in columns:
+            prints = [known[name].cell(column) for name in (*parts, whole)]
             if None in prints:
                 continue
             *of_parts, of_whole = cast(list[Printed], prints)
             value = sum(one.value for one in of_parts)
-            slack = float(np.sqrt(3 * (halves_of(of_parts) ** 2).sum())) if column != "df" else 0.0
-            how = f"sum of {' and '.join(parts)} as printed"
-            quantity = f"{COLUMNS[column][0]} of {whole}"
-            yield compared("sums of squares add up", study.where_anova, quantity, of_whole, value, how, slack)
+            slack = float(halves_of(of_parts).sum()) if column != "df" else 0.0
+            how, quantity = f"sum of {' and '.join(parts)} as printed", f"{WORDS[column]} of {whole}"
+            interval = value - slack, value + slack
+            yield within("sums of squares add up", study.where_anova, quantity, of_whole, value, interval, how)
 
 
-def _statistics(study: SurfaceStudy) -> Iterator[Finding]:
+def _statistics(study: SurfaceStudy, fit: TableRefit) -> Iterator[Finding]:
     names = [name for name in STATISTICS if name in study.statistics]
-    if not names:
-        return
-
-    def recomputed(responses: FloatArray) -> FloatArray:
-        anova = _analysed(study, responses)
-        return np.array([STATISTICS[name][1](anova) for name in names])
-
-    values, slack = _with_slack(study, recomputed)
-    how = f"second-order fit to {study.where_runs}"
-    for k, name in enumerate(names):
-        print_, words = study.statistics[name], STATISTICS[name][0]
-        check, where = "statistics of the fit", study.where_statistics
-        if np.isfinite(values[k]):
-            yield compared(check, where, words, print_, float(values[k]), how, float(slack[k]))
+    found = fit.statistics() if names else {}
+    how, check, where = _fit_words(study, fit.surface), "statistics of the fit", study.where_statistics
+    for name in names:
+        cell, value = study.statistics[name], found[name]
+        if isfinite(value.value):
+            slack = _within(cell, value)
+            yield compared(check, where, STATISTICS[name], cell, value.value, how, slack, _rounded(study))
         else:
-            yield unchecked(check, where, words, "the refit cannot do without one of the runs", print_.text)
+            yield unchecked(check, where, STATISTICS[name], "the refit cannot do without one of the runs", cell.text)
 
 
 def _coefficients(study: SurfaceStudy, equation: Equation) -> Iterator[Finding]:
+    """Every coefficient by the model of the analysis of variance or, if they fit it better, by its own terms alone."""
     names = ("1", *term_names(study.factors)[1:])
     printed = {name: k for k, name in enumerate(names) if name in equation.coefficients}
+    candidates = [_equation_figures(study, equation, printed, None)]
+    if any(figure.status == "differs" for figure in candidates[0]) and _terms_of(equation):
+        candidates.append(_equation_figures(study, equation, printed, _terms_of(equation)))
+    yield from min(candidates, key=lambda figures: sum(figure.status == "differs" for figure in figures))
 
+
+def _equation_figures(
+    study: SurfaceStudy, equation: Equation, printed: dict[str, int], terms: tuple[str, ...] | None
+) -> list[Figure]:
     def recomputed(responses: FloatArray) -> FloatArray:
-        surface = refit(study, responses)
+        surface = refit(study, responses, terms)
         return surface.coefficients if equation.coded else surface.coefficients_natural
 
-    values, slack = _with_slack(study, recomputed)
-    how = f"second-order fit to {study.where_runs} in {'coded' if equation.coded else 'natural'} units"
-    for name, k in printed.items():
-        quantity = "constant" if name == "1" else f"coefficient of {name}"
-        cell = equation.coefficients[name]
-        yield compared("printed equation", equation.where, quantity, cell, float(values[k]), how, float(slack[k]))
+    values = values_of(study.responses)
+    found, slack = recomputed(values), worst_case(recomputed, values, common_half(study.responses))
+    how = f"{_fit_words(study, refit(study, None, terms))} in {'coded' if equation.coded else 'natural'} units"
+    return [
+        compared(
+            "printed equation",
+            equation.where,
+            "constant" if name == "1" else f"coefficient of {name}",
+            equation.coefficients[name],
+            float(found[k]),
+            how,
+            float(slack[k]),
+            _rounded(study),
+        )
+        for name, k in printed.items()
+    ]
 
 
 def _own_runs(study: SurfaceStudy, equation: Equation) -> Iterator[Finding]:
@@ -238,11 +417,12 @@ def _own_run(study: SurfaceStudy, equation: Equation, surface: Surface, point: F
     given, model = float(equation_at(study, equation, point)), float(surface.predict(point))
     runs = (study.coded == point).all(axis=1)
     observed = float(values_of(study.responses)[runs].mean())
+    same: Status = "reproduced exactly" if printed(short(given)).agrees(model) else "only if rounded"
     return Figure(
         "printed equation at the design's own runs",
         equation.where,
         f"response at ({', '.join(f'{x:+g}' if x else '0' for x in point)})",
-        "differs" if abs(given - model) > sigma else "reproduced",
+        "differs" if abs(given - model) > sigma else same,
         short(given),
         model,
         sigma,
@@ -276,30 +456,18 @@ def _weights(study: SurfaceStudy, equation: Equation, coded: FloatArray) -> dict
     }
 
 
-def _with_slack(study: SurfaceStudy, compute: Callable[[FloatArray], FloatArray]) -> tuple[FloatArray, FloatArray]:
-    values = values_of(study.responses)
-    return compute(values), rounding_slack(compute, values, common_half(study.responses))
-
-
 def _by_refit(optimum: Optimum, study: SurfaceStudy, surface: Surface, point: FloatArray, printed: Printed) -> Figure:
     value, error = float(surface.predict(point)), float(surface.standard_error(point))
     slack = _slack_of_setting(optimum, study, surface.predict)
-    of_runs = rounding_slack(
+    of_runs = worst_case(
         lambda y: np.array([float(refit(study, y).predict(point))]),
         values_of(study.responses),
         common_half(study.responses),
     )
     slack += float(of_runs[0])
-    return Figure(
-        PREDICTION,
-        optimum.where,
-        "refitted model at the optimum",
-        "reproduced" if printed.agrees(value, slack) else "differs",
-        printed.text,
-        value,
-        slack,
-        f"second-order fit to {study.where_runs} at {_setting(optimum)}: {value:.1f} ± {error:.1f} (standard error)",
-    )
+    how = f"{_fit_words(study, surface)} at {_setting(optimum)}: {value:.1f} ± {error:.1f} (standard error)"
+    rounded = "responses and setting were rounded"
+    return compared(PREDICTION, optimum.where, "refitted model at the optimum", printed, value, how, slack, rounded)
 
 
 def _by_equation(
@@ -309,16 +477,9 @@ def _by_equation(
     slack = _slack_of_setting(optimum, study, lambda coded: equation_at(study, equation, coded))
     # Rounded coefficients are forgiven up to the noise of one run: beyond it, whoever uses the print is misled.
     slack += min(coefficient_slack(study, equation, point), sigma)
-    return Figure(
-        PREDICTION,
-        optimum.where,
-        f"{equation.where} as printed at the optimum",
-        "reproduced" if printed.agrees(value, slack) else "differs",
-        printed.text,
-        value,
-        slack,
-        f"{equation.where} with the coefficients as printed at {_setting(optimum)}: {value:.1f}",
-    )
+    how = f"{equation.where} with the coefficients as printed at {_setting(optimum)}: {value:.1f}"
+    rounded, quantity = "coefficients and setting were rounded", f"{equation.where} as printed at the optimum"
+    return compared(PREDICTION, optimum.where, quantity, printed, value, how, slack, rounded)
 
 
 def _slack_of_setting(optimum: Optimum, study: SurfaceStudy, predict: Callable[[FloatArray], FloatArray]) -> float:

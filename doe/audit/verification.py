@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from doe.analysis.t_tests import Sample, pooled_test, welch_test
 from doe.analysis.verification import relative_error_percent, sd_from_pooled_p, sd_from_welch_p
-from doe.audit.finding import Figure, Finding, Remark, compared, like, unchecked
+from doe.audit.finding import Figure, Finding, Remark, Status, compared, like, unchecked
 from doe.audit.printed import Printed, common_half, halves_of, most_agreed, rounding_slack, values_of
 from doe.audit.study import Ascent, Target, Verified
 from doe.errors import StatisticsError
@@ -26,12 +26,17 @@ from doe.errors import StatisticsError
 FloatArray = npt.NDArray[np.float64]
 
 RELATIVE_ERROR = "relative error against the stated target"
+NO_TARGET = "the study states no target"
 T_TEST = "two-sample t test"
 TESTS = {"Student's": pooled_test, "Welch's": welch_test}
 
 
-def check_ascent_errors(ascent: Ascent, target: Target) -> Iterator[Finding]:
+def check_ascent_errors(ascent: Ascent, target: Target | None) -> Iterator[Finding]:
     """Every printed error of a walk, the target that they imply, and which step is nearest."""
+    if target is None:
+        if ascent.errors or ascent.best is not None:
+            yield unchecked(RELATIVE_ERROR, ascent.where, "relative errors, nearest step", NO_TARGET)
+        return
     stated = target.mean.value
     halves = common_half(ascent.responses)
     # Some print errors with a sign; their size is what is checked.
@@ -60,7 +65,7 @@ def check_ascent_errors(ascent: Ascent, target: Target) -> Iterator[Finding]:
         yield _best(ascent, target)
 
 
-def check_verification_error(verified: Verified, target: Target) -> Iterator[Finding]:
+def check_verification_error(verified: Verified, target: Target | None) -> Iterator[Finding]:
     """Mean and relative error of fresh runs; an error that does not fit is held against other denominators."""
     values = values_of(verified.responses)
     halves = common_half(verified.responses)
@@ -69,12 +74,18 @@ def check_verification_error(verified: Verified, target: Target) -> Iterator[Fin
     if verified.mean is not None:
         how = f"mean of {values.size} runs"
         yield compared("mean of replicates", verified.where, "mean response", verified.mean, mean, how, slack)
-    if verified.relative_error_percent is not None:
+    if verified.relative_error_percent is not None and target is None:
+        yield unchecked(RELATIVE_ERROR, verified.where, "relative error [%]", NO_TARGET)
+    elif verified.relative_error_percent is not None and target is not None:
         yield _verified_error(verified, verified.relative_error_percent, target, mean, slack)
 
 
-def check_verification_test(verified: Verified, target: Target) -> Iterator[Finding]:
+def check_verification_test(verified: Verified, target: Target | None) -> Iterator[Finding]:
     """The printed p of the two-sample test, and the standard error of the mean beside the relative error."""
+    if target is None:
+        if verified.p_two_sample is not None:
+            yield unchecked(T_TEST, verified.where, "p", NO_TARGET)
+        return
     runs = values_of(verified.responses)
     if verified.p_two_sample is not None:
         yield _p(verified, verified.p_two_sample, target)
@@ -116,16 +127,18 @@ def _verified_error(verified: Verified, error: Printed, target: Target, mean: fl
     stated, words = target.mean.value, "100 |mean − target|/target"
     value, quantity = relative_error_percent(mean, stated), "relative error [%]"
     figure = compared(RELATIVE_ERROR, verified.where, quantity, error, value, words, 100 * slack / abs(stated))
-    if figure.status == "reproduced" and error.agrees(value):
+    if figure.status == "reproduced exactly":
         return figure
     means = [("the unrounded mean", mean)]
     if verified.mean is not None:
         means.append((f"the printed mean {verified.mean.text}", verified.mean.value))
     for name, middle in means:
         if error.agrees(relative_error_percent(middle, stated)):
-            return Figure(
-                RELATIVE_ERROR, verified.where, quantity, "reproduced", error.text, value, 0.0, f"{words}, {name}"
-            )
+            how = f"{words}, {name}"
+            status: Status = "reproduced exactly"
+            return Figure(RELATIVE_ERROR, verified.where, quantity, status, error.text, value, 0.0, how)
+    if figure.status != "differs":
+        return figure
     if verified.mean is not None:
         rounded = relative_error_percent(verified.mean.value, stated)
         words = f"{words} = {like(value, error)} ({like(rounded, error)} from the printed mean)"
@@ -150,7 +163,7 @@ def _best(ascent: Ascent, target: Target) -> Figure:
         "nearest step",
         ascent.where,
         "step nearest to the target",
-        "reproduced" if same else "differs",
+        "reproduced exactly" if same else "differs",
         str(ascent.best),
         nearest,
         0.0,
@@ -184,8 +197,9 @@ def _p(verified: Verified, p: Printed, target: Target) -> Figure:
         ]
         found[name] = (ends[1], max(abs(ends[0] - ends[1]), abs(ends[2] - ends[1])))
     for name, (value, slack) in found.items():
-        if p.agrees(value, slack):
-            return Figure(T_TEST, verified.where, "p", "reproduced", p.text, value, slack, f"{name} test")
+        figure = compared(T_TEST, verified.where, "p", p, value, f"{name} test", slack)
+        if figure.status != "differs":
+            return figure
     value, slack = found["Student's"]
     return Figure(T_TEST, verified.where, "p", "differs", p.text, value, slack, _both(found))
 

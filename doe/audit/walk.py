@@ -110,7 +110,7 @@ def _stated(study: SurfaceStudy, ascent: Ascent, steps: DesignSteps, walk: Float
             LEVELS_ON_WALK,
             where,
             f"level {words} of the design, {step}",
-            "differs" if apart else "reproduced",
+            "differs" if apart else "reproduced exactly",
             _listed(level),
             _listed(setting),
             0.0,

@@ -102,8 +102,10 @@ class TableEntries:
         return TableEntries(value, self._name(key))
 
     def tables(self, key: str) -> tuple[TableEntries, ...]:
-        """A list of tables, empty where it is missing."""
+        """A list of tables, empty where it is missing; a single table is a list of one."""
         value = self._get(key, [])
+        if isinstance(value, dict):
+            return (TableEntries(value, self._name(key)),)
         if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
             raise self.error(key, f"a list of tables [[{key}]] is needed")
         return tuple(TableEntries(item, f"{self._name(key)} {number}") for number, item in enumerate(value, 1))

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from doe.analysis.surface import term_names
 from doe.audit import Printed, PublishedStudy, printed, printed_or_none
+from doe.audit.anova_table import source_name
 from doe.audit.restitution_formula import names_in
 from doe.audit.study import (
     AnovaLine,
@@ -35,7 +36,7 @@ from doe.audit.study import (
     Total,
     Verified,
 )
-from doe.audit.surface_refit import source_name
+from doe.audit.surface_refit import STATISTICS
 from doe.errors import AuditError
 from doe.table_file import read_table as read_cells
 from explorer.audit.entries import TableEntries, read_entries
@@ -46,9 +47,23 @@ Part = TypeVar("Part")
 
 MOST_BYTES = 2_000_000
 """Bytes of one file; published tables hold thousands."""
-STATISTICS = ("r_squared", "r_squared_adjusted", "r_squared_predicted", "cv_percent", "adequate_precision", "sigma")
 MOST_FACTORS = 8
 """Of a second-order surface: 45 terms."""
+ANOVA_COLUMNS = {
+    "source": ("source", "sourceofvariation", "effect", "factor", "term", "terms", "regression"),
+    "sum_of_squares": (
+        *("sumofsquares", "sumsq", "ss", "adjss", "sumsquares", "partialss", "typeiss", "typeiiss", "typeiiiss"),
+        *("typeisumofsquares", "typeiisumofsquares", "typeiiisumofsquares", "seqss"),
+    ),
+    "sequential": ("seqss", "sequentialss"),
+    "df": ("df", "dof", "degreesoffreedom"),
+    "mean_square": ("meansquare", "meansq", "ms", "adjms"),
+    "f": ("fvalue", "f", "fratio"),
+    "p": ("pvalue", "p", "prf", "probf", "pvalueprobf", "sig"),
+}
+"""Figure → the columns in which programs print it, by their letters alone ("Pr(>F)": "prf"), the first one found."""
+NO_FIGURE = ("", "*", "-", "–", "—", "NA", "NaN")
+"""What stands in a cell that has none."""
 FORMAT = 1
 
 
@@ -76,11 +91,12 @@ def _study(entries: TableEntries, folder: Path) -> PublishedStudy:
         return _finished(read, entries.table(key), folder) if key in entries else None
 
     ascent = optional("ascent", read_ascent)
-    surface = optional("surface", partial(read_surface, ascent=ascent))
+    surface = partial(read_surface, ascent=ascent)
+    surfaces = tuple(_finished(surface, one, folder) for one in entries.tables("surface"))
     study = PublishedStudy(
         title=entries.text("title"),
         source=entries.text("source", " ").strip(),
-        target=_finished(_target, entries.table("target"), folder),
+        target=optional("target", _target),
         derived=tuple(_finished(_derived, one, folder) for one in entries.tables("derived")),
         measured=tuple(part for one in entries.tables("measured") for part in _finished(_measured, one, folder)),
         totals=tuple(_finished(_total, one, folder) for one in entries.tables("total")),
@@ -88,8 +104,8 @@ def _study(entries: TableEntries, folder: Path) -> PublishedStudy:
         drop_test=optional("drop_test", _drop_test),
         screening=optional("screening", read_screening),
         ascent=ascent,
-        surface=surface,
-        optimum=read_optimum(entries.table("optimum"), surface) if "optimum" in entries else None,
+        surfaces=surfaces,
+        optimum=read_optimum(entries.table("optimum"), surfaces) if "optimum" in entries else None,
         verified=optional("verification", read_verified),
     )
     entries.finish()
@@ -269,10 +285,11 @@ def read_ascent(entries: TableEntries, folder: Path) -> Ascent:
 
 def read_surface(entries: TableEntries, folder: Path, ascent: Ascent | None) -> SurfaceStudy:
     """``[surface]`` with ``[[surface.factor]]``, ``[surface.statistics]`` and ``[surface.equation]``; ``ascent`` is the
-    walk that its levels may be said to be steps of."""
-    runs, anova = read_table(folder, entries.text("runs")), read_table(folder, entries.text("anova"))
+    walk that its levels may be said to be steps of. Without ``runs`` its figures are held against one another only."""
+    runs = read_table(folder, entries.text("runs")) if "runs" in entries else None
+    anova = read_table(folder, entries.text("anova"))
     factors = entries.tables("factor")
-    if not 1 <= len(factors) <= MOST_FACTORS:
+    if not (0 if runs is None else 1) <= len(factors) <= MOST_FACTORS:
         raise entries.error("factor", f"{len(factors)} factors; allowed: 1 … {MOST_FACTORS}")
     names = tuple(one.text("name") for one in factors)
     if len(set(names)) < len(names):
@@ -281,12 +298,13 @@ def read_surface(entries: TableEntries, folder: Path, ascent: Ascent | None) -> 
     high = np.array([one.number("high") for one in factors])
     if not (low < high).all():
         raise entries.error("factor", "low must be below high")
-    levels = _numbers(runs, tuple(one.text("column") for one in factors))
+    columns = tuple(one.text("column", None if runs is not None else " ") for one in factors)
+    levels = np.empty((0, len(factors))) if runs is None else _numbers(runs, columns)
     screened = tuple(one.text("screened", name) for one, name in zip(factors, names, strict=True))
     for one in factors:
         one.finish()
     coded = levels if entries.flag("coded", True) else (2 * levels - low - high) / (high - low)
-    where_runs = entries.text("where_runs")
+    where_runs = entries.text("where_runs", None if runs is not None else " ").strip()
     where_anova = entries.text("where_anova")
     given = entries.table("statistics") if "statistics" in entries else None
     statistics = {} if given is None else {key: given.figure(key) for key in STATISTICS if key in given}
@@ -301,8 +319,8 @@ def read_surface(entries: TableEntries, folder: Path, ascent: Ascent | None) -> 
         low=low,
         high=high,
         coded=coded,
-        responses=runs.numbers(entries.text("response")),
-        anova=tuple(_anova_line(anova, row) for row in range(anova.rows)),
+        responses=runs.numbers(entries.text("response")) if runs is not None else (),
+        anova=_anova_lines(anova),
         statistics=statistics,
         equation=_equation(entries.table("equation"), names) if "equation" in entries else None,
         steps=_steps(entries.table("steps"), ascent) if "steps" in entries else None,
@@ -320,13 +338,18 @@ def _steps(entries: TableEntries, ascent: Ascent | None) -> DesignSteps:
     return DesignSteps(**found)
 
 
-def _anova_line(table: PrintedTable, row: int) -> AnovaLine:
-    cells = {key: table.number_or_none(key, row) for key in ("sum_of_squares", "df", "mean_square")}
-    return AnovaLine(
-        table.texts("source")[row],
-        **cells,
-        f=table.number_or_none("f_value", row),
-        p=table.number_or_none("p_value", row),
+def _anova_lines(table: PrintedTable) -> tuple[AnovaLine, ...]:
+    plain = {"".join(filter(str.isalnum, column.lower())): column for column in reversed([*table.columns])}
+    found: dict[str, str] = {}
+    for figure, names in ANOVA_COLUMNS.items():
+        column = next((plain[name] for name in names if name in plain), None)
+        # "Seq SS" is the sum of squares where no other stands beside it.
+        if column is not None and column not in found.values():
+            found[figure] = column
+    sources = table.texts(found.pop("source", "source"))
+    return tuple(
+        AnovaLine(source, **{figure: table.number_or_none(column, row) for figure, column in found.items()})
+        for row, source in enumerate(sources)
     )
 
 
@@ -346,15 +369,21 @@ def _equation(entries: TableEntries, factors: tuple[str, ...]) -> Equation:
     return equation
 
 
-def read_optimum(entries: TableEntries, surface: SurfaceStudy | None) -> Optimum:
-    """``[optimum]`` with ``values``: factor of the surface → its value, natural unit."""
-    if surface is None:
+def read_optimum(entries: TableEntries, surfaces: tuple[SurfaceStudy, ...]) -> Optimum:
+    """``[optimum]`` with ``values``: factor of the surface → its value, natural unit. Of several surfaces ``surface``
+    says which one, by its ``where_anova``."""
+    if not surfaces:
         raise entries.error("values", "there is no [surface] that this could be the optimum of")
-    values = entries.table("values")
+    places = [surface.where_anova for surface in surfaces]
+    where = entries.text("surface", None if len(places) > 1 else places[0])
+    if where not in places:
+        raise entries.error("surface", f"{where!r} is not one of {', '.join(places)}")
+    values, position = entries.table("values"), places.index(where)
     found = Optimum(
         where=entries.text("where"),
-        values=tuple(values.figure(name) for name in surface.factors),
+        values=tuple(values.figure(name) for name in surfaces[position].factors),
         predicted=entries.figure_or_none("predicted"),
+        surface=position,
     )
     values.finish()
     entries.finish()
@@ -409,8 +438,9 @@ class PrintedTable:
             raise AuditError(f"{self.name}, line {self.lines[row]}, {column}: {error}") from None
 
     def number_or_none(self, column: str, row: int) -> Printed | None:
-        """One cell, None where it is empty or the column is not there."""
-        return self.number(column, row) if self.columns.get(column, ())[row : row + 1] not in ((), ("",)) else None
+        """One cell, None where no figure stands in it or the column is not there."""
+        cells = self.columns.get(column)
+        return None if cells is None or cells[row] in NO_FIGURE else self.number(column, row)
 
 
 def read_table(folder: Path, name: str) -> PrintedTable:

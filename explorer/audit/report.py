@@ -1,6 +1,6 @@
 """The findings of an audit for a reader: a text for the terminal, and the same sections as HTML and as Markdown.
 
-What differs comes first; what is reproduced is counted by its table.
+What differs comes first; what is reproduced is counted by its table, what needs a slack is listed with it.
 """
 
 from __future__ import annotations
@@ -21,12 +21,16 @@ from explorer.units import MISSING
 HEADINGS: dict[Status, str] = {
     "differs": "differ",
     "cannot be checked": "cannot be checked",
-    "reproduced": "reproduced",
+    "only if rounded": "reproduced only if rounded",
+    "reproduced exactly": "reproduced exactly",
 }
+REPRODUCED: tuple[Status, ...] = ("reproduced exactly", "only if rounded")
 NOBODY = About()
 WHAT = (
-    "A figure is reproduced if the recomputed value rounds to the print, allowing for the rounding of the printed "
-    "numbers it is computed from. Everything is recomputed from the publication's own tables; nothing is simulated."
+    "A figure is reproduced exactly if the recomputed value rounds to the print. The figures of an analysis of "
+    "variance are first held against one another, as far as the rounding of each allows, and then against the runs. "
+    "What comes out only if the runs, or other inputs, were rounded before they were printed is listed with the slack "
+    "that this gives. Everything is recomputed from the publication's own tables; nothing is simulated."
 )
 
 
@@ -42,9 +46,10 @@ def _parts(audit: Audit) -> Iterator[str]:
     yield _listed("REMARKS", [f"{remark.where}: {remark.text}" for remark in audit.remarks])
     unchecked = [f"{f.where}: {f.quantity}".lstrip(": ") + f": {f.how}" for f in audit.having("cannot be checked")]
     yield _listed("CANNOT BE CHECKED", unchecked)
+    yield _listed("ONLY IF ROUNDED", [_differs(figure) for figure in audit.having("only if rounded")])
     rows = reproduced_by_place(audit)
     if rows:
-        yield "REPRODUCED\n" + text_table(("where", "check", "figures"), rows)
+        yield "REPRODUCED EXACTLY\n" + text_table(("where", "check", "figures"), rows)
 
 
 def _differs(figure: Figure) -> str:
@@ -70,8 +75,11 @@ def audit_report(audit: Audit, about: About = NOBODY) -> Report:
     """The report of an audit."""
     figures = DataTable(
         "figures",
-        ("where", "figure", "status", "printed", "recomputed", "how"),
-        tuple((f.where, f.quantity, f.status, f.printed, recomputed_text(f), f.how) for f in audit.figures),
+        ("where", "figure", "status", "printed", "recomputed", "slack", "how"),
+        tuple(
+            (f.where, f.quantity, f.status, f.printed, recomputed_text(f), f"{f.slack:.2g}", f.how)
+            for f in audit.figures
+        ),
     )
     return Report(
         f"Audit: {audit.title}",
@@ -85,7 +93,7 @@ def audit_report(audit: Audit, about: About = NOBODY) -> Report:
 
 def banner(audit: Audit) -> Banner:
     """Whether the study's own tables give what it prints."""
-    wrong, right = len(audit.having("differs")), len(audit.having("reproduced"))
+    wrong, right = len(audit.having("differs")), len(audit.having(*REPRODUCED))
     why = f"Of {len(audit.figures)} printed figures, {counted(audit)}."
     if wrong:
         return Banner(
@@ -102,7 +110,7 @@ def banner(audit: Audit) -> Banner:
 
 
 def audit_sections(audit: Audit) -> tuple[Section, ...]:
-    """In short, what differs, remarks, what cannot be checked, what is reproduced."""
+    """In short, what differs, remarks, what cannot be checked, what is reproduced only if rounded, and what exactly."""
     return tuple(section for section in _sections(audit) if section.blocks)
 
 
@@ -113,7 +121,9 @@ def _sections(audit: Audit) -> Iterator[Section]:
     remarks = tuple(f"{remark.where}: {remark.text}" for remark in audit.remarks)
     yield Section("Remarks", (Bullets(remarks),) if remarks else ())
     yield Section("What cannot be checked", _unchecked(audit.having("cannot be checked")))
-    yield Section("What is reproduced", _reproduced(audit))
+    rounded = audit.having("only if rounded")
+    yield Section("What is reproduced only if its inputs were rounded", _table(rounded, "How, and with what slack"))
+    yield Section("What is reproduced exactly", _reproduced(audit))
 
 
 def _table(figures: tuple[Figure, ...], how: str) -> tuple[Block, ...]:
@@ -131,7 +141,7 @@ def _unchecked(figures: tuple[Figure, ...]) -> tuple[Block, ...]:
 
 
 def _reproduced(audit: Audit) -> tuple[Block, ...]:
-    figures = audit.having("reproduced")
+    figures = audit.having("reproduced exactly")
     if not figures:
         return ()
     counts = Table(("Where", "Check", "Figures"), reproduced_by_place(audit))
@@ -165,6 +175,6 @@ def recomputed_text(figure: Figure) -> str:
 
 
 def reproduced_by_place(audit: Audit) -> tuple[tuple[str, str, str], ...]:
-    """(place, check, how many) of what is reproduced, in the order of the study."""
-    counts = Counter((figure.where, figure.check) for figure in audit.having("reproduced"))
+    """(place, check, how many) of what is reproduced exactly, in the order of the study."""
+    counts = Counter((figure.where, figure.check) for figure in audit.having("reproduced exactly"))
     return tuple((where, check, str(count)) for (where, check), count in counts.items())

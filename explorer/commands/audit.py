@@ -21,8 +21,8 @@ def audit(
 ) -> None:
     """Recompute every figure of a published calibration study that can be recomputed.
 
-    Each is reproduced, differs (with the recomputed value and how it came about), or cannot be checked (with the
-    reason). Exit code 0 whatever was found.
+    Each is reproduced exactly, only if the runs or other inputs were rounded (with the slack), differs (with the
+    recomputed value and how it came about), or cannot be checked (with the reason). Exit code 0 whatever was found.
     """
     from doe.audit import audit_study
     from explorer.audit.read_study import read_study, shipped_study

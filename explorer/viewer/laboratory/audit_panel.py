@@ -10,7 +10,10 @@ from explorer.viewer.actions import on_upload
 from explorer.viewer.laboratory.answer_view import AnswerView
 from explorer.viewer.panel import LABORATORY, PageContext, Panel
 
-WAITING = "Every figure of a published study that can be recomputed: reproduced, differs, or cannot be checked."
+WAITING = (
+    "Every figure of a published study that can be recomputed: reproduced exactly, only if its inputs were rounded, "
+    "differs, or cannot be checked."
+)
 
 
 class AuditPanel(Panel):

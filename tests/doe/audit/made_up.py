@@ -74,7 +74,7 @@ def clean_study(seed=7):
         drop_test=DropTest("Equation 4", "(vx + vy) / v", 45.0, 0.2, None, restitutions),
         screening=screening,
         ascent=_ascent(rng, target),
-        surface=surface,
+        surfaces=(surface,),
         optimum=Optimum("section 5", shown(natural, 5)),
         verified=_verified(target),
     )

@@ -21,12 +21,12 @@ def test_a_p_at_its_level_is_no_fault_and_a_bound_says_what_it_says(clean):
     screening = replace(clean.screening, level_of_others=0.04)
     at_level = replace(screening, p=at(screening.p, 3, printed("0.04")))
     named, others = significant(replace(clean, screening=at_level))
-    assert (named.status, others.status) == ("reproduced", "differs")
+    assert (named.status, others.status) == ("reproduced exactly", "differs")
     assert "0.0378 from F" in others.how
     unknown = replace(at_level, f=(), error_df=2)
-    assert [f.status for f in significant(replace(clean, screening=unknown))] == ["reproduced"] * 2
+    assert [f.status for f in significant(replace(clean, screening=unknown))] == ["reproduced exactly"] * 2
     bound = replace(unknown, p=at(screening.p, 3, printed("<0.05")), level_of_others=0.01)
-    assert [f.status for f in significant(replace(clean, screening=bound))] == ["reproduced"] * 2
+    assert [f.status for f in significant(replace(clean, screening=bound))] == ["reproduced exactly"] * 2
 
 
 def significant(study):
@@ -36,9 +36,9 @@ def significant(study):
 def test_without_p_and_f_what_the_factors_leave_of_the_runs_decides(clean):
     """12 runs less 8 factors leave the 3 degrees of freedom of the error; with another number nothing can be said."""
     bare = replace(clean.screening, f=(), p=())
-    assert [f.status for f in significant(replace(clean, screening=bare))] == ["reproduced"] * 2
+    assert [f.status for f in significant(replace(clean, screening=bare))] == ["reproduced exactly"] * 2
     fewer = replace(bare, significant=("F1", "F2"))
-    assert [f.status for f in significant(replace(clean, screening=fewer))] == ["reproduced", "differs"]
+    assert [f.status for f in significant(replace(clean, screening=fewer))] == ["reproduced exactly", "differs"]
     lost = replace(bare, error_df=2)
     assert [f.status for f in significant(replace(clean, screening=lost))] == ["cannot be checked"] * 2
 
@@ -46,14 +46,14 @@ def test_without_p_and_f_what_the_factors_leave_of_the_runs_decides(clean):
 def test_a_design_off_the_best_step_or_off_the_walk_is_remarked(clean):
     """Nothing is said of steps here: the design around step 2, and one whose second factor goes between the steps."""
     surface = replace(clean.surface, steps=None)
-    assert audit_study(replace(clean, surface=surface)).remarks == ()
+    assert audit_study(replace(clean, surfaces=(surface,))).remarks == ()
     delta = clean.ascent.settings[1] - clean.ascent.settings[2]
     off = replace(surface, low=surface.low + delta, high=surface.high + delta)
-    (remark,) = on_the_walk(replace(clean, surface=off))
+    (remark,) = on_the_walk(replace(clean, surfaces=(off,)))
     assert "is step 2 and not the step called best, 3 (30, 0.4, 3), which lies at (+1.00, +1.00, -1.00)" in remark.text
     inward = np.array([0.0, 0.02, 0.0])
     narrow = replace(surface, low=surface.low + inward, high=surface.high - inward)
-    (remark,) = on_the_walk(replace(clean, surface=narrow))
+    (remark,) = on_the_walk(replace(clean, surfaces=(narrow,)))
     assert "are no steps of the walk: B 0.34 and 0.46, steps 0.24, 0.32, 0.4" in remark.text
 
 

@@ -5,9 +5,10 @@ import math
 import numpy as np
 import pytest
 
+from doe.audit.anova_table import consistency, read_lines, source_name
 from doe.audit.printed import most_agreed, printed, rounding_slack
 from doe.audit.restitution_formula import evaluated, flight, names_in
-from doe.audit.surface_refit import source_name
+from doe.audit.study import AnovaLine
 from doe.errors import AuditError
 
 
@@ -144,7 +145,88 @@ def test_a_flight_keeps_its_energy_along_the_plate():
         ("Pure Error", "pure_error"),
         ("Sum", "total"),
         ("model", "model"),
+        ("Regression", "model"),
+        ("Total Model", "model"),
+        ("Residuals", "residual"),
+        ("Residual Error", "residual"),
+        ("Total Error", "residual"),
+        ("Lack-of-Fit", "lack_of_fit"),
+        ("Cor Total", "total"),
+        ("Corrected Total", "total"),
+        ("C. Total", "total"),
+        ("Total SS", "total"),
+        ("  2-Way Interaction", "interaction"),
+        ("Crossproduct", "interaction"),
+        ("Quadratic", "square"),
+        ("FO(x1, x2)", "linear"),
+        ("x1", "X1"),
+        ("X1:X2", "X1*X2"),
+        ("X2*X1", "X1*X2"),
+        ("X1 by X2", "X1*X2"),
+        ("X1*X1", "X1^2"),
+        ("I(X1^2)", "X1^2"),
+        ("X1 (Q)", "X1^2"),
+        ("X1(150,200)", "X1"),
+        ("(X1-175)*(X2-20)", "X1*X2"),
+        ("(X1-175)*(X1-175)", "X1^2"),
+        ("X1^2*X2", "x1_2_x2"),
+        ("X3", "x3"),
+        ("Curvature", "curvature"),
     ],
 )
 def test_lines_of_an_anova_are_known_by_their_usual_names(printed_name, name):
     assert source_name(printed_name, ("X1", "X2")) == name
+
+
+def lines_of(*sources, factors=("Temp", "Rate"), df=None):
+    degrees = df or [None] * len(sources)
+    prints = [
+        AnovaLine(source, df=None if n is None else printed(str(n))) for source, n in zip(sources, degrees, strict=True)
+    ]
+    return [(line.role, line.source) for line in read_lines(prints, factors)]
+
+
+def test_letters_and_numbers_of_factors_are_those_that_the_table_gives_them():
+    expert = lines_of("A-Temp", "B-Rate", "AB", "A²", "B^2")
+    assert [source for _, source in expert] == ["Temp", "Rate", "Temp*Rate", "Temp^2", "Rate^2"]
+    statistica = lines_of("(1)Temp (L)", "Temp (Q)", "(2)Rate(L)", "Rate(Q)", "1L by 2L")
+    assert [source for _, source in statistica] == ["Temp", "Temp^2", "Rate", "Rate^2", "Temp*Rate"]
+    # A letter that nothing explains could be any factor; 1L by 2Q is no term of second order.
+    assert lines_of("A", "AB") == [("other", "a"), ("other", "ab")]
+    assert lines_of("(1)Temp (L)", "(2)Rate (L)", "1L by 2Q")[2][0] == "other"
+    assert lines_of("A-Temp", factors=("A", "B")) == [("term", "A")]
+
+
+def test_the_uncorrected_total_of_spss_is_no_total():
+    roles = [role for role, _ in lines_of("Corrected Model", "Temp", "Error", "Total", "Corrected Total")]
+    assert roles == ["model", "term", "residual", "other", "total"]
+
+
+def test_error_is_the_residual_unless_the_table_has_another():
+    assert lines_of("Temp", "Error", "Total")[1] == ("residual", "residual")
+    assert lines_of("Temp", "Error", "Lack-of-Fit", "Pure Error")[1] == ("residual", "residual")
+    assert lines_of("Temp", "Error", "Pure Error", "Total Error")[1] == ("residual", "residual")
+    assert lines_of("Temp", "Residual", "Lack of Fit", "Error")[3] == ("pure_error", "pure_error")
+    assert lines_of("Model", "Lack of Fit", "Error", "Total", df=[5, 3, 4, 12])[2] == ("pure_error", "pure_error")
+    assert lines_of("Model", "Lack of Fit", "Error", "Total", df=[5, 3, 7, 12])[2] == ("residual", "residual")
+
+
+@pytest.mark.parametrize(
+    "f, agrees",
+    [("47.22", True), ("47.2", True), ("47.214", True), ("47.23", False), ("40.22", False), ("4.722", False)],
+)
+def test_f_is_the_quotient_of_the_prints_and_of_nothing_beside_them(f, agrees):
+    """484.00/10.25: 483.995/10.255 … 484.005/10.245 by the mean squares, SS/df = 51.25/5 leaves 10.249 … 10.251."""
+    line = AnovaLine("A", printed("484.00"), printed("1"), printed("484.00"), printed(f))
+    error = AnovaLine("Residual", printed("51.25"), printed("5"), printed("10.25"))
+    judged, role = consistency(read_lines([line, error], ("A",)))
+    assert (judged[0, "f"].agrees, role) == (agrees, "residual")
+    assert judged[0, "f"].interval == pytest.approx((483.995 / 10.251, 484.005 / 10.249))
+
+
+def test_an_f_that_was_divided_by_hand_is_no_fault():
+    """33.25/3 = 11.0833, printed 11.08: over 9.00 it gives 1.2311 by hand and 1.2315 unrounded."""
+    for f in ("1.2311", "1.2315"):
+        lack = AnovaLine("Lack of fit", printed("33.250"), printed("3"), printed("11.08"), printed(f))
+        error = AnovaLine("Pure error", printed("18.000"), printed("2"), printed("9.00"))
+        assert consistency(read_lines([lack, error], ()))[0][0, "f"].agrees

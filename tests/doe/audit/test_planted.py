@@ -111,11 +111,11 @@ def a_printed_p_that_hides_a_factor(study):
 
 
 def design_levels(study):
-    return replace(study, surface=replace(study.surface, steps=DesignSteps("1", "3", "4")))
+    return replace(study, surfaces=(replace(study.surface, steps=DesignSteps("1", "3", "4")),))
 
 
 def design_centre(study):
-    return replace(study, surface=replace(study.surface, steps=DesignSteps("2", "4", "4")))
+    return replace(study, surfaces=(replace(study.surface, steps=DesignSteps("2", "4", "4")),))
 
 
 def one_ascent_error(study):
@@ -129,24 +129,24 @@ def best_step(study):
 def anova_cell(study):
     line = study.surface.anova[2]
     wrong = replace(line, sum_of_squares=printed(f"{line.sum_of_squares.value + 1:.4f}"))
-    return replace(study, surface=replace(study.surface, anova=at(study.surface.anova, 2, wrong)))
+    return replace(study, surfaces=(replace(study.surface, anova=at(study.surface.anova, 2, wrong)),))
 
 
 def anova_total(study):
     line = study.surface.anova[-1]
     wrong = replace(line, sum_of_squares=printed(f"{line.sum_of_squares.value + 1:.4f}"))
-    return replace(study, surface=replace(study.surface, anova=(*study.surface.anova[:-1], wrong)))
+    return replace(study, surfaces=(replace(study.surface, anova=(*study.surface.anova[:-1], wrong)),))
 
 
 def r_squared(study):
-    return replace(study, surface=replace(study.surface, statistics={"r_squared": printed("0.8123")}))
+    return replace(study, surfaces=(replace(study.surface, statistics={"r_squared": printed("0.8123")}),))
 
 
 def coefficient(study):
     equation = study.surface.equation
-    wrong = printed(f"{equation.coefficients['A'].value + 0.006:.5f}")
-    changed = replace(equation, coefficients={**equation.coefficients, "A": wrong})
-    return replace(study, surface=replace(study.surface, equation=changed), optimum=None)
+    wrong = printed(f"{equation.coefficients['A*C'].value + 0.0019:.5f}")
+    changed = replace(equation, coefficients={**equation.coefficients, "A*C": wrong})
+    return replace(study, surfaces=(replace(study.surface, equation=changed),), optimum=None)
 
 
 def verified_mean(study):
@@ -181,7 +181,7 @@ PLANTED = {
     anova_cell: ("analysis of variance from the runs", "Table 8", "sum of squares of B"),
     anova_total: ("sums of squares add up", "Table 8", "sum of squares of total"),
     r_squared: ("statistics of the fit", "section 4", "R²"),
-    coefficient: ("printed equation", "Equation 5", "coefficient of A"),
+    coefficient: ("printed equation", "Equation 5", "coefficient of A*C"),
     verified_mean: ("mean of replicates", "Table 9", "mean response"),
     verified_p: ("two-sample t test", "Table 9", "p"),
 }
@@ -256,7 +256,7 @@ def test_coefficients_with_too_few_digits_miss_the_design_s_own_runs(clean):
     equation = clean.surface.equation
     coarse = {name: printed(f"{cell.value:.2g}") for name, cell in equation.coefficients.items()}
     study = replace(
-        clean, surface=replace(clean.surface, equation=replace(equation, coefficients=coarse)), optimum=None
+        clean, surfaces=(replace(clean.surface, equation=replace(equation, coefficients=coarse)),), optimum=None
     )
     audit = audit_study(study)
     missed = [f for f in audit.having("differs") if f.check == "printed equation at the design's own runs"]
@@ -337,7 +337,7 @@ def test_few_scattered_runs_are_no_evidence_of_agreement(clean):
 
 def test_a_surface_that_cannot_be_fitted_is_said_once(clean):
     few = replace(clean.surface, coded=clean.surface.coded[:9], responses=clean.surface.responses[:9])
-    audit = audit_study(replace(clean, surface=few, optimum=None, verified=None))
+    audit = audit_study(replace(clean, surfaces=(few,), optimum=None, verified=None))
     assert any("cannot separate" in figure.how for figure in audit.having("cannot be checked"))
 
 
@@ -354,8 +354,21 @@ def test_a_number_that_the_table_prints_as_something_else_is_told():
     among = study.quotes[0].among
     free = replace(study.quotes[0], original=None, value=printed("0.55"))
     (found,) = [f for f in audit_study(replace(study, quotes=(free,))).figures if f.check == "values said twice"]
-    assert found.status == "reproduced"
+    assert found.status == "reproduced exactly"
     lost = replace(free, value=printed("0.31"), elsewhere=("nu of seed",))
     (found,) = [f for f in audit_study(replace(study, quotes=(lost,))).figures if f.check == "values said twice"]
     assert (found.status, found.recomputed) == ("differs", among[0].value)
     assert found.how.endswith("it prints 0.31 as nu of seed")
+
+
+def test_without_a_target_all_that_needs_none_is_checked(clean):
+    audit = audit_study(replace(clean, target=None))
+    assert audit.having("differs") == ()
+    unchecked = {(figure.where, figure.quantity) for figure in audit.having("cannot be checked")}
+    assert unchecked == {
+        ("Table 6", "relative errors, nearest step"),
+        ("section 5", "response"),
+        ("Table 9", "relative error [%]"),
+        ("Table 9", "p"),
+    }
+    assert next(figure.quantity for figure in audit.figures if figure.where == "Table 9") == "mean response"

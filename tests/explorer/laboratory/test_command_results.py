@@ -144,7 +144,7 @@ def test_an_analysis_has_its_words_its_charts_and_its_report():
 def test_an_audit_is_that_of_the_command():
     answer = audit_result(None)
     assert answer.text.strip() == told(answer)
-    assert "142 reproduced" in answer.text
+    assert "141 reproduced exactly" in answer.text
     assert b"</html>" in answer.files["audit.html"]
 
 
