@@ -31,7 +31,7 @@ def viewer(tmp_path):
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     yield f"rerun+http://127.0.0.1:{port}/proxy", path, process
     process.kill()
-    process.wait(20)
+    process.wait(120)
 
 
 def test_bodies_and_changes_arrive_at_the_viewer(viewer):
@@ -50,7 +50,7 @@ def test_bodies_and_changes_arrive_at_the_viewer(viewer):
         assert time.monotonic() < end, "nothing arrived"
         time.sleep(0.1)
     process.send_signal(signal.SIGINT)
-    process.wait(20)
+    process.wait(120)
     recording = read_recording(path)
     assert recording.times == pytest.approx([0.1, 0.2, 0.3])
     seeds = next(one for one in recording.components if one.shape.name == "seed")
