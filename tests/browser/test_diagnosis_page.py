@@ -29,6 +29,8 @@ def test_the_board_names_the_effect_with_its_charts(page):
     board = page.frame_locator('iframe[title="Diagnosis"]')
     board.locator(".banner strong").wait_for()
     assert "ROLLING RESISTANCE" in board.locator(".banner").inner_text().upper()
+    # A chart is drawn once it comes into sight.
+    board.locator("figure").first.scroll_into_view_if_needed()
     board.locator("figure .js-plotly-plot").first.wait_for()
     assert "with probability 96.7 %" in board.locator("body").inner_text()
     page.locator("#state-line").get_by_text("Trefoil pour 2").wait_for()

@@ -72,7 +72,7 @@ def test_a_mesh_with_a_hole_is_refused_in_words_and_the_pour_goes_on(page, tmp_p
     press(page, "r")
     wait_for(lambda: state(page) == "running")
     page.get_by_text("Rig and material").click()
-    page.get_by_text("Shape or funnel from a mesh").click()
+    page.get_by_text("Shape or funnel from a mesh", exact=True).click()
     with page.expect_file_chooser() as chooser:
         page.get_by_role("button", name="Upload a body and pour").click()
     chooser.value.set_files(tmp_path / "open.stl")

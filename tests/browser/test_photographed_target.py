@@ -108,6 +108,6 @@ def test_it_is_there_after_a_restart_until_it_is_removed(browser, project):
         page.get_by_role("button", name="Remove the target", exact=True).click()
         page.locator("#state-line").get_by_text("25.00° ± 2.00°").wait_for()
         room(page, "Calibrate")
-        seen(page, "as in the study's file")
+        seen(page, "From the study's file")
         shot(page, "removed")
     assert not (project / "target").exists()
