@@ -150,7 +150,12 @@ class CalibrationProcess:
 
     def resumable(self) -> bool:
         """Whether the last one was stopped, in this session of the page or before."""
-        return self.status().state in ("cancelled", "failed") or self._unfinished() is not None
+        if self.status().state in ("cancelled", "failed"):
+            return True
+        try:
+            return self._unfinished() is not None
+        except ValueError:  # the study's file cannot be read, which is told where one is started
+            return False
 
     def retry(self) -> None:
         """Run the last calibration again, with more seeds for replicates that are left without a valid run."""

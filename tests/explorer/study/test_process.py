@@ -422,3 +422,10 @@ def test_another_study_is_started_from_a_copy_and_resumed(tmp_path):
     arguments = json.loads((out / "arguments.json").read_text())
     assert arguments[arguments.index("--study") + 1] == str(copy)
     assert arguments[-1] == "--resume"
+
+
+def test_a_study_whose_file_cannot_be_read_is_not_resumable(tmp_path):
+    process = study(tmp_path)
+    assert not process.resumable()
+    (tmp_path / "my study.toml").write_text("format = ")
+    assert not process.resumable()
