@@ -67,7 +67,10 @@ def duration_text(study: Study, profile: Profile, store: Path, workers: int | No
 
 def reckoned_time(study: Study, profile: Profile) -> float:
     """Time of one pour [s]: spheres × steps / ``PACE``, from the first body's entry to rest; NaN without a feed."""
-    scene = with_profile(study, profile.name)[0].scene
+    try:
+        scene = with_profile(study, profile.name)[0].scene
+    except ValueError:  # a profile that this study cannot have, which is told where it is started
+        return math.nan
     if not {"rig.mass", "insertion.rate"} <= set(parameters(scene)):
         return math.nan
     spheres = sum(n * len(body.clump.radii) for n, body in zip(body_counts(scene), scene.bodies, strict=True))

@@ -66,3 +66,8 @@ def test_a_study_whose_pilot_sizes_it_takes_at_least_that(store):
     sized = replace(QUICK, resolution_deg=2.0)
     assert duration_text(STUDY, sized, store, 2).startswith("at least ")
     assert "at least about" in duration_text(STUDY, sized, store, 2)
+
+
+def test_a_profile_that_the_study_cannot_have_tells_no_time(tmp_path):
+    said = duration_text(STUDY, replace(STANDARD, name="nobody's"), tmp_path / "none.sqlite", 2)
+    assert "how long is told after the first pours" in said
