@@ -46,8 +46,10 @@ class PileRecording:
         self._now = ""
 
     def offer(self, able: bool) -> None:
-        """Whether there is an answer to record."""
-        self._buttons.visible = able
+        """Whether there is an answer to record; what is being recorded can be cancelled without one, too."""
+        visible = able or bool(self._work.busy_with)
+        if self._buttons.visible != visible:
+            self._buttons.visible = visible
 
     def show(self) -> None:
         """Say whether one is being made."""

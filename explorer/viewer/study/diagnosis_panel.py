@@ -150,6 +150,7 @@ class DiagnosisPanel(Panel):
         self._view.show(status, text + waiting_markdown(waiting), waiting, self._resumable(status))
         self._chooser.offer(self._diagnosis.finished())
         self._follow()
+        self._offer_piles()
         self._recording.show()
         self._show_board()
 
@@ -168,13 +169,17 @@ class DiagnosisPanel(Panel):
             # A folder that somebody named may hold any JSON, also that of another version.
             self._result, trouble = None, escaped(f"{folder}: {error}")
         self._trouble.content = trouble
-        self._offer_piles()
 
     def _offer_piles(self) -> None:
-        """What there is an answer for."""
-        self._piles.visible = self._result is not None
-        self._corrected.visible = self._result is not None and bool(self._result.added)
-        self._recording.offer(self._result is not None)
+        """What there is an answer for; and a way back from it."""
+        found = self._result is not None
+        for buttons, visible in (
+            (self._piles, found or self._former is not None),
+            (self._corrected, self._result is not None and bool(self._result.added)),
+        ):
+            if buttons.visible != visible:
+                buttons.visible = visible
+        self._recording.offer(found)
 
     def _show_piles(self) -> None:
         """Measured pile, calibrated and corrected model side by side; the middle one is the page's own pour."""

@@ -331,8 +331,13 @@ def test_a_pour_of_an_answer_leaves_a_way_back_to_one_s_own(server):
     panel._pour(other)
     panel._pour(with_values(other, {"rig.mass": "10g"}))
     assert session.now.scene != mine
+    # The answer may be gone, as when another diagnosis starts; the way back is not.
+    panel._offer_piles()
+    assert panel._piles.visible
     panel._back()
     assert (session.now.scene, session.now.seed, session.source) == (mine, 7, material_source("sunflower_extract"))
+    panel._offer_piles()
+    assert not panel._piles.visible
 
 
 def test_the_answer_s_buttons_pour_and_calibrate_the_corrected_model(server, tmp_path):
