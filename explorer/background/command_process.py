@@ -175,7 +175,7 @@ class CommandProcess:
 
     def _ending(self, code: int) -> dict[str, Any]:
         if self._cancelled_at is not None and code != 0:
-            return {"state": "cancelled"}
+            return {"state": "cancelled", "message": ""}
         if code in self._endings:
             return {"state": "finished", "message": f"{self._endings[code]}: {self.out}/report.html"}
         return {"state": "failed", "message": f"{self._command} ended with exit code {code}: {self._last_words()}"}

@@ -71,7 +71,7 @@ def test_cancel_and_resume(tmp_path):
         process.start("quick")
     process.cancel()
     wait_for(lambda: process.status().state != "running")
-    assert process.status().state == "cancelled"
+    assert (process.status().state, process.status().message) == ("cancelled", "")
     process.resume()
     wait_for(lambda: process.status().state != "running")
     assert process.status().state == "finished"
