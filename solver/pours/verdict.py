@@ -136,7 +136,10 @@ def _name(rig: PourRig) -> str:
 
 def _across(across: Obstruction, rig: PourRig, moment: Moment) -> str:
     """E.g. "one petiole lies across the outlet of the funnel and holds up 4.1 g, 14 % of the charge"."""
-    body = f"one {across.component} ({_grams(across.mass)}) lies across the outlet of the {_name(rig)}"
+    where = f"lies across the outlet of the {_name(rig)}"
+    if across.height:
+        where = f"is wedged in the {_name(rig)} {1e3 * across.height:.0f} mm above the outlet"
+    body = f"one {across.component} ({_grams(across.mass)}) {where}"
     if across.above == 0.0:
         return f"{body}, with nothing above it"
     return f"{body} and holds up {_grams(across.above)}, {_share(across.above, moment)} of the charge"

@@ -69,6 +69,9 @@ class Obstruction:
     """Its own [kg]."""
     above: float
     """Of the other bodies over the outlet [kg]; in a rig that is to be empty, of all that are in it."""
+    height: float = 0.0
+    """Of its lowest point over the edge [m] where that is more than the outlet's half width: it is wedged between
+    walls; 0 where it is at the outlet."""
 
 
 def obstruction(
@@ -95,7 +98,9 @@ def obstruction(
         if _reaches_both_sides(outlet, spheres.centre[mine, :2], spheres.radius[mine], bodies.position[b, :2]):
             above = others & over if keeps else others
             name = bodies.component_names[bodies.component[b]]
-            return Obstruction(name, float(bodies.mass[b]), float(bodies.mass[above].sum()))
+            gap = float(lowest[b]) - height
+            wedged = gap if gap > outlet.half_width else 0.0
+            return Obstruction(name, float(bodies.mass[b]), float(bodies.mass[above].sum()), wedged)
     return None
 
 

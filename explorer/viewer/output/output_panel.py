@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from html import escape
 from typing import Any
@@ -108,4 +109,7 @@ def command_html(source: SceneSource, scene: Scene, seed: int) -> str:
     except CommandError as error:
         line, select = f"None: {error}", "auto"
     style = f"display:block; user-select:{select}; white-space:pre-wrap; padding:0.4em; margin-bottom:0.6em"
-    return small_html(f"<code style='{style}; background:rgba(128,150,170,0.14)'>{escape(line)}</code>")
+    # Each option keeps its value, and no line breaks at a hyphen inside one.
+    whole = "<span style='display:inline-block; max-width:100%'>{}</span>"
+    words = " ".join(whole.format(escape(part)) for part in re.split(r" (?=--)", line))
+    return small_html(f"<code style='{style}; background:rgba(128,150,170,0.14)'>{words}</code>")

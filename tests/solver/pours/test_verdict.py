@@ -10,6 +10,7 @@ from solver.scenes.numerics import Numerics
 
 SOUND = {"finite": 1.0, "overflow": 0.0, "lost": 0.0, "overlap": 0.0}
 ALONE, HOLDING = Obstruction("petiole", 0.4e-3, 0.0), Obstruction("petiole", 0.4e-3, 4.2e-3)
+WEDGED = Obstruction("petiole", 0.4e-3, 0.0, 0.04)
 
 
 def judged(rig, hanging, in_rig, discharged=0.02, across=None, blocked=False, stalled=True):
@@ -42,6 +43,12 @@ def judged(rig, hanging, in_rig, discharged=0.02, across=None, blocked=False, st
             0.4e-3,
             ALONE,
             (Outcome.AT_REST, "one petiole (0.4 g) lies across the outlet of the {}, with nothing above it"),
+        ),
+        (
+            1,
+            0.4e-3,
+            WEDGED,
+            (Outcome.AT_REST, "one petiole (0.4 g) is wedged in the {} 40 mm above the outlet, with nothing above it"),
         ),
         (20, 6e-3, None, (Outcome.JAMMED, "20 bodies (6 g, 20 % of the charge) stay in the {}")),
         (

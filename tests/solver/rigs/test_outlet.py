@@ -56,6 +56,13 @@ def test_a_stick_over_the_opening_is_across_it_and_holds_what_is_above(way):
     assert seen.above == pytest.approx(2e-3)
 
 
+def test_a_stick_wedged_higher_up_tells_how_high():
+    way = (1.0, 0.0, 0.0)
+    assert found(*placed((LEVEL, way))).height == 0.0
+    # Its lowest point: the middle of its spheres less their radius, over the edge.
+    assert found(*placed(((0.0, 0.003, HEIGHT + 0.04), way))).height == pytest.approx(0.04 - 2.7e-3)
+
+
 def test_a_stick_alone_holds_nothing():
     assert found(*placed((LEVEL, (0.0, 1.0, 0.0)))).above == 0.0
 
