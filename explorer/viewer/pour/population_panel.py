@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
@@ -26,6 +26,7 @@ from solver import Scene
 OBSERVABLE = "angle_of_repose_deg"
 MORE = 8
 """Pours of one order."""
+POUR_MORE, POUR_BOTH = f"Pour {MORE} more", f"Pour {MORE} of each"
 SETTLED = 0.7
 """Wall time [s] for which parameters have to stay before their pours are looked for: a slider's drag asks once."""
 AGAIN = 4.0
@@ -76,11 +77,13 @@ class PopulationPanel(Panel):
         self._changed = ""
         self._compared_for: object = None
         self._comparison: Comparison | None = None
+        self._poured: Scene | None = None
+        self._to_come: tuple[Scene, int] | None = None
         self._html = gui.add_html("")
-        self._more = gui.add_button(f"Pour {MORE} more", hint=f"In the background, with other seeds. {HINT}")
+        self._more = gui.add_button(POUR_MORE, hint=f"In the background, with other seeds. {HINT}")
         self._stop = gui.add_button("Cancel these pours", visible=False, hint="Finished pours are kept.")
         self._more.on_click(lambda _: page.post(self._pour))
-        self._stop.on_click(lambda _: page.post(self._process.cancel))
+        self._stop.on_click(lambda _: page.post(self._cancel))
 
     def show(self, now: Now) -> None:
         """Look for pours of the parameters in force, and tell what there is."""
@@ -88,6 +91,10 @@ class PopulationPanel(Panel):
         if status.scene != self._scene:
             self._scene, self._since = status.scene, wall
         command = self._process.status()
+        if self._to_come is not None and not command.alive:
+            order, self._to_come = self._to_come, None
+            self._begin(*order)
+            command = self._process.status()
         if self._more.visible == command.alive:
             self._more.visible, self._stop.visible = not command.alive, command.alive
         changed = status.energy_put_in is not None or status.disturbed
@@ -96,7 +103,12 @@ class PopulationPanel(Panel):
             self._look(status.scene, pour, wall)
         here = self._found is not None and self._found[0] == status.scene
         population = self._found[1] if self._found is not None and here else None
-        html = population_html(population, pour, command, self._changed if here else "", self._comparison)
+        former = None if self._former is None else self._former[1]
+        changed = self._changed if here else ""
+        label = POUR_BOTH if changed else POUR_MORE
+        if self._more.label != label:
+            self._more.label = label
+        html = population_html(population, pour, command, changed, self._comparison, former, self._whose(status.scene))
         if self._html.content != html:
             self._html.content = html
 
@@ -105,7 +117,32 @@ class PopulationPanel(Panel):
         self._process.close()
 
     def _pour(self) -> None:
-        self._process.start(self._session.status().scene, MORE)
+        """More of the present parameters; after a change of the former ones as well, until both have as many."""
+        scene = self._session.status().scene
+        if self._former is None or self._found is None or not self._changed or self._found[0] != scene:
+            self._begin(scene, MORE)
+            return
+        sides = (self._found, self._former)
+        wanted = max(MORE, *(population.n for _, population in sides))
+        wanted += MORE if all(population.n == wanted for _, population in sides) else 0
+        orders = [(one, wanted - population.n) for one, population in sides if population.n < wanted]
+        self._begin(*orders[0])
+        self._to_come = next(iter(orders[1:]), None)
+
+    def _begin(self, scene: Scene, pours: int) -> None:
+        self._process.start(scene, pours)
+        self._poured = scene
+
+    def _whose(self, scene: Scene) -> str:
+        """Whose pours are made in the background, where it is not ``scene``, which is on the screen."""
+        if self._poured is None or self._poured == scene:
+            return ""
+        former = self._former is not None and self._former[0] == self._poured
+        return "the former parameters" if former else f"{self._poured.title}, other parameters"
+
+    def _cancel(self) -> None:
+        self._to_come = None
+        self._process.cancel()
 
     def _look(self, scene: Scene, pour: ThisPour, wall: float) -> None:
         """Read the store where it may have become another, then compare, both off the loop."""
@@ -113,7 +150,12 @@ class PopulationPanel(Panel):
         anew = self._found is None or self._found[0] != scene
         if wanted != self._asked_for and (anew or wall >= self._asked_at + AGAIN):
             self._asked_for, self._asked_at = wanted, wall
-            self._work.start("reading stored pours", lambda: self._process.read(scene, OBSERVABLE), self._taking(scene))
+            scenes = [scene] if self._former is None else [scene, self._former[0]]
+            self._work.start(
+                "reading stored pours",
+                lambda: [(one, self._process.read(one, OBSERVABLE)) for one in scenes],
+                self._take,
+            )
         elif self._found is not None and self._former is not None and not anew:
             new, former = self._found[1], self._former[1]
             single = math.nan if pour.doubt else round(pour.angle, 1)
@@ -121,17 +163,17 @@ class PopulationPanel(Panel):
                 self._compared_for = new, single, former
                 self._work.start("comparing pours", lambda: compared(new, single, former), self._take_comparison)
 
-    def _taking(self, scene: Scene) -> Callable[[Population], None]:
-        def take(population: Population) -> None:
-            if self._found is not None and self._found[0] != scene:
-                # What a slider stood at on its way has no pours; those before it say more.
-                if self._former is None or self._found[1].n > 1:
-                    self._former = self._found
-                self._comparison = None
-                self._changed = told_difference(self._former[0], scene)
-            self._found = scene, population
-
-        return take
+    def _take(self, read: Sequence[tuple[Scene, Population]]) -> None:
+        """The population of the parameters in force, and anew that of the former ones."""
+        (scene, population), *former = read
+        self._former = next(iter(former), self._former)
+        if self._found is not None and self._found[0] != scene:
+            # What a slider stood at on its way has no pours; those before it say more.
+            if self._former is None or self._found[1].n > 1:
+                self._former = self._found
+            self._comparison = None
+            self._changed = told_difference(self._former[0], scene)
+        self._found = scene, population
 
     def _take_comparison(self, comparison: Comparison | None) -> None:
         self._comparison = comparison
@@ -145,14 +187,23 @@ def told_difference(former: Scene, scene: Scene) -> str:
 
 
 def population_html(
-    population: Population | None, pour: ThisPour, command: CommandStatus, changed: str, comparison: Comparison | None
+    population: Population | None,
+    pour: ThisPour,
+    command: CommandStatus,
+    changed: str,
+    comparison: Comparison | None,
+    former: Population | None = None,
+    whose: str = "",
 ) -> str:
-    """Strip, line, comparison and progress; ``changed``: what differs from the former parameters, "" for no telling."""
-    lines = [_process_line(command)]
+    """Strip, line, comparison and progress; ``changed``: what differs from the ``former`` parameters, "" for none told.
+
+    ``whose``: pours that are made in the background, "" for those of the parameters in force.
+    """
+    lines = [_process_line(command, whose)]
     if population is None:
         lines.insert(0, "Looking for other pours with these parameters …")
         return _block("", lines)
-    lines = [*lines, _compared_line(population, changed, comparison), _of_this_pour(population, pour)]
+    lines = [*lines, _compared_line(population, changed, comparison, former), _of_this_pour(population, pour)]
     sample = population.sample
     head = "" if population.n < 2 else f"<b>{sample.mean:.1f} ± {sample.sd:.1f}°</b> over {population.n} seeds; "
     drawn = strip_svg(population, pour) if population.n else ""
@@ -238,11 +289,15 @@ def _of_this_pour(population: Population, pour: ThisPour) -> str:
     return f"<span style='color:{css(FLANK)}'>▲</span> this pour {pour.angle:.1f}° ({about})."
 
 
-def _compared_line(population: Population, changed: str, found: Comparison | None) -> str:
+def _compared_line(population: Population, changed: str, found: Comparison | None, former: Population | None) -> str:
     if not changed:
         return ""
     if found is None:
-        return f"{escape(changed)}: under two stored pours of the former parameters, nothing to compare with."
+        stored = 0 if former is None else former.n
+        if stored > 1:
+            return f"{escape(changed)}: {stored} stored pours of the former parameters, none of these yet."
+        few = "one stored pour" if stored else "no stored pour"
+        return f"{escape(changed)}: {few} of the former parameters; <b>{POUR_BOTH}</b> tells whether it is real."
     pours = "one pour" if population.n < 2 else f"{found.pours} pours"
     sides = f"{found.difference:+.1f} ± {found.half_width:.1f}° (95 %)"
     verdict = "distinguishable" if found.distinguishable else "not distinguishable"
@@ -250,10 +305,11 @@ def _compared_line(population: Population, changed: str, found: Comparison | Non
     return f"{escape(changed)}: {sides} against {found.former} former: <b>{verdict} in {pours}</b>{more}."
 
 
-def _process_line(command: CommandStatus) -> str:
+def _process_line(command: CommandStatus, whose: str) -> str:
     if command.alive:
+        of = f" ({escape(whose)})" if whose else ""
         left = f"time left {time_left(command.eta_s)}" if command.done else "the first one takes longest"
-        return f"Pouring in the background: {command.done} of {command.planned or MORE}, {left}."
+        return f"Pouring in the background{of}: {command.done} of {command.planned or MORE}, {left}."
     return escape(command.message) if command.state in ("failed", "cancelled") else ""
 
 

@@ -186,3 +186,48 @@ def test_more_pours_are_asked_for_and_can_be_cancelled(table):
     table.panel._process.status = lambda: CommandStatus("running", done=3, planned=8, eta_s=64.0)
     assert "Pouring in the background: 3 of 8, time left 1 min 04 s." in table.look()
     assert (table.panel._more.visible, table.panel._stop.visible) == (False, True)
+
+
+def test_both_sides_of_a_change_are_poured_until_they_have_as_many(table):
+    """Two stored pours before the change, three after it: five more of the new ones, then six of the former."""
+    started = []
+    table.panel._process.start = lambda scene, pours: started.append((scene.pairs, pours))
+    table.look()
+    table.session.set_parameters({FRICTION: 0.2})
+    table.look()
+    assert table.panel._more.label == "Pour 8 of each"
+    table.panel._pour()
+    smooth = table.session.now.scene.pairs
+    assert started == [(smooth, MORE - 3)]
+    table.panel._process.status = lambda: CommandStatus("running", done=0, planned=5)
+    table.look()
+    assert len(started) == 1
+    table.panel._process.status = lambda: IDLE
+    table.look()
+    assert started[1:] == [(SOURCE.scene.pairs, MORE - 2)]
+    table.panel._process.status = lambda: CommandStatus("running", done=1, planned=6, eta_s=64.0)
+    assert "Pouring in the background (the former parameters): 1 of 6" in table.look()
+    # What is added to the former ones counts at once.
+    for seed in (11, 12, 13, 14, 15, 16):
+        table.store.add(stored(SOURCE.scene, seed, 22.0))
+    table.look()
+    assert "against 8 former" in table.look()
+
+
+def test_cancelled_pours_of_the_one_side_are_not_followed_by_those_of_the_other(table):
+    started = []
+    table.panel._process.start = lambda scene, pours: started.append(pours)
+    table.look()
+    table.session.set_parameters({FRICTION: 0.2})
+    table.look()
+    table.panel._pour()
+    table.panel._cancel()
+    table.look()
+    assert started == [MORE - 3]
+
+
+def test_what_a_comparison_lacks_is_named():
+    no_former = told(population(), changed="friction 0.5 → 0.4")
+    assert "no stored pour of the former parameters; Pour 8 of each tells whether it is real." in no_former
+    waits = text(population_html(population(), PILE, IDLE, "friction 0.5 → 0.4", None, population(18.0, 20.0)))
+    assert "2 stored pours of the former parameters, none of these yet." in waits
