@@ -12,11 +12,12 @@ from doe.declared.model import effect_values
 from doe.diagnose.result import CalibratedModel
 from doe.measurement.load import load_measurement
 from doe.measurement.measurement import Condition, Measurement
-from explorer.diagnosis.result import DiagnosisResult
+from explorer.diagnosis.result import DiagnosisResult, PouredModel
 from explorer.errors import CommandError
 from solver import Scene, with_values
 from solver.assets import AssetNotFoundError, measurement_folder
 
+ANGLE = "angle_of_repose_deg"
 LEAST_HEIGHT = 3e-4
 """Height [m] below which nothing of a measured surface is drawn."""
 SECTORS = 72
@@ -46,6 +47,8 @@ class AnswerPiles:
     """None where the data hold neither scans nor profiles of this condition."""
     angle: tuple[float, float]
     """Mean and standard deviation of the measured angles of repose [°]; NaN where none were, or only one."""
+    poured: tuple[tuple[float, float, int], tuple[float, float, int]]
+    """The same of the diagnosis's fresh pours of both models, and their number."""
 
 
 def answer_piles(result: DiagnosisResult) -> AnswerPiles:
@@ -62,18 +65,32 @@ def answer_piles(result: DiagnosisResult) -> AnswerPiles:
         model_scene(measurement, condition, result.confirmation.after),
         measured_surface(result, condition.name),
         measured_angle(condition),
+        (
+            poured_angle(result, result.confirmation.before, condition.name),
+            poured_angle(result, result.confirmation.after, condition.name),
+        ),
     )
 
 
 def measured_angle(condition: Condition) -> tuple[float, float]:
     """Mean and standard deviation of the angles of repose that were measured in ``condition`` [°]; NaN without."""
-    found = condition.offered.get("angle_of_repose_deg")
+    found = condition.offered.get(ANGLE)
     known = np.empty(0) if found is None else np.asarray(found.values, dtype=float)
     known = known[np.isfinite(known)]
     return (
         float(known.mean()) if known.size else math.nan,
         float(known.std(ddof=1)) if known.size > 1 else math.nan,
     )
+
+
+def poured_angle(result: DiagnosisResult, model: PouredModel, condition: str) -> tuple[float, float, int]:
+    """Mean and standard deviation of the angle of repose [°] over the fresh pours of ``model``, and their number."""
+    names = next(one.summaries for one in result.measured if one.condition == condition)
+    found = next((one for one in model.conditions if one.condition == condition), None)
+    if found is None or ANGLE not in names:
+        return math.nan, math.nan, 0
+    k = names.index(ANGLE)
+    return float(found.mean[k]), float(found.sd[k]), found.pours
 
 
 def model_scene(measurement: Measurement, condition: Condition, model: CalibratedModel) -> Scene:

@@ -90,9 +90,10 @@ class PhotographedTarget:
     def line(self) -> str:
         """The angle, where it is from, and what each number beside it is."""
         if self.n == 1:
+            left, right = self.result.piles[0].left[0], self.result.piles[0].right[0]
             return (
                 f"{angle_words(self.mean, self.sd)}, read off {self.names[0]}: both of reading it. One photograph: how "
-                "piles differ among each other is in neither."
+                f"piles differ among each other is in neither. Its flanks: {fixed(left)}° and {fixed(right)}°."
             )
         return (
             f"{fixed(self.mean)}° (standard deviation between piles {fixed(self.sd)}°; standard error of the mean "

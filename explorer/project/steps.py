@@ -80,7 +80,9 @@ def measured_step(targets: Sequence[Target], photographed: PhotographedTarget | 
     """Of the measured pile: the photographs that were made the target, or the first target of the study."""
     hint = "What was measured in the laboratory: the target of the calibration."
     if photographed is not None:
-        return Step("Measured", StepState.MEASURED, photographed.short, f"{hint} {photographed.line}", Room.LABORATORY)
+        # One pile says nothing of how piles differ.
+        state = StepState.MEASURED if photographed.n > 1 else StepState.ASSUMED
+        return Step("Measured", state, photographed.short, f"{hint} {photographed.line}", Room.LABORATORY)
     if not targets:
         return Step("Measured", StepState.EMPTY, "", hint, Room.LABORATORY)
     target = targets[0]
@@ -136,7 +138,7 @@ def next_step(steps: Sequence[Step]) -> tuple[str, Room]:
         return "read the angle of a measured pile off photographs", Room.LABORATORY
     if calibrate.state == StepState.EMPTY:
         assumed = measured.state == StepState.ASSUMED
-        return "start the calibration" + (" (the target is assumed)" if assumed else ""), Room.CALIBRATE
+        return "start the calibration" + (" (the target is uncertain)" if assumed else ""), Room.CALIBRATE
     if calibrate.state == StepState.FAILED and diagnose.state == StepState.EMPTY:
         return "ask which effect the model lacks", Room.DIAGNOSE
     if diagnose.state == StepState.EMPTY:

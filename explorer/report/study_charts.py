@@ -35,6 +35,8 @@ Plots = dict[str, Plot]
 """Title → plot, in the order of the list to choose from."""
 
 Named = Iterator[tuple[str, Plot]]
+FEWEST_SEEDS = 4
+"""Of the pilot, from which on its noise is drawn: the interval of σ then ends at 3.7 times it (χ², 3 degrees)."""
 
 
 def study_plots(result: AnyStudy) -> Plots:
@@ -45,7 +47,8 @@ def study_plots(result: AnyStudy) -> Plots:
 
 def _pilot(result: AnyStudy) -> Named:
     pilot = result.pilot
-    if pilot is None:
+    # The interval of a σ over two seeds reaches up to 32 times it: no chart of that tells anything.
+    if pilot is None or min(noise.runs for noise in pilot.noise.values()) < FEWEST_SEEDS:
         return
     caption = "Whiskers: 95 % intervals; bias: its range over the ways to fill a cone with bodies."
     yield "Noise of the estimators", Plot(lambda: short_rows(stacked(noise_of_estimators(pilot))), caption, 1.7)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from doe.studies.study import TRIES, load_study, with_profile
+from doe.studies.study import TRIES, Study, load_study, with_profile
 from explorer.background.command_process import PROGRAM, BackgroundError, CommandProcess, CommandStatus, WaitingLine
 from explorer.background.output_folder import finished, new_folder, newest_unfinished
 from explorer.background.progress import given_up
@@ -37,6 +37,10 @@ class StudyProcess(Protocol):
     @property
     def out(self) -> Path | None:
         """Output folder of the study started last, None before the first."""
+
+    @property
+    def present(self) -> QueuedStudy | None:
+        """The study that was started last, None where it was one of an earlier session of the page."""
 
     def start(self, profile: str, edits: StudyEdits = NO_EDITS, file: Path | None = None) -> None:
         """Start a new study, of another ``file`` than ``study_file`` where one is given.
@@ -90,6 +94,7 @@ class QueuedStudy:
     """Content of its own study file; empty for the page's file as it is."""
     photographed: PhotographedTarget | None
     """Photographs in place of the study's own target."""
+    study: Study
 
 
 class CalibrationProcess:
@@ -114,6 +119,8 @@ class CalibrationProcess:
         self.study_file, self._folder, self._store, self._target = study_file, folder, store, target
         self._process = CommandProcess("study", ENDINGS, program)
         self._profile, self._tries = "", TRIES
+        self.present: QueuedStudy | None = None
+        """The study that was started last, None where it was one of an earlier session of the page."""
         self._line: WaitingLine[QueuedStudy] = WaitingLine(self._process, self._begin, "studies")
         self.status, self.clear_queue = self._line.status, self._line.clear
         self.cancel, self.pause, self.go_on = self._process.cancel, self._process.pause, self._process.go_on
@@ -183,7 +190,7 @@ class CalibrationProcess:
         photographed = None if self._target is None or other else load_target(self._target)
         if photographed is not None:
             photographed.of_study(study.targets)
-        return QueuedStudy(file.stem, profile, edits, text, photographed)
+        return QueuedStudy(file.stem, profile, edits, text, photographed, study)
 
     def _begin(self, order: QueuedStudy) -> None:
         self._profile, self._tries = order.profile, TRIES
@@ -194,6 +201,7 @@ class CalibrationProcess:
         if order.photographed is not None:
             order.photographed.copied(out / FOLDER)
         self._process.start(out, self._arguments(out))
+        self.present = order
         self._line.begun()
 
     def _last(self) -> Path:
@@ -202,7 +210,7 @@ class CalibrationProcess:
             found = self._unfinished()
             if found is None:
                 raise BackgroundError("no study has been stopped before its end; there is nothing to resume")
-            out, self._profile = found
+            (out, self._profile), self.present = found, None
         return out
 
     def _unfinished(self) -> tuple[Path, str] | None:

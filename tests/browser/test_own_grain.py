@@ -27,6 +27,8 @@ def test_the_first_card_leads_to_the_form_and_what_stands_in_it_is_poured(page):
     page.get_by_role("button", name="I have a grain and a photograph").click()
     pour = page.get_by_role("button", name="Pour this grain", exact=True)
     pour.wait_for()
+    # The photograph beside it.
+    page.get_by_role("button", name="Read the angle", exact=True).filter(visible=True).wait_for()
     page.get_by_label("Length [mm]").filter(visible=True).fill("9")
     page.get_by_label("Length [mm]").filter(visible=True).press("Enter")
     page.get_by_label("Name of the grain").fill("lentil")

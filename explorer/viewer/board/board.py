@@ -47,10 +47,12 @@ class Stage:
 
 @dataclass(frozen=True)
 class BoardAct:
-    """A button below the verdict: its label, and the command that it sends (`explorer.viewer.shell.channel`)."""
+    """A button below the verdict: its label, the command that it sends (`explorer.viewer.shell.channel`), and the room
+    that it opens, if any."""
 
     label: str
     command: Mapping[str, Any]
+    room: str = ""
 
 
 @dataclass(frozen=True)

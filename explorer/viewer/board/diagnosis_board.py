@@ -6,6 +6,7 @@ from functools import partial
 
 from explorer.background.command_process import CommandStatus
 from explorer.diagnosis.result import DiagnosisResult
+from explorer.project.steps import Room
 from explorer.report.content import Table
 from explorer.report.diagnosis.answer import banner
 from explorer.report.diagnosis.charts import diagnosis_plots, likely, map_chart
@@ -19,7 +20,7 @@ SIDE_BY_SIDE, POUR_CORRECTED, CALIBRATE_CORRECTED = "show_piles", "pour_correcte
 SIDE_BY_SIDE_ACT = BoardAct("Show side by side", {"do": SIDE_BY_SIDE})
 CORRECTED_ACTS = (
     BoardAct("Pour the corrected model", {"do": POUR_CORRECTED}),
-    BoardAct("Calibrate the corrected model", {"do": CALIBRATE_CORRECTED}),
+    BoardAct("Calibrate the corrected model", {"do": CALIBRATE_CORRECTED}, Room.CALIBRATE),
 )
 
 

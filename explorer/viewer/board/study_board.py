@@ -43,7 +43,7 @@ def study_board(
         title=study.title or study.name,
         subtitle=working(status) if status is not None and alive else f"profile {study.profile.name}",
         banner=banner(result) if isinstance(result, StudyResult) else None,
-        stages=stages_of(status, so_far) if alive else (),
+        stages=() if finished else stages_of(status, so_far),
         charts=made_charts(_beside_photographs(result, photographed))
         + made_charts(study_plots(result))[:: -1 if finished else 1],
         tables=(*_answers(result), _runs(result)),

@@ -102,7 +102,7 @@ class BesidePile:
     def close(self) -> None:
         """End the second pour and take all of it off the page."""
         self._take_signs_away()
-        self._aside = {}
+        self._step_back()
         if self._second is not None:
             self._second.close()
             self._second = None
@@ -149,6 +149,16 @@ class BesidePile:
             view = stand_aside(camera, away, scene, middle)
             go_to_place(client, view)
             self._aside[number] = Aside(away, aspect_of(camera), np.array(view.position), scene, middle)
+
+    def _step_back(self) -> None:
+        """Every camera that nobody has moved since goes back to the first pile, as near as it was."""
+        clients = self._server.get_clients()
+        for number, aside in self._aside.items():
+            client = clients.get(number)
+            if client is not None and aside.holds(client.camera.position):
+                aim = np.array([0.0, 0.0, MIDDLE * scene_height(aside.scene)])
+                go_to_place(client, CameraView(aim + aside.away, aim))
+        self._aside = {}
 
     def _follow_windows(self) -> None:
         """A picture that has another shape now, of a camera that no person has moved since, holds all plates again."""

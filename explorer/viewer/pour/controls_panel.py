@@ -1,4 +1,4 @@
-"""The controls that stay in sight: six sliders, *Pour again*, and *Keep beside* for a second pile.
+"""The controls that stay in sight: six sliders, *Pour again*, and *Pour a second* for a pile beside it.
 
 Five act on the running pour; the feed rate acts on the next one. Each stands for one physical quantity, wherever in the
 scene it occurs; what one slider moves together is set apart under Set-up.
@@ -14,6 +14,7 @@ from explorer.viewer.panel import CONTROLS, PageContext
 from explorer.viewer.pour.live_panel import LiveControl, control_for, screen_range, titled
 from explorer.viewer.pour.rebuilt_panel import RebuiltPanel
 from explorer.viewer.pour.restart_panel import LARGEST_SEED, entered, on_screen, same_value
+from explorer.viewer.pour.second_pile import POUR_SECOND, SECOND_HINT
 from solver.scenes.material import Pair
 from solver.scenes.scene import Scene, parameters, value, with_values
 
@@ -55,9 +56,9 @@ class Controls:
         button_group(
             gui,
             "Second pile",
-            {"Keep beside": self._keep, "Take away": page.beside.close},
+            {POUR_SECOND: self._keep, "Take away": page.beside.close},
             post,
-            hint="A pile with the parameters as they are now stays beside the first while you change that.",
+            hint=SECOND_HINT,
         )
         button_group(
             gui,

@@ -97,8 +97,8 @@ class PopulationPanel(Panel):
             command = self._process.status()
         if self._more.visible == command.alive:
             self._more.visible, self._stop.visible = not command.alive, command.alive
-        changed = status.energy_put_in is not None or status.disturbed
-        pour = ThisPour(angle_of_repose_deg(status), status.seed, self._doubt.doubt(status), changed)
+        no_draw = status.energy_put_in is not None or status.disturbed
+        pour = ThisPour(angle_of_repose_deg(status), status.seed, self._doubt.doubt(status), no_draw)
         if not self._work.busy_with and wall >= self._since + SETTLED:
             self._look(status.scene, pour, wall)
         here = self._found is not None and self._found[0] == status.scene

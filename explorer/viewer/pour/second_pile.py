@@ -14,7 +14,12 @@ from explorer.viewer.pour.readout import STATE_WORDS, TROUBLE, angle_of_repose_d
 from solver.pours.record import Outcome
 
 DIFFERENCES_SHOWN = 6
-NONE = "None yet. *Keep beside* keeps a pile as it is now, to compare with what you change."
+POUR_SECOND = "Pour a second"
+SECOND_HINT = (
+    "Pours a pile beside this one: the same seed, with the parameters as they are now. It stays so while you change "
+    "the first."
+)
+NONE = f"None yet. *{POUR_SECOND}* pours one as it is now, to compare with what you change."
 
 
 class SecondPile(Panel):
@@ -28,9 +33,9 @@ class SecondPile(Panel):
         button_group(
             gui,
             "Second pile",
-            {"Keep beside": self._pour, "Take away": self._beside.close},
+            {POUR_SECOND: self._pour, "Take away": self._beside.close},
             page.post,
-            hint="The same seed, with the parameters as they are now; it stays so while you change the first pile.",
+            hint=SECOND_HINT,
         )
         self._text = gui.add_markdown(NONE)
 

@@ -91,7 +91,7 @@ function show(board) {
     element("strong", {}, board.banner.headline), element("p", {}, board.banner.why),
     element("p", {}, element("b", {}, "Next: "), board.banner.then),
     ...(outer?.explorer ? board.acts : []).map(one => element("button", { class: "act",
-      onclick: () => outer.explorer.send(one.command) }, one.label))));
+      onclick: () => { outer.explorer.send(one.command); if (one.room) outer.explorer.openRoom(one.room); } }, one.label))));
   if (board.report) parts.push(element("p", {}, element("a", { href: board.report, target: "_blank", rel: "noopener" },
     "Open the report")));
   if (board.stages.length) parts.push(table({ title: "Stages", header: ["Stage", "Pours", "", "Found"], caption: "",

@@ -78,22 +78,24 @@ function showSteps(project) {
 
 // The first visit of a browser begins with four ways to begin; later they are behind "?".
 const WAYS = [
-  ["I have a grain and a photograph", "Give the grain's shape and sizes, pour it and keep it as a file. The Laboratory " +
-    "reads the angle off a photograph of your pile, and the page of that file calibrates against it.", "Set-up",
-    "A grain of your own"],
-  ["Just play", "Watch a pile of sunflower seeds form, and move its friction, stiffness and restitution.", "Controls"],
+  ["I have a grain and a photograph", "On the left, read the angle off a photograph of your pile and make it the " +
+    "target. On the right, give the grain's shape and sizes and pour it; its file, once kept, is calibrated against it.",
+    ["Set-up", "A grain of your own"], ["Laboratory", "Photograph"]],
+  ["Just play", "Watch a pile of sunflower seeds form, and move its friction, stiffness and restitution.", ["Controls"]],
   ["Plan an experiment", "A screening or response-surface design as a sheet to fill in, with its power told before you " +
-    "measure.", "Laboratory", "Your own design"],
+    "measure.", ["Laboratory", "Your own design"]],
   ["Let a hidden effect be found", "Measured data of trefoil bodies with an effect that their model lacks: start the " +
-    "diagnosis, and see it named.", "Diagnose"],
+    "diagnosis, and see it named.", ["Diagnose"]],
 ];
 const keys = element("ul", { class: "keys" });
 const beginning = element("dialog", { id: "beginning", "aria-labelledby": "beginning-title" },
   element("form", { method: "dialog" }, element("h2", { id: "beginning-title" }, "Where do you want to begin?"),
-    element("div", { class: "cards" }, ...WAYS.map(([title, text, room, section]) => element("button",
+    element("div", { class: "cards" }, ...WAYS.map(([title, text, ...places]) => element("button",
       { class: "card", value: title, onclick: () => requestAnimationFrame(() => {
-        openRoom(room);
-        if (section) openSection(section);
+        for (const [room, section] of places) {
+          openRoom(room);
+          if (section) openSection(section);
+        }
       }) },
       element("b", {}, title), element("span", {}, text)))),
     element("details", {}, element("summary", {}, "Keys"), keys),

@@ -188,7 +188,11 @@ class DiagnosisPanel(Panel):
 
     def _place_piles(self, piles: AnswerPiles) -> None:
         fold_beside_narrow(self._page)
-        self._page.beside.pour(piles.after, self._pour(piles.before), ("calibrated model", "corrected model"))
+        names = [
+            f"{model} model{poured_sign(*poured)}"
+            for model, poured in zip(("calibrated", "corrected"), piles.poured, strict=True)
+        ]
+        self._page.beside.pour(piles.after, self._pour(piles.before), (names[0], names[1]))
         self._page.beside.show_measured(piles.measured, measured_sign(piles), piles.before)
 
     def _pour_corrected(self) -> None:
@@ -273,6 +277,13 @@ def measured_sign(piles: AnswerPiles) -> str:
     spread = f" ± {sd:.1f}°" if math.isfinite(sd) else ""
     angle = f"\n{mean:.1f}°{spread}" if math.isfinite(mean) else ""
     return f"{shown} ({piles.condition.name}){angle}"
+
+
+def poured_sign(mean: float, sd: float, pours: int) -> str:
+    """The line above a model's pile on what all its fresh pours gave: one pour alone may say the opposite."""
+    if not math.isfinite(mean):
+        return ""
+    return f"\n{mean:.1f}° ± {sd:.1f}° over {pours} pours" if pours > 1 else ""
 
 
 class CandidateEffects:

@@ -17,7 +17,7 @@ from explorer.errors import CommandError
 from explorer.photograph.target import PhotographedTarget
 from explorer.session import Session
 from explorer.study.duration import duration_text
-from explorer.study.process import PARTIAL, RESULT
+from explorer.study.process import PARTIAL, RESULT, QueuedStudy
 from explorer.study.runs import scene_of
 from explorer.units import observable_label, observed
 from explorer.viewer.board.board_view import BoardView
@@ -63,7 +63,7 @@ class StudyPanel(Panel):
             hint=None if loaded is None else "; ".join(profile_text(loaded, name) for name in loaded.profiles),
         )
         self._loaded, self._store = loaded, page.diagnosis.store or default_store()
-        self._asked: tuple[str, str] | None = None
+        self._asked: Hashable = None
         self._state, self._stopped = "", False
         self._takes = ""
         self._targets, self._kept = () if loaded is None else loaded.targets, page.target
@@ -92,15 +92,17 @@ class StudyPanel(Panel):
     def show(self, now: Now) -> None:
         """Ask the study how far it is."""
         photographed = self._kept.now
-        if self._target.content != (target := target_markdown(self._targets, photographed)):
+        status = self._study.status()
+        present = self._study.present if status.alive else None
+        target = target_markdown(self._targets, photographed) if present is None else running_markdown(present)
+        if self._target.content != target:
             self._target.content = target
         self._order.follow(photographed is not None)
-        status = self._study.status()
         waiting = self._study.waiting()
         known = "" if self._result is not None else "study"
         text = state_markdown(status, known, "runs", now.notice) + waiting_markdown(waiting)
-        if not status.alive:
-            text = f"{self._expected(status.state)}\n\n{text}"
+        if not status.alive or (present is not None and status.eta_s is None):
+            text = f"{self._expected(status.state, present)}\n\n{text}"
         if self._trouble:
             text += f"\n\n{escaped(self._trouble)}"
         self._view.show(status, text, waiting, self._resumable(status))
@@ -111,12 +113,13 @@ class StudyPanel(Panel):
         self._recording.show()
         self._show_board()
 
-    def _expected(self, state: str) -> str:
-        """What the chosen profile takes; read anew when another one is chosen, and when a study ends."""
-        asked = str(self._profile.value), state
-        if asked != self._asked:
-            study, self._asked = self._loaded, asked
-            profile = study.profiles.get(asked[0]) if study else None
+    def _expected(self, state: str, present: QueuedStudy | None) -> str:
+        """What the study at work takes, or the chosen profile; read anew for another one, and when a study ends."""
+        study = self._loaded if present is None else present.study
+        name = str(self._profile.value) if present is None else present.profile
+        if (asked := (name, state, id(study))) != self._asked:
+            self._asked = asked
+            profile = study.profiles.get(name) if study else None
             self._takes = duration_text(study, profile, self._store) if study and profile else ""
         return self._takes
 
@@ -206,6 +209,12 @@ def profile_text(study: Study, name: str) -> str:
     if profile.resolution_deg is None:
         runs = f"{sum(planned_runs(study, profile).values())} runs"
     return f"{name}: {profile.spheres} shapes, {runs}"
+
+
+def running_markdown(order: QueuedStudy) -> str:
+    """Material, profile and target of the study at work: it may be another one than that on the page."""
+    target = target_markdown(order.study.targets, order.photographed).partition(" From the study's file")[0]
+    return f"**At work:** {escaped(order.study.scene.title)}, profile {escaped(order.profile)}. {target}"
 
 
 def target_markdown(targets: Sequence[Target], photographed: PhotographedTarget | None) -> str:

@@ -78,3 +78,11 @@ def test_the_example_shows_its_piles_by_the_shipped_name_of_its_data():
     path = "effect.rolling_resistance.rolling_friction"
     assert value(piles.before, path) == 0.0 < value(piles.after, path)
     assert piles.measured is not None
+    # One pour may say the opposite of what all of them do: those of the confirmation are told as well.
+    (before, sd, pours), (after, *_) = piles.poured
+    assert pours == next(one.pours for one in result.confirmation.before.conditions)
+    assert sd > 0.0
+    measured = piles.angle[0]
+    row = next(one for one in result.error.fit if one.observable == "angle_of_repose_deg")
+    assert abs(before - measured) == pytest.approx(row.before, abs=1e-6)
+    assert abs(after - measured) == pytest.approx(row.after, abs=1e-6)

@@ -135,11 +135,15 @@ def test_a_question_that_cannot_be_asked_is_refused(tmp_path, question, trouble)
 
 
 def test_a_queued_diagnosis_starts_after_the_one_before_with_its_own_effects(tmp_path):
-    process = diagnosis(tmp_path, "time.sleep(3.0 if '--budget' not in arguments else 0.0)")
+    go = tmp_path / "go"
+    # The first one ends when the others have been asked for, however slow that is.
+    wait = f"while '--budget' not in arguments and not os.path.exists({str(go)!r}): time.sleep(0.02)"
+    process = diagnosis(tmp_path, wait)
     process.queue(Question("trefoil_1"))  # nothing runs: at once
     process.queue(Question("trefoil_2", ("air_drag", "twisting"), 300))
     process.queue(Question("trefoil_1", budget=190))
     assert process.waiting() == ("trefoil_2, 2 effects, about 300 pours", "trefoil_1, about 190 pours")
+    go.touch()
     wait_for(
         lambda: process.status().state == "finished" and not process.waiting() and len(process.finished()) == 3, 120.0
     )

@@ -90,6 +90,9 @@ def test_one_photograph_says_that_it_knows_no_spread_between_piles(piles, tmp_pa
     assert target.mean == pytest.approx(27.0, abs=0.15)
     assert target.sd == pytest.approx(read.angles.mean.error_deg)  # one standard error, not the 95 % of the reading
     assert "One photograph: how piles differ among each other is in neither." in target.line
+    # Flanks that differ say something of it.
+    left, right = (f"{one.value_deg:.2f}°" for one in (read.angles.left, read.angles.right))
+    assert target.line.endswith(f"Its flanks: {left} and {right}.")
     (first,) = target.of_study(load_study("sunflower_extract").targets)
     assert (first.n, first.sd_source) == (None, OF_ONE)
 

@@ -37,6 +37,7 @@ class FakeStudy:
 
     study_file = asset_path("studies", "sunflower_extract")
     store = STORELESS.store
+    present = None
 
     def __init__(self):
         self.asked, self.now, self.out, self.queued, self.done = [], CommandStatus("idle"), None, (), ()

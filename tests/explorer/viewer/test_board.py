@@ -41,6 +41,10 @@ def test_every_kind_of_diagnosis_says_what_is_missing_and_shows_the_piles(case):
     titles = [chart["title"] for chart in shown["charts"]]
     assert len([one for one in titles if one.startswith("Pile")]) == len(result.piles)
     assert len([one for one in titles if one.startswith("Where the pile is off")]) == len(result.maps)
+    # What starts a study opens the room in which it is seen.
+    assert {act["label"]: act["room"] for act in shown["acts"]}.get(
+        "Calibrate the corrected model", "Calibrate"
+    ) == "Calibrate"
     assert titles[: len(result.piles)] == [one for one in titles if one.startswith("Pile")]
 
 
@@ -50,6 +54,24 @@ def test_without_a_result_a_board_says_where_the_command_is():
     assert shown["subtitle"] == "Running: pilot, 3 of 20, time left 1 min 01 s"
     assert [one["mark"] for one in shown["stages"]] == ["▶"]
     assert json.loads(board_json(study_board(None, None))) == json.loads(board_json(Board("", "")))
+
+
+def test_a_cancelled_study_keeps_what_its_stages_have_come_to():
+    result = reported_studies.result_of_case("planted")
+    partial = {key: result[key] for key in ("schema", "study", "pilot")} | {"partial": "screening", "line": ""}
+    stages = (StageProgress("pilot", 20, 20, "σ 1.2"), StageProgress("screening", 3, 28))
+    status = CommandStatus("cancelled", "screening", 23, 48, stages=stages)
+    shown = json.loads(board_json(study_board(study_from(partial), status)))
+    assert [(one["name"], one["mark"]) for one in shown["stages"]] == [("pilot", "done"), ("screening", "–")]
+    assert [one["title"] for one in shown["charts"]] == ["Noise of the estimators"]
+
+
+def test_a_noise_of_two_seeds_is_no_chart():
+    result = reported_studies.result_of_case("planted")
+    noise = {name: one | {"runs": 2} for name, one in result["pilot"]["noise"].items()}
+    partial = {key: result[key] for key in ("schema", "study")} | {"pilot": result["pilot"] | {"noise": noise}}
+    shown = json.loads(board_json(study_board(study_from(partial | {"partial": "pilot", "line": ""}), None)))
+    assert shown["charts"] == []
 
 
 def test_a_folder_is_a_board_that_follows_its_files(tmp_path):

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import plotly.io
 import pytest
@@ -13,6 +14,8 @@ from explorer.background.command_process import CommandStatus
 from explorer.background.progress import StageProgress, TriedRun
 from explorer.report.sections.answer import banner as study_banner
 from explorer.report.study_charts import Plot
+from explorer.study.edit import StudyEdits
+from explorer.study.process import QueuedStudy
 from explorer.viewer.actions import Actions
 from explorer.viewer.panel import Now
 from explorer.viewer.study.order_panel import number_on_screen
@@ -109,6 +112,25 @@ def test_an_empty_page_says_what_to_do(table):
     assert "comes with the response surface" in table.panel._profiler._words.content
     table.panel._profiler._hand_on()
     assert table.session.asked == []
+
+
+def test_the_study_at_work_is_named_with_its_own_target(table):
+    """It may be another one than the page's: the corrected model of a diagnosis."""
+    study = load_study(str(FakeStudy.study_file))
+    other = replace(
+        study, scene=replace(study.scene, title="Trefoil pour 2"), targets=(replace(study.targets[0], mean=17.9),)
+    )
+    table.study.present = QueuedStudy("corrected_study", "quick", StudyEdits(), "", None, other)
+    table.study.now = CommandStatus("running")
+    table.show()
+    assert "**At work:** Trefoil pour 2, profile quick." in table.panel._target.content
+    assert "17.90°" in table.panel._target.content
+    assert "24.68°" not in table.panel._target.content
+    # What it will take stands there until the first pours tell.
+    assert "runs of coarse shapes" in table.panel._view._text.content
+    table.study.now = CommandStatus("cancelled")
+    table.show()
+    assert "24.68°" in table.panel._target.content
 
 
 def test_stages_failed_runs_and_the_queue_are_told(table):
