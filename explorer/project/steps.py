@@ -56,6 +56,10 @@ class Step:
     """Where it is done."""
 
 
+STOPPED = "stopped with an error"
+"""What is said of a command that broke off."""
+
+
 @dataclass(frozen=True)
 class Finished:
     """The newest finished study or diagnosis of a project."""
@@ -112,7 +116,7 @@ def command_step(name: str, hint: str, room: Room, status: CommandStatus, finish
         share = f"{status.done / status.planned:.0%}" if status.planned else ""
         return Step(name, StepState.RUNNING, "paused" if status.state == "paused" else share, hint, room)
     if status.state == "failed":
-        return Step(name, StepState.FAILED, "stopped with an error", hint, room)
+        return Step(name, StepState.FAILED, STOPPED, hint, room)
     if finished is None:
         return Step(name, StepState.EMPTY, "", hint, room)
     return Step(name, StepState.DONE if finished.succeeded else StepState.FAILED, finished.said, hint, room)
@@ -132,6 +136,9 @@ def next_step(steps: Sequence[Step]) -> tuple[str, Room]:
     for step in (calibrate, diagnose):
         if step.state == StepState.RUNNING:
             return f"see what {step.name} has found so far", step.room
+    for step in (calibrate, diagnose):
+        if step.said == STOPPED:
+            return f"see under {step.name} why it stopped", step.room
     if by_name["Pour"].state == StepState.FAILED:
         return "see under Pour why there is no pile", Room.POUR
     if measured.state == StepState.EMPTY:

@@ -106,7 +106,7 @@ def state_markdown(status: CommandStatus, what: str, runs: str, notice: str = ""
     """
     state = STATE_WORDS.get(status.state, f"No {what} is running." if what else "")
     if status.alive and status.planned:
-        part = f"{counted}: " if counted else ""
+        part = f"{counted[0].upper()}{counted[1:]}: " if counted else ""
         state += f" {part}{status.done} of {status.planned} {runs}, time left {time_left(status.eta_s)}."
     if status.alive and status.stage:
         state += f" Now: {escaped(status.stage)}."

@@ -231,7 +231,7 @@ def test_the_panel_asks_and_shows(server, tmp_path):
     panel.show(Now(None, notice="no such folder"))
     assert panel._view._bar.value == 25.0
     text = panel._view._text.content
-    assert "known of this stage: 5 of 20 pours, time left 2 min 05 s" in text
+    assert "Known of this stage: 5 of 20 pours, time left 2 min 05 s" in text
     assert "no such folder" in text
     assert [(one["name"], one["count"], one["mark"], one["found"]) for one in board(panel)["stages"]] == [
         ("base model", "30 of 30", "done", "*64* settings"),

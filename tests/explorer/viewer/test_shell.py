@@ -12,7 +12,7 @@ import websockets
 from explorer.background.command_process import CommandStatus
 from explorer.errors import CommandError
 from explorer.live.messages import Event, SessionState, Status
-from explorer.project.steps import Room, StepState, command_step, measured_step, next_step, pour_step
+from explorer.project.steps import Finished, Room, Step, StepState, command_step, measured_step, next_step, pour_step
 from explorer.scene.source import material_source
 from explorer.viewer.guarded_server import guarded_server
 from explorer.viewer.panel import Now
@@ -198,5 +198,16 @@ def test_a_pour_without_a_pile_is_a_failed_step_that_comes_first():
     after = [command_step("Diagnose", "", Room.DIAGNOSE, IDLE, None)]
     assert next_step([*before, pour_step(jammed), *after]) == ("see under Pour why there is no pile", Room.POUR)
     assert next_step([*before, pour_step(heap), *after])[1] == Room.LABORATORY
+
+
+def test_a_study_that_broke_off_is_looked_at_before_the_model_is_doubted():
+    broken = command_step("Calibrate", "", Room.CALIBRATE, CommandStatus("failed"), None)
+    missed = command_step("Calibrate", "", Room.CALIBRATE, CommandStatus("idle"), Finished("out of reach", False, True))
+    idle = CommandStatus("idle")
+    rest = [measured_step(()), command_step("Diagnose", "", Room.DIAGNOSE, idle, None)]
+    pour = Step("Pour", StepState.DONE, "", "", Room.POUR)
+    assert next_step([pour, broken, *rest]) == ("see under Calibrate why it stopped", Room.CALIBRATE)
+    measured = Step("Measured", StepState.MEASURED, "25°", "", Room.LABORATORY)
+    assert next_step([pour, missed, measured, rest[1]]) == ("ask which effect the model lacks", Room.DIAGNOSE)
     running = command_step("Calibrate", "", Room.CALIBRATE, CommandStatus("running", done=17, planned=50), None)
     assert (running.state, running.said) == (StepState.RUNNING, "34%")
