@@ -55,6 +55,8 @@ class SceneNodes:
     def __init__(self, server: viser.ViserServer, scene: Scene, root: str = "") -> None:
         self.meshes = [body_triangles(body) for body in scene.bodies]
         """Surface of a body of each component, in its own frame."""
+        self.widest = math.inf
+        """Largest radius of the plate [m], whatever lies farther out: where another one stands beside it."""
         numbers = body_counts(scene)
         self.bodies = BodyNodes(
             server,
@@ -76,7 +78,7 @@ class SceneNodes:
         """
         self._show_surfaces(frame.surfaces)
         if self._plate is not None:
-            self._plate.reach(plate_radius(frame))
+            self._plate.reach(min(self.widest, plate_radius(frame)))
         self.bodies.show(frame, seen)
 
     def fade(self, opacity: float) -> None:

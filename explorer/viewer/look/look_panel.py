@@ -41,6 +41,7 @@ class LookPanel(Panel):
     def __init__(self, page: PageContext) -> None:
         server, session, post = page.server, page.session, page.post
         self._server, self._session, self._settings = server, session, page.look
+        self._beside = page.beside
         self._status = session.status()
         self._scene = self._status.scene
         self._nodes = SceneNodes(server, self._scene)
@@ -90,6 +91,7 @@ class LookPanel(Panel):
         generation, self._status = self._status.generation, now.status
         if now.status.generation != generation:
             self._clear(now.status.scene)
+        self._nodes.widest = self._beside.widest_plate
         if now.frame is not None:
             fresh = self._drawn is None or now.frame.number != self._drawn.number
             self._show_frame(now.frame)

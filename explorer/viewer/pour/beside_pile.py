@@ -108,6 +108,11 @@ class BesidePile:
             self._second = None
             self._remove_nodes()
 
+    @property
+    def widest_plate(self) -> float:
+        """Largest radius of the first pile's plate [m], so that it does not lie over those beside it."""
+        return math.inf if self._second is None else PLATE_RADIUS
+
     def draw(self) -> None:
         """Draw its newest frame."""
         if self._second is None:
@@ -117,6 +122,7 @@ class BesidePile:
         if self._drawn is None or another_set_up(status.scene, self._drawn):
             self._remove_nodes()
             self._nodes, self._drawn = SceneNodes(self._server, status.scene, ROOT), status.scene
+            self._nodes.widest = PLATE_RADIUS
         if self._nodes is not None and frame is not None and frame.number != self._frame_number:
             self._frame_number = frame.number
             self._nodes.show(frame)

@@ -16,7 +16,7 @@ from explorer.viewer.look.camera import go_to_place
 from explorer.viewer.panel import Now
 from explorer.viewer.pour.beside_pile import BESIDE, ROOT, BesidePile, stand_aside
 from explorer.viewer.pour.second_pile import NONE, SecondPile, comparison_markdown
-from explorer.viewer.scene_nodes import PLATE_RADIUS
+from explorer.viewer.scene_nodes import PLATE_RADIUS, SceneNodes
 from solver import Outcome, with_values
 from solver.observables import Value
 from tests.explorer.viewer.page_session import page_context
@@ -262,3 +262,20 @@ def test_a_picture_of_another_shape_holds_all_plates_again_unless_a_person_moved
     client.camera.image_width *= 2
     bench.panel.draw(Now(bench.first.now))
     np.testing.assert_array_equal(client.camera.position, moved)
+
+
+def test_a_plate_does_not_grow_over_the_one_beside_it(bench):
+    """A body has rolled 0.9 m away: alone its plate follows it, beside another one it does not."""
+    beside = bench.panel._beside
+    assert beside.widest_plate == float("inf")
+    bench.panel._pour()
+    assert beside.widest_plate == PLATE_RADIUS
+    far = replace(frame(1), position=np.float32([[0.9, 0.0, 0.0]]))
+    bench.second.newest = far
+    bench.panel.draw(Now(bench.first.now))
+    assert beside._nodes._plate._radius == PLATE_RADIUS
+    alone = SceneNodes(bench.server, SCENE, "/alone")
+    alone.show(far)
+    assert alone._plate._radius > 0.9
+    beside.close()
+    assert beside.widest_plate == float("inf")
