@@ -48,7 +48,7 @@ slow: .venv/.ready ## the tests marked slow, but for those of `make peers`
 nightly: .venv/.ready ## what is too long for CI (80 min at most); writes docs/nightly.md
 	$(BIN)/python -m tests.nightly
 
-pictures: .venv/.ready ## the pictures of README and docs, taken from the running program (needs Chromium; 15 min)
+pictures: .venv/.ready ## the pictures of README and docs, taken from the running program (needs Chromium; 25 min)
 	$(BIN)/python -m tests.browser.pictures
 
 preview: .venv/.ready ## record the pour that the page shows while its solver loads (1 min)

@@ -218,10 +218,18 @@ def results(browser: Browser, home: Path) -> None:
         for pictures in (finished_pictures, laboratory_pictures, pour_pictures, side_by_side):
             with camera(browser, address) as view:
                 pictures(view)
+
+
+def sizes(browser: Browser, home: Path) -> None:
+    """The most important rooms in windows of other sizes, and one at 200 %."""
+    with_results(home)
+    with served(*POUR, "--store", home / "runs.sqlite", data=home, patience=60) as address:
         with camera(browser, address, zoom=TWICE) as view:
+            view.settled()
             view.open("Calibrate")
             view.board("Study")
             view.take("calibrate_finished_200_percent", 6.0)
+            view.page.locator("#state-line").get_by_label("Dark or light page").click()
         for size in (WIDE, SMALL, PHONE):
             with camera(browser, address, size) as view:
                 sized_pictures(view, f"_{size[0]}")
@@ -263,6 +271,10 @@ def pour_pictures(view: Camera) -> None:
     slider(view.page, "Friction").focus()
     view.page.keyboard.press("Home")
     view.take("controls_changed", 4.0)
+    # Without friction nothing comes to rest.
+    view.keys("z")
+    view.press("Same seed")
+    view.settled()
 
 
 def laboratory_pictures(view: Camera) -> None:
@@ -347,7 +359,14 @@ def replay(browser: Browser, home: Path) -> None:
         view.take("replay", 12.0)
 
 
-PARTS = {"first": first_visit, "empty": without_results, "work": at_work, "results": results, "replay": replay}
+PARTS = {
+    "first": first_visit,
+    "empty": without_results,
+    "work": at_work,
+    "results": results,
+    "sizes": sizes,
+    "replay": replay,
+}
 BEGAN = time.monotonic()
 
 
