@@ -113,6 +113,10 @@ def _parameters(result: LabResult) -> Section:
         )
     header = ("of", "quantity", "mean", "SD", "95 % of the mean", "n", "outliers", "formula")
     blocks: list[Block] = [Table(header, tuple(rows), "95 %: Student’s t. Outliers are kept.")]
+    errors = [_with_errors(one) for one in result.derived if one.reading and one.name not in CONDITIONS]
+    if errors:
+        head = ("of", "quantity", "SD/√n", "u of the readings", "u of both", "95 % of the mean")
+        blocks.append(Table(head, tuple(errors), "With the errors that the readings declare, by the GUM."))
     estimates = []
     for other in result.estimates:
         unit = reading_unit(other.unit)
@@ -125,6 +129,15 @@ def _parameters(result: LabResult) -> Section:
         blocks.append(Table(("of", "quantity", "value", "95 %", "formula"), tuple(estimates), "From several tests."))
     notes = dict.fromkeys([*(note for one in result.derived for note in one.notes), *result.notes])
     return Section("Parameters", (*blocks, *((Bullets(tuple(notes)),) if notes else ())))
+
+
+def _with_errors(one: Derived) -> tuple[str, ...]:
+    """What the errors that the readings declare add to a mean."""
+    assert one.reading is not None
+    unit, u = reading_unit(one.unit), one.reading
+    found = [number(unit.of(x), 2) for x in (one.summary.standard_error, u.standard, u.combined)]
+    low, high = (number(unit.of(x), 4) for x in (u.low, u.high))
+    return (_of(one), one.name.replace("_", " "), *found, unit.attach(f"{low} … {high}"))
 
 
 def _of(one: Derived) -> str:
