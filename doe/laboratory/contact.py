@@ -22,7 +22,7 @@ Hertz–Mindlin contact give back a little of the spin, so that simulated values
 
 Rebound: h1 and h2 are those of the same point of the body, v = √(2gh) before and after. Air is not in it: with drag in
 proportion to v² and the length Λ = v_t²/(2g) in which a body all but reaches its terminal speed v_t, v² = v_t² (1 −
-exp(−h1/Λ)) is reached, and v² = v_t² (exp(h2/Λ) − 1) is needed, so that the true e is larger (:func:`rebound_in_air`).
+exp(−h1/Λ)) is reached, and v² = v_t² (exp(h2/Λ) − 1) is needed, so that the true e is larger (``bias.py``).
 For a sphere Λ = 2 ρ d/(3 C_d ρ_air).
 
 Rolling: the torque μ_r R N (`solver.effects.rolling_resistance`, R* = R on a plane) holds a sphere up to tan α = μ_r.
@@ -180,11 +180,6 @@ def rebound_restitution(row: Reading) -> float:
         return row.values["restitution"]
     ratio = row.values["rebound_height"] / row.values["drop_height"]
     return math.sqrt(ratio) if ratio >= 0.0 else math.nan
-
-
-def rebound_in_air(ratio: float, fall: float) -> float:
-    """e of the contact where √(h2/h1) is ``ratio``; ``fall``: h1/Λ."""
-    return math.sqrt(math.expm1(ratio**2 * fall) / -math.expm1(-fall)) if fall > 0.0 else ratio
 
 
 def rolling_friction(row: Reading) -> float:

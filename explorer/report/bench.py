@@ -15,6 +15,7 @@ from doe.laboratory.result import CONDITIONS
 from doe.provenance import About
 from explorer.errors import CommandError
 from explorer.files.output_file import write_whole
+from explorer.laboratory.twin_row import LIKE
 from explorer.report.content import (
     Banner,
     Block,
@@ -33,6 +34,11 @@ from explorer.report.html import page
 from explorer.units import enumeration, number, reading_unit
 
 PANEL_HEIGHT = 420
+PARAMETERS = (
+    "Lay the parameters over a material: `explorer lab … --out part.toml`, then `explorer new material NAME --part "
+    "part.toml`."
+)
+TARGET = "A target, no parameter: parameters are found by it. Its like is simulated by {}."
 LEAST_POINTS = 3
 """Fewer readings of the solver's instrument are a few numbers, which the table has, and no curve."""
 
@@ -86,8 +92,7 @@ def banner(result: LabResult) -> Banner:
         Word.MEASURED,
         kinds,
         f"{least} replicates at least of every quantity{odd}.",
-        "Lay the parameters over a material: `explorer lab … --out part.toml`, then `explorer new material NAME --part "
-        "part.toml`.",
+        TARGET.format(LIKE[result.test]) if result.test in LIKE else PARAMETERS,
     )
 
 

@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 
 from doe.laboratory import LaboratoryError, analyse
 from doe.laboratory.bias import bias_table
-from doe.laboratory.contact import ROLLING_FRICTION, rebound_in_air
+from doe.laboratory.contact import ROLLING_FRICTION
 from solver.assets import asset_path
 from tests.doe.laboratory.readings import assert_one_line, written
 
@@ -64,9 +64,7 @@ def test_what_air_takes_is_that_of_the_integrated_motion():
         length = 1.0 / fall
         assert shown == pytest.approx(math.sqrt(risen(e, 1.0, length)), rel=1e-6)
         assert ratio == pytest.approx(shown / e)
-        assert rebound_in_air(shown, fall) == pytest.approx(e)
     assert all(ratio < 1.0 for *_, ratio in table.rows)
-    assert rebound_in_air(0.6, 0.0) == 0.6
 
 
 def test_rolling_friction_by_slope_and_by_the_way_to_rest(tmp_path):

@@ -261,4 +261,7 @@ def test_the_errors_of_readings_stand_beside_the_scatter():
 def test_a_report_of_a_test_with_errors_has_them(tmp_path):
     folder = tmp_path / "report"
     assert explorer("lab", "drum", "drum", "--report", folder).exit_code == 0
-    assert "u of the readings" in (folder / "report.html").read_text()
+    page = (folder / "report.html").read_text()
+    assert "u of the readings" in page
+    assert "A target, no parameter" in page
+    assert "explorer simulate rotating_drum" in page
