@@ -13,7 +13,7 @@ of the replicates s
     u_c² = s²/n + u²,  ν = u_c⁴/((s²/n)²/(n − 1)),  95 % interval: mean ± t(ν) u_c
 
 The part of the readings' errors that differs from replicate to replicate is in s already, and counts twice: the
-interval is rather too wide than too narrow. Sources: JCGM 100:2008 (GUM), 4.3.7, 5.1.2, 5.1.3 note 2, G.4.
+interval is rather too wide than too narrow. Source: JCGM 100:2008 (GUM), clauses 4.3, 5.1, G.6.
 """
 
 from __future__ import annotations

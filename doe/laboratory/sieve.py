@@ -10,14 +10,14 @@
 
 Bodies are counted on the solver, and weighed here. If sizes are log-normal, ln x has the same deviation σ by number and
 by mass, and the median by number is exp(−3σ²) times that by mass, since mass goes with x³ (the moments of a log-normal
-distribution; Hatch & Choate 1929):
+distribution; Hatch and Choate):
 
     σ = ln(d84/d16)/2, 16 and 84 being Φ(−1) and Φ(1)
     size_spread = √(exp(σ²) − 1), the coefficient of variation of such a distribution
     mean size by number = d50 exp(−3σ²) exp(σ²/2)
 
 A sieve sorts by the second largest dimension of a body, roughly, and by how long it is shaken. Sources: ISO 2591-1
-(test sieving), ASTM C136 (aggregates); Rosin & Rammler 1933, J. Inst. Fuel 7:29; DIN 66145 for its line.
+(test sieving), ASTM C136 (aggregates); Rosin & Rammler 1933; DIN 66145 for its line.
 """
 
 from __future__ import annotations
