@@ -6,12 +6,15 @@ from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from pathlib import Path
 
-from doe.laboratory import tables, weighing
+from doe.laboratory import bulk, contact, tables, weighing
 from doe.laboratory.contact import friction, restitution
 from doe.laboratory.dimensions import FLAT, SHAPES, dimensions, size_spreads
 from doe.laboratory.elastic import moduli, poisson_ratios
-from doe.laboratory.result import LabResult
-from doe.laboratory.tables import LaboratoryError, Layout, Table, read_table
+from doe.laboratory.result import Derived, LabResult
+from doe.laboratory.sieve import SIEVE, sieve
+from doe.laboratory.tables import LaboratoryError, Layout, Table, read_table, template
+
+Analysis = Callable[[Table], LabResult]
 
 
 @dataclass(frozen=True)
@@ -19,7 +22,7 @@ class BenchTest:
     """How the readings of a test are laid out, and the analysis of such a table."""
 
     layout: Layout
-    analyse: Callable[[Table], LabResult]
+    analyse: Analysis
 
 
 def _compression(table: Table) -> LabResult:
@@ -39,9 +42,14 @@ def _inclined_plane(table: Table) -> LabResult:
     return LabResult("inclined_plane", table.file, friction(table))
 
 
-def _drop(table: Table) -> LabResult:
-    derived, notes = restitution(table)
-    return LabResult("drop", table.file, derived, notes=notes)
+def _noted(test: str, analyse: Callable[[Table], tuple[tuple[Derived, ...], tuple[str, ...]]]) -> Analysis:
+    """The analysis of a test that gives quantities, and notes on all of them."""
+
+    def result(table: Table) -> LabResult:
+        derived, notes = analyse(table)
+        return LabResult(test, table.file, derived, notes=notes)
+
+    return result
 
 
 def _moisture(table: Table) -> LabResult:
@@ -68,12 +76,23 @@ TESTS: dict[str, BenchTest] = {
     "compression": BenchTest(tables.COMPRESSION, _compression),
     "shear": BenchTest(tables.FORCE_DISPLACEMENT, _shear),
     "inclined_plane": BenchTest(tables.INCLINED_PLANE, _inclined_plane),
-    "drop": BenchTest(tables.DROP, _drop),
+    "drop": BenchTest(tables.DROP, _noted("drop", restitution)),
+    "rebound": BenchTest(contact.REBOUND, _noted("rebound", contact.rebound)),
+    "rolling": BenchTest(contact.ROLLING, _noted("rolling", contact.rolling)),
     "moisture": BenchTest(tables.MOISTURE, _moisture),
     "density": BenchTest(tables.IMMERSION, _density),
     "composition": BenchTest(tables.COMPOSITION, _composition),
     "dimensions": BenchTest(tables.DIMENSIONS, _dimensions),
+    "sieve": BenchTest(SIEVE, _noted("sieve", sieve)),
+    "bulk_density": BenchTest(bulk.BULK_DENSITY, _noted("bulk_density", bulk.bulk_density)),
+    "drum": BenchTest(bulk.DRUM, _noted("drum", bulk.drum)),
+    "draw_down": BenchTest(bulk.DRAW_DOWN, _noted("draw_down", bulk.draw_down)),
 }
+
+
+def template_of(test: str) -> str:
+    """A sheet of ``test`` to fill in, with what to write in each column; :func:`analyse` reads it."""
+    return template(test, TESTS[test].layout)
 
 
 def analyse(test: str, path: Path) -> LabResult:

@@ -1,6 +1,9 @@
 """What the paper's formulas give where the answer is known: closed forms over the range of the parameters.
 
     drop          L/(2H) of a rigid sphere against its e, over friction (``contact.py``)
+    rebound       √(h2/h1) of a body with drag in proportion to v² against its e (``contact.py``):
+                  h2/Λ = ln(1 + e² (1 − exp(−h1/Λ))), Λ = v_t²/(2g)
+    sieve         size_spread of log-normal sizes against what a stack of sieves reads (``sieve.py``)
     compression   Equation (1) on a sphere between rigid plates, A = π R δ the area of the contact, ΔL = 2 δ, T = 2 R:
                   E_app/E = 4/(3 π (1 − ν²) √(δ/R));  with the sphere's cross-section A = π R², δ/R times that
     shear         Equation (2) there, on the contact that is sheared with no slip, ΔL twice its slip:
@@ -15,15 +18,30 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from scipy import stats
+
 from doe.laboratory.contact import flight, tangential_share
-from doe.laboratory.tables import LaboratoryError
+from doe.laboratory.sieve import size_spread
+from doe.laboratory.tables import LaboratoryError, Reading
 from doe.record import Record
 
 RESTITUTIONS = (0.2, 0.35, 0.5, 0.65, 0.8)
 FRICTIONS = (0.0, 0.1, 0.3, 0.6)
+SPACINGS = (2.0 ** (1 / 6), 2.0**0.25, 2.0**0.5, 2.0)
+"""Of sieves: opening over that of the next finer one."""
+SPREADS = (0.1, 0.2, 0.4)
+FALLS = (0.01, 0.03, 0.1, 0.3)
+"""h1/Λ."""
 STRAINS = (0.001, 0.003, 0.01, 0.03)
 POISSON_RATIOS = (0.2, 0.3, 0.4)
-EXACT = {"inclined_plane": "tan σ gives back the friction", "dimensions": "a caliper has no model"}
+READ_OFF = "what is read off needs no model of bodies"
+EXACT = {
+    "inclined_plane": "tan σ gives back the friction",
+    "rolling": "tan α and h/L of a sphere give back the rolling friction",
+    "dimensions": "a caliper has no model",
+    "drum": READ_OFF,
+    "draw_down": READ_OFF,
+}
 """Why a test has no bias; the others weigh."""
 
 
@@ -39,7 +57,8 @@ class BiasTable(Record):
 
 def bias_table(test: str) -> BiasTable:
     """The table of a test whose formula does not give back what was put in; LaboratoryError for another one."""
-    tables = {"drop": drop_bias, "compression": compression_bias, "shear": shear_bias}
+    tables = {"drop": drop_bias, "rebound": rebound_bias, "sieve": sieve_bias}
+    tables |= {"compression": compression_bias, "shear": shear_bias}
     if test not in tables:
         exact = EXACT.get(test, "a difference of masses has no model")
         raise LaboratoryError(f"--bias: {test}: {exact}; allowed: {', '.join(tables)}")
@@ -60,6 +79,50 @@ def drop_bias() -> BiasTable:
         rows=tuple(rows),
         statement=f"exact only for a horizontal rebound; even e = 0 gives {least:.3f} where the sphere grips",
     )
+
+
+def rebound_bias() -> BiasTable:
+    """√(h2/h1) over h1/Λ and restitution."""
+    rows = []
+    for fall in FALLS:
+        for e in RESTITUTIONS:
+            shown = math.sqrt(math.log1p(e * e * -math.expm1(-fall)) / fall)
+            rows.append((fall, e, shown, shown / e))
+    return BiasTable(
+        title="a sphere that falls and rises in air, drag as v²: e = √(h2/h1) against the e of the contact",
+        columns=("h1_over_length", "restitution", "root_h2_over_h1", "ratio"),
+        rows=tuple(rows),
+        statement="Λ = v_t²/(2g) = 2 ρ d/(3 C_d ρ_air) of a sphere: 8.3 m for 3 mm of 2500 kg/m³ with C_d = 0.5 in air "
+        "of 1.2 kg/m³, so that 200 mm are 0.024 of it; in vacuum, and on the solver, √(h2/h1) is e",
+    )
+
+
+def sieve_bias() -> BiasTable:
+    """The spread of sizes that a stack of sieves reads, over how far its sieves stand apart."""
+    rows = []
+    for spacing in SPACINGS:
+        for spread in SPREADS:
+            shown = size_spread(log_normal_stack(spacing, spread))
+            rows.append((spacing, spread, shown, shown / spread))
+    return BiasTable(
+        title="log-normal sizes, one sieve at the median by mass: spread by percentiles that are linear between sieves",
+        columns=("spacing", "size_spread", "shown", "ratio"),
+        rows=tuple(rows),
+        statement="what lies between two sieves is taken as spread evenly over them: three sieves or more within d16 … "
+        "d84 give the spread to some per cent",
+    )
+
+
+def log_normal_stack(spacing: float, spread: float) -> list[Reading]:
+    """Fractions of a kilogram of log-normal sizes on sieves 1 m · ``spacing``^k, the median by mass 1 m."""
+    sigma = math.sqrt(math.log1p(spread**2))
+    reach = max(2, math.ceil(4.0 * sigma / math.log(spacing)))
+    openings = [spacing**k for k in range(-reach, reach + 1)]
+    finer = [0.0, *(float(stats.norm.cdf(math.log(x) / sigma)) for x in openings), 1.0]
+    return [
+        Reading(0, (), "", {"aperture": x, "mass_retained": above - below})
+        for x, below, above in zip([0.0, *openings], finer, finer[1:], strict=False)
+    ]
 
 
 def compression_bias() -> BiasTable:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from doe.laboratory.hertz import HertzRange
 from doe.laboratory.linear_range import LinearRange
+from doe.laboratory.reading_error import ReadingError, propagated, reading_error
 from doe.laboratory.replicates import ReplicateSummary, summarise
 from doe.laboratory.tables import Reading, Table
 from doe.record import Record
@@ -20,7 +21,8 @@ class Derived(Record):
     """One quantity of one component or pair, from replicates; SI.
 
     file: that the readings stand in. parameter: where it belongs in a material file
-    (``pair.seed.plate.static_friction``), empty if it is no parameter.
+    (``pair.seed.plate.static_friction``), empty if it is no parameter. reading: what the errors add that the readings
+    declare, None where they declare none.
     """
 
     name: str
@@ -33,6 +35,7 @@ class Derived(Record):
     summary: ReplicateSummary
     parameter: str = ""
     notes: tuple[str, ...] = ()
+    reading: ReadingError | None = None
 
 
 @dataclass(frozen=True)
@@ -88,10 +91,30 @@ def derived(
     values: Sequence[float],
     parameter: str = "",
     notes: tuple[str, ...] = (),
+    errors: Sequence[float] = (),
 ) -> Derived:
-    """A quantity with the summary of its ``values`` (SI), one per replicate."""
+    """A quantity with the summary of its ``values`` (SI), one per replicate; ``errors``: by their readings, or none."""
     names, numbers = tuple(replicates), tuple(values)
-    return Derived(name, unit, of, formula, table.file, names, numbers, summarise(numbers), parameter, notes)
+    summary = summarise(numbers)
+    reading = reading_error(errors, summary)
+    return Derived(name, unit, of, formula, table.file, names, numbers, summary, parameter, notes, reading)
+
+
+def of_rows(
+    table: Table,
+    name: str,
+    unit: str,
+    of: tuple[str, ...],
+    formula: str,
+    rows: Sequence[Reading],
+    value: Callable[[Reading], float],
+    parameter: str = "",
+    notes: tuple[str, ...] = (),
+) -> Derived:
+    """``value`` of each of the ``rows``, which are of one component or pair, and what their readings' errors add."""
+    errors = [propagated((row,), lambda rows: value(rows[0])) for row in rows]
+    names, values = [row.replicate for row in rows], list(map(value, rows))
+    return derived(table, name, unit, of, formula, names, values, parameter, notes, errors)
 
 
 def per_row(
@@ -99,8 +122,7 @@ def per_row(
 ) -> tuple[Derived, ...]:
     """``value`` of every row, one quantity per component or pair; ``parameter`` makes its path from the names."""
     return tuple(
-        derived(table, name, unit, of, formula, [row.replicate for row in rows], list(map(value, rows)), parameter(*of))
-        for of, rows in table.groups().items()
+        of_rows(table, name, unit, of, formula, rows, value, parameter(*of)) for of, rows in table.groups().items()
     )
 
 

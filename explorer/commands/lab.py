@@ -15,10 +15,16 @@ class Test(StrEnum):
     SHEAR = "shear"
     INCLINED_PLANE = "inclined_plane"
     DROP = "drop"
+    REBOUND = "rebound"
+    ROLLING = "rolling"
     MOISTURE = "moisture"
     DENSITY = "density"
     COMPOSITION = "composition"
     DIMENSIONS = "dimensions"
+    SIEVE = "sieve"
+    BULK_DENSITY = "bulk_density"
+    DRUM = "drum"
+    DRAW_DOWN = "draw_down"
 
 
 def lab(
@@ -32,7 +38,12 @@ def lab(
         None, metavar="FILE.csv", help="With shear: compression tests of the same components, for Poisson's ratio."
     ),
     leave_out: list[str] = typer.Option([], metavar="NAME", help="With composition: a component that is not poured."),
-    out: Path | None = typer.Option(None, metavar="PART.toml", help="New file with the parameters and their origin."),
+    out: Path | None = typer.Option(
+        None, metavar="PART.toml", help="New file with the parameters and their origin; with --template FILE.csv."
+    ),
+    template: bool = typer.Option(
+        False, "--template", help="Print a sheet to fill in: columns, units, what to write, how many replicates."
+    ),
     plot: Path | None = typer.Option(
         None, metavar="FILE.html", help="New page: parameters, and the curves with their straight part."
     ),
@@ -62,6 +73,7 @@ def lab(
         material=material,
         simulate=simulate,
         bias=bias,
+        template=template,
         json=json,
         report=report,
         author=author,

@@ -21,6 +21,7 @@ import numpy.typing as npt
 from PIL import Image
 
 from doe.audit import audit_study
+from doe.laboratory.analysis import template_of
 from doe.target import Target
 from explorer.audit.read_study import read_study, shipped_study
 from explorer.audit.report import audit_html, audit_text
@@ -44,7 +45,7 @@ from explorer.tables.laboratory import lab_text
 from explorer.tables.photograph import NOTE, Rows, measure_result, measure_tables
 from explorer.tables.pours import bench_text
 from solver import Scene, read_toml, with_values
-from solver.assets import asset_path, photograph_scales
+from solver.assets import asset_path, photograph_scales, shipped_assets
 from solver.photograph import open_picture
 
 PART = "Points of every replicate; the line is the part that the modulus is taken from, drawn on to zero force."
@@ -114,6 +115,16 @@ def twin_result(order: LabOrder) -> CommandResult:
     words = lab_words(order)
     said = command_output(words)
     return replace(bench_result(order), text=said, command=shlex.join(["explorer", *words]))
+
+
+def template_file(test: str) -> tuple[str, bytes]:
+    """`explorer lab TEST --template`: the name of the sheet and its content."""
+    return f"{test}_sheet.csv", template_of(test).encode()
+
+
+def examples_of(test: str) -> tuple[str, ...]:
+    """Names of the shipped readings of a test: its own first, then others."""
+    return tuple(name for name in shipped_assets("laboratory") if name == test or name.startswith(f"{test}_"))
 
 
 def lab_words(order: LabOrder) -> list[str]:

@@ -51,8 +51,12 @@ class PartFile(TomlTable):
     pair: dict[str, dict[str, dict[str, Any]]] = Field(default_factory=dict)
     body: list[PartBody] = Field(default_factory=list)
     """Names, each with a mass_fraction, or with size_distribution and size_spread."""
+    effect: dict[str, dict[str, Any]] = Field(default_factory=dict)
     measured: dict[str, Any] = Field(default_factory=dict)
-    """The origin of the same numbers: value, unit, n, sd, low_95, high_95, formula, notes, source, sha256."""
+    """The origin of the same numbers: value, unit, n, sd, low_95, high_95, formula, notes, source, sha256.
+
+    Where the readings declare their errors also u_readings and u_combined, standard uncertainties of the mean.
+    """
 
 
 def part_table(result: LabResult) -> Table:
@@ -76,7 +80,7 @@ def part_text(table: Table, heading: str) -> str:
     lines += ["", f"format = {table['format']}"]
     for body in table.get("body", []):
         lines += ["", "[[body]]", *_entries(body)]
-    for kind in ("materials", "pair", "measured"):
+    for kind in ("materials", "pair", "effect", "measured"):
         lines += _tables((kind,), table.get(kind, {}))
     return "\n".join(lines) + "\n"
 
@@ -145,6 +149,7 @@ def with_part(scene: Scene, table: Table) -> Scene:
             for key, value in entry.items():
                 settings[f"pair.{a}.{b}.{key}"] = value
                 struck |= {f"pair.{a}.{b}.{key}", f"pair.{b}.{a}.{key}"}
+    settings |= {f"effect.{name}.{key}": value for name, entry in part.effect.items() for key, value in entry.items()}
     of_bodies = _of_bodies(part.body)
     fractions = {path.split(".")[1]: value for path, value in of_bodies.items() if path.endswith(".mass_fraction")}
     settings |= {path: value for path, value in of_bodies.items() if not path.endswith(".mass_fraction")}
@@ -235,7 +240,8 @@ def _keep(table: Table, keys: Sequence[str], entries: Mapping[str, Any], root: s
 def _of_derived(one: Derived) -> Table:
     s = one.summary
     numbers = {"value": s.mean, "unit": one.unit, "n": s.n, "sd": s.sd, "low_95": s.low, "high_95": s.high}
-    return _finite(numbers) | _said(one) | _origin((one.file,))
+    errors = {"u_readings": one.reading.standard, "u_combined": one.reading.combined} if one.reading else {}
+    return _finite(numbers | errors) | _said(one) | _origin((one.file,))
 
 
 def _of_estimate(one: Estimate) -> Table:

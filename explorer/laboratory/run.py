@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from doe.laboratory import LabResult, analyse
-from doe.laboratory.analysis import analyse_composition, analyse_elastic
+from doe.laboratory.analysis import analyse_composition, analyse_elastic, template_of
 from doe.laboratory.bias import BiasTable, bias_table
 from explorer.errors import CommandError
-from explorer.files.output_file import check_new_file
+from explorer.files.output_file import check_new_file, write_whole
 from explorer.files.run_folder import appearing, check_vacant, json_text
 from explorer.files.run_result import made_today
 from explorer.laboratory.part import part_table, part_text, with_part
@@ -21,13 +21,15 @@ from explorer.tables.laboratory import bias_data, bias_text, lab_data, lab_text,
 from solver import ParameterError, Scene
 from solver.assets import asset_path
 
+CLOSED_FORM = ("shear", "rebound")
+"""Tests with a twin whose formula's bias is a closed form only."""
 BENCH = "bench"
 """Kind of the result in a folder of --report, and the name of its file."""
 
 
 @dataclass(frozen=True)
 class LabOrder:
-    """What `explorer lab` was asked for; ``file`` None means that only the bias of the test's formula is wanted."""
+    """What `explorer lab` was asked for; ``file`` None: only the bias of the test's formula, or a template."""
 
     test: str
     file: str | None = None
@@ -38,6 +40,7 @@ class LabOrder:
     material: str | None = None
     simulate: bool = False
     bias: bool = False
+    template: bool = False
     json: bool = False
     report: Path | None = None
     author: str = ""
@@ -47,6 +50,9 @@ class LabOrder:
 def run_lab(order: LabOrder, say: Callable[[str], None]) -> bool:
     """Carry out ``order``; True if every round trip that was asked for closes. CommandError and others in one line."""
     _check(order)
+    if order.template:
+        _template(order, say)
+        return True
     if order.file is None:
         table = bias_table(order.test)
         say(json_text({"test": order.test, "bias": bias_data(table)}) if order.json else bias_text(table))
@@ -62,13 +68,24 @@ def run_lab(order: LabOrder, say: Callable[[str], None]) -> bool:
     if order.json:
         say(json_text(lab_data(result, rows, bias)))
     else:
-        if bias and scene and order.test == "shear":
+        if bias and scene and order.test in CLOSED_FORM:
             say("\nThe bias of this formula is a closed form; it is shown as it is, and not simulated.")
         for text in filter(None, (bias and bias_text(bias), rows and twin_text(rows))):
             say(f"\n{text}")
         for path in filter(None, (order.out, order.figure, order.report)):
             say(f"\nwrote {path}")
     return all(row.closes is not False for row in rows)
+
+
+def _template(order: LabOrder, say: Callable[[str], None]) -> None:
+    """The sheet of a test, into a file or as it is."""
+    text = template_of(order.test)
+    if order.out:
+        write_whole(order.out, text)
+    if order.json:
+        say(json_text({"test": order.test, "template": text}))
+    else:
+        say(f"wrote {order.out}" if order.out else text.rstrip("\n"))
 
 
 def _write(order: LabOrder, result: LabResult, part: dict[str, Any]) -> None:
@@ -106,8 +123,11 @@ def analysed(order: LabOrder) -> LabResult:
 
 def _check(order: LabOrder) -> None:
     """Refuse, before any work, what cannot be carried out."""
+    if order.template:
+        _check_template(order)
+        return
     if order.file is None and not order.bias:
-        raise CommandError("FILE.csv is missing; without readings only --bias has something to show")
+        raise CommandError("FILE.csv is missing; without readings only --bias and --template have something to show")
     if order.file is None and any(
         (order.simulate, order.out, order.figure, order.report, order.compression, order.left_out)
     ):
@@ -132,6 +152,15 @@ def _check(order: LabOrder) -> None:
         check_vacant(order.report, "--report")
 
 
+def _check_template(order: LabOrder) -> None:
+    """A template is made of nothing but the test's name."""
+    others = (order.file, order.compression, order.left_out, order.figure, order.report, order.material)
+    if any(others) or order.simulate or order.bias:
+        raise CommandError("--template: makes an empty sheet; allowed beside it: --out FILE.csv, --json")
+    if order.out:
+        check_new_file(order.out, ".csv")
+
+
 def _scene_with(part: dict[str, Any], order: LabOrder) -> Scene:
     """The material of the twins with what was derived."""
     name = order.material or DEFAULT_MATERIAL
@@ -151,7 +180,7 @@ def _twins(result: LabResult, scene: Scene) -> list[TwinRow]:
 def _bias(order: LabOrder, result: LabResult, scene: Scene | None) -> BiasTable | None:
     if not order.bias:
         return None
-    if scene is None or order.test == "shear":
+    if scene is None or order.test in CLOSED_FORM:
         return bias_table(order.test)
     from explorer.laboratory.twin import simulated_bias
 

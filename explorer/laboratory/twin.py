@@ -4,6 +4,8 @@ A round trip closes where what comes out is within ``CLOSES`` of what was put in
 
     inclined_plane        tan of the angle at which the body slides = μ
     drop                  tracked rebound (v_x + v_z)/√(2gH) = e
+    rebound               √(h2/h1) of a ball of the body's mass on a level plate = e
+    rolling               tan of the angle at which such a ball begins to roll = μ_r
     compression, shear    E* and G* of the contact by Hertz and Mindlin, and E and G of the specimen from them:
                           1/E* = (1 − ν²)/E + (1 − ν_w²)/E_w,  1/G* = (2 − ν)/G + (2 − ν_w)/G_w
 
@@ -23,16 +25,20 @@ from scipy.optimize import brentq
 
 from doe.laboratory import Derived, LabResult
 from doe.laboratory.bias import STRAINS, BiasTable, compression_ratio
-from doe.laboratory.contact import flight, tangential_share
+from doe.laboratory.contact import ROLLING_FRICTION, flight, tangential_share
 from explorer.errors import CommandError
 from explorer.laboratory.twin_row import CLOSES, RIGS, TwinRow
-from solver import Scene, with_rig, with_values
+from solver import Scene, backend, with_rig, with_values
 from solver.scenes.body import Body
 from solver.scenes.material import Material
 from solver.single_body import BenchResult, run_bench_test
+from solver.single_body.bench import UPRIGHT, ball
+from solver.single_body.inclined_plane import onset, rebound_height
 
 TILT_RATE = 5.0
 """Of the inclined plane [°/s]; the angle moves by less than a hundredth of a degree against the rig's own 1 °/s."""
+DROP_HEIGHT = 0.2
+"""Of a twin whose readings tell none [m]."""
 LOWEST, HIGHEST = 0.05, 1.0
 """Restitutions that the solver takes."""
 FIRST_READING = 0.02
@@ -47,6 +53,10 @@ def twins(result: LabResult, scene: Scene) -> Iterator[TwinRow]:
             yield from _friction(of, own, scene)
         elif result.test == "drop":
             yield from _restitution(of, own, scene)
+        elif result.test == "rebound":
+            yield _rebound(of, own, scene)
+        elif result.test == "rolling":
+            yield _rolling(of, own["rolling_friction"].summary.mean, scene)
         else:
             yield from _moduli(of, own, scene)
 
@@ -75,10 +85,31 @@ def _restitution(of: tuple[str, ...], own: dict[str, Derived], scene: Scene) -> 
         yield TwinRow(of, "restitution_that_lands_there", "1", None, own["restitution"].summary.mean, landing, None)
 
 
+def _rebound(of: tuple[str, ...], own: dict[str, Derived], scene: Scene) -> TwinRow:
+    height = own["drop_height"].summary.mean if "drop_height" in own else DROP_HEIGHT
+    bench = bench_scene(scene, "rebound", of)
+    backend.init(threads=1)
+    risen = rebound_height(bench, specimen(scene, of)[0], height)
+    return _round_trip(of, "restitution", own["restitution"].summary.mean, math.sqrt(risen / height))
+
+
+def _rolling(of: tuple[str, ...], friction: float, scene: Scene) -> TwinRow:
+    settings = {ROLLING_FRICTION: friction, "rig.tilt_rate": TILT_RATE}
+    bench = with_values(bench_scene(scene, "rolling", of), settings)
+    backend.init(threads=1)
+    angle, _ = onset(bench, ball(specimen(scene, of)[0]))
+    return _round_trip(of, "rolling_friction", friction, math.tan(math.radians(angle)))
+
+
+def _round_trip(of: tuple[str, ...], name: str, put_in: float, simulated: float) -> TwinRow:
+    """What was measured is what was put in."""
+    closes = abs(simulated - put_in) <= CLOSES * put_in
+    return TwinRow(of, name, "1", put_in, put_in, simulated, closes)
+
+
 def restitution_that_lands(bench: Scene, measured: float) -> float | None:
     """The e with which the ball of the drop rig gives L/(2H) = ``measured``; None if no e that is allowed does."""
     # Only here: the drop alone, without the study beside it.
-    from solver.single_body.bench import UPRIGHT, ball
     from solver.single_body.drop_plate_45 import drop, paper_estimate
 
     gravity, height = math.hypot(*bench.gravity), bench.rig.drop_height  # type: ignore[attr-defined]

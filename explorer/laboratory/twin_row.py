@@ -13,10 +13,18 @@ CLOSES = 0.01
 RIGS = {
     "inclined_plane": "inclined_plane",
     "drop": "drop_plate_45",
+    "rebound": "inclined_plane",
+    "rolling": "inclined_plane",
     "compression": "compression",
     "shear": "compression",
 }
-"""Rig of each test that has a twin."""
+"""Rig of each test that has a twin; a rebound is on the plane while it is level."""
+LIKE = {
+    "bulk_density": "explorer simulate lifting_cylinder (bulk_density_kg_m3, solid_fraction of the pile)",
+    "drum": "explorer simulate rotating_drum (dynamic_angle_deg)",
+    "draw_down": "explorer simulate draw_down_box (draw_down_angle_deg, angle_of_repose_deg@0, discharge)",
+}
+"""Command that simulates the like of a test without a twin, with a whole material in place of what the test gave."""
 
 
 @dataclass(frozen=True)
@@ -45,4 +53,5 @@ class TwinRow(Record):
 def check_twin(test: str) -> None:
     """Raise CommandError for a test that has no rig."""
     if test not in RIGS:
-        raise CommandError(f"--simulate: {test} has no rig; allowed: {', '.join(RIGS)}")
+        like = f"; its like is {LIKE[test]}" if test in LIKE else ""
+        raise CommandError(f"--simulate: {test} has no rig{like}; allowed: {', '.join(RIGS)}")

@@ -15,6 +15,7 @@ from doe.laboratory.result import CONDITIONS
 from doe.provenance import About
 from explorer.errors import CommandError
 from explorer.files.output_file import write_whole
+from explorer.laboratory.twin_row import LIKE
 from explorer.report.content import (
     Banner,
     Block,
@@ -33,6 +34,11 @@ from explorer.report.html import page
 from explorer.units import enumeration, number, reading_unit
 
 PANEL_HEIGHT = 420
+PARAMETERS = (
+    "Lay the parameters over a material: `explorer lab … --out part.toml`, then `explorer new material NAME --part "
+    "part.toml`."
+)
+TARGET = "A target, no parameter: parameters are found by it. Its like is simulated by {}."
 LEAST_POINTS = 3
 """Fewer readings of the solver's instrument are a few numbers, which the table has, and no curve."""
 
@@ -86,8 +92,7 @@ def banner(result: LabResult) -> Banner:
         Word.MEASURED,
         kinds,
         f"{least} replicates at least of every quantity{odd}.",
-        "Lay the parameters over a material: `explorer lab … --out part.toml`, then `explorer new material NAME --part "
-        "part.toml`.",
+        TARGET.format(LIKE[result.test]) if result.test in LIKE else PARAMETERS,
     )
 
 
@@ -113,6 +118,10 @@ def _parameters(result: LabResult) -> Section:
         )
     header = ("of", "quantity", "mean", "SD", "95 % of the mean", "n", "outliers", "formula")
     blocks: list[Block] = [Table(header, tuple(rows), "95 %: Student’s t. Outliers are kept.")]
+    errors = [_with_errors(one) for one in result.derived if one.reading and one.name not in CONDITIONS]
+    if errors:
+        head = ("of", "quantity", "SD/√n", "u of the readings", "u of both", "95 % of the mean")
+        blocks.append(Table(head, tuple(errors), "With the errors that the readings declare, by the GUM."))
     estimates = []
     for other in result.estimates:
         unit = reading_unit(other.unit)
@@ -125,6 +134,15 @@ def _parameters(result: LabResult) -> Section:
         blocks.append(Table(("of", "quantity", "value", "95 %", "formula"), tuple(estimates), "From several tests."))
     notes = dict.fromkeys([*(note for one in result.derived for note in one.notes), *result.notes])
     return Section("Parameters", (*blocks, *((Bullets(tuple(notes)),) if notes else ())))
+
+
+def _with_errors(one: Derived) -> tuple[str, ...]:
+    """What the errors that the readings declare add to a mean."""
+    assert one.reading is not None
+    unit, u = reading_unit(one.unit), one.reading
+    found = [number(unit.of(x), 2) for x in (one.summary.standard_error, u.standard, u.combined)]
+    low, high = (number(unit.of(x), 4) for x in (u.low, u.high))
+    return (_of(one), one.name.replace("_", " "), *found, unit.attach(f"{low} … {high}"))
 
 
 def _of(one: Derived) -> str:

@@ -35,7 +35,7 @@ def lab_text(result: LabResult) -> str:
     parts = [f"{result.test}: {result.file}", _derived_table(result.derived)]
     if result.estimates:
         parts.append(_estimate_table(result.estimates))
-    parts += [table for table in (_straight_table(result), _hertz_table(result)) if table]
+    parts += [table for table in (_errors_table(result), _straight_table(result), _hertz_table(result)) if table]
     notes = [f"{_name(one.of)} {one.name}: {text}" for one in result.derived for text in _remarks(one)]
     notes += [f"{_name(one.of)} {one.name}: {text}" for one in result.estimates for text in one.notes]
     notes += [*dict.fromkeys(note for one in result.derived for note in one.notes), *result.notes]
@@ -102,6 +102,29 @@ def _estimate_table(estimates: Sequence[Estimate]) -> str:
         error = _scaled(one.standard_error, factor, 2)
         rows.append((_name(one.of), one.name, _scaled(one.value, factor), error, interval, unit, one.formula))
     return text_table(("of", "quantity", "value", "SE", "95 %", "unit", "formula"), rows)
+
+
+def _errors_table(result: LabResult) -> str:
+    """What the errors that the readings declare add to each mean."""
+    rows = []
+    for one in result.derived:
+        if one.reading is None or one.name in CONDITIONS:
+            continue
+        unit, factor = _screen(one.unit, one.name)
+        reading = one.reading
+        numbers = (one.summary.standard_error, reading.standard, reading.combined)
+        interval = f"{_scaled(reading.low, factor)} … {_scaled(reading.high, factor)}"
+        rows.append((_name(one.of), one.name, *(_scaled(u, factor, 2) for u in numbers), interval, unit))
+    head = (
+        "with the readings' own errors",
+        "quantity",
+        "SD/√n",
+        "u of readings",
+        "u of both",
+        "95 % of the mean",
+        "unit",
+    )
+    return text_table(head, rows) if rows else ""
 
 
 def _straight_table(result: LabResult) -> str:

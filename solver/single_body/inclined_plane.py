@@ -1,8 +1,11 @@
-"""Angle at which a body begins to slide (``rigs/inclined_plane.py``).
+"""Angle at which a body begins to slide (``rigs/inclined_plane.py``), or a ball to roll; and how high a ball rebounds.
 
 First a fast tilt finds the angle roughly, then a slow one from ``MARGIN`` below it measures. Sliding is noticed late,
 at ``SLIDING`` speed. As the tilt grows in proportion to time, so does the acceleration: √v grows in proportion to the
-time, and to the tilt, since the onset, which is where the line through two of its values meets zero.
+time, and to the tilt, since the onset, which is where the line through two of its values meets zero. The same holds for
+a ball that rolls, held up to tan α = μ_r by its rolling resistance (``effects/rolling_resistance.py``).
+
+On the level plane a ball that falls by h1 rises to h2 = e² h1, without air.
 """
 
 from __future__ import annotations
@@ -13,8 +16,9 @@ from typing import cast
 import numpy as np
 
 from solver.rigs.inclined_plane import InclinedPlane
+from solver.scenes.body import Body
 from solver.scenes.scene import Scene
-from solver.single_body.bench import Bench, BenchResult, Quantity, held
+from solver.single_body.bench import Bench, BenchResult, Quantity, ball, held
 
 FAST = 20.0
 """Speed of the first tilt, and of the way to where the second begins [°/s]."""
@@ -28,6 +32,11 @@ MOMENT = 1e-3
 """Simulated time between two changes of the tilt [s]."""
 SETTLING = 0.1
 """Time to settle on the level plane [s]."""
+CLOSE_BY = 1e-3
+"""From this long [s] before the impact on, a falling ball is watched, every ``LOOK`` steps."""
+LOOK = 5
+GIVEN_UP = 1.0
+"""A ball that is not off the plane this long [s] after the impact stays on it."""
 
 Path = list[tuple[float, float, float]]
 """Tilt [°], displacement [m], speed [m/s]."""
@@ -37,9 +46,7 @@ def measure(scene: Scene, seed: int) -> BenchResult:
     """Tilt the plane under the held body; the angle of sliding beside atan μ_s of the pair."""
     rig = cast(InclinedPlane, scene.rig)
     body = next(body for body in scene.bodies if body.name == rig.body)
-    rough, _ = _tilt(scene, rig, 0.0, FAST)
-    slow = min(rig.tilt_rate, FAST)
-    angle, path = _tilt(scene, rig, max(0.0, rough - MARGIN), slow) if math.isfinite(rough) else (rough, [])
+    angle, path = onset(scene, held(body))
     friction = scene.contact_pair(body, rig.wall).static_friction
     return BenchResult(
         test=rig.name,
@@ -57,12 +64,22 @@ def measure(scene: Scene, seed: int) -> BenchResult:
     )
 
 
-def _tilt(scene: Scene, rig: InclinedPlane, start: float, rate: float) -> tuple[float, Path]:
-    """Angle of sliding [°], NaN if the body holds, and the path; the tilt grows by ``rate`` [°/s] from ``start`` on."""
-    body = next(body for body in scene.bodies if body.name == rig.body)
-    bench = Bench(scene, rig, held(body))
+def onset(scene: Scene, specimen: Body) -> tuple[float, Path]:
+    """Angle [°] from which on ``specimen`` moves down the plane, NaN if it holds, and the path of the slow tilt.
+
+    One that is :func:`~solver.single_body.bench.held` slides there, a ball rolls or slides.
+    """
+    rig = cast(InclinedPlane, scene.rig)
+    rough, _ = _tilt(scene, specimen, 0.0, FAST)
+    slow = min(rig.tilt_rate, FAST)
+    return _tilt(scene, specimen, max(0.0, rough - MARGIN), slow) if math.isfinite(rough) else (rough, [])
+
+
+def _tilt(scene: Scene, specimen: Body, start: float, rate: float) -> tuple[float, Path]:
+    """Angle of the onset [°], NaN if the body holds, and the path; tilted by ``rate`` [°/s] from ``start`` on."""
+    bench = Bench(scene, scene.rig, specimen)
     gravity = math.hypot(*scene.gravity)
-    clump = body.clump
+    clump = specimen.clump
     bench.put(np.array([0.0, 0.0, float((clump.radii - clump.centres[:, 2]).max())]))
     _set_tilt(bench, gravity, 0.0)
     bench.run(SETTLING)
@@ -92,3 +109,21 @@ def _set_tilt(bench: Bench, gravity: float, tilt_deg: float) -> None:
     """Turn gravity so that the plane slopes down towards +x."""
     angle = math.radians(tilt_deg)
     bench.batch.set_gravity(0, (gravity * math.sin(angle), 0.0, -gravity * math.cos(angle)))
+
+
+def rebound_height(scene: Scene, body: Body, height: float) -> float:
+    """Height [m] to which a ball of ``body`` rises again, its lowest point above the plane, after falling ``height``.
+
+    NaN if it stays there. Once it is off the plane its flight is the free one, z + v²/(2g).
+    """
+    specimen, gravity = ball(body), math.hypot(*scene.gravity)
+    bench = Bench(scene, scene.rig, specimen)
+    radius = float(specimen.clump.radii[0])
+    bench.put(np.array([0.0, 0.0, radius + height]))
+    bench.run(max(bench.dt, math.sqrt(2.0 * height / gravity) - CLOSE_BY))
+    for _ in range(math.ceil((GIVEN_UP + CLOSE_BY) / (LOOK * bench.dt))):
+        touching = bench.run(LOOK * bench.dt)["touching"] > 0
+        state = bench.state()
+        if not touching and state[9] > 0.0:
+            return float(state[2] - radius + state[9] ** 2 / (2.0 * gravity))
+    return math.nan

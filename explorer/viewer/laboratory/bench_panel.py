@@ -7,15 +7,16 @@ from typing import Any
 
 import viser
 
+from doe.laboratory import TESTS
 from doe.table_file import SUFFIXES
-from explorer.laboratory.command_results import bench_result, twin_result
+from explorer.laboratory.command_results import bench_result, examples_of, template_file, twin_result
 from explorer.laboratory.part import measured_source
 from explorer.laboratory.run import LabOrder, analysed
 from explorer.scene.source import SceneSource
 from explorer.viewer.laboratory.answer_view import AnswerView
 from explorer.viewer.laboratory.inputs import UploadSlot
+from explorer.viewer.output.send_file import send_file
 from explorer.viewer.panel import LABORATORY, PageContext, Panel
-from solver.assets import shipped_assets
 
 NO_COMPRESSION = "none"
 WAITING = "Choose a test; its readings are those of the shipped example until you upload yours. Then: Evaluate."
@@ -29,10 +30,19 @@ class BenchPanel(Panel):
     def __init__(self, page: PageContext) -> None:
         server, gui, folder, post = page.server, page.server.gui, page.uploads, page.post
         self._session, self._folder, self._background = page.session, folder, page.bench_work
-        tests = shipped_assets("laboratory")
-        self._test = gui.add_dropdown("Test", tests, hint="What was measured; columns: doe/laboratory/README.md.")
+        tests = tuple(TESTS)
+        self._test = gui.add_dropdown("Test", tests, hint="What was measured; its columns: Sheet to fill in.")
+        sheet = gui.add_button(
+            "Sheet to fill in", hint="Columns, units, what to write, how many replicates; then upload it as readings."
+        )
         self._readings = UploadSlot(
-            server, "Readings", (tests[0],), SUFFIXES, folder, post, "One row per replicate or point of a curve."
+            server,
+            "Readings",
+            examples_of(tests[0]),
+            SUFFIXES,
+            folder,
+            post,
+            "One row per replicate or point of a curve.",
         )
         self._compression = UploadSlot(
             server,
@@ -54,7 +64,8 @@ class BenchPanel(Panel):
         self._bias = gui.add_checkbox(
             "Where the formula misses",
             False,
-            hint="What the test's usual formula gives over a range of what was put in (drop, compression, shear).",
+            hint="What the test's usual formula gives over a range of what was put in (drop, rebound, sieve, "
+            "compression, shear).",
         )
         evaluate = gui.add_button("Evaluate", hint="Mean, spread, interval, normality, outliers, parameters.")
         pour = gui.add_button(
@@ -68,7 +79,13 @@ class BenchPanel(Panel):
         def _(event: viser.GuiEvent[Any]) -> None:
             if event.client_id is not None:
                 test = str(event.target.value)
-                post(lambda: self._readings.offer((test,)))
+                post(lambda: self._readings.offer(examples_of(test)))
+
+        @sheet.on_click
+        def _(event: viser.GuiEvent[Any]) -> None:
+            if event.client is not None:
+                client = event.client
+                post(lambda: send_file(client, *template_file(str(self._test.value))))
 
     def set_dark(self, dark: bool) -> None:
         """Charts for a dark page, or a light one."""

@@ -219,7 +219,8 @@ def test_an_unknown_test_lists_the_known_ones(tmp_path):
 
 def test_shipped_examples_give_the_article_s_means():
     """The examples are made up to the printed means; their readings are the inputs that the article does not print."""
-    assert set(TESTS) == {path.stem for path in asset_path("laboratory", "drop").parent.glob("*.csv")}
+    shipped = {path.stem for path in asset_path("laboratory", "drop").parent.glob("*.csv")}
+    assert shipped - {"rebound_glass_acrylic"} == set(TESTS)
     for row in published("table1_physical"):
         moisture, density = (analyse(test, asset_path("laboratory", test)) for test in ("moisture", "density"))
         wet = of(moisture, row["component"], quantity="moisture_wet_basis").summary.mean

@@ -6,6 +6,7 @@ import tomllib
 import pytest
 
 from doe.laboratory import TESTS
+from explorer.commands import lab
 from solver import load_material, value
 from solver.assets import asset_path
 from tests.explorer.command_line import explorer, refused
@@ -187,6 +188,14 @@ def test_the_figure_holds_every_replicate_and_escapes_names(tmp_path):
     [
         (["torsion", "drop"], "torsion"),
         (["drop"], "FILE.csv is missing"),
+        (["drop", "drop", "--template"], "--template: makes an empty sheet"),
+        (["drop", "--template", "--bias"], "--template: makes an empty sheet"),
+        (["drop", "--template", "--out", "x.toml"], ".csv"),
+        (["drum", "drum", "--simulate"], "explorer simulate rotating_drum"),
+        (["draw_down", "draw_down", "--simulate"], "explorer simulate draw_down_box"),
+        (["bulk_density", "bulk_density", "--simulate"], "explorer simulate lifting_cylinder"),
+        (["sieve", "sieve", "--simulate"], "sieve has no rig"),
+        (["drum", "--bias"], "needs no model"),
         (["drop", "nowhere.csv"], "nowhere.csv"),
         (["drop", "--bias", "--simulate"], "need readings"),
         (["moisture", "moisture", "--simulate"], "moisture has no rig"),
@@ -218,3 +227,41 @@ def test_single_readings_have_no_figure(tmp_path):
 def test_shipped_examples_say_that_they_are_made_up():
     for test in TESTS:
         assert "# Made up" in asset_path("laboratory", test).read_text()
+
+
+def test_the_choices_are_the_tests_that_there_are():
+    assert [one.value for one in lab.Test] == list(TESTS)
+
+
+@pytest.mark.parametrize("test", TESTS)
+def test_a_sheet_is_printed_or_written_and_read_once_it_is_filled_in(test, tmp_path):
+    path = tmp_path / "sheet.csv"
+    assert explorer("lab", test, "--template", "--out", path).stdout == f"wrote {path}\n"
+    printed = explorer("lab", test, "--template").stdout
+    assert path.read_text() == printed
+    assert json.loads(explorer("lab", test, "--template", "--json").stdout) == {"test": test, "template": printed}
+    assert "no readings below the names" in refused(explorer("lab", test, path))
+    header = printed.splitlines()[-1].split(",")
+    shipped = asset_path("laboratory", test)
+    rows = [line.split(",") for line in shipped.read_text().splitlines() if not line.startswith("#")]
+    # The shipped readings, copied into the sheet by hand: columns that it lacks are those of the errors of readings.
+    cells = [dict(zip(rows[0], row, strict=True)) for row in rows[1:]]
+    path.write_text(printed + "".join(",".join(row.get(name, "") for name in header) + "\n" for row in cells))
+    of_sheet = json.loads(explorer("lab", test, path, "--json").stdout)
+    of_shipped = json.loads(explorer("lab", test, shipped, "--json").stdout)
+    assert [one["values"] for one in of_sheet["derived"]] == [one["values"] for one in of_shipped["derived"]]
+
+
+def test_the_errors_of_readings_stand_beside_the_scatter():
+    shown = explorer("lab", "rebound", "rebound").stdout
+    assert "with the readings' own errors" in shown
+    assert "with the readings' own errors" not in explorer("lab", "drop", "drop").stdout
+
+
+def test_a_report_of_a_test_with_errors_has_them(tmp_path):
+    folder = tmp_path / "report"
+    assert explorer("lab", "drum", "drum", "--report", folder).exit_code == 0
+    page = (folder / "report.html").read_text()
+    assert "u of the readings" in page
+    assert "A target, no parameter" in page
+    assert "explorer simulate rotating_drum" in page

@@ -1,6 +1,7 @@
 """Parts of a material: what `explorer lab --out` writes, and how it gets into a material."""
 
 import hashlib
+import math
 import tomllib
 
 import pytest
@@ -41,6 +42,39 @@ def test_two_files_are_both_named_where_both_counted():
     assert measured["poisson_ratio"]["source"] == "compression.csv, shear.csv"
     assert measured["youngs_modulus"]["source"] == "compression.csv"
     assert measured["shear_modulus"]["source"] == "shear.csv"
+
+
+def test_rolling_friction_is_that_of_the_effect(scene, tmp_path):
+    path = tmp_path / "rolling.toml"
+    path.write_text(part_text(part_table(analyse("rolling", shipped("rolling"))), "rolling"))
+    table = read_part(path)
+    mean = table["effect"]["rolling_resistance"]["rolling_friction"]
+    assert mean == pytest.approx(0.0498, abs=1e-4)
+    assert value(with_part(scene, table), "effect.rolling_resistance.rolling_friction") == mean
+    origin = table["measured"]["effect"]["rolling_resistance"]["rolling_friction"]
+    assert origin["u_combined"] == pytest.approx(math.hypot(origin["sd"] / math.sqrt(10), origin["u_readings"]))
+    assert (
+        "u_readings"
+        not in part_table(analyse("drop", shipped("drop")))["measured"]["pair"]["seed"]["seed"]["restitution"]
+    )
+
+
+@pytest.mark.parametrize("entry", [{"rolling_resistance": {"rolling": 0.1}}, {"rolling": {"rolling_friction": 0.1}}])
+def test_an_effect_that_there_is_not_does_not_fit(scene, entry):
+    with pytest.raises(ParameterError, match=r"effect\.rolling"):
+        with_part(scene, {"format": 1, "effect": entry})
+
+
+def test_the_spread_of_a_sieve_is_the_body_s(scene):
+    table = part_table(analyse("sieve", shipped("sieve")))
+    assert value(with_part(scene, table), "body.seed.size_spread") == pytest.approx(0.19, abs=0.001)
+    assert table["body"][0]["size_distribution"] == "log_normal"
+
+
+@pytest.mark.parametrize("test", ["bulk_density", "drum", "draw_down"])
+def test_a_target_is_kept_as_measured_and_no_parameter(test):
+    table = part_table(analyse(test, shipped(test)))
+    assert set(table) == {"format", "measured"}
 
 
 def test_friction_and_restitution_get_into_the_material_in_either_order(scene):

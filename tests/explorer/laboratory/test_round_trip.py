@@ -11,6 +11,8 @@ pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("taichi")]
 CLOSING = {
     "inclined_plane": {"static_friction": 9},
     "drop": {"restitution": 9},
+    "rebound": {"restitution": 3},
+    "rolling": {"rolling_friction": 1},
     "compression": {"effective_youngs_modulus": 3, "effective_shear_modulus": 3},
     "shear": {"effective_youngs_modulus": 3, "effective_shear_modulus": 3},
 }

@@ -55,6 +55,34 @@ def test_the_drop_closes_by_the_tracked_rebound_and_not_by_l_over_2h(tmp_path, s
     assert landing == pytest.approx(0.433, abs=0.02)
 
 
+@pytest.mark.parametrize("e", [0.3, 0.9])
+def test_the_rebound_closes(e, tmp_path, scene):
+    head = "a,b,replicate,drop_height_mm,rebound_height_mm\n"
+    rows = rows_of(tmp_path, scene, "rebound", f"{head}seed,rigid_sieve_plate,1,150,{150 * e * e!r}\n")
+    assert rows["restitution"].put_in == pytest.approx(e)
+    assert rows["restitution"].closes
+
+
+def test_a_rebound_without_heights_falls_from_a_usual_one(tmp_path, scene):
+    rows = rows_of(tmp_path, scene, "rebound", "a,b,replicate,restitution\nseed,plate,1,0.6\n")
+    assert rows["restitution"].closes
+
+
+@pytest.mark.parametrize("angle", [1.0, 8.0])
+def test_rolling_closes(angle, tmp_path, scene):
+    rows = rows_of(tmp_path, scene, "rolling", f"a,b,replicate,angle_deg\nseed,rigid_sieve_plate,1,{angle}\n")
+    assert rows["rolling_friction"].put_in == pytest.approx(math.tan(math.radians(angle)))
+    assert rows["rolling_friction"].closes
+
+
+def test_rolling_of_a_sphere_that_slides_first_does_not_close(tmp_path, scene):
+    """Where μ < μ_r the ball slides at atan μ: what is found is the friction, and the twin says so."""
+    slippery = with_values(scene, {"pair.seed.rigid_sieve_plate.static_friction": 0.05})
+    rows = rows_of(tmp_path, slippery, "rolling", "a,b,replicate,angle_deg\nseed,rigid_sieve_plate,1,8\n")
+    assert rows["rolling_friction"].simulated == pytest.approx(0.05, rel=0.02)
+    assert rows["rolling_friction"].closes is False
+
+
 def test_the_restitution_that_lands_there_lands_there(scene):
     bench = with_values(bench_scene(scene, "drop", ("seed", "plate")), {"rig.drop_height": 0.2})
     found = restitution_that_lands(bench, 0.6)

@@ -7,7 +7,9 @@ from dataclasses import replace
 import pytest
 from viser import UploadedFile
 
-from explorer.laboratory.command_results import CommandResult
+from doe.laboratory import TESTS
+from doe.laboratory.analysis import template_of
+from explorer.laboratory.command_results import CommandResult, template_file
 from explorer.scene.source import material_source
 from explorer.viewer.actions import Actions
 from explorer.viewer.laboratory.answer_view import answer_html
@@ -62,6 +64,24 @@ def test_every_shipped_bench_test_is_a_choice_and_an_answer(bench):
         assert bench.do(bench.bench._evaluate) == ""
         assert f"explorer lab {test} {test}" in text_of(bench.bench.view)
         assert not bench.bench.view._take.disabled
+
+
+def test_the_choice_of_tests_is_the_list_of_tests_and_each_comes_with_its_examples(bench):
+    assert tuple(bench.bench._test.options) == tuple(TESTS)
+    for test in TESTS:
+        bench.bench._test.value = test
+        event(bench.bench._test, test)
+        assert finished(bench.actions, bench.background) == ""
+        assert bench.bench._readings.chosen == test
+    bench.bench._test.value = "rebound"
+    event(bench.bench._test, "rebound")
+    finished(bench.actions, bench.background)
+    assert tuple(bench.bench._readings._choice.options) == ("rebound", "rebound_glass_acrylic")
+
+
+def test_the_sheet_of_a_test_is_what_the_command_prints():
+    name, content = template_file("sieve")
+    assert (name, content.decode()) == ("sieve_sheet.csv", template_of("sieve"))
 
 
 def test_a_pour_starts_with_what_was_measured(bench):
