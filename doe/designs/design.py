@@ -39,6 +39,10 @@ class DesignOptions(Record):
     """P of the fraction 2^(k − P) by the usual generators."""
     alpha: Alpha = "rotatable"
     """Where the axial points stand."""
+    blocks: int | None = None
+    """Orthogonal blocks of rows: days, batches, operators; with them, ``centre`` is of each block."""
+    nonregular: bool = False
+    """Whether no main effect may be wholly confused with an interaction of two, where a regular table is as usual."""
     seed: int = 1
     """Of a design that is drawn."""
 
@@ -64,6 +68,8 @@ class Points:
     """One line per column that is confused with others, factors by their letters."""
     notes: tuple[str, ...] = ()
     """Sentences that a reader must know."""
+    block: npt.NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    """In which block each row is run, from 0, shape (rows,). Empty: there are no blocks."""
 
 
 class Design(ABC):

@@ -30,13 +30,23 @@ def design(
     ),
     out: Path = typer.Option(..., metavar="FILE.csv", help="New sheet, one line per run in the order to run them."),
     runs: int | None = typer.Option(
-        None, min=2, help="plackett-burman: size of the table, 8 … 48; lhs, sobol: points."
+        None,
+        min=2,
+        help="plackett-burman: size of the table, 8 … 48; factorial: best fraction; lhs, sobol: points.",
     ),
     replicates: int | None = typer.Option(None, min=1, max=1000, help="Runs of each row; 1 if not given."),
-    centre: int | None = typer.Option(None, min=0, max=1000, help="Runs with every factor in the middle."),
+    centre: int | None = typer.Option(
+        None, min=0, max=1000, help="Runs with every factor in the middle; with --blocks in each block."
+    ),
+    blocks: int | None = typer.Option(
+        None, min=2, max=512, help="Orthogonal blocks (days, batches): their effects take nothing from the model's."
+    ),
     fold: bool = typer.Option(False, "--fold", help="plackett-burman: add the mirror image of every row."),
+    nonregular: bool = typer.Option(
+        False, "--nonregular", help="plackett-burman, 16 and 32 runs: no main effect is wholly an interaction of two."
+    ),
     generator: list[str] = typer.Option([], metavar="E=ABC", help="factorial: a fraction; may be repeated."),
-    fraction: int = typer.Option(0, min=0, help="factorial: 2^(k−P) by the usual generators.", metavar="P"),
+    fraction: int = typer.Option(0, min=0, help="factorial: 2^(k−P) of minimum aberration.", metavar="P"),
     alpha: Alpha = typer.Option(Alpha.ROTATABLE, help="central-composite: where the axial points stand."),
     seed: int | None = typer.Option(
         None, min=0, help="Of the order of the runs, and of lhs and sobol; 1 if not given."
@@ -63,10 +73,22 @@ def design(
         if value is not None and not 0 < value < float("inf"):
             raise CommandError(f"{option} {value:g}: allowed: a positive number")
     file = read_factors(asset_path("designs", factors))
-    order = DesignOrder(kind, runs, replicates, centre, seed, fold, tuple(generator), fraction, alpha, standard_order)
+    order = DesignOrder(
+        kind,
+        runs,
+        replicates,
+        centre,
+        seed,
+        fold,
+        tuple(generator),
+        fraction,
+        alpha,
+        standard_order,
+        blocks=blocks,
+        nonregular=nonregular,
+    )
     plan = make_plan(order, file)
     said = json_text(plan_result(plan, file, sigma, effect)) if json else plan_text(plan, file, sigma, effect)
     write_whole(out, sheet_text(plan, file))
-    typer.echo(
-        said if json else f"{said}\n\nwrote {out}; fill in {', '.join(file.responses)}, then: explorer analyse {out}"
-    )
+    then = f"explorer analyse {out}{' --block block' if blocks else ''}"
+    typer.echo(said if json else f"{said}\n\nwrote {out}; fill in {', '.join(file.responses)}, then: {then}")

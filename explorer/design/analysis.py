@@ -21,6 +21,7 @@ from explorer.design.choices import ModelOrder
 from explorer.design.factors_file import read_factors, region_of
 from explorer.design.filled_sheet import Runs, read_sheet, runs_of
 from explorer.design.result import DesignResult, Response, RunCount, SheetFactor
+from explorer.design.run_plan import BLOCK
 from explorer.errors import CommandError
 from explorer.files.run_folder import appearing, json_text
 from explorer.files.run_result import made_today, versions
@@ -66,7 +67,7 @@ def run_analyse(order: AnalyseOrder) -> DesignResult:
     path = asset_path("runs", order.sheet)
     factors = read_factors(asset_path("designs", order.factors)).factors if order.factors else ()
     sheet = read_sheet(path, factors)
-    responses = [name for name in sheet.responses if name != order.block and not sheet.is_words(name)]
+    responses = [name for name in sheet.responses if name not in (order.block, BLOCK) and not sheet.is_words(name)]
     runs = runs_of(sheet, order.response or _only_response(sheet.path, responses), order.only, order.block)
     result = analyse_runs(runs, order)
     if order.out is not None:

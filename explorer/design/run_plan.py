@@ -7,6 +7,7 @@ row,replicate,run,seed,shear_modulus [MPa],…,angle_of_repose_deg
 
 One line per run, in the order to run them. ``row`` is the row of the design in standard order, ``seed`` a number of its
 own for an engine that draws at random. An empty cell is a run that is missing. Lines that begin with # are comments.
+With blocks there is a column ``block`` as well, 1, 2, …: all runs of one block come before those of the next.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.designs import DESIGNS, Design, DesignOptions, Points
+from doe.errors import StatisticsError
 from explorer.design.choices import Alpha
 from explorer.design.factors_file import FactorsFile, region_of
 from explorer.errors import CommandError
@@ -33,9 +35,13 @@ OPTIONS = {
     "fraction": "--fraction",
     "alpha": "--alpha",
     "centre": "--centre",
+    "blocks": "--blocks",
+    "nonregular": "--nonregular",
 }
 """Option of a design → how it is spelt on the command line."""
 COLUMNS = ("row", "replicate", "run", "seed")
+BLOCK = "block"
+"""Column of a sheet whose runs are made in blocks."""
 SEPARATOR = " | "
 
 
@@ -53,6 +59,8 @@ class DesignOrder:
     fraction: int = 0
     alpha: Alpha = Alpha.ROTATABLE
     standard_order: bool = False
+    blocks: int | None = None
+    nonregular: bool = False
 
 
 @dataclass(frozen=True)
@@ -60,7 +68,7 @@ class RunPlan:
     """A design and its runs.
 
     ``sequence`` (runs, 2): row of the points and replicate, from 0, in the order in which they are run. ``seeds``
-    (runs,): a different one for every run.
+    (runs,): a different one for every run. ``block`` (runs,): of each run, from 0; empty where there are none.
     """
 
     design: Design
@@ -68,6 +76,7 @@ class RunPlan:
     sequence: npt.NDArray[np.int64]
     seeds: npt.NDArray[np.int64]
     seed: int
+    block: npt.NDArray[np.int64]
 
     @property
     def coded(self) -> Array:
@@ -85,21 +94,52 @@ def make_plan(order: DesignOrder, file: FactorsFile) -> RunPlan:
     if order.design not in DESIGNS:
         raise CommandError(f"design {order.design[:40]!r}: allowed are {', '.join(DESIGNS)}")
     design, seed = DESIGNS[order.design], _first(order.seed, file.seed, 1)
+    replicates = _first(order.replicates, file.replicates, 1)
+    # Blocks of whole replicates hold every row equally often, in any design.
+    of_replicates = order.blocks if order.blocks is not None and replicates % order.blocks == 0 else None
     options = DesignOptions(
-        order.runs, order.centre, order.fold, order.generators, order.fraction, order.alpha.value, seed
+        runs=order.runs,
+        centre=order.centre,
+        fold=order.fold,
+        generators=order.generators,
+        fraction=order.fraction,
+        alpha=order.alpha.value,
+        seed=seed,
+        blocks=None if of_replicates else order.blocks,
+        nonregular=order.nonregular,
     )
     _refuse_foreign_options(design, options)
+    if order.blocks and BLOCK in (*(factor.name for factor in file.factors), *file.responses):
+        raise CommandError(f"--blocks: the sheet's column {BLOCK!r} is a name of the factors file; allowed: another")
     if "centre" in design.options:
         options = replace(options, centre=file.centre if order.centre is None else order.centre)
-    points = design.points(len(file.factors), options)
-    replicates = _first(order.replicates, file.replicates, 1)
+    points = _points(design, len(file.factors), options)
     rows = len(points.coded)
     if rows * replicates > MOST_RUNS:
         raise CommandError(f"{rows} rows × {replicates} replicates: allowed are {MOST_RUNS} runs")
     every = np.array([(row, replicate) for replicate in range(replicates) for row in range(rows)])
+    if of_replicates:
+        block = every[:, 1] * of_replicates // replicates
+    else:
+        block = points.block[every[:, 0]] if len(points.block) else points.block
     seeds = _first(file.first_seed, 1) + np.arange(len(every))
     turn = np.arange(len(every)) if order.standard_order else np.random.default_rng(seed).permutation(len(every))
-    return RunPlan(design, points, every[turn], seeds[turn], seed)
+    if len(block):
+        turn = turn[np.argsort(block[turn], kind="stable")]
+        block = block[turn]
+    return RunPlan(design, points, every[turn], seeds[turn], seed, block)
+
+
+def _points(design: Design, factors: int, options: DesignOptions) -> Points:
+    """The rows; blocks that a design has not are refused with what there is for every design."""
+    try:
+        return design.points(factors, options)
+    except StatisticsError as error:
+        if options.blocks is None or not str(error).startswith("blocks"):
+            raise
+        raise CommandError(
+            f"--{error}; or whole replicates in each: --replicates {options.blocks} --blocks {options.blocks}"
+        ) from None
 
 
 def _refuse_foreign_options(design: Design, options: DesignOptions) -> None:
@@ -107,7 +147,8 @@ def _refuse_foreign_options(design: Design, options: DesignOptions) -> None:
     for name in options.given():
         if name not in design.options:
             takers = ", ".join(other.name for other in DESIGNS.values() if name in other.options)
-            raise CommandError(f"{OPTIONS[name]}: is not for {design.name}; it belongs to {takers}")
+            other = f", or {options.blocks} replicates of any design" if name == "blocks" else ""
+            raise CommandError(f"{OPTIONS[name]}: is not for {design.name}; it belongs to {takers}{other}")
     if options.runs is not None and options.runs > MOST_RUNS:
         raise CommandError(f"--runs {options.runs}: allowed are {MOST_RUNS}")
 
@@ -131,11 +172,13 @@ def sheet_text(plan: RunPlan, file: FactorsFile) -> str:
             SEPARATOR.join(["# factor", factor.name, *numbers, factor.unit or "1", written(factor.reference)]) + "\n"
         )
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow([*COLUMNS, *(factor.title for factor in file.factors), *file.responses])
+    own = [*COLUMNS, BLOCK] if len(plan.block) else COLUMNS
+    writer.writerow([*own, *(factor.title for factor in file.factors), *file.responses])
     natural = region_of(file.factors).natural(plan.coded)
     for position, ((row, replicate), seed) in enumerate(zip(plan.sequence, plan.seeds, strict=True)):
         levels = [written(value) for value in natural[row]]
-        writer.writerow([row + 1, replicate + 1, position + 1, seed, *levels, *[""] * len(file.responses)])
+        block = [plan.block[position] + 1] if len(plan.block) else []
+        writer.writerow([row + 1, replicate + 1, position + 1, seed, *block, *levels, *[""] * len(file.responses)])
     return stream.getvalue()
 
 

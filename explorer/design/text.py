@@ -12,6 +12,7 @@ import numpy as np
 
 from doe.analysis.models import Order, bearable, highest_order, terms_of
 from doe.analysis.power import TermPrecision, precision
+from doe.analysis.surface import Blocks
 from doe.designs import factor_letters
 from doe.record import plain
 from explorer.design.factors_file import FactorsFile, region_of
@@ -40,6 +41,7 @@ def plan_result(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: f
             for letter, factor in zip(factor_letters(len(file.factors)), file.factors, strict=True)
         ],
         "coded": plan.coded.tolist(),
+        **({"block": (plan.block + 1).tolist()} if len(plan.block) else {}),
         "aliases": list(plan.points.aliases),
         "model": planned_order(plan),
         "power": plain(list(_power(plan, sigma, effect))),
@@ -60,6 +62,7 @@ def plan_text(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: flo
             ],
         ),
         *_beyond(plan, file),
+        *_blocks(plan),
     ]
     if plan.points.aliases:
         lines = "\n".join(plan.points.aliases)
@@ -77,6 +80,15 @@ def _beyond(plan: RunPlan, file: FactorsFile) -> list[str]:
         for factor, low, high in zip(file.factors, natural.min(axis=0), natural.max(axis=0), strict=True)
     ]
     return [f"The axial runs go beyond low … high: {enumeration(ends)}. --alpha inscribed keeps them within."]
+
+
+def _blocks(plan: RunPlan) -> list[str]:
+    """A sentence about the blocks: their sizes, in the order in which they are run."""
+    if not len(plan.block):
+        return []
+    sizes = ", ".join(map(str, np.bincount(plan.block)))
+    of = "whole replicates" if not len(plan.points.block) else "rows"
+    return [f"Blocks of {of}, of {sizes} runs, one block after the other, shuffled within each."]
 
 
 def _power_text(plan: RunPlan, sigma: float | None, effect: float | None) -> str:
@@ -107,12 +119,17 @@ def _power_text(plan: RunPlan, sigma: float | None, effect: float | None) -> str
 
 
 def planned_order(plan: RunPlan) -> Order | None:
-    """The model that the runs will bear; None where they leave no error even for the linear one."""
+    """The model that the runs bear beside their blocks; None where they leave no error even for the linear one."""
     letters = factor_letters(plan.coded.shape[1])
-    values = np.zeros((len(plan.coded), plan.replicates))
-    if plan.design.main_effects_only or not bearable(plan.coded, values, letters, terms_of(letters, "linear")):
-        return "linear" if bearable(plan.coded, values, letters, terms_of(letters, "linear")) else None
-    return highest_order(plan.coded, values, letters)
+    runs, values = plan.coded[plan.sequence[:, 0]], np.zeros((len(plan.sequence), 1))
+    blocks = None
+    if len(plan.block):
+        names = tuple(str(number + 1) for number in range(plan.block.max() + 1))
+        blocks = Blocks(names, plan.block[:, None])
+    linear = bearable(runs, values, letters, terms_of(letters, "linear"), blocks)
+    if plan.design.main_effects_only or not linear:
+        return "linear" if linear else None
+    return highest_order(runs, values, letters, blocks=blocks)
 
 
 def _power(plan: RunPlan, sigma: float | None, effect: float | None) -> tuple[TermPrecision, ...]:
@@ -122,7 +139,7 @@ def _power(plan: RunPlan, sigma: float | None, effect: float | None) -> tuple[Te
     letters = factor_letters(plan.coded.shape[1])
     runs = plan.coded[plan.sequence[:, 0]]
     # Without a sigma everything is counted in it.
-    return precision(runs, letters, terms_of(letters, order), sigma or 1.0, effect or math.nan)
+    return precision(runs, letters, terms_of(letters, order), sigma or 1.0, effect or math.nan, block=plan.block)
 
 
 def analysis_text(result: DesignResult) -> str:

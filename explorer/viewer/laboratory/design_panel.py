@@ -33,7 +33,23 @@ class DesignPanel(Panel):
             )
             self._replicates = gui.add_number("Runs of each row", 1, min=1, max=1000, step=1)
             self._size = gui.add_number(
-                "Size", 0, min=0, max=20_000, step=1, hint="plackett-burman: 8 … 48; lhs, sobol: points; 0: as usual."
+                "Size",
+                0,
+                min=0,
+                max=20_000,
+                step=1,
+                hint="plackett-burman: 8 … 48; factorial: fraction; else points; 0: usual.",
+            )
+            self._blocks = gui.add_number(
+                "Blocks",
+                0,
+                min=0,
+                max=512,
+                step=1,
+                hint="Days or batches; their effects take nothing from the model's.",
+            )
+            self._nonregular = gui.add_checkbox(
+                "Nonregular", False, hint="plackett-burman, 16 and 32 runs: no main effect is wholly an interaction."
             )
             self._fold = gui.add_checkbox(
                 "Fold over", False, hint="plackett-burman: the mirror image of every row too, which frees main effects."
@@ -69,7 +85,14 @@ class DesignPanel(Panel):
     def _follow(self) -> None:
         """Ask for what the chosen kind of design takes."""
         kind = DESIGNS.get(str(self._kind.value))
-        for name, handle in {"runs": self._size, "fold": self._fold, "generators": self._generators}.items():
+        fields = {
+            "runs": self._size,
+            "blocks": self._blocks,
+            "nonregular": self._nonregular,
+            "fold": self._fold,
+            "generators": self._generators,
+        }
+        for name, handle in fields.items():
             handle.visible = kind is not None and name in kind.options
 
     def _make(self) -> None:
@@ -79,6 +102,8 @@ class DesignPanel(Panel):
             replicates=int(self._replicates.value),
             fold=self._fold.visible and bool(self._fold.value),
             generators=tuple(str(self._generators.value).split()) if self._generators.visible else (),
+            blocks=(int(self._blocks.value) or None) if self._blocks.visible else None,
+            nonregular=self._nonregular.visible and bool(self._nonregular.value),
         )
         factors = self._factors.chosen
         known = positive(self._sigma.value)

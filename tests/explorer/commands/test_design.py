@@ -179,6 +179,22 @@ def test_fraction_prints_its_defining_relation_and_alias_chains(tmp_path):
     assert "AE = BC = DF" in said
 
 
+def test_days_that_differ_take_nothing_from_the_model(tmp_path, process):
+    """A surface with a shift of 7 from day to day: the coefficients are the planted ones, and the days add up to 0."""
+    path, said = made(tmp_path, "central-composite", "--factors", process, "--blocks", 2, "--seed", 4)
+    assert "Blocks of rows, of 7, 7 runs" in said
+    assert f"explorer analyse {path} --block block" in said
+    lines = [line.split(",") for line in path.read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
+    day, x1, x2 = np.array([[float(one[4]), (float(one[5]) - 85) / 5, (float(one[6]) - 175) / 5] for one in lines]).T
+    noise = 1e-3 * np.random.default_rng(3).standard_normal(len(lines))
+    filled = fill(path, 80 + x1 - 2 * x2 + 3 * x1 * x2 - 1.4 * x1**2 + 7 * day + noise)
+    surface = analysed(filled, "--block", "block")["analysis"]["model"]["surface"]
+    assert surface["coefficients"] == pytest.approx([90.5, 1, -2, 3, -1.4, 0], abs=0.01)
+    assert surface["block_effects"] == pytest.approx([-3.5, 3.5], abs=0.01)
+    # Without a name the column is no response, and is pointed at.
+    assert "Not used: block." in explorer("analyse", filled).stdout
+
+
 def test_power_is_in_the_plain_data(tmp_path, process):
     result = explorer("design", "factorial", "--factors", process, "--replicates", 4, "--sigma", 2, "--effect", 3,
                       "--out", tmp_path / "runs.csv", "--json")  # fmt: skip

@@ -122,6 +122,8 @@ def test_a_sheet_is_that_of_the_command(tmp_path, monkeypatch):
     [
         (DesignOrder("plackett-burman", runs=12, fold=True), "--runs 12 --fold"),
         (DesignOrder("factorial", generators=("C=AB",)), "--generator C=AB"),
+        (DesignOrder("plackett-burman", runs=16, nonregular=True), "--runs 16 --nonregular"),
+        (DesignOrder("central-composite", blocks=3), "--blocks 3"),
     ],
 )
 def test_options_of_a_design_are_part_of_its_command_line(order, said, tmp_path, monkeypatch):
