@@ -164,8 +164,8 @@ STANDARD_FRACTIONS: dict[tuple[int, int], tuple[str, ...]] = {
     (8, 3): ("F=ABC", "G=ABD", "H=BCDE"),
     (8, 4): ("E=BCD", "F=ACD", "G=ABC", "H=ABD"),
 }
-"""(factors, generators) → generators: up to 8 factors of Box, Hunter and Hunter 2005, Statistics for Experimenters, table
-6.22; the others from ``FURTHER_FRACTIONS``."""
+"""(factors, generators) → generators: up to 8 factors of table 6.22 of Box, Hunter and Hunter 2005, Statistics for
+Experimenters; the others of ``FURTHER_FRACTIONS``."""
 
 FURTHER_FRACTIONS = (
     (4, range(9, 16), "ABC ABD ACD BCD ABCD AB AC AD BC BD CD"),

@@ -8,7 +8,7 @@ from pathlib import Path
 import typer
 
 from explorer.commands.listing import Listing
-from explorer.design.choices import Alpha
+from explorer.design.choices import Alpha, ModelOrder
 
 
 class Designs(Listing):
@@ -32,7 +32,7 @@ def design(
     runs: int | None = typer.Option(
         None,
         min=2,
-        help="plackett-burman: size of the table, 8 … 48; factorial: best fraction; lhs, sobol: points.",
+        help="plackett-burman: size of the table, 8 … 48; factorial: best fraction; others: points.",
     ),
     replicates: int | None = typer.Option(None, min=1, max=1000, help="Runs of each row; 1 if not given."),
     centre: int | None = typer.Option(
@@ -48,8 +48,15 @@ def design(
     generator: list[str] = typer.Option([], metavar="E=ABC", help="factorial: a fraction; may be repeated."),
     fraction: int = typer.Option(0, min=0, help="factorial: 2^(k−P) of minimum aberration.", metavar="P"),
     alpha: Alpha = typer.Option(Alpha.ROTATABLE, help="central-composite: where the axial points stand."),
+    model: ModelOrder | None = typer.Option(None, help="d-optimal, i-optimal: of whose terms; quadratic if not given."),
+    constraint: list[str] = typer.Option(
+        [], metavar="'A + B <= 1'", help="d-optimal, i-optimal: in the factors' units; may be repeated."
+    ),
+    augment: Path | None = typer.Option(
+        None, metavar="RUNS.csv", help="d-optimal, i-optimal: keep this sheet's finished runs, and add --runs to them."
+    ),
     seed: int | None = typer.Option(
-        None, min=0, help="Of the order of the runs, and of lhs and sobol; 1 if not given."
+        None, min=0, help="Of the order of the runs, and of designs that are drawn; 1 if not given."
     ),
     standard_order: bool = typer.Option(False, "--standard-order", help="Do not shuffle the runs."),
     sigma: float | None = typer.Option(None, help="Standard deviation of one run: what will the design see?"),
@@ -86,6 +93,9 @@ def design(
         standard_order,
         blocks=blocks,
         nonregular=nonregular,
+        model=model,
+        constraints=tuple(constraint),
+        augment=augment,
     )
     plan = make_plan(order, file)
     said = json_text(plan_result(plan, file, sigma, effect)) if json else plan_text(plan, file, sigma, effect)

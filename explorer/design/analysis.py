@@ -79,6 +79,12 @@ def run_analyse(order: AnalyseOrder) -> DesignResult:
 def analyse_runs(runs: Runs, order: AnalyseOrder) -> DesignResult:
     """The analysis of one response."""
     region = region_of(runs.factors)
+    named = [factor for factor in runs.factors if factor.levels]
+    if named and order.target is not None:
+        raise CommandError(
+            f"--target: {named[0].name} is no number, and has no settings between its levels; "
+            "allowed: the runs of one level in a sheet of their own"
+        )
     _refuse_dependent(runs, region, order.sheet)
     reference = np.array([factor.reference for factor in runs.factors])
     target = None if order.target is None else ResponseTarget(order.target, order.target_error, reference)
@@ -137,6 +143,9 @@ def _run_notes(runs: Runs, region: Region, found: DesignAnalysis) -> list[str]:
     """What single runs ask for: levels far outside a factor's range, and runs without which there is no model."""
     row, replicate = np.nonzero(~np.isnan(runs.responses))
     labels, notes = _labels(runs), []
+    for factor in runs.factors:
+        if factor.levels:
+            notes.append(f"{factor.name}: −1 is {factor.levels[0]}, +1 is {factor.levels[1]}.")
     for label, k in zip(labels, row, strict=True):
         for factor, coded, level in zip(runs.factors, runs.coded[k], region.natural(runs.coded[k]), strict=True):
             if abs(coded) > FAR:

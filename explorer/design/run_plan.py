@@ -5,6 +5,8 @@
 row,replicate,run,seed,shear_modulus [MPa],…,angle_of_repose_deg
 3,1,1,3,46.18,…,
 
+A factor of names is declared by ``# levels | solvent | water | ethanol``.
+
 One line per run, in the order to run them. ``row`` is the row of the design in standard order, ``seed`` a number of its
 own for an engine that draws at random. An empty cell is a run that is missing. Lines that begin with # are comments.
 With blocks there is a column ``block`` as well, 1, 2, …: all runs of one block come before those of the next.
@@ -14,15 +16,18 @@ from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from doe.designs import DESIGNS, Design, DesignOptions, Points
 from doe.errors import StatisticsError
-from explorer.design.choices import Alpha
-from explorer.design.factors_file import FactorsFile, region_of
+from explorer.design.choices import Alpha, ModelOrder
+from explorer.design.factors_file import DesignFactor, FactorsFile, coded_constraint, region_of
+from explorer.design.filled_sheet import finished_runs, read_sheet
 from explorer.errors import CommandError
 
 Array = npt.NDArray[np.float64]
@@ -37,6 +42,10 @@ OPTIONS = {
     "centre": "--centre",
     "blocks": "--blocks",
     "nonregular": "--nonregular",
+    "model": "--model",
+    "constraints": "--constraint",
+    "levels": "levels of a factor that is no number",
+    "kept": "--augment",
 }
 """Option of a design → how it is spelt on the command line."""
 COLUMNS = ("row", "replicate", "run", "seed")
@@ -61,6 +70,11 @@ class DesignOrder:
     standard_order: bool = False
     blocks: int | None = None
     nonregular: bool = False
+    model: ModelOrder | None = None
+    constraints: tuple[str, ...] = ()
+    """In the factors' units, as "A + B <= 1"."""
+    augment: Path | None = None
+    """Sheet whose finished runs are kept."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +83,7 @@ class RunPlan:
 
     ``sequence`` (runs, 2): row of the points and replicate, from 0, in the order in which they are run. ``seeds``
     (runs,): a different one for every run. ``block`` (runs,): of each run, from 0; empty where there are none.
+    ``finished``: cells of the responses of the runs that are kept, which stand first.
     """
 
     design: Design
@@ -77,6 +92,7 @@ class RunPlan:
     seeds: npt.NDArray[np.int64]
     seed: int
     block: npt.NDArray[np.int64]
+    finished: tuple[tuple[str, ...], ...] = ()
 
     @property
     def coded(self) -> Array:
@@ -95,8 +111,15 @@ def make_plan(order: DesignOrder, file: FactorsFile) -> RunPlan:
         raise CommandError(f"design {order.design[:40]!r}: allowed are {', '.join(DESIGNS)}")
     design, seed = DESIGNS[order.design], _first(order.seed, file.seed, 1)
     replicates = _first(order.replicates, file.replicates, 1)
+    kept = np.zeros((0, len(file.factors)))
+    finished: tuple[tuple[str, ...], ...] = ()
+    if order.augment is not None:
+        if "kept" in design.options and (replicates > 1 or order.blocks):
+            raise CommandError("--augment: the finished runs stay as they are; allowed: no --replicates, no --blocks")
+        kept, finished = finished_runs(read_sheet(order.augment, file.factors), file.responses)
     # Blocks of whole replicates hold every row equally often, in any design.
     of_replicates = order.blocks if order.blocks is not None and replicates % order.blocks == 0 else None
+    names = tuple(len(factor.levels) for factor in file.factors)
     options = DesignOptions(
         runs=order.runs,
         centre=order.centre,
@@ -107,13 +130,19 @@ def make_plan(order: DesignOrder, file: FactorsFile) -> RunPlan:
         seed=seed,
         blocks=None if of_replicates else order.blocks,
         nonregular=order.nonregular,
+        model=(order.model or ModelOrder.QUADRATIC).value,
+        constraints=tuple(coded_constraint(text, file.factors) for text in order.constraints),
+        levels=names if any(names) and "levels" in design.options else (),
+        kept=tuple(map(tuple, kept.tolist())),
     )
-    _refuse_foreign_options(design, options)
+    asked = (*options.given(), *(["model"] if order.model is not None else []))
+    _refuse_foreign_options(design, options, asked)
     if order.blocks and BLOCK in (*(factor.name for factor in file.factors), *file.responses):
         raise CommandError(f"--blocks: the sheet's column {BLOCK!r} is a name of the factors file; allowed: another")
     if "centre" in design.options:
         options = replace(options, centre=file.centre if order.centre is None else order.centre)
     points = _points(design, len(file.factors), options)
+    _refuse_levels_between_names(design, file, points.coded)
     rows = len(points.coded)
     if rows * replicates > MOST_RUNS:
         raise CommandError(f"{rows} rows × {replicates} replicates: allowed are {MOST_RUNS} runs")
@@ -127,7 +156,20 @@ def make_plan(order: DesignOrder, file: FactorsFile) -> RunPlan:
     if len(block):
         turn = turn[np.argsort(block[turn], kind="stable")]
         block = block[turn]
-    return RunPlan(design, points, every[turn], seeds[turn], seed, block)
+    if finished:
+        turn = np.concatenate([np.arange(len(finished)), turn[turn >= len(finished)]])
+    return RunPlan(design, points, every[turn], seeds[turn], seed, block, finished)
+
+
+def _refuse_levels_between_names(design: Design, file: FactorsFile, coded: Array) -> None:
+    """A factor of names is run at them, and at nothing between or beyond."""
+    for factor, column in zip(file.factors, coded.T, strict=True):
+        if factor.levels and not np.isclose(column[:, None], factor.codes, atol=1e-9).any(axis=1).all():
+            takers = ", ".join(other.name for other in DESIGNS.values() if "levels" in other.options)
+            raise CommandError(
+                f"{design.name}: runs {factor.name} between or beyond its levels {', '.join(factor.levels)}; "
+                f"allowed: {takers}, or two levels in a two-level design"
+            )
 
 
 def _points(design: Design, factors: int, options: DesignOptions) -> Points:
@@ -142,9 +184,9 @@ def _points(design: Design, factors: int, options: DesignOptions) -> Points:
         ) from None
 
 
-def _refuse_foreign_options(design: Design, options: DesignOptions) -> None:
+def _refuse_foreign_options(design: Design, options: DesignOptions, asked: Iterable[str]) -> None:
     """An option of another design is a misunderstanding, not to be passed over."""
-    for name in options.given():
+    for name in asked:
         if name not in design.options:
             takers = ", ".join(other.name for other in DESIGNS.values() if name in other.options)
             other = f", or {options.blocks} replicates of any design" if name == "blocks" else ""
@@ -167,6 +209,9 @@ def sheet_text(plan: RunPlan, file: FactorsFile) -> str:
         + "\n"
     )
     for factor in file.factors:
+        if factor.levels:
+            stream.write(SEPARATOR.join(["# levels", factor.name, *factor.levels]) + "\n")
+            continue
         numbers = [written(factor.low), written(factor.high)]
         stream.write(
             SEPARATOR.join(["# factor", factor.name, *numbers, factor.unit or "1", written(factor.reference)]) + "\n"
@@ -176,10 +221,16 @@ def sheet_text(plan: RunPlan, file: FactorsFile) -> str:
     writer.writerow([*own, *(factor.title for factor in file.factors), *file.responses])
     natural = region_of(file.factors).natural(plan.coded)
     for position, ((row, replicate), seed) in enumerate(zip(plan.sequence, plan.seeds, strict=True)):
-        levels = [written(value) for value in natural[row]]
+        levels = [level_text(factor, value) for factor, value in zip(file.factors, natural[row], strict=True)]
+        answers = plan.finished[position] if position < len(plan.finished) else [""] * len(file.responses)
         block = [plan.block[position] + 1] if len(plan.block) else []
-        writer.writerow([row + 1, replicate + 1, position + 1, seed, *block, *levels, *[""] * len(file.responses)])
+        writer.writerow([row + 1, replicate + 1, position + 1, seed, *block, *levels, *answers])
     return stream.getvalue()
+
+
+def level_text(factor: DesignFactor, value: float) -> str:
+    """A level in the factor's unit, or its name."""
+    return factor.levels[int(np.argmin(np.abs(np.array(factor.codes) - value)))] if factor.levels else written(value)
 
 
 def written(value: float) -> str:

@@ -15,7 +15,7 @@ from doe.analysis.power import TermPrecision, precision
 from doe.analysis.surface import Blocks
 from doe.designs import factor_letters
 from doe.record import plain
-from explorer.design.factors_file import FactorsFile, region_of
+from explorer.design.factors_file import DesignFactor, FactorsFile, region_of
 from explorer.design.result import DesignResult
 from explorer.design.run_plan import RunPlan
 from explorer.report.content import Facts, Table
@@ -43,8 +43,19 @@ def plan_result(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: f
         "coded": plan.coded.tolist(),
         **({"block": (plan.block + 1).tolist()} if len(plan.block) else {}),
         "aliases": list(plan.points.aliases),
-        "model": planned_order(plan),
-        "power": plain(list(_power(plan, sigma, effect))),
+        **({} if plan.points.efficiency is None else _optimal_result(plan)),
+        "model": None if _many_names(file) else planned_order(plan),
+        "power": [] if _many_names(file) else plain(list(_power(plan, sigma, effect))),
+    }
+
+
+def _optimal_result(plan: RunPlan) -> dict[str, Any]:
+    """What an optimal design says of itself, as JSON types."""
+    assert plan.points.efficiency is not None
+    return {
+        "efficiency": plan.points.efficiency.to_dict(),
+        "kept": len(plan.finished),
+        "gained": list(plan.points.gained),
     }
 
 
@@ -57,7 +68,7 @@ def plan_text(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: flo
         text_table(
             ["", "factor", "low", "high", "unit"],
             [
-                [letter, f.name, number(f.low, 6), number(f.high, 6), f.unit or "1"]
+                [letter, f.name, *([f.levels[0], f.levels[-1], "name"] if f.levels else _range(f))]
                 for letter, f in zip(letters, file.factors, strict=True)
             ],
         ),
@@ -67,12 +78,21 @@ def plan_text(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: flo
     if plan.points.aliases:
         lines = "\n".join(plan.points.aliases)
         parts.append(f"aliases (what is on the left also holds what is on the right):\n{lines}")
-    return "\n\n".join([*parts, *plan.points.notes, _power_text(plan, sigma, effect)])
+    return "\n\n".join([*parts, *plan.points.notes, _power_text(plan, file, sigma, effect)])
+
+
+def _many_names(file: FactorsFile) -> bool:
+    """Whether a factor has more names than the polynomials of `doe.analysis` tell apart."""
+    return any(len(factor.levels) > 2 for factor in file.factors)
+
+
+def _range(factor: DesignFactor) -> list[str]:
+    return [number(factor.low, 6), number(factor.high, 6), factor.unit or "1"]
 
 
 def _beyond(plan: RunPlan, file: FactorsFile) -> list[str]:
     """A sentence about runs beyond low … high, which a laboratory may not be able to make."""
-    if np.abs(plan.coded).max() <= 1 + 1e-9:
+    if plan.finished or np.abs(plan.coded).max() <= 1 + 1e-9:
         return []
     natural = region_of(file.factors).natural(plan.coded)
     ends = [
@@ -91,7 +111,9 @@ def _blocks(plan: RunPlan) -> list[str]:
     return [f"Blocks of {of}, of {sizes} runs, one block after the other, shuffled within each."]
 
 
-def _power_text(plan: RunPlan, sigma: float | None, effect: float | None) -> str:
+def _power_text(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: float | None) -> str:
+    if _many_names(file):
+        return "What it will see is not told for a factor of three names and more."
     found = _power(plan, sigma, effect)
     if not found:
         return (

@@ -206,6 +206,8 @@ def sheet_result(order: DesignOrder, factors: str, sigma: float | None) -> Comma
     words += ["--fold"] if order.fold else []
     words += ["--nonregular"] if order.nonregular else []
     words += [word for generator in order.generators for word in ("--generator", generator)]
+    words += [] if order.model is None else ["--model", order.model.value]
+    words += [word for constraint in order.constraints for word in ("--constraint", constraint)]
     return CommandResult(
         plan_text(plan, file, sigma, None), shlex.join(words), {}, {"runs.csv": sheet_text(plan, file).encode()}
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from doe.designs import DESIGNS
 from doe.table_file import SUFFIXES
 from explorer.design.analysis import AnalyseOrder
+from explorer.design.choices import ModelOrder
 from explorer.design.run_plan import DesignOrder
 from explorer.laboratory.command_results import analysis_result, sheet_result
 from explorer.viewer.laboratory.answer_view import AnswerView
@@ -38,7 +39,7 @@ class DesignPanel(Panel):
                 min=0,
                 max=20_000,
                 step=1,
-                hint="plackett-burman: 8 … 48; factorial: fraction; else points; 0: usual.",
+                hint="Rows of a table or fraction, or points; 0: as usual.",
             )
             self._blocks = gui.add_number(
                 "Blocks",
@@ -46,7 +47,7 @@ class DesignPanel(Panel):
                 min=0,
                 max=512,
                 step=1,
-                hint="Days or batches; their effects take nothing from the model's.",
+                hint="Days or batches, clear of the model's effects; 0: none.",
             )
             self._nonregular = gui.add_checkbox(
                 "Nonregular", False, hint="plackett-burman, 16 and 32 runs: no main effect is wholly an interaction."
@@ -56,6 +57,12 @@ class DesignPanel(Panel):
             )
             self._generators = gui.add_text(
                 "Generators", "", hint="factorial: a fraction, as E=ABC; several with spaces between."
+            )
+            self._model = gui.add_dropdown(
+                "Model", tuple(one.value for one in ModelOrder), initial_value="quadratic", hint="Whose terms are told."
+            )
+            self._constraints = gui.add_text(
+                "Constraints", "", hint="In the factors' units, as A + B <= 1; several with ; between."
             )
             self._sigma = gui.add_number(
                 "Standard deviation of a run", 0.0, min=0.0, hint="In the response's unit; 0: unknown. For the power."
@@ -91,6 +98,8 @@ class DesignPanel(Panel):
             "nonregular": self._nonregular,
             "fold": self._fold,
             "generators": self._generators,
+            "model": self._model,
+            "constraints": self._constraints,
         }
         for name, handle in fields.items():
             handle.visible = kind is not None and name in kind.options
@@ -104,6 +113,10 @@ class DesignPanel(Panel):
             generators=tuple(str(self._generators.value).split()) if self._generators.visible else (),
             blocks=(int(self._blocks.value) or None) if self._blocks.visible else None,
             nonregular=self._nonregular.visible and bool(self._nonregular.value),
+            model=ModelOrder(self._model.value) if self._model.visible else None,
+            constraints=tuple(one.strip() for one in str(self._constraints.value).split(";") if one.strip())
+            if self._constraints.visible
+            else (),
         )
         factors = self._factors.chosen
         known = positive(self._sigma.value)

@@ -95,7 +95,7 @@ def test_what_cannot_be_kept_is_refused(bench, name, content):
 def test_a_design_asks_for_what_it_takes(bench):
     panel = bench.design
     fields = {"runs": panel._size, "blocks": panel._blocks, "nonregular": panel._nonregular, "fold": panel._fold}
-    fields["generators"] = panel._generators
+    fields |= {"generators": panel._generators, "model": panel._model, "constraints": panel._constraints}
     for name, design in DESIGNS.items():
         panel._kind.value = name
         event(panel._kind, name)
