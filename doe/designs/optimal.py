@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations
+from itertools import combinations, product
 from typing import ClassVar
 
 import numpy as np
@@ -32,8 +32,8 @@ IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 SPARE_RUNS = 3
 """More than terms, where no number is asked for."""
-FEWEST_STARTS, MOST_STARTS = 5, 30
-LEVELS_TO_SET = 800
+FEWEST_STARTS, MOST_STARTS = 6, 40
+LEVELS_TO_SET = 1500
 """In all starts together, about: large designs are started less often."""
 MOST_PASSES = 100
 GRID = {"linear": (-1.0, 1.0), "interactions": (-1.0, 1.0), "quadratic": (-1.0, -0.5, 0.0, 0.5, 1.0)}
@@ -42,6 +42,7 @@ RIDGE = 1e-6
 """Of N, added to X'X: while runs are too few it says in which direction another one tells most."""
 REGION_POINTS = 4096
 """Drawn in the cube, of which those within the constraints stand for the region."""
+MOST_CANDIDATES = 3000
 FEWEST_IN_REGION = 20
 SLACK = 1e-9
 """Of a constraint, in coded units."""
@@ -69,6 +70,26 @@ class Region:
                 low, high = (low, min(high, end)) if weights[factor] > 0 else (max(low, end), high)
         inside = [one for one in grid if low < one < high]
         return np.array([low, *inside, high]) if low < high else np.array([point[factor]])
+
+    def candidates(self, grid: Sequence[float]) -> FloatArray:
+        """Points from which a search starts, shape (n, factors): every combination of low, middle, high and names, and
+        where the constraints end the range of a factor with the others there.
+        """
+        corners = [one for one in grid if one in (-1.0, 0.0, 1.0)]
+        levels = [codes(names) if names else np.array(corners) for names in self.levels]
+        if np.prod([len(one) for one in levels], dtype=np.float64) <= MOST_CANDIDATES:
+            points = np.array(list(product(*levels)))
+        else:
+            random = np.random.default_rng(0)
+            points = np.stack([random.choice(one, MOST_CANDIDATES) for one in levels], axis=1)
+        cut = np.flatnonzero(self.constraints[:, :-1].any(axis=0)).tolist()
+        ends = []
+        for point in points:
+            for factor in cut:
+                for level in self.choices(point, factor, ())[[0, -1]]:
+                    ends.append([*point[:factor], level, *point[factor + 1 :]])
+        every = np.vstack([points, *ends]) if ends else points
+        return np.unique(every[self.allowed(every)].round(12), axis=0)
 
     @cached_property
     def sample(self) -> FloatArray:
@@ -169,10 +190,15 @@ def optimal_design(
     random = np.random.default_rng(seed)
     moments = terms.moments(region)
     fixed = terms.matrix(kept).T @ terms.matrix(kept) + RIDGE * (runs + len(kept)) * np.eye(len(terms.names))
+    candidates = region.candidates(grid)
+    # Along an edge that is no axis a single level cannot move; a whole run can.
+    others = candidates if len(region.constraints) else np.zeros((0, len(region.levels)))
     best: tuple[float, FloatArray] | None = None
-    for _ in range(_starts(runs, len(region.levels))):
-        points = region.sample[random.integers(len(region.sample), size=runs)]
-        _exchange(points, terms, region, grid, fixed, moments if mean_variance else None)
+    for start in range(_starts(runs, len(region.levels))):
+        points = candidates[random.integers(len(candidates), size=runs)]
+        # Every other search for the best prediction begins where the coefficients are best.
+        for criterion in (None, moments) if mean_variance and start % 2 else (moments if mean_variance else None,):
+            _exchange(points, terms, region, grid, fixed, criterion, others)
         information = fixed + terms.matrix(points).T @ terms.matrix(points)
         if mean_variance:
             worth = -float(np.trace(np.linalg.solve(information, moments)))
@@ -195,24 +221,28 @@ def _exchange(
     grid: Sequence[float],
     fixed: FloatArray,
     moments: FloatArray | None,
+    candidates: FloatArray,
 ) -> None:
-    """Improve points in place, one level of one run at a time.
+    """Improve points in place, one level of one run at a time, or a whole run by one of the candidates.
 
     With A the inverse of X'X without the run, a run with the row f multiplies det(X'X) by 1 + f'Af, and takes
     f'A M A f/(1 + f'Af) from the mean variance (M: moments of the region).
     """
-    rows = terms.matrix(points)
+    rows, candidate_rows = terms.matrix(points), terms.matrix(candidates)
     for _ in range(MOST_PASSES):
         changed = False
         for run in range(len(points)):
             others = np.delete(rows, run, axis=0)
             inverse = np.linalg.inv(fixed + others.T @ others)
             spread = None if moments is None else inverse @ moments @ inverse
-            for factor in range(points.shape[1]):
-                levels = region.choices(points[run], factor, grid)
-                offered = np.repeat(points[[run]], 1 + len(levels), axis=0)
-                offered[1:, factor] = levels
-                f = terms.matrix(offered)
+            for factor in range(-1 if len(candidates) else 0, points.shape[1]):
+                if factor < 0:
+                    offered, f = np.vstack([points[[run]], candidates]), np.vstack([rows[[run]], candidate_rows])
+                else:
+                    levels = region.choices(points[run], factor, grid)
+                    offered = np.repeat(points[[run]], 1 + len(levels), axis=0)
+                    offered[1:, factor] = levels
+                    f = terms.matrix(offered)
                 gain = np.einsum("ni,ij,nj->n", f, inverse, f)
                 if spread is not None:
                     gain = np.einsum("ni,ij,nj->n", f, spread, f) / (1 + gain)
@@ -285,8 +315,9 @@ class OptimalDesign(Design):
         found = efficiency(terms, region, design, grid)
         notes = [
             f"D-efficiency {found.d:.1f} %, A-efficiency {found.a:.1f} %, G-efficiency {found.g:.1f} % (100 %: "
-            "orthogonal, which a quadratic model cannot be); variance of the prediction in the mean over the region "
-            f"{found.mean_variance:.3g} σ². The best of {_starts(runs, factors)} starts, not proved to be the best."
+            f"orthogonal{', which a quadratic model cannot be' if options.model == 'quadratic' else ''}); "
+            f"variance of the prediction in the mean over the region {found.mean_variance:.3g} σ². The best of "
+            f"{_starts(runs, factors)} starts, not proved to be the best."
         ]
         before = terms.estimable(kept)
         gained = tuple(name for name, was in zip(terms.names, before, strict=True) if not was)

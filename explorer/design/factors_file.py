@@ -164,21 +164,25 @@ def coded_constraint(text: str, factors: tuple[DesignFactor, ...]) -> tuple[floa
     known = {factor.name: k for k, factor in enumerate(factors)}
     known |= {letter: k for k, letter in enumerate(factor_letters(len(factors)))}
     name = "|".join(re.escape(one) for one in sorted(known, key=len, reverse=True))
-    term = re.compile(rf"\s*([+\-−]?)\s*(\d*\.?\d*(?:[eE][+-]?\d+)?)\s*\*?\s*(?:({name})(?![\w]))?\s*")
+    number = r"\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+"
+    term = re.compile(rf"([+\-−]?)\s*(?:({number})\s*(?:\*?\s*({name})(?!\w))?|({name})(?!\w))\s*")
     weights, bound = np.zeros(len(factors)), 0.0
-    for side, text_of_side in zip((1.0, -1.0), sides, strict=True):
-        rest = text_of_side.strip()
+    for side, part in zip((1.0, -1.0), sides, strict=True):
+        rest = part.strip()
         while rest:
             match = term.match(rest)
-            if match is None or not (match[2] or match[3]) or match[2] == ".":
+            if match is None or (not match[1] and rest != part.strip()):
                 raise CommandError(f"--constraint {text!r}: cannot read {rest!r}; {allowed}: {', '.join(known)}")
-            number = side * (-1.0 if match[1] in {"-", "−"} else 1.0) * float(match[2] or 1.0)
-            if match[3] is None:
-                bound -= number
-            elif factors[known[match[3]]].levels:
-                raise CommandError(f"--constraint {text!r}: {match[3]} is no number; {allowed} that are numbers")
+            size, named = (
+                side * (-1.0 if match[1] in {"-", "−"} else 1.0) * float(match[2] or 1.0),
+                match[3] or match[4],
+            )
+            if named is None:
+                bound -= size
+            elif factors[known[named]].levels:
+                raise CommandError(f"--constraint {text!r}: {named} is no number; {allowed} that are numbers")
             else:
-                weights[known[match[3]]] += number
+                weights[known[named]] += size
             rest = rest[match.end() :]
     if not weights.any():
         raise CommandError(f"--constraint {text!r}: names no factor; {allowed}: {', '.join(known)}")

@@ -195,6 +195,110 @@ def test_days_that_differ_take_nothing_from_the_model(tmp_path, process):
     assert "Not used: block." in explorer("analyse", filled).stdout
 
 
+SOLVENT = """
+[[factor]]
+name = "solvent"
+levels = ["water", "ethanol"]
+"""
+
+
+def test_an_optimal_design_stays_within_constraints_in_the_factors_units(tmp_path, process):
+    process.write_text(PROCESS + SOLVENT, encoding="utf-8")
+    limits = ("--constraint", "time + temperature <= 265", "--constraint", "A >= 2*B - 266")
+    path, said = made(tmp_path, "i-optimal", "--factors", process, "--runs", 12, *limits, "--model", "quadratic")
+    assert "i-optimal, quadratic model of 9 terms: 12 rows × 1 = 12 runs" in said
+    assert "D-efficiency" in said
+    lines = path.read_text(encoding="utf-8").splitlines()
+    assert "# levels | solvent | water | ethanol" in lines
+    runs = [line.split(",")[4:7] for line in lines if line[0].isdigit()]
+    time, temperature = np.array([[float(one[0]), float(one[1])] for one in runs]).T
+    assert (time + temperature <= 265 + 1e-6).all()
+    assert (time >= 2 * temperature - 266 - 1e-6).all()
+    assert {one[2] for one in runs} == {"water", "ethanol"}
+
+
+def test_runs_are_added_to_a_finished_sheet_for_what_it_could_not_tell(tmp_path):
+    """A half fraction with C = AB, four of eight runs filled: the added runs make a main effect of C again."""
+    factors = many_factors(tmp_path, 3)
+    path, _ = made(tmp_path, "factorial", "--factors", factors, "--generator", "C=AB", "--replicates", 2,
+                   "--standard-order")  # fmt: skip
+    fill(path, (1.5, 2.5, 3.5, 4.5))
+    out = tmp_path / "more.csv"
+    order = ("design", "d-optimal", "--factors", factors, "--augment", path, "--runs", 4, "--model", "interactions")
+    result = explorer(*order, "--out", out, "--json")
+    assert result.exit_code == 0, result.output
+    said = json.loads(result.stdout)
+    assert said["gained"] == ["A", "B", "C", "A*B", "A*C", "B*C"]
+    assert (said["kept"], said["runs"], said["efficiency"]["d"]) == (4, 8, pytest.approx(100))
+    lines = [line.split(",") for line in out.read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
+    assert [line[-1] for line in lines] == ["1.5", "2.5", "3.5", "4.5", "", "", "", ""]
+    assert len({tuple(line[4:7]) for line in lines}) == 8
+    again = explorer(*order, "--out", tmp_path / "again.csv")
+    assert "The 4 finished runs could not tell apart A, B, C, A*B, A*C, B*C; with the 4 added runs" in again.stdout
+    assert "no --replicates" in refused(explorer(*order, "--replicates", 2, "--out", tmp_path / "x.csv"))
+    explorer("design", "factorial", "--factors", factors, "--out", tmp_path / "empty.csv")
+    empty = ("design", "d-optimal", "--factors", factors, "--augment", tmp_path / "empty.csv")
+    assert "no run with a result in response" in refused(explorer(*empty, "--out", tmp_path / "x.csv"))
+
+
+def test_a_factor_of_two_names_is_analysed_by_its_name(tmp_path, process):
+    """y = 10 + time's 2 and solvent's 3 either way of the mean: ethanol, the second name, is +1."""
+    process.write_text(PROCESS + SOLVENT, encoding="utf-8")
+    path, _ = made(tmp_path, "factorial", "--factors", process, "--replicates", 2)
+    runs = [line.split(",")[4:7] for line in path.read_text(encoding="utf-8").splitlines() if line[0].isdigit()]
+    noise = np.random.default_rng(5).standard_normal(len(runs)) / 100
+    values = [10 + 2 * (float(a) - 85) / 5 + (3 if c == "ethanol" else -3) for a, _, c in runs]
+    result = analysed(fill(path, np.array(values) + noise))
+    found = dict(zip(result["analysis"]["model"]["surface"]["terms"],
+                     result["analysis"]["model"]["surface"]["coefficients"], strict=True))  # fmt: skip
+    assert [found[term] for term in ("intercept", "A", "B", "C")] == pytest.approx([10, 2, 0, 3], abs=0.02)
+    assert "solvent: −1 is water, +1 is ethanol." in result["analysis"]["notes"]
+    assert "--target: solvent is no number" in refused(explorer("analyse", path, "--target", 12))
+    path.write_text(path.read_text(encoding="utf-8").replace("ethanol,", "Ethanol,", 1), encoding="utf-8")
+    assert "column solvent: 'Ethanol'; allowed: water, ethanol" in refused(explorer("analyse", path))
+
+
+def test_a_factor_of_three_names_is_analysed_as_blocks(tmp_path, process):
+    process.write_text(PROCESS + SOLVENT.replace('"ethanol"', '"ethanol", "oil"'), encoding="utf-8")
+    path, said = made(tmp_path, "d-optimal", "--factors", process, "--model", "linear", "--runs", 12)
+    assert "not told for a factor of three names" in said
+    fill(path, np.random.default_rng(1).standard_normal(12))
+    message = refused(explorer("analyse", path))
+    assert "solvent has 3 levels that are no numbers; allowed: " in message
+    assert "--only time,temperature --block solvent" in message
+    result = analysed(path, "--only", "time,temperature", "--block", "solvent")
+    assert set(result["analysis"]["model"]["surface"]["block_names"]) == {"water", "ethanol", "oil"}
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        (("--constraint", "time < 3"), "--constraint 'time < 3': allowed: a form such as"),
+        (("--constraint", "time + heat <= 3"), "cannot read '+ heat'"),
+        (("--constraint", "time temperature <= 3"), "cannot read 'temperature'"),
+        (("--constraint", "2* <= time"), "cannot read '*'"),
+        (("--constraint", "3 <= 4"), "names no factor"),
+        (("--constraint", "solvent <= 1"), "solvent is no number"),
+        (("--constraint", "time + temperature <= 20"), "allowed: a wider region"),
+        (("--runs", 5), "runs = 5: too few for the 9 terms of the quadratic model; allowed: at least 9"),
+        (("--augment", "nowhere.csv"), "nowhere.csv"),
+    ],
+)
+def test_bad_orders_of_an_optimal_design_get_one_line(tmp_path, process, options, message):
+    process.write_text(PROCESS + SOLVENT, encoding="utf-8")
+    out = tmp_path / "runs.csv"
+    assert message in refused(explorer("design", "d-optimal", "--factors", process, *options, "--out", out))
+    assert not out.exists()
+
+
+def test_names_are_for_designs_that_run_them(tmp_path, process):
+    process.write_text(PROCESS + SOLVENT, encoding="utf-8")
+    order = ("design", "central-composite", "--factors", process, "--out", tmp_path / "runs.csv")
+    assert "runs solvent between or beyond its levels water, ethanol" in refused(explorer(*order))
+    other = ("design", "factorial", "--factors", process, "--model", "linear", "--out", tmp_path / "runs.csv")
+    assert "--model: is not for factorial; it belongs to d-optimal, i-optimal" in refused(explorer(*other))
+
+
 def test_power_is_in_the_plain_data(tmp_path, process):
     result = explorer("design", "factorial", "--factors", process, "--replicates", 4, "--sigma", 2, "--effect", 3,
                       "--out", tmp_path / "runs.csv", "--json")  # fmt: skip
