@@ -28,7 +28,9 @@ def design(
     factors: str = typer.Option(
         ..., metavar="FILE", help="TOML with name, low, high and unit of every factor, or a shipped one's name."
     ),
-    out: Path = typer.Option(..., metavar="FILE.csv", help="New sheet, one line per run in the order to run them."),
+    out: Path = typer.Option(
+        ..., metavar="FILE.csv", help="New sheet, .csv or .xlsx: one line per run in the order to run them."
+    ),
     runs: int | None = typer.Option(
         None,
         min=2,
@@ -58,22 +60,29 @@ def design(
     seed: int | None = typer.Option(
         None, min=0, help="Of the order of the runs, and of designs that are drawn; 1 if not given."
     ),
+    decimal_comma: bool = typer.Option(
+        False, "--decimal-comma", help="CSV with 0,5 for 0.5 and semicolons, as spreadsheets of many languages open it."
+    ),
     standard_order: bool = typer.Option(False, "--standard-order", help="Do not shuffle the runs."),
     sigma: float | None = typer.Option(None, help="Standard deviation of one run: what will the design see?"),
     effect: float | None = typer.Option(None, help="With which chance will it see a change so large?"),
     json: bool = typer.Option(False, "--json", help="Print plain data."),
 ) -> None:
     """Write the runs of a design; says what is confused with what, and which effects it will be able to see."""
+    from doe.table_file import WORKBOOK
     from explorer.design.factors_file import read_factors
-    from explorer.design.run_plan import DesignOrder, make_plan, sheet_text
+    from explorer.design.run_plan import DesignOrder, make_plan, sheet_text, sheet_workbook
     from explorer.design.text import plan_result, plan_text
     from explorer.errors import CommandError
-    from explorer.files.output_file import write_whole
+    from explorer.files.output_file import write_whole_bytes
     from explorer.files.run_folder import json_text
     from solver.assets import asset_path
 
     if out.exists():
         raise CommandError(f"--out {out}: is there already; name a new file")
+    workbook = out.suffix.lower() == WORKBOOK
+    if workbook and decimal_comma:
+        raise CommandError(f"--decimal-comma: {out} is a workbook, which shows numbers as its reader has them")
     if not out.absolute().parent.is_dir():
         raise CommandError(f"--out {out}: no folder {out.absolute().parent}")
     for option, value in (("--sigma", sigma), ("--effect", effect)):
@@ -99,6 +108,8 @@ def design(
     )
     plan = make_plan(order, file)
     said = json_text(plan_result(plan, file, sigma, effect)) if json else plan_text(plan, file, sigma, effect)
-    write_whole(out, sheet_text(plan, file))
+    # Without the mark at its head a spreadsheet takes the file's letters for Windows's.
+    text = "\ufeff" * decimal_comma + sheet_text(plan, file, decimal_comma)
+    write_whole_bytes(out, sheet_workbook(plan, file) if workbook else text.encode())
     then = f"explorer analyse {out}{' --block block' if blocks else ''}"
     typer.echo(said if json else f"{said}\n\nwrote {out}; fill in {', '.join(file.responses)}, then: {then}")

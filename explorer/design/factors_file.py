@@ -21,6 +21,7 @@ from solver import Like, Names, Number, ParameterError, Settings, TomlTable, Who
 NAME = re.compile(r"[^\W\d][\w-]{0,59}")
 UNIT = re.compile(r"[^\s=@|,;\[\]\"'`<>][^|,;\[\]\"`<>\n]{0,19}")
 LEVEL = re.compile(r"[^\s=@|,;\[\]\"'`<>][^|,;\[\]\"`<>\n]{0,39}")
+RESPONSE = re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^\]]*)\]\s*")
 RESERVED = ("row", "replicate", "run", "seed")
 """Columns of the sheet that are not factors."""
 MOST_FACTORS = 47
@@ -48,7 +49,7 @@ class FactorsTable(TomlTable):
     title: str = Field("", max_length=200)
     """What is studied."""
     responses: Annotated[tuple[str, ...], Names()] = ("response",)
-    """Columns to fill in."""
+    """Columns to fill in, with their units where they have any: "strength [MPa]"."""
     replicates: Annotated[int, Whole(1)] | None = None
     centre: Annotated[int, Whole(0)] | None = None
     seed: Annotated[int, Whole(0)] | None = None
@@ -94,6 +95,13 @@ class FactorsFile(Record):
     centre: int | None = None
     seed: int | None = None
     first_seed: int | None = None
+    response_units: tuple[str, ...] = ()
+
+    @property
+    def response_titles(self) -> tuple[str, ...]:
+        """Names with units, as in the header of the sheet."""
+        units = self.response_units or ("",) * len(self.responses)
+        return tuple(f"{name} [{unit}]" if unit else name for name, unit in zip(self.responses, units, strict=True))
 
 
 def region_of(factors: tuple[DesignFactor, ...]) -> Region:
@@ -231,7 +239,16 @@ def _factors_file(table: FactorsTable) -> FactorsFile:
     factors = tuple(_factor(one, f"factor[{k}]") for k, one in enumerate(entries, start=1))
     if not table.responses:
         raise StudyFileError("responses: []; allowed: a list of names")
-    responses = tuple(checked_name(name, "responses") for name in table.responses)
+    heads = [RESPONSE.fullmatch(text) for text in table.responses]
+    for text, head in zip(table.responses, heads, strict=True):
+        if head is not None and head["unit"] and not UNIT.fullmatch(head["unit"]):
+            raise StudyFileError(f"responses: unit of {text!r}; allowed: up to 20 characters without | , ; or quotes")
+    responses = tuple(
+        checked_name(text if head is None else head["name"], "responses")
+        for text, head in zip(table.responses, heads, strict=True)
+    )
+    units = tuple("" if head is None else head["unit"] or "" for head in heads)
     no_repeats(factors, responses)
     title = " ".join(table.title.split())
-    return FactorsFile(title, factors, responses, table.replicates, table.centre, table.seed, table.first_seed)
+    numbers = (table.replicates, table.centre, table.seed, table.first_seed)
+    return FactorsFile(title, factors, responses, *numbers, response_units=units if any(units) else ())

@@ -26,7 +26,7 @@ import numpy.typing as npt
 from doe.designs import DESIGNS, Design, DesignOptions, Points
 from doe.errors import StatisticsError
 from explorer.design.choices import Alpha, ModelOrder
-from explorer.design.factors_file import DesignFactor, FactorsFile, coded_constraint, region_of
+from explorer.design.factors_file import DesignFactor, FactorsFile, coded_constraint, is_number, region_of
 from explorer.design.filled_sheet import finished_runs, read_sheet
 from explorer.errors import CommandError
 
@@ -199,33 +199,55 @@ def _first(*values: int | None) -> int:
     return next(value for value in values if value is not None)
 
 
-def sheet_text(plan: RunPlan, file: FactorsFile) -> str:
-    """The empty sheet."""
+def sheet_text(plan: RunPlan, file: FactorsFile, decimal_comma: bool = False) -> str:
+    """The empty sheet as CSV; with decimal commas, semicolons are between the cells, as spreadsheets have it there."""
+    comments, rows = _sheet(plan, file)
     stream = io.StringIO()
-    stream.write(
+    stream.writelines(f"{line}\n" for line in comments)
+    writer = csv.writer(stream, delimiter=";" if decimal_comma else ",", lineterminator="\n")
+    writer.writerow(rows[0])
+    for row in rows[1:]:
+        writer.writerow([cell.replace(".", ",") if decimal_comma and is_number(cell) else cell for cell in row])
+    return stream.getvalue()
+
+
+def sheet_workbook(plan: RunPlan, file: FactorsFile) -> bytes:
+    """The empty sheet as a workbook (.xlsx); what is a number is one there."""
+    # Imported where it is used: it takes a second, and few sheets are workbooks.
+    import pandas
+
+    comments, rows = _sheet(plan, file)
+    cells: list[list[str | float | None]] = [[line, *[None] * (len(rows[0]) - 1)] for line in comments]
+    cells += [[float(cell) if is_number(cell) else cell or None for cell in row] for row in rows]
+    stream = io.BytesIO()
+    pandas.DataFrame(cells, dtype=object).to_excel(stream, header=False, index=False, engine="openpyxl")
+    return stream.getvalue()
+
+
+def _sheet(plan: RunPlan, file: FactorsFile) -> tuple[list[str], list[list[str]]]:
+    """The comments of the sheet, and its rows, the header first."""
+    comments = [
         SEPARATOR.join(
             ["# design", plan.design.name, *plan.points.traits, *plan.points.generators, f"seed {plan.seed}"]
         )
-        + "\n"
-    )
+    ]
     for factor in file.factors:
         if factor.levels:
-            stream.write(SEPARATOR.join(["# levels", factor.name, *factor.levels]) + "\n")
+            comments.append(SEPARATOR.join(["# levels", factor.name, *factor.levels]))
             continue
         numbers = [written(factor.low), written(factor.high)]
-        stream.write(
-            SEPARATOR.join(["# factor", factor.name, *numbers, factor.unit or "1", written(factor.reference)]) + "\n"
+        comments.append(
+            SEPARATOR.join(["# factor", factor.name, *numbers, factor.unit or "1", written(factor.reference)])
         )
-    writer = csv.writer(stream, lineterminator="\n")
-    own = [*COLUMNS, BLOCK] if len(plan.block) else COLUMNS
-    writer.writerow([*own, *(factor.title for factor in file.factors), *file.responses])
+    own = [*COLUMNS, BLOCK] if len(plan.block) else [*COLUMNS]
+    rows = [[*own, *(factor.title for factor in file.factors), *file.response_titles]]
     natural = region_of(file.factors).natural(plan.coded)
     for position, ((row, replicate), seed) in enumerate(zip(plan.sequence, plan.seeds, strict=True)):
+        block = [plan.block[position] + 1] if len(plan.block) else []
         levels = [level_text(factor, value) for factor, value in zip(file.factors, natural[row], strict=True)]
         answers = plan.finished[position] if position < len(plan.finished) else [""] * len(file.responses)
-        block = [plan.block[position] + 1] if len(plan.block) else []
-        writer.writerow([row + 1, replicate + 1, position + 1, seed, *block, *levels, *answers])
-    return stream.getvalue()
+        rows.append([*map(str, [row + 1, replicate + 1, position + 1, seed, *block]), *levels, *answers])
+    return comments, rows
 
 
 def level_text(factor: DesignFactor, value: float) -> str:

@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 
+from explorer.design.filled_sheet import read_sheet
 from solver.assets import asset_path
 from tests.explorer.command_line import explorer, refused
 
@@ -334,6 +335,48 @@ def test_bad_orders_of_a_design_leave_no_file(tmp_path, arguments, message):
     out = tmp_path / "runs.csv"
     assert message in refused(explorer(*arguments, "--out", out))
     assert not out.exists()
+
+
+def test_a_workbook_and_a_sheet_with_decimal_commas_hold_the_same_runs(tmp_path, process):
+    """Read back by the table reader, and the numbers of the workbook as numbers by openpyxl."""
+    import openpyxl
+
+    process.write_text(PROCESS.replace('"yield"', '"yield [%]"').replace("80", "80.5") + SOLVENT, encoding="utf-8")
+    names = {"a.csv": (), "b.csv": ("--decimal-comma",), "c.xlsx": ()}
+    sheets = {}
+    for name, options in names.items():
+        order = ("design", "factorial", "--factors", process, *options, "--out", tmp_path / name)
+        assert explorer(*order).exit_code == 0
+        sheet = read_sheet(tmp_path / name)
+        levels = [[sheet.level(k, factor) for factor in sheet.factors] for k in range(len(sheet.cells))]
+        sheets[name] = (sheet.factors, sheet.units, levels)
+        assert sheet.responses == ["yield"]
+        assert sheet.units["yield"] == "%"
+    assert sheets["a.csv"] == sheets["b.csv"] == sheets["c.xlsx"]
+    text = (tmp_path / "b.csv").read_bytes().decode("utf-8")
+    assert text.startswith("\ufeff# design")
+    assert "row;replicate;run;seed;time [min];temperature [°F];solvent;yield [%]" in text
+    assert ";80,5;" in text
+    page = openpyxl.load_workbook(tmp_path / "c.xlsx").active
+    time = [row[4] for row in page.iter_rows(min_row=6, values_only=True)]
+    assert set(time) == {80.5, 90.0}
+    both = ("design", "factorial", "--factors", process, "--decimal-comma", "--out", tmp_path / "d.xlsx")
+    assert "is a workbook" in refused(explorer(*both))
+
+
+def test_a_workbook_is_analysed_as_the_sheet_is(tmp_path):
+    import openpyxl
+
+    factors = many_factors(tmp_path, 4)
+    made_sheet, _ = made(tmp_path, "factorial", "--factors", factors, "--standard-order")
+    book_file = tmp_path / "runs.xlsx"
+    explorer("design", "factorial", "--factors", factors, "--standard-order", "--out", book_file)
+    book = openpyxl.load_workbook(book_file)
+    for row, value in zip(book.active.iter_rows(min_row=7), FILTRATION_RATE, strict=True):
+        row[-1].value = value
+    book.save(book_file)
+    by_book, by_sheet = analysed(book_file), analysed(fill(made_sheet, FILTRATION_RATE))
+    assert by_book["analysis"] == by_sheet["analysis"]
 
 
 def test_a_sheet_is_not_written_over(tmp_path):

@@ -246,6 +246,7 @@ def test_a_response_that_would_be_markup_is_refused(tmp_path):
         ("low = 0.1", "low = 0.3", r"factor\[2\].high: 0.3 is not above low 0.3"),
         ("low = 0.1", 'low = "0.1"', r"factor\[2\].low: '0.1' is not a number"),
         ("low = 0.1", "lower = 0.1", r"factor\[2\].lower: unknown key"),
+        ('"strength"', '"strength [M|a]"', r"responses: unit of 'strength \[M\|a\]'; allowed"),
         ("low = 0.1", "", r"factor\[2\].low: missing"),
         ("low = 0.1", 'levels = ["a"]\nlow = 0.1', r"factor\[2\].low: 0.1 beside levels \(time\); allowed: one"),
         ("low = 0.1\nhigh = 0.3", 'levels = ["a"]', r"factor\[2\].levels: \['a'\]; allowed: two or more different"),
