@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +17,7 @@ import numpy.typing as npt
 from doe.analysis.canonical import Canonical, RidgePath, canonical_analysis, ridge_analysis
 from doe.analysis.contrasts import Contrasts, Curvature, curvature, is_regular, regular_contrasts, screening_contrasts
 from doe.analysis.few_terms import FewTermsModel, few_terms
+from doe.analysis.mixture import MixtureFit
 from doe.analysis.model_adequacy import BoxCox, Diagnostics, box_cox, diagnose_fit
 from doe.analysis.models import Order, OrderFit, bearable, fit_summary, hierarchical, highest_order, terms_of
 from doe.analysis.optimum import Optimum, find_optimum
@@ -63,7 +65,8 @@ class Effects(Record):
 @dataclass(frozen=True)
 class DesignAnalysis(Record):
     """What the runs of a design say. effects: None unless every level is low, high or (all factors) middle. model: None
-    where the runs leave no error for any model. notes: sentences that a reader must know.
+    where the runs leave no error for any model. mixture: of parts that add up to a whole, instead of all others. notes:
+    sentences that a reader must know.
     """
 
     fits: tuple[OrderFit, ...]
@@ -71,6 +74,12 @@ class DesignAnalysis(Record):
     model: FittedModel | None
     optimum: Optimum | None
     notes: tuple[str, ...]
+    mixture: MixtureFit | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return every field; that of a mixture only where it is one."""
+        found = super().to_dict()
+        return found if self.mixture is not None else {name: one for name, one in found.items() if name != "mixture"}
 
 
 @dataclass(frozen=True)

@@ -50,6 +50,8 @@ class DesignOptions(Record):
     """Number of names of each factor that is no number; 0 of one that is. Empty: all are."""
     kept: tuple[tuple[float, ...], ...] = ()
     """Coded levels of finished runs, beside which others are looked for."""
+    lattice: int | None = None
+    """Steps of a share in a mixture."""
     nonregular: bool = False
     """Whether no main effect may be wholly confused with an interaction of two, where a regular table is as usual."""
     seed: int = 1
@@ -109,6 +111,8 @@ class Design(ABC):
     """What it is for, in one line."""
     options: ClassVar[tuple[str, ...]] = ()
     """Fields of :class:`DesignOptions` that it takes."""
+    mixture: ClassVar[bool] = False
+    """Whether its factors are the parts of a whole."""
     main_effects_only: ClassVar[bool] = False
     """Whether it is made for a model without interactions and squares."""
 

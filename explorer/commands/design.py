@@ -57,6 +57,9 @@ def design(
     augment: Path | None = typer.Option(
         None, metavar="RUNS.csv", help="d-optimal, i-optimal: keep this sheet's finished runs, and add --runs to them."
     ),
+    lattice: int | None = typer.Option(
+        None, min=1, max=50, metavar="M", help="mixture: all blends in steps of 1/M; the simplex centroid if not given."
+    ),
     seed: int | None = typer.Option(
         None, min=0, help="Of the order of the runs, and of designs that are drawn; 1 if not given."
     ),
@@ -105,6 +108,7 @@ def design(
         model=model,
         constraints=tuple(constraint),
         augment=augment,
+        lattice=lattice,
     )
     plan = make_plan(order, file)
     said = json_text(plan_result(plan, file, sigma, effect)) if json else plan_text(plan, file, sigma, effect)

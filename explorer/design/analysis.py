@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from doe.analysis.analyse import DesignAnalysis, ResponseTarget, analyse_design
+from doe.analysis.mixture import MixtureOrder, fit_mixture
 from doe.analysis.models import ORDERS, Order
 from doe.analysis.steepest_ascent import Region
 from doe.analysis.surface_anova import FULL
@@ -85,6 +86,8 @@ def analyse_runs(runs: Runs, order: AnalyseOrder) -> DesignResult:
             f"--target: {named[0].name} is no number, and has no settings between its levels; "
             "allowed: the runs of one level in a sheet of their own"
         )
+    if _whole(runs, region):
+        return _result(runs, order, _mixture(runs, region, order))
     _refuse_dependent(runs, region, order.sheet)
     reference = np.array([factor.reference for factor in runs.factors])
     target = None if order.target is None else ResponseTarget(order.target, order.target_error, reference)
@@ -94,6 +97,10 @@ def analyse_runs(runs: Runs, order: AnalyseOrder) -> DesignResult:
         )
     except StatisticsError as error:
         raise CommandError(f"{order.sheet}, column {runs.response}: {error}") from None
+    return _result(runs, order, replace(found, notes=(*found.notes, *_run_notes(runs, region, found))))
+
+
+def _result(runs: Runs, order: AnalyseOrder, analysis: DesignAnalysis) -> DesignResult:
     return DesignResult(
         sheet=order.sheet,
         design=runs.design,
@@ -103,11 +110,43 @@ def analyse_runs(runs: Runs, order: AnalyseOrder) -> DesignResult:
         factors=_factors(runs),
         coded=runs.coded,
         target=order.target,
-        analysis=replace(found, notes=(*found.notes, *_run_notes(runs, region, found))),
+        analysis=analysis,
         command=_command(order),
         versions=versions(),
         about=made_today(order.author, order.notes),
     )
+
+
+def _whole(runs: Runs, region: Region) -> bool:
+    """Whether all factors are the parts of a mixture: they add up to one number in every run with a result, and nothing
+    else ties them.
+    """
+    valid = ~np.isnan(runs.responses).all(axis=1)
+    levels = region.natural(runs.coded[valid])
+    if len(runs.factors) < 2 or any(factor.levels for factor in runs.factors) or len(levels) <= len(runs.factors):
+        return False
+    if (levels < -SAME).any():
+        return False  # what can be below zero is no amount
+    one_sum = bool(np.ptp(levels.sum(axis=1)) < SAME * np.abs(levels).max())
+    return one_sum and bool(np.linalg.matrix_rank(levels - levels.mean(axis=0), tol=1e-6) == len(runs.factors) - 1)
+
+
+def _mixture(runs: Runs, region: Region, order: AnalyseOrder) -> DesignAnalysis:
+    """Scheffé's polynomial of a mixture; raises CommandError for what is not for one."""
+    for option, given in (("--target", order.target is not None), ("--terms", order.terms), ("--block", order.block)):
+        if given:
+            raise CommandError(f"{option}: is not for a mixture: in {order.sheet} the factors add up to one sum")
+    polynomial: MixtureOrder | None = None
+    if order.order is not None:
+        polynomial = "linear" if order.order == ModelOrder.LINEAR else "quadratic"
+    lows = np.array([factor.low for factor in runs.factors])
+    names = factor_letters(len(runs.factors))
+    try:
+        found = fit_mixture(region.natural(runs.coded), runs.responses, lows, names, polynomial)
+    except StatisticsError as error:
+        raise CommandError(f"{order.sheet}, column {runs.response}: {error}") from None
+    note = "A mixture: the factors add up to one sum in every run, and Scheffé's polynomial stands for the model."
+    return DesignAnalysis((), None, None, None, (note,), mixture=found)
 
 
 def _refuse_dependent(runs: Runs, region: Region, sheet: str) -> None:

@@ -46,6 +46,7 @@ OPTIONS = {
     "constraints": "--constraint",
     "levels": "levels of a factor that is no number",
     "kept": "--augment",
+    "lattice": "--lattice",
 }
 """Option of a design → how it is spelt on the command line."""
 COLUMNS = ("row", "replicate", "run", "seed")
@@ -73,6 +74,7 @@ class DesignOrder:
     model: ModelOrder | None = None
     constraints: tuple[str, ...] = ()
     """In the factors' units, as "A + B <= 1"."""
+    lattice: int | None = None
     augment: Path | None = None
     """Sheet whose finished runs are kept."""
 
@@ -130,6 +132,7 @@ def make_plan(order: DesignOrder, file: FactorsFile) -> RunPlan:
         seed=seed,
         blocks=None if of_replicates else order.blocks,
         nonregular=order.nonregular,
+        lattice=order.lattice,
         model=(order.model or ModelOrder.QUADRATIC).value,
         constraints=tuple(coded_constraint(text, file.factors) for text in order.constraints),
         levels=names if any(names) and "levels" in design.options else (),
@@ -141,6 +144,8 @@ def make_plan(order: DesignOrder, file: FactorsFile) -> RunPlan:
         raise CommandError(f"--blocks: the sheet's column {BLOCK!r} is a name of the factors file; allowed: another")
     if "centre" in design.options:
         options = replace(options, centre=file.centre if order.centre is None else order.centre)
+    if design.mixture:
+        _require_parts(file)
     points = _points(design, len(file.factors), options)
     _refuse_levels_between_names(design, file, points.coded)
     rows = len(points.coded)
@@ -159,6 +164,20 @@ def make_plan(order: DesignOrder, file: FactorsFile) -> RunPlan:
     if finished:
         turn = np.concatenate([np.arange(len(finished)), turn[turn >= len(finished)]])
     return RunPlan(design, points, every[turn], seeds[turn], seed, block, finished)
+
+
+def _require_parts(file: FactorsFile) -> None:
+    """The high of a part is what is left where all others are at their lows: one room for all."""
+    rooms = [factor.high - factor.low for factor in file.factors]
+    named = [factor.name for factor in file.factors if factor.levels]
+    if named:
+        raise CommandError(f"mixture: {named[0]} is no number; allowed: parts with low and high")
+    if max(rooms) - min(rooms) > 1e-9 * max(rooms):
+        listed = ", ".join(f"{factor.name} {room:g}" for factor, room in zip(file.factors, rooms, strict=True))
+        raise CommandError(
+            f"mixture: high less low is not the same for every part ({listed}); allowed: the whole less the sum of all "
+            "lows, as of 0 and 1, or of 0 and 100"
+        )
 
 
 def _refuse_levels_between_names(design: Design, file: FactorsFile, coded: Array) -> None:

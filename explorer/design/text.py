@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from doe.analysis.mixture import bearable_order, mixture_terms
 from doe.analysis.models import Order, bearable, highest_order, terms_of
 from doe.analysis.power import TermPrecision, precision
 from doe.analysis.surface import Blocks
@@ -19,9 +20,16 @@ from explorer.design.factors_file import DesignFactor, FactorsFile, region_of
 from explorer.design.result import DesignResult
 from explorer.design.run_plan import RunPlan
 from explorer.report.content import Facts, Table
-from explorer.report.design.model import curvature, diagnostics, effect_table, few_terms_table, fit_summary
+from explorer.report.design.model import (
+    curvature,
+    diagnostics,
+    effect_table,
+    few_terms_table,
+    fit_summary,
+    mixture_table,
+)
 from explorer.report.design.sections import factor_table, in_short, settings_table, shape, target
-from explorer.report.sections.surface import anova_table
+from explorer.report.sections.surface import anova_table, variance_table
 from explorer.tables.text_table import text_table
 from explorer.units import enumeration, number
 
@@ -112,6 +120,8 @@ def _blocks(plan: RunPlan) -> list[str]:
 
 
 def _power_text(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: float | None) -> str:
+    if plan.design.mixture:
+        return _mixture_text(plan)
     if _many_names(file):
         return "What it will see is not told for a factor of three names and more."
     found = _power(plan, sigma, effect)
@@ -138,6 +148,17 @@ def _power_text(plan: RunPlan, file: FactorsFile, sigma: float | None, effect: f
         f"what the {planned_order(plan)} model will see at p < 0.05, in {unit} "
         f"({found[0].df} degrees of freedom for the error):\n{table}"
     )
+
+
+def _mixture_text(plan: RunPlan) -> str:
+    """Which of Scheffé's polynomials the runs bear."""
+    letters = factor_letters(plan.coded.shape[1])
+    order = bearable_order((plan.coded[plan.sequence[:, 0]] + 1) / 2, letters)
+    if order is None:
+        return "As many blends as terms, or fewer: nothing is left for the error. --replicates 2 or --centre give one."
+    terms = len(mixture_terms(letters, order))
+    df = len(plan.sequence) - terms
+    return f"The runs bear Scheffé's {order} polynomial ({terms} terms), with {df} degrees of freedom for the error."
 
 
 def planned_order(plan: RunPlan) -> Order | None:
@@ -176,6 +197,8 @@ def analysis_text(result: DesignResult) -> str:
             parts.append(curvature(effects.curvature, effects.response))
     if found.model is not None:
         parts += [_table(fit_summary(found)), _table(anova_table(found.model.anova))]
+    if found.mixture is not None:
+        parts += [_table(mixture_table(result, found.mixture)), _table(variance_table(found.mixture.rows))]
     told: set[str] = set()
     for section in (in_short(result), diagnostics(result), shape(result), target(result)):
         if section is not None:

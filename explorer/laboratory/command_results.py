@@ -199,6 +199,7 @@ def sheet_result(order: DesignOrder, factors: str, sigma: float | None) -> Comma
         ("--replicates", order.replicates),
         ("--centre", order.centre),
         ("--blocks", order.blocks),
+        ("--lattice", order.lattice),
         ("--sigma", sigma),
     )
     for option, number in numbers:

@@ -16,7 +16,7 @@ from doe.stages.surface import OptimumResult
 from explorer.design.result import DesignResult
 from explorer.report.content import Banner, Block, Caution, Code, Facts, Figure, Section, Table, Text, Word
 from explorer.report.design.charts import ridge
-from explorer.report.design.model import diagnostics, effects, model, units_of_factors
+from explorer.report.design.model import blend_words, diagnostics, effects, mixture, model, units_of_factors
 from explorer.report.figures.model import cloud, ranges
 from explorer.report.figures.surface import solutions
 from explorer.report.identified import GIVES_TARGET, cloud_caution, rule, settings
@@ -211,6 +211,13 @@ def acting_words(result: DesignResult) -> str:
     found = result.analysis
     if found.effects is not None:
         return acting(found.effects.screening)
+    if found.mixture is not None:
+        row = found.mixture.rows[0]
+        return (
+            f"the blend changes the response (p = {p_value(row.p)})"
+            if row.p < 0.05
+            else f"no change by the blend is seen (p = {p_value(row.p)})"
+        )
     return "no model could be fitted" if found.model is None else terms_that_act(found.model.anova)
 
 
@@ -222,6 +229,8 @@ def _acting_names(result: DesignResult) -> list[str]:
         if any(math.isfinite(test.p) for test in tests.values()):
             return [name for name, test in tests.items() if test.p_holm < 0.05]
         return [e.name for e in screening.effects if not e.is_dummy and abs(e.effect) > screening.lenth.margin]
+    if found.mixture is not None:
+        return [factor.factor for factor in result.factors] if found.mixture.rows[0].p < 0.05 else []
     if found.model is None:
         return []
     rows = [row for row in found.model.anova.rows if row.source not in WHOLE]
@@ -260,6 +269,15 @@ def in_short(result: DesignResult) -> Section:
             ("Equation, actual", actual + units_of_factors(result.factors)),
             ("R², adjusted, predicted", ", ".join(fixed(value, 4) for value in r2)),
             ("Scatter of one run", observed(response, anova.sigma)),
+        ]
+    if found.mixture is not None:
+        blends = found.mixture
+        facts += [
+            ("Highest blend", blend_words(result, blends.highest)),
+            ("Lowest blend", blend_words(result, blends.lowest)),
+            ("Looked for", f"over all blends within low … high, in steps of {percent(blends.step)} of the room"),
+            ("R², adjusted, predicted", ", ".join(fixed(value, 4) for value in blends.shares_explained)),
+            ("Scatter of one run", observed(response, blends.sigma)),
         ]
     if found.optimum is not None:
         facts.append(("Target", found.optimum.statement))
@@ -343,6 +361,7 @@ SECTIONS: tuple[Callable[[DesignResult], Section | None], ...] = (
     in_short,
     target,
     effects,
+    mixture,
     model,
     diagnostics,
     shape,

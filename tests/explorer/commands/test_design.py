@@ -300,6 +300,45 @@ def test_names_are_for_designs_that_run_them(tmp_path, process):
     assert "--model: is not for factorial; it belongs to d-optimal, i-optimal" in refused(explorer(*other))
 
 
+def test_a_mixture_goes_from_its_parts_to_the_best_blend(tmp_path):
+    """A whole of 100, 20 of water at least: y = 3 a + 5 b + 1 w + 8 a b of the shares above the lows."""
+    factors = tmp_path / "parts.toml"
+    parts = {"ash": (0, 80), "binder": (0, 80), "water": (20, 100)}
+    entries = (
+        f'[[factor]]\nname = "{name}"\nlow = {low}\nhigh = {high}\nunit = "%"\n' for name, (low, high) in parts.items()
+    )
+    factors.write_text("".join(entries), encoding="utf-8")
+    path, said = made(tmp_path, "mixture", "--factors", factors, "--replicates", 2, "--centre", 1)
+    assert "simplex centroid: 8 rows × 2 = 16 runs" in said
+    assert "special cubic polynomial (7 terms), with 9 degrees of freedom" in said
+    runs = [
+        [float(cell) for cell in line.split(",")[4:7]] for line in path.read_text().splitlines() if line[0].isdigit()
+    ]
+    assert np.allclose(np.sum(runs, axis=1), 100)
+    a, b, w = ((np.array(runs) - [0, 0, 20]) / 80).T
+    noise = np.random.default_rng(2).standard_normal(16) / 1000
+    result = analysed(fill(path, 3 * a + 5 * b + w + 8 * a * b + noise), "--model", "quadratic")
+    found = result["analysis"]["mixture"]
+    assert found["terms"] == ["A", "B", "C", "A*B", "A*C", "B*C"]
+    assert found["coefficients"] == pytest.approx([3, 5, 1, 8, 0, 0], abs=0.02)
+    # On the edge of ash and binder: b = 1/2 + 2/16.
+    assert found["highest"]["amounts"] == pytest.approx([30, 50, 20], abs=0.8)
+    out = tmp_path / "report"
+    assert explorer("analyse", path, "--out", out).exit_code == 0
+    text = (out / "report.md").read_text(encoding="utf-8")
+    assert "Scheffé's special cubic polynomial" in text
+    assert "Highest blend" in text
+    assert "--target: is not for a mixture" in refused(explorer("analyse", path, "--target", 3))
+
+
+def test_parts_whose_ranges_cannot_be_one_whole_are_refused(tmp_path, process):
+    order = ("design", "mixture", "--factors", process, "--out", tmp_path / "x.csv")
+    process.write_text(PROCESS.replace("170", "175"), encoding="utf-8")
+    assert "high less low is not the same for every part (time 10, temperature 5)" in refused(explorer(*order))
+    many = ("design", "lhs", "--factors", process, "--lattice", 2, "--out", tmp_path / "x.csv")
+    assert "--lattice: is not for lhs; it belongs to mixture" in refused(explorer(*many))
+
+
 def test_power_is_in_the_plain_data(tmp_path, process):
     result = explorer("design", "factorial", "--factors", process, "--replicates", 4, "--sigma", 2, "--effect", 3,
                       "--out", tmp_path / "runs.csv", "--json")  # fmt: skip
