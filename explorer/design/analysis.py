@@ -18,7 +18,7 @@ from doe.analysis.steepest_ascent import Region
 from doe.analysis.surface_anova import FULL
 from doe.designs import DESIGNS, factor_letters
 from doe.errors import StatisticsError
-from explorer.design.choices import ModelOrder
+from explorer.design.choices import ModelOrder, Reduction
 from explorer.design.factors_file import read_factors, region_of
 from explorer.design.filled_sheet import Runs, read_sheet, runs_of
 from explorer.design.result import DesignResult, Response, RunCount, SheetFactor
@@ -55,6 +55,7 @@ class AnalyseOrder:
     only: tuple[str, ...] = ()
     block: str = ""
     """Column of the block in which each run was made."""
+    reduction: Reduction | None = None
     out: Path | None = field(default=None)
     author: str = ""
     notes: str = ""
@@ -93,7 +94,14 @@ def analyse_runs(runs: Runs, order: AnalyseOrder) -> DesignResult:
     target = None if order.target is None else ResponseTarget(order.target, order.target_error, reference)
     try:
         found = analyse_design(
-            runs.coded, runs.responses, region, _order(runs, order), _symbols(runs, order.terms), target, runs.blocks
+            runs.coded,
+            runs.responses,
+            region,
+            _order(runs, order),
+            _symbols(runs, order.terms),
+            target,
+            runs.blocks,
+            None if order.reduction is None else order.reduction.value,
         )
     except StatisticsError as error:
         raise CommandError(f"{order.sheet}, column {runs.response}: {error}") from None
@@ -133,7 +141,13 @@ def _whole(runs: Runs, region: Region) -> bool:
 
 def _mixture(runs: Runs, region: Region, order: AnalyseOrder) -> DesignAnalysis:
     """Scheffé's polynomial of a mixture; raises CommandError for what is not for one."""
-    for option, given in (("--target", order.target is not None), ("--terms", order.terms), ("--block", order.block)):
+    asked = {
+        "--target": order.target is not None,
+        "--terms": order.terms,
+        "--block": order.block,
+        "--reduce": order.reduction,
+    }
+    for option, given in asked.items():
         if given:
             raise CommandError(f"{option}: is not for a mixture: in {order.sheet} the factors add up to one sum")
     polynomial: MixtureOrder | None = None
@@ -325,6 +339,7 @@ def _command(order: AnalyseOrder) -> tuple[str, ...]:
         ("--terms", order.terms, ",".join),
         ("--only", order.only, ",".join),
         ("--block", order.block, str),
+        ("--reduce", order.reduction, str),
     ]
     for option, value, write in options:
         if value is not None and value not in ("", ()):

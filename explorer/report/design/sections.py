@@ -58,6 +58,12 @@ def target(result: DesignResult) -> Section | None:
         ("Reachable in the region", between(found.reachable_low, found.reachable_high)),
         ("Compatible with the target", f"{percent(found.compatible_share)} of the region, at 95 %"),
     ]  # fmt: skip
+    further = result.analysis.at_target
+    if further is not None:
+        facts += [
+            ("One further run there", f"± {number(further.one_run)} about the model, 95 %"),
+            ("95 % of all further runs", f"± {number(further.most_runs)} about the model, with a confidence of 95 %"),
+        ]
     if not found.target_standard_error:
         facts.append(("The target itself", "taken as exact; `--target-error` states its standard error"))
     blocks: list[Block] = [Facts(tuple(facts)), settings_table(result, optimum)]

@@ -339,6 +339,33 @@ def test_parts_whose_ranges_cannot_be_one_whole_are_refused(tmp_path, process):
     assert "--lattice: is not for lhs; it belongs to mixture" in refused(explorer(*many))
 
 
+def test_a_reduced_model_says_what_was_dropped_and_that_its_p_are_too_small(tmp_path):
+    full, reduced = analysed("sunflower_extract"), analysed("sunflower_extract", "--reduce", "p")
+    assert "reduced" not in full["analysis"]
+    found = reduced["analysis"]["reduced"]
+    surface = reduced["analysis"]["model"]["surface"]
+    left = [term for term, is_in in zip(surface["terms"], surface["included"], strict=True) if is_in][1:]
+    assert sorted(left + found["dropped"]) == sorted(surface["terms"][1:])
+    assert found["dropped"]
+    text = explorer("analyse", "sunflower_extract", "--reduce", "aicc", "--target", 24.68).stdout
+    assert "Reduced by AICc, one term after the other" in text
+    assert "take no account of this search and are too small" in text
+    out = tmp_path / "report"
+    assert explorer("analyse", "sunflower_extract", "--reduce", "aicc", "--out", out).exit_code == 0
+    assert "explorer analyse sunflower_extract --reduce aicc" in (out / "report.md").read_text(encoding="utf-8")
+
+
+def test_further_runs_at_the_target_have_their_own_intervals(tmp_path):
+    """Wider than that of the mean, by the scatter of a run; most runs wider than one."""
+    result = analysed("sunflower_extract", "--target", 24.68)["analysis"]
+    one, most = result["at_target"]["one_run"], result["at_target"]["most_runs"]
+    mean = (result["optimum"]["predicted_high"] - result["optimum"]["predicted_low"]) / 2
+    sigma = result["model"]["anova"]["sigma"]
+    assert mean < one < most
+    assert one > sigma
+    assert "One further run there: ± " in explorer("analyse", "sunflower_extract", "--target", 24.68).stdout
+
+
 def test_power_is_in_the_plain_data(tmp_path, process):
     result = explorer("design", "factorial", "--factors", process, "--replicates", 4, "--sigma", 2, "--effect", 3,
                       "--out", tmp_path / "runs.csv", "--json")  # fmt: skip
