@@ -117,7 +117,7 @@ def make_plan(order: DesignOrder, file: FactorsFile) -> RunPlan:
     finished: tuple[tuple[str, ...], ...] = ()
     if order.augment is not None:
         if "kept" in design.options and (replicates > 1 or order.blocks):
-            raise CommandError("--augment: the finished runs stay as they are; allowed: no --replicates, no --blocks")
+            raise CommandError("--augment: the finished runs stay as they are; allowed: --replicates 1, no --blocks")
         kept, finished = finished_runs(read_sheet(order.augment, file.factors), file.responses)
     # Blocks of whole replicates hold every row equally often, in any design.
     of_replicates = order.blocks if order.blocks is not None and replicates % order.blocks == 0 else None

@@ -84,7 +84,7 @@ def test_blocks_of_a_second_order_design_are_orthogonal_to_every_term(name, fact
     [(2, 2, 14, 1.414), (3, 3, 20, 1.633), (4, 3, 30, 2.0), (5, 2, 33, 2.0), (6, 3, 54, 2.366), (7, 9, 90, 2.828)],
 )
 def test_a_blocked_central_composite_has_the_alpha_of_its_closed_form(factors, blocks, runs, alpha):
-    """Box and Hunter 1957: alpha² = F (2 k + n_A)/(2 (F + n_F)); the sizes are those that Minitab's table lists too."""
+    """Box and Hunter 1957: alpha² = F (2 k + n_A)/(2 (F + n_F)); of 3 factors also Minitab's 20 runs."""
     design, block = central_composite_blocks(factors, blocks)
     assert len(design) == runs
     assert np.abs(design).max() == pytest.approx(alpha, abs=5e-4)

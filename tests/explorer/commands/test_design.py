@@ -236,7 +236,7 @@ def test_runs_are_added_to_a_finished_sheet_for_what_it_could_not_tell(tmp_path)
     assert len({tuple(line[4:7]) for line in lines}) == 8
     again = explorer(*order, "--out", tmp_path / "again.csv")
     assert "The 4 finished runs could not tell apart A, B, C, A*B, A*C, B*C; with the 4 added runs" in again.stdout
-    assert "no --replicates" in refused(explorer(*order, "--replicates", 2, "--out", tmp_path / "x.csv"))
+    assert "allowed: --replicates 1" in refused(explorer(*order, "--replicates", 2, "--out", tmp_path / "x.csv"))
     explorer("design", "factorial", "--factors", factors, "--out", tmp_path / "empty.csv")
     empty = ("design", "d-optimal", "--factors", factors, "--augment", tmp_path / "empty.csv")
     assert "no run with a result in response" in refused(explorer(*empty, "--out", tmp_path / "x.csv"))
